@@ -30,7 +30,7 @@ LARGEST_CONTACT_TURN = 0.3
 # Contact of the line with itself: places of `contact` (address, what is asked, whether it is near), and what is asked
 # (kernels.self_contact).
 ADDRESS, ASKED, NEAR = range(3)
-PREPARE, LIMIT, TOUCH, FINISH, REST = range(5)
+PREPARE, LIMIT, TOUCH, FINISH, REST, RADIUS = range(6)
 call_contact = caller(0.0)
 call_reel = caller(0)
 
@@ -155,8 +155,7 @@ def start_step(plane, space, task, line, sea, old, new, work, contact, contact_t
     rho, safe = task.rho, 1.0
     if contact[ADDRESS] != 0:
         safe = ask_contact(contact, contact_table, PREPARE)
-        if contact[NEAR] != 0:
-            rho = 0.0
+        rho = ask_contact(contact, contact_table, RADIUS)
     task = Task(task.what, task.dt, task.before, rho, task.cv, task.ca, task.turning, task.limits, task.cut)
     s = scheme(rho, task.before, task.dt)
     turn, where = begin_step(plane, space, line, sea, old, new, work.u, s, safe)

@@ -21,7 +21,7 @@ from hybrid.kernels.block_elimination import solve_again
 from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, NOW, PARITY, RHO, STEP_BEFORE, TRY_END
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.generalized_alpha import scheme
-from hybrid.kernels.newton import ASKED, FINISH, LIMIT, NEAR, PREPARE, REST, TOUCH
+from hybrid.kernels.newton import ASKED, FINISH, LIMIT, NEAR, PREPARE, RADIUS, REST, TOUCH
 from hybrid.kernels.references import reader
 from hybrid.kernels.report import FORCE_A, SELF_FRICTION_WORK
 from hybrid.kernels.self_contact_friction import (
@@ -34,6 +34,7 @@ from hybrid.kernels.self_contact_friction import (
 )
 from hybrid.kernels.self_contact_law import FORCE, WX, WY, P, Q, add_gradient, add_product
 from hybrid.kernels.self_contact_pairs import (
+    CALMS,
     ENERGY,
     FADED,
     FADES,
@@ -47,6 +48,8 @@ from hybrid.kernels.self_contact_pairs import (
     OVERFLOW,
     PART,
     POINTS,
+    QUIET,
+    RETURNS,
     ROLLS,
     SINCE,
     SLIP_WORK,
@@ -275,10 +278,19 @@ def keep_last(contact, now):
 
 
 @inner
+def radius(contact, clock, near):
+    """Spectral radius at infinity of a step: 0 near contact, and from there back to that of the run."""
+    if near:
+        return 0.0
+    part = (contact.numbers[QUIET] - CALMS) / RETURNS
+    return clock[RHO] * min(max(part, 0.0), 1.0)
+
+
+@inner
 def find_spins(line, contact, clock, near, old, new, u):
     """contact.x = shifts of nodes and spins of cells in the step that is tried."""
     x, dt = contact.x, clock[TRY_END] - clock[NOW]
-    cv = scheme(0.0 if near else clock[RHO], clock[STEP_BEFORE], dt).cv
+    cv = scheme(radius(contact, clock, near), clock[STEP_BEFORE], dt).cv
     for i in range(u.shape[0]):
         for k in range(3):
             x[i, k] = u[i, k]
@@ -389,7 +401,7 @@ def contact_task(table):
     """What is asked by `call[ASKED]` of the configuration old.r + work.u.
 
     PREPARE, LIMIT: the part of the prediction, of the correction work.x, that is safe; TOUCH: 1, or 0 where it fails;
-    FINISH, and REST, where no step is tried: the energy of contact, J.
+    RADIUS: the spectral radius of the step; FINISH, and REST, where no step is tried: the energy of contact, J.
     """
     job = read(table)
     line, ends, contact, work, phase = job.line, job.ends, job.contact, job.work, job.call[ASKED]
@@ -400,7 +412,11 @@ def contact_task(table):
     if phase == PREPARE:
         near = prepare(line, ends, contact, old, work.u, job.clock[NOW], job.clock[TRY_END] - job.clock[NOW])
         job.call[NEAR] = 1 if near else 0
+        if near:
+            numbers[QUIET] = 0.0
         return contact.numbers[PART]
+    if phase == RADIUS:
+        return radius(contact, job.clock, job.call[NEAR] != 0)
     if phase == LIMIT:
         speed = contact.numbers[SPEED]
         for i in range(work.x.shape[0]):
@@ -425,6 +441,7 @@ def contact_task(table):
     if numbers[HORIZON] > 0.0 and phase in (FINISH, REST):
         look_ahead(line, ends, contact, new.v if phase == FINISH else old.v)
     if phase == FINISH:
+        numbers[QUIET] += 1.0
         load_ends(line, ends, contact, work.report)
     if phase in (FINISH, REST):
         press(line, contact, job.touch, 2 if phase == FINISH else 0)

@@ -42,6 +42,9 @@ SAFE = 0.8  # part of the way to where the force is infinite that a correction m
 IMPACT = 25.0  # size of the law over m' v^2 in a collision at the speed v
 # The speed of the law falls by half while strands go so many diameters at it: a collision takes two or three.
 FADES = 10.0
+# Vibrations that contact leaves are damped for so many steps after it (rho_inf 0), then less and less over so many more:
+# of 400 random throws one or two in a hundred then gain energy; without, or with 4 and 8, those that gain are more.
+CALMS, RETURNS = 10.0, 20.0
 MOST_PRODUCTS = 60  # of GMRES
 PAIRS_OF_NODE = 8  # that are kept at most
 LEAST_KEEPS = 0.05  # diameters, of KEEPS
@@ -63,8 +66,9 @@ LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of wh
     KEEPS,  # m, for displacements up to which the pairs kept are all that there are; < 0: none are kept
     ROLLS,  # 1 where friction turns strands about themselves; 0: nothing holds their spin, and it is left out
     FADED,  # s, time up to which SPEED has faded; nan: it has not begun
-) = range(15)
-NUMBERS = 15
+    QUIET,  # steps since the last one that was near contact
+) = range(16)
+NUMBERS = 16
 WATCH, COLLECT = -1, -2  # beside LIMIT and TOUCH: how near the line is to itself; keep pairs for all of a step
 POINTS, NODES, OVERFLOW, GRIPS, FRESH, PAIRS, STALE = range(7)  # of `counts`; STALE: the tree is of other positions
 COUNTS = 7

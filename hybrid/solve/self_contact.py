@@ -21,6 +21,7 @@ from hybrid.kernels.self_contact_pairs import (
     HORIZON,
     NARROWEST,
     POINTS,
+    QUIET,
     ROLLS,
     SINCE,
     SPEED,
@@ -63,7 +64,7 @@ class SelfContact:
         contact.stiff[:] = np.maximum(STIFFNESS * bends / contact.width**2, TENSION * tension_scale * (bends == 0.0))
         contact.mass[:] = line.mass / pieces
         contact.numbers[WIDEST], contact.numbers[FRICTION] = contact.width.max(), friction
-        contact.numbers[SINCE], contact.numbers[FADED] = np.nan, np.nan
+        contact.numbers[SINCE], contact.numbers[FADED], contact.numbers[QUIET] = np.nan, np.nan, np.inf
         contact.numbers[NARROWEST] = contact.width.min()
         holds_twist = (
             line.spin.all()
@@ -133,7 +134,8 @@ class SelfContact:
         grips = contact.fresh[: counts[FRESH]] if latest else contact.grips[: counts[GRIPS]]
         stored = float(numbers[TRIED] if latest else numbers[STORED])
         return {
-            "speed": float(numbers[SPEED]), "faded": float(numbers[FADED]), "stored": stored, "grips": grips.copy(),
+            "speed": float(numbers[SPEED]), "faded": float(numbers[FADED]), "quiet": float(numbers[QUIET]),
+            "stored": stored, "grips": grips.copy(),
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -142,7 +144,7 @@ class SelfContact:
         if grips.ndim != 2 or grips.shape[1] != GRIP or not np.isfinite(grips).all():
             raise ValueError(f"self_contact/grips: expected rows of {GRIP} finite numbers")
         numbers[SPEED], numbers[STORED], numbers[SINCE] = saved["speed"], saved["stored"], np.nan
-        numbers[FADED] = saved.get("faded", np.nan)
+        numbers[FADED], numbers[QUIET] = saved.get("faded", np.nan), saved.get("quiet", np.inf)
         counts[GRIPS] = 0
         if self.contact.grips.size:
             grips = grips[: len(self.contact.grips)].copy()

@@ -12,6 +12,7 @@ from bits import Stopping, differences, went_on
 import hybrid
 from hybrid.kernels.books import FRICTION
 from hybrid.kernels.energies import observe
+from hybrid.kernels.newton import NEAR
 from hybrid.kernels.self_contact_pairs import ENERGY, POINTS, SPEED
 from hybrid.kernels.self_distance import LEAST_DISTANCE
 from hybrid.simulation.transient import Transient
@@ -36,11 +37,11 @@ def hairpin(angle: float, gap: float, chord: float = 0.025) -> np.ndarray:
     return np.column_stack([np.interp(at, s, r[:, k]) for k in range(3)])
 
 
-def flying(r: np.ndarray, step: float, duration: float, **contact: Any) -> hybrid.Simulation:
+def flying(r: np.ndarray, step: float, duration: float, width: float = WIDTH, **contact: Any) -> hybrid.Simulation:
     """A line with nodes at r, m, that nothing holds."""
     s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(r, axis=0), axis=1)))
     section = {
-        "length": float(s[-1]), "mass": 0.4, "diameter": WIDTH, "bending_stiffness": STIFF, "axial_stiffness": 2e5,
+        "length": float(s[-1]), "mass": 0.4, "diameter": width, "bending_stiffness": STIFF, "axial_stiffness": 2e5,
         "torsional_stiffness": 0.8 * STIFF,
     }  # fmt: skip
     return hybrid.Simulation(hybrid.validate_scene({
@@ -89,6 +90,27 @@ def test_a_throw(seed: int, steps: float) -> None:
     assert run.envelope.itself.itself.found[LEAST_DISTANCE] > 0.5 * WIDTH
     moved = (mass * run.state.v).sum(axis=0) - momentum
     assert np.abs(moved).max() < 1e-13 * mass.sum() * speed
+
+
+@pytest.mark.parametrize("seed", [17, 163])
+def test_free_flight_after_contact_gains_no_energy(seed: int) -> None:
+    """Throws of the bench that had 1.28 and 1.39 of their energy in free flight when only contact itself was damped."""
+    random = np.random.default_rng(seed)
+    width, speed = random.uniform(0.01, 0.04), float(np.exp(random.uniform(np.log(2.0), np.log(20.0))))
+    steps, friction = random.uniform(1.0, 10.0), random.uniform(0.05, 0.8)
+    r = hairpin(random.uniform(15.0, 90.0), 3.0 * width)
+    step, duration = steps * width / speed, 30.0 * width / speed * steps
+    simulation = flying(r, step, duration, width, friction=friction)
+    run = simulation._loop.run
+    run.state.v[:, 2] = -0.5 * speed * (1.0 + np.tanh(np.linspace(-1.0, 1.0, len(r)) / 0.15))
+    run.state.v[:] += 0.05 * speed * random.normal(size=3)
+    run._find_accelerations()
+    first, most, near = energy(run), 0.0, 0
+    while simulation.t < duration * (1.0 - 1e-9):
+        simulation.advance(min(simulation.t + step, duration))
+        most, near = max(most, energy(run)), near + int(run.run.contact.call[NEAR])
+    assert 0 < near < 20  # of 30
+    assert most < 1.001 * first
 
 
 def angular_momentum(run: Transient) -> np.ndarray:
