@@ -12,6 +12,7 @@ from problems import order
 
 import hybrid
 from hybrid.adapt.manager import DomainManager
+from hybrid.kernels import binding
 from hybrid.kernels import books as b
 from hybrid.kernels import zone_step as z
 from hybrid.kernels.binding import Table
@@ -167,6 +168,57 @@ def test_changes_in_arrays_made_once_are_those_of_new_arrays(friction: str, monk
     for name in ("position", "velocity", "tension", "curvature", "work/zones", "energy/bending", "envelope/tension_max",
                  "envelope/curvature_t_max", "envelope/displacement_max", "steps/iterations"):  # fmt: skip
         assert np.array_equal(once[name], anew[name], equal_nan=True), name
+
+
+SHORT = [
+    *TOUCHDOWN, "time.duration=4", "model={kind: adaptive, curvature_error: 0.05}", "output.every=0.1",
+    "ends.end.motion={heave: {amplitude: 2.0, period: 6.0}, ramp: 1.0}",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def short():
+    return hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", SHORT))
+
+
+def test_what_is_held_after_a_change_is_what_binding_would_give(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a change of cells the numbers of tables are put in their places; what Python then holds has these."""
+    held = []
+
+    def hold(self: Table, **values) -> None:
+        binding._here.known.clear()  # numbers of tuples that were bound before
+        anew = self.again(self.numbers.copy())
+        anew._bound.clear()
+        anew.bind(**values)
+        np.testing.assert_array_equal(self.numbers, anew.numbers, err_msg=", ".join(values))
+        held.append(set(values))
+        holds(self, **values)
+
+    holds = Table.hold
+    monkeypatch.setattr(Table, "hold", hold)
+    with hybrid.Simulation(hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*SHORT, "dimension=2"])) as simulation:
+        while simulation.t < 3.99:
+            simulation.step()  # after each Python has the cells of now
+    assert len(held) > 10 and {"line", "old", "new", "work", "books", "zones"} <= set().union(*held)
+
+
+def test_outputs_that_wait_are_not_lost_with_the_arrays_they_wait_in(
+    short: hybrid.Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where a push out of the plane dies, or an end is let go, cells change in other arrays from then on."""
+    refused = []
+
+    def still_fits(self: CellChanges) -> bool:
+        waits = bool(self._run.count[b.SAMPLES]) and self._run.t > 1.0
+        refused.extend([self] * waits)
+        return fits(self) and not waits
+
+    fits = CellChanges.still_fits
+    monkeypatch.setattr(CellChanges, "still_fits", still_fits)
+    found = hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", SHORT))
+    assert refused
+    for name in ("t", "position", "tension", "work/zones"):
+        np.testing.assert_array_equal(found[name], short[name], err_msg=name)
 
 
 def test_kinds_and_cells_keep_the_share() -> None:
