@@ -162,11 +162,11 @@ class Diagnostics:
             text = "this equilibrium holds within the plane alone: in space (`dimension: 3`) the cable would leave it"
             self.note(0.0, int(np.argmin(found.state.T)), "out of plane", text)
         if not found.judged:
-            why = (
-                "round-off of the bending of so short cells hides it"
-                if found.blurred
-                else "an end moment is not conservative"
-            )
+            why = "an end moment is not conservative"
+            if found.blurred:
+                why = "round-off of the bending of so short cells hides it"
+            if found.touch.size:
+                why = "the line touches itself; a damped motion with contact, without friction, led there"
             text = f"the stability of this equilibrium is not judged, because {why}"
             self.events.event(0.0, 0.0, self._model.length, "stability not judged", text)
 

@@ -18,6 +18,7 @@ from hybrid.model.equilibrium_hints import reasons_against
 from hybrid.model.plane import leaves_plane, planar, untwist
 from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.schema import Scene
+from hybrid.simulation.contact_equilibrium import with_contact
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium, solve_statics
 
@@ -28,7 +29,22 @@ MANY = 1000
 
 
 def equilibrium_of(scene: Scene, model: Model, t: float) -> Equilibrium:
-    """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size."""
+    """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size.
+
+    Of a line that touches itself, where contact is asked for, that to which a damped motion with contact leads.
+    """
+    try:
+        found = _without_contact(scene, model, t)
+    except ComputationError:
+        touching = with_contact(model, t, None)
+        if touching is None:
+            raise
+        return touching
+    return with_contact(model, t, found) or found
+
+
+def _without_contact(scene: Scene, model: Model, t: float) -> Equilibrium:
+    """Equilibrium of a line that nothing keeps from passing through itself."""
     try:
         found = _by_coarser(scene, model, t) or _statics(scene, model, t)
         _count_turns(scene, model, t, found.state)

@@ -48,7 +48,7 @@ class StaticCase:
         model, found, switching = self._equilibrium(resolution)
         observer = self.observer(model)
         texts = {"scene": scene_text(self.scene)}
-        if model.line.bits & SELF_CONTACT:
+        if model.line.bits & SELF_CONTACT and not found.touch.size:
             refuse_contact(self.scene, model, found)
         envelope = Envelope(self.scene, model, moves=False)
         with result_recorder(self.scene, model, observer, target, texts, found, envelope) as recorder:
@@ -134,8 +134,8 @@ def refuse_contact(scene: Scene, model: Model, found: Equilibrium) -> None:
     of_equilibrium(Envelope(scene, model, moves=False), scene, model, found, event)
     for s, other in met:
         given = f"true, where the equilibrium without contact touches itself at s = {s:.6g} m and s = {other:.6g} m"
-        expected = "a line that does not touch itself in equilibrium: statics compute no contact of a line with itself"
-        fix = "`hybrid run` with `damping` of the sections, from a start that is apart, until it rests; or leave it out"
+        expected = "a line of rods whose starting shape is apart, for a damped motion with contact to lead to rest"
+        fix = "`model: rod`, another `initial_guess`, or `hybrid run` from a start that is apart; or leave it out"
         raise SceneError([Complaint("contact.self", given, expected, fix)])
 
 
@@ -150,6 +150,8 @@ def _values(model: Model, found: Equilibrium, observer: Observer) -> dict[str, o
     if model.line.bits & SEABED:
         report[SEABED_ENERGY] = stored(model.line, sea, found.state.r)
     batch = batch_of_one(0.0, ends, found.state, report, np.zeros(len(POWERS)), sea)
+    if found.touch.size:
+        batch = batch._replace(touch=found.touch[None])
     shift = correction.corrector.shift(correction.corrector.sampled[:1], batch) if correction is not None else None
     return {name: x[0] for name, x in observer.values_of(observer.look(batch), shift=shift).items()}
 

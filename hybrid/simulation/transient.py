@@ -15,7 +15,7 @@ from hybrid.adapt.manager import Change
 from hybrid.errors import Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT
-from hybrid.kernels.report import SEABED_ENERGY
+from hybrid.kernels.report import SEABED_ENERGY, SELF_CONTACT_ENERGY
 from hybrid.kernels.state import State, Work, state_for
 from hybrid.kernels.step_law import FIRST
 from hybrid.model.build import Model
@@ -215,7 +215,9 @@ class Transient:
         """Accelerations and tensions that are consistent with positions, velocities and loads."""
         ends, run = self.model.ends, self.run
         acceleration = ends.acceleration(self.t, 1e-3 * self.resolution.step)
-        force = run.contact.force(self.state) if run.contact is not None else None
+        force, pressed = None, 0.0
+        if run.contact is not None:
+            force, pressed = run.contact.force(self.state), run.contact.energy()
         lengthening: np.ndarray | float = 0.0
         if self.payout is not None:
             self.payout.stand_still()
@@ -227,6 +229,7 @@ class Transient:
             raise StepFailed(Tried(taken.outcome, taken.iterations, taken.correction, taken.where), 0.0)
         run.move(ends.moves())
         run.clock[b.LAST_DT] = 0.0
+        self.stepper.work.report[SELF_CONTACT_ENERGY] = pressed
         self._restart_books()
         if new_leg:
             self.begin_leg()

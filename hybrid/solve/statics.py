@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import islice
 
 import numpy as np
@@ -54,6 +54,7 @@ class Equilibrium:
     with_friction: bool  # True when friction took part
     judged: bool  # False when its stability could not be judged (an end moment, or `blurred`)
     blurred: bool = False  # True when round-off of the bending of very short cells hides whether it buckles
+    touch: Floats = field(default_factory=lambda: np.zeros(0))  # (N+1,) N/m, where the line touches itself
 
     @property
     def summary(self) -> str:
@@ -241,19 +242,19 @@ def _relax(solver: _Solver, ends: Ends, state: State) -> State:
     return old
 
 
-def _nudged(solver: _Solver, state: State) -> State:
+def nudged(line: Line, state: State, length: float, time_scale: float) -> State:
     """A state given a small push in all three directions and a turn about itself, off an unstable equilibrium."""
     pushed = state.copy()
-    x = solver.line.s / solver.length
-    speed = PUSH * solver.length / np.sqrt(float(solver.line.mass.sum()) * solver.length / solver.scale)
+    x = line.s / length
+    speed = PUSH * length / time_scale
     for k in range(3):
         pushed.v[:, k] = speed * np.sin((k + 1) * np.pi * x + 0.3 * k)
-    if solver.line.bits & PLANAR:
-        pushed.v[:] -= np.outer(pushed.v @ solver.line.plane[2], solver.line.plane[2])
+    if line.bits & PLANAR:
+        pushed.v[:] -= np.outer(pushed.v @ line.plane[2], line.plane[2])
         return pushed
     d = pushed.e / np.linalg.norm(pushed.e, axis=1)[:, None]
     turned = np.cos(TURN) * pushed.a1 + np.sin(TURN) * np.cross(d, pushed.a1)
-    pushed.a1[:] = np.where(solver.line.spin[:, None] == 1, turned, pushed.a1)
+    pushed.a1[:] = np.where(line.spin[:, None] == 1, turned, pushed.a1)
     return pushed
 
 
@@ -300,7 +301,8 @@ def _attempts(
     yield settled
     for _, outcome, _, state in (settled, soft, first):
         if outcome == Outcome.UNSTABLE:
-            fallen = _relax(solver, ends, _nudged(solver, state))
+            time_scale = float(np.sqrt(float(solver.line.mass.sum()) * solver.length / solver.scale))
+            fallen = _relax(solver, ends, nudged(solver.line, state, solver.length, time_scale))
             yield "pushed off an unstable equilibrium", *solver.newton(solver.line, ends, fallen)
 
 

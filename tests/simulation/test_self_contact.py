@@ -271,7 +271,37 @@ def test_it_resumes_bit_for_bit_with_zones_that_move(tmp_path: Path, monkeypatch
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
-def test_an_equilibrium_that_touches_itself_is_refused() -> None:
+@pytest.fixture(scope="module")
+def resting() -> tuple[dict[str, Any], hybrid.Result]:
+    """A rod with three turns whose clamps are half its length apart: tables of its scene, and its equilibrium."""
+    tables = looped(contact={"self": True, "friction": 0.2}, time={"duration": 0.2, "step": 0.01})
+    del tables["ends"]["end"]["motion"]
+    tables["ends"]["end"]["position"] = [2.0, 0, 0]
+    return tables, hybrid.static(hybrid.validate_scene(tables))
+
+
+def test_an_equilibrium_in_contact(resting: tuple[dict[str, Any], hybrid.Result]) -> None:
+    """No turn of the clamps is lost, strands are apart, and what is left over shows that it is an equilibrium."""
+    result = resting[1]
+    assert result.status == "complete" and "damped motion with contact" in result.message
+    assert {"line touches itself", "stability not judged"} <= {event.kind for event in result.events}
+    assert result["turns/link"][0] == pytest.approx(3.0, abs=1e-9)
+    assert result["turns/writhe"][0] > 1.5
+    assert 0.94 * WIDTH < float(result["self_distance/distance"]) < 1.05 * WIDTH
+    assert result["energy/self_contact"][0] > 0.0 and result["self_contact"].max() > 0.0
+    assert float(result.message.split("residual force ")[1].split()[0]) < 1e-6  # N, of a tension of 10
+
+
+def test_a_run_stays_where_it_touches_itself_at_rest(resting: tuple[dict[str, Any], hybrid.Result]) -> None:
+    tables, static = resting
+    result = hybrid.run(hybrid.validate_scene(tables))
+    assert np.abs(result["position"] - static["position"]).max() < 1e-9
+    assert result["tension"] == pytest.approx(np.broadcast_to(static["tension"], result["tension"].shape), abs=1e-5)
+    assert result["energy/self_contact"] == pytest.approx(float(static["energy/self_contact"][0]), rel=1e-6)
+    assert "unstable" not in {event.kind for event in result.events}
+
+
+def test_an_equilibrium_that_touches_itself_from_a_start_within_itself_is_refused() -> None:
     """A weight pulls the legs of a line straight, 0.95 diameters apart."""
     ends = {
         "start": {"kind": "pinned", "position": [0, 0, 0]},

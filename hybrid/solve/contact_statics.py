@@ -1,0 +1,211 @@
+"""Equilibrium of a line that touches itself: a damped motion with contact until it rests, then Newton with contact.
+
+Statics find an equilibrium from any shape, and Newton's path there may pass the line through itself.  A motion from a
+start that is apart does not, so its rest has the loops and crossings that the start and the ends imply.  Friction,
+between strands and on the bed, is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from hybrid.errors import ComputationError, Outcome
+from hybrid.kernels import entry
+from hybrid.kernels.accept import LARGEST_TWIST
+from hybrid.kernels.binding import Table
+from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, NOW, PARITY, STEP_BEFORE, TRY_END
+from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance, workspace_of
+from hybrid.kernels.forces import FRICTION, MASS_DAMPING, ROTARY, SELF_FRICTION, WAVES
+from hybrid.kernels.newton import EQUILIBRIUM, NEAR, STEP, Task
+from hybrid.kernels.report import FORCE_A, SELF_CONTACT_ENERGY, TWIST
+from hybrid.kernels.run import blank_job, in_space
+from hybrid.kernels.self_contact_pairs import KEEPS, SPEED
+from hybrid.kernels.state import Ends, Line, Sea, State
+from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.stability import Stability
+from hybrid.solve.statics import BALANCED, BALANCING, CALM, GYRATION, MOST_ITERATIONS, REACH, Equilibrium, nudged
+from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
+
+# Steps of the damped motion, at most; the largest, in time scales: what moves by more meets itself at full speed.
+STEPS, LARGEST = 20_000, 0.25
+# Speed, in lengths per time scale, at which all is stopped (a start that a bed throws up, a strong torque), and the
+# most that a cell spins in a step, rad: what is faster could twist from cell to cell by half a turn unseen.
+FASTEST, MOST_SPIN = 10.0, 1.0
+# Newton with contact is tried where the motion has calmed to these parts of CALM, one after the other.
+CALMER = (1.0, 1e-1, 1e-2, 1e-3)
+ROAD = "damped motion with contact to rest, then Newton"
+
+
+@dataclass
+class _Job:
+    """Steps and equilibria of a line with contact, from states[0] and states[1] in turn."""
+
+    line: Line
+    sea: Sea
+    ends: Ends
+    contact: SelfContact
+    states: tuple[State, State]
+
+    def __post_init__(self) -> None:
+        self.work = workspace_of(self.line, keep=True)
+        self.clock, self.count = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+        self.touch = np.zeros((3, self.line.s.size))
+        self.table = Table(blank_job())
+        self.attach()
+
+    def attach(self) -> None:
+        """Contact is that of this job from now on."""
+        contact_table = self.contact.attach(
+            self.line, self.ends, self.states, self.work, self.clock, self.count, self.touch
+        )
+        self.table.bind(
+            line=self.line, sea=self.sea, ends=self.ends, was=NO_PUSH, now=NO_PUSH, work=self.work,
+            contact=self.contact.call, contact_table=contact_table,
+        )  # fmt: skip
+
+    @property
+    def state(self) -> State:
+        """The state now."""
+        return self.states[self.count[PARITY]]
+
+    def step(self, dt: float, before: float, limits: Limits) -> tuple[int, int, float]:
+        """One step with rho_inf 0: outcome, iterations, largest way of a node, m.  The state is that after it if OK."""
+        clock, count = self.clock, self.count
+        old, new = self.states[count[PARITY]], self.states[1 - count[PARITY]]
+        clock[TRY_END], clock[STEP_BEFORE] = clock[NOW] + dt, before
+        self.table.bind(task=Task(STEP, dt, before, 0.0, limits=limits), old=old, new=new)
+        outcome, iterations, _, _ = in_space(self.table.numbers)
+        twisted = self.work.report[TWIST] > LARGEST_TWIST or dt * float(np.abs(new.w).max()) > MOST_SPIN
+        if outcome == Outcome.OK and twisted:
+            outcome = Outcome.TWISTED_TOO_FAR
+        if outcome != Outcome.OK:
+            return outcome, iterations, 0.0
+        clock[NOW], count[PARITY] = clock[TRY_END], 1 - count[PARITY]
+        return outcome, iterations, float(np.abs(new.r - old.r).max())
+
+    def rest(self) -> None:
+        """Stop all motion."""
+        for still in (self.state.v, self.state.a, self.state.vd, self.state.w, self.state.wa, self.state.wd):
+            still[:] = 0.0
+
+    def equilibrium(self, anchor: float, limits: Limits) -> tuple[Outcome, int]:
+        """Newton from the state, which becomes what was found; anchor: 1/s2, of springs of that times the mass."""
+        numbers = self.contact.contact.numbers
+        numbers[SPEED], self.contact.call[NEAR] = 0.0, 0
+        numbers[KEEPS] = -1.0  # no pairs are kept of a step
+        self.work.u[:] = 0.0
+        self.table.bind(task=Task(EQUILIBRIUM, ca=anchor, limits=limits), old=self.state, new=self.state)
+        outcome, iterations, _, _ = in_space(self.table.numbers)
+        self.state.r[:] += self.work.u
+        self.state.vd[:], self.state.wd[:] = 0.0, 0.0
+        return Outcome(outcome), iterations
+
+    def residual(self, anchor: float) -> float:
+        """Largest force, N, that is left over at a node of the state, contact included; work.report is its report."""
+        work, state = self.work, self.state
+        work.u[:] = 0.0
+        rows = block_rows(self.line)
+        bad = entry.assembly(self.line, self.sea, self.ends, state, 0.0, anchor, work._replace(rows=rows))
+        if bad >= 0:
+            return float("inf")
+        force = self.contact.force(state)
+        left = out_of_balance(self.line, rows) + force
+        for k in np.flatnonzero(self.ends.held):
+            left[-k] = 0.0  # k is 0 or 1: the first or the last node
+            work.report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3] += force[-k]
+        work.report[SELF_CONTACT_ENERGY] = self.contact.energy()
+        return float(np.abs(left).max())
+
+
+def damped(line: Line, length: float, time_scale: float) -> Line:
+    """The line with damping by mass, and inertia of spin as statics.relax lends it."""
+    gyration = line.spin * 0.5 * (line.mass[:-1] + line.mass[1:]) * (GYRATION * length) ** 2
+    return line._replace(
+        damp=np.nan_to_num(line.damp) + 2.0 * line.mass / time_scale,
+        polar=np.nan_to_num(line.polar) + gyration,
+        rotary=np.nan_to_num(line.rotary),
+        bits=line.bits | MASS_DAMPING | ROTARY,
+    )
+
+
+def _calming(job: _Job, time_scale: float, length: float, limits: Limits) -> Iterator[int]:
+    """The damped motion: iterations so far, each time that it has calmed by another order, and at its end."""
+    dt, before, calm, total, orders = 1e-3 * time_scale, 0.0, 0, 0, list(CALMER)
+    for _ in range(STEPS):
+        outcome, iterations, moved = job.step(dt, before, limits)
+        total += iterations
+        if outcome != Outcome.OK:
+            dt *= 0.5
+            if outcome == Outcome.TWISTED_TOO_FAR and job.work.report[TWIST] > LARGEST_TWIST:
+                job.rest()
+            if dt < 1e-9 * time_scale:
+                break
+            continue
+        before = dt
+        if float(np.abs(job.state.v).max()) > FASTEST * length / time_scale:
+            job.rest()
+            calm = 0
+        if iterations <= 5:
+            dt = min(1.5 * dt, LARGEST * time_scale)
+        calm = calm + 1 if moved < orders[0] * CALM * length * before / time_scale else 0
+        if calm >= 3:
+            yield total
+            orders.pop(0)
+            calm = 0
+            if not orders:
+                return
+    yield total
+
+
+def settled(
+    line: Line, sea: Sea, ends: Ends, start: State, length: float, scale: float, contact: SelfContact,
+    keeps_turns: Callable[[State], str],
+) -> Equilibrium:  # fmt: skip
+    """Equilibrium of a line of rods with contact, from a start that is at rest and apart.
+
+    length: m; scale: the tension scale, N; contact: of this line, without friction; keeps_turns: what turns a state has
+    lost, empty: none.  ComputationError: it does not come to rest, or has lost turns.
+    """
+    smooth = line._replace(bits=line.bits & ~(WAVES | FRICTION | SELF_FRICTION))
+    time_scale = float(np.sqrt(line.mass.sum() * length / scale))
+    first = nudged(smooth, start, length, time_scale)
+    moving = _Job(damped(smooth, length, time_scale), sea, ends, contact, (first, first.copy()))
+    anchor = Stability(smooth, sea, length, scale).anchor
+    limits, total, path = Limits(REACH * length, scale, MOST_OF_STEP), 0, []
+    for iterations in _calming(moving, time_scale, length, limits):
+        rest = moving.state.copy()
+        found, kept = _Job(smooth, sea, ends, contact, (rest, rest.copy())), contact.contact.numbers.copy()
+        found.rest()
+        outcome, residual, lost = Outcome.NOT_CONVERGED, np.inf, keeps_turns(rest)
+        if lost:  # and will not come back
+            raise ComputationError(Outcome.TURNS_LOST, None, None, lost)
+        for _ in range(BALANCING):
+            outcome, more = found.equilibrium(anchor, Limits(REACH * length, scale, MOST_ITERATIONS))
+            total += more
+            if outcome != Outcome.OK:
+                break
+            residual = found.residual(anchor)
+            if residual <= BALANCED * (float(np.abs(rest.T).max()) + scale):
+                lost = keeps_turns(rest)
+                if lost:
+                    outcome = Outcome.TURNS_LOST
+                    break
+                path.append(f"{ROAD}: found ({total + iterations} iterations in all)")
+                touch = found.touch[0].copy()
+                return Equilibrium(
+                    rest, tuple(path), total + iterations, residual, found.work.report.copy(), -1, False, False,
+                    touch=touch,
+                )  # fmt: skip
+            outcome = Outcome.NOT_CONVERGED
+        path.append(f"{ROAD}: {lost or outcome.cause} ({total + iterations} iterations in all)")
+        contact.contact.numbers[:] = kept
+        moving.attach()
+    raise ComputationError(outcome, None, None, "\n              ".join(path))
+
+
+def contact_energy(line: Line, sea: Sea, ends: Ends, state: State, contact: SelfContact) -> float:
+    """Energy, J, of contact of a state at rest; 0: nothing touches; infinite: parts are in each other."""
+    return _Job(line, sea, ends, contact, (state, state.copy())).contact.energy()
