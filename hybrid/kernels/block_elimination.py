@@ -33,6 +33,8 @@ WIDTH = 24  # columns of W
 SPAN = 9  # columns of X_i
 ROW = SIZE * SPAN  # numbers of X_i
 KEPT = 73  # numbers kept of a block, for another right-hand side
+# A straight inextensible line that is held at both ends has no compliance: a pivot, as a part of its row, that is none.
+NO_PIVOT = 1e-12
 
 
 @inner
@@ -386,13 +388,20 @@ def solve5(X, k, W, x, i):
         x[i, c] = y / W[7 * c]
 
 
-@kernel
-def solve_again(X, W, b, x):
-    """Solve with another right-hand side b (N+1, 5) and the factors that the last march kept behind the X_i.
+@inner
+def solve_last(X, k, x, n):
+    """The last block of a line whose end is joined to a point, held there: x_n from its right-hand side in x_n."""
+    a, rest = X[k + 37] if X[k + 63] > 0.0 else X[k + 12], 0.0
+    for j in range(1, 4):
+        rest = max(rest, abs(X[k + 37 + j] if X[k + 63] > 0.0 else X[k + 12 + j]))
+    x[n, 0] = x[n, 0] / a if abs(a) > NO_PIVOT * rest else 0.0
+    for j in range(1, SIZE):
+        x[n, j] = 0.0
 
-    b: length of the cell before (m), balance of the node (N), spin of the cell after (N m), as the march assembles
-    them; of a held node nothing, because it stays.  x as in `substitute`; False if it is not finite.
-    """
+
+@inner
+def solve_with(X, W, b, x, joined):
+    """As `solve_again`; joined: the end is joined to a point (kernels.joined_lines), and is held there."""
     n = x.shape[0] - 1
     for i in range(n + 1):
         k = (n + 1) * ROW + i * KEPT
@@ -414,7 +423,8 @@ def solve_again(X, W, b, x):
                     for j in range(SIZE):
                         y -= X[k + 12 + SIZE * r + j] * x[i - 1, j]
                     x[i, r] = y
-            solve5(X, k + 37, W, x, i)
+            if not (joined and i == n):
+                solve5(X, k + 37, W, x, i)
         else:
             b0, b1, b2, b3 = size * b[i, 0], b[i, 1], b[i, 2], b[i, 3]
             if i >= 1:
@@ -423,13 +433,18 @@ def solve_again(X, W, b, x):
                 b1 -= X[k] * y0 + X[k + 1] * y1 + X[k + 2] * y2
                 b2 -= X[k + 3] * y0 + X[k + 4] * y1 + X[k + 5] * y2
                 b3 -= X[k + 6] * y0 + X[k + 7] * y1 + X[k + 8] * y2
-            x[i, 0], x[i, 1], x[i, 2], x[i, 3] = solve4(
-                (X[k + 12], X[k + 13], X[k + 14], X[k + 15], b0),
-                (X[k + 16], X[k + 17], X[k + 18], X[k + 19], b1),
-                (X[k + 20], X[k + 21], X[k + 22], X[k + 23], b2),
-                (X[k + 24], X[k + 25], X[k + 26], X[k + 27], b3),
-            )
+            if joined and i == n:
+                x[n, 0] = b0
+            else:
+                x[i, 0], x[i, 1], x[i, 2], x[i, 3] = solve4(
+                    (X[k + 12], X[k + 13], X[k + 14], X[k + 15], b0),
+                    (X[k + 16], X[k + 17], X[k + 18], X[k + 19], b1),
+                    (X[k + 20], X[k + 21], X[k + 22], X[k + 23], b2),
+                    (X[k + 24], X[k + 25], X[k + 26], X[k + 27], b3),
+                )
             x[i, 4] = 0.0
+    if joined:
+        solve_last(X, (n + 1) * ROW + n * KEPT, x, n)
     total = 0.0
     for i in range(n - 1, -1, -1):
         p = i * ROW
@@ -451,3 +466,13 @@ def solve_again(X, W, b, x):
                 x[i, j] = y
                 total += abs(y)
     return total < math.inf
+
+
+@kernel
+def solve_again(X, W, b, x):
+    """Solve with another right-hand side b (N+1, 5) and the factors that the last march kept behind the X_i.
+
+    b: length of the cell before (m), balance of the node (N), spin of the cell after (N m), as the march assembles
+    them; of a held node nothing, because it stays.  x as in `substitute`; False if it is not finite.
+    """
+    return solve_with(X, W, b, x, False)

@@ -37,6 +37,7 @@ from hybrid.kernels.joined_lines import (
 from hybrid.kernels.report import FORCE_A, MOMENT_A
 from hybrid.kernels.rotations import cross, hat, mat_mat
 from hybrid.kernels.run import read
+from hybrid.kernels.zone_torque import torsional_stiffness
 
 START, END = 0, 1
 # Columns of S: the tension, shift and turn of the start, of the end, and the right-hand side; its rows: as the first.
@@ -211,6 +212,7 @@ def spread(l, joints, seats, job, arms, points, tensions, row, S, G, A, m):
         rows1, size1 = follow(end, points, arms[l, END], turns(seats, l, END), G[END])
     rows, size = (rows0, rows1), (size0, size1)
     at = (first_unknown(max(start, 0), tensions, points), first_unknown(max(end, 0), tensions, points))
+    twist_ends(l, seats, job, at, A)
     if row >= 0:
         add_row(S, TENSION, 1.0, A, row, m, row, at, rows, size, G)
     for k in range(2):
@@ -236,6 +238,25 @@ def spread(l, joints, seats, job, arms, points, tensions, row, S, G, A, m):
                 for i in range(3):
                     for j in range(3):
                         A[at[k] + 3 + i, at[k] + 3 + j] += H[3 * i + j]
+
+
+@inner
+def twist_ends(l, seats, job, at, A):
+    """By how much a turn of one end of a line changes the torque through its catenary zones on both; at: as of `spread`.
+
+    Lines are eliminated with that torque as it is, and corrected for its change afterwards (kernels.zone_torque).
+    """
+    k = torsional_stiffness(job.line)
+    if not k > 0.0:
+        return
+    frame = job.ends.frame
+    for m in range(2):
+        for o in range(2):
+            if turns(seats, l, m) and turns(seats, l, o):
+                part = -k if m == o else k
+                for i in range(3):
+                    for j in range(3):
+                        A[at[m] + 3 + i, at[o] + 3 + j] += part * frame[m, 2 + 3 * i] * frame[o, 2 + 3 * j]
 
 
 @inner

@@ -31,6 +31,7 @@ from hybrid.kernels.joined_lines import solve_dense
 from hybrid.kernels.junctions import END, START, add_pull, assemble_junctions, correct_all, place_ends
 from hybrid.kernels.newton import (
     ASSEMBLY,
+    CORRECT,
     CORRECTION,
     EQUILIBRIUM,
     LARGEST_TURN,
@@ -46,6 +47,7 @@ from hybrid.kernels.newton import (
     Task,
     follow_law,
     has_converged,
+    pass_torque,
     round_off_tension,
 )
 from hybrid.kernels.node_forces import get3
@@ -113,6 +115,26 @@ def size_up(tables, ca):
         if not mine <= size:
             size = mine
     return shift, turn, size, worst, where
+
+
+@inner
+def correct_torques(tables, cv):
+    """Corrections of lines with the torque through their catenary zones, which changes with them; their ends stay where
+
+    the correction has put them.
+    """
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        pass_torque(1, job.line, job.ends, job.new, job.work, CORRECT, cv)
+
+
+@inner
+def forget_torques(tables):
+    """How lines answer to torques is found anew in every step."""
+    for l in range(tables.shape[0]):
+        known = read(tables[l]).work.torsion.known
+        if known.shape[0] > 0:
+            known[0] = -1.0
 
 
 @inner
@@ -255,6 +277,7 @@ def solve_system(
             return TURNED_TOO_FAR, 0, turn, line, cell
     else:
         start_here(old, work)
+    forget_torques(tables)
     rubs = 0
     for l in range(count):
         numbers[l, TASK_CV], numbers[l, TASK_CA], numbers[l, TASK_DT] = s.cv, s.ca, task.dt
@@ -290,6 +313,7 @@ def solve_system(
             bad = read(tables[line])
             outcome, where = NOT_FINITE, first_bad(bad.work.x, bad.new.e)
             break
+        correct_torques(tables, s.cv)
         if task.what == CORRECTION:
             outcome = OK
             break

@@ -21,8 +21,8 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.assembly import get9
-from hybrid.kernels.block_elimination import SIZE, solve_again
+from hybrid.kernels.assembly import JOINED, get9
+from hybrid.kernels.block_elimination import SIZE, solve_with
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import STIFFNESS_DAMPING
@@ -232,8 +232,11 @@ def report_end_moments(line, ends, state, report):
 
 
 @inner
-def solve_columns(line, work):
-    """How the line answers to each torque, and to a torque on each cell that is held meanwhile."""
+def solve_columns(line, work, joined):
+    """How the line answers to each torque, and to a torque on each cell that is held meanwhile; joined: its end is, to
+
+    a point (kernels.joined_lines), and is held there.
+    """
     torsion, n = work.torsion, line.h.shape[0]
     zones = line.torsion.shape[0]
     good = True
@@ -259,7 +262,7 @@ def solve_columns(line, work):
         else:
             cell = torsion.floating[j - zones]
             right[cell, 4] = torsion.passed[HOLD, cell]
-        good = solve_again(work.X, work.W, right, torsion.columns[j]) and good
+        good = solve_with(work.X, work.W, right, torsion.columns[j], joined) and good
     return good
 
 
@@ -315,14 +318,14 @@ def solve_dense(A):
 
 
 @inner
-def correct(line, state, work, cv):
+def correct(line, state, work, cv, joined):
     """Correct the march's solution work.x for the torques that change with it."""
     torsion, x = work.torsion, work.x
     zones, m = line.torsion.shape[0], torsion.columns.shape[0]
     known = torsion.known
     if known[2] > 0.0:
         known[0], known[1] = cv, 0.0
-        if not solve_columns(line, work):
+        if not solve_columns(line, work, joined):
             x[0, 1] = math.nan
             return
         for j in range(m):
@@ -368,12 +371,26 @@ def pass_torque(line, ends, state, work, part, cv):
         work.report[STIFFNESS_DAMPING_POWER] += finish(line, ends, state, work.torsion)
         report_end_moments(line, ends, state, work.report)
     elif felt and part == CORRECT:
-        correct(line, state, work, cv)
+        correct(line, state, work, cv, ends.held[1] == JOINED)
     elif felt:
         known = work.torsion.known
         known[2] = 1.0 if cv == 0.0 or known[0] != cv or known[1] >= SERVES else 0.0
         find_torques(line, ends, state, work)
     return 0
+
+
+@inner
+def torsional_stiffness(line):
+    """Torque by which a line resists a turn of one end against the other, N m/rad; 0 of one without such zones."""
+    soft = 0.0
+    for z in range(line.torsion.shape[0]):
+        soft += line.torsion[z, COMPLIANCE]
+    if not soft > 0.0:
+        return 0.0
+    for i in range(line.kb.shape[0]):
+        if line.element[i] and line.kb[i, 2] > 0.0:
+            soft += 1.0 / line.kb[i, 2]
+    return 1.0 / soft
 
 
 def floating_rods(line: Line, held: np.ndarray) -> np.ndarray:

@@ -85,10 +85,11 @@ def connection_findings(system: System) -> Iterator[Finding]:
                 yield from _clamp_findings(system, name, key, held)
         model = line.chosen_model
         both = [system.clamp(name, key) for key in ("start", "end")]
-        if isinstance(model, ZonesModel) and all(x is not None and not x.swivel for x in both):
-            expected = "a swivel at one end, because torque through catenary zones of several lines is not computed"
-            fix = f"lines.{name}.connections.end.swivel: true, or model: rod"
-            yield Finding(("lines", name, "model"), expected, fix)
+        twisted = isinstance(model, ZonesModel) and all(x is not None and not x.swivel for x in both)
+        if twisted and line.break_at is not None:
+            expected = "nothing, because a torque passes through the catenary zones of this line"
+            fix = f"leave it out, or lines.{name}.connections.end.swivel: true, or model: rod"
+            yield Finding(("lines", name, "break_at"), expected, fix)
     for name, point in system.points.items():
         if isinstance(point, FixedPoint) and point.motion is not None and not system.clamped_at(name):
             for turn in (x for x in point.motion.harmonics() if x in TURNS):

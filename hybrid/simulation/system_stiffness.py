@@ -70,6 +70,7 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     system = _system(scene)
     kind, name = _target(system, at)
     model = build_system(system)
+    _refuse_torques(model)
     found = equilibrium_of_system(system, model, np.inf)
     solver, state, first = found.solver, found.state, 0
     size = 6 if kind == "body" else 3
@@ -100,6 +101,15 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     if matrix is None:
         raise ComputationError(Outcome.SINGULAR, None, None, f"nothing gives way at {at}: its lines do not stretch")
     return Stiffness(at, np.asarray(matrix, float), np.asarray(matrix - own, float), position, rotation)
+
+
+def _refuse_torques(model: SystemModel) -> None:
+    """SceneError: the factors know the torque through catenary zones of some line only roughly."""
+    for name, line in zip(model.names, model.models, strict=True):
+        if line.line.torsion.size:
+            fix = f"lines.{name}: model: rod, or a swivel at one end; --offsets takes such lines"
+            expected = "lines without a torque through catenary zones, which the factors know only roughly"
+            raise SceneError([Complaint(f"lines.{name}.model", "zones that a torque passes through", expected, fix)])
 
 
 def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], heading: float = 0.0) -> Offsets:

@@ -22,7 +22,7 @@ from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
 from hybrid.kernels.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, STATE, VD, WA, WD, WORK, A, U, V, W, X
 from hybrid.kernels.books import Books
 from hybrid.kernels.carried_frames import ANSWER, SEAT, TURNS
-from hybrid.kernels.entry import NO_PUSH, workspace
+from hybrid.kernels.entry import NO_PUSH, workspace_of
 from hybrid.kernels.forces import FRICTION, WAVES
 from hybrid.kernels.joined_lines import COLUMNS, FUNCTIONAL
 from hybrid.kernels.junctions import HANDED
@@ -107,7 +107,10 @@ def _room(x: JoinedLine) -> Work:
     cells, joints = x.line.h.size, x.joints
     kept = (cells + 1) * KEPT if _carries(x) else KEPT if joints[1] >= 0 else 0
     rows = np.zeros((1 if joints[0] >= 0 else 0, SIZE * WIDTH))
-    return workspace(cells)._replace(X=np.zeros((cells + 1) * ROW + kept), rows=rows)
+    if x.line.torsion.size:  # a torque takes all factors, and those are kept in every march where they serve again
+        kept = (cells + 1) * KEPT
+    work = workspace_of(x.line, keep=_carries(x) or joints[1] >= 0)
+    return work._replace(X=np.zeros((cells + 1) * ROW + kept), rows=rows)
 
 
 class SystemSolver:

@@ -1,0 +1,159 @@
+"""Torque through catenary zones of lines in a scene of several: as of one cable, through points, on bodies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import SceneError
+from hybrid.kernels.newton import TOLERANCE
+
+LENGTH, CELLS, GJ = 40.0, 40, 150.0
+SECTION = {
+    "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 60.0, "torsional_stiffness": GJ,
+    "drag": {"normal": 1.2}, "added_mass": {"normal": 1},
+}  # fmt: skip
+A, B = [0.0, 0.0, 0.0], [34.0, 4.0, -6.0]
+START = {"tangent": [1, 0, -0.4], "normal": [0, 0, 1]}
+END = {"tangent": [1, 0.2, 0.3], "normal": [0, 1.0, 0.3]}
+ZONES = [("rod", 6), ("catenary", 10), ("rod", 8), ("catenary", 10), ("rod", 6)]
+MOTION = {"sway": {"amplitude": 0.5, "period": 3.0}, "roll": {"amplitude": 30, "period": 3.0}, "ramp": 2.0}
+COMMON = {
+    "environment": {"fluid": {"density": 1025, "current": [0.3, 0.4, 0]}}, "time": {"duration": 3.0, "step": 0.1},
+}  # fmt: skip
+
+
+def zoned(zones: Any) -> dict[str, Any]:
+    return {"kind": "zones", "zones": [{kind: length, "cells": length} for kind, length in zones]}
+
+
+def one(**more: Any) -> dict[str, Any]:
+    ends = {
+        "start": {"kind": "clamped", "position": A, **START},
+        "end": {"kind": "clamped", "position": B, "motion": MOTION, **END},
+    }
+    cable = {"sections": [SECTION | {"length": LENGTH}]}
+    scene = {
+        "cable": cable,
+        "ends": ends,
+        "initial": "equilibrium",
+        "model": zoned(ZONES),
+        "output": {"points": CELLS + 1},
+    }
+    return COMMON | scene | more
+
+
+def line(start: str, end: str, zones: Any, connections: dict[str, Any]) -> dict[str, Any]:
+    length = sum(x for _, x in zones)
+    model = zoned(zones) if len(zones) > 1 else "rod"
+    mesh = {} if len(zones) > 1 else {"mesh": {"cells": length}}
+    return {"start": start, "end": end, "connections": connections, "sections": [SECTION | {"length": float(length)}],
+            "model": model, **mesh}  # fmt: skip
+
+
+def several(lines: dict[str, Any], **points: Any) -> dict[str, Any]:
+    points = {"a": {"position": A}, "b": {"position": B, "motion": MOTION}} | points
+    return COMMON | {"points": points, "lines": lines, "output": {"points": CELLS + 1}}
+
+
+CUT = {"cut": {"initial_guess": [16.0, 2.0, -8.0]}}
+BEFORE, AFTER = [*ZONES[:2], ("rod", 4)], [("rod", 4), *ZONES[3:]]
+PIECES = {
+    "whole, the other way": [(ZONES, True)],
+    "zones on both sides of a point": [(BEFORE, False), (AFTER, False)],
+    "that both run to": [(BEFORE, False), (AFTER, True)],
+}
+
+
+def turned(held: Any) -> Any:
+    return held | {"tangent": [-x for x in held["tangent"]]} if isinstance(held, dict) else held
+
+
+def in_pieces(name: str) -> dict[str, Any]:
+    lines = {}
+    for k, (zones, flipped) in enumerate(PIECES[name]):
+        first, last = k == 0, k == len(PIECES[name]) - 1
+        ends = ["a" if first else "cut", "b" if last else "cut"]
+        held: list[Any] = [START if first else "clamped", END if last else "clamped"]
+        if flipped:
+            ends, held, zones = ends[::-1], [turned(x) for x in held[::-1]], zones[::-1]
+        lines[f"line{k}"] = line(ends[0], ends[1], zones, {"start": held[0], "end": held[1]})
+    return several(lines, **(CUT if len(lines) > 1 else {}))
+
+
+@pytest.fixture(scope="module")
+def whole() -> hybrid.Result:
+    return hybrid.run(one())
+
+
+@pytest.mark.parametrize("name", PIECES)
+def test_torque_passes_as_in_one_cable(whole: hybrid.Result, name: str) -> None:
+    """At rest and in motion, in one line, or in two that are clamped to a free point, either way round.
+
+    Where it is cut two elements of half a cell differ from one by the product of bend and twist of a cell.
+    """
+    found = hybrid.run(in_pieces(name))
+    assert np.abs(whole["torque"][0]).min() > 1.0 and np.ptp(whole["torque"][:, 20]) > 0.3
+    if len(PIECES[name]) == 1:
+        apart = np.abs(found.lines["line0"]["position"][:, ::-1] - whole["position"])
+        assert apart[0].max() < 1e-9 * LENGTH and apart.max() < 20 * TOLERANCE * LENGTH
+    else:
+        assert np.abs(found["points/cut/position"] - whole["position"][:, 20]).max() < 1e-7 * LENGTH
+    for moment, key in ((found["points/a/moment"], "moment_start"), (found["points/b/moment"], "moment_end")):
+        assert np.abs(moment + whole[key]).max() < 1e-4 * np.abs(whole[key]).max()
+
+
+def on_a_body(moment: Any) -> dict[str, Any]:
+    """A body between two taut lines along x without weight, turned by a moment about them."""
+    held = {"start": {"tangent": [1, 0, 0], "normal": [0, 0, 1]}, "end": {"tangent": [1, 0, 0], "normal": [0, 0, 1]}}
+    zones = [("rod", 4), ("catenary", 10), ("rod", 6)]
+    points = {
+        "a": {"position": [0, 0, 0]}, "b": {"position": [60.06, 0, 0]},
+        "left": {"body": "body", "place": [-10, 0, 0]}, "right": {"body": "body", "place": [10, 0, 0]},
+    }  # fmt: skip
+    lines = {"one": line("a", "left", zones, held), "two": line("right", "b", zones[::-1], held)}
+    for each in lines.values():
+        each["sections"] = [{key: x for key, x in each["sections"][0].items() if key not in ("drag", "added_mass")}]
+    given = {"initial_guess": [30.03, 0, 0], "mass": 50, "inertia": [40, 900, 900], "moment": moment}
+    return {"environment": {"gravity": 0.0}, "points": points, "lines": lines, "bodies": {"body": given}}
+
+
+def test_a_body_is_held_by_the_torque_of_its_lines() -> None:
+    """It turns by M/(2 GJ/L), with half of the moment in each line."""
+    found = hybrid.static(on_a_body([9.0, 0, 0]))
+    assert found["bodies/body/rotation"][-1] == pytest.approx(
+        [np.degrees(9.0 / (2 * GJ / 20.0)), 0, 0], rel=1e-6, abs=1e-6
+    )
+    for name, sign in (("one", 1.0), ("two", -1.0)):
+        assert found.lines[name]["torque"][-1] == pytest.approx(sign * 4.5, rel=1e-6)
+
+
+def test_a_body_swings_about_lines_that_hold_it_by_torque() -> None:
+    """Torsion pendulum let go: period 2 pi sqrt(J/(2 GJ/L)), and its energy stays."""
+    time = {"time": {"duration": 14.0, "step": 0.1, "rho_inf": 1.0}, "output": {"every": 0.1}}
+    found = hybrid.run(on_a_body({"value": [9.0, 0, 0], "until": 0.1}) | time)
+    angle, t = found["bodies/body/rotation"][1:, 0], found.times[1:] - 0.1
+    w = np.sqrt(2 * GJ / 20.0 / 40.0)
+    assert angle == pytest.approx(angle[0] * np.cos(w * t), abs=0.02 * angle[0])
+
+
+@pytest.mark.parametrize(
+    ("where", "change"),
+    [
+        ("lines.one.break_at", lambda t: t["lines"]["one"].update(break_at={"time": 1.0, "end": "start"})),
+    ],
+)
+def test_what_is_not_computed_with_it_is_refused(where: str, change: Any) -> None:
+    tables = on_a_body([1.0, 0, 0]) | {"time": {"duration": 4.0, "step": 0.1}}
+    change(tables)
+    with pytest.raises(SceneError) as refused:
+        hybrid.plan(tables)
+    assert where in str(refused.value)
+
+
+def test_stiffness_from_factors_is_refused() -> None:
+    with pytest.raises(SceneError, match="torque"):
+        hybrid.stiffness(on_a_body([1.0, 0, 0]), "body:body")
