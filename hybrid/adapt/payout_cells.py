@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.kernels.axial_law import DYNAMIC, FIRST, LAST, PER_TENSION, STRAIN, TENSION
 from hybrid.kernels.reel import Reel
 from hybrid.kernels.state import Floats, Line, State, blank_state
 
@@ -42,7 +43,7 @@ def from_far_end(state: State, side: int) -> State:
 
 def line_from_far_end(line: Line, side: int, far: float) -> Line:
     """What of a line `enter` and `leave` ask for, counted from the far end, at the arc length far, m."""
-    return line if side else line._replace(s=far - line.s[::-1], h=line.h[::-1], ck=line.ck[::-1])
+    return line if side else line._replace(s=far - line.s[::-1], h=line.h[::-1], ck=line.ck[::-1], law=line.law[::-1])
 
 
 def lack_at(reel: Reel, t: float) -> tuple[Floats, Floats]:
@@ -59,9 +60,22 @@ def _size(e: Floats) -> float:
     return float(np.sqrt(e @ e))
 
 
-def _lack(true: float, ck: float, T: float, e: Floats) -> float:
+def _strain(line: Line, state: State, c: int) -> float:
+    """Strain of cell c under its tension: by its compliance, or by its law (kernels.axial_law)."""
+    T = float(state.T[c])
+    if not line.law.size or line.law[c, LAST] == line.law[c, FIRST]:
+        return float(line.ck[c]) * T
+    row = line.law[c]
+    mean = float(state.slow[c]) if row[DYNAMIC] > 0.0 else T
+    x, y = line.law_table[int(row[FIRST]) : int(row[LAST]), [STRAIN, TENSION]].T
+    j = min(max(int(np.searchsorted(y, mean, side="right")) - 1, 0), y.size - 2)
+    strain = x[j] + (mean - y[j]) * (x[j + 1] - x[j]) / (y[j + 1] - y[j])
+    return float(strain + ((T - mean) / (row[DYNAMIC] + row[PER_TENSION] * max(mean, 0.0)) if mean != T else 0.0))
+
+
+def _lack(true: float, strain: float, e: Floats) -> float:
     """What a cell lacks of its true length, m, so that its law of length holds."""
-    return true - _size(e) / (1.0 + ck * T)
+    return true - _size(e) / (1.0 + strain)
 
 
 def _mismatch(line: Line, state: State, flow: Flow, reel: Reel, c: int) -> float:
@@ -69,8 +83,8 @@ def _mismatch(line: Line, state: State, flow: Flow, reel: Reel, c: int) -> float
     e = state.e[c]
     along = float(e @ (state.v[c + 1] - state.v[c])) / _size(e)
     grows = (flow.rate if c == growing(line, reel) else 0.0) - float(lack_at(reel, flow.t)[1][c])
-    ck, T = float(line.ck[c]), float(state.T[c])
-    return along - grows * (1.0 + ck * T) - float(line.h[c]) * ck * _tension_rate(state, flow, c)
+    ck, strain = float(line.ck[c]), _strain(line, state, c)
+    return along - grows * (1.0 + strain) - float(line.h[c]) * ck * _tension_rate(state, flow, c)
 
 
 def growing(line: Line, reel: Reel) -> int:
@@ -82,10 +96,12 @@ def _tension_rate(state: State, flow: Flow, c: int) -> float:
     return float(state.T[c] - flow.tension[c]) / flow.dt if flow.dt > 0.0 else 0.0
 
 
-def _rate(ck: float, T: float, h: float, rises: float, e: Floats, e1: Floats, grows: float, mismatch: float) -> float:
+def _rate(
+    ck: float, strain: float, h: float, rises: float, e: Floats, e1: Floats, grows: float, mismatch: float
+) -> float:
     """Rate, m/s, of what a cell lacks: its chord e has the rate e1, its true length grows; mismatch: it keeps."""
     along = float(e @ e1) / _size(e)
-    return grows - (along - mismatch - h * ck * rises) / (1.0 + ck * T)
+    return grows - (along - mismatch - h * ck * rises) / (1.0 + strain)
 
 
 def _carried(a: Floats, e: Floats, to: Floats) -> Floats:
@@ -134,16 +150,21 @@ def _weights(x: Floats, at: float) -> Floats:
     return w
 
 
+def _means(line: Line) -> tuple[str, ...]:
+    """What cells have beside other lines' where tension is no multiple of strain: mean tensions."""
+    return ("slow",) if line.law.size else ()
+
+
 def enter(line: Line, target: Line, state: State, reel: Reel, new: Reel, flow: Flow, place: float) -> State:
     """The state with one more node at `place`, m, in the cell that grows; what new cells lack goes into `new`."""
     g = growing(line, reel)
     i = g + 1  # the new node; the one that was there is the next
-    out = blank_state(line.h.size + 1, len(line.torsion))
+    out = blank_state(line.h.size + 1, len(line.torsion), line.law.size > 0)
     out.turn[:] = state.turn
     for name in ("r", "v", "a", "vd", "slip", "bed"):
         x, y = getattr(state, name), getattr(out, name)
         y[:i], y[i + 1 :] = x[:i], x[i:]
-    for name in ("e", "T", "a1", "w", "wa", "wd"):
+    for name in ("e", "T", "a1", "w", "wa", "wd", *_means(line)):
         x, y = getattr(state, name), getattr(out, name)
         y[:i], y[i:] = x[:i], x[g:]
     first = max(i - 3, 0)
@@ -165,9 +186,12 @@ def enter(line: Line, target: Line, state: State, reel: Reel, new: Reel, flow: F
     for c, true, at in ((g, trues[0], 0.5 * trues[0] - 0.5 * h), (i, trues[1], 0.5 * h - 0.5 * trues[1])):
         out.T[c] = state.T[g] + slope * at
         out.a1[c] = _carried(state.a1[g], state.e[g], out.e[c])
-        ck, T, grows = float(target.ck[c]), float(out.T[c]), flow.rate if c == i else 0.0
-        rate = _rate(ck, T, true, rises, out.e[c], out.v[c + 1] - out.v[c], grows, mismatch * true / h)
-        _lacks(new, c, float(_lack(true, ck, T, out.e[c])), rate, flow)
+        if line.law.size:
+            out.slow[c] = state.slow[g] + slope * at
+        strain, grows = _strain(target, out, c), flow.rate if c == i else 0.0
+        e1 = out.v[c + 1] - out.v[c]
+        rate = _rate(float(target.ck[c]), strain, true, rises, out.e[c], e1, grows, mismatch * true / h)
+        _lacks(new, c, float(_lack(true, strain, out.e[c])), rate, flow)
     return out
 
 
@@ -175,26 +199,27 @@ def leave(line: Line, target: Line, state: State, reel: Reel, new: Reel, flow: F
     """The state without the last material node; what the cell that two become lacks goes into `new`."""
     g = growing(line, reel)
     c = g - 1
-    out = blank_state(line.h.size - 1, len(line.torsion))
+    out = blank_state(line.h.size - 1, len(line.torsion), line.law.size > 0)
     out.turn[:] = state.turn
     for name in ("r", "v", "a", "vd", "slip", "bed"):
         x, y = getattr(state, name), getattr(out, name)
         y[:g], y[g:] = x[:g], x[g + 1 :]
-    for name in ("e", "T", "a1", "w", "wa", "wd"):
+    for name in ("e", "T", "a1", "w", "wa", "wd", *_means(line)):
         x, y = getattr(state, name), getattr(out, name)
         y[:g], y[g:] = x[:g], x[g + 1 :]
     ha, hb = line.h[c], line.h[g]
     out.e[c] = state.e[c] + state.e[g]
-    for name in ("T", "w", "wa", "wd"):
+    for name in ("T", "w", "wa", "wd", *_means(line)):
         x = getattr(state, name)
         getattr(out, name)[c] = (ha * x[c] + hb * x[g]) / (ha + hb)
     out.a1[c] = _carried(state.a1[c], state.e[c], out.e[c])
     mismatch = _mismatch(line, state, flow, reel, c) + _mismatch(line, state, flow, reel, g)
     rises = (ha * _tension_rate(state, flow, c) + hb * _tension_rate(state, flow, g)) / (ha + hb)
-    true, ck, T = float(line.s[g + 1] - line.s[c]), float(target.ck[c]), float(out.T[c])
+    true, strain = float(line.s[g + 1] - line.s[c]), _strain(target, out, c)
     _keep_lacks(reel, new, c)
-    rate = _rate(ck, T, true, rises, out.e[c], out.v[c + 1] - out.v[c], flow.rate, mismatch)
-    _lacks(new, c, _lack(true, ck, T, out.e[c]), rate, flow)
+    e1 = out.v[c + 1] - out.v[c]
+    rate = _rate(float(target.ck[c]), strain, true, rises, out.e[c], e1, flow.rate, mismatch)
+    _lacks(new, c, _lack(true, strain, out.e[c]), rate, flow)
     return out
 
 

@@ -13,13 +13,13 @@ from math import inf
 
 import numpy as np
 
+from hybrid.couple.moordyn_places import PlacesAlone, frame_of_angles, spin_of_rates
 from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.cables import chain_of
 from hybrid.interop.moordyn.deck import Deck, read_deck
 from hybrid.interop.moordyn.rows import read_source
 from hybrid.interop.moordyn.systems import JOINTS, system_of
 from hybrid.kernels.state import Floats
-from hybrid.model.bodies import frame_of
 from hybrid.scene.analysis import CatenaryModel
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import parse_either
@@ -45,9 +45,9 @@ class MoorDynBody:
 
     def at(self, r: Floats, v: Floats) -> dict[str, tuple[Floats, Floats]]:
         """Places and velocities of its points where the body is at r (m, rad) and moves with v (m/s, rad/s)."""
-        frame = frame_of(tuple(np.degrees(r[3:])))
+        frame, spin = frame_of_angles(r[3:]), spin_of_rates(r[3:], v[3:])
         arms = {name: frame @ place for name, place in self.points.items()}
-        return {name: (r[:3] + arm, v[:3] + np.cross(v[3:], arm)) for name, arm in arms.items()}
+        return {name: (r[:3] + arm, v[:3] + np.cross(spin, arm)) for name, arm in arms.items()}
 
 
 class MoorDynPoint:
@@ -75,14 +75,17 @@ class MoorDyn:
     """A system, made by `Create`, ready after `Init`."""
 
     def __init__(self, path: str) -> None:
-        self.deck: Deck = read_deck(read_source(path))
+        self.deck: Deck = read_deck(read_source(path), needs_lines=False)
+        self.simulation: SystemSimulation | PlacesAlone | None = None
+        self.dt, self.origin, self.closed = LONGEST_STEP, inf, False
+        if not self.deck.lines:
+            self._without_lines()
+            return
         made = system_of(self.deck)
         self.text, self.notes = made.text, made.notes
-        self.simulation: SystemSimulation | None = None
-        self.dt, self.origin, self.closed = LONGEST_STEP, inf, False
         scene, _ = parse_either(self.text)
         assert isinstance(scene, System)
-        self.scene = scene
+        self.scene: System | None = scene
         names = {
             id: f"point{id}" if f"point{id}" in scene.points else f"body{p.on}" for id, p in self.deck.points.items()
         }
@@ -97,6 +100,34 @@ class MoorDyn:
             x.name for x in self.points if self.deck.points[x.id].kind == "coupled" and x.name in scene.points
         ]
         self.lines = [self._line(id) for id in sorted(self.deck.lines)]
+
+    def _without_lines(self) -> None:
+        """A deck of points alone, that are held or on bodies that the caller moves."""
+        deck, self.scene, self.text, self.notes = self.deck, None, "", []
+        loose = [b.row for b in deck.bodies.values() if b.kind != "coupled"]
+        loose += [p.row for p in deck.points.values() if p.kind == "free"]
+        if loose or deck.rods:
+            row = (loose or [x.row for x in deck.rods.values()])[0]
+            fix = "add the lines that hold it"
+            raise SceneError(
+                [Complaint("left out", " ".join(row.cells), "coupled bodies, held points", fix, row.line)], deck.file
+            )
+        self.points = [MoorDynPoint(self, id, f"point{id}") for id in sorted(deck.points)]
+        self.bodies = [
+            MoorDynBody(id, [*b.place, *np.radians(b.angles)], {
+                f"point{k}": np.array(p.place) for k, p in deck.points.items() if p.on == id
+            }) for id, b in sorted(deck.bodies.items())
+        ]  # fmt: skip
+        self.coupled = [x.name for x in self.points if deck.points[x.id].kind == "coupled"]
+        self.lines = []
+
+    def first_places(self) -> dict[str, tuple[Floats, Floats]]:
+        """Where the points of a deck without lines are, at rest."""
+        still = np.zeros(6)
+        found = {x.name: (np.array(self.deck.points[x.id].place), still[:3]) for x in self.points}
+        for body in self.bodies:
+            found |= body.at(body.r, still)
+        return found
 
     def _line(self, id: int) -> MoorDynLine:
         chain = chain_of(self.deck, id, JOINTS)
@@ -115,7 +146,7 @@ class MoorDyn:
         return 6 * len(self.bodies) + 3 * len(self.coupled)
 
     @property
-    def running(self) -> SystemSimulation:
+    def running(self) -> SystemSimulation | PlacesAlone:
         """The simulation; ValueError before `Init` and after `Close`."""
         if self.simulation is None:
             raise ValueError("the system is not running: call Init first, and nothing after Close")
@@ -150,7 +181,7 @@ class MoorDyn:
     def point(self, name: str) -> PointState:
         """A point now; before `Init` where the deck has it, at rest, without force."""
         if self.simulation is None and self.origin == inf and not self.closed:
-            place = self.scene.first_place(name)
+            place = self.first_places()[name][0] if self.scene is None else self.scene.first_place(name)
             return PointState(np.array(place, float), np.zeros(3), np.zeros(3))
         return self.running.point(name)
 
@@ -195,6 +226,9 @@ def Init(instance: MoorDyn, x: Sequence[float] = (), v: Sequence[float] = ()) ->
     first, speed = instance.numbers(x, "x"), instance.numbers(v, "v")
     places = instance.places(first, speed)
     instance.note(first, speed)
+    if instance.scene is None:
+        instance.simulation = PlacesAlone(instance.first_places() | places)
+        return 0
     data = instance.scene.model_dump(exclude_none=True)
     for name, (place, _) in places.items():
         data["points"][name] = {"kind": "fixed", "position": place.tolist()}

@@ -124,3 +124,34 @@ def follow_law(line, old, new, work, dt, _):
         law[i, LOSS] = (T - elastic) * faster + h * slides
     work.report[STRETCH_ENERGY] = energy
     return 0
+
+
+@inner
+def has_law(line, i):
+    """Whether the tension of cell i is no multiple of its strain."""
+    return line.law.shape[0] > 0 and line.law[i, LAST] > line.law[i, FIRST]
+
+
+@inner
+def strain_and_energy(line, state, i):
+    """Strain of cell i under its tension, of which nothing is of damping, and its energy per length, J/m."""
+    T = state.T[i]
+    if not has_law(line, i):
+        return line.ck[i] * T, 0.5 * line.ck[i] * T * T
+    law, first, last = line.law, int(line.law[i, FIRST]), int(line.law[i, LAST])
+    if not law[i, DYNAMIC] > 0.0:
+        strain, _, stored = strain_at(line.law_table, first, last, T)
+        return strain, stored
+    mean = state.slow[i]
+    strain, _, stored = strain_at(line.law_table, first, last, mean)
+    E, _ = stiffness_at(law, i, mean)
+    return strain + (T - mean) / E, stored + 0.5 * (T * T - mean * mean) / E
+
+
+@kernel
+def stretch_energy(line, state):
+    """Energy, J, of the stretch of a line without damping, from its tensions."""
+    total = 0.0
+    for i in range(line.h.shape[0]):
+        total += line.h[i] * strain_and_energy(line, state, i)[1]
+    return total

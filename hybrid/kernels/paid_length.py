@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hybrid.kernels.axial_law import has_law
 from hybrid.kernels.compile import inner
 from hybrid.kernels.element import put_spring
 from hybrid.kernels.reel import (
@@ -123,7 +124,9 @@ def fill_cells(line, reel):
         q[PER_LENGTH], reel.true[k] = h, h
         line.s[node(line, reel, k + 1)] = reel.numbers[FAR] + reel.numbers[SIDE] * end
         fill_node(line, i, before, q, 1.0)
-        line.ck[c], line.tau[c], line.diameter[c] = q[STRETCH] / h, q[TAU] / h, q[DIAMETER] / h
+        if not has_law(line, c):  # which is linearised anew in every iteration, and is one for all that is on the reel
+            line.ck[c] = q[STRETCH] / h
+        line.tau[c], line.diameter[c] = q[TAU] / h, q[DIAMETER] / h
         line.drag_n[c], line.drag_t[c] = 0.5 * q[DRAG_N], 0.5 * q[DRAG_T]
         line.added_n[c], line.added_t[c] = 0.5 * q[ADDED_N], 0.5 * q[ADDED_T]
         line.buoy[c], line.displaced[c] = 0.5 * q[BUOY], 0.5 * q[DISPLACED]

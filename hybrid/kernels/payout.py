@@ -21,6 +21,7 @@ import math
 import numpy as np
 
 from hybrid.kernels import books as b
+from hybrid.kernels.axial_law import strain_and_energy
 from hybrid.kernels.cell import Chord, chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import relative_rotation
@@ -225,8 +226,8 @@ def leave_to_reel(line, zones, reel):
 @inner
 def stretch_work(line, state, c):
     """Energy per length, N, that a cell takes up when its unstretched length grows and its ends stay."""
-    T = state.T[c]
-    return T + 0.5 * line.ck[c] * T * T
+    strain, energy = strain_and_energy(line, state, c)
+    return state.T[c] * (1.0 + strain) - energy
 
 
 @inner

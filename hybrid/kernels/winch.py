@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 
+from hybrid.kernels.axial_law import SHIFT, has_law
 from hybrid.kernels.block_elimination import ROW, SPAN
 from hybrid.kernels.block_elimination_plane import COLUMNS, TRIPLE
 from hybrid.kernels.cell import chord
@@ -109,4 +110,5 @@ def softness(line, state, X):
         p = c * ROW
         moves = d[0] * X[p + SPAN] + d[1] * X[p + 2 * SPAN] + d[2] * X[p + 3 * SPAN]
     ck = line.ck[c]
-    return (1.0 + ck * state.T[c]) / (moves - line.h[c] * ck)
+    shift = line.law[c, SHIFT] if has_law(line, c) else 0.0
+    return (1.0 + shift + ck * state.T[c]) / (moves - line.h[c] * ck)

@@ -185,11 +185,16 @@ def _stretch_by_a_law(cable: Cable, model: Model, ends: Ends, solver: str) -> It
         if isinstance(model, AdaptiveModel):
             fix = "write `model: rod`, `model: catenary`, or zones of both"
             yield Finding((*here, key), "nothing, because zones move (model: adaptive)", fix)
-        for name in paid:
-            fix = "give axial_stiffness (N), at the tension you expect"
-            yield Finding((*here, key), f"nothing, because line is paid out (ends.{name}.payout)", fix)
         if solver == "shooting":
             yield Finding(("solver",), f"elimination, because of {key} of a section", "leave solver out")
+    for name in paid:
+        own = cable.sections[0 if name == "start" else -1]
+        for i, section in enumerate(getattr(ends, name).payout.reel or ()):
+            if (section.curve, section.dynamic_stiffness) != (own.curve, own.dynamic_stiffness):
+                expected = "the tension over strain of the section at the winch (tension_strain, dynamic_stiffness)"
+                keys = [key for key in ("dynamic_stiffness", "tension_strain") if getattr(section, key) is not None]
+                at: Place = ("ends", name, "payout", "reel", i, *keys[:1])
+                yield Finding(at, expected, "give it the same, or leave these out and give axial_stiffness (N)")
 
 
 def _arbiter_steps(time: Time | None, solver: str, accuracy: Accuracy | None) -> Iterator[Finding]:

@@ -12,6 +12,7 @@ from hybrid.adapt.payout_cells import Flow, enter, from_far_end, leave, line_fro
 from hybrid.kernels import books as b
 from hybrid.kernels import reel as p
 from hybrid.kernels import winch as w
+from hybrid.kernels.axial_law import SHIFT, stretch_energy
 from hybrid.kernels.binding import Table
 from hybrid.kernels.books import CLOCK_SIZE
 from hybrid.kernels.energies import observe
@@ -153,6 +154,8 @@ class PayingOut:
         self.count += 1 if enters else -1
         length = float(numbers[p.LENGTH])
         changed = self.on(model, length, model.layout.rod[source] if model.layout is not None else None)
+        if model.line.law.size:  # laws as the last step has linearised them
+            changed.line.ck[:], changed.line.law[:, SHIFT:] = model.line.ck[source], model.line.law[source, SHIFT:]
         reel, side = self._blank(self.count), plan.side
         line, target = line_from_far_end(model.line, side, plan.far), line_from_far_end(changed.line, side, plan.far)
         seen = from_far_end(state, side)
@@ -168,7 +171,10 @@ class PayingOut:
         if carry is not None:
             carry(changed, source)
         ends = model.ends.at(run.t)
-        return changed, out, energy(changed.line, ends, out) - energy(model.line, ends, state)
+        more = energy(changed.line, ends, out) - energy(model.line, ends, state)
+        if model.line.law.size:
+            more += stretch_energy(changed.line, out) - stretch_energy(model.line, state)
+        return changed, out, more
 
     def _came_from(self, enters: bool, cells: int) -> np.ndarray:
         """Which of so many old cells those of a line come from in which a node enters, or leaves."""

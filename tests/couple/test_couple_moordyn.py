@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import hybrid
 from hybrid.couple import moordyn
@@ -201,3 +202,44 @@ def test_scripts_that_ask_the_deck_where_things_are(tmp_path: Path, monkeypatch:
         moordyn.Create("file.invalid")
     with pytest.raises(hybrid.SceneError):
         moordyn.Create("file.invalid")
+
+
+TURNED = """------ a body and three points
+--- BODIES ---
+ID Attachment X0 Y0 Z0 r0 p0 y0 Mass CG* I* Volume CdA* Ca
+(#) (-) (m) (m) (m) (deg) (deg) (deg) (kg) (m) (kg-m^2) (m^3) (m^2) (-)
+1 coupled 0 0 0 0 0 0 0 0 0 0 0 0
+--- POINTS ---
+ID Type X Y Z M V CdA CA
+(-) (-) (m) (m) (m) (kg) (m^3) (m^2) (-)
+1 Body1 1 0 0 0 0 0 0
+2 Body1 0 1 0 0 0 0 0
+3 Body1 0 0 1 0 0 0 0
+--- OPTIONS ---
+0.0 g
+100 WtrDpth
+"""
+
+
+def test_a_body_turns_as_moordyn_turns_it(tmp_path: Path) -> None:
+    """Angles about x, the turned y, the turned z (R = Rx Ry Rz), as MoorDyn 2.7 has them; a deck needs no lines for it."""
+    path = tmp_path / "turned.txt"
+    path.write_text(TURNED, encoding="utf-8")
+    system = moordyn.Create(str(path))
+    points = [moordyn.GetPoint(system, k) for k in (1, 2, 3)]
+    assert moordyn.Init(system, [0] * 6, [0] * 6) == 0
+    assert np.array([moordyn.GetPointPos(x) for x in points]) == pytest.approx(np.eye(3))
+    rates = np.radians([10.0, 20.0, 30.0])
+    for k in range(2):
+        r, _ = moordyn.GetBodyState(moordyn.GetBody(system, 1))
+        assert moordyn.Step(system, r, [0, 0, 0, *rates], float(k), 1.0) == [0.0] * 6
+    found = np.array([moordyn.GetPointPos(x) for x in points]).T
+    expected = Rotation.from_euler("XYZ", [20, 40, 60], degrees=True)
+    assert found == pytest.approx(expected.as_matrix(), abs=1e-12)
+    spin = np.array([moordyn.GetPointVel(x) for x in points]).T @ found.T
+    t = 1e-6
+    later = Rotation.from_euler("XYZ", np.degrees([2 + t, 2 + t, 2 + t] * rates), degrees=True).as_matrix()
+    assert spin == pytest.approx((later - found) @ found.T / t, abs=1e-5)
+    with pytest.raises(ValueError, match="no line"):
+        moordyn.GetLine(system, 1)
+    moordyn.Close(system)

@@ -112,9 +112,13 @@ class Deck:
     notes: list[Note] = field(default_factory=list)
 
 
-def read_deck(source: Source) -> Deck:
-    """The tables of a deck; SceneError with every complaint if it is refused."""
-    for name, title in (("line types", "LINE TYPES"), ("lines", "LINES")):
+def read_deck(source: Source, needs_lines: bool = True) -> Deck:
+    """The tables of a deck; SceneError with every complaint if it is refused.
+
+    needs_lines: whether one without lines is refused, even if it has points.
+    """
+    without = not needs_lines and "lines" not in source.sections and bool(source.rows("points"))
+    for name, title in () if without else (("line types", "LINE TYPES"), ("lines", "LINES")):
         if name not in source.sections:
             found = ", ".join(s.title for s in source.sections.values()) or "no section that MoorDyn knows"
             expected = f"a section that begins with a row such as ------- {title} -------"

@@ -1,0 +1,90 @@
+"""Lines that are paid out whose tension is no multiple of strain: tables and fibre ropes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from simulation.test_payout import clamped, exchanged, sagging
+
+import hybrid
+from hybrid.errors import SceneError
+
+EA = 2e5
+SAME = {"tension_strain": [[0, 0], [0.005, 0.005 * EA], [0.1, 0.1 * EA]]}
+# Close to a constant stiffness, whatever its time.
+NEAR = {"axial_stiffness": EA, "dynamic_stiffness": {"constant": 1.00001 * EA, "relaxation_time": 2.0}}
+TABLE = {"tension_strain": [[0, 0], [0.008, 800], [0.012, 1800], [0.05, 20000]]}
+ROPE = TABLE | {"dynamic_stiffness": {"constant": 6e5, "per_tension": 10.0, "relaxation_time": 4.0}}
+
+
+def paid(
+    section: dict[str, Any], rate: float = 0.8, step: float = 0.05, duration: float = 12.0, **more: Any
+) -> dict[str, Any]:
+    scene = sagging(rate=rate, step=step, duration=duration, **more)
+    scene["cable"]["sections"][0] |= section
+    return scene
+
+
+@pytest.mark.parametrize("rate", [0.8, -0.8])
+@pytest.mark.parametrize(("same", "most"), [(SAME, 1e-7), (NEAR, 2e-5)], ids=["table", "rope"])
+def test_a_law_that_is_a_constant_stiffness_does_as_that(rate: float, same: dict[str, Any], most: float) -> None:
+    """Tension, places and energies, over nodes that enter and leave."""
+    one, other = hybrid.run(paid({"axial_stiffness": EA}, rate)), hybrid.run(paid(same, rate))
+    assert np.abs(np.diff(one["payout/length"])).sum() > 5.0
+    for name in ("reaction_end", "position", "energy/stretch", "work/end", "payout/power"):
+        assert np.abs(other[name] - one[name]).max() < most * np.abs(one[name]).max()
+
+
+@pytest.mark.parametrize("law", [TABLE, ROPE], ids=["table", "rope"])
+def test_energy_is_balanced(law: dict[str, Any]) -> None:
+    left, put_in = [], 0.0
+    for step in (0.1, 0.05):
+        found = hybrid.run(paid(law, step=step))
+        left.append(np.abs(found["work/scheme"]).max())
+        put_in = np.abs(found["work/end"]).max()
+    assert left[1] < 3e-4 * put_in
+    assert left[0] > 2.5 * left[1]
+
+
+def test_the_mirror_image_pays_out_the_same() -> None:
+    reel = [{**sagging(EA=1.0)["cable"]["sections"][0], "mass": 6.0} | ROPE]
+    del reel[0]["axial_stiffness"]
+    scene = paid(ROPE, step=0.1)
+    scene["ends"]["end"]["payout"]["reel"] = reel
+    one, other = hybrid.run(scene), hybrid.run(exchanged(scene))
+    assert np.abs(one["reaction_end"] - other["reaction_start"]).max() < 1e-7 * np.abs(one["reaction_end"]).max()
+
+
+def test_resumed_bit_for_bit(tmp_path: Path) -> None:
+    scene = paid(ROPE, model="rod", EI=2e4, step=0.1)
+    scene = clamped(scene)
+    scene["ends"]["end"]["payout"]["longest"] = 120.0
+    whole = hybrid.run(scene, output=tmp_path / "whole.h5")
+    hybrid.run({**scene, "time": {"duration": 8.0, "step": 0.1}}, output=tmp_path / "part.h5")
+    resumed = hybrid.resume(tmp_path / "part.h5", until=12.0)
+    for name in ("position", "tension", "reaction_end", "energy/stretch", "work/end", "work/zones", "work/scheme"):
+        assert np.array_equal(whole[name], resumed[name]), name
+
+
+def test_a_winch_holds_its_tension_on_a_rope() -> None:
+    """The length is an unknown beside a tension that is no multiple of strain: what remains at rest is what is held."""
+    winch = {"tension": 2200.0, "inertia": 200.0, "damping": 100.0, "ramp": 4.0}
+    scene = paid(ROPE, duration=40.0, step=0.2)
+    scene["ends"]["end"] |= {"payout": {"winch": winch, "longest": 130.0}, "motion": None}
+    scene["environment"] = {"fluid": {"density": 1025}}
+    scene["cable"]["sections"][0]["drag"] = {"normal": 1.2}
+    found = hybrid.run(scene)
+    pull = np.linalg.norm(found["reaction_end"], axis=1)
+    assert pull[-1] == pytest.approx(2200.0, rel=5e-3) and pull[0] < 1900.0
+
+
+def test_another_rope_on_the_reel_is_refused() -> None:
+    scene = paid(ROPE)
+    section = scene["cable"]["sections"][0]
+    scene["ends"]["end"]["payout"]["reel"] = [{**section, **TABLE, "dynamic_stiffness": None}]
+    with pytest.raises(SceneError) as refused:
+        hybrid.plan(scene)
+    assert "ends.end.payout.reel[0]" in str(refused.value)
