@@ -103,7 +103,7 @@ class MoorDyn:
 
     def _without_lines(self) -> None:
         """A deck of points alone, that are held or on bodies that the caller moves."""
-        deck, self.scene, self.text, self.notes = self.deck, None, "", []
+        deck, self.scene, self.text, self.notes = self.deck, None, "", ()
         loose = [b.row for b in deck.bodies.values() if b.kind != "coupled"]
         loose += [p.row for p in deck.points.values() if p.kind == "free"]
         if loose or deck.rods:
