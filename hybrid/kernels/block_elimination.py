@@ -400,8 +400,8 @@ def solve_last(X, k, x, n):
 
 
 @inner
-def solve_with(X, W, b, x, joined):
-    """As `solve_again`; joined: the end is joined to a point (kernels.joined_lines), and is held there."""
+def solve_forward(X, W, b, x, joined):
+    """The first half of `solve_with`: what another right-hand side makes of that of every X_i, into x."""
     n = x.shape[0] - 1
     for i in range(n + 1):
         k = (n + 1) * ROW + i * KEPT
@@ -445,6 +445,12 @@ def solve_with(X, W, b, x, joined):
             x[i, 4] = 0.0
     if joined:
         solve_last(X, (n + 1) * ROW + n * KEPT, x, n)
+
+
+@inner
+def solve_backward(X, x):
+    """The second half of `solve_with`, in place."""
+    n = x.shape[0] - 1
     total = 0.0
     for i in range(n - 1, -1, -1):
         p = i * ROW
@@ -466,6 +472,21 @@ def solve_with(X, W, b, x, joined):
                 x[i, j] = y
                 total += abs(y)
     return total < math.inf
+
+
+@inner
+def solve_with(X, W, b, x, joined):
+    """As `solve_again`; joined: the end is joined to a point (kernels.joined_lines), and is held there."""
+    solve_forward(X, W, b, x, joined)
+    return solve_backward(X, x)
+
+
+@inner
+def add_to_right(X, part, x):
+    """Add a part of what `solve_forward` has left in x to the right-hand sides of all X_i."""
+    for i in range(x.shape[0]):
+        for k in range(SIZE):
+            X[i * ROW + k * SPAN + SPAN - 1] += part * x[i, k]
 
 
 @kernel

@@ -208,11 +208,9 @@ def solve3(A0, A1, A2):
     return i0 * (A0[3] - A0[1] * x1 - A0[2] * x2), x1, x2
 
 
-@kernel
-def solve_again_planar(plane, X, b, x):
-    """As `block_elimination.solve_again` for a cable in a plane: b and x (N+1, 5) are of space, what b has across the
-    plane is not read, and x has nothing there and no spin.
-    """
+@inner
+def solve_forward_planar(plane, X, b, x):
+    """The first half of `solve_again_planar`: what another right-hand side makes of that of every block, into x."""
     n = x.shape[0] - 1
     y0, y1, y2, z1, z2 = 0.0, 0.0, 0.0, 0.0, 0.0  # of the node before: dT, dr; of the one before that: dr
     for i in range(n + 1):
@@ -230,6 +228,12 @@ def solve_again_planar(plane, X, b, x):
             (X[p], X[p + 1], X[p + 2], c0), (X[p + 3], X[p + 4], X[p + 5], c1), (X[p + 6], X[p + 7], X[p + 8], c2)
         )
         x[i, 0], x[i, 1], x[i, 2] = y0, y1, y2
+
+
+@inner
+def solve_backward_planar(plane, X, x):
+    """The second half of `solve_again_planar`, in place."""
+    n = x.shape[0] - 1
     y, z = (0.0, 0.0, 0.0), (0.0, 0.0)
     total = 0.0
     for i in range(n, -1, -1):
@@ -243,3 +247,20 @@ def solve_again_planar(plane, X, b, x):
         x[i, 1], x[i, 2], x[i, 3] = to_space(plane, (a, c))
         y, z = (t, a, c), (y[1], y[2])
     return total < math.inf
+
+
+@kernel
+def solve_again_planar(plane, X, b, x):
+    """As `block_elimination.solve_again` for a cable in a plane: b and x (N+1, 5) are of space, what b has across the
+    plane is not read, and x has nothing there and no spin.
+    """
+    solve_forward_planar(plane, X, b, x)
+    return solve_backward_planar(plane, X, x)
+
+
+@inner
+def add_to_right_planar(X, part, x):
+    """Add a part of what `solve_forward_planar` has left in x to the right-hand sides of all blocks."""
+    for i in range(x.shape[0]):
+        for k in range(3):
+            X[i * TRIPLE + k * COLUMNS + COLUMNS - 1] += part * x[i, k]

@@ -50,8 +50,10 @@ from hybrid.kernels.winch import (
     INERTIA,
     TENSION,
     accept,
+    answer_of_start,
     at_its_end,
     last_change,
+    lengthen_start,
     losses,
     predict,
     softness,
@@ -314,21 +316,27 @@ def iterate(table):
     take_riding_off(line, reel)
     if t <= winch[BEGIN] or not winch[TENSION] > 0.0:
         return 0
-    state, at = job.old if job.counts[b.PARITY] else job.new, last_change(line)
+    state, at, starts = job.old if job.counts[b.PARITY] else job.new, last_change(line), end_of(reel) == 0
     more, slope = of_material(line, job.sea, job.ends, state, reel, line.h.shape[0])
     force, _ = force_of_fairlead(reel, job.report, more)
-    pull = pull_at(force, slope) + job.X[at]
+    if starts:
+        answer, more_pull = answer_of_start(line, state, job.X, job.W, reel.columns)
+    else:
+        answer, more_pull = softness(line, state, job.X), job.X[at]
+    pull = pull_at(force, slope) + more_pull
     lost, steep = losses(winch, numbers[RATE])
-    answer = softness(line, state, job.X)
     left = winch[INERTIA] * numbers[ACCELERATION] + lost + tension_held(winch, t) - pull
-    carried = line.mass[line.h.shape[0]] * math.sqrt(dot(slope, slope))
+    carried = line.mass[node(line, reel, line.h.shape[0])] * math.sqrt(dot(slope, slope))
     stiff = (winch[INERTIA] + carried) * winch[CA] + steep * winch[CV] - answer
     change = -left / stiff
     numbers[LENGTH] += change
     numbers[RATE] += winch[CV] * change
     numbers[ACCELERATION] += winch[CA] * change
     prepare(line, reel, t)
-    job.X[at] += answer * change
+    if starts:
+        lengthen_start(line, job.X, change, reel.columns)
+    else:
+        job.X[at] += answer * change
     return 0
 
 

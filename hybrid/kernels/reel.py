@@ -62,19 +62,21 @@ class Reel(NamedTuple):
     riding: Floats  # (m+1, 3) N, by which the forces on them are more because they do not move as the material does
     stage: Floats  # (1,) 1 while these are among the forces on the line
     winch: Floats  # (WINCH,) of a winch that holds a tension (kernels.winch)
+    columns: Floats  # (3, N+1, 5) that such a winch at the start works in; else empty
 
 
 def blank_reel(
     cells: int, law: Floats | None = None, pieces: Floats | None = None, winch: Floats | None = None,
-    layer: Floats | None = None,
+    layer: Floats | None = None, columns: bool = False,
 ) -> Reel:  # fmt: skip
-    """A reel of a line of so many cells."""
+    """A reel of a line of so many cells; columns: whether a winch at its start holds a tension."""
     z = np.zeros
     return Reel(
         z(NUMBERS), z((1, 8)) if law is None else law, z((1, 1 + PER_LENGTH)) if pieces is None else pieces,
         z(1 + PER_LENGTH), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 1, 6)),
         z(REPORT_SIZE), z((2, 1 + PER_LENGTH)), z(1) if layer is None else layer,
         z((1 if layer is None else layer.size, 3)), z(1), z(WINCH) if winch is None else winch,
+        z((3, cells + 1, 5) if columns else (3, 0, 5)),
     )  # fmt: skip
 
 
@@ -104,6 +106,7 @@ class ReelJob(NamedTuple):
     report: Floats  # (REPORT_SIZE,) of the step
     reel: Reel
     X: Floats  # of the line's kernels.state.Work
+    W: Floats
     zones: MovingZones
 
 
@@ -112,7 +115,7 @@ def blank_reel_job() -> ReelJob:
     state, z = blank_state(1), np.zeros
     return ReelJob(
         blank_line(1), no_sea(1), no_ends(), state, state, z(CLOCK_SIZE), z(COUNT_SIZE, np.int64), z((2, WORKS)),
-        z((2, 3)), z(REPORT_SIZE), blank_reel(1), z(0), zones_that_stay(),
+        z((2, 3)), z(REPORT_SIZE), blank_reel(1), z(0), z(0), zones_that_stay(),
     )  # fmt: skip
 
 

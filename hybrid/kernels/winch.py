@@ -13,8 +13,15 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.axial_law import SHIFT, has_law
-from hybrid.kernels.block_elimination import ROW, SPAN
-from hybrid.kernels.block_elimination_plane import COLUMNS, TRIPLE
+from hybrid.kernels.block_elimination import ROW, SPAN, add_to_right, solve_backward, solve_forward, substitute
+from hybrid.kernels.block_elimination_plane import (
+    COLUMNS,
+    TRIPLE,
+    add_to_right_planar,
+    solve_backward_planar,
+    solve_forward_planar,
+    substitute_planar,
+)
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner
 from hybrid.kernels.forces import PLANAR
@@ -112,3 +119,42 @@ def softness(line, state, X):
     ck = line.ck[c]
     shift = line.law[c, SHIFT] if has_law(line, c) else 0.0
     return (1.0 + shift + ck * state.T[c]) / (moves - line.h[c] * ck)
+
+
+@inner
+def answer_of_start(line, state, X, W, columns):
+    """The same of a first cell that changes its length, the fairlead at the start: how its tension answers, N/m, and
+
+    its change in the equations eliminated in X, N.  X has room for the factors of another right-hand side; columns:
+    (3, N+1, 5), of which the first keeps what `lengthen_start` adds to the right-hand sides.
+    """
+    forward, column, x = columns[0], columns[1], columns[2]
+    n = line.h.shape[0]
+    for i in range(n + 1):
+        for k in range(5):
+            x[i, k] = 0.0
+    shift = line.law[0, SHIFT] if has_law(line, 0) else 0.0
+    x[1, 0] = 1.0 + shift + line.ck[0] * state.T[0]
+    if line.bits & PLANAR:
+        solve_forward_planar(line.plane, X, x, forward)
+    else:
+        solve_forward(X, W, x, forward, False)
+    for i in range(n + 1):
+        for k in range(5):
+            column[i, k] = forward[i, k]
+    if line.bits & PLANAR:
+        solve_backward_planar(line.plane, X, column)
+        substitute_planar(line.plane, X, x)
+    else:
+        solve_backward(X, column)
+        substitute(X, x)
+    return column[1, 0], x[1, 0]
+
+
+@inner
+def lengthen_start(line, X, change, columns):
+    """The equations eliminated in X with a first cell that is longer by a change, m, behind `answer_of_start`."""
+    if line.bits & PLANAR:
+        add_to_right_planar(X, change, columns[0])
+    else:
+        add_to_right(X, change, columns[0])

@@ -58,7 +58,7 @@ class PayingOut:
     def _blank(self, count: int) -> Reel:
         """Arrays of a line of so many material nodes, none of whose cells lacks anything."""
         plan = self.plan
-        reel = blank_reel(count + self.rides, self.law, plan.pieces, self.winch, plan.layer)
+        reel = blank_reel(count + self.rides, self.law, plan.pieces, self.winch, plan.layer, self.at_start)
         place, before = float(plan.nodes[count - 1]), float(plan.nodes[count - 2])
         numbers = reel.numbers
         numbers[p.SIDE], numbers[p.FAR] = (1.0 if plan.side else -1.0), plan.far
@@ -88,7 +88,7 @@ class PayingOut:
         self.table.bind(
             line=model.line, sea=model.sea.values, ends=model.ends.values, old=run.states[0], new=run.states[1],
             clock=run.clock, counts=run.count, work=run.books.work, velocity=run.books.velocity,
-            report=stepper.work.report, reel=self.reel, X=stepper.work.X,
+            report=stepper.work.report, reel=self.reel, X=stepper.work.X, W=stepper.work.W,
             zones=moving,
         )  # fmt: skip
         numbers = self.table.numbers
@@ -99,6 +99,11 @@ class PayingOut:
     def rides(self) -> int:
         """Nodes that ride with the fairlead."""
         return self.plan.layer.size - 1
+
+    @property
+    def at_start(self) -> bool:
+        """Whether a winch at the start holds a tension: an iteration then takes another right-hand side."""
+        return self.holds_tension and not self.plan.side
 
     @property
     def holds_tension(self) -> bool:

@@ -469,8 +469,6 @@ def test_other_refusals() -> None:
     scene = hanging(RATE, 5.0)
     scene["ends"]["start"] = scene["ends"]["end"] | {"position": [30, 0, 0]}
     assert "ends.start.payout" in refused(scene)
-    scene = exchanged(hanging({"winch": {"tension": 900.0, "inertia": 50}, "longest": 60}, 5.0))
-    assert "ends.start.payout.winch" in refused(scene)
     scene = exchanged(hanging({"rate": 0.5}, 5.0))
     assert "ends.start.payout.ramp" in refused(scene)
     scene = exchanged(hanging({"rate": -20.0, "ramp": 1}, 6.0))
