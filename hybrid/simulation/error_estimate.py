@@ -22,6 +22,7 @@ from hybrid.simulation.error_order import (
     around,
     as_halved,
     at_all_outputs,
+    blended,
     falls,
     magnitude,
     order,
@@ -29,6 +30,7 @@ from hybrid.simulation.error_order import (
     squares,
     start_change,
     step_share,
+    with_neighbours,
 )
 from hybrid.simulation.run_sample import (
     END_FORCES,
@@ -246,9 +248,11 @@ class Estimate:
             if finer > LEAST_RATIO and name in by_mesh:
                 if name in by_step:
                     by_step[name] = by_step[name] / shorter**p
-                by_mesh[name] = self._mesh_error(name, change, by_step.get(name), before)
+                shown = self._mesh_error(name, change, by_step.get(name), before)
+                by_mesh[name] = blended(shown, by_mesh[name] / finer**p, finer, p)
             elif shorter > LEAST_RATIO:
-                by_step[name] = change / (shorter**p - 1.0)
+                shown = change / (shorter**p - 1.0)
+                by_step[name] = blended(shown, by_step[name] / shorter**p, shorter, p) if name in by_step else shown
 
     @property
     def not_converged(self) -> dict[str, float]:
@@ -324,19 +328,23 @@ class Estimate:
 
     def _causes(self, name: str, quantity: str, a: int, b: int) -> dict[str, np.ndarray]:
         """Magnitudes by cause of the outputs from number a to b; name: of the output, empty if it is not compared."""
-        by_step, by_mesh = self._signed(name, a, b) if name else (None, None)
+        before, after = max(a - 1, 0), min(b + 1, self._count)
+        by_step, by_mesh = self._signed(name, before, after) if name else (None, None)
         model, out = self._model_error(quantity, a, b), dict[str, np.ndarray]()
         if model is not None:
             out["model"] = model
         if by_mesh is not None:
-            out["mesh"] = total = magnitude(by_mesh, name)
+            found = {"mesh": magnitude(by_mesh, name)}
+            total = found["mesh"]
             if by_step is not None:
-                out["time"] = magnitude(by_step, name)
-                total = total + out["time"]
+                found["time"] = magnitude(by_step, name)
+                total = total + found["time"]
                 if self.cancels:
                     both = magnitude(by_mesh + by_step, name)
                     total = SAFETY * ((1.0 - OF_SIZES) * both + OF_SIZES * total)
-            out["total"] = total + (model if model is not None else 0.0)
+            for cause, error in (found | {"total": total}).items():
+                out[cause] = with_neighbours(error, a - before, b - before, starts=a == 0)
+            out["total"] = out["total"] + (model if model is not None else 0.0)
         return out
 
     def checkpoint(self) -> Tree:

@@ -121,6 +121,35 @@ def at_all_outputs(error: np.ndarray, known: np.ndarray, a: int, b: int) -> np.n
     return np.asarray(between)
 
 
+def blended(shown: np.ndarray, expected: np.ndarray, finer: float, p: float) -> np.ndarray:
+    """Errors of a run that is so many times finer than the one before: as their difference shows, and as expected from
+
+    the errors of that one.  Of a run that is hardly finer the first would be mostly what else differs between the two,
+    such as when zones change, times 1/(finer^p - 1): it counts as far as that is no more than in the first estimate.
+    But no error is smaller than the difference.
+    """
+    part = (finer**p - 1.0) / (COARSER**p - 1.0)
+    if part >= 1.0:
+        return shown
+    found, least = part * shown + (1.0 - part) * expected, min(1.0, finer**p - 1.0) * shown
+    return np.where(np.abs(found) < np.abs(least), least, found)
+
+
+def with_neighbours(error: np.ndarray, first: int, last: int, starts: bool) -> np.ndarray:
+    """Sizes (n, ...) of errors: of the outputs from first to last the largest of each and of those beside it.
+
+    Errors of a motion swing about nothing, and estimates do not swing quite as they do: where one of the two passes
+    through nothing at an output, the other need not.  starts: the first of them is the start, which does not swing.
+    """
+    out, kept = error[first:last].copy(), error[first].copy()
+    for k in (-1, 1):
+        a, b = max(first, -k), min(last, len(error) - k)  # those that have one on this side
+        np.maximum(out[a - first : b - first], error[a + k : b + k], out=out[a - first : b - first])
+    if starts:
+        out[0] = kept
+    return out
+
+
 def magnitude(error: np.ndarray, name: str) -> np.ndarray:
     """Of vectors their length, of numbers their size."""
     return np.asarray(np.linalg.norm(error, axis=-1) if name == "position" or name in END_FORCES else np.abs(error))

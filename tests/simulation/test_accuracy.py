@@ -180,6 +180,38 @@ def test_errors_by_mesh_and_step_add_with_their_signs(sign):
     assert total == pytest.approx(SAFETY * ((1.0 - OF_SIZES) * (0.02 + sign * 0.01) + OF_SIZES * 0.03), rel=1e-6)
 
 
+def test_where_an_error_passes_through_nothing_its_figure_is_that_beside_it():
+    """Errors that swing, known at every second output, are nothing at the fifth; the start does not swing."""
+
+    def run(fineness, steps, every=1):
+        found = sample(Resolution(fineness, 0.1, None, 1e-3), steps, 2.0, every)
+        keep = np.unique(np.append(np.arange(0, 9, every), 8))
+        swings = np.array([0.0, 0.5, 1.0, 0.5, 0.0, 0.5, 1.0, 0.5, 0.0])[keep]
+        found.values["position"][..., 2] = (0.01 / fineness**2 * swings)[:, None]
+        return found
+
+    errors = Estimate(run(1.0, 100), run(0.5, 50, 2), None, run(0.25, 25, 2)).errors
+    (found,) = (x.values.max(axis=1) for x in errors.blocks() if (x.cause, x.name) == ("total", "position"))
+    assert found[0] == 0.0 and found[1:] == pytest.approx(np.full(8, 0.01), rel=1e-6)
+
+
+@pytest.mark.parametrize("finer, largest", [(1.2, 0.04), (2.0, 0.03)])
+def test_what_a_hardly_finer_run_differs_by_is_not_taken_for_its_error(finer, largest):
+    """Runs differ by 0.03 m for other reasons, too (zones change at other times), and no more than that is taken for an error.
+
+    Amplified by 1/(1.2^2 - 1) it was an error of 0.08 m, and a finer result was the less accurate one.
+    """
+    resolution = Resolution(1.0, 0.1, None, 1e-3)
+    runs = [sample(resolution, 100, 2.0), sample(resolution.coarser(2, 2), 50, 2.0, 2)]
+    estimate = Estimate(
+        *runs, sample(resolution.coarser(2, 4), 25, 2.0, 4), sample(resolution.coarser(4, 4), 25, 2.0, 4)
+    )
+    before = estimate.errors.largest("mesh", "position")
+    estimate.update(sample(replace(resolution, fineness=finer), 100, 2.0, noise=-0.03))
+    after = estimate.errors.largest("mesh", "position")
+    assert before / finer**2 <= after < largest
+
+
 def test_what_finer_runs_change_as_much_does_not_converge():
     """A peak between cells: each halving finds as much of it as the one before."""
     resolution = Resolution(1.0, 0.1, None, 1e-3)
