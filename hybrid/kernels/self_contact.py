@@ -57,6 +57,7 @@ from hybrid.kernels.self_contact_pairs import (
     STALE,
     STORED,
     TRIED,
+    TRIES,
     WIDEST,
     Contact,
     blank_contact,
@@ -306,7 +307,7 @@ def hold_points(line, contact):
     numbers = contact.numbers
     numbers[SLIP_WORK], numbers[TRIED] = 0.0, 0.0
     for k in range(contact.counts[POINTS]):
-        work, energy = hold_point(line, contact, numbers[FRICTION], contact.points[k], contact.holds[k])
+        work, energy = hold_point(line, contact, numbers[FRICTION], contact.points[k], contact.holds[k], numbers[TRIES])
         numbers[SLIP_WORK] += work
         numbers[TRIED] += energy
 
@@ -412,6 +413,7 @@ def contact_task(table):
     if phase == PREPARE:
         near = prepare(line, ends, contact, old, work.u, job.clock[NOW], job.clock[TRY_END] - job.clock[NOW])
         job.call[NEAR] = 1 if near else 0
+        numbers[TRIES] += 1.0
         if near:
             numbers[QUIET] = 0.0
         return contact.numbers[PART]

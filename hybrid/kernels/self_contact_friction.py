@@ -42,7 +42,11 @@ FOLLOWED = 4.0  # diameters that the foot of a point may go in a step without lo
 # Friction of a point of contact: force on strand p (N); direction of sliding; its stiffness (N/m); the coefficient where
 # it slides, else 0; travel along and across strand p (m).
 HELD, SLIDING, GIVES, SLIDES, TRAVEL = 0, 3, 6, 7, 8
-HOLD = 10
+# And of the iteration before in the same try: number of the try; its point, as piece and place in it, and the piece of
+# the foot; what the surfaces were shifted by (m); 1 where that has turned back, and friction is taken as viscous.
+TRY, WHO, WHOSE, BEFORE, TURNS_BACK = 10, 11, 12, 13, 16
+HOLD = 17
+SHRINKS = 0.9  # part to which a shift falls that goes to none; one that falls by less slides indeed
 # What is kept of it from step to step: piece; arc lengths of the point and of its foot (m); travel (m); spring (N/m).
 PIECE, AT, FOOT, TRAVELLED, KEPT_SPRING = 0, 1, 2, 3, 5
 GRIP = 6
@@ -142,8 +146,32 @@ def find_grip(line, contact, row):
 
 
 @inner
-def hold_point(line, contact, friction, row, hold):
-    """Friction of a point of contact at the shifts and spins contact.x; its work in the step, and its energy (J)."""
+def turns_back(row, hold, trial, slides, number):
+    """1 where the shift of a point has turned back in the iterations of a try, until it shrinks no more; keeps it.
+
+    Sliding friction has no stiffness along the shift: Newton's method goes beyond no shift at all, and back.
+    """
+    who, whose, back = row[P] + row[PLACE], row[Q], 0.0
+    if hold[TRY] == number and hold[WHO] == who and hold[WHOSE] == whose:
+        before = (hold[BEFORE], hold[BEFORE + 1], hold[BEFORE + 2])
+        back = hold[TURNS_BACK]
+        if slides:
+            if dot(trial, before) < 0.0:
+                back = 1.0
+            elif dot(trial, trial) > SHRINKS * SHRINKS * dot(before, before):
+                back = 0.0
+    hold[TRY], hold[WHO], hold[WHOSE] = number, who, whose
+    for k in range(3):
+        hold[BEFORE + k] = trial[k]
+    return back
+
+
+@inner
+def hold_point(line, contact, friction, row, hold, number):
+    """Friction of a point of contact at the shifts and spins contact.x; its work in the step, and its energy (J).
+
+    number: of the try.
+    """
     first, second = directions(contact, row)
     along, across = find_grip(line, contact, row)
     g, _ = shift_of(contact, row, contact.x)
@@ -153,6 +181,7 @@ def hold_point(line, contact, friction, row, hold):
     if spring * size > most:
         part = most / (spring * size)
         hold[GIVES], hold[SLIDES] = part * spring, friction
+    hold[TURNS_BACK] = turns_back(row, hold, trial, hold[SLIDES] > 0.0, number)
     travel = scale(part, trial)
     for k in range(3):
         hold[HELD + k] = -spring * travel[k]
@@ -177,7 +206,8 @@ def add_held_product(line, contact, k, x, out):
     gives = hold[GIVES]
     f = scale(gives, g)
     if hold[SLIDES] > 0.0:
-        f = sub(f, scale(gives * dot(t, g) + hold[SLIDES] * row[ALONG] * nearer, t))
+        along = 0.0 if hold[TURNS_BACK] > 0.0 else gives * dot(t, g)
+        f = sub(f, scale(along + hold[SLIDES] * row[ALONG] * nearer, t))
     load(line, contact, row, f, out)
 
 

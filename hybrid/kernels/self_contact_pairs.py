@@ -67,8 +67,9 @@ LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of wh
     ROLLS,  # 1 where friction turns strands about themselves; 0: nothing holds their spin, and it is left out
     FADED,  # s, time up to which SPEED has faded; nan: it has not begun
     QUIET,  # steps since the last one that was near contact
-) = range(16)
-NUMBERS = 16
+    TRIES,  # of steps so far
+) = range(17)
+NUMBERS = 17
 WATCH, COLLECT = -1, -2  # beside LIMIT and TOUCH: how near the line is to itself; keep pairs for all of a step
 POINTS, NODES, OVERFLOW, GRIPS, FRESH, PAIRS, STALE = range(7)  # of `counts`; STALE: the tree is of other positions
 COUNTS = 7
