@@ -18,6 +18,7 @@ from hybrid.simulation.api import static
 from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.system_run import static_system
+from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.reader import Result, open_result, written_result
 
 if TYPE_CHECKING:
@@ -64,8 +65,8 @@ def equilibrium(scene: Scene | System, made: Plan | SystemPlan) -> Result:
     It is looked for as `hybrid static` does, from the scene alone: from the last picture Newton's method might find
     another one, where there are several.
     """
-    memory = io.BytesIO()
     if not isinstance(scene, Scene):
+        memory = io.BytesIO()
         static_system(scene, memory, scene_text(scene))
         return open_result(memory)
     check_motions(scene)
@@ -76,8 +77,9 @@ def equilibrium(scene: Scene | System, made: Plan | SystemPlan) -> Result:
         points = min(max(sum(made.cells) + 1, LEAST_POINTS), MOST_POINTS)
         output = scene.output.model_copy(update={"points": points, "errors": False})
         scene = scene.model_copy(update={"output": output})
-    StaticCase(scene).record(first_resolution(scene), memory)
-    return written_result(memory)
+    target = MemoryTarget()
+    StaticCase(scene).record(first_resolution(scene), target)
+    return written_result(target)
 
 
 def _begin_to_compile(scene: Scene | System, compiling: Callable[[], None]) -> None:

@@ -48,6 +48,7 @@ from hybrid.simulation.restart import RemainingRun, remaining_run, remaining_sys
 from hybrid.simulation.restore import refused
 from hybrid.simulation.run_sample import RunSample
 from hybrid.simulation.static_case import StaticCase
+from hybrid.store.array_recorder import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
 from hybrid.store.named_arrays import Tree
@@ -96,7 +97,7 @@ def run(
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
     chosen = criterion is None and model_is_free(scene)  # most often rods, which need least to be compiled
     compile_beside(with_model(scene, "rod") if chosen else scene)
-    case, target = Case(scene, criterion), _target(output, overwrite)
+    case, target = Case(scene, criterion), _target(output, overwrite, wants_errors(scene))
     with locked(_path(output)), _supervised(case, progress):
         if isinstance(target, Path):
             _beside(target).unlink(missing_ok=True)  # of a run that was cut off
@@ -120,13 +121,14 @@ def static(scene: SceneLike | System, output: str | Path | None = None, *, overw
             return static_shooting(scene, output, overwrite)
     compile_beside(scene, static=True)
     case, begin = StaticCase(scene), clock.process_time()
-    target, resolution = _target(output, overwrite), first_resolution(scene)
+    target, resolution = _target(output, overwrite, wants_errors(scene)), first_resolution(scene)
     with locked(_path(output)):
         choice, resolution = _surveyed_at_rest(case, resolution)
         scene = case.scene
         if not wants_errors(scene):
             case.record(resolution, target)
             return written_result(target)
+        assert not isinstance(target, MemoryTarget)
         compute = _replacing(target, case.record, case.record)
         free = _free(scene)._replace(steps=False)
         control = ErrorController(requested_accuracy(scene), free, False, case.sample, compute, choice=choice)
@@ -183,7 +185,8 @@ def _several_lines(
     """The motion of several lines, or, with progress None, their equilibrium."""
     from hybrid.simulation.system_run import static_system
 
-    target = _target(output, overwrite)
+    target = _target(output, overwrite, True)
+    assert not isinstance(target, MemoryTarget)
     with locked(_path(output)):
         if progress is None:
             static_system(system, target, scene_text(system))
@@ -210,15 +213,13 @@ def _move_lines(
             write_system_errors(system, target, compare)
 
 
-def _compute(
-    case: Case, target: Path | io.BytesIO, source: Path | None = None, remaining: RemainingRun | None = None
-) -> None:
+def _compute(case: Case, target: Target, source: Path | None = None, remaining: RemainingRun | None = None) -> None:
     """Compute a result, and its errors if they are wanted; source, remaining: what to continue."""
     begin = clock.process_time()
     control: ErrorController | None = None
 
-    def first(resolution: Resolution, to: Path | io.BytesIO) -> RunSample:
-        if remaining is None or remaining.anew or source is None or isinstance(to, io.BytesIO):
+    def first(resolution: Resolution, to: Target) -> RunSample:
+        if remaining is None or remaining.anew or source is None or not isinstance(to, Path):
             return case.record(resolution, to, found())
         return case.resume(source, to, found())
 
@@ -237,6 +238,7 @@ def _compute(
     if not wants_errors(case.scene):
         first(_surveyed(case, resolution)[1] if remaining is None else resolution, target)
         return
+    assert not isinstance(target, MemoryTarget)
     kept = False
     case.beside_result = target if isinstance(target, Path) else None
     try:
@@ -370,11 +372,14 @@ def _path(output: str | Path | None) -> Path | None:
     return path
 
 
-def _target(output: str | Path | None, overwrite: bool) -> Path | io.BytesIO:
-    """Where the result goes; ResultError, before anything is computed, if it cannot go there."""
+def _target(output: str | Path | None, overwrite: bool, amended: bool) -> Target:
+    """Where the result goes; ResultError, before anything is computed, if it cannot go there.
+
+    amended: whether it is changed when it is complete, or has several lines: a result in memory is then that of a file.
+    """
     path = _path(output)
     if path is None:
-        return io.BytesIO()
+        return io.BytesIO() if amended else MemoryTarget()
     check_target(path, overwrite)
     return path
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 import time as clock
 from collections.abc import Callable, Sequence
@@ -56,6 +55,7 @@ from hybrid.simulation.time_loop import FORCE_COLUMNS, SAME_STOP, TimeLoop
 from hybrid.simulation.transient import Transient
 from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
+from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
 from hybrid.store.hdf5_file import is_result, open_file, opened
 from hybrid.store.memory_recorder import MemoryRecorder
@@ -103,7 +103,7 @@ class Case:
 
     # --- results --------------------------------------------------------------------------------
 
-    def record(self, resolution: Resolution, target: Path | io.BytesIO, before: Tree | None = None) -> RunSample:
+    def record(self, resolution: Resolution, target: Target, before: Tree | None = None) -> RunSample:
         """Compute the result into a file, or memory; what is to be compared of it.  before: what was found before."""
         begin = self._begin_result(resolution)
         loop, recorder, equilibrium = self.prepare(
@@ -117,8 +117,8 @@ class Case:
         return self._compared(loop.run, target, clock.process_time() - begin)
 
     def prepare(
-        self, resolution: Resolution, target: Path | io.BytesIO, kept: Tree | None = None
-    ) -> tuple[TimeLoop, Recorder, Equilibrium | None]:
+        self, resolution: Resolution, target: Target, kept: Tree | None = None
+    ) -> tuple[TimeLoop, Recorder | ArrayRecorder, Equilibrium | None]:
         """The loop of a run, its result, and the equilibrium that it starts from; kept: as `before` of `Recorder`."""
         model, equilibrium, switching = self._start(resolution)
         loop = self._loop(self.scene, model, resolution, switching, target)
@@ -132,7 +132,7 @@ class Case:
             recorder.event(0.0, 0.0, model.length, "zones fixed", ZONES_FIXED)
         return loop, recorder, equilibrium
 
-    def again(self, saved: Tree, loop: TimeLoop, target: Path | io.BytesIO, drive: Callable[[Model], None]) -> TimeLoop:
+    def again(self, saved: Tree, loop: TimeLoop, target: Target, drive: Callable[[Model], None]) -> TimeLoop:
         """The loop of a run as it was at a checkpoint of its own; drive: sets the ends of its model."""
         resolution = loop.run.resolution
         model, switching, correction = restored_parts([self.scene], resolution, saved, self.criterion)
@@ -236,11 +236,12 @@ class Case:
             detail = f"{', '.join(changed)}: other than when the run began"
             raise ResultError(f"{source} cannot go on\n    detail:   {detail}\n    try:      run its scene again")
 
-    def _compared(self, run: Transient, target: Path | io.BytesIO, cpu: float) -> RunSample:
+    def _compared(self, run: Transient, target: Target, cpu: float) -> RunSample:
         """What is to be compared of a complete result."""
         resolution, cells = run.resolution, compared_cells(run.model)
         if not wants_errors(self.scene):
             return RunSample(resolution, {}, cells, run.steps, 0.0)
+        assert not isinstance(target, MemoryTarget), "errors are written into a file"
         with open_file(target, summed=False) as file:
             model_errors = [f"{MODEL_ERRORS}{x}" for x in file.get(MODEL_ERRORS, ())]
             stored = {name: file[name] for name in (*COMPARED, *model_errors) if name in file}
@@ -354,7 +355,7 @@ class Case:
         model: Model,
         resolution: Resolution,
         switching: ZoneSwitching | None,
-        target: Path | io.BytesIO | None,
+        target: Target | None,
         correction: Correction | None = None,
         points: Floats | None = None,
         until: float | None = None,

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,8 +19,10 @@ from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import Scene
 from hybrid.simulation.envelope import Envelope
 from hybrid.solve.statics import Equilibrium
+from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.format import Field
 from hybrid.store.named_arrays import Tree
+from hybrid.store.recorder import BaseRecorder
 from hybrid.store.writer import Recorder
 
 if TYPE_CHECKING:
@@ -49,13 +49,13 @@ def result_recorder(
     scene: Scene,
     model: Model,
     observer: Observer,
-    target: Path | io.BytesIO,
+    target: Target,
     texts: Mapping[str, str],
     found: Equilibrium | SystemEquilibrium | None,
     envelope: Envelope,
     outputs: int = 0,
     before: Tree | None = None,
-) -> Recorder:
+) -> Recorder | ArrayRecorder:
     """A new result, in a file or in memory; whether a file may be replaced was asked before anything was computed.
 
     found: the equilibrium at the start; envelope: of what is computed, its values not yet known; outputs: after the
@@ -79,17 +79,24 @@ def result_recorder(
     if observer.jumps.size:
         text = "arc lengths of point loads, joints and changes of section; right/* has the values just after them"
         fixed.append((Field("right/s", "m", text, observer.jumps.shape, ("right/s",)), observer.jumps))
-    recorder = Recorder(
-        target, grid_s=observer.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
-        attributes=attributes, texts=texts, fixed=fixed, outputs=outputs + 1, overwrite=True, before=before,
-        templates=cache_folder().parent,
-    )  # fmt: skip
+    steps = STEP_FIELDS if outputs else ()
+    recorder: Recorder | ArrayRecorder
+    if isinstance(target, MemoryTarget):
+        recorder = ArrayRecorder(
+            target, grid_s=observer.s, fields=observer.fields, step_fields=steps, attributes=attributes, texts=texts,
+            fixed=fixed,
+        )  # fmt: skip
+    else:
+        recorder = Recorder(
+            target, grid_s=observer.s, fields=observer.fields, step_fields=steps, attributes=attributes, texts=texts,
+            fixed=fixed, outputs=outputs + 1, overwrite=True, before=before, templates=cache_folder().parent,
+        )  # fmt: skip
     if model.layout is not None:
         _note_neglected_bending(scene, model, recorder)
     return recorder
 
 
-def _note_neglected_bending(scene: Scene, model: Model, recorder: Recorder) -> None:
+def _note_neglected_bending(scene: Scene, model: Model, recorder: BaseRecorder) -> None:
     """Clamps and point loads in catenary zones: who wants their moment has to ask for it."""
     for s, text in _neglected_clamps(scene, model):
         recorder.event(0.0, s, s, "bending at clamp neglected", text)

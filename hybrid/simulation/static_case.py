@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import time as clock
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -34,6 +32,7 @@ from hybrid.simulation.run_sample import COMPARED, MODEL_ERRORS, RunSample, cate
 from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import POWERS
+from hybrid.store.array_recorder import Target
 
 
 class StaticCase:
@@ -42,7 +41,7 @@ class StaticCase:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
 
-    def record(self, resolution: Resolution, target: Path | io.BytesIO) -> RunSample:
+    def record(self, resolution: Resolution, target: Target) -> RunSample:
         """Compute the result into a file, or memory; what is to be compared of it."""
         begin = clock.process_time()
         model, found, switching = self._equilibrium(resolution)

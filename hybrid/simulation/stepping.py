@@ -35,6 +35,7 @@ from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
 from hybrid.store.named_arrays import pack, unpack
 from hybrid.store.reader import Result, open_result
+from hybrid.store.writer import Recorder
 
 # Of a step: a step so short is round-off of the times of others.
 SLIVER = 1e-6
@@ -86,6 +87,7 @@ class Simulation(SteppedEnds):
         except BaseException:
             self._stack.close()
             raise
+        assert isinstance(recorder, Recorder)
         self._loop.recorder = self._recorder = DeferredRecorder(recorder)
         self._driven: dict[int, DrivenEnd] = {}
         self._wound: tuple[float | None, float] | None = None  # length and rate that are set for the next step

@@ -67,6 +67,7 @@ class LineResult:
         recorder = result_recorder(
             scene, model, self.observer, io.BytesIO(), {"scene": scene_text(scene)}, found, self.envelope, outputs
         )
+        assert isinstance(recorder, Recorder)
         recorder.lay_by()
         self.recorder: Recorder | DeferredRecorder = recorder
         loaded, bodies = model.loaded_ends, scene.ends.bodies()

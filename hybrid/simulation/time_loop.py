@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import time as clock
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -32,6 +31,7 @@ from hybrid.simulation.transient import StepFailed, Transient
 from hybrid.simulation.transient_checkpoint import checkpoint, restore
 from hybrid.solve.run import Tried
 from hybrid.solve.statics import Equilibrium
+from hybrid.store.array_recorder import ArrayRecorder, Target
 from hybrid.store.memory_recorder import MemoryRecorder
 from hybrid.store.named_arrays import matched
 from hybrid.store.writer import Recorder
@@ -70,7 +70,7 @@ class TimeLoop:
         self,
         run: Transient,
         observer: Observer,
-        target: Path | io.BytesIO | None,
+        target: Target | None,
         report: Callable[[Transient, bool], None],
         interrupted: Callable[[], bool],
     ) -> None:
@@ -79,7 +79,7 @@ class TimeLoop:
         its end.
         """
         self.run, self.observer, self.target = run, observer, target
-        self.recorder: Recorder | MemoryRecorder | DeferredRecorder = MemoryRecorder(FORCE_COLUMNS)
+        self.recorder: Recorder | ArrayRecorder | MemoryRecorder | DeferredRecorder = MemoryRecorder(FORCE_COLUMNS)
         self.diagnostics = Diagnostics(run.model, run.events)
         self._report, self._interrupted = report, interrupted
         self._observed = run.model  # by the observer
@@ -371,7 +371,7 @@ class TimeLoop:
         """
         recorder = self.recorder
         self.run.events.write_to(recorder)
-        if not isinstance(recorder, Recorder):
+        if not isinstance(recorder, Recorder | ArrayRecorder):
             return
         (steps, changes), here = self._kept, (self.run.steps, self.run.changes)
         much = steps < 0 or (here[0] - steps) * self.run.model.cells >= WORK

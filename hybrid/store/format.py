@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 import h5py
 import numpy as np
@@ -29,6 +30,8 @@ CACHE = 4 * _CHUNK_BYTES
 BLOCK = 512
 # Widths of fixed texts (bytes): a kind is a word, an event a sentence or two.
 _KIND, _TEXT = "S32", "S512"
+INDEX = "index"  # description of a dimension that has no scale of its own
+_STATUS_WIDTHS = {"status": 32, "message": 2048}  # bytes
 _RESERVED = {"t", "s", "xyz", "scene", "steps", "zones", "events", "changes", "checkpoint"}
 
 
@@ -89,17 +92,29 @@ def versions() -> dict[str, str]:
     return found
 
 
+def attributes_of_format() -> dict[str, str | int]:
+    """Root attributes that are the same in all results of this version."""
+    numbers = {f"version_{package}": number for package, number in versions().items()}
+    return {"format": FORMAT, "format_version": FORMAT_VERSION, **numbers}
+
+
 def create_attributes(file: h5py.File) -> None:
     """Root attributes that are the same in all files of this version; `write_attributes` adds the others."""
-    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
-    for package, number in versions().items():
-        file.attrs[f"version_{package}"] = number
-    for name, text, width in (("status", "running", 32), ("message", "", 2048)):
+    for name, value in attributes_of_format().items():
+        file.attrs[name] = value
+    for name, width in _STATUS_WIDTHS.items():
         dtype = h5py.string_dtype("utf-8", width)  # fixed, to be overwritten by `close`
-        file.attrs.create(name, fixed_text(text, dtype), dtype=dtype)
+        file.attrs.create(name, fixed_text(status_attributes("running", "")[name], dtype), dtype=dtype)
 
 
-def write_attributes(file: h5py.File, attributes: Mapping[str, str | float | int]) -> None:
+def status_attributes(status: str, message: str) -> dict[str, str]:
+    """The attributes that say how a run ended, cut to what a file has room for."""
+    given = {"status": status, "message": message}
+    return {name: cut(given[name], width).decode() for name, width in _STATUS_WIDTHS.items()}
+
+
+def write_attributes(file: Any, attributes: Mapping[str, str | float | int]) -> None:
+    """Add attributes to those of a new result; file: of which `attrs` is a mapping."""
     file.attrs["created"] = datetime.now(UTC).isoformat(timespec="seconds")
     for name, value in attributes.items():
         if name in file.attrs:
@@ -116,8 +131,11 @@ def write_texts(file: h5py.File, texts: Mapping[str, str]) -> None:
             file.create_dataset(name, data=text, dtype=h5py.string_dtype())
 
 
-def create_scales(file: h5py.File, points: int, fields: Sequence[Field], fixed: Sequence[Field]) -> None:
-    """The datasets that do not grow: dimension scales first, then the fixed quantities; `write_fixed` gives values."""
+def scales_of(points: int, fields: Sequence[Field], fixed: Sequence[Field]) -> dict[str, Field]:
+    """Dimension scales of what does not grow, by name; ResultError where two sizes of a dimension differ.
+
+    Those with INDEX as description count from 0; `s`, and what is in `fixed`, get their values by `write_fixed`.
+    """
     grid = Field("s", "m", "unstretched arc length from the start, of the output grid", (points,), ("s",))
     scales = {"s": grid} | {f.name: f for f in fixed if f.dims == (f.name,)}
     for field in (*fields, *fixed):
@@ -125,12 +143,24 @@ def create_scales(file: h5py.File, points: int, fields: Sequence[Field], fixed: 
             if dim == "xyz":
                 axes = Field("xyz", "", "axes of the inertial frame, z up", (3,), ("xyz",), dtype="S1")
                 scales.setdefault(dim, axes)
-            known = scales.setdefault(dim, Field(dim, "", "index", (size,), (dim,), dtype="int64"))
+            known = scales.setdefault(dim, Field(dim, "", INDEX, (size,), (dim,), dtype="int64"))
             if known.shape != (size,):
                 raise ResultError(f"field '{field.name}' has {size} along {dim}, others have {known.shape[0]}")
+    return scales
+
+
+def scale_values(field: Field) -> np.ndarray:
+    """What a new dimension scale holds."""
+    if field.name == "xyz":
+        return np.array([b"x", b"y", b"z"])
+    return np.arange(field.shape[0]) if field.description == INDEX else np.zeros(field.shape, field.dtype)
+
+
+def create_scales(file: h5py.File, points: int, fields: Sequence[Field], fixed: Sequence[Field]) -> None:
+    """The datasets that do not grow: dimension scales first, then the fixed quantities; `write_fixed` gives values."""
+    scales = scales_of(points, fields, fixed)
     for name, field in scales.items():
-        values = np.arange(field.shape[0]) if field.description == "index" else np.zeros(field.shape, field.dtype)
-        data = file.create_dataset(name, data=np.array([b"x", b"y", b"z"]) if name == "xyz" else values)
+        data = file.create_dataset(name, data=scale_values(field))
         annotate(data, field.unit, field.description, field.frame)
         data.make_scale(name)
         data.dims[0].label = name
@@ -157,11 +187,15 @@ def add_fixed(file: h5py.File, fixed: Sequence[tuple[Field, np.ndarray]]) -> Non
 
 def write_fixed(file: h5py.File, grid_s: np.ndarray, fixed: Sequence[tuple[Field, np.ndarray]]) -> None:
     """The values of what does not grow: the output grid, and quantities that do not depend on time."""
+    for name, values in values_of_fixed(grid_s, fixed).items():
+        write_all(h5d.open(file.id, name.encode()), values)
+
+
+def values_of_fixed(grid_s: np.ndarray, fixed: Sequence[tuple[Field, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Checked values by name of what does not grow; ResultError."""
     if grid_s.ndim != 1 or len(grid_s) == 0 or not np.isfinite(grid_s).all() or (np.diff(grid_s) <= 0).any():
         raise ResultError("the output grid must be increasing finite arc lengths")
-    write_all(h5d.open(file.id, b"s"), grid_s)
-    for field, values in fixed:
-        write_all(h5d.open(file.id, field.name.encode()), checked(field, np.asarray(values, dtype=field.dtype)))
+    return {"s": grid_s} | {f.name: checked(f, np.asarray(values, dtype=f.dtype)) for f, values in fixed}
 
 
 def write_all(data: h5d.DatasetID, values: np.ndarray) -> None:

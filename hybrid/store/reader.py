@@ -37,16 +37,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from h5py import h5d, h5ds, h5g, h5o
 
 from hybrid.errors import ResultError
-from hybrid.store.format import plain_text
-from hybrid.store.hdf5_file import check_format, open_file
+from hybrid.store.array_recorder import MemoryTarget
+from hybrid.store.contents import Contents, FileContents
 from hybrid.store.histories import Histories
 from hybrid.store.integrity import readable
-from hybrid.store.lines import GROUP, Lines
+from hybrid.store.lines import Lines
 from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, right_of
-from hybrid.store.plain_datasets import dims_of, units_of, values_of
 from hybrid.store.records import (
     THERE,
     Attributes,
@@ -63,9 +61,6 @@ from hybrid.store.records import (
 if TYPE_CHECKING:
     import xarray
 
-TEXTS = ("scene", "changes")
-HIDDEN = ("checkpoint", GROUP)  # what is for the program alone, and results of lines
-
 
 class Result(Histories):
     """The recorded answer of one run.
@@ -74,75 +69,50 @@ class Result(Histories):
     is.  Use `refresh` to see what a running computation has added since.
     """
 
-    def __init__(self, source: str | Path | io.BytesIO, summed: bool = True, line: str = "") -> None:
+    def __init__(self, source: str | Path | io.BytesIO | MemoryTarget, summed: bool = True, line: str = "") -> None:
         """summed: as of `open_file`; line: name of a line of a result of several lines, of which alone it is then."""
         self._source, self._line = Path(source) if isinstance(source, str) else source, line
         self._open(summed)
 
     def _open(self, summed: bool = True) -> None:
-        self._file = open_file(self._source, summed)
+        source = self._source
+        if isinstance(source, MemoryTarget):
+            assert source.contents is not None, "nothing was recorded"
+            self._contents: Contents = source.contents
+        else:
+            self._contents = FileContents(source, summed, self._line)
         try:
-            with readable(self._source):
-                check_format(self._file, self._source)
-                self._root: Any = self._file[f"{GROUP}/{self._line}"] if self._line else self._file
-                self._scan()
+            with readable(source):
+                self._look()
         except BaseException:
-            self._file.close()
+            self._contents.close()
             raise
 
-    def _scan(self) -> None:
+    def _look(self) -> None:
+        contents = self._contents
         self._cache: dict[str, np.ndarray] = {}
-        self._stored: dict[str, str] = {}  # names in the file, where another version wrote it
-        data: dict[str, Any] = {}
-        groups: set[str] = set()
-
-        def visit(path: bytes) -> None:  # HDF5's own interface: objects of h5py take four times as long
-            name = path.decode()
-            if name.split("/")[0] in HIDDEN or name in TEXTS:
-                return
-            found = h5o.open(self._root.id, path)
-            if isinstance(found, h5d.DatasetID):
-                if name in OLD_NAMES:
-                    self._stored[OLD_NAMES[name]] = name
-                    name = OLD_NAMES[name]
-                data[name] = found
-            elif isinstance(found, h5g.GroupID):
-                groups.add(name)
-
-        self._root.id.links.visit(visit)
-        self.names, self._data = tuple(data), data
-        self._dims, self.units = Looked(data, dims_of), Looked(data, units_of, ALIASES)
+        data = contents.data
+        self.names, self._groups = tuple(data), contents.groups
+        self._dims, self.units = Looked(data, contents.dims_of), Looked(data, contents.units_of, ALIASES)
         # Taken once, so that everything read later shows the same moment of a file that grows.
         # t first: the zones of an output are complete before its time is.
-        scales = [n for n, each in data.items() if h5ds.is_scale(each) and self._dims[n] == (n,)]
-        self._rows = {n: self._refreshed(n).shape[0] for n in sorted(scales, key=lambda n: n != "t")}
-        self._groups = sorted(groups)
+        scales = [n for n, each in data.items() if contents.is_scale(each) and self._dims[n] == (n,)]
+        self._rows = {n: contents.length(n) for n in sorted(scales, key=lambda n: n != "t")}
         self.attributes: dict[str, Any] = Attributes(
-            {OLD_ATTRIBUTES.get(k, k): _plain(v) for k, v in self._root.attrs.items()}
+            {OLD_ATTRIBUTES.get(k, k): v for k, v in contents.attributes.items()}
         )
         table = self["zones"]
         rows = zip(*(table[k].tolist() for k in Zone._fields), strict=True)
         self.zones = ZoneHistory(table["output"], [Zone(*row) for row in rows], len(self.times))
 
-    def _refreshed(self, name: str) -> Any:
-        """A dataset of HDF5's own interface, whose length is that of now."""
-        data = self._data[name]
-        if self._file.swmr_mode:
-            data.refresh()  # HDF5 may remember it from a moment before
-        return data
-
-    def _dataset(self, name: str) -> Any:
-        self._refreshed(name)
-        return self._root[self._stored.get(name, name)]
-
     def close(self) -> None:
         """Let go of the file; what was read already stays."""
-        self._file.close()
+        self._contents.close()
 
     def refresh(self) -> Result:
         """Look at the file again, for what was added since it was opened; returns itself."""
         if isinstance(self._source, Path):
-            self._file.close()
+            self._contents.close()
             self._open()
         return self
 
@@ -175,11 +145,11 @@ class Result(Histories):
             return Columns(self, name)  # made anew: a cycle would keep all arrays until garbage is searched for
         name = self._known(name)
         if name not in self._cache:
-            if not self._file:
+            if not self._contents.is_open:
                 raise ResultError(f"'{name}' was not read before the result was closed; open the file again")
             dims, _ = self._dims[name], self.units[name]  # which stay with it when the file is closed
             with readable(self._source):
-                array = values_of(self._refreshed(name), self._rows.get(dims[0]) if dims else None)
+                array = self._contents.values(name, self._rows.get(dims[0]) if dims else None)
             if array.dtype.kind == "S":
                 array = np.char.decode(array, "utf-8", "replace")
             array.setflags(write=False)  # it is shared by everyone who asks again
@@ -203,10 +173,9 @@ class Result(Histories):
 
     def label(self, name: str) -> dict[str, str]:
         """`units`, `description` and `frame` of an array, as the file has them; empty where it has none."""
-        if not self._file:
+        if not self._contents.is_open:
             raise ResultError("the result is closed; open the file again")
-        attrs = self._dataset(self._known(name)).attrs
-        return {key: plain_text(attrs.get(key, "")) for key in ("units", "description", "frame")}
+        return self._contents.label(self._known(name))
 
     def describe(self, name: str) -> str:
         """What an array is: dimensions, unit, frame, in a sentence; of a group, what is in it."""
@@ -311,9 +280,7 @@ class Result(Histories):
     @property
     def lines(self) -> Lines:
         """The lines of a result of several lines by name, each a result of its own; of one line there are none."""
-        if self._line or not self._file or GROUP not in self._file:
-            return Lines(self, ())
-        return Lines(self, tuple(plain_text(name) for name in self._file[GROUP].attrs["order"]))
+        return Lines(self, self._contents.order if self._contents.is_open else ())
 
     def line(self, name: str) -> Result:
         """A line of a result of several lines, as a result of its own; `lines` has their names."""
@@ -341,12 +308,14 @@ class Result(Histories):
     def scene_text(self) -> str:
         """The scene that was run, as YAML text."""
         with readable(self._source):
-            return plain_text(self._root["scene"][()])
+            if not (text := self._contents.text("scene")):
+                raise KeyError("it has no scene")
+            return text
 
     @property
     def changes_text(self) -> str:
         """Scenes that held from some time on, as JSON [{"t": s, "scene": YAML}, ...]; empty if there were none."""
-        return plain_text(self._root["changes"][()]) if "changes" in self._root else ""
+        return self._contents.text("changes")
 
     @property
     def title(self) -> str:
@@ -407,7 +376,7 @@ def open_result(source: str | Path | bytes | io.BytesIO) -> Result:
     return Result(source if isinstance(source, io.BytesIO) else Path(source).expanduser().resolve())
 
 
-def written_result(source: Path | io.BytesIO) -> Result:
+def written_result(source: Path | io.BytesIO | MemoryTarget) -> Result:
     """Open a result that this process has written just now, without holding its bytes against their sum."""
     return Result(source, summed=False)
 
@@ -437,7 +406,3 @@ def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim
 def _current(name: str) -> str:
     """The name a dataset has now, from an alias or from the name an older version gave it."""
     return ALIASES.get(name) or OLD_NAMES.get(name, name)
-
-
-def _plain(value: Any) -> Any:
-    return plain_text(value) if isinstance(value, bytes) else value.item() if isinstance(value, np.generic) else value

@@ -20,7 +20,7 @@ class Table:
     Rows wait as arrays until they are written through HDF5's own interface: h5py's slices take twice as long.
     """
 
-    def __init__(self, file: h5py.Group, group: str, fields: Sequence[Field]) -> None:
+    def __init__(self, file: h5py.Group | None, group: str, fields: Sequence[Field]) -> None:
         self.fields, self._names = tuple(fields), [f"{group}/{field.name}".lstrip("/") for field in fields]
         self.move(file)
         self.scale = self._names[0] if fields else ""  # the first dataset says how many rows are complete
@@ -28,7 +28,7 @@ class Table:
         self.waiting = self.bytes_waiting = 0  # rows in them, and their bytes
         self.count = 0  # written rows
 
-    def move(self, file: h5py.Group) -> None:
+    def move(self, file: h5py.Group | None) -> None:
         """Write to the datasets of the same names of another file, or of a group of it; opened when rows come."""
         self._file: h5py.Group | None = file
         self._datasets: list[h5d.DatasetID] = []
@@ -40,6 +40,15 @@ class Table:
     def _open(self) -> None:
         if self._file is not None and not self._datasets:
             self._datasets = [h5d.open(self._file.id, name.encode()) for name in self._names]
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """The rows that wait, (n, ...) of each dataset by its name."""
+        found = {}
+        for k, (name, field) in enumerate(zip(self._names, self.fields, strict=True)):
+            parts = [block[k] for block in self._blocks]
+            one = parts[0] if len(parts) == 1 else None
+            found[name] = np.concatenate([np.zeros((0, *field.shape), field.dtype), *parts]) if one is None else one
+        return found
 
     def drop(self) -> None:
         """Forget the rows that wait."""

@@ -18,7 +18,7 @@ import pytest
 import hybrid
 from hybrid.cli.tables import zones_over_time
 from hybrid.errors import OMITTED, ZONE_EVENTS
-from hybrid.store import writer as record
+from hybrid.store import recorder as record
 
 STEP, PERIOD = 0.05, 40.0  # s: of a step, and of the coming and going of a rod
 PER_STEP = 80  # bytes of the step log a step: ten numbers

@@ -9,7 +9,7 @@ from bits import Stopping, differences, went_on
 
 import hybrid
 from hybrid.errors import OMITTED
-from hybrid.store import writer as record
+from hybrid.store import recorder as record
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Everything that a state can consist of: fixed zones, adaptive ones, friction, waves, a plane, the corrected catenary,

@@ -226,7 +226,7 @@ def test_a_running_file_can_be_read_and_survives_a_kill(tmp_path: Path) -> None:
         assert writer.stdout is not None and writer.stdout.readline() == "ready\n"
         result = open_result(path)
         before = len(result.times)
-        assert result._file.swmr_mode
+        assert result._contents._file.swmr_mode
         for _ in range(20):
             check_consistent(result)
             result.refresh()
@@ -240,7 +240,7 @@ def test_a_running_file_can_be_read_and_survives_a_kill(tmp_path: Path) -> None:
         writer.stdout.close()
     for opened in (result.refresh(), open_result(path)):
         check_consistent(opened)
-        assert not opened._file.swmr_mode
+        assert not opened._contents._file.swmr_mode
         assert opened.status == "running" and "interrupted or still running" in repr(opened)
     with recorder(path, overwrite=True):  # and a killed file can be replaced
         pass
@@ -415,7 +415,7 @@ memory = io.BytesIO()
 written(memory)
 result, unfinished = open_result(memory), recorder(io.BytesIO())
 result.me = result
-assert result._file and result.tension.shape == (4, 5)
+assert result._contents.is_open and result.tension.shape == (4, 5)
 """
     code = code.format(here=str(Path(__file__).parent))
     env = os.environ | {"PYTHONPATH": str(Path(hybrid.__file__).parents[1])}

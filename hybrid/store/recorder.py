@@ -1,0 +1,157 @@
+"""What every recorder of a result does: outputs, steps and events are checked, and wait as rows of its tables."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from math import isfinite, nan
+from types import TracebackType
+from typing import Any, Self
+
+import h5py
+import numpy as np
+
+from hybrid.errors import OMITTED, ResultError
+from hybrid.store.format import Field, unsound
+from hybrid.store.table import Table
+
+# Events of a kind that are written, of some 700 bytes each; a run that has more of them goes on, and says how many.
+MOST_OF_A_KIND = 10_000
+STATUS = ("running", "complete", "interrupted", "failed")
+
+
+class BaseRecorder:
+    """Tables of one result whose rows wait; a context manager that closes it with the right status."""
+
+    def _begin(self, file: h5py.Group | None, tables: Mapping[str, Sequence[Field]]) -> None:
+        """Tables by group; file: where their datasets are, None: in memory alone."""
+        self._tables = tables
+        self._all = tuple(Table(file, group, columns) for group, columns in tables.items())
+        self._outputs, self._steps, self._zone_rows, self._events = self._all
+        fields, step_fields = tables["/"][1:], tables["steps"]
+        self._names = {f.name for f in fields}
+        self._step_names = [f.name for f in step_fields]
+        self._finite_steps = [k for k, f in enumerate(step_fields) if not f.nan_ok]
+        self._zones: list[tuple[str, float, float]] | None = None
+        self.last = -np.inf  # time of the last output, s
+        self.files: Mapping[str, str] = {}  # digests of files that the run reads, for checkpoints
+        self._happened: Counter[str] = Counter()  # events by kind
+        self._replaced: dict[str, np.ndarray] = {}  # values of what does not grow
+
+    def _write_many_steps(self) -> None:
+        """Write rows of the log of the steps where there are many."""
+
+    def close(self, status: str = "complete", message: str = "") -> None:
+        """End the result with a status of STATUS and a message."""
+        raise NotImplementedError
+
+    def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:
+        """Append an output at time t (s), with the zones (kind, s_a, s_b) that hold then; errors as of `save_batch`."""
+        self.save_batch(np.array([t]), {name: np.asarray(x)[None] for name, x in values.items()}, zones)
+
+    def save_batch(
+        self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: Sequence[tuple[str, float, float]],
+        later: Sequence[Sequence[tuple[str, float, float]]] = (),
+    ) -> None:  # fmt: skip
+        """Append outputs at the times (nb,), s, of the fields (nb, ...), with the zones that hold in all of them, or
+
+        in the first; later: those of each of the others, where they differ.
+        The arrays are kept until they are written.  ResultError when a field is missing, unknown, of another shape, or
+        not finite; the outputs before the first that is wrong are kept.
+        """
+        if values.keys() != self._names:
+            wrong = ", ".join(sorted(values.keys() ^ self._names))
+            raise ResultError(f"the recorder was promised other fields; missing or unknown: {wrong}")
+        late = np.diff(times, prepend=self.last) > 0.0
+        good = int(np.argmin(np.append(late & np.isfinite(times), False)))  # outputs before the first wrong one
+        fields, error = self._outputs.fields[1:], ""
+        if good < len(times):
+            before = times[good - 1] if good else self.last
+            error = f"an output at t = {float(times[good])!r} s cannot follow the one at t = {float(before)!r} s"
+        for field in fields:
+            first, why = unsound(field, values[field.name], times)
+            if first < good:
+                good, error = first, why
+        if good:
+            self._keep(times[:good], [values[field.name][:good] for field in fields], [zones, *later][:good])
+        if error:
+            raise ResultError(error)
+
+    def _keep(
+        self, times: np.ndarray, columns: list[np.ndarray], zones: Sequence[Sequence[tuple[str, float, float]]]
+    ) -> None:
+        """Let outputs wait, and the zones of the first, or of each, where they are others than before."""
+        first = self._outputs.count + self._outputs.waiting
+        for k, these in enumerate(zones):
+            now = [(str(kind), float(a), float(b)) for kind, a, b in these]
+            if not all(isfinite(a) and isfinite(b) for _, a, b in now):
+                raise ResultError(f"a zone is not finite at t = {times[k]:.9g} s: {now}")
+            if now != self._zones:
+                for zone in now:
+                    self._zone_rows.add_row((times[k], first + k, *zone))
+                self._zones = now
+        self._outputs.add([times, *columns])
+        self.last = float(times[-1])
+
+    def log(self, values: Mapping[str, float | int]) -> None:
+        """Append a row to the log of the steps; errors as of `log_rows`."""
+        self.log_rows(np.array([[values[name] for name in self._step_names]], float))
+
+    def log_rows(self, rows: np.ndarray) -> None:
+        """Append rows (n, number of step fields) to the log of the steps; written with the next output or block.
+
+        ResultError when one is not finite where it has to be.
+        """
+        finite = np.isfinite(rows[:, self._finite_steps])
+        if not finite.all():
+            i, k = np.argwhere(~finite)[0]
+            name = self._step_names[self._finite_steps[k]]
+            raise ResultError(f"'{name}' of the step log is not finite: {rows[i].tolist()}")
+        self._steps.add(list(rows.T.copy()))
+        self._write_many_steps()
+
+    def event(
+        self,
+        t: float,
+        s_a: float,
+        s_b: float,
+        kind: str,
+        text: str,
+        *,
+        criterion: str = "",
+        value: float = nan,
+        threshold: float = nan,
+        energy: float = nan,
+    ) -> None:
+        """Note that something happened at time t (s) on s_a <= s <= s_b (m), and why; the rest: of changes of zones."""
+        if not (isfinite(t) and isfinite(s_a) and isfinite(s_b)):
+            raise ResultError(f"event '{kind}' is not finite: t = {t} s, s = {s_a} ... {s_b} m")
+        self._happened[kind] += 1
+        if self._happened[kind] <= MOST_OF_A_KIND:
+            self._events.add_row((t, s_a, s_b, kind, text, criterion, value, threshold, energy))
+
+    def _count_left_out(self) -> None:
+        """Of events that were too many to write: how many there were."""
+        for kind, count in self._happened.items():
+            left = count - MOST_OF_A_KIND
+            if left > 0:
+                text = f"{left} more events '{kind}' are not written, after the first {MOST_OF_A_KIND}"
+                row = (max(self.last, 0.0), 0.0, 0.0, OMITTED, text, kind, float(left), nan, nan)
+                self._events.add_row(row)
+
+    def replace(self, values: Mapping[str, np.ndarray]) -> None:
+        """Other values for quantities of `fixed`, by name; written with the next flush."""
+        self._replaced.update(values)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        if kind is None:
+            self.close()
+        elif issubclass(kind, Exception):
+            with suppress(ResultError):  # what cannot be written now, either, is not the news
+                self.close("failed", str(error) or kind.__name__)
+        else:  # Ctrl-C, or a SystemExit made of a signal
+            self.close("interrupted", "stopped from outside")

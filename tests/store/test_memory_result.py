@@ -1,0 +1,99 @@
+"""A result in memory holds the same, under the same names, as one that is written into a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.store.array_recorder import ArrayContents, ArrayRecorder, MemoryTarget
+from hybrid.store.format import Field
+from hybrid.store.reader import Result, written_result
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+Pair = tuple[Result, Result]
+
+
+@pytest.fixture(scope="module", params=["motion", "at rest"])
+def pair(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pair]:
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["time.duration=1", "output.errors=false"])
+    path = tmp_path_factory.mktemp("pair") / "x.h5"
+    compute = hybrid.run if request.param == "motion" else hybrid.static
+    with compute(scene) as memory, compute(scene, path) as file:
+        yield memory, file
+
+
+def test_the_arrays_are_the_same(pair: Pair) -> None:
+    memory, file = pair
+    assert isinstance(memory._contents, ArrayContents)
+    assert memory.names == file.names
+    for name in file.names:
+        mine, its = memory[name], file[name]
+        assert (mine.dtype, mine.shape) == (its.dtype, its.shape), name
+        if name != "steps/cpu":
+            np.testing.assert_array_equal(mine, its, name)
+
+
+def test_what_is_said_of_them_is_the_same(pair: Pair) -> None:
+    memory, file = pair
+    groups = sorted({name.split("/")[0] for name in file.names if "/" in name})
+    for name in (*file.names, *groups):
+        assert memory.describe(name) == file.describe(name)
+    for name in file.names:
+        assert (memory.dims(name), memory.label(name)) == (file.dims(name), file.label(name))
+        assert memory.units[name] == file.units[name]
+    mine, its = ({k: v for k, v in x.attributes.items() if k != "created"} for x in pair)
+    assert mine == its
+    assert set(memory.attributes) == set(file.attributes)
+    assert (memory.scene_text, memory.changes_text) == (file.scene_text, file.changes_text)
+    assert (memory.events, memory.zones[:]) == (file.events, file.zones[:])
+    assert repr(memory.mesh[0]) == repr(file.mesh[0])
+
+
+def test_closed_it_keeps_what_was_read_and_nothing_else() -> None:
+    text = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["output.errors=false"])
+    result = hybrid.static(text)
+    tension = result.tension
+    result.close()
+    assert result.tension is tension
+    with pytest.raises(hybrid.ResultError, match="was not read before the result was closed"):
+        result.position  # noqa: B018
+    with pytest.raises(hybrid.ResultError, match="closed"):
+        result.label("tension")
+
+
+def _recorder(target: MemoryTarget) -> ArrayRecorder:
+    return ArrayRecorder(
+        target, grid_s=np.array([0.0, 1.0]), fields=[Field("x", "m", "a place", (2,), ("s",))], step_fields=(),
+        attributes={"title": "t"}, texts={"scene": "a: 1"}, fixed=[(Field("k", "", "a number"), np.array(2.0))],
+    )  # fmt: skip
+
+
+def test_a_run_that_fails_says_so() -> None:
+    target = MemoryTarget()
+    with pytest.raises(ValueError, match="why"), _recorder(target) as recorder:
+        recorder.save(0.0, {"x": np.zeros(2)}, [("rod", 0.0, 1.0)])
+        raise ValueError("why")
+    result = written_result(target)
+    assert (result.status, result.message, result.x.shape) == ("failed", "why", (1, 2))
+
+
+def test_what_cannot_be_kept_is_refused() -> None:
+    recorder = _recorder(MemoryTarget())
+    with pytest.raises(hybrid.ResultError, match="not finite"):
+        recorder.save(0.0, {"x": np.array([0.0, np.nan])}, [("rod", 0.0, 1.0)])
+    recorder.replace({"k": np.zeros(3)})
+    with pytest.raises(hybrid.ResultError, match="k has shape"):
+        recorder.close()
+    with pytest.raises(hybrid.ResultError, match="increasing"):
+        ArrayRecorder(
+            MemoryTarget(), grid_s=np.array([1.0, 0.0]), fields=(), step_fields=(), attributes={}, texts={}
+        )  # fmt: skip
+    with pytest.raises(hybrid.ResultError, match="written by the recorder itself"):
+        ArrayRecorder(
+            MemoryTarget(), grid_s=np.array([0.0, 1.0]), fields=(), step_fields=(), attributes={"status": "x"},
+            texts={},
+        )  # fmt: skip
