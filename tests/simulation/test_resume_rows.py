@@ -108,7 +108,7 @@ def test_the_file_of_the_result_does_not_hold_them(tmp_path: Path, monkeypatch: 
     beside = sum(x.stat().st_size for x in rows(tmp_path))
     assert (tmp_path / "run.h5").stat().st_size > beside > 0
     with hybrid.open(tmp_path / "run.h5") as result:
-        assert result._file["checkpoint/before"].size < 10_000
+        assert result._contents._file["checkpoint/before"].size < 10_000
 
 
 def test_into_another_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
