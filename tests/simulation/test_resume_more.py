@@ -449,7 +449,8 @@ def test_home_and_links_lead_to_the_file_they_name(tmp_path, monkeypatch):
     (tmp_path / "link.h5").symlink_to("run.h5")
     hybrid.run(scene, tmp_path / "link.h5").close()
     assert (tmp_path / "link.h5").is_symlink()
-    assert {x.name for x in tmp_path.iterdir()} == {"run.h5", "link.h5"}
+    left = {x.name for x in tmp_path.iterdir()} - {".cache"}  # kernels, where no other folder is named for them
+    assert left == {"run.h5", "link.h5"}
 
 
 def test_checkpoints_are_at_the_same_places_whatever_the_clock(tmp_path, monkeypatch):
