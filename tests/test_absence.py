@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import subprocess
 import sys
 from typing import Any
@@ -249,7 +248,7 @@ def test_results_kept_in_memory_write_no_file(tmp_path: Any, monkeypatch: pytest
     monkeypatch.chdir(tmp_path)
     result = hybrid.run(scene(BARE))
     assert result.tension.size and not list(tmp_path.iterdir())
-    assert isinstance(result._source, io.BytesIO)
+    assert result.file is None
 
 
 @pytest.mark.parametrize("command", ["schema", "--help", "--version"])

@@ -63,6 +63,7 @@ class Session:
         self._answered = -1  # revision of the last one
         self._computing = 0.0  # since when (s), or 0
         self._disk, self._gone = "", 0.0
+        self._named: dict[Path, Stamp | None] = {}  # files that the scene names, as they were before it was read
         self._sent_state = ""
         self._tasks: list[asyncio.Task[None]] = []
         self._reading = asyncio.Lock()
@@ -219,15 +220,10 @@ class Session:
 
     async def _watch_named(self) -> None:
         """Look at the files that the scene names, such as motions: where one has changed there is a new picture."""
-        revision, stamps = -1, dict[Path, Stamp | None]()
         while self.document is not None:
-            if revision != self.document.revision:
-                revision = self.document.revision
-                files = named_files(self.document.text, self.document.folder)
-                stamps = {file: stamps.get(file) or stamp_of(file) for file in files}
-            now = {file: stamp_of(file) for file in stamps}
-            if now != stamps:
-                stamps = now
+            now = {file: stamp_of(file) for file in self._named}
+            if now != self._named:
+                self._named = now
                 self._wanted.set()
             await asyncio.sleep(WATCH_NAMED)
 
@@ -239,6 +235,8 @@ class Session:
             await self._wanted.wait()
             self._wanted.clear()
             revision, text = self.document.revision, self.document.text
+            # before they are read, so that no change after that is missed
+            self._named = {file: stamp_of(file) for file in named_files(text, self.document.folder)}
             if not text.strip():
                 continue
             self._computing = clock.monotonic()

@@ -256,8 +256,11 @@ def test_the_file_is_watched_and_saving_asks_where_it_was_changed(
     assert "Theirs" in file.read_text()
 
 
-def test_files_that_the_scene_names_are_watched(viewed: tuple[str, Session, Path], page: Page) -> None:
-    """A picture follows the motion file: not there, sound, and with a jump of velocity."""
+def test_files_that_the_scene_names_are_watched(
+    viewed: tuple[str, Session, Path], page: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A picture follows the motion file: not there, sound, and with a jump of velocity; soon after one another, too."""
+    monkeypatch.setattr("hybrid.live.session.WATCH_NAMED", 0.5)
     moved = SCENE.replace("{heave: {amplitude: 0.5, period: 4}, ramp: 4}", "{file: moved.csv}")
     problems = page.picture(page.edit(moved))["problems"]
     assert problems and "moved.csv" in problems[0]["text"] + problems[0]["given"]

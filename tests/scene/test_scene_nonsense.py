@@ -46,7 +46,7 @@ model: {kind: rod}
 TWISTED = """\
 cable: {sections: [{length: 10.0, mass: 1.0, bending_stiffness: 2.0, torsional_stiffness: 1.0}]}
 ends:
-  start: {kind: clamped, position: [0.0, 0.0, 0.0], tangent: [1.0, 0.0, 0.0], turns: -0.5}
+  start: {kind: clamped, position: [0.0, 0.0, 0.0], tangent: [1.0, 0.0, 0.0], turns: -0.5, bend_stiffness: 500.0}
   end: {kind: guided, tangent: [1.0, 0.0, 0.0], normal: [0.0, 0.0, 1.0], turns: 3.0}
 initial: {kind: equilibrium}
 model: {kind: rod}

@@ -12,7 +12,7 @@ import pytest
 import hybrid
 import hybrid.solve.run
 from hybrid.simulation.time_loop import TimeLoop
-from hybrid.store.writer import Recorder
+from hybrid.store.recorder import BaseRecorder
 
 ROD = {
     "length": 10.0, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e5, "bending_stiffness": 5.0,
@@ -125,13 +125,13 @@ def test_outputs_with_criteria_wait_in_the_buffer(monkeypatch: pytest.MonkeyPatc
     settings = ["time.duration=30", "output.criteria=true"]
     scene = hybrid.load_scene(Path(__file__).parents[2] / "examples" / "touchdown.yaml", settings)
     batches: list[int] = []
-    save = Recorder.save_batch
+    save = BaseRecorder.save_batch
 
-    def counted(self: Recorder, times: np.ndarray, *more: Any) -> None:
+    def counted(self: BaseRecorder, times: np.ndarray, *more: Any) -> None:
         batches.append(times.size)
         save(self, times, *more)
 
-    monkeypatch.setattr(Recorder, "save_batch", counted)
+    monkeypatch.setattr(BaseRecorder, "save_batch", counted)
     many = hybrid.run(scene)
     assert max(batches) > 20  # while lengths or bending are on their way, outputs do not wait
     monkeypatch.setattr(TimeLoop, "_may_wait", False)
