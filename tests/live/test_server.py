@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import random
 import time
@@ -14,6 +15,7 @@ pytest.importorskip("starlette", reason='not installed: pip install "hybrid-cabl
 from viewed import LINES, SCENE, Page, exchange, random_edit, served
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
+from hybrid.live.document import Document
 from hybrid.live.named_files import MOST_FILES, named_files
 from hybrid.live.pictures import picture_of
 from hybrid.live.server import LARGEST_MESSAGE
@@ -256,11 +258,8 @@ def test_the_file_is_watched_and_saving_asks_where_it_was_changed(
     assert "Theirs" in file.read_text()
 
 
-def test_files_that_the_scene_names_are_watched(
-    viewed: tuple[str, Session, Path], page: Page, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A picture follows the motion file: not there, sound, and with a jump of velocity; soon after one another, too."""
-    monkeypatch.setattr("hybrid.live.session.WATCH_NAMED", 0.5)
+def test_files_that_the_scene_names_are_watched(viewed: tuple[str, Session, Path], page: Page) -> None:
+    """A picture follows the motion file: not there, sound, and with a jump of velocity."""
     moved = SCENE.replace("{heave: {amplitude: 0.5, period: 4}, ramp: 4}", "{file: moved.csv}")
     problems = page.picture(page.edit(moved))["problems"]
     assert problems and "moved.csv" in problems[0]["text"] + problems[0]["given"]
@@ -271,6 +270,32 @@ def test_files_that_the_scene_names_are_watched(
     file.write_text(file.read_text().replace("2.0,14.0", "2.0,wrong"))
     problems = page.hear("picture")["picture"]["problems"]
     assert problems and "moved.csv" in problems[0]["text"] + problems[0]["given"]
+
+
+def test_a_file_that_changes_while_it_is_read_is_read_again(tmp_path: Path) -> None:
+    """Before anyone has looked at it for the first time, too."""
+    text, file = "motion: {file: moved.csv}\n", tmp_path / "moved.csv"
+    asked: list[bool] = []
+
+    async def read() -> None:
+        session, again = Session(Document(text, folder=tmp_path)), asyncio.Event()
+
+        async def ask(*_: object) -> bytes:
+            asked.append(file.exists())
+            file.write_text("t,x,y,z\n")
+            if len(asked) > 1:
+                again.set()
+            return b'{"problems": []}'
+
+        session.workers.ask = ask  # type: ignore[method-assign]
+        session._wanted.set()
+        tasks = [asyncio.create_task(work) for work in (session._compute(), session._watch_named())]
+        await asyncio.wait_for(again.wait(), 20.0)
+        for task in tasks:
+            task.cancel()
+
+    asyncio.run(read())
+    assert asked == [False, True]
 
 
 def test_files_are_found_in_texts_that_are_no_scenes(tmp_path: Path) -> None:
