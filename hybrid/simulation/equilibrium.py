@@ -35,8 +35,12 @@ def equilibrium_of(scene: Scene, model: Model, t: float) -> Equilibrium:
     """
     try:
         found = _without_contact(scene, model, t)
-    except ComputationError:
-        touching = with_contact(model, t, None)
+    except ComputationError as failed:
+        try:
+            touching = with_contact(model, t, None)
+        except ComputationError as too:
+            tried = "\n              ".join(x for x in (failed.detail, too.detail) if x)
+            raise ComputationError(failed.outcome, None, failed.s, tried) from None
         if touching is None:
             raise
         return touching

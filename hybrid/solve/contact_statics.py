@@ -181,7 +181,7 @@ def settled(
         found.rest()
         outcome, residual, lost = Outcome.NOT_CONVERGED, np.inf, keeps_turns(rest)
         if lost:  # and will not come back
-            raise ComputationError(Outcome.TURNS_LOST, None, None, lost)
+            raise ComputationError(Outcome.TURNS_LOST, None, _place(moving), lost)
         for _ in range(BALANCING):
             outcome, more = found.equilibrium(anchor, Limits(REACH * length, scale, MOST_ITERATIONS))
             total += more
@@ -203,7 +203,14 @@ def settled(
         path.append(f"{ROAD}: {lost or outcome.cause} ({total + iterations} iterations in all)")
         contact.contact.numbers[:] = kept
         moving.attach()
-    raise ComputationError(outcome, None, None, "\n              ".join(path))
+    raise ComputationError(outcome, None, _place(moving), "\n              ".join(path))
+
+
+def _place(job: _Job) -> float:
+    """Arc length, m, where contact is strongest; where nothing touches, of the fastest node."""
+    touch = np.abs(job.touch[0])
+    node = touch.argmax() if touch.any() else np.linalg.norm(job.state.v, axis=1).argmax()
+    return float(job.line.s[node])
 
 
 def contact_energy(line: Line, sea: Sea, ends: Ends, state: State, contact: SelfContact) -> float:
