@@ -57,8 +57,8 @@ from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
+from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.hdf5_file import is_result, open_file, opened
-from hybrid.store.memory_recorder import MemoryRecorder
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.reader import open_result, written_result
 from hybrid.store.stored_array import StoredArray
@@ -295,7 +295,7 @@ class Case:
         if self.beside_result is not None and points is None and numbers > MOST_IN_MEMORY:
             loop.recorder = RowsRecorder(rows_path(self.beside_result, rows_key(resolution)), FORCE_COLUMNS)
         found = loop.recorder
-        assert isinstance(found, MemoryRecorder)
+        assert isinstance(found, ComparisonRecorder)
         try:
             loop.begin(equilibrium)
             loop.to_the_end(until or self._duration, self._exact, self.changes)

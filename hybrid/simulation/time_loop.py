@@ -32,7 +32,7 @@ from hybrid.simulation.transient_checkpoint import checkpoint, restore
 from hybrid.solve.run import Tried
 from hybrid.solve.statics import Equilibrium
 from hybrid.store.array_recorder import ArrayRecorder, Target
-from hybrid.store.memory_recorder import MemoryRecorder
+from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.named_arrays import matched
 from hybrid.store.writer import Recorder
 
@@ -79,7 +79,9 @@ class TimeLoop:
         its end.
         """
         self.run, self.observer, self.target = run, observer, target
-        self.recorder: Recorder | ArrayRecorder | MemoryRecorder | DeferredRecorder = MemoryRecorder(FORCE_COLUMNS)
+        self.recorder: Recorder | ArrayRecorder | ComparisonRecorder | DeferredRecorder = ComparisonRecorder(
+            FORCE_COLUMNS
+        )
         self.diagnostics = Diagnostics(run.model, run.events)
         self._report, self._interrupted = report, interrupted
         self._observed = run.model  # by the observer

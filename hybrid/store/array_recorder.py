@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 from types import SimpleNamespace
@@ -45,16 +46,8 @@ class ArrayDataset:
     """One array with what it says of itself; `valid` until the result is closed."""
 
     def __init__(self, field: Field, dims: tuple[str, ...], values: np.ndarray) -> None:
+        """field: named as the array, with its table; dims: of all of the array, the rows of a table first."""
         self.field, self.dims, self.values, self.valid = field, dims, values, True
-
-    @property
-    def is_scale(self) -> bool:
-        return self.dims == (self.name,)
-
-    @property
-    def name(self) -> str:
-        """As in `Field`, with its table."""
-        return self.field.name
 
 
 class ArrayContents:
@@ -71,7 +64,7 @@ class ArrayContents:
         self.attributes, self.is_open = attributes, True
 
     def is_scale(self, data: ArrayDataset) -> bool:
-        return data.is_scale
+        return data.dims == (data.field.name,)
 
     def dims_of(self, data: ArrayDataset) -> tuple[str, ...]:
         return data.dims
@@ -149,12 +142,8 @@ class ArrayRecorder(BaseRecorder):
         for table in self._all:
             for (name, values), field in zip(table.columns().items(), table.fields, strict=True):
                 dims = (name,) if name == table.scale else (table.scale, *field.dims)
-                data[name] = ArrayDataset(_named(field, name), dims, values)
+                data[name] = ArrayDataset(replace(field, name=name), dims, values)
                 groups |= {name.split("/")[0]} if "/" in name else set()
             table.drop()
         self._attributes |= status_attributes(status, message)
         self._target.contents = ArrayContents(data, list(groups), self._attributes, self._texts)
-
-
-def _named(field: Field, name: str) -> Field:
-    return Field(name, field.unit, field.description, field.shape, field.dims, field.frame, field.nan_ok, field.dtype)

@@ -14,8 +14,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.hdf5_file import unwritable
-from hybrid.store.memory_recorder import MemoryRecorder
 from hybrid.store.named_arrays import DIGEST, Tree, matched
 
 _PIECE = 1 << 20  # numbers, or bytes, that are read at a time
@@ -66,7 +66,7 @@ class StoredRows:
         return self[:] if dtype is None else self[:].astype(dtype)
 
 
-class RowsRecorder(MemoryRecorder):
+class RowsRecorder(ComparisonRecorder):
     """A recorder whose outputs go into such a file."""
 
     def __init__(self, path: Path, columns: Sequence[int] = ()) -> None:

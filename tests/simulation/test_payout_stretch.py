@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from simulation.test_payout import clamped, exchanged, sagging
+from test_payout import clamped, exchanged, sagging
 
 import hybrid
 from hybrid.errors import SceneError

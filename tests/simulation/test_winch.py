@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from simulation.test_payout import exchanged
+from test_payout import exchanged
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError

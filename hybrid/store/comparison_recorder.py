@@ -1,4 +1,4 @@
-"""A run kept in memory without a file: what a run to estimate errors from leaves behind."""
+"""What is kept of a run to compare with: arrays of its outputs, and no result that anyone opens."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from hybrid.errors import ResultError
 
 
-class MemoryRecorder:
+class ComparisonRecorder:
     """Stands in for a `Recorder` where only arrays are wanted: outputs, events, and some columns of the step log."""
 
     def __init__(self, columns: Sequence[int] = ()) -> None:
