@@ -164,8 +164,9 @@ def profiles(
 ) -> Panel:
     """One or two quantities of the same unit along s at one output, and their range over all times; gaps at jumps.
 
-    The zones of that output are shaded, and the estimated error is a band, if the file has one. Further names after
-    the first are dashed, and left out where they would not be visible. times: when else to show the first, in grey.
+    The range is that of every step where the file has its envelope.  The zones of that output are shaded, and the
+    estimated error is a band, if the file has one. Further names after the first are dashed, and left out where they
+    would not be visible. times: when else to show the first, in grey.
     """
     names = [names] if isinstance(names, str) else list(names)
     items: list[Item] = _zones_behind(result, output)
@@ -179,12 +180,13 @@ def profiles(
     for k, (name, found) in enumerate(drawn):
         s, values = found.s, found.values * factor
         if len(values) > 1:
-            low, high = values.min(axis=0), values.max(axis=0)
-            items.append(Band(s, low, high, colour=GREY, opacity=0.28 - 0.12 * k))
-            usual = max(float(np.percentile(high, 90)), float(values[output].max()))
-            if len(drawn) == 1 and 0.0 < 10.0 * usual < high.max():  # a spike would press all else to the ground
-                bottom, top = float(low.min()) - 0.1 * usual, 1.5 * usual
-                spike = f"peak {short(high.max(), 3)} {unit} at s = {short(s[high.argmax()], 4)} m"
+            places, low, high, _ = extent(result, name)
+            low, high = low * factor, high * factor
+            items.append(Band(places, low, high, colour=GREY, opacity=0.28 - 0.12 * k))
+            usual, most = max(float(np.nanpercentile(high, 90)), float(values[output].max())), float(np.nanmax(high))
+            if len(drawn) == 1 and 0.0 < 10.0 * usual < most:  # a spike would press all else to the ground
+                bottom, top = float(np.nanmin(low)) - 0.1 * usual, 1.5 * usual
+                spike = f"peak {short(most, 3)} {unit} at s = {short(places[np.nanargmax(high)], 4)} m"
                 items.append(Text(0.03, 0.91, spike, parts="xy"))
         for n, t in enumerate(times if k == 0 else ()):
             then = values[int(np.abs(result.times - t).argmin())]

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import hybrid
 from hybrid.cli.tables import extremes_facts, extremes_rows
 from hybrid.store.reader import Result
+from hybrid.view.figure import Band
+from hybrid.view.panels import profiles
+from hybrid.view.style import prefix
 from hybrid.view.summary import Fact, attention, facts_of
 
 TETHER = """
@@ -54,6 +58,10 @@ def test_outputs_far_apart_give_the_same_facts() -> None:
         assert {k: a.values[k] for k in same} == {k: b.values[k] for k in same} and (a.t, a.s) == (b.t, b.s), key
     assert extremes_facts(few) == extremes_facts(many)
     assert few.tension.max() < 0.999 * fact(few, "tension").values["tension"]
+    panel = profiles(few, "tension")
+    (band,) = [item for item in panel.items if isinstance(item, Band)]
+    drawn, factor = np.nanmax(band.high), prefix("N", float(few.tension.max()))[0]
+    assert drawn == pytest.approx(factor * fact(few, "tension").values["tension"], rel=1e-9)
 
 
 def test_limits_are_in_the_closing_lines_and_the_report(tmp_path: Path) -> None:
