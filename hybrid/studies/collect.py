@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -90,10 +90,11 @@ def collected(result: Result, wanted: Mapping[str, Kept]) -> Collected:
     """What is wanted of a result, by name: `<name>_<take>`, or the name alone where one thing is taken."""
     kept: dict[str, tuple[Variable, Floats]] = {}
     reasons, absent = {}, ""
+    memory: dict[tuple[str, str], Any] = {}
     for key, (name, take) in names_of(wanted).items():
         try:
             of = result if wanted[name].line is None else result.line(str(wanted[name].line))
-            kept[key] = _taken(of, name, wanted[name], take)
+            kept[key] = _taken(of, name, wanted[name], take, memory)
         except (HybridError, KeyError, AttributeError) as error:
             reasons[key] = str(error).splitlines()[0]
             if not isinstance(error, NotAlwaysThere):
@@ -101,8 +102,13 @@ def collected(result: Result, wanted: Mapping[str, Kept]) -> Collected:
     return Collected(kept, reasons, absent)
 
 
-def _taken(result: Result, own: str, kept: Kept, take: str) -> tuple[Variable, Floats]:
-    """One thing that is kept of a result under the name `own`; its times and places are dimensions of that name."""
+def _taken(
+    result: Result, own: str, kept: Kept, take: str, memory: dict[tuple[str, str], Any]
+) -> tuple[Variable, Floats]:
+    """One thing that is kept of a result under the name `own`; its times and places are dimensions of that name.
+
+    memory: the history under a name and its summary, for the next thing that is taken of it.
+    """
     name, at = kept.quantity, None if kept.at is None else np.atleast_1d(np.asarray(kept.at, float))
     if take in ("max", "min") and at is None and kept.times is None and f"envelope/{name}_{take}" in result:
         values = result[f"envelope/{name}_{take}"]  # of every step
@@ -120,7 +126,8 @@ def _taken(result: Result, own: str, kept: Kept, take: str) -> tuple[Variable, F
         return Variable("", text, dims, places), damage if dims else damage[0]
     if at is not None and not lies_along(result, name):
         raise ResultError(f"'{name}' has no value at an arc length")
-    history = history_of(result, name, kept.times, at)
+    history = memory.get((own, "history")) or history_of(result, name, kept.times, at)
+    memory[own, "history"] = history
     if history.s is None and history.values.ndim > 1:
         raise ResultError(
             f"'{name}' has {history.values[0].size} values at a time, and one is kept\n    try:      end_force_end"
@@ -153,7 +160,8 @@ def _taken(result: Result, own: str, kept: Kept, take: str) -> tuple[Variable, F
     if take == "median":
         return _placed(Variable(unit, text, dims, places), moments.median_over_time(history.t, flat))
     attribute, other = OF_SUMMARY[take]
-    summary = moments.summary(history.t, flat)
+    summary = memory.get((own, "summary")) or moments.summary(history.t, flat)
+    memory[own, "summary"] = summary
     variable = Variable(unit if other is None else other, text, dims, places)
     return _placed(variable, getattr(summary, attribute))
 
