@@ -120,9 +120,7 @@ def remaining_system(
             fix = "--until T goes on beyond its end"
             raise ResultError(f"{path} is complete: there is nothing left to do\n    try:      {fix}")
         return found
-    if not (until >= reached and math.isfinite(until)):
-        fix = "the file holds everything before: hybrid.open(path).lines[name].at(t=...)"
-        raise _refused("until", f"{until:g} s", f"a time after {reached:g} s, up to which it is computed", fix)
+    _refuse_what_is_no_later_time(until, reached, "hybrid.open(path).lines[name].at(t=...)")
     data = found.model_dump(mode="json", exclude_none=True)
     data["time"]["duration"] = until
     data.setdefault("output", {})["every"] = output_interval(found)
@@ -152,13 +150,20 @@ def _found(path: Path) -> tuple[Scene, tuple[LoadChange, ...], str, Tree, Checkp
     return scene, changes, status, before, point, points
 
 
+def _refuse_what_is_no_later_time(until: float, reached: float, reading: str) -> None:
+    """SceneError if a run that has reached a time (s) cannot go on to another; reading: how what is there is read."""
+    if not math.isfinite(until):
+        raise _refused("until", f"{until:g} s", "a time in s", f"--until {2.0 * reached or 100.0:g}")
+    if until < reached:
+        expected = f"a time after {reached:g} s, up to which it is computed"
+        raise _refused("until", f"{until:g} s", expected, f"the file holds everything before: {reading}")
+
+
 def _longer(
     scene: Scene, changes: Sequence[LoadChange], until: float, reached: float
 ) -> tuple[Scene, tuple[LoadChange, ...]]:
     """The same until another time, with outputs as often as before."""
-    if not (until >= reached and math.isfinite(until)):
-        fix = "the file holds everything before: hybrid.open(path).at(t=...)"
-        raise _refused("until", f"{until:g} s", f"a time after {reached:g} s, up to which it is computed", fix)
+    _refuse_what_is_no_later_time(until, reached, "hybrid.open(path).at(t=...)")
     later = [x.t for x in changes if x.t >= until]
     if later:
         fix = "a later end; a change that was asked for cannot be taken back"
