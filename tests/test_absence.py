@@ -130,7 +130,7 @@ SCENES = {
             HYBRID,
             **WET,
         ),
-        DRAG | ADDED_MASS | MASS_DAMPING | STIFFNESS_DAMPING | ROTARY,
+        DRAG | ADDED_MASS | MASS_DAMPING | STIFFNESS_DAMPING | ROTARY | MAY_TOUCH,
     ),
 }
 each_scene = pytest.mark.parametrize(("asked", "bits"), SCENES.values(), ids=SCENES.keys())

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state import Line
-from hybrid.scene.schema import AdaptiveModel, RodModel, Scene
+from hybrid.scene.analysis import CorrectedZone
+from hybrid.scene.schema import AdaptiveModel, CatenaryModel, CorrectedModel, Scene, ZonesModel
 
 # Diameters of slack of the smallest loop: WINDOW of kernels.self_contact_pairs less OUTER of kernels.self_contact_law,
 # which a plan does not import.
@@ -30,10 +31,8 @@ def self_reach(scene: Scene) -> Reach:
     model = scene.model
     off = {
         "a section has no diameter": any(x.diameter is None for x in scene.cable.sections),
-        "catenaries that stay know no contact; `model: rod` or `model: adaptive` do": (
-            not isinstance(model, RodModel | AdaptiveModel)
-            or (isinstance(model, AdaptiveModel) and (bool(model.force_catenary) or model.correct))
-        ),
+        "catenaries that stay touch each other with contact: {self: true} alone": isinstance(model, CatenaryModel),
+        "corrected catenaries know no contact; those that are not corrected do": is_corrected(model),
         f"solver: {scene.solver} knows no contact": scene.solver != "elimination",
         "dimension: 2, and contact leads out of a plane": scene.dimension == 2,
         "line is paid out": any(getattr(end, "payout", None) is not None for end in scene.ends.both),
@@ -46,6 +45,13 @@ def self_reach(scene: Scene) -> Reach:
         return Reach(False, False, f"the slack of {max(slack, 0.0):.3g} m is less than {least:.3g} m, of a loop")
     much = "whatever its ends do" if math.isinf(slack) else f"a slack of {slack:.3g} m, and a loop takes {least:.3g} m"
     return Reach(False, True, f"from where it comes near itself: {much}; contact: {{self: false}} switches it off")
+
+
+def is_corrected(model: object) -> bool:
+    """Whether results of catenaries are corrected for bending, which knows no contact of the line with itself."""
+    if isinstance(model, ZonesModel):
+        return any(isinstance(zone, CorrectedZone) for zone in model.zones)
+    return isinstance(model, CorrectedModel) or (isinstance(model, AdaptiveModel) and model.correct)
 
 
 def no_contact(scene: Scene) -> str:

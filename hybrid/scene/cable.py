@@ -158,9 +158,9 @@ class Contact(Table):
 
     self: bool | None = Field(
         default=None,
-        description="whether parts of the cable that are no neighbours keep a diameter apart in a run; needs "
-        "model: rod or adaptive, and the diameter of every section; absent: where these are given and the cable can "
-        "reach itself, from when it comes near itself on, else parts pass through each other, and an event says where",
+        description="whether parts of the cable that are no neighbours keep a diameter apart in a run; needs the "
+        "diameter of every section; absent: where these are given, the model has rods and the cable can reach "
+        "itself, from when it comes near itself on, else parts pass through each other, and an event says where",
     )
     friction: NonNegative = Field(
         default=0.0,

@@ -242,7 +242,7 @@ def _in_a_plane(
 def _touches_itself(
     cable: Cable, contact: Contact, model: Model, solver: str, dimension: int | None
 ) -> Iterator[Finding]:
-    """Contact of the cable with itself is known between rods, in space; catenaries of zones that move become rods."""
+    """Contact of the cable with itself is computed in space, of lines that are not corrected for bending."""
     if contact.self is False and contact.friction > 0.0:
         expected = "0 or nothing, because parts of the cable do not touch each other without contact.self"
         yield Finding(("contact", "friction"), expected, "leave `self: false` out, or leave friction out")
@@ -253,16 +253,13 @@ def _touches_itself(
         if section.diameter is None:
             expected = "a number > 0, in m, which parts of the cable keep apart (contact.self)"
             yield Finding(("cable", "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
-    if not isinstance(model, RodModel | AdaptiveModel):
-        expected = "false, because contact is known between rods alone"
-        yield Finding(here, expected, "add `model: rod` or `model: adaptive`, or leave it out")
-    if isinstance(model, AdaptiveModel):
-        expected = "nothing, because contact of the cable with itself makes rods of what touches (contact.self)"
-        if model.force_catenary:
-            yield Finding(("model", "force_catenary"), expected, "leave it out, or leave contact out")
-        if model.correct:
-            expected = "false, because the correction knows no contact of the cable with itself (contact.self)"
-            yield Finding(("model", "correct"), expected, "leave it out, or leave contact out")
+    if isinstance(model, AdaptiveModel) and model.correct:
+        expected = "false, because the correction knows no contact of the cable with itself (contact.self)"
+        yield Finding(("model", "correct"), expected, "leave it out, or leave contact out")
+    zones = model.zones if isinstance(model, ZonesModel) else ()
+    if isinstance(model, CorrectedModel) or any(isinstance(zone, CorrectedZone) for zone in zones):
+        expected = "false, because the correction of catenaries knows no contact of the cable with itself"
+        yield Finding(here, expected, "write catenary in place of corrected, or leave contact out")
     if solver == "shooting":
         yield Finding(here, "false, because shooting knows no contact", "leave it out, or leave solver out")
     if dimension == 2:

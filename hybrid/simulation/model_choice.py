@@ -51,7 +51,7 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
     counts = [grading.count(0.0, model.length, resolution.fineness) for grading in gradings.values()]
     lengths = rod_cells(moving, model.cable, demand.s, gradings["adaptive"])
     parts = resolution.fineness * float(np.trapezoid(1.0 / lengths, demand.s))
-    near = "it comes near itself, and catenaries that stay know no contact" if case.came_near_itself else ""
+    near = "it comes near itself, and contact of catenaries alone is not asked for" if case.came_near_itself else ""
     why_not = structural(scene, model.cable) or near or no_catenary(found, demand.s)
     share = rod_share(model, demand, found)
     rods, catenaries, base = counts

@@ -63,7 +63,7 @@ def least_bending(model: Model) -> Floats:
     return np.asarray(model.cable.B[model.cable.piece(0.5 * (s[:-1] + s[1:])), :2].min(axis=1))
 
 
-REMEDY = "contact: {self: true} does in a run of rods, or of zones that move"
+REMEDY = "contact: {self: true} does, of catenaries that are not corrected for bending too"
 
 
 def meeting_text(s: float, other: float, distance: float, width: float, dt: float, why: str) -> str:

@@ -272,6 +272,29 @@ def test_it_resumes_bit_for_bit_with_zones_that_move(tmp_path: Path, monkeypatch
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
+LEGS = {"zones": [{"catenary": 3.0}, {"rod": 2.0}, {"catenary": 3.0}]}
+
+
+@pytest.mark.parametrize("asked", [True, None])
+def test_fixed_zones_touch_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: bool | None) -> None:
+    """The legs of a U, catenaries whose bend between them is rod; against rods, and resumed."""
+    contact = {"friction": 0.3} | ({"self": True} if asked else {})
+    scene, stopping = hybrid.validate_scene(closing(LEGS, mesh={"cells": 160}, contact=contact)), Stopping(monkeypatch)
+    result = hybrid.run(scene, tmp_path / "whole.h5", progress=stopping)
+    kinds = {event.kind for event in result.events}
+    assert "line meets itself" not in kinds and "line touches itself" in kinds
+    assert result["energy/self_contact"].any() and float(result["self_distance/distance"]) > 0.85 * WIDTH
+    put_in = np.abs(result["work/end"]).max() + np.ptp(result["energy/potential"])
+    assert result["work/scheme"].max() < 1e-3 * put_in
+    if not asked:
+        return
+    rods = hybrid.run(hybrid.validate_scene(closing("rod", mesh={"cells": 160})))
+    assert np.linalg.norm(result["position"] - rods["position"], axis=2).max() < 1e-3 * 8.0
+    assert result["energy/self_contact"].max() == pytest.approx(rods["energy/self_contact"].max(), rel=0.3)
+    assert went_on(scene, tmp_path / "run.h5", stopping, [500, 20]) == 2
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+
+
 @pytest.fixture(scope="module")
 def resting() -> tuple[dict[str, Any], hybrid.Result]:
     """A rod with three turns whose clamps are half its length apart: tables of its scene, and its equilibrium."""
@@ -347,11 +370,10 @@ def test_a_strand_lies_on_another_on_a_seabed() -> None:
 @pytest.mark.parametrize(
     "model",
     [
-        "catenary", "corrected", {"kind": "adaptive", "correct": True},
-        {"kind": "adaptive", "force_catenary": [[1.0, 2.0]]}, {"zones": [{"rod": 4.0}, {"catenary": 4.0}]},
+        "corrected", {"kind": "adaptive", "correct": True}, {"zones": [{"rod": 4.0}, {"corrected": 4.0}]},
     ],
 )  # fmt: skip
-def test_catenaries_that_stay_are_refused(model: Any) -> None:
+def test_corrected_catenaries_are_refused(model: Any) -> None:
     with pytest.raises(hybrid.SceneError, match=r"contact"):
         hybrid.validate_scene(closing(model))
 
