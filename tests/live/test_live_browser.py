@@ -192,9 +192,11 @@ def hammer(browser: Any, scene: Path, count: int, seed: int) -> None:
         visit.context.close()
 
 
-@pytest.mark.slow
-def test_a_thousand_random_edits_leave_the_page_alive(browser: Any, scene: Path) -> None:
-    hammer(browser, scene, 1000, 4)
+@pytest.mark.parametrize(
+    "many", [pytest.param(200, marks=pytest.mark.slow), pytest.param(1000, marks=pytest.mark.bench)]
+)
+def test_random_edits_leave_the_page_alive(browser: Any, scene: Path, many: int) -> None:
+    hammer(browser, scene, many, 4)
 
 
 @pytest.mark.slow

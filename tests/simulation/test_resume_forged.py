@@ -61,17 +61,17 @@ def test_a_checkpoint_of_other_content_is_refused_or_resumed(good: Path) -> None
 
 @pytest.mark.parametrize(
     "many",
-    [pytest.param(800, marks=pytest.mark.slow), pytest.param(3000, marks=pytest.mark.bench)],  # 6 minutes
+    [pytest.param(200, marks=pytest.mark.slow), pytest.param(3000, marks=pytest.mark.bench)],  # 6 minutes
 )
 def test_many_checkpoints_of_other_content(many: int, good: Path) -> None:
-    """The first 800 of 3000 that are drawn from one distribution, as are the 120 above, on every change."""
+    """The first 200 of 3000 that are drawn from one distribution, as are the 120 above, on every change."""
     count = forgeries(good, 2000, 2000 + many)
     assert count["refused"] > 2 * many // 3 and count["resumed"] > many // 30
 
 
 @pytest.mark.parametrize(
     "many",
-    [pytest.param(200, marks=pytest.mark.slow), pytest.param(600, marks=pytest.mark.bench)],  # 3 minutes each
+    [pytest.param(60, marks=pytest.mark.slow), pytest.param(600, marks=pytest.mark.bench)],  # 3 minutes each
 )
 @pytest.mark.parametrize("name", ["laying", "touchdown"])
 def test_checkpoints_of_adaptive_runs(name: str, many: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -98,7 +98,7 @@ def kills(name: str, count: int, folder: Path, seed: int) -> dict[str, int]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_some_kills(name, tmp_path):
-    went = kills(name, 4, tmp_path, 1)
+    went = kills(name, 2, tmp_path, 1)
     assert went["opened"] == went["killed"] - went["before there was a file"]
     assert went["steps times cells recomputed"] <= 2 * WORK
 
