@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import hybrid
 from hybrid.cli.plan_tables import contents_table
-from hybrid.cli.tables import extremes_facts
+from hybrid.cli.tables import extremes_facts, verdict_text, verdicts_of
 from hybrid.store.limits import held_of
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def _ended(console: Console, result: Result, target: Path, plot: bool, text: str
         if plot:
             pictures.append(target.with_suffix(f".{name}.png"))
             hybrid.plot(line, pictures[-1])
-    lines = {name: extremes_facts(line) for name, line in result.lines.items()}
+    lines = {name: extremes_facts(line) | verdicts_of(line) for name, line in result.lines.items()}
     held = [x._asdict() | {"text": x.text} for x in held_of(result)]
     points, bodies = _last(result, "points"), _last(result, "bodies")
     console.events(result.events)
@@ -103,6 +103,8 @@ def _table(lines: dict[str, Any], points: dict[str, Any], bodies: dict[str, Any]
         most, least = facts["tension_max"], facts["tension_min"]
         at = f"{most['value']:.5g} N at s = {most['s']:.5g} m"
         table.add_row(f"line {name}", f"tension {least['value']:.5g} to {at}")
+        for each in facts.get("accuracy", ()):
+            table.add_row("", verdict_text(each))
     for name, facts in points.items():
         turned = f", turned by {_vector(facts['rotation'], 1e-6)} deg" if "rotation" in facts else ""
         force = f", force of the lines {_vector(facts['force'])} N" if "force" in facts else ""

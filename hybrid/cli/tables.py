@@ -5,7 +5,8 @@ rich is imported when a table is made: a command that prints JSON does without.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -164,6 +165,21 @@ def errors_facts(result: Result) -> dict[str, Any]:
         known = not kinds & {*uncertain, "several equilibria", "implausible"}
         found["met"] = "accuracy missed" not in kinds and (known or None)
     return found
+
+
+def verdicts_of(line: Result) -> dict[str, Any]:
+    """What was asked of a line of several, and whether it is met, by quantity; empty if nothing was."""
+    found = line.attributes.get("accuracy_verdicts")
+    return {"accuracy": json.loads(str(found))} if found else {}
+
+
+def verdict_text(found: Mapping[str, Any]) -> str:
+    """The same of one quantity, for people."""
+    name = str(found["quantity"]).replace("end_force_", "force at the ").replace("_", " ")
+    if found["error"] is None:
+        return f"{name}: asked, not estimated"
+    unit, word = found["unit"], {True: "met", False: "MISSED", None: "not verified, see the note"}[found["met"]]
+    return f"{name}: error {_short(found['error'])} {unit}, asked {_short(found['asked'])} {unit}: {word}"
 
 
 def errors_table(errors: dict[str, Any], result: Result) -> Any:

@@ -54,6 +54,7 @@ from hybrid.kernels.node_forces import get3
 from hybrid.kernels.powers import book_work, find_powers
 from hybrid.kernels.references import caller
 from hybrid.kernels.report import (
+    LOCAL_ERROR,
     RESIDUAL,
     RESIDUAL_NODE,
     SEABED_ENERGY,
@@ -63,6 +64,7 @@ from hybrid.kernels.report import (
 from hybrid.kernels.run import read
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
+from hybrid.kernels.step_law import REFUSED
 
 JUNCTIONS = 5
 call_solver = caller((0, 0, 0.0, 0))
@@ -231,15 +233,27 @@ def keep_books(tables, joints, dt, t):
 
 
 @inner
-def end_system_step(tables, joints, floors, old, new, work, task, s, t, solved):
-    """Rates and books of a step that is `solved`; OK or why it is refused, with its line (-1: a body) and cell."""
+def error_ratio(tables, allowed):
+    """Largest error of the step over what is allowed of it, of all lines; reports are those of the step."""
+    ratio = 0.0
+    for l in range(tables.shape[0]):
+        ratio = max(ratio, read(tables[l]).work.report[LOCAL_ERROR] / allowed[l])
+    return ratio
+
+
+@inner
+def end_system_step(tables, joints, floors, allowed, old, new, work, task, s, t, solved):
+    """Rates and books of a step that is `solved`; OK or why it is refused, with its line (-1: a body) and cell.
+
+    A step whose error is too large (kernels.step_law) is none for the books: whoever asked for it takes it back.
+    """
     line, turn, cell = end_lines(tables, floors, s, task, solved)
     turned = end_bodies(old, new, work, s)
     if line >= 0:
         return (TURNED_TOO_FAR if turn > 0.0 else SLACK), line, cell
     if solved and not turned < LARGEST_STEP_TURN:
         return TURNED_TOO_FAR, -1, -1
-    if solved:
+    if solved and not error_ratio(tables, allowed) > REFUSED:
         keep_books(tables, joints, task.dt, t)
         book_bodies(work, task.dt)
     return OK, -1, -1
@@ -247,8 +261,8 @@ def end_system_step(tables, joints, floors, old, new, work, task, s, t, solved):
 
 @kernel
 def solve_system(
-    task, t, solver, tables, numbers, joints, fairleads, seats, arms, gaps, floors, first, columns, functional, answers,
-    q, net, bodies, old, new, work, S, G, A,
+    task, t, solver, tables, numbers, joints, fairleads, seats, arms, gaps, floors, allowed, first, columns, functional,
+    answers, q, net, bodies, old, new, work, S, G, A,
 ):  # fmt: skip
     """Do a task (kernels.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a system.
 
@@ -258,9 +272,10 @@ def solve_system(
     memory as float64; joints: (L, 2) points, then bodies, that start and end are joined to, -1 where they are held;
     fairleads: (L, 2, 3) m of ends at bodies, in their axes; seats: (L, 2, SEAT) frames of ends that turn with bodies
     (kernels.carried_frames); gaps: (L, 2, 3) m that ends at bodies have still to go, given for a CORRECTION, else worked
-    in as arms (L, 2, 3); floors: (L,) N, tension at or below which a catenary cell is slack; first: (L,) where columns
-    (3, .., 5), or (COLUMNS, .., 5) where an end turns, of a line begin that carries some; bodies, old, new, work: rows of
-    numbers of each body (kernels.bodies); functional: (FUNCTIONAL,), answers: (2, ANSWER), q: (COLUMNS,), net: (P, 3),
+    in as arms (L, 2, 3); floors: (L,) N, tension at or below which a catenary cell is slack; allowed: (L,) m, error of a
+    step, beyond REFUSED times of which it is not booked; first: (L,) where columns (3, .., 5), or (COLUMNS, .., 5) where
+    an end turns, of a line begin that carries some; bodies, old, new, work: rows of numbers of each body
+    (kernels.bodies); functional: (FUNCTIONAL,), answers: (2, ANSWER), q: (COLUMNS,), net: (P, 3),
     S: (HANDED - 1, HANDED), G: (2, 6, 6) and A: (m+3, m+1), m tensions and coordinates, are worked in.
     On return `net` is what does not balance at the points, N.
     Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.
@@ -335,7 +350,9 @@ def solve_system(
     if task.what == STEP or task.what == EQUILIBRIUM:
         follow_laws(tables, s)
     if task.what == STEP:
-        bad, line_of_bad, cell = end_system_step(tables, joints, floors, old, new, work, task, s, t, outcome == OK)
+        bad, line_of_bad, cell = end_system_step(
+            tables, joints, floors, allowed, old, new, work, task, s, t, outcome == OK
+        )
         if bad != OK:
             outcome, line, where = bad, line_of_bad, cell
     if task.what == ASSEMBLY and outcome == OK:

@@ -140,9 +140,10 @@ def plan_system(system: System) -> SystemPlan:
             refuse_too_much(scene)
         plans[name] = _plan(scene)
     every = list(plans.values())
+    shortest = min(every, key=lambda x: x.step)  # all have the steps in common
     return SystemPlan(
-        plans, system.free, sum(sum(x.cells) for x in every), sum(x.unknowns for x in every), every[0].steps,
-        every[0].step, sum(x.seconds for x in every),
+        plans, system.free, sum(sum(x.cells) for x in every), sum(x.unknowns for x in every), shortest.steps,
+        shortest.step, sum(x.seconds for x in every),
     )  # fmt: skip
 
 

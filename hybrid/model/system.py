@@ -24,6 +24,7 @@ from hybrid.model.clamps import (
     with_clamps,
 )
 from hybrid.model.initial_shape import dead_loads
+from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.points import Fairlead
@@ -33,6 +34,30 @@ from hybrid.scene.system import System
 MOST_ROUNDS = 100  # of Newton's method for the first places of the points
 SAME_FORCE = 1e-5  # of the largest force at a point: what may be left there of what does not balance
 FARTHEST = 0.25  # of the shortest line: how far a point goes in a round
+
+
+@dataclass(frozen=True)
+class SystemResolution:
+    """How finely several lines are computed: each its cells and the error allowed per step, all the same steps."""
+
+    lines: Mapping[str, Resolution]  # by name
+
+    @classmethod
+    def first(cls, system: System) -> SystemResolution:
+        """The resolution for the accuracy of each line, before anything is known of its errors."""
+        found = {name: first_resolution(system.scene_of(name)) for name in system.lines}
+        step = min(x.step for x in found.values())
+        return cls({name: replace(x, step=step) for name, x in found.items()})
+
+    @property
+    def one(self) -> Resolution:
+        """That of the first line, with what all have in common: step, every, shortest, and whether steps are fixed."""
+        return next(iter(self.lines.values()))
+
+    @property
+    def allowed(self) -> Floats:
+        """(L,) m, error of each line allowed per step; infinite: steps are fixed."""
+        return np.array([np.inf if x.local is None else x.local for x in self.lines.values()])
 
 
 @dataclass(frozen=True)
@@ -51,6 +76,7 @@ class SystemModel:
     seats: Floats  # (L, 2, SEAT) frames of ends that turn with a free body or point (kernels.carried_frames)
     known: Mapping[str, KnownMotion]  # of bodies that are held or moved
     scenes: Mapping[str, Scene]  # of the lines by name, with their points where the system has them
+    resolution: SystemResolution
     loose: frozenset[tuple[int, int]] = frozenset()  # ends (line, 0 or 1) that have left their points
 
     @property
@@ -84,13 +110,14 @@ class SystemModel:
 
 
 def build_system(
-    system: System, places: Floats | None = None, bodies: Floats | None = None, before: SystemModel | None = None
-) -> SystemModel:
+    system: System, places: Floats | None = None, bodies: Floats | None = None, before: SystemModel | None = None,
+    resolution: SystemResolution | None = None,
+) -> SystemModel:  # fmt: skip
     """Make the model that a system requires.
 
     places: (P, 3) m of the free points, bodies: (B, STATE) of the free bodies and the points behind them, None: where
-    the scene has them; before: a model of the same system that was made before, whose seats hold, None: as the first
-    shapes lie.
+    the scene has them; before: a model of the same system that was made before, whose seats and cells hold, None: as
+    the first shapes lie; resolution: how finely, None: as the scene asks for.
     Raises SceneError where a line cannot be meshed.
     """
     rigid = system.rigid
@@ -122,7 +149,9 @@ def build_system(
             at[name] = tuple((row[PLACE:FRAME] + row[FRAME:V].reshape(3, 3) @ np.array(place)).tolist())
             joint[name], fairleads[name] = len(free) + carriers.index(carrier), place
     seats, scenes = (None, {}) if before is None else (before.seats, before.scenes)
-    maker = _Lines(system, at, bodies, {x: joint[x] - len(free) for x in fairleads}, seats, scenes)
+    if resolution is None:
+        resolution = before.resolution if before is not None else SystemResolution.first(system)
+    maker = _Lines(system, at, bodies, {x: joint[x] - len(free) for x in fairleads}, seats, scenes, resolution)
     maker.turn_points()
     models = [maker.model(name) for name in system.lines]
     known = maker.known
@@ -133,7 +162,7 @@ def build_system(
     return SystemModel(
         tuple(system.lines), tuple(models), free, rigid, tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends),
         places, made, maker.bodies, np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
-        maker.seats, known, maker.scenes,
+        maker.seats, known, maker.scenes, resolution,
     )  # fmt: skip
 
 
@@ -142,14 +171,14 @@ class _Lines:
 
     def __init__(
         self, system: System, at: Mapping[str, Any], bodies: Floats, rows: Mapping[str, int], seats: Floats | None,
-        scenes: Mapping[str, Scene],
+        scenes: Mapping[str, Scene], resolution: SystemResolution,
     ) -> None:  # fmt: skip
         """at: places of the points that are joined; rows: of `bodies`, of the points that are carried by one; scenes:
 
         of lines, that are known.
         """
         self._system, self._at, self.bodies, self._rows = system, at, bodies.copy(), rows
-        self._given, self._names = seats, list(system.lines)
+        self._given, self._names, self._resolution = seats, list(system.lines), resolution.lines
         self.seats = np.zeros((len(self._names), 2, SEAT)) if seats is None else seats
         self._at_rigid = {end: x for p in system.rigid for end, x in directions_at_rigid(system, p).items()}
         self.scenes = dict(scenes)  # of lines, with their points where the system has them
@@ -190,7 +219,7 @@ class _Lines:
         return None if row is None else self.bodies[row, FRAME:V].reshape(3, 3)
 
     def _shape(self, name: str, directions: Mapping[str, Any] | None) -> Model:
-        return build(self._scene(name, (), directions), spare=False)
+        return build(self._scene(name, (), directions), self._resolution[name], spare=False)
 
     def _scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> Scene:
         """The scene of a line between the places of its points; of one that is carried, with the point."""
@@ -225,7 +254,7 @@ class _Lines:
         model = self._shape(name, directions)
         carried = system.carried(name)
         if carried:
-            other = build(self._scene(name, carried, directions), like=model)
+            other = build(self._scene(name, carried, directions), self._resolution[name], like=model)
             held = [k for k, end in enumerate(("start", "end")) if clamps[k] is not None]
             other = with_clamps(other, model.line, held)
             other.ends.values.frame[held] = model.ends.values.frame[held]

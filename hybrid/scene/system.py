@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from hybrid.errors import SceneError
+from hybrid.scene.accuracy import AskedAccuracy
 from hybrid.scene.analysis import CatenaryModel, Equilibrium, Mesh, Model, RodModel, Time, ZonesModel
 from hybrid.scene.attachments import Attachment
 from hybrid.scene.base import Finding, Place, Positive, Table, Text, Truth, Whole, refuse
@@ -54,6 +55,9 @@ class JoinedLine(Table):
         description="rod, catenary, or zones of both that stay; absent: rod with bending stiffness, else catenary",
     )
     mesh: Mesh | None = Field(default=None, description="how the line is cut into cells; absent: chosen")
+    accuracy: AskedAccuracy | None = Field(
+        default=None, description="how wrong the result of this line may be; absent: as `accuracy` of the system"
+    )
     break_at: LineFailure | None = Field(
         default=None,
         description="when the line breaks from the point at one of its ends, at a time or after the first step with so "
@@ -102,7 +106,7 @@ class SystemOutput(Table):
     )
     errors: Truth | None = Field(
         default=None,
-        description="estimate how wrong a motion is, by mesh and time step, by two coarser runs; absent: not",
+        description="estimate how wrong the result is, by mesh and time step; absent: where an accuracy is asked",
     )
 
 
@@ -110,8 +114,6 @@ class System(Table):
     """Several lines, the points where they meet, what acts on them, and what is asked."""
 
     instead: ClassVar[Mapping[str, str]] = {
-        "accuracy": "several lines are not refined by themselves: `output: {errors: true}` says how wrong the result "
-        "is; then a finer `mesh` of the lines, or a smaller time.step",
         "ends": "a scene of several lines has points, at which its lines end",
         "initial": "several lines start in equilibrium, found from initial_guess of points and bodies",
         "model": "each line has its own: lines.NAME.model",
@@ -130,6 +132,11 @@ class System(Table):
     )
     lines: dict[Name, JoinedLine] = Field(min_length=1, description="lines by name, each between two points")
     time: Time | None = Field(default=None, description="how long to compute; absent: statics only")
+    accuracy: AskedAccuracy | None = Field(
+        default=None,
+        description="how wrong the result of each line may be: its cells and the time steps follow from it, unless "
+        "they are given; parts are of the length, and of the largest force at the ends, of each line",
+    )
     output: SystemOutput = Field(default=SystemOutput(), description="what is kept")
 
     @property
@@ -265,11 +272,12 @@ class System(Table):
         tables: dict[str, Any] = {
             "title": f"{self.title}, line {name}" if self.title else f"line {name}", "environment": self.environment,
             "cable": line.cable, "ends": Ends(**ends), "initial": Equilibrium(), "model": line.chosen_model,
-            "mesh": line.mesh, "contact": {"self": False},
+            "mesh": line.mesh, "contact": {"self": False}, "accuracy": line.accuracy or self.accuracy,
         }  # fmt: skip
         if self.time is not None:
             tables["time"] = self.time
-        tables["output"] = {"points": self.output.points} | ({"every": self.output.every} if self.output.every else {})
+        given = {key: getattr(self.output, key) for key in ("points", "every", "errors")}
+        tables["output"] = {key: value for key, value in given.items() if value is not None}
         return Scene.model_validate(tables)
 
     def _places(self, line: JoinedLine) -> dict[str, Triple]:
@@ -290,15 +298,6 @@ class System(Table):
         if self.time is None:
             raise SceneError([missing_time(self)])
         return self.time
-
-    @model_validator(mode="after")
-    def _steps_are_fixed(self) -> System:
-        if self.time is not None and self.time.controlled:
-            expected = "a fixed step, in s, because several lines are computed together"
-            key = "step" if self.time.step is None else "tolerance"
-            fix = "add `step: ...` (s)" if key == "step" else "leave tolerance out"
-            refuse([Finding(("time", key), expected if key == "step" else f"nothing, but {expected}", fix)])
-        return self
 
     @model_validator(mode="after")
     def _lines_join_points(self) -> System:
@@ -410,8 +409,13 @@ class System(Table):
         at: Place = found.at
         if at[:1] == ("cable",):
             at = ("lines", name, *at[1:])
-        elif at[:1] in (("model",), ("mesh",)):
+        elif at[:1] in (("model",), ("mesh",)) or (at[:1] == ("accuracy",) and line.accuracy is not None):
             at = ("lines", name, *at)
+        elif at[:1] == ("accuracy",):
+            expected = f"{found.expected}, in line {name}"
+            return Finding(
+                at, expected, f"{found.fix}; or give the other lines an `accuracy` of their own", found.given
+            )
         elif at[:1] == ("ends",) and len(at) > 1:
             point = getattr(line, str(at[1]))
             rest = at[2:]

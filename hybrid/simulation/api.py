@@ -183,12 +183,15 @@ def _several_lines(
     system: System, output: str | Path | None, overwrite: bool, progress: bool | Listener | None
 ) -> Result:
     """The motion of several lines, or, with progress None, their equilibrium."""
+    from hybrid.simulation.system_accuracy import is_refined, refine_system
     from hybrid.simulation.system_run import static_system
 
     target = _target(output, overwrite, True)
     assert not isinstance(target, MemoryTarget)
     with locked(_path(output)):
-        if progress is None:
+        if progress is None and is_refined(system, moves=False):
+            refine_system(system, target, ProgressReporter(None, 1.0), lambda: False, moves=False)
+        elif progress is None:
             static_system(system, target, scene_text(system))
         else:
             _move_lines(system, target, progress)
@@ -199,10 +202,14 @@ def _move_lines(
     system: System, target: Path | io.BytesIO, progress: bool | Listener, source: Path | None = None
 ) -> None:
     """Compute the motion of several lines; source: the result to go on with."""
+    from hybrid.simulation.system_accuracy import is_refined, refine_system
     from hybrid.simulation.system_run import run_system
 
     duration = system.require_time().duration
     with interrupts() as stopped, ProgressReporter(listener_of(progress), duration) as reporter:
+        if is_refined(system, moves=True):
+            refine_system(system, target, reporter, stopped, source)
+            return
         run_system(system, target, scene_text(system), reporter, stopped, source)
         if system.output.errors:
             from hybrid.simulation.system_errors import write_system_errors

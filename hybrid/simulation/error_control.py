@@ -156,10 +156,18 @@ class ErrorController:
     def start(self, resolution: Resolution) -> tuple[RunSample, Errors | None]:
         """From a first resolution to the result and its errors, None where they cannot be estimated."""
         self.comparisons, self.first = self._compute_comparisons(resolution), resolution
-        self.next = self._forecast(resolution)
+        self.next = self.forecast_resolution(resolution)
         return self.proceed()
 
-    def _forecast(self, resolution: Resolution) -> Resolution:
+    def compare_with(self, runs: Sequence[RunSample | None], failed: str = "") -> None:
+        """Take over runs to compare with; failed: why there is not even the first."""
+        if failed or runs[0] is None:
+            text = f"no error figure: a coarser run to compare with failed: {failed}"
+            self._notes.append(("no error figure", text))
+            return
+        self.comparisons = runs[0], runs[1], runs[2]
+
+    def forecast_resolution(self, resolution: Resolution) -> Resolution:
         """How finely the first result is computed: finer, where the runs to compare with show that it must be."""
         if self.comparisons is None or self.asked is None or not self.moves or self.irregular:
             return resolution
@@ -182,25 +190,25 @@ class ErrorController:
                     raise
                 return self.without_refinement(f"a finer run failed: {str(error).splitlines()[0]}")
             if self.estimate is None:
-                if not self._first_estimate(result):
+                if not self.first_estimate(result):
                     return result, None
             else:
-                self._next_estimate(self.estimate, resolution, result)
+                self.next_estimate(self.estimate, resolution, result)
             assert self.estimate is not None
             if self.estimate.lacks_model_errors():
                 self._renew_model_errors(self.estimate, resolution)
-            self.next = self._next_resolution()
+            self.next = self.next_resolution()
             if self.next is not None and not any(kind == COSTLY_ACCURACY for kind, _ in self._notes):
                 self._notes += costly(self.runs, self.estimate.run, self.next)
         assert self.estimate is not None
         errors = self.estimate.errors
         if self.asked is not None:
-            verdict = self._verdict(self.asked)
+            verdict = self.verdict(self.asked)
             if verdict.ratio > 1.0:
-                self._note_missed(verdict)
+                self.note_missed(verdict)
         return self.estimate.run, errors
 
-    def _verdict(self, asked: RequestedAccuracy) -> Verdict:
+    def verdict(self, asked: RequestedAccuracy) -> Verdict:
         """How the errors compare with what is asked: at every instant, or of extremes and standard deviations."""
         assert self.estimate is not None
         if not self.irregular or not self.statistics:
@@ -226,7 +234,7 @@ class ErrorController:
         """Where leaving bending out makes more of the error than is asked allows, how much; else empty."""
         if self.asked is None or self.estimate is None:
             return ""
-        found = self._verdict(self.asked)
+        found = self.verdict(self.asked)
         misses = found.ratio > 1.0 and found.model > MOST_OF_MODEL
         return f"leaving bending out makes {100 * found.model:.2g} % of what is asked" if misses else ""
 
@@ -235,7 +243,7 @@ class ErrorController:
         assert self.estimate is not None
         run, errors = self.estimate.run, self.estimate.errors
         if self.asked is not None:  # else its model error was to be followed
-            verdict = self._verdict(self.asked)
+            verdict = self.verdict(self.asked)
             if verdict.ratio > 1.0:
                 self._notes.append(("accuracy missed", f"{verdict.text}; {why}"))
         return run, errors
@@ -266,7 +274,7 @@ class ErrorController:
         self.runs.append(run.cpu)
         return run
 
-    def _first_estimate(self, result: RunSample) -> bool:
+    def first_estimate(self, result: RunSample) -> bool:
         """Compare the first result with the coarser runs; False: they say nothing of its errors."""
         if self.comparisons is None:
             self._notes += result.notes
@@ -287,12 +295,12 @@ class ErrorController:
         self.estimate, self.comparisons = estimate, None
         return True
 
-    def _next_estimate(self, estimate: Estimate, resolution: Resolution, result: RunSample) -> None:
+    def next_estimate(self, estimate: Estimate, resolution: Resolution, result: RunSample) -> None:
         """Take over a finer result; where its zones are others, runs to compare with are computed anew."""
         stricter = resolution.zones < estimate.run.resolution.zones
         if stricter and estimate.differs_in_zones(result):
             self.comparisons = self._compute_comparisons(resolution)
-            if self.comparisons is not None and self._first_estimate(result):
+            if self.comparisons is not None and self.first_estimate(result):
                 return
         estimate.update(result)
         if self.statistics:
@@ -325,15 +333,15 @@ class ErrorController:
             text = f"the effect of neglected bending is that of a run before: {str(error).splitlines()[0]}"
             self._notes.append(("error uncertain", text))
 
-    def _next_resolution(self) -> Resolution | None:
+    def next_resolution(self) -> Resolution | None:
         """The resolution of the next result; None: what is asked is met, or more of it would not help."""
         assert self.estimate is not None
         if self.asked is None:
             return None
         run, before = self.estimate.run, self._ratio
-        verdict = self._verdict(self.asked)
+        verdict = self.verdict(self.asked)
         while verdict.ratio > 1.0 and self._leaves_out(verdict, verdict.ratio / before):
-            verdict, before = self._verdict(self.asked), np.inf
+            verdict, before = self.verdict(self.asked), np.inf
         self._ratio, falls = verdict.ratio, verdict.ratio / before  # 0 for the first
         self._judged += 1
         most = MOST_REFINEMENTS if self.moves else REFINEMENTS_AT_REST
@@ -386,7 +394,7 @@ class ErrorController:
         diverges = self.statistics[verdict.statistic].falls.get(name, np.nan) > DIVERGES
         return bool(diverges) or is_chance(self.statistics, verdict.statistic, name)
 
-    def _note_missed(self, verdict: Verdict) -> None:
+    def note_missed(self, verdict: Verdict) -> None:
         """Say that what was asked is not met, whose doing it is, and what to try."""
         main = max((verdict.mesh, "mesh"), (verdict.time, "time step"), (verdict.model, "model"))[1]
         free = {"mesh": self.free.mesh, "time step": self.free.steps, "model": self.free.zones}[main]

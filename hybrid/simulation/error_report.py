@@ -38,6 +38,24 @@ def write_errors(
 
     cpu: s, of all passes; done: nothing is left to be refined; else the file keeps what a refinement is resumed from.
     """
+    attributes = effort(scene, control, result, cpu)
+    fields = error_fields(result, errors) if errors is not None else []
+    names = {field.name for field in fields}
+
+    def blocks() -> Iterator[tuple[str, int, np.ndarray]]:
+        for cause, name, begin, values in errors.blocks() if errors is not None else ():
+            if f"errors/{cause}/{name}" in names:
+                yield f"errors/{cause}/{name}", begin, values
+
+    def known_then(happened: Happened) -> tuple[Mapping[str, str | float | int], list[tuple[str, str]]]:
+        found, notes = known(scene, control, result, errors, happened)
+        return attributes | found, notes
+
+    amend(target, fields, blocks(), known_then, done)
+
+
+def effort(scene: Scene, control: ErrorController, result: RunSample, cpu: float) -> dict[str, str | float | int]:
+    """What was spent on a result, and what was asked, as its attributes; cpu: s, of all passes."""
     resolution = result.resolution
     attributes: dict[str, str | float | int] = {
         "effort_fineness": resolution.fineness, "effort_runs": len(control.runs),
@@ -49,34 +67,30 @@ def write_errors(
         attributes["effort_zones"] = resolution.zones
     if control.asked is not None:
         attributes["accuracy_asked"] = control.asked.text
-    fields = _error_fields(result, errors) if errors is not None else []
-    names = {field.name for field in fields}
-
-    def blocks() -> Iterator[tuple[str, int, np.ndarray]]:
-        for cause, name, begin, values in errors.blocks() if errors is not None else ():
-            if f"errors/{cause}/{name}" in names:
-                yield f"errors/{cause}/{name}", begin, values
-
-    def known_then(happened: Happened) -> tuple[Mapping[str, str | float | int], list[tuple[str, str]]]:
-        undersampled: list[tuple[str, str]] = []
-        if errors is not None and control.moves:
-            largest = {name: errors.largest("total", name) for name in errors.fields.get("total", {})}
-            changes = [t for t, kind in happened if kind in ZONE_EVENTS]
-            undersampled = undersampled_end_forces(np.array([0.0, *output_times(scene)]), result, largest, changes)
-            if control.asked is None or control.asked.asks(END_FORCE):
-                error = max(largest.get(name, 0.0) for name in END_FORCES.values())
-                undersampled += damped_jolts(scene, result, error, control.allowed_force)
-        found = summary(errors) if errors is not None else {}
-        if control.irregular:
-            each = [summary(estimate.errors) for estimate in control.statistics.values()]
-            for name in each[0] if each else ():
-                found[name.replace("error_", "error_extremes_", 1)] = max(x[name] for x in each)
-        return attributes | found, [*dict(reversed(control.notes)).items(), *undersampled]
-
-    amend(target, fields, blocks(), known_then, done)
+    return attributes
 
 
-def _error_fields(result: RunSample, errors: Errors) -> list[Field]:
+def known(
+    scene: Scene, control: ErrorController, result: RunSample, errors: Errors | None, happened: Happened
+) -> tuple[dict[str, float], list[tuple[str, str]]]:
+    """The largest errors, as attributes, and events of a result; happened: its events until now."""
+    undersampled: list[tuple[str, str]] = []
+    if errors is not None and control.moves:
+        largest = {name: errors.largest("total", name) for name in errors.fields.get("total", {})}
+        changes = [t for t, kind in happened if kind in ZONE_EVENTS]
+        undersampled = undersampled_end_forces(np.array([0.0, *output_times(scene)]), result, largest, changes)
+        if control.asked is None or control.asked.asks(END_FORCE):
+            error = max(largest.get(name, 0.0) for name in END_FORCES.values())
+            undersampled += damped_jolts(scene, result, error, control.allowed_force)
+    found = summary(errors) if errors is not None else {}
+    if control.irregular:
+        each = [summary(estimate.errors) for estimate in control.statistics.values()]
+        for name in each[0] if each else ():
+            found[name.replace("error_", "error_extremes_", 1)] = max(x[name] for x in each)
+    return found, [*dict(reversed(control.notes)).items(), *undersampled]
+
+
+def error_fields(result: RunSample, errors: Errors) -> list[Field]:
     """Errors by cause and quantity; those by neglected bending only where the run has not written them itself."""
     return [
         Field(

@@ -56,23 +56,8 @@ def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample, skip: Collec
 
     skip: quantities that are not judged.
     """
-    bounds: list[tuple[str, str, float, float | None]] = []  # quantity, unit, bound; if a part is asked, of what
-    if asked.position is not None:
-        bounds.append(("position", "m", asked.position, None))
-    for name in END_FORCES.values():
-        if asked.tension is not None:
-            bounds.append((name, "N", asked.tension, None))
-        if asked.of_end_force is not None:
-            bounds.append((name, "N", asked.of_end_force * run.largest_end_force, run.largest_end_force))
-    for name, unit, part in (
-        ("curvature", "1/m", asked.of_curvature), ("bending_moment", "N m", asked.of_moment),
-        ("tension", "N", asked.of_tension),
-    ):  # fmt: skip
-        if part is not None and name in run.values:
-            largest = float(np.asarray(run.values[name]).max())
-            bounds.append((name, unit, part * largest, largest))
     worst, reached = Verdict(0.0, 0.0, 0.0, 0.0, "nothing is asked"), dict[str, tuple[float, str]]()
-    for name, unit, bound, most in bounds:
+    for name, unit, bound, most in bounds_of(asked, run):
         if bound <= 0.0 or name in skip:
             continue
         total = _largest(errors, "total", name)
@@ -88,6 +73,42 @@ def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample, skip: Collec
             text = f"{quantity}: error {total:.3g} {unit}, asked {bound:.3g} {unit}"
             worst = Verdict(total / bound, mesh, time, model / bound, text, name=name)
     return replace(worst, reached=", ".join(text for _, text in reached.values()))
+
+
+def bounds_of(asked: RequestedAccuracy, run: RunSample) -> list[tuple[str, str, float, float | None]]:
+    """What is asked of a run that has it: quantity, unit, bound; if a part is asked, of what."""
+    bounds: list[tuple[str, str, float, float | None]] = []
+    if asked.position is not None:
+        bounds.append(("position", "m", asked.position, None))
+    for name in END_FORCES.values():
+        if asked.tension is not None:
+            bounds.append((name, "N", asked.tension, None))
+        if asked.of_end_force is not None:
+            bounds.append((name, "N", asked.of_end_force * run.largest_end_force, run.largest_end_force))
+    for name, unit, part in (
+        ("curvature", "1/m", asked.of_curvature), ("bending_moment", "N m", asked.of_moment),
+        ("tension", "N", asked.of_tension),
+    ):  # fmt: skip
+        if part is not None and name in run.values:
+            largest = float(np.asarray(run.values[name]).max())
+            bounds.append((name, unit, part * largest, largest))
+    return bounds
+
+
+def verdicts(
+    asked: RequestedAccuracy, errors: Sequence[Errors], run: RunSample, certain: bool
+) -> list[dict[str, str | float | bool | None]]:
+    """What is asked of each quantity, its error, the largest of several, and whether that is met; None: not verified.
+
+    errors: empty where they are not known; certain: whether nothing makes them doubtful.
+    """
+    out: list[dict[str, str | float | bool | None]] = []
+    for name, unit, bound, _ in bounds_of(asked, run):
+        known = bool(errors) and all(name in x.fields.get("total", {}) for x in errors)
+        error = max(_largest(x, "total", name) for x in errors) if known else None
+        met = None if error is None else (certain or None) if error <= bound else False
+        out.append({"quantity": name, "unit": unit, "asked": bound, "error": error, "met": met})
+    return out
 
 
 def not_converged(found: Mapping[str, float], asked: RequestedAccuracy | None) -> list[tuple[str, str]]:

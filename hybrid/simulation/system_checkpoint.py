@@ -10,11 +10,13 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.kernels.report import REPORT_SIZE
+from hybrid.model.system import SystemResolution
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.system import System
-from hybrid.simulation.restore import program
+from hybrid.simulation.restore import program, refused, resolution_from, resolution_tree
 from hybrid.simulation.transient_checkpoint import FIRST_REPORT
-from hybrid.store.checkpoint import Checkpoint, digest_of
+from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
+from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import matched
 
 if TYPE_CHECKING:
@@ -31,6 +33,7 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
         "t": run.t, "steps": run.steps, "last": run.last_step, "loaded": run.loaded, "leg": [*run.leg],
         "cpu": run.cpu, "dry": sorted(run.dry), "bodies": run.state.bodies, "body_work": run.solver.body_work,
         "lines": lines, "broken": [*run.failures.broken], "rest": run.rest,
+        "control": run.control.checkpoint() if run.control is not None else [],
     }  # fmt: skip
 
 
@@ -40,8 +43,13 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         if not isinstance(saved["broken"], list):
             raise ValueError("broken: numbers of what has broken were expected")
         run.failures.again(saved["broken"])
-    saved = {"broken": [], "rest": run.rest, **saved}  # an earlier program took members as at the first guess
-    template = checkpoint(run) | {"dry": None, "broken": None}
+    saved = {
+        "broken": [],
+        "rest": run.rest,
+        "control": [],
+        **saved,
+    }  # an earlier program took members as at the first guess
+    template = checkpoint(run) | {"dry": None, "broken": None, "control": None}
     saved["lines"] = of_today(saved.get("lines"), template["lines"])
     for line in template["lines"].values():
         line["report"] = np.full_like(line["report"], np.inf)  # it may have numbers that are not finite
@@ -74,6 +82,8 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
     """Be as when `checkpoint` was called, of a run with the same things broken, without a look at its form."""
     run.t, run.steps, run.last_step, run.loaded = found["t"], found["steps"], found["last"], found["loaded"]
     run.leg, run.dry, run.cpu = (found["leg"][0], found["leg"][1]), set(found["dry"]), found["cpu"]
+    if run.control is not None:
+        run.control.restore(found["control"])
     run.state.bodies[:], run.solver.body_work[:] = found["bodies"], found["body_work"]
     for line, x, work, state in zip(run.lines, run.solver.lines, run.solver.work, run.state.lines, strict=True):
         mine = found["lines"][line.name]
@@ -84,7 +94,24 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
 
 def content(run: SystemRun) -> dict[str, Any]:
     """What the writer keeps of a checkpoint."""
-    return {"program": program(), "asks": False, "resolution": {}, "state": checkpoint(run)}
+    resolution = {name: resolution_tree(x) for name, x in run.resolution.lines.items()}
+    return {"program": program(), "asks": False, "resolution": resolution, "state": checkpoint(run)}
+
+
+def kept_resolution(system: System, source: Path) -> SystemResolution:
+    """How finely a result was computed that has a checkpoint.  ResultError: it is none of this system."""
+    with opened(source) as file:
+        tree = read_checkpoint(file).resolution
+    first = SystemResolution.first(system)
+    if not tree:  # of an earlier program
+        return first
+    with refused(source):
+        if set(tree) != set(system.lines):
+            raise ValueError("resolutions of other lines")
+        found = {name: resolution_from(tree[name], system.scene_of(name)) for name in system.lines}
+        if len({(x.step, x.every, x.local is None) for x in found.values()}) > 1:
+            raise ValueError("lines with other steps")
+        return SystemResolution(found)
 
 
 def files_of(system: System) -> dict[str, str]:

@@ -26,9 +26,12 @@ from hybrid.simulation.diagnostics import REMEMBERED, Diagnostics, stretch_text
 from hybrid.simulation.envelope import Envelope, marks_of
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.result_file import result_recorder
+from hybrid.simulation.run_sample import COMPARED
+from hybrid.simulation.time_loop import FORCE_COLUMNS
 from hybrid.solve.run import no_extremes
 from hybrid.solve.system import JoinedLine, SystemTaken
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
+from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.writer import Recorder
 
 # Outputs of a line that wait for one another: quantities of all of them are computed together.
@@ -37,12 +40,12 @@ WAITING = 64
 SAME_PLACE = 1e-9
 
 
-def observer_of(scene: Scene, model: Model, moves: bool) -> Observer:
-    """What records the outputs of a line; moves: whether it does, or is in equilibrium."""
+def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | None = None) -> Observer:
+    """What records the outputs of a line; moves: whether it does, or is in equilibrium; only: quantities, None: all."""
     s, jumps = output_points(scene)
     return Observer(
-        model.line, model.sea.values, model.zones, s, moves, model.attached, jumps=jumps,
-        changes=section_changes(scene), quantities=quantities_of(scene),
+        model.line, model.sea.values, model.zones, s, moves and only is None, model.attached, only=only, jumps=jumps,
+        changes=section_changes(scene), quantities=None if only else quantities_of(scene),
     )  # fmt: skip
 
 
@@ -51,25 +54,28 @@ class LineResult:
 
     def __init__(
         self, number: int, name: str, scene: Scene, model: Model, found: SystemEquilibrium | None, state: State,
-        outputs: int,
+        outputs: int, compared: bool = False,
     ) -> None:  # fmt: skip
         """number: of the line in its system; found: the equilibrium that it starts from, None: it goes on; state: from
 
-        which displacements count; outputs: after the first, 0 of an equilibrium.
+        which displacements count; outputs: after the first, 0 of an equilibrium; compared: whether it is only to be
+        compared with, in arrays.
         """
         self.number, self.name, self.model, self.scene = number, name, model, scene
         self.events = EventLog()
         self.diagnostics = Diagnostics(model, self.events)
         self._moves = outputs > 0
-        self.observer = observer_of(scene, model, self._moves)
+        self.observer = observer_of(scene, model, self._moves, COMPARED if compared else None)
         self.envelope = Envelope(scene, model, self._moves)
         self.envelope.itself.on = False  # lines of a system are not watched for meeting themselves
-        recorder = result_recorder(
-            scene, model, self.observer, io.BytesIO(), {"scene": scene_text(scene)}, found, self.envelope, outputs
-        )
-        assert isinstance(recorder, Recorder)
-        recorder.lay_by()
-        self.recorder: Recorder | DeferredRecorder = recorder
+        self.recorder: Recorder | DeferredRecorder | ComparisonRecorder = ComparisonRecorder(FORCE_COLUMNS)
+        if not compared:
+            recorder = result_recorder(
+                scene, model, self.observer, io.BytesIO(), {"scene": scene_text(scene)}, found, self.envelope, outputs
+            )
+            assert isinstance(recorder, Recorder)
+            recorder.lay_by()
+            self.recorder = recorder
         loaded, bodies = model.loaded_ends, scene.ends.bodies()
         self._carried = [k for k, end in enumerate(("start", "end")) if end in bodies and loaded[k]]
         self.books = self._own_books(state)
@@ -166,7 +172,9 @@ class LineResult:
         if not self._moves:
             self.diagnostics.mesh(seen)
             return
-        stop = self.diagnostics.outputs(seen, values)
+        stop = None
+        if not isinstance(self.recorder, ComparisonRecorder):  # which has too little to be judged
+            stop = self.diagnostics.outputs(seen, values)
         if stop is not None:
             raise LineFailed(self.number, stop[0], float(batch.t[-1]), float(self.model.line.s[stop[1]]))
 

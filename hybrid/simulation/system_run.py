@@ -17,24 +17,33 @@ from hybrid.kernels.cache import cache_folder
 from hybrid.kernels.report import BEND, TWIST_NODE
 from hybrid.kernels.state import Floats, state_for
 from hybrid.model.plan import output_times, parts
-from hybrid.model.resolution import first_resolution
-from hybrid.model.system import build_system
+from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restore import refused
-from hybrid.simulation.system_checkpoint import check_files, content, files_of, other_program, restore
+from hybrid.simulation.system_checkpoint import (
+    check_files,
+    content,
+    files_of,
+    kept_resolution,
+    other_program,
+    restore,
+)
 from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.system_points import fields_of, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, named
+from hybrid.simulation.system_steps import StepControl
 from hybrid.simulation.time_loop import SAME_STOP, WORK, apart
 from hybrid.solve.system import SystemSolver, SystemState, SystemTaken
 from hybrid.solve.system_statics import LineFailed
 from hybrid.store.checkpoint import read_checkpoint
+from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.hdf5_file import opened
+from hybrid.store.named_arrays import Tree
 from hybrid.store.writer import Recorder
 
 # A step that fails is repeated in halves, down to this part of it.
@@ -47,21 +56,31 @@ class SystemRun:
     """One system, computed into a file or into memory."""
 
     def __init__(
-        self, system: System, target: Path | io.BytesIO, text: str, moves: bool, kept: bool = False,
-        source: Path | None = None,
+        self, system: System, target: Path | io.BytesIO | None, text: str, moves: bool, kept: bool = False,
+        source: Path | None = None, resolution: SystemResolution | None = None, found: Tree | None = None,
     ) -> None:  # fmt: skip
-        """text: the scene as YAML; moves: whether its motion is wanted, else its equilibrium under full loads; kept:
+        """target: None: the run is only to be compared with; text: the scene as YAML; moves: whether its motion is
 
-        whether a file gets checkpoints; source: the result to go on with, from its checkpoint, in place of a start.
+        wanted, else its equilibrium under full loads; kept: whether a file gets checkpoints; source: the result to go
+        on with, from its checkpoint, in place of a start; resolution: how finely, None: as the scene asks for, or the
+        checkpoint says; found: what was found before the run, for whoever goes on with its file.
         """
+        self._before = found or {}
         self.system, self.target, self.moves = system, target, moves
         self.kept = kept and isinstance(target, Path)
-        self.model = build_system(system)
+        if source is not None:
+            resolution = kept_resolution(system, source)
+        self.model = build_system(system, resolution=resolution)
+        self.resolution = self.model.resolution
+        one = self.resolution.one
+        self.control = StepControl(one) if moves and one.local is not None else None
         names = self.model.names
         guesses = system.guesses
         known = self.model.scenes
         self.scenes = [system.scene_of(name, system.carried(name), guesses, scene=known[name]) for name in names]
         self.times = output_times(self.scenes[0]) if moves else []
+        if moves and one.every > 1:  # a run to compare with has as many times fewer
+            self.times = [*self.times[one.every - 1 : -1 : one.every], self.times[-1]]
         self.found = None
         if source is None:
             self.found = equilibrium_of_system(system, self.model, 0.0 if moves else np.inf)
@@ -72,7 +91,7 @@ class SystemRun:
             self.state = SystemState(blank, np.zeros_like(self.model.body_places))
             self.start_from(self.model.body_places)
         self.lines = [
-            LineResult(k, name, scene, model, self.found, state, len(self.times))
+            LineResult(k, name, scene, model, self.found, state, len(self.times), target is None)
             for k, (name, scene, model, state) in enumerate(
                 zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
             )
@@ -86,10 +105,11 @@ class SystemRun:
         self._checked = -1  # steps at the last checkpoint
         self._between = False  # whether the state is that between two steps
         self._begin = clock.process_time()
-        if source is None:
-            self.recorder: Recorder | DeferredRecorder = self._new_recorder(text)
-        else:
+        self.recorder: Recorder | DeferredRecorder | ComparisonRecorder = ComparisonRecorder()
+        if source is not None:
             self.recorder = self._go_on(source, text)
+        elif target is not None:
+            self.recorder = self._new_recorder(text)
 
     # --- the file -----------------------------------------------------------------------------------
 
@@ -99,7 +119,7 @@ class SystemRun:
 
     def _new_recorder(self, text: str) -> Recorder:
         """The result of the points and bodies, with those of the lines in it."""
-        assert self.found is not None
+        assert self.found is not None and self.target is not None
         attributes: dict[str, str | float | int] = {
             "title": self.system.title, "cells": self.model.cells, "lines": len(self.model.names),
             "length": sum(x.length for x in self.model.models), "static_path": self.found.summary,
@@ -111,8 +131,8 @@ class SystemRun:
         recorder = Recorder(
             self.target, grid_s=np.zeros(1), fields=[*fields_of(self.system), *self.quantities.fields],
             step_fields=(), attributes=attributes, fixed=self.quantities.limits,
-            texts={"scene": text}, outputs=len(self.times) + 1, overwrite=True, before={} if self.kept else None,
-            templates=cache_folder().parent, parts=self._parts,
+            texts={"scene": text}, outputs=len(self.times) + 1, overwrite=True,
+            before=self._before if self.kept else None, templates=cache_folder().parent, parts=self._parts,
         )  # fmt: skip
         recorder.files = files_of(self.system)
         return recorder
@@ -126,13 +146,15 @@ class SystemRun:
             self.make_solver()
             with refused(source):
                 restore(self, point.state)
-                near = SAME_STOP * (self.system.require_time().step or 1.0)
+                near = SAME_STOP * self.resolution.one.step
                 if not point.t - near <= self.t <= self.system.require_time().duration + near:
                     raise ValueError(f"t = {self.t:g} s after an output at {point.t:g} s")
             self.model.load_bodies(self.t, self.solver.bodies, self.loaded)
             self._other, self._between = self.state.copy(), True
             fields = [*fields_of(self.system), *self.quantities.fields]
-            recorder = Recorder.again(file, self.target, fields, (), point, {"scene": text}, {}, (), self._parts)
+            recorder = Recorder.again(
+                file, self.target, fields, (), point, {"scene": text}, self._before, (), self._parts
+            )
         recorder.files = files_of(self.system)
         if why := other_program(point):
             recorder.event(point.t, 0.0, 0.0, OTHER_PROGRAM, why)
@@ -141,6 +163,8 @@ class SystemRun:
 
     def keep(self, last: bool = False) -> None:
         """Keep a checkpoint where one is due, by the work done, and bring the file up to date; last: it is the end."""
+        if isinstance(self.recorder, ComparisonRecorder):
+            return
         due = self._checked < 0 or last or (self.steps - self._checked) * self.model.cells >= WORK
         new = self.kept and self._between and due and self.steps != self._checked
         if not (new or self.recorder.due):
@@ -163,13 +187,14 @@ class SystemRun:
 
     def _output(self, solver: SystemSolver) -> None:
         """Record points, bodies and lines as they are."""
-        values = values_of(self.system, self.model, solver, self.state, self.t)
         seen = {
             line.name: line.state_for_output(self.t, x.ends, state, work)
             for line, x, state, work in zip(self.lines, solver.lines, self.state.lines, solver.work, strict=True)
         }
-        values |= self.quantities.values(seen, {line.name: line for line in self.lines})
-        self.recorder.save(self.t, values, [("lines", 0.0, 0.0)])
+        if self.target is not None:
+            values = values_of(self.system, self.model, solver, self.state, self.t)
+            values |= self.quantities.values(seen, {line.name: line for line in self.lines})
+            self.recorder.save(self.t, values, [("lines", 0.0, 0.0)])
         self._look_for_dry_bodies()
         for line in self.lines:
             line.output(seen[line.name])
@@ -245,6 +270,8 @@ class SystemRun:
         """A solver for the model as it is."""
         self.solver = SystemSolver(joined_lines(self.model, 0.0), len(self.model.free), self.model.body_numbers(0.0))
         self.solver.keep_books([line.books for line in self.lines])
+        if self.control is not None:
+            self.solver.allowed[:] = self.resolution.allowed
 
     def begin_motion(self) -> None:
         """Make the start ready for steps, and record it."""
@@ -268,30 +295,41 @@ class SystemRun:
         time = self.system.require_time()
         given = [*(m.ends.breaks for m in self.model.models), *(b.breaks for b in self.model.bodies)]
         self._breaks = sorted({x for each in (*given, self.failures.times) for x in each if x < time.duration})
-        return apart([*self.times, *self._breaks], self.t, time.step or time.duration)
+        return apart([*self.times, *self._breaks], self.t, self.resolution.one.step)
 
     def go_to(self, stop: float, look: Callable[[], None] = lambda: None) -> None:
-        """Steps to `stop` (s), equal ones, with what is due there; look: called every LOOK steps."""
-        time = self.system.require_time()
-        step = time.step or time.duration
-        first, done = self.leg
-        span = stop - first
-        count = parts(span, step)
-        for k in range(done, count):
+        """Steps to `stop` (s), with what is due there; look: called every LOOK steps."""
+        rho, step = self.system.require_time().rho_inf, self.resolution.one.step
+        while self.t < stop:
             self._between = False
-            self._step(stop if k == count - 1 else first + (k + 1) * span / count, time.rho_inf)
-            self.leg = (first, k + 1) if k + 1 < count else (self.t, 0)
+            self._step(self._end_of_step(stop), rho)
             if self.failures.all and self.failures.due(step):
-                self._settle(self.solver)
-                self.last_step = 0.0
+                self._restart()
                 self._other = self.state.copy()
             if self.steps % LOOK == 0:
                 self._look(self.solver)
-            if k == count - 1:
+            if self.t >= stop:
                 self._arrive(stop, step)
             self._between = True
             if self.steps % LOOK == 0:
                 look()
+
+    def _end_of_step(self, stop: float) -> float:
+        """When the next step should end (s): after equal ones up to a stop, or as their errors are."""
+        if self.control is not None:
+            return self.control.end(self.t, stop)
+        first, k = self.leg
+        count = parts(stop - first, self.resolution.one.step)
+        end = stop if k >= count - 1 else first + (k + 1) * (stop - first) / count
+        self.leg = (first, k + 1) if k + 1 < count else (stop, 0)
+        return end
+
+    def _restart(self) -> None:
+        """Loads, or what holds the lines, are others now: accelerations jump."""
+        self._settle(self.solver)
+        self.last_step = 0.0
+        if self.control is not None:
+            self.control.restart()
 
     def _arrive(self, stop: float, step: float) -> None:
         """What is due at a stop (s): other loads, and an output."""
@@ -299,8 +337,7 @@ class SystemRun:
             self.loaded = self.t
             for model in self.model.models:
                 model.ends.set_loads(self.t)
-            self._settle(self.solver)
-            self.last_step = 0.0
+            self._restart()
         if any(abs(x - stop) <= SAME_STOP * step for x in self.times):
             self._look(self.solver)
             self._output(self.solver)
@@ -330,7 +367,7 @@ class SystemRun:
 
     def _settle(self, solver: SystemSolver) -> None:
         """Accelerations and tensions that are consistent with positions, velocities and loads."""
-        step = self.system.require_time().step or 1.0
+        step = self.resolution.one.step if self.moves else 1.0
         accelerations: list[Floats] = []
         for line, model in zip(self.lines, self.model.models, strict=True):
             accelerations.append(model.ends.acceleration(self.t, 1e-3 * step))
@@ -344,8 +381,9 @@ class SystemRun:
             raise self._stopped(solver, taken, 0.0)
 
     def _step(self, end: float, rho: float) -> None:
-        """To `end` (s), in one step or in halves."""
-        solver, shortest = self.solver, SHORTEST * (end - self.t)
+        """To `end` (s), in one step or in halves; where errors choose steps, one step, which may end earlier."""
+        solver, control = self.solver, self.control
+        shortest = SHORTEST * (end - self.t) if control is None else control.shortest
         dt, repeats = end - self.t, 0
         while self.t < end:
             dt = min(dt, end - self.t)
@@ -356,12 +394,16 @@ class SystemRun:
                 line.books.velocity[:] = model.ends.velocity
             self.model.load_bodies(t, solver.bodies, self.loaded)
             self.model.stir(t, self.state.bodies, t - self.t, solver.bodies)
-            before = self.last_step or t - self.t  # a start counts as a step of fixed length does (kernels.run)
+            # a start counts as a step of fixed length does (kernels.run)
+            before = self.last_step or (t - self.t if control is None else 0.0)
             taken = solver.step(self.state, self._other, t - self.t, rho, before, t)
             if taken.outcome != Outcome.OK:
-                dt, repeats = 0.5 * dt, repeats + 1
-                if dt < shortest:
-                    raise self._stopped(solver, taken, 2.0 * dt)
+                if 0.5 * dt < shortest:
+                    raise self._stopped(solver, taken, dt)
+                dt, repeats = (0.5 * dt if control is None else control.failed(t - self.t)), repeats + 1
+                continue
+            if control is not None and (again := control.shorter(t - self.t, taken.ratio)):
+                dt, repeats = again, repeats + 1
                 continue
             self.last_step = t - self.t
             self.t, self.state, self._other = t, self._other, self.state
@@ -370,6 +412,8 @@ class SystemRun:
             for line, state, work in zip(self.lines, self.state.lines, solver.work, strict=True):
                 line.log(t, self.last_step, taken, repeats, state, work, cpu)
             repeats = 0
+            if control is not None:
+                return
 
     def _stopped(self, solver: SystemSolver, taken: SystemTaken, dt: float) -> LineFailed:
         """Why no step leads on."""
@@ -389,15 +433,25 @@ class SystemRun:
 
 
 def run_system(
-    system: System, target: Path | io.BytesIO, text: str, reporter: ProgressReporter, interrupted: Callable[[], bool],
-    source: Path | None = None, name: str = RESULT,
-) -> None:  # fmt: skip
-    """Compute the motion of a system into a file or into memory; source: what to go on with; name: of the pass."""
-    run = SystemRun(system, target, text, moves=True, kept=True, source=source)
-    reporter.begin(name, first_resolution(run.scenes[0]))
+    system: System, target: Path | io.BytesIO | None, text: str, reporter: ProgressReporter,
+    interrupted: Callable[[], bool], source: Path | None = None, name: str = RESULT,
+    resolution: SystemResolution | None = None, found: Tree | None = None,
+) -> SystemRun:  # fmt: skip
+    """Compute the motion of a system into a file, into memory, or (target None) to be compared with.
+
+    source: what to go on with; name: of the pass;
+    resolution: how finely, None: as the scene asks for; found: as of `SystemRun`.
+    """
+    run = SystemRun(system, target, text, moves=True, kept=True, source=source, resolution=resolution, found=found)
+    reporter.begin(name, run.resolution.one)
     run.record_motion(reporter, interrupted)
+    return run
 
 
-def static_system(system: System, target: Path | io.BytesIO, text: str) -> None:
-    """Compute the equilibrium of a system under full loads into a file or into memory."""
-    SystemRun(system, target, text, moves=False).record_equilibrium()
+def static_system(
+    system: System, target: Path | io.BytesIO | None, text: str, resolution: SystemResolution | None = None
+) -> SystemRun:
+    """Compute the equilibrium of a system under full loads; target, resolution: as of `run_system`."""
+    run = SystemRun(system, target, text, moves=False, resolution=resolution)
+    run.record_equilibrium()
+    return run

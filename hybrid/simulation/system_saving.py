@@ -12,6 +12,7 @@ from hybrid.model.system import SystemModel
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.system_checkpoint import checkpoint, set_state
 from hybrid.simulation.system_run import SystemRun
+from hybrid.store.writer import Recorder
 
 
 class SavedSystem(NamedTuple):
@@ -36,9 +37,10 @@ def defer(run: SystemRun) -> None:
     """From now on, what is recorded can be taken back."""
     if isinstance(run.recorder, DeferredRecorder):
         return
+    assert isinstance(run.recorder, Recorder)
     run.recorder = DeferredRecorder(run.recorder)
     for line in run.lines:
-        assert not isinstance(line.recorder, DeferredRecorder)
+        assert isinstance(line.recorder, Recorder)
         line.recorder = DeferredRecorder(line.recorder)
 
 
@@ -52,6 +54,7 @@ def commit(run: SystemRun) -> None:
 
     LineFailed where an output says that going on would make no sense.
     """
+    assert isinstance(run.recorder, DeferredRecorder)
     due = run.recorder.due
     if due:
         for line in run.lines:

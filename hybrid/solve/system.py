@@ -8,7 +8,7 @@ point has none of its own, it is the last or first node of every line that is jo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import is_
 from typing import NamedTuple
 
@@ -79,7 +79,8 @@ class SystemState(NamedTuple):
 @dataclass(frozen=True)
 class SystemTaken:
     """How a solution went: outcome, Newton iterations, predicted next correction, line and cell or node where it was
-    worst, the largest residual force at a node or point (N), and the local error of a step (m)."""
+    worst, the largest residual force at a node or point (N), the local error of a step (m), and the largest of a line
+    over what is allowed of it: a step of more than REFUSED (kernels.step_law) is in no books, and is to be repeated."""
 
     outcome: Outcome
     iterations: int
@@ -88,6 +89,7 @@ class SystemTaken:
     where: int
     residual: float
     error: float = 0.0
+    ratio: float = 0.0
 
 
 def joined_ends(ends: Ends, joints: tuple[int, int]) -> Ends:
@@ -135,6 +137,7 @@ class SystemSolver:
         self.work = [_room(x) for x in lines]
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
         self._floors = np.array([x.floor for x in lines])
+        self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
         carried = [x.line.h.size + 1 if _carries(x) else 0 for x in lines]
         columns = COLUMNS if self._seats[:, :, TURNS].any() else 3
         self._first = np.concatenate([[0], np.cumsum(carried)[:-1]]).astype(np.int64)
@@ -175,9 +178,9 @@ class SystemSolver:
         self._states = [*old.lines], [*new.lines]
         outcome, iterations, left, line, where = solve_system(
             task, t, self._solver, self._numbers, self._numbers.view(np.float64), self.joints, self._fairleads,
-            self._seats, self._arms, self._gaps, self._floors, self._first, self._columns, self._functional,
-            self._answers, self._turned, self.net, self.bodies, old.bodies, new.bodies, self.body_work, self._handed,
-            self._follow, self._matrix,
+            self._seats, self._arms, self._gaps, self._floors, self.allowed, self._first, self._columns,
+            self._functional, self._answers, self._turned, self.net, self.bodies, old.bodies, new.bodies,
+            self.body_work, self._handed, self._follow, self._matrix,
         )  # fmt: skip
         return SystemTaken(Outcome(outcome), iterations, left, line, where, self.residual())
 
@@ -202,10 +205,8 @@ class SystemSolver:
         taken = self._solve(Task(STEP, dt, before, rho, limits=Limits(REACH * self.length, 1.0, most)), old, new, t)
         if taken.outcome != Outcome.OK:
             return taken
-        error = max(float(work.report[LOCAL_ERROR]) for work in self.work)  # fairleads move as their bodies
-        return SystemTaken(
-            taken.outcome, taken.iterations, taken.correction, taken.line, taken.where, taken.residual, error
-        )
+        errors = np.array([work.report[LOCAL_ERROR] for work in self.work])  # fairleads move as their bodies
+        return replace(taken, error=float(errors.max()), ratio=float((errors / self.allowed).max()))
 
     def consistent_accelerations(
         self, states: SystemState, accelerations: Sequence[Floats], t: float = 0.0

@@ -54,16 +54,21 @@ def amend_lines(
     attributes: Mapping[str, Mapping[str, str | float | int]],
     of_all: Mapping[str, str | float | int],
     events: Sequence[tuple[str, str]],
+    of_lines: Mapping[str, Sequence[tuple[str, str]]] | None = None,
 ) -> None:
     """Add to a complete result of several lines what is known of each only afterwards.
 
-    fields, values, attributes: by the name of the line, as of `amend`; of_all: attributes of the system; events: of it.
+    fields, values, attributes: by the name of the line, as of `amend`; of_all: attributes of the system; events: of it,
+    of_lines: of lines.
     """
+    notes = of_lines or {}
 
     def add(file: h5py.File) -> None:
+        if BEFORE in file:
+            del file[BEFORE]
         for name, each in fields.items():
             blocks = [(field.name, 0, values[name][field.name]) for field in each]
-            _add(file[f"{GROUP}/{name}"], each, blocks, lambda _, name=name: (attributes[name], ()))  # type: ignore[misc]
+            _add(file[f"{GROUP}/{name}"], each, blocks, lambda _, name=name: (attributes[name], notes.get(name, ())))  # type: ignore[misc]
         _add(file, (), (), lambda _: (of_all, events))
 
     change_complete(target, add)

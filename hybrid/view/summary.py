@@ -7,6 +7,7 @@ values where a quantity jumps, whatever a page later draws of them.  A fact has 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -415,7 +416,18 @@ def _errors(result: Result) -> Fact:
         position, force = (found[f"extremes_total_{x}"] for x in ("position", "end_force"))
         text += f" at an instant; extremes {amount(position, 'm', 2)} and {amount(force, 'N', 2)}"
     text += f"; asked was {asked}." if asked else "."
-    return Fact("errors", title, text, "plain", found | {"asked": asked})
+    return Fact("errors", title, text + _verdicts(result), "plain", found | {"asked": asked})
+
+
+def _verdicts(result: Result) -> str:
+    """Whether what was asked of a line of several is met, by quantity; empty if nothing was, or of one cable."""
+    given = result.attributes.get("accuracy_verdicts")
+    words = {True: "met", False: "missed", None: "not verified"}
+    each = [(x["quantity"].replace("end_force_", "force at the "), x) for x in json.loads(str(given or "[]"))]
+    texts = [
+        f"{name.replace('_', ' ')} {'not estimated' if x['error'] is None else words[x['met']]}" for name, x in each
+    ]
+    return f" Of that: {', '.join(texts)}." if texts else ""
 
 
 def _status(result: Result) -> Fact:

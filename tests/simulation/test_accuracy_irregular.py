@@ -124,7 +124,7 @@ def test_motion_that_turns_out_irregular_after_its_last_refinement():
     control = estimated(False)
     control.start(FINENESS)
     control._judged, control._ratio = 6, np.inf
-    assert control._next_resolution() is None
+    assert control.next_resolution() is None
 
 
 def test_a_line_that_stays_taut_is_judged_at_every_instant():

@@ -1,0 +1,370 @@
+"""Several lines, computed as often and as finely as it takes for the accuracy that is asked of each.
+
+As of one cable (simulation.error_control): a coarse run shows where cells should be short, coarser runs what the errors
+will be, and where a result misses what is asked, a finer one follows.  Each line has an error control of its own, which
+sees the line in all of the runs; what one of them asks for, all get: steps are the same, and the error of a line may
+come from the cells of the next.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import time as clock
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybrid.errors import ComputationError
+from hybrid.model.output_points import output_points
+from hybrid.model.plan import output_interval
+from hybrid.model.resolution import (
+    Resolution,
+    is_irregular,
+    mesh_is_free,
+    requested_accuracy,
+    wants_errors,
+    wants_survey,
+)
+from hybrid.model.system import SystemModel, SystemResolution, build_system
+from hybrid.scene.read import scene_text
+from hybrid.scene.schema import Scene
+from hybrid.scene.system import System
+from hybrid.simulation.error_control import ErrorController, comparison_resolutions
+from hybrid.simulation.error_report import effort, error_fields, known
+from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution, with_survey
+from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
+from hybrid.simulation.refinement import COSTLY_ACCURACY, Free, costly, verdicts
+from hybrid.simulation.restore import refused, resolution_from, resolution_tree
+from hybrid.simulation.run_sample import COMPARED, NOT_ESTIMATED, RunSample, split_outputs
+from hybrid.simulation.system_checkpoint import kept_resolution
+from hybrid.simulation.system_lines import LineResult
+from hybrid.simulation.system_run import SystemRun, run_system, static_system
+from hybrid.store.amend import amend_lines
+from hybrid.store.checkpoint import read_before
+from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.format import Field
+from hybrid.store.hdf5_file import opened
+from hybrid.store.named_arrays import Tree
+from hybrid.store.reader import Result, open_result
+
+# Events that make it uncertain whether an accuracy is met.
+DOUBTS = (
+    "error uncertain", "largest force uncertain", "windows uncertain", "several equilibria", "implausible",
+    NOT_ESTIMATED,
+)  # fmt: skip
+Samples = dict[str, RunSample]  # of the lines, by name
+
+
+def is_refined(system: System, moves: bool) -> bool:
+    """Whether a system is computed several times, here: an accuracy is asked, or errors of steps that follow the
+
+    motion, or of an equilibrium.  (Errors of fixed steps alone: simulation.system_errors.)
+    """
+    scenes = [system.scene_of(name) for name in system.lines]
+    if not any(wants_errors(x) for x in scenes):
+        return False
+    open_steps = moves and system.require_time().controlled
+    return not moves or open_steps or any(requested_accuracy(x) is not None for x in scenes)
+
+
+class SystemPasses:
+    """All runs that the result of a system takes."""
+
+    def __init__(
+        self, system: System, target: Path | io.BytesIO, moves: bool, reporter: ProgressReporter,
+        interrupted: Callable[[], bool],
+    ) -> None:  # fmt: skip
+        """moves: whether its motion is computed, else its equilibrium; others as of `run_system`."""
+        self.system, self.target, self.moves = system, target, moves
+        self.reporter, self.interrupted = reporter, interrupted
+        self.scenes = {name: system.scene_of(name) for name in system.lines}
+        time = system.time
+        self._steps_free = moves and time is not None and time.controlled and time.tolerance is None
+        self.controls = {
+            name: ErrorController(
+                requested_accuracy(scene), Free(mesh_is_free(scene), self._steps_free, False), moves, _elsewhere,
+                _elsewhere, irregular=moves and is_irregular(scene),
+            )
+            for name, scene in self.scenes.items()
+        }  # fmt: skip
+        self._costs: list[float] = []  # s of processor time, of all runs
+        self._notes: list[tuple[str, str]] = []  # events of the system
+        self._begin = clock.process_time()
+
+    # --- runs -----------------------------------------------------------------------------------
+
+    def compute(self, source: Path | None = None) -> None:
+        """The result, as fine as it takes, with its errors; source: a result to go on with."""
+        first, result = self._goes_on(source) if source is not None else (None, None)
+        if first is None:
+            first = self._surveyed(SystemResolution.first(self.system))
+            self._expect(first)
+            self._compare(first)
+            resolution = self._forecast(first)
+            result = self._record(resolution, self.target, RESULT, found=_tree(first))
+        else:
+            assert source is not None
+            resolution = kept_resolution(self.system, source)
+            self._compare(first)
+        assert result is not None
+        self._refine(resolution, result)
+
+    def _goes_on(self, source: Path) -> tuple[SystemResolution, Samples]:
+        """What the runs to compare with were computed for, and the result, which is computed to its end."""
+        assert isinstance(self.target, Path)
+        with opened(source) as file:
+            tree = read_before(file)
+        with refused(source):
+            self._costs += [0.0] * any(wants_survey(scene) for scene in self.scenes.values())
+            if set(tree) != set(self.scenes):
+                raise ValueError("it was begun without an accuracy")
+            first = SystemResolution({name: resolution_from(tree[name], x) for name, x in self.scenes.items()})
+        with open_result(source) as found:
+            done = found.status == "complete" and self._is_at_end(found)
+        if not done or source != self.target:
+            return first, self._record(None, self.target, RESULT, source, tree)
+        self._costs.append(0.0)
+        return first, self._samples(self.target, kept_resolution(self.system, source), 0.0)
+
+    def _is_at_end(self, found: Result) -> bool:
+        end = self.system.require_time().duration
+        return len(found.times) > 0 and float(found.times[-1]) >= end * (1.0 - 1e-9)
+
+    def _record(
+        self, resolution: SystemResolution | None, target: Path | io.BytesIO | None, name: str,
+        source: Path | None = None, found: Tree | None = None, system: System | None = None,
+    ) -> Samples:  # fmt: skip
+        """Compute the system, or another; what is compared of its lines.  target: None: it is for that alone."""
+        begin, asked = clock.process_time(), system or self.system
+        if self.moves:
+            text, look = scene_text(asked), self.interrupted
+            run = run_system(asked, target, text, self.reporter, look, source, name, resolution, found)
+        else:
+            run = static_system(asked, target, scene_text(asked), resolution)
+        self._costs.append(clock.process_time() - begin)
+        if target is not None:
+            return self._samples(target, run.resolution, self._costs[-1])
+        return {x.name: compared(x, run, self._costs[-1]) for x in run.lines}
+
+    def _samples(self, target: Path | io.BytesIO, resolution: SystemResolution, cpu: float) -> Samples:
+        with open_result(target) as result:
+            return {name: sample_of(line, resolution.lines[name], cpu) for name, line in result.lines.items()}
+
+    def _surveyed(self, first: SystemResolution) -> SystemResolution:
+        """With cells where a coarse run shows that they should be."""
+        free = [name for name, scene in self.scenes.items() if wants_survey(scene)]
+        if not free:
+            return first
+        coarse = SystemResolution({name: survey_resolution(x) for name, x in first.lines.items()})
+        if not self.moves:
+            coarse = SystemResolution({name: replace(x, every=1) for name, x in coarse.lines.items()})
+        output = self.system.output.model_copy(update={"points": POINTS, "quantities": {}})
+        changed: dict[str, Any] = {"output": output}
+        if self.moves:
+            until = max(survey_duration(self.scenes[name]) for name in free)
+            every = output_interval(self.system)
+            changed["output"] = output.model_copy(update={"every": every})
+            changed["time"] = self.system.require_time().model_copy(update={"duration": until})
+        try:
+            asked = self.system.model_copy(update=changed)
+            runs = self._record(coarse, None, PRE_RUN, system=asked)
+        except ComputationError:
+            return first
+        model, out = build_system(self.system, resolution=coarse), dict(first.lines)
+        for name in free:
+            scene, of_line = self.scenes[name], model.models[model.names.index(name)]
+            s = output_points(asked.scene_of(name)).s
+            survey = Survey.of(scene, first.lines[name], of_line, s, runs[name].values)
+            out[name] = with_survey(first.lines[name], scene, survey)
+        return SystemResolution(out)
+
+    def _expect(self, first: SystemResolution) -> None:
+        if not self.moves:
+            return
+        passes = [(ESTIMATION, x) for x in comparison_resolutions(first.one, self.moves)]
+        self.reporter.expect([*passes, (RESULT, first.one)], first.one)
+
+    def _compare(self, first: SystemResolution) -> None:
+        """The runs to compare with, as of `ErrorController`."""
+        every = {name: comparison_resolutions(x, self.moves) for name, x in first.lines.items()}
+        found: list[Samples | None] = [None, None, None]
+        failed = ""
+        for k in (0, 1, 2) if self.moves else (0, 2):  # without steps the second is the first
+            resolution = SystemResolution({name: x[k] for name, x in every.items()})
+            try:
+                found[k] = self._record(resolution, None, ESTIMATION)
+            except ComputationError as error:
+                if not k:
+                    failed = str(error).splitlines()[0]
+                    break
+        for name, control in self.controls.items():
+            control.runs[:] = self._costs
+            control.compare_with([x[name] if x is not None else None for x in found], failed)
+
+    def _forecast(self, first: SystemResolution) -> SystemResolution:
+        """How finely the first result is computed: finer, where the runs to compare with show that it must be."""
+        wanted = {name: x.forecast_resolution(first.lines[name]) for name, x in self.controls.items()}
+        return self._finer(first, wanted)
+
+    def _finer(self, now: SystemResolution, wanted: Mapping[str, Resolution]) -> SystemResolution:
+        """As fine as the finest that is wanted; what the scene gives stays."""
+        cells = max(x.fineness / now.lines[name].fineness for name, x in wanted.items())
+        steps = min(x.step / now.one.step if now.one.step else 1.0 for x in wanted.values())
+        free = {name: cells if mesh_is_free(scene) else 1.0 for name, scene in self.scenes.items()}
+        steps = steps if self._steps_free else 1.0
+        return SystemResolution({name: x.coarser(1.0 / free[name], steps) for name, x in now.lines.items()})
+
+    # --- judgement ------------------------------------------------------------------------------
+
+    def _refine(self, resolution: SystemResolution, result: Samples) -> None:
+        """Finer results until what is asked is met, or more would not help; then errors are written."""
+        stopped: BaseException | None = None
+        while True:
+            wanted = self._judged(resolution, result)
+            if not wanted:
+                self._note_missed("")
+                break
+            finer = self._finer(resolution, wanted)
+            self._warn_of_costs(result, finer)
+            try:
+                result, resolution = self._replaced(finer), finer
+            except ComputationError as error:
+                self._note_missed(f"a finer run failed: {str(error).splitlines()[0]}")
+                break
+            except KeyboardInterrupt as error:
+                self._note_missed("a finer run was stopped from outside")
+                stopped = error
+                break
+        self._write(resolution, result)
+        if stopped is not None:
+            raise stopped
+
+    def _judged(self, resolution: SystemResolution, result: Samples) -> dict[str, Resolution]:
+        """Take over a result; how finely lines that miss what is asked of them want the next one."""
+        wanted = {}
+        for name, control in self.controls.items():
+            control.runs[:] = self._costs
+            if control.estimate is None:
+                if not control.first_estimate(result[name]):
+                    continue
+            else:
+                control.next_estimate(control.estimate, resolution.lines[name], result[name])
+            found = control.next_resolution()
+            if found is not None:
+                wanted[name] = found
+        return wanted
+
+    def _warn_of_costs(self, result: Samples, finer: SystemResolution) -> None:
+        if not any(kind == COSTLY_ACCURACY for kind, _ in self._notes):
+            self._notes += costly(self._costs, next(iter(result.values())), finer.one)
+
+    def _replaced(self, resolution: SystemResolution) -> Samples:
+        """A finer result in place of that before it, when it is complete."""
+        if isinstance(self.target, io.BytesIO):
+            new = io.BytesIO()
+            found = self._record(resolution, new, REFINEMENT)
+            self.target.seek(0)
+            self.target.truncate()
+            self.target.write(new.getvalue())
+            return found
+        beside = self.target.with_name(f".{self.target.name}.finer")
+        try:
+            found = self._record(resolution, beside, REFINEMENT, found=_tree(resolution))
+            os.replace(beside, self.target)
+        finally:
+            beside.unlink(missing_ok=True)
+        return found
+
+    def _note_missed(self, why: str) -> None:
+        """Say of each line that misses what is asked; why: more was tried in vain."""
+        for control in self.controls.values():
+            if control.asked is None or control.estimate is None:
+                continue
+            if why:
+                control.without_refinement(why)
+                continue
+            verdict = control.verdict(control.asked)
+            if verdict.ratio > 1.0:
+                control.note_missed(verdict)
+
+    # --- the file -------------------------------------------------------------------------------
+
+    def _write(self, resolution: SystemResolution, result: Samples) -> None:
+        """Add errors, what was asked and whether it is met to the result of each line."""
+        cpu, model = clock.process_time() - self._begin, build_system(self.system, resolution=resolution)
+        fields, values = dict[str, list[Field]](), dict[str, dict[str, np.ndarray]]()
+        attributes, notes = dict[str, dict[str, str | float | int]](), dict[str, list[tuple[str, str]]]()
+        with open_result(self.target) as found:
+            happened = {name: [(e.t, e.kind) for e in line.events] for name, line in found.lines.items()}
+        for name, control in self.controls.items():
+            scene, run = self.scenes[name], result[name]
+            errors = control.estimate.errors if control.estimate is not None else None
+            fields[name] = error_fields(run, errors) if errors is not None else []
+            values[name] = {x.name: np.zeros((len(run.values["position"]), *x.shape)) for x in fields[name]}
+            for cause, quantity, begin, rows in errors.blocks() if errors is not None else ():
+                if (kept := values[name].get(f"errors/{cause}/{quantity}")) is not None:
+                    kept[begin : begin + len(rows)] = rows
+            largest, notes[name] = known(scene, control, run, errors, happened[name])
+            notes[name] += _not_estimated(scene, model, name)
+            attributes[name] = {**effort(scene, control, run, cpu), **largest}
+            if control.asked is not None:
+                kinds = {kind for kind, _ in (*notes[name], *((k, t) for t, k in happened[name]))}
+                of = [x.errors for x in control.statistics.values()] if control.irregular else [errors]
+                certain = not kinds & set(DOUBTS)
+                each = verdicts(control.asked, [x for x in of if x is not None], run, certain)
+                attributes[name]["accuracy_verdicts"] = json.dumps(each)
+        keys = {x for each in attributes.values() for x in each if x.startswith("error_")}
+        of_all = {x: max(float(each[x]) for each in attributes.values() if x in each) for x in keys}
+        of_all |= {"effort_runs": len(self._costs), "effort_cpu": cpu}
+        events = [(kind, f"line {name}: {text}") for name, each in notes.items() for kind, text in each]
+        amend_lines(self.target, fields, values, attributes, of_all, [*self._notes, *events], notes)
+
+
+def _elsewhere(resolution: Resolution) -> RunSample:
+    raise AssertionError("all lines are computed together")
+
+
+def _tree(resolution: SystemResolution) -> Tree:
+    return {name: resolution_tree(x) for name, x in resolution.lines.items()}
+
+
+def compared(line: LineResult, run: SystemRun, cpu: float) -> RunSample:
+    """What is compared of a line in a run that is only to be compared with; cpu: s, of all lines."""
+    found, resolution = line.recorder, run.resolution.lines[line.name]
+    assert isinstance(found, ComparisonRecorder)
+    values, _ = split_outputs({name: found[name] for name in found.names})
+    return RunSample(resolution, values, line.model.cells, max(run.steps, 1), cpu, resolution.every, forces=found.steps)
+
+
+def sample_of(line: Result, resolution: Resolution, cpu: float) -> RunSample:
+    """What is compared of a line in a complete result; cpu: s, of all lines."""
+    values = {name: np.asarray(line[name]) for name in COMPARED if name in line}
+    columns = [f"steps/{name}" for name in ("t", "end_force_start", "end_force_end")]
+    forces = np.zeros((0, 3))
+    if len(line.times) > 1 and columns[0] in line:
+        forces = np.column_stack([line[name] for name in columns])
+    unresolved = any(event.kind == "unresolved bend" for event in line.events)
+    steps, cells = max(len(forces), 1), int(line.attributes["cells"])
+    return RunSample(resolution, values, cells, steps, cpu, resolution.every, unresolved, forces=forces)
+
+
+def _not_estimated(scene: Scene, model: SystemModel, name: str) -> list[tuple[str, str]]:
+    """The event of a line that says what may make it wrong, and is not in its errors."""
+    zones = model.models[model.names.index(name)].zones
+    if any(x.weakest_bending for x in scene.cable.sections) and any(z.kind == "catenary" for z in zones):
+        text = "what bending would change in its catenaries is not estimated in several lines; `model: rod` leaves none"
+        return [(NOT_ESTIMATED, f"{text} out")]
+    return []
+
+
+def refine_system(
+    system: System, target: Path | io.BytesIO, reporter: ProgressReporter, interrupted: Callable[[], bool],
+    source: Path | None = None, moves: bool = True,
+) -> None:  # fmt: skip
+    """Compute a system as finely as is asked, with its errors; arguments as of `SystemPasses` and `compute`."""
+    SystemPasses(system, target, moves, reporter, interrupted).compute(source)

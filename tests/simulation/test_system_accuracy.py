@@ -1,0 +1,137 @@
+"""Accuracy of several lines: what is asked is met or said to be missed, by line and quantity."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bits import differences
+
+import hybrid
+import hybrid.simulation.system_run
+from hybrid.errors import ComputationError
+from hybrid.simulation import progress as reports
+from hybrid.simulation import system_accuracy
+
+LEG = {"length": 70, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
+
+
+def bridle(**tables: Any) -> dict[str, Any]:
+    """Two legs to a float that a third line draws aside, up and down."""
+    surge = {"surge": {"amplitude": 0.5, "period": 4}, "ramp": 4}
+    return {
+        "environment": {"fluid": {"density": 1025, "current": [0.4, 0.1, 0]}},
+        "points": {
+            "west": {"position": [-55, 0, -50]}, "east": {"position": [55, 5, -50]},
+            "float": {"initial_guess": [0, 0, -10], "mass": 300, "volume": 1.2, "drag_area": 2},
+            "winch": {"position": [35, 0, 1], "motion": surge},
+        },
+        "lines": {
+            "west": {"start": "west", "end": "float", "sections": [LEG]},
+            "east": {"start": "float", "end": "east", "sections": [LEG]},
+            "tow": {"start": "float", "end": "winch", "sections": [LEG | {"length": 45, "bending_stiffness": 300}]},
+        },
+        "time": {"duration": 4.0}, "accuracy": "1%", "output": {"every": 0.5, "points": 11},
+    } | tables  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
+    path = tmp_path_factory.mktemp("accuracy") / "run.h5"
+    hybrid.run(bridle(), path).close()
+    return hybrid.open(path)
+
+
+def verdicts(line: hybrid.Result) -> dict[str, dict[str, Any]]:
+    return {x["quantity"]: x for x in json.loads(str(line.attributes["accuracy_verdicts"]))}
+
+
+def test_what_is_asked_is_judged_by_line_and_quantity(result: hybrid.Result) -> None:
+    scene = bridle(time={"duration": 4.0, "step": 0.0125}, accuracy=None)
+    for line in scene["lines"].values():
+        line["mesh"] = {"cells": 150}
+    fine = hybrid.run(scene)
+    for name, line in result.lines.items():
+        wrong = np.linalg.norm(line.position - fine.lines[name].position, axis=2).max()
+        figure = line["errors/total/position"].max()
+        assert line.attributes["error_total_position"] == figure and 0.5 < figure / wrong < 6.0, (name, figure / wrong)
+        found, length = verdicts(line), float(line.attributes["length"])
+        assert list(found) == ["position", "end_force_start", "end_force_end"]
+        assert found["position"]["asked"] == pytest.approx(0.01 * length) and found["position"]["met"] is True
+        forces = max(np.linalg.norm(line[f"reaction_{end}"], axis=1).max() for end in ("start", "end"))
+        for end in ("start", "end"):
+            one = found[f"end_force_{end}"]
+            assert one["asked"] == pytest.approx(0.01 * forces)
+            assert one["error"] == line[f"errors/total/end_force_{end}"].max()
+            assert one["met"] is (one["error"] <= one["asked"])
+    assert len({int(line.attributes["cells"]) for line in result.lines.values()}) > 1  # each has a mesh of its own
+    steps = np.diff(result.lines["tow"]["steps/t"])
+    assert steps.max() > 2.0 * steps.min()  # and they follow the motion
+
+
+def test_a_stopped_run_goes_on_bit_for_bit(
+    result: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
+    monkeypatch.setattr(reports, "REPORT_EVERY", -1.0)
+    path = tmp_path / "stopped.h5"
+
+    def stop(progress: reports.Progress) -> None:
+        if progress.name == "result" and progress.t > 2.0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(bridle(), path, progress=stop)
+    hybrid.resume(path).close()
+    assert result.file is not None and differences(result.file, path) == []
+
+
+def test_what_nobody_estimated_is_never_met(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = bridle(accuracy=None, time={"duration": 0.5, "step": 0.05})
+    scene["lines"]["tow"] |= {"model": "catenary", "accuracy": "2%"}
+    found = hybrid.run(scene)
+    tow = verdicts(found.lines["tow"])
+    assert tow["position"]["met"] is None and tow["position"]["error"] < tow["position"]["asked"]
+    assert [e.kind for e in found.lines["tow"].events].count("model error not estimated") == 1
+    assert "accuracy_verdicts" not in found.lines["west"].attributes
+
+    def fails(*_: Any, **__: Any) -> None:
+        raise ComputationError(hybrid.errors.Outcome.SLACK, 1.0, 0.0)
+
+    computed = system_accuracy.run_system
+    monkeypatch.setattr(system_accuracy, "run_system", lambda *x: computed(*x) if x[6] == "result" else fails())
+    found = hybrid.run(scene)
+    assert all(x["met"] is None and x["error"] is None for x in verdicts(found.lines["tow"]).values())
+    assert {"no error figure"} <= {e.kind for e in found.events}
+
+
+def test_an_accuracy_too_high_is_missed_and_says_so() -> None:
+    scene = bridle(accuracy={"position": "0.0001 mm"}, time={"duration": 1.0, "step": 0.1})
+    found = hybrid.run(scene)
+    assert verdicts(found.lines["west"])["position"]["met"] is False
+    texts = [e.text for e in found.events if e.kind == "accuracy missed"]
+    assert any(text.startswith("line west: position") and "time.step" in text for text in texts)
+
+
+def test_an_equilibrium_has_an_accuracy_too() -> None:
+    scene = bridle(accuracy={"tension": "0.02%"})
+    del scene["time"]
+    found = hybrid.static(scene)
+    for line in found.lines.values():
+        assert all(x["met"] for x in verdicts(line).values()) and line["errors/total/position"].shape == (
+            1,
+            len(line.s),
+        )
+
+
+def test_what_a_line_does_not_have_is_refused_with_its_name() -> None:
+    scene = bridle(accuracy={"bending_moment": "5%"})
+    with pytest.raises(hybrid.SceneError, match="in line west"):
+        hybrid.run(scene)
+    scene = bridle()
+    scene["lines"]["west"]["accuracy"] = {"bending_moment": "5%"}
+    with pytest.raises(hybrid.SceneError, match=r"lines\.west\.accuracy"):
+        hybrid.run(scene)
