@@ -161,6 +161,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
 
     jobs: list[Any] = []
     monkeypatch.setattr(CellChanges, "change", compiled)
+    monkeypatch.setattr(CellChanges, "alone", False)
     monkeypatch.setattr(zone_switching, "transfer_to", in_python)
     monkeypatch.setattr(zone_switching, "begin_switch", begin)
     return found

@@ -9,9 +9,13 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from hybrid.kernels import books as b
+from hybrid.kernels import zone_step as z
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.criteria import CRITERIA
+from hybrid.kernels.criteria import CRITERIA, GIVEN
+from hybrid.kernels.references import reader
 from hybrid.kernels.state import Floats
 
 
@@ -201,3 +205,72 @@ def _plan(ratios, off, rod, calm, t, base, buffer, shortest, wait, flags):
     for j in range(n):
         out[j] = near[j] or (rod[j] and t - calm[j] < wait[j])
     _tidy(out, rod, base, shortest, asks)
+
+
+# --- reviews without consequence --------------------------------------------------------------------
+
+
+class ReviewJob(NamedTuple):
+    """What a review of n base cells knows, as the domain manager has it."""
+
+    zone_table: NDArray[np.int64]  # of a kernels.zone_step.ZoneJob
+    base: Floats  # (n+1,) m
+    given: NDArray[np.int64]  # (n,)
+    calm_since: Floats  # (n,) s
+    patience: Floats  # (n,)
+    seen: Floats  # (criteria, n), largest ratios since the last output
+    buffer: Floats  # (n,) m (written)
+    off: Floats  # (criteria,)
+    calm: Floats  # (n,) s, as a plan would have it (written)
+    wait: Floats  # (n,) s (written)
+    flags: NDArray[np.bool_]  # (4, n) (written)
+    shortest: float  # m
+    dwell: float  # s
+    parts: float  # of the buffer
+    light: float  # N/m
+    forced: float  # ratio of what is given as rod
+    pause: float  # s until the next review
+    held: int  # 1 where rods may not go
+
+
+def blank_review_job() -> ReviewJob:
+    """A job with the types that every one has."""
+    each, whole, flags = np.zeros(1), np.zeros(1, np.int64), np.zeros((4, 1), bool)
+    rows = np.zeros((1, 1))
+    return ReviewJob(
+        whole, each, whole, each, each, rows, each, each, each, each, flags, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
+    )
+
+
+read, read_zones = reader(blank_review_job()), reader(z.blank_zone_job())
+
+
+@kernel
+def quiet_review(table):
+    """1 where a review now changes nothing, and is done; 0: the domain manager has to do it."""
+    job = read(table)
+    run = read_zones(job.zone_table)
+    zones, clock = run.zones, run.zones.clock
+    kinds, ratios, rod, n = zones.kinds, zones.ratios, zones.rod, zones.rod.shape[0]
+    if clock[z.LOUDEST] > 1.0 or zones.counts[z.HOLDS_TWIST] or zones.counts[z.LOADED]:
+        return 0
+    for j in range(n):
+        if zones.leaving[j]:
+            return 0
+        if job.given[j] > 0:
+            ratios[GIVEN, j] = job.forced
+        job.flags[0, j], job.calm[j], job.wait[j] = False, job.calm_since[j], job.dwell * job.patience[j]
+    state = run.new if run.counts[b.PARITY] else run.old
+    reach(state.T, kinds.base_of_cell, kinds.EI, kinds.w, kinds.floor, job.parts, job.light, job.buffer)
+    now = run.clock[b.NOW]
+    _plan(ratios, job.off, rod, job.calm, now, job.base, job.buffer, job.shortest, job.wait, job.flags)
+    for j in range(n):
+        planned = (job.flags[3, j] or (job.held != 0 and rod[j])) and job.given[j] >= 0
+        if planned != rod[j]:
+            return 0
+    for j in range(n):
+        job.calm_since[j] = job.calm[j]
+        for c in range(ratios.shape[0]):
+            job.seen[c, j], ratios[c, j] = max(job.seen[c, j], ratios[c, j]), 0.0
+    clock[z.NEXT_REVIEW] = now + job.pause
+    return 1

@@ -64,16 +64,15 @@ class Shaped:
         self.table.bind(**self._values(old, new))
         return self.table.numbers.copy()
 
-    def __call__(self, old: int, new: int) -> np.ndarray:
-        """The table for so many cells."""
-        self.table.numbers[:] = self._fixed + old * self._by_old + new * self._by_new
-        return self.table.numbers
+    @property
+    def numbers(self) -> np.ndarray:
+        """(3, size) fixed, for each old and each new cell."""
+        return np.array([self._fixed, self._by_old, self._by_new])
 
-    def put(self, cells: int, names: tuple[str, ...], to: Table) -> None:
-        """Numbers of some values of a line of so many cells into a table of the same kind."""
-        for name in names:
-            at = self.table.part(name)
-            to.numbers[at] = self._fixed[at] + cells * self._by_new[at]
+    def places(self, names: tuple[str, ...]) -> np.ndarray:
+        """Where the numbers of some values are."""
+        parts = [self.table.part(name) for name in names]
+        return np.concatenate([np.arange(at.start, at.stop) for at in parts])
 
 
 class Side:

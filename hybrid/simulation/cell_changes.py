@@ -13,8 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.adapt.manager import OF_BASE, Change
+from hybrid.adapt.manager import BUFFER, OF_BASE, REVIEWS, Change
+from hybrid.adapt.user_criterion import FORCED_RATIO
+from hybrid.adapt.zone_rules import OFF, blank_review_job, quiet_review
 from hybrid.kernels import books as b
+from hybrid.kernels import following_run as f
 from hybrid.kernels import zone_step as z
 from hybrid.kernels.binding import Packed, Room, Table
 from hybrid.kernels.books import Books, sample_size
@@ -29,13 +32,13 @@ from hybrid.kernels.cell_changes import (
 )
 from hybrid.kernels.entry import NO_PUSH
 from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.newton import ASSEMBLY, RUN, Task
+from hybrid.kernels.newton import RUN, Task
 from hybrid.kernels.run import blank_job
-from hybrid.kernels.sampling import SAME_TIME
-from hybrid.kernels.state import NO_TENSION_TORQUE, NO_TORSION, TENSION_TORQUE, Floats, Line, Sea, State, Work
+from hybrid.kernels.run import run as steps
+from hybrid.kernels.state import NO_TENSION_TORQUE, NO_TORSION, TENSION_TORQUE, Batch, Floats, Line, Sea, State, Work
 from hybrid.kernels.zone_line import blank_kinds_job, blank_line_job, fill_kinds, fill_line
 from hybrid.kernels.zone_step import Zones, blank_zone_job
-from hybrid.kernels.zone_switch import AFTER, BEFORE, NUMBERS, RELAXES, TIME, begin_switch, blank_switch_job, end_switch
+from hybrid.kernels.zone_switch import AFTER, BEFORE, NUMBERS, begin_switch, blank_switch_job, end_switch
 from hybrid.kernels.zone_transfer import Match, Transfer
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
 from hybrid.model.sea import Surroundings
@@ -61,10 +64,14 @@ if TYPE_CHECKING:
 # Of the tables of a run, what depends on the cells.
 IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
 IN_ZONES = ("line", "sea", "old", "new", "zones")
+# Lines whose outputs may wait, and their nodes in all.
+MOST_WAITING, MOST_PLACES = 256, 20_000
 
 
 class CellChanges:
     """Changes of the cells of a run (`Transient`) whose rods stay what they are."""
+
+    alone = True  # whether cells change without a return to Python
 
     def __init__(self, owner: Transient) -> None:
         """Room for all; `adopt` before the first change."""
@@ -87,12 +94,34 @@ class CellChanges:
         self._twist, self._clamps, self._held = np.zeros(self.base), np.zeros((2, 2, 3)), np.zeros(2, bool)
         self._room_for_places = np.zeros(self.most + 1 + extra), np.zeros(self.most + 1 + extra, np.int64)
         self._match = Room(Packed(blank_joined), self.most), Room(Packed(blank_single), self.most)
-        self.side, self.cells, self.adopted, self._stale = 0, 0, False, False
+        self._calls, self._at = np.zeros(f.CALLS, np.int64), np.zeros(f.AT_SIZE, np.int64)
+        self._following, self._review = Table(f.blank_following_job()), Table(blank_review_job())
+        self._waiting, self._places = np.zeros((MOST_WAITING, 3), np.int64), np.zeros(MOST_PLACES, np.int64)
+        self.adopted, self._synced = False, -1  # number of changes that Python knows of
         self._views: dict[Any, Any] = {}  # while tables are bound
         self._shifts = np.zeros(1, bool)
         self._follows = bool(owner.switching.zones.clock[z.SHARE] > 0.0)
         self._binding = self._bound = False
         self._tension_floor = TENSION_FLOOR, LEAST_TENSION * manager.scale
+
+    @property
+    def side(self) -> int:
+        """Which of the two sets of arrays is in use."""
+        return int(self._at[f.SIDE])
+
+    @property
+    def cells(self) -> int:
+        """Cells of the line now."""
+        return int(self._at[f.CELLS])
+
+    @property
+    def waits(self) -> bool:
+        """Whether there are outputs of cells of before."""
+        return bool(self._at[f.WAITING])
+
+    @property
+    def _stale(self) -> bool:
+        return bool(self._at[f.CHANGES] != self._synced)
 
     @staticmethod
     def _key(owner: Transient) -> tuple[Any, ...]:
@@ -170,8 +199,9 @@ class CellChanges:
         return found
 
     def _books(self, cells: int) -> Books:
-        size = sample_size(cells, True)
-        samples = self._samples[: self._rows * size].reshape(self._rows, size)
+        size, used = sample_size(cells, True), int(self._at[f.USED])
+        rows = min(self._rows, (self._samples.size - used) // size)
+        samples = self._samples[used : used + rows * size].reshape(rows, size)
         kept = self._view(self._kept, cells)
         if not self._binding:
             return self._run.books._replace(samples=samples, base=self._base, **kept._asdict())
@@ -241,27 +271,77 @@ class CellChanges:
             return {name: found[name] for name in IN_ZONES if name in found} | {"zones": self._zones(k, m)}
 
         both, pairs = (0, 1), ((0, 0), (0, 1), (1, 0), (1, 1))
-        self._lay_out = [Table(blank_layout_job()) for _ in both]
+        layouts = []
         for k in both:
-            at = self._layout(k, self.most)
-            self._lay_out[k].bind(
+            at, table = self._layout(k, self.most), Table(blank_layout_job())
+            table.bind(
                 plan=zones.plan, rod=zones.next_rod, parts=zones.parts, finest=self._finest, place=at.place, s=at.s,
                 of=at.of, rods=at.rods, first=sides[k].first,
             )  # fmt: skip
-
-        def shaped(blank: Any, values: Any, *given: int) -> Shaped:
-            return Shaped(Table(blank), partial(values, *given))
+            layouts.append(table)
 
         def on_new(values: Any, k: int, n: int, m: int) -> dict[str, Any]:
             found: dict[str, Any] = values(k, m)
             return found
 
-        self._lines = [shaped(blank_line_job(), partial(on_new, line_job), k) for k in both]
-        self._kinds = [shaped(blank_kinds_job(), partial(on_new, kinds_job), k) for k in both]
-        self._switches = {(k, p): shaped(blank_switch_job(), switch_job, k, p) for k, p in pairs}
-        self._renews = {(k, p): shaped(blank_renew_job(), renew_job, k, p) for k, p in pairs}
-        self._in_run = [shaped(blank_job(), partial(on_new, in_run), k) for k in both]
-        self._in_zones = [shaped(blank_zone_job(), partial(on_new, in_zones), k) for k in both]
+        def for_sides(blank: Any, values: Any) -> list[Shaped]:
+            return [Shaped(Table(blank()), partial(on_new, values, k)) for k in both]
+
+        lines, kinds = for_sides(blank_line_job, line_job), for_sides(blank_kinds_job, kinds_job)
+        of_run, of_zones = for_sides(blank_job, in_run), for_sides(blank_zone_job, in_zones)
+        switches = [Shaped(Table(blank_switch_job()), partial(switch_job, *pair)) for pair in pairs]
+        renews = [Shaped(Table(blank_renew_job()), partial(renew_job, *pair)) for pair in pairs]
+        self._tables = layouts, lines, kinds, of_run, of_zones, switches, renews  # what is bound there stays alive
+        self._bind_following(layouts, lines, kinds, of_run, of_zones, switches, renews)
+
+    def _bind_review(self) -> None:
+        """The table of reviews that change nothing."""
+        manager = self._switching.manager
+        n = manager.given.size
+        self._review.bind(
+            zone_table=self._switching.table.numbers, base=manager.layout.base, given=manager.given.astype(np.int64),
+            off=OFF, calm=np.zeros(n), wait=np.zeros(n), flags=np.zeros((4, n), bool), shortest=manager.shortest,
+            dwell=float(manager.dwell), parts=BUFFER, light=1e-9 * manager.scale, forced=FORCED_RATIO,
+            pause=(1.0 / REVIEWS - 1e-9) * manager.pace,
+        )  # fmt: skip
+
+    def _bind_following(
+        self, layouts: list[Table], lines: list[Shaped], kinds: list[Shaped], of_run: list[Shaped],
+        of_zones: list[Shaped], switches: list[Shaped], renews: list[Shaped],
+    ) -> None:  # fmt: skip
+        """The table of runs whose cells change in compiled code."""
+        run, zones = self._run, self._switching.zones
+
+        def stacked(shaped: list[Shaped], places: Any = slice(None)) -> np.ndarray:
+            return np.array([x.numbers[:, places] for x in shaped])
+
+        in_run, in_zones = of_run[0].places(IN_RUN), of_zones[0].places(IN_ZONES)
+        numbers: dict[str, Any] = {
+            "calls": self._calls, "at": self._at, "clock": run.clock, "counts": run.count, "outputs": run.books.outputs,
+            "work": run.books.work, "zone_clock": zones.clock, "zone_counts": zones.counts, "numbers": self._numbers,
+            "run": run.table.numbers, "run_places": in_run, "in_run": stacked(of_run, in_run),
+            "zones": self._switching.table.numbers, "zone_places": in_zones, "in_zones": stacked(of_zones, in_zones),
+            "layouts": np.array([x.numbers for x in layouts]), "line": lines[0].table.numbers, "lines": stacked(lines),
+            "kind": kinds[0].table.numbers, "kinds": stacked(kinds), "switch": switches[0].table.numbers,
+            "switches": stacked(switches), "renewed": renews[0].table.numbers, "renews": stacked(renews),
+            "review": self._review.numbers, "here": zones.here, "waiting": self._waiting, "places": self._places,
+        }  # fmt: skip
+        self._following.bind(**numbers)
+        self._bind_review()
+        at, samples = self._at, self._samples.__array_interface__["data"][0]
+        at[f.ROOM], at[f.ROOM_SIZE], at[f.MOST_ROWS] = samples, self._samples.size, self._rows
+        at[f.TASK] = run.table.part("task").start
+        (at[f.SAMPLES_AT],) = np.flatnonzero(of_run[0].numbers[0] == samples)
+        calls = {
+            f.LAY_OUT: (lay_out, layouts[0]), f.CLEAR: (clear_state, renews[0].table),
+            f.LINE: (fill_line, lines[0].table), f.BEGIN: (begin_switch, switches[0].table),
+            f.KINDS: (fill_kinds, kinds[0].table), f.END: (end_switch, switches[0].table),
+            f.RENEW: (renew, renews[0].table), f.BEFORE_FORCES: (before_forces, run.table),
+            f.AFTER_FORCES: (after_forces, run.table), f.STEPS: (steps, run.table),
+            f.REVIEW: (quiet_review, self._review),
+        }  # fmt: skip
+        for k, (kernel, table) in calls.items():
+            self._calls[k] = kernel.address(table.numbers)
 
     # --- changes ------------------------------------------------------------------------------------
 
@@ -275,7 +355,7 @@ class CellChanges:
             self._bind_all()
             self._binding, self._bound = False, True
             self._views.clear()
-        self.side, self.cells = k, n
+        self._at[f.SIDE], self._at[f.CELLS] = k, n
         parity, at = int(run.count[b.PARITY]), self._layout(k, n)
         for which in (0, 1):
             _copy(run.states[which], self._state(k, which, n))
@@ -291,14 +371,26 @@ class CellChanges:
         at.place[:], at.s[:], at.of[:], at.rods[:] = layout.places, model.line.s, layout.base_of_cell, layout.rod_cells
         self._sides[k].first[:] = self._base[:] = layout.first
         run.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
-        self._put_numbers()
-        self.adopted, self._stale = True, True
+        self._calls[f.SOLVER] = run.solver_address()
+        f.put_cells(self._following.numbers)
+        self.adopted, self._synced = True, -1
         run.count[b.PARITY] = parity
         self.sync()
 
-    def _put_numbers(self) -> None:
-        self._in_run[self.side].put(self.cells, IN_RUN, self._run.table)
-        self._in_zones[self.side].put(self.cells, IN_ZONES, self._switching.table)
+    def go(self, reviewed: bool = False) -> int:
+        """Steps, and changes of cells that need nothing else; a code of kernels.books.
+
+        reviewed: the criteria have just been reviewed after a step, and zones stay as they are.
+        """
+        self._at[f.ALONE], self._at[f.MAY_WAIT] = self.alone, self._owner.outputs_may_wait
+        manager = self._switching.manager
+        self._review.bind(
+            calm_since=manager.calm_since, patience=manager.patience, seen=manager.seen, buffer=manager.buffer,
+            held=int(manager.held),
+        )  # fmt: skip
+        code = self._run.go(lambda: int(f.go_on(self._following.numbers, reviewed)))
+        self._run.set_quota(self.cells)
+        return code
 
     @property
     def due(self) -> bool:
@@ -307,12 +399,10 @@ class CellChanges:
 
     def unwatched(self) -> bool:
         """After a step that Python is to look at: whether nothing is to be done but a review and a change of cells."""
-        clock, count = self._run.clock, self._run.count
-        if count[b.FLAGS] or count[b.ASKS] or count[b.SAMPLES]:
+        count = self._run.count
+        if count[b.FLAGS] or count[b.ASKS]:
             return False
-        outputs, at = self._run.books.outputs, int(count[b.OUTPUT])
-        # one at the end of the step is sampled after the change, one within it would have to be before
-        return at == outputs.size or bool(outputs[at] >= clock[b.NOW] - SAME_TIME * clock[b.LAST_DT])
+        return not self.due or bool(f.cells_may_change(self._following.numbers))
 
     def review_due(self) -> bool:
         """Whether the criteria are to be reviewed."""
@@ -346,37 +436,44 @@ class CellChanges:
 
         adopt: takes over other zones, where they are other ones.
         """
-        run, k, n = self._run, self.side, self.cells
-        to, parity, zones = 1 - k, int(run.count[b.PARITY]), self._switching.zones
-        m = int(lay_out(self._lay_out[to].numbers))
-        renewing, switching = self._renews[k, parity](n, m), self._switches[k, parity](n, m)
-        self._numbers[TIME], self._numbers[RELAXES] = run.clock[b.NOW], zones.counts[z.RELAXING]
-        clear_state(renewing)
-        fill_line(self._lines[to](n, m))
-        begin_switch(switching)
+        table = self._following.numbers
+        f.begin_cells(table)
         if adopt is not None:
             adopt()
-        fill_kinds(self._kinds[to](n, m))
-        end_switch(switching)
-        renew(renewing)
-        self.side, self.cells, self._stale = to, m, True
-        run.set_quota(m)
-        self._put_numbers()
-        table, what = run.table.numbers, run.table.part("task").start
-        before_forces(table)
-        table[what] = ASSEMBLY
-        run.solver(table)
-        table[what] = RUN
-        after_forces(table)
-        booked = float(self._numbers[AFTER] - self._numbers[BEFORE])
-        run.books.work[0, b.ZONES] += booked
-        return booked
+        f.end_cells(table)
+        self._run.set_quota(self.cells)
+        return float(self._numbers[AFTER] - self._numbers[BEFORE])
+
+    # --- outputs that wait --------------------------------------------------------------------------
+
+    def waiting(self) -> list[tuple[Line, Batch]]:
+        """Outputs of cells of before, with the lines that they are of, as arrays that the next steps overwrite."""
+        model, found, begin = self._owner.model, [], 0
+        assert model.layout is not None and model.on_base is not None
+        for offset, count, cells in self._waiting[: self._at[f.WAITING]].tolist():
+            here = np.zeros(self.most + 1, bool)
+            here[self._places[begin : begin + cells + 1]] = True
+            begin += cells + 1
+            line = model.on_base.line(model.layout._replace(here=here), model.line.bits, model.line.plane)
+            size = sample_size(cells, True)
+            rows = self._samples[offset : offset + count * size].reshape(count, size)
+            found.append((line, self._run.batch_of(rows, cells, model.ends.values)))
+        return found
+
+    def empty(self) -> None:
+        """No output waits any longer."""
+        waits = self.waits
+        self._at[[f.WAITING, f.PLACED, f.USED]] = 0
+        if waits and self.adopted:
+            self._synced = -1
+            f.put_cells(self._following.numbers)
+            self.sync()
 
     def sync(self) -> None:
         """What Python has of the line is that of now."""
         if not self._stale:
             return
-        self._stale = False
+        self._synced = int(self._at[f.CHANGES])
         owner, run, k, n = self._owner, self._run, self.side, self.cells
         model, switching, line = owner.model, self._switching, self._line(k, n)
         assert model.layout is not None

@@ -12,7 +12,7 @@ import numpy as np
 
 from hybrid.errors import ComputationError
 from hybrid.kernels.books import AT_STOP, FAILED, FLAGS, JUMPED, LOG, PAUSED, ROWS, SAMPLES, STEPPED, STRETCHED
-from hybrid.kernels.state import Batch, batch_of_one
+from hybrid.kernels.state import Batch, Line, batch_of_one
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.outputs.joined_lines import Output, outputs_in
@@ -117,6 +117,7 @@ class TimeLoop:
         exact: whether steps end at outputs.
         """
         run = self.run
+        run.outputs_may_wait = self._may_be_joined and not self.patient
         try:
             for change in changes[run.changes :]:
                 self.until(change.t, exact)
@@ -236,10 +237,15 @@ class TimeLoop:
         are put aside, to be recorded with others.
         """
         run = self.run
+        before = run.waiting()
         batch = run.run.samples(run.model.ends.values)
+        for line, outputs in before:
+            self._put_aside(line, outputs)
+        if before:
+            run.empty()
         if aside:
             if batch is not None:
-                self._put_aside(batch)
+                self._put_aside(run.model.line, batch)
             return
         if everything or batch is not None or self._aside or run.run.count[ROWS] > LOGGED:
             self._log()
@@ -254,10 +260,10 @@ class TimeLoop:
         of_states = not observer.writes_criteria and observer.quantities is None and self.run.correction is None
         return of_states and not line.law.size and line.h.size >= FEWEST_JOINED
 
-    def _put_aside(self, batch: Batch) -> None:
-        """Outputs of the cells of now, to be recorded with others."""
+    def _put_aside(self, line: Line, batch: Batch) -> None:
+        """Outputs of a line of the zones of now, to be recorded with others."""
         model = self.run.model
-        self._aside += [(model, x) for x in outputs_in(batch, model.line, model.zones)]
+        self._aside += [(model, x) for x in outputs_in(batch, line, model.zones)]
         self._note_torque()
         if sum(x.line.s.size for _, x in self._aside) > MOST_ASIDE:
             self._log()

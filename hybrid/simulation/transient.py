@@ -16,7 +16,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT
 from hybrid.kernels.report import SEABED_ENERGY, SELF_CONTACT_ENERGY
-from hybrid.kernels.state import State, Work, state_for
+from hybrid.kernels.state import Batch, Line, State, Work, state_for
 from hybrid.kernels.step_law import FIRST
 from hybrid.model.build import Model
 from hybrid.model.plan import parts
@@ -99,6 +99,7 @@ class Transient:
         self.plane_monitor.comes_back = switching is None and correction is None and self.payout is None
         self.changes = 0  # of the scene, so far
         self.asks_samples = False  # whether Python looks at every output as it is sampled
+        self.outputs_may_wait = False  # whether outputs may wait although the cells that they are of have changed
         self.turned = self.slackened = False  # whether an event has told of steps cut by the turn of an end, by slack
         self._pending: Change | None = None
         self._reviewed: Change | None = None  # what a review asks for that is done already
@@ -169,6 +170,15 @@ class Transient:
         paid = self.payout is not None and self.payout.due
         leaves = self._leaves or self._returns or self.nears_itself
         return not (self._pending is not None or leaves or self._overloaded or joints or paid)
+
+    def waiting(self) -> list[tuple[Line, Batch]]:
+        """Outputs before those in the buffer of the run, of cells that have changed since; `empty` when done."""
+        return self._cells.waiting() if self._cells is not None else []
+
+    def empty(self) -> None:
+        """What `waiting` gave, and the samples of the run, have been taken."""
+        if self._cells is not None:
+            self._cells.empty()
 
     @property
     def cells_follow(self) -> bool:
@@ -305,19 +315,16 @@ class Transient:
     def _go(self) -> int:
         """Let the compiled run go on, through changes of cells that need nothing else; a code of kernels.books."""
         cells = self._changes_of_cells()
-        code = self.run.go()
-        if cells is not None:
-            while code == b.STEPPED and cells.unwatched():
-                if cells.review_due():
-                    self._reviewed = cells.review()
-                    if self._reviewed is not None:
-                        break
-                elif not cells.due:
+        if cells is None:
+            return self.run.go()
+        code = cells.go()
+        while code == b.STEPPED and cells.unwatched():
+            if cells.review_due():
+                self._reviewed = cells.review()
+                if self._reviewed is not None:
                     break
-                if cells.due:
-                    cells.change()
-                code = self.run.go()
-            cells.sync()
+            code = cells.go(reviewed=True)
+        cells.sync()
         return code
 
     def _changes_of_cells(self) -> CellChanges | None:
@@ -325,7 +332,8 @@ class Transient:
         if not CellChanges.applies(self):
             return None
         if self._cells is None or not self._cells.still_fits():
-            if self.run.count[b.SAMPLES]:  # outputs wait in the arrays of before: Python changes cells until they go
+            waits = self._cells is not None and self._cells.waits
+            if self.run.count[b.SAMPLES] or waits:  # in the arrays of before: Python changes cells until they go
                 return None
             self._cells = CellChanges(self)
         if not self._cells.adopted:

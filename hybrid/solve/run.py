@@ -6,7 +6,7 @@ The loop over time is compiled (kernels.run).  Here are its arrays, and what the
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -175,12 +175,17 @@ class CompiledRun:
         self.count[b.PHASE], self.count[b.AFTER_START], self.count[b.NEW_STATE] = b.START, b.BEGIN_STEP, 1
         self.go()
 
-    def go(self) -> int:
-        """Go on until a code of kernels.books."""
-        if not self._address:  # compiled now, where it is needed, if it has not been
+    def solver_address(self) -> int:
+        """Of the kernel that solves its steps, which is compiled now, where it is needed, if it has not been."""
+        if not self._address:
             self._address = self._solver.address(self.table.numbers)
             self.table.bind(solver=self._address)
-        code: int = run(self.table.numbers)
+        return self._address
+
+    def go(self, by: Callable[[], int] | None = None) -> int:
+        """Go on until a code of kernels.books; by: what is called instead of the kernel of steps alone."""
+        self.solver_address()
+        code: int = run(self.table.numbers) if by is None else by()
         if code in (b.PAUSED, b.AT_STOP):
             self.count[b.QUOTA] = self.quota
         return code
@@ -269,7 +274,11 @@ class CompiledRun:
         self.count[b.SAMPLES] = 0
         if not count:
             return None
-        rows, at = self.books.samples[:count], 0
+        return self.batch_of(self.books.samples[:count], cells, ends)
+
+    def batch_of(self, rows: Floats, cells: int, ends: Ends) -> Batch:
+        """Rows (n, size) of samples of a line of so many cells, as views; ends: as of `samples`."""
+        at, count = 0, len(rows)
 
         def take(*shape: int) -> Floats:
             nonlocal at
