@@ -38,6 +38,7 @@ from hybrid.kernels.self_contact_law import (
 )
 
 SAME_PLACE = 1e-6  # diameters between sample points that are the same
+NEAREST = 0.13  # diameters from a place to the nearest of sample points that are a quarter of a diameter apart
 FOLLOWED = 4.0  # diameters that the foot of a point may go in a step without losing its travel
 # Friction of a point of contact: force on strand p (N); direction of sliding; its stiffness (N/m); the coefficient where
 # it slides, else 0; travel along and across strand p (m).
@@ -129,19 +130,27 @@ def directions(contact, row):
 
 
 @inner
-def find_grip(line, contact, row):
-    """The travel kept of a point, along and across strand p, from the nearest that was on the same strand; 0: none."""
+def find_grip(line, contact, row, other_cells):
+    """The travel kept of a point, along and across strand p, from the nearest that was on the same strand; 0: none.
+
+    other_cells: whether the line has other cells than when travels were kept: the nearest is then half the distance of
+    two sample points away at most.
+    """
     p, width = int(row[P]), contact.width[int(row[P])]
     at = arc_length(line, p, row[PLACE])
     foot = arc_length(line, int(row[Q]), row[FOOT_PLACE])
     along, across, least = 0.0, 0.0, FOLLOWED * width
-    k = contact.heads[p]
-    while k >= 0:
-        grip = contact.grips[k]
-        if abs(grip[AT] - at) < SAME_PLACE * width and abs(grip[FOOT] - foot) < least:
-            least = abs(grip[FOOT] - foot)
-            along, across = grip[TRAVELLED], grip[TRAVELLED + 1]
-        k = contact.links[k]
+    beside, within = (1, NEAREST) if other_cells else (0, SAME_PLACE)
+    for piece in range(max(p - beside, 1), min(p + beside + 1, contact.heads.shape[0] - 1)):
+        k = contact.heads[piece]
+        while k >= 0:
+            grip = contact.grips[k]
+            aside = abs(grip[AT] - at)
+            apart = abs(grip[FOOT] - foot) + (aside if other_cells else 0.0)
+            if aside < within * width and apart < least:
+                least = apart
+                along, across = grip[TRAVELLED], grip[TRAVELLED + 1]
+            k = contact.links[k]
     return along, across
 
 
@@ -167,13 +176,13 @@ def turns_back(row, hold, trial, slides, number):
 
 
 @inner
-def hold_point(line, contact, friction, row, hold, number):
+def hold_point(line, contact, friction, row, hold, number, other_cells):
     """Friction of a point of contact at the shifts and spins contact.x; its work in the step, and its energy (J).
 
-    number: of the try.
+    number: of the try; other_cells: as in `find_grip`.
     """
     first, second = directions(contact, row)
-    along, across = find_grip(line, contact, row)
+    along, across = find_grip(line, contact, row, other_cells)
     g, _ = shift_of(contact, row, contact.x)
     trial = add(g, add(scale(along, first), scale(across, second)))
     size, spring, most = math.sqrt(dot(trial, trial)), row[SPRING], -friction * row[FORCE]

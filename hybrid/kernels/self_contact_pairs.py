@@ -71,8 +71,9 @@ LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of wh
 ) = range(17)
 NUMBERS = 17
 WATCH, COLLECT = -1, -2  # beside LIMIT and TOUCH: how near the line is to itself; keep pairs for all of a step
-POINTS, NODES, OVERFLOW, GRIPS, FRESH, PAIRS, STALE = range(7)  # of `counts`; STALE: the tree is of other positions
-COUNTS = 7
+# Of `counts`.  STALE: the tree is of other positions; REMESHED: the grips are of other cells.
+POINTS, NODES, OVERFLOW, GRIPS, FRESH, PAIRS, STALE, REMESHED = range(8)
+COUNTS = 8
 
 
 class Contact(NamedTuple):

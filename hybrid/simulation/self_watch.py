@@ -193,7 +193,7 @@ def let_touch_itself(run: CompiledRun, scene: Scene, model: Model, work: Work) -
         model.line, diameters(model), least_bending(model), model.tension_scale, scene.contact.friction
     )
     if before is not None:
-        contact.restore(before.checkpoint(run.t))
+        contact.restore(before.checkpoint(run.t), remeshed=True)
     run.touch_itself(contact, model.line, model.ends.values, work)
 
 

@@ -464,6 +464,11 @@ class Transient:
         """The forces and the powers of a state that has changed between two steps."""
         model = self.model
         self.stepper.evaluate_forces(model.sea.at(self.t), model.ends.at(self.t), self.state)
+        run = self.run
+        if run.contact is not None:
+            before = float(run.report[SELF_CONTACT_ENERGY])
+            now = run.contact.settle(self.state, model.ends.values, self.stepper.work.report)
+            run.books.work[0, b.ZONES] += now - before
         self._restart_books()
 
     # --- another model --------------------------------------------------------------------------

@@ -10,6 +10,7 @@ import numpy as np
 from hybrid.kernels.binding import Table
 from hybrid.kernels.forces import ROTARY
 from hybrid.kernels.newton import ADDRESS, ASKED, REST
+from hybrid.kernels.report import FORCE_A, SELF_CONTACT_ENERGY
 from hybrid.kernels.self_contact import blank_contact_job, contact_task
 from hybrid.kernels.self_contact_friction import AT, GRIP, HELD, PIECE
 from hybrid.kernels.self_contact_law import DISTANCE, FORCE, NORMAL, WX, WY, P, Q
@@ -22,6 +23,7 @@ from hybrid.kernels.self_contact_pairs import (
     NARROWEST,
     POINTS,
     QUIET,
+    REMESHED,
     ROLLS,
     SINCE,
     SPEED,
@@ -74,13 +76,26 @@ class SelfContact:
         contact.numbers[ROLLS] = float(bool(line.bits & ROTARY) or holds_twist)
         self.contact = contact
         self._middles = 0.5 * (line.s[1:] + line.s[:-1])
-        self.call = np.zeros(3, np.int64)
+        self.call, self._touch = np.zeros(3, np.int64), np.zeros((3, 0))
         self._job = Table(blank_contact_job())
 
     def energy(self) -> float:
         """Energy, J, of contact where work.u has led the state of a run; infinite where strands are in each other."""
         self.call[ASKED] = REST
         energy: float = contact_task(self._table)
+        return energy
+
+    def settle(self, state: State, ends: Ends, report: Floats) -> float:
+        """Energy, J, of contact of the state of a run, on other cells now: what travels store counts from here.
+
+        It goes into the report of the state, and what contact does to ends that are held into their forces.
+        """
+        self._work.u[:] = 0.0
+        force, energy = self.force(state), self.energy()
+        self.contact.numbers[STORED] = self.contact.numbers[TRIED]
+        report[SELF_CONTACT_ENERGY] = energy
+        for k in np.flatnonzero(ends.held):  # 0 or 1: the first or the last node
+            report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3] += force[-k]
         return energy
 
     @property
@@ -135,17 +150,21 @@ class SelfContact:
         stored = float(numbers[TRIED] if latest else numbers[STORED])
         return {
             "speed": float(numbers[SPEED]), "faded": float(numbers[FADED]), "quiet": float(numbers[QUIET]),
-            "stored": stored, "grips": grips.copy(),
+            "stored": stored, "grips": grips.copy(), "remeshed": bool(counts[REMESHED]) and not latest,
+            "touch": self._touch[0].copy(),
         }  # fmt: skip
 
-    def restore(self, saved: Mapping[str, Any]) -> None:
-        """Go on from `checkpoint`; of another mesh with what lies on sample points of both.  ValueError: no grips."""
+    def restore(self, saved: Mapping[str, Any], remeshed: bool = False) -> None:
+        """Go on from `checkpoint`; remeshed: of a line that had other cells.  ValueError: no grips."""
         grips, numbers, counts = saved["grips"], self.contact.numbers, self.contact.counts
         if grips.ndim != 2 or grips.shape[1] != GRIP or not np.isfinite(grips).all():
             raise ValueError(f"self_contact/grips: expected rows of {GRIP} finite numbers")
         numbers[SPEED], numbers[STORED], numbers[SINCE] = saved["speed"], saved["stored"], np.nan
         numbers[FADED], numbers[QUIET] = saved.get("faded", np.nan), saved.get("quiet", np.inf)
-        counts[GRIPS] = 0
+        counts[GRIPS], counts[REMESHED] = 0, remeshed or saved.get("remeshed", False)
+        touch = saved.get("touch", np.zeros(0))
+        if not remeshed and touch.shape == self._touch[0].shape:
+            self._touch[0] = touch
         if self.contact.grips.size:
             grips = grips[: len(self.contact.grips)].copy()
             grips[:, PIECE] = np.clip(np.searchsorted(self._middles, grips[:, AT]), 1, self._middles.size - 1)
