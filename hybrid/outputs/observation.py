@@ -388,7 +388,7 @@ class Observation:
         """(ns, nb) N/m, force across where the line touches itself: means of what lies nearest to an output point."""
         touch = self.batch.touch
         if not touch.size:
-            return np.zeros((self.grid.s.size, self.batch.t.size))
+            return np.zeros((self.grid.s.size, self.columns))
         return means_beside(self.grid.s, self.line.s, touch) if self.grid.s.size > 1 else self.grid.chords @ touch.T
 
     @property

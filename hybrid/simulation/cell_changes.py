@@ -6,7 +6,7 @@ the numbers of the other one.  What Python has of the line is made anew when the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -80,6 +80,7 @@ class CellChanges:
         self._fixed_to = self._key(owner)
         model, manager, layout = owner.model, owner.switching.manager, owner.model.layout
         self.most, self.base = int(layout.starts[-1]), int(layout.rod.size)
+        self._starts = layout.starts
         self._finest, self._piece = layout.finest.nodes, model.cable.piece(0.5 * (layout.base[1:] + layout.base[:-1]))
         self._base = np.zeros(self.base + 1, np.int64)
         self._sides = Side(self.most, self.base), Side(self.most, self.base)
@@ -291,7 +292,8 @@ class CellChanges:
         of_run, of_zones = for_sides(blank_job, in_run), for_sides(blank_zone_job, in_zones)
         switches = [Shaped(Table(blank_switch_job()), partial(switch_job, *pair)) for pair in pairs]
         renews = [Shaped(Table(blank_renew_job()), partial(renew_job, *pair)) for pair in pairs]
-        self._tables = layouts, lines, kinds, of_run, of_zones, switches, renews  # what is bound there stays alive
+        self._lines = lines
+        self._tables = layouts, kinds, of_run, of_zones, switches, renews  # what is bound there stays alive
         self._bind_following(layouts, lines, kinds, of_run, of_zones, switches, renews)
 
     def _bind_review(self) -> None:
@@ -446,19 +448,26 @@ class CellChanges:
 
     # --- outputs that wait --------------------------------------------------------------------------
 
-    def waiting(self) -> list[tuple[Line, Batch]]:
-        """Outputs of cells of before, with the lines that they are of, as arrays that the next steps overwrite."""
-        model, found, begin = self._owner.model, [], 0
-        assert model.layout is not None and model.on_base is not None
+    def waiting(self) -> Iterator[tuple[Line, Batch]]:
+        """Outputs of cells of before, with the lines that they are of, in arrays that the next one overwrites."""
+        begin = 0
         for offset, count, cells in self._waiting[: self._at[f.WAITING]].tolist():
-            here = np.zeros(self.most + 1, bool)
-            here[self._places[begin : begin + cells + 1]] = True
-            begin += cells + 1
-            line = model.on_base.line(model.layout._replace(here=here), model.line.bits, model.line.plane)
+            line = self._line_of(self._places[begin : begin + cells + 1])
             size = sample_size(cells, True)
             rows = self._samples[offset : offset + count * size].reshape(count, size)
-            found.append((line, self._run.batch_of(rows, cells, model.ends.values)))
-        return found
+            begin += cells + 1
+            yield line, self._run.batch_of(rows, cells, self._owner.model.ends.values)
+
+    def _line_of(self, places: np.ndarray) -> Line:
+        """The line with nodes at these places of the finest mesh, in the arrays that are not in use."""
+        k, m, starts = 1 - self.side, places.size - 1, self._starts
+        at, table = self._layout(k, m), self._lines[k].table.numbers
+        at.place[:], at.s[:] = places, self._finest[places]
+        at.of[:] = np.searchsorted(starts, places[:-1], "right") - 1
+        at.rods[:] = self._switching.zones.rod[at.of]
+        table[:] = np.array([1, 0, m]) @ self._lines[k].numbers
+        fill_line(table)
+        return self._line(k, m)
 
     def empty(self) -> None:
         """No output waits any longer."""

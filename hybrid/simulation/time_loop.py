@@ -237,12 +237,10 @@ class TimeLoop:
         are put aside, to be recorded with others.
         """
         run = self.run
-        before = run.waiting()
-        batch = run.run.samples(run.model.ends.values)
-        for line, outputs in before:
+        for line, outputs in run.waiting():
             self._put_aside(line, outputs)
-        if before:
-            run.empty()
+        batch = run.run.samples(run.model.ends.values)
+        run.empty()
         if aside:
             if batch is not None:
                 self._put_aside(run.model.line, batch)

@@ -171,9 +171,13 @@ class Transient:
         leaves = self._leaves or self._returns or self.nears_itself
         return not (self._pending is not None or leaves or self._overloaded or joints or paid)
 
-    def waiting(self) -> list[tuple[Line, Batch]]:
-        """Outputs before those in the buffer of the run, of cells that have changed since; `empty` when done."""
-        return self._cells.waiting() if self._cells is not None else []
+    def waiting(self) -> Iterator[tuple[Line, Batch]]:
+        """Outputs before those in the buffer of the run, of cells that have changed since, each overwritten by the
+
+        next; `empty` when done.
+        """
+        if self._cells is not None:
+            yield from self._cells.waiting()
 
     def empty(self) -> None:
         """What `waiting` gave, and the samples of the run, have been taken."""
