@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.bed import bed_under
-from hybrid.kernels.cell_errors import layer_length, longest_cell, node_curvature, second_difference
+from hybrid.kernels.cell_errors import CURVATURE, layer_length, longest_cell, node_curvature, second_difference
 from hybrid.kernels.compile import inner
 from hybrid.kernels.forces import SEABED
 from hybrid.kernels.node_forces import get3
@@ -30,7 +30,8 @@ HORIZON = 2.5  # steps of the way of an edge for which cells are made when they 
 STEEPEST = 0.8  # by which W may grow with s: cells beside each other differ by little more than 2
 AHEAD = 0.75  # of W from which cells are halved where others must be: changes become fewer
 MERGE = 0.5  # of W that two cells made one may be long
-CALM_STEPS = 4  # for which two cells must have been so short
+STEADY = 2.0  # times the curvature error of lengths: by so much may curvature change along two cells made one
+CALM_STEPS = 4  # for which two cells must have been so short and so evenly bent
 FADE = 10.0  # ramp times over which the largest curvature of earlier is forgotten
 SAVED = 0.12  # of all cells: so many must go before any goes
 SMOOTHED = 0.1  # part by which delta comes nearer to what it is, in a step: at once it is unstable in slack lines
@@ -129,7 +130,21 @@ def least_wanted(zones, p, b):
 
 
 @inner
-def halves(zones, p, a, size, unit):
+def is_steady(line, zones, p, b):
+    """Whether curvature changes little from the p-th node to place b on the finest mesh.
+
+    The curvature of a node is that half-way between the middles of its cells.  Where two of these become one that
+    place moves by an eighth of its length, and a moment that is another one at once shakes the line.
+    """
+    q, turn = p + 1, zones.kinds.turn
+    while q + 1 < zones.wanted.shape[0] and zones.place[q] < b:
+        q += 1
+    change = abs(node_curvature(line, turn, q) - node_curvature(line, turn, p))
+    return change <= STEADY * zones.limits[CURVATURE]
+
+
+@inner
+def halves(line, zones, p, a, size, unit):
     """Whether the part of `size` finest cells of length `unit` from place a on is halved."""
     W, middle, h = least_wanted(zones, p, a + size), a + size // 2, size * unit
     if h > W * AHEAD:
@@ -137,12 +152,13 @@ def halves(zones, p, a, size, unit):
         return True
     if not zones.here[middle]:
         return False
-    zones.calm[middle] = zones.calm[middle] + 1 if h <= MERGE * W else 0
+    calm = h <= MERGE * W and is_steady(line, zones, p, a + size)
+    zones.calm[middle] = zones.calm[middle] + 1 if calm else 0
     return zones.calm[middle] < CALM_STEPS
 
 
 @inner
-def plan_base_cell(zones, p, begin, size, unit):
+def plan_base_cell(line, zones, p, begin, size, unit):
     """Nodes of a base cell of `size` finest cells, into zones.plan.
 
     p: its first node now.  Parts in their order along the line: the one that begins at an offset is as long as the largest power of two in it.
@@ -151,7 +167,7 @@ def plan_base_cell(zones, p, begin, size, unit):
     while offset < size:
         while zones.place[p + 1] <= begin + offset:
             p += 1
-        while part > 1 and halves(zones, p, begin + offset, part, unit):
+        while part > 1 and halves(line, zones, p, begin + offset, part, unit):
             part //= 2
             zones.plan[begin + offset + part] = True
         offset += part
@@ -173,7 +189,7 @@ def plan_cells(line, sea, state, zones, dt):
         while zones.place[p] < begin:
             p += 1
         zones.plan[begin] = True
-        plan_base_cell(zones, p, begin, size, zones.H[j] / size)
+        plan_base_cell(line, zones, p, begin, size, zones.H[j] / size)
         begin += size
     zones.plan[begin] = True
     gone = 0
