@@ -112,8 +112,8 @@ WORST = 3
 # Bits of `marks`: what a node has.
 LOADED, SEAM = 1, 2  # a point load; where one section ends and the next begins
 # Rows of `extremes`.
-TENSION, CURVATURE, MOMENT, TORQUE, PRESSURE, DISPLACEMENT, SELF_PRESSURE = range(7)
-EXTREMES = 7
+TENSION, CURVATURE, MOMENT, TORQUE, PRESSURE, DISPLACEMENT, SELF_PRESSURE, WALL_TENSION, VON_MISES = range(9)
+EXTREMES = 9
 
 
 class Books(NamedTuple):
@@ -143,6 +143,12 @@ class Books(NamedTuple):
     extremes: Floats  # (4, EXTREMES, N+1+K) lowest, highest, and their times (s); empty: not wanted
     # (3, N+1) N/m, of contact of the line with itself: now, before the last step, where the try has led; empty: there is none
     touch: Floats
+    # Of quantities that a scene asks for by name (kernels.named_quantities); none: empty.
+    asked: Floats  # (Q, ASKED) what they are
+    reached: Floats  # (Q, REACHED) lowest and highest values of all steps
+    path: Floats  # (P, PATH_ROW) chords that clearances are to, m
+    radii: Floats  # (S, 2) m, where the sections of the line end, and their outer radii
+    walls: Floats  # (S, WALL) of sections, in a line that has pipes (kernels.pipes); empty: it has none
 
 
 # A sample, one row: t, sea.now (4), of both ends position (2, 3), frame (2, 9), spin, force and moment (2, 3 each), report,

@@ -112,6 +112,19 @@ def of_chords(line, state, i):
 
 
 @inner
+def towards(line, state, marks, i, side):
+    """Curvature at what may be a kink, node i, as the nodes on its side (-1, 1) lead to."""
+    x = 0.0
+    if is_smooth(line, marks, i + side):
+        x = of_chords(line, state, i + side)
+        if is_smooth(line, marks, i + 2 * side) and is_smooth(line, marks, i + 3 * side):
+            there = of_chords(line, state, i + 2 * side)
+            far = abs(line.s[i + side] - line.s[i]) / abs(line.s[i + 2 * side] - line.s[i + side])
+            x = max(0.0, x + far * (x - there))
+    return x
+
+
+@inner
 def note_catenary(line, state, books, i, t):
     """Curvature at a node without element; at what may be a kink, on each side, as its neighbours lead to."""
     if is_smooth(line, books.marks, i):
@@ -122,14 +135,28 @@ def note_catenary(line, state, books, i, t):
         cell = i - 1 if side < 0 else i
         if cell < 0 or cell == n or line.spin[cell]:
             continue
-        x = 0.0
-        if is_smooth(line, books.marks, i + side):
-            x = of_chords(line, state, i + side)
-            if is_smooth(line, books.marks, i + 2 * side) and is_smooth(line, books.marks, i + 3 * side):
-                there = of_chords(line, state, i + 2 * side)
-                far = abs(line.s[i + side] - line.s[i]) / abs(line.s[i + 2 * side] - line.s[i + side])
-                x = max(0.0, x + far * (x - there))
+        x = towards(line, state, books.marks, i, side)
         widen(books.extremes, CURVATURE, i if side < 0 else books.right[i], x, t)
+
+
+@inner
+def at_rod_end(line, ends, state, i, side, passed):
+    """Curvature, moment and torque at node i, where the rod on its side (-1, 1) ends without element."""
+    n, cell = line.h.shape[0], i - 1 if side < 0 else i
+    d, _, _ = chord(get3(state.e, cell))
+    torque, moment = passed, 0.0
+    if i == 0 or i == n:
+        m = scale(-1.0 if i == 0 else 1.0, get3(ends.moment, 0 if i == 0 else 1))
+        torque = dot(m, d)
+        across = add(m, scale(-torque, d))
+        moment = math.sqrt(dot(across, across))
+    j, curvature = i + side, 0.0
+    if line.element[j]:
+        curvature = math.sqrt(line.k0[j, 0] ** 2 + line.k0[j, 1] ** 2) / line.hn[j]
+        stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
+        if stiffness > 0.0:
+            curvature += moment / stiffness
+    return curvature, moment, torque
 
 
 @inner
@@ -150,23 +177,22 @@ def note_rod_end(line, ends, state, books, i, passed, t):
                 widen(books.extremes, MOMENT, i if side < 0 else books.right[i], 0.0, t)
                 widen(books.extremes, TORQUE, i if side < 0 else books.right[i], passed, t)
             continue
-        d, _, _ = chord(get3(state.e, cell))
-        torque, moment = passed, 0.0
-        if i == 0 or i == n:
-            m = scale(-1.0 if i == 0 else 1.0, get3(ends.moment, 0 if i == 0 else 1))
-            torque = dot(m, d)
-            across = add(m, scale(-torque, d))
-            moment = math.sqrt(dot(across, across))
-        j, curvature = i + side, 0.0
-        if line.element[j]:
-            curvature = math.sqrt(line.k0[j, 0] ** 2 + line.k0[j, 1] ** 2) / line.hn[j]
-            stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
-            if stiffness > 0.0:
-                curvature += moment / stiffness
+        curvature, moment, torque = at_rod_end(line, ends, state, i, side, passed)
         at = i if side < 0 else books.right[i]
         widen(books.extremes, CURVATURE, at, curvature, t)
         widen(books.extremes, MOMENT, at, moment, t)
         widen(books.extremes, TORQUE, at, torque, t)
+
+
+@inner
+def beside_seam(line, books, i, j):
+    """Curvature at the element of node i, where sections meet, on the side of its neighbour j."""
+    own = min(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
+    stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
+    x = books.strains[i, 0]
+    if line.element[j] and own > 0.0 and stiffness > 0.0:
+        x = max(0.0, x + books.strains[i, 1] * (1.0 / stiffness - 1.0 / own))
+    return x
 
 
 @inner
@@ -182,13 +208,8 @@ def note_element(line, books, i, t):
     if not (books.marks[i] & SEAM):
         widen_both(books.extremes, books.right, CURVATURE, i, curvature, t)
         return
-    own = min(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
     for j in (i - 1, i + 1):
-        stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
-        x = curvature
-        if line.element[j] and own > 0.0 and stiffness > 0.0:
-            x = max(0.0, x + moment * (1.0 / stiffness - 1.0 / own))
-        widen(books.extremes, CURVATURE, i if j < i else books.right[i], x, t)
+        widen(books.extremes, CURVATURE, i if j < i else books.right[i], beside_seam(line, books, i, j), t)
 
 
 @inner

@@ -129,6 +129,7 @@ class Job(NamedTuple):
     reel: int = 0  # address of kernels.payout.pay_out; 0: the length of the line stays
     iterated: int = 0  # of a run: address of kernels.payout.iterate; 0: iterations need nothing of it
     follower: int = 0  # and of what is called with `following` after every step; 0: nothing
+    quantities: int = 0  # address of kernels.named_quantities.note_quantities; 0: none are asked for
 
 
 def blank_books(cells: int = 1, rows: int = 1) -> Books:
@@ -140,7 +141,7 @@ def blank_books(cells: int = 1, rows: int = 1) -> Books:
         borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
         samples=z((rows, sample_size(cells))), model_error=z((2, 0)), strains=z((0, 3)), start=z((nodes, 3)), marks=z(nodes, np.int8),
         right=np.arange(nodes),
-        extremes=z((4, 0, nodes)), touch=z((3, 0)),
+        extremes=z((4, 0, nodes)), touch=z((3, 0)), asked=z((0, 0)), reached=z((0, 0)), path=z((0, 0)), radii=z((0, 2)), walls=z((0, 0)),
     )  # fmt: skip
 
 
@@ -158,7 +159,7 @@ def blank_job() -> Job:
 
 read = reader(blank_job())
 call_solver, call_follower, call_zones, call_itself = caller((0, 0, 0.0, 0)), caller(0), caller(0), caller(0)
-call_reel = caller(0)
+call_reel, call_quantities = caller(0), caller(0)
 
 
 @inner
@@ -173,7 +174,7 @@ def watch_itself(job, state):
 
 
 @inner
-def conclude(job, old, new):
+def conclude(table, job, old, new):
     """After a try: -1, or what to return.  Where the step is accepted its books are kept, and it is looked at."""
     line, sea, ends, books, work = job.line, job.sea, job.ends, job.books, job.work
     clock, count, asks = books.clock, books.counts, job.books.counts[ASKS] & ASK_STEPS
@@ -199,6 +200,8 @@ def conclude(job, old, new):
         count[FLAGS] |= watch_itself(job, new)
         if books.extremes.shape[1] > 0:
             note_extremes(line, sea, ends, new, books, clock[NOW])
+        if job.quantities != 0:
+            call_quantities(job.quantities, table)
         if job.zones != 0:
             asks |= call_zones(job.zones, job.zone_table)
         if job.reel != 0:
@@ -209,7 +212,7 @@ def conclude(job, old, new):
 
 
 @inner
-def between_steps(job, old, new):
+def between_steps(table, job, old, new):
     """The phases before a try; `new` is the state now.  -1 when one is to be made, else what to return."""
     clock, count = job.books.clock, job.books.counts
     if count[PHASE] == START:
@@ -218,6 +221,8 @@ def between_steps(job, old, new):
         if count[NEW_STATE] and job.books.extremes.shape[1] > 0:
             first_strains(job.line, job.ends, new, job.books)
             note_extremes(job.line, job.sea, job.ends, new, job.books, clock[NOW])
+        if count[NEW_STATE] and job.quantities != 0:
+            call_quantities(job.quantities, table)
         count[PHASE] = count[AFTER_START]
     if count[PHASE] == SAMPLE:
         if not sample_step(job.line, job.sea, old, new, job.books):
@@ -293,7 +298,7 @@ def run(table):
         old, new = job.old, job.new
         if count[PARITY]:
             old, new = job.new, job.old
-        code = between_steps(job, new, old)
+        code = between_steps(table, job, new, old)
         if code >= 0:
             return code
         if count[PHASE] == SOLVE:
@@ -313,6 +318,6 @@ def run(table):
                 return TRIED
             if count[ASKS] & ASK_TRIES:
                 return TRIED
-        code = conclude(job, old, new)
+        code = conclude(table, job, old, new)
         if code >= 0:
             return code

@@ -20,7 +20,7 @@ from hybrid.kernels.bodies import (
     size_of_moves,
     start_here,
 )
-from hybrid.kernels.books import RATES, STORED
+from hybrid.kernels.books import NOW, RATES, STORED
 from hybrid.kernels.carried_frames import turns
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.configuration import first_bad, measure, update
@@ -61,7 +61,7 @@ from hybrid.kernels.report import (
     SLACKEST,
     SLACKEST_CELL,
 )
-from hybrid.kernels.run import read
+from hybrid.kernels.run import call_quantities, read
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
 from hybrid.kernels.step_law import REFUSED
@@ -198,6 +198,14 @@ def keep_report(books, report):
 
 
 @inner
+def note_quantities(table, job, t):
+    """Ranges of the quantities that are asked of a line, to its state at t (s)."""
+    if job.quantities != 0:
+        job.books.clock[NOW] = t
+        call_quantities(job.quantities, table)
+
+
+@inner
 def begin_books(tables, joints, t):
     """Powers of the states as they are, what the seabed stores, and extremes where they are kept; t: s, now."""
     for l in range(tables.shape[0]):
@@ -214,6 +222,7 @@ def begin_books(tables, joints, t):
             keep_report(books, report)
             first_strains(line, job.ends, new, books)
             note_extremes(line, sea, job.ends, new, books, t)
+        note_quantities(tables[l], job, t)
 
 
 @inner
@@ -230,6 +239,7 @@ def keep_books(tables, joints, dt, t):
         if books.extremes.shape[1] > 0:
             keep_report(books, report)
             note_extremes(line, job.sea, job.ends, new, books, t)
+        note_quantities(tables[l], job, t)
 
 
 @inner

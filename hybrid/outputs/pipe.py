@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from hybrid.kernels import pipes as wall_of
 from hybrid.kernels.state import Floats
 from hybrid.model.payout import whole_scene
 from hybrid.outputs.probes import Probe
@@ -48,6 +49,7 @@ class Pipes:
             z = self._surface if p.pressure_z is None else p.pressure_z
             rows.append((outer, outer - 2.0 * p.wall, p.modulus, p.pressure, z, p.content_density))
         self._walls = Walls(*np.array(rows, float).T)
+        self.whole = tuple(begin + np.cumsum([x.length for x in sections]))  # m, where they end
         limits = [x.pipe.max_stress if x.pipe is not None else None for x in sections]
         self.limits = np.array([np.nan if x is None else x for x in limits], float)
 
@@ -63,6 +65,23 @@ class Pipes:
     def largest_allowed(self, s: Floats, after: bool) -> Floats:
         """Largest stress (ns,) Pa allowed at arc lengths s (m), after or before where sections meet; NaN: any."""
         return self.limits[self._sections(s, after)]
+
+    def rows(self) -> Floats:
+        """(sections, WALL) of kernels.pipes."""
+        found, walls = np.zeros((len(self.whole), wall_of.WALL)), self._walls
+        columns: dict[int, Any] = {
+            wall_of.SECTION_END: self.whole, wall_of.OUTER: walls.outer, wall_of.INNER: walls.inner,
+            wall_of.MODULUS: np.nan_to_num(walls.modulus), wall_of.INSIDE: walls.pressure,
+            wall_of.INSIDE_Z: walls.pressure_z, wall_of.CONTENT: walls.content * self._gravity,
+            wall_of.WATER: self._density * self._gravity, wall_of.SURFACE: self._surface,
+        }  # fmt: skip
+        for column, values in columns.items():
+            found[:, column] = values
+        return found
+
+    def has_wall(self, s: Floats) -> np.ndarray:
+        """(ns,) bool, whether the sections at arc lengths s (m), away from where they meet, are pipes."""
+        return ~np.isnan(self._walls.modulus[self._sections(s, True)])
 
     def _sections(self, s: Floats, after: bool) -> np.ndarray:
         return np.searchsorted(self._bounds, s + (self._near if after else -self._near))

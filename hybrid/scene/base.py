@@ -75,7 +75,9 @@ class Table(BaseModel):
     A key that was renamed keeps its former names, in `validation_alias=AliasChoices(name, former, ...)`.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, field_title_generator=_title, defer_build=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, field_title_generator=_title, defer_build=True
+    )
 
     former: ClassVar[Mapping[str, str]] = {}  # of each former name, the key of today
     instead: ClassVar[Mapping[str, str]] = {}  # of keys that other tables have and this one cannot: what to do

@@ -51,7 +51,7 @@ TAKEN = (
     "seabed_x", "seabed_y", "seabed_height", "seabed_ends", "surface", "attached", "min_bend_radius", "max_tension",
     "min_tension", "bending_stiffness", "diameter", "turns", "payout", "energy", "work", "errors", "criteria", "steps",
     "right", "mesh", "envelope", "limits", "zones", "events", "points", "bodies", "lines", "times", "checkpoint",
-    "scene", "template", "word", "plane", "bounds", "ends", "self_distance",
+    "scene", "template", "word", "plane", "bounds", "ends", "self_distance", "extremes",
 )  # fmt: skip
 # The field with the arc length at which a clearance is least: its name after that of the clearance.
 WHERE = "_at"

@@ -23,6 +23,8 @@ from hybrid.model.payout import whole_scene
 from hybrid.model.sections import SECTION_LIMITS, limits_along, section_changes
 from hybrid.model.self_reach import no_contact
 from hybrid.outputs.output_grid import Grid
+from hybrid.outputs.pipe import Pipes
+from hybrid.outputs.step_quantities import StepQuantities
 from hybrid.scene.schema import Scene
 from hybrid.simulation.self_watch import SelfWatch
 from hybrid.solve.run import CompiledRun, no_extremes
@@ -41,6 +43,8 @@ QUANTITIES = {
     b.PRESSURE: ("contact", "N/m", "normal force of the seabed per length", "seabed"),
     b.SELF_PRESSURE: ("self_contact", "N/m", "force per length where the line touches itself", "self_contact"),
     b.DISPLACEMENT: ("displacement", "m", "distance from where the node was at the start", "time"),
+    b.WALL_TENSION: ("wall_tension", "N", "tension in the wall", "pipe"),
+    b.VON_MISES: ("von_mises", "Pa", "largest von Mises stress in the wall of a pipe", "pipe"),
 }
 
 _S_TEXT = "arc lengths of nodes; point loads and changes of section come twice, with the value before and after them"
@@ -95,6 +99,9 @@ class Envelope:
         has |= ({"seabed"} if model.line.bits & SEABED else set()) | ({"time"} if moves else set())
         has |= {"self_contact"} if moves and model.line.bits & (SELF_CONTACT | MAY_TOUCH) else set()
         has |= {"torsion"} if "rod" in has or (model.line.torsion.size and not model.line.bits & PLANAR) else set()
+        # corrected outputs are not of the line that steps compute
+        pipes = Pipes(scene) if moves and not model.corrected and any(x.pipe for x in scene.cable.sections) else None
+        has |= {"pipe"} if pipes is not None else set()
         self._rows = {row: what for row, what in QUANTITIES.items() if what[3] in has}
         side = 3.0 * NEAR * model.length  # beyond which a place is no longer at a change of section
         first, second = (np.flatnonzero(np.diff(self.s) == 0.0) + k for k in (0, 1))
@@ -103,10 +110,16 @@ class Envelope:
         beside[second] += side
         whole, begin = whole_scene(scene)
         self._limits = limits_along(whole, beside - begin)
+        self._walls = pipes.has_wall(beside) if pipes is not None else np.zeros(0, bool)
+        self._stress = np.full(self.s.size, np.nan)
+        if pipes is not None:
+            self._stress = pipes.largest_allowed(beside, True)
         self._grows = model.payout is not None
         if moves and model.line.bits & MAY_TOUCH and not model.line.bits & SELF_CONTACT:
             self.bounds[:, b.SELF_PRESSURE] = 0.0  # there is no contact before it is computed
         self.itself = SelfWatch(model, no_contact(scene)) if moves else SelfWatch(model)
+        asked = scene.output.quantities if moves and not model.corrected else {}
+        self.quantities = StepQuantities(scene, asked, pipes)
 
     # --- what is kept -------------------------------------------------------------------------------
 
@@ -155,12 +168,18 @@ class Envelope:
             "bounds": self.bounds.copy(),
             "now": now.copy(),
             "itself": self.itself.itself.found.copy(),
-        }
+        } | ({"quantities": self.quantities.reached.copy()} if self.quantities else {})
 
     def restore(self, saved: Mapping[str, Any], now: Floats) -> None:
         """Go on as `checkpoint` has written, into `now`.  ValueError: it is that of another line."""
         mine = self.checkpoint(now)
-        found = matched({"itself": mine["itself"]} | dict(saved), mine, "state/envelope")  # files of before have none
+        older = {"itself": mine["itself"]}  # files of before have none
+        saved = dict(saved)
+        for name in ("bounds", "now"):  # nor wall tension and stress
+            saved[name] = with_pipes(saved.get(name))
+        self.quantities.restore(saved.get("quantities"))
+        older |= {"quantities": self.quantities.reached} if self.quantities else {}
+        found = matched(older | saved, mine, "state/envelope")
         self.begin, self.start[:], self.bounds[:] = found["begin"], found["start"], found["bounds"]
         now[:], self.itself.itself.found[:] = found["now"], found["itself"]
 
@@ -173,6 +192,9 @@ class Envelope:
         for name, values in self._limits.items():
             unit, text, _ = SECTION_LIMITS[name]
             out.append((Field(f"{GROUP}/{name}", unit, f"{text}; NaN: none", n, dims, nan_ok=True), values))
+        if np.isfinite(self._stress).any():
+            full, of = f"{GROUP}/max_stress", "largest von Mises stress allowed; NaN: none"
+            out.append((Field(full, "Pa", of, n, dims, nan_ok=True), self._stress))
         for name, unit, text, _ in self._rows.values():
             for bound, word in (("min", "smallest"), ("max", "largest")):
                 full, of = f"{GROUP}/{name}_{bound}", f"{word} {text} at any accepted step"
@@ -181,6 +203,7 @@ class Envelope:
                 out.append((when, unknown))
         for name, text in ((BEGIN, "the steps counted begin"), (END, "they end, so far")):
             out.append((Field(name, "s", f"extremes are of all accepted steps: when {text}", nan_ok=True), unknown[0]))
+        out += [(field, np.full(field.shape, np.nan)) for field in self.quantities.fields()]
         return out + [(field, unknown[0]) for field in self.itself.fields()]
 
     def judged(self, values: Mapping[str, np.ndarray]) -> list[Judged]:
@@ -196,13 +219,23 @@ class Envelope:
     def values(self, nodes: Floats, extremes: Floats, t: float) -> dict[str, np.ndarray]:
         """Values of those fields up to time t (s), with the extremes (4, EXTREMES, N+1+K) of the mesh of now."""
         bounds = self._with(nodes, extremes)
-        out = {BEGIN: np.array(self.begin), END: np.array(t), **self.itself.values()}
+        out = {BEGIN: np.array(self.begin), END: np.array(t), **self.itself.values(), **self.quantities.values()}
         for row, (name, *_) in self._rows.items():
             for k, bound in enumerate(("min", "max")):
                 x = bounds[k, row]
+                if row == b.VON_MISES:
+                    x = np.where(self._walls, x, np.inf)
                 out[f"{GROUP}/{name}_{bound}"] = np.where(np.isfinite(x), x, np.nan)
                 out[f"{GROUP}/{name}_t_{bound}"] = bounds[2 + k, row]
         return out
+
+
+def with_pipes(x: Any) -> Any:
+    """Extremes of a checkpoint, with unknown ones of pipes where it has none."""
+    if not (isinstance(x, np.ndarray) and x.ndim == 3 and x.shape[:2] == (4, b.WALL_TENSION)):
+        return x
+    more = np.full((4, b.EXTREMES - b.WALL_TENSION, x.shape[2]), np.nan)
+    return np.concatenate([x, more], axis=1)
 
 
 def of_equilibrium(

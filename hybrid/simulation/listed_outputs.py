@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from hybrid.model.build import build
@@ -10,7 +10,7 @@ from hybrid.model.model_costs import with_model
 from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.model.system import build_system
 from hybrid.outputs.probes import PROBES
-from hybrid.scene.quantities import KINDS
+from hybrid.scene.quantities import KINDS, Quantity
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.scene.system import System
@@ -46,6 +46,8 @@ def listed_outputs(scene: SceneLike | System) -> list[Listed]:
     guesses = asked.guesses
     scenes = {name: asked.scene_of(name, asked.carried(name), guesses) for name in model.names}
     found = _over_time([*fields_of(asked), *SystemQuantities(asked, scenes).fields])
+    if asked.time is not None:
+        found = _with_ranges(found, asked.output.quantities)
     for (name, each), built in zip(scenes.items(), model.models, strict=True):
         fields = observer_of(each, built, asked.time is not None).fields
         found += _over_time(fields, steps=asked.time is not None, begin=f"{GROUP}/{name}/")
@@ -71,7 +73,20 @@ def _of_scene(scene: Scene) -> list[Listed]:
         observer = case.observer(model, isinstance(scene.model, AdaptiveModel), case.points.s, None)
     else:
         observer = StaticCase(scene).observer(model)
-    return _over_time(observer.fields, steps=moves)
+    found = _over_time(observer.fields, steps=moves)
+    return _with_ranges(found, scene.output.quantities, model.corrected) if moves else found
+
+
+def _with_ranges(found: list[Listed], asked: Mapping[str, Quantity], corrected: bool = False) -> list[Listed]:
+    """Listed quantities that say whether extremes and limits of them are those of every step; asked: by name."""
+    out = []
+    for x in found:
+        if x.name in asked or x.name in ("wall_tension", "von_mises"):
+            outputs = corrected or (x.name in asked and asked[x.name].other is not None)
+            text = "extremes and limits: at the outputs" if outputs else "extremes and limits: of every step"
+            x = x._replace(description=f"{x.description}; {text}")
+        out.append(x)
+    return out
 
 
 def _over_time(fields: Iterable[Field], steps: bool = False, begin: str = "") -> list[Listed]:

@@ -34,6 +34,7 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
         "cpu": run.cpu, "dry": sorted(run.dry), "bodies": run.state.bodies, "body_work": run.solver.body_work,
         "lines": lines, "broken": [*run.failures.broken], "rest": run.rest,
         "control": run.control.checkpoint() if run.control is not None else [],
+        "quantities": run.quantities.checkpoint(),
     }  # fmt: skip
 
 
@@ -50,6 +51,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         **saved,
     }  # an earlier program took members as at the first guess
     template = checkpoint(run) | {"dry": None, "broken": None, "control": None}
+    saved = {"quantities": run.quantities.unknown(), **saved}  # nor did it keep ranges
     saved["lines"] = of_today(saved.get("lines"), template["lines"])
     for line in template["lines"].values():
         line["report"] = np.full_like(line["report"], np.inf)  # it may have numbers that are not finite
@@ -85,6 +87,7 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
     if run.control is not None:
         run.control.restore(found["control"])
     run.state.bodies[:], run.solver.body_work[:] = found["bodies"], found["body_work"]
+    run.quantities.restore(found["quantities"])
     for line, x, work, state in zip(run.lines, run.solver.lines, run.solver.work, run.state.lines, strict=True):
         mine = found["lines"][line.name]
         for name, values in mine["state"].items():

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from hybrid.kernels.state import Batch, Floats
 from hybrid.outputs.probes import Probe
 from hybrid.outputs.quantities import Quantities
+from hybrid.outputs.step_quantities import StepQuantities
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.simulation.result_file import limits_of
@@ -23,12 +24,45 @@ class SystemQuantities:
         """scenes: of the lines, by name."""
         self._wanted, self._scenes = system.output.quantities, scenes
         self._of_line: dict[str, tuple[Quantities, dict[str, Probe]]] = {}
+        self._steps: dict[str, StepQuantities] = {}  # their ranges over all steps, of a motion
         for line, scene in scenes.items():
             mine = {name: q for name, q in self._wanted.items() if q.line == line}
             if mine:
                 found = Quantities(scene, mine)
                 found.pipes = None  # their stresses are in the result of the line
                 self._of_line[line] = found, found.probes()
+
+    def keep_ranges(self, lines: Sequence[LineResult]) -> None:
+        """From now on the books of the lines keep the ranges of what is asked of them, over all steps."""
+        for line in lines:
+            pipes = line.envelope.quantities.pipes
+            found = StepQuantities(line.scene, {n: q for n, q in self._wanted.items() if q.line == line.name}, pipes)
+            if found:
+                line.books, self._steps[line.name] = found.given_to(line.books), found
+
+    @property
+    def ranges(self) -> list[tuple[Field, np.ndarray]]:
+        """The smallest and the largest value of each over all steps, not yet known."""
+        return [(f, np.full(f.shape, np.nan)) for x in self._steps.values() for f in x.fields()]
+
+    def range_values(self) -> dict[str, np.ndarray]:
+        """Values of those fields up to now."""
+        return {name: x for each in self._steps.values() for name, x in each.values().items()}
+
+    def checkpoint(self) -> dict[str, np.ndarray]:
+        """Ranges by line."""
+        return {name: x.reached.copy() for name, x in self._steps.items()}
+
+    def unknown(self) -> dict[str, np.ndarray]:
+        """The same of a run that has kept none so far."""
+        for x in self._steps.values():
+            x.restore(None)
+        return self.checkpoint()
+
+    def restore(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Go on with ranges that a checkpoint has; of one from before there were any, they stay unknown."""
+        for name, x in self._steps.items():
+            x.restore(saved.get(name))
 
     @property
     def fields(self) -> list[Field]:

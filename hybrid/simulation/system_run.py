@@ -97,6 +97,8 @@ class SystemRun:
             )
         ]
         self.quantities = SystemQuantities(system, dict(zip(names, self.scenes, strict=True)))
+        if moves and target is not None:
+            self.quantities.keep_ranges(self.lines)
         self.t, self.steps, self.last_step, self.cpu = 0.0, 0, 0.0, 0.0
         self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
         self.dry: set[str] = set()  # bodies that have been said to be out of the water
@@ -130,7 +132,7 @@ class SystemRun:
             attributes["fairleads"] = json.dumps(on_bodies)
         recorder = Recorder(
             self.target, grid_s=np.zeros(1), fields=[*fields_of(self.system), *self.quantities.fields],
-            step_fields=(), attributes=attributes, fixed=self.quantities.limits,
+            step_fields=(), attributes=attributes, fixed=[*self.quantities.limits, *self.quantities.ranges],
             texts={"scene": text}, outputs=len(self.times) + 1, overwrite=True,
             before=self._before if self.kept else None, templates=cache_folder().parent, parts=self._parts,
         )  # fmt: skip
@@ -172,6 +174,7 @@ class SystemRun:
         for line in self.lines:
             line.write_down()
             line.write_envelope(self.t)
+        self.recorder.replace(self.quantities.range_values())
         self.gather_events()
         if new and isinstance(self.recorder, Recorder):
             self.cpu, self._checked = clock.process_time() - self._begin, self.steps
@@ -219,6 +222,7 @@ class SystemRun:
         for line in self.lines:
             for t, s_a, s_b, kind, text in line.close(self.t, status, message):
                 self.recorder.event(t, s_a, s_b, kind, f"line {line.name}: {text}")
+        self.recorder.replace(self.quantities.range_values())
         self.recorder.close(status, message)
 
     # --- what is computed ---------------------------------------------------------------------------

@@ -60,6 +60,7 @@ def commit(run: SystemRun) -> None:
         for line in run.lines:
             line.write_down()
             line.write_envelope(run.t)
+        run.recorder.replace(run.quantities.range_values())
     run.gather_events()
     for recorder in recorders(run):
         recorder.commit()

@@ -82,6 +82,8 @@ class Transient:
         self.switching, self.correction, self.beyond = switching, correction, -np.inf
         self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes, switching is not None)
         self.envelope = Envelope(scene, model, moves=True) if extremes else None
+        if self.envelope is not None and self.envelope.quantities:
+            self.run.keep_ranges(self.envelope.quantities.given_to(self.run.books))
         self.itself: SelfWatch | None = None
         if self.envelope is not None:
             self.itself = self.envelope.itself

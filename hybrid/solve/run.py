@@ -17,6 +17,7 @@ from hybrid.kernels.binding import Table
 from hybrid.kernels.books import sample_size
 from hybrid.kernels.entry import NO_PUSH, check_turns
 from hybrid.kernels.forces import PLANAR, SELF_CONTACT
+from hybrid.kernels.named_quantities import note_quantities
 from hybrid.kernels.newton import RUN, Limits, Task
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.run import blank_books, blank_job, in_plane, in_space, run
@@ -190,6 +191,11 @@ class CompiledRun:
             self.count[b.QUOTA] = self.quota
         return code
 
+    def keep_ranges(self, books: b.Books) -> None:
+        """From now on steps keep the ranges of the quantities that are asked for in these books, of the same arrays."""
+        self.books = books
+        self.table.bind(books=books, quantities=note_quantities.address(self.table.numbers))
+
     def wait_longer(self) -> None:
         """Before a line is attached for a run that is stepped from outside: more steps and samples may wait."""
         self._rows, self._room = ROWS_OUTSIDE, np.zeros(0)
@@ -214,6 +220,7 @@ class CompiledRun:
 
     def _changing(self) -> Iterator[Floats]:
         skipped = {"outputs", "log", "samples", "borne", "base", "placed", "loaded", "start", "marks", "right"}
+        skipped |= {"asked", "path", "radii", "walls"}
         skipped.add("model_error")  # where it is followed, simulation.stepping packs a checkpoint instead
         yield from (x for state in self.states for x in state)
         yield from self.pushes

@@ -26,6 +26,7 @@ from hybrid.kernels.entry import NO_PUSH, workspace_of
 from hybrid.kernels.forces import FRICTION, WAVES
 from hybrid.kernels.joined_lines import COLUMNS, FUNCTIONAL
 from hybrid.kernels.junctions import HANDED
+from hybrid.kernels.named_quantities import note_quantities
 from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, Limits, Task
 from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL
 from hybrid.kernels.resolution_checks import lowest
@@ -165,7 +166,8 @@ class SystemSolver:
         """Keep powers, work and extremes of the lines in these books from now on."""
         self.books = list(books)
         for table, each in zip(self._tables, books, strict=True):
-            table.bind(books=each)
+            asks = each.asked.size or each.walls.size
+            table.bind(books=each, quantities=note_quantities.address(self._numbers[0]) if asks else 0)
 
     def _solve(self, task: Task, old: SystemState, new: SystemState, t: float = 0.0) -> SystemTaken:
         both = [*new.lines, *old.lines]

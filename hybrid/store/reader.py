@@ -15,6 +15,7 @@ Layout, format 1 (`record` writes it)::
     /events/{criterion,value,threshold,energy}
     /envelope/{s,<field>_min,<field>_max,<field>_t_min,<field>_t_max,begin,end}
                                     extremes of all accepted steps from begin to end, over nodes (`envelope`)
+    /extremes/{<name>,t/<name>}     of named quantities: smallest and largest of all accepted steps, and when
     /mesh/{s,always}                nodes that there may be, and whether they are there outside of rod zones as well
     /scene                          the scene, as YAML text
     /changes                        scenes that held from some time on, as JSON; only where there are any

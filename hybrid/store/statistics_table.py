@@ -12,6 +12,7 @@ from hybrid.statistics.extremes import THREE_HOURS, of_record
 from hybrid.statistics.moments import summary
 from hybrid.store.envelope import extreme
 from hybrid.store.histories import Window, history_of, lies_along, usual_names
+from hybrid.store.limits import at_every_step
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
@@ -61,15 +62,21 @@ def rows_of(
 
 def _beyond_outputs(result: Result, name: str, t: np.ndarray, largest: Any) -> str:
     """What the envelope of all nodes and steps knows of the largest value in the times t (n,) s; "": nothing more."""
-    found = extreme(result, name, "max")
-    if found is None or not t[0] <= found.t <= t[-1]:
+    found, named = extreme(result, name, "max"), at_every_step(result, name, "largest")
+    if found is not None:
+        value, when, where = found.value, found.t, f"s = {found.s:.5g} m, "
+    elif named is not None:
+        value, when, where = named[0], named[1], ""
+    else:
         return ""
-    if not found.value - largest > WORTH_A_NOTE * abs(largest):
+    if not (t[0] <= when <= t[-1] and value - largest > WORTH_A_NOTE * abs(largest)):
         return ""
     unit = result.units[name]
+    of, more = ("all nodes and steps", " or more output.points") if where else ("all steps", "")
+    shows = "show" if more else "shows"
     return (
-        f"{name}: {found.value:.5g} {unit} at s = {found.s:.5g} m, t = {found.t:.5g} s, of all nodes and steps, "
-        f"{float(largest):.5g} {unit} at the outputs; a shorter output.every or more output.points show more of it"
+        f"{name}: {value:.5g} {unit} at {where}t = {when:.5g} s, of {of}, {float(largest):.5g} {unit} at the outputs; "
+        f"a shorter output.every{more} {shows} more of it"
     )
 
 

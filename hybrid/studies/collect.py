@@ -12,6 +12,7 @@ from hybrid.errors import HybridError, ResultError
 from hybrid.scene.study import Kept
 from hybrid.statistics import extremes, moments
 from hybrid.store.histories import history_of, lies_along
+from hybrid.store.limits import at_every_step
 from hybrid.store.reader import Result
 
 Floats = np.ndarray
@@ -112,9 +113,13 @@ def _taken(
     name, at = kept.quantity, None if kept.at is None else np.atleast_1d(np.asarray(kept.at, float))
     if take in ("max", "min") and at is None and kept.times is None and f"envelope/{name}_{take}" in result:
         values = result[f"envelope/{name}_{take}"]  # of every step
-        known = values[np.isfinite(values)]
-        worst = (known.max() if take == "max" else known.min()) if known.size else np.nan
+        finite = values[np.isfinite(values)]
+        worst = (finite.max() if take == "max" else finite.min()) if finite.size else np.nan
         return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(worst)
+    if take in ("max", "min") and at is None and kept.times is None:
+        known = at_every_step(result, name, "largest" if take == "max" else "smallest")
+        if known is not None:
+            return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(known[0])
     if take == "damage":
         assert kept.curve is not None
         s, damage = result.damage(kept.curve, strength=kept.strength, section=kept.section, times=kept.times, at=at)
