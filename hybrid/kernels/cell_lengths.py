@@ -24,6 +24,7 @@ from hybrid.kernels.zone_criteria import depth
 
 TURN = 0.3  # rad that a cell turns through
 SHORTEST_CELL = 0.6  # of l0
+SHARP = 0.5  # rad: a kink that runs along a line may be as short as this over its curvature, which l0 at rest is not
 EDGE_CELL, EDGE_WIDTH = 1.0, 3.0  # of l0: cells beside a contact edge, and how far from it
 FARTHEST = 30.0  # of l0: how far an edge is foreseen to go in a step
 HORIZON = 2.5  # steps of the way of an edge for which cells are made when they change, so that fewer steps do
@@ -46,17 +47,27 @@ def bending_length(kinds, T, i):
 
 
 @inner
+def shortest_length(l0, kappa, limits):
+    """Below which cells need not be: what a layer, or a kink on its way, of largest curvature kappa asks for."""
+    least = SHORTEST_CELL * l0
+    if kappa > 0.0:
+        least = min(least, 0.9 * math.sqrt(8.0 * limits[CURVATURE] / kappa) * min(l0, SHARP / kappa))
+    return least
+
+
+@inner
 def wanted_length(line, kinds, T, i, limits):
     """W at node i; limits: (4,) errors that interpolation may make."""
     n, turn = T.shape[0], kinds.turn
-    bends = 0.0
+    bends, largest = 0.0, node_curvature(line, turn, i)
     for k in range(max(i - 1, 1), min(i + 2, n)):
         bends = max(bends, second_difference(line, turn, k))
+        largest = max(largest, node_curvature(line, turn, k))
     k = node_curvature(line, turn, i)
     W = longest_cell(kinds.EI[i], kinds.w[i], k, bends, limits)
     if k > 0.0:
         W = min(W, TURN / k)
-    return max(W, SHORTEST_CELL * bending_length(kinds, T, i))
+    return max(W, shortest_length(bending_length(kinds, T, i), largest, limits))
 
 
 @inner
