@@ -25,6 +25,7 @@ from hybrid.kernels.zone_criteria import depth
 TURN = 0.3  # rad that a cell turns through
 SHORTEST_CELL = 0.6  # of l0
 SHARP = 0.5  # rad: a kink that runs along a line may be as short as this over its curvature, which l0 at rest is not
+NEAR = 3  # nodes to either side whose curvature counts
 EDGE_CELL, EDGE_WIDTH = 1.0, 3.0  # of l0: cells beside a contact edge, and how far from it
 FARTHEST = 30.0  # of l0: how far an edge is foreseen to go in a step
 HORIZON = 2.5  # steps of the way of an edge for which cells are made when they change, so that fewer steps do
@@ -62,6 +63,7 @@ def wanted_length(line, kinds, T, i, limits):
     bends, largest = 0.0, node_curvature(line, turn, i)
     for k in range(max(i - 1, 1), min(i + 2, n)):
         bends = max(bends, second_difference(line, turn, k))
+    for k in range(max(i - NEAR, 1), min(i + NEAR + 1, n)):  # flanks of a kink are as sharp as it
         largest = max(largest, node_curvature(line, turn, k))
     k = node_curvature(line, turn, i)
     W = longest_cell(kinds.EI[i], kinds.w[i], k, bends, limits)
