@@ -271,7 +271,7 @@ def whip(model, cells: int) -> hybrid.Result:
 def test_cells_become_as_short_as_a_kink_that_gets_sharper() -> None:
     """A kink at a free end is three times as sharp as a layer at rest there.
 
-    Held to 0.6 l0, curvature was off by 14 % of its largest and the end force by 0.93 % of its mean; 3000 rods are
+    Held to 0.6 l0, curvature was off by 11 % of its largest and the end force by 0.93 % of its mean; 3000 rods are
     within 1 % and 0.08 % of 6000.
     """
     rods = whip("rod", 3000)
