@@ -198,7 +198,7 @@ def may_touch(line, ends, width, p, q):
     if not (q - p > NEIGHBOURS and between > window):
         return False
     if ends.held[0] != 0 and ends.held[1] != 0:
-        return p + n - q > NEIGHBOURS and line.s[p] + line.s[n] - line.s[q] > window
+        return p + n - q > NEIGHBOURS and line.s[p] - line.s[0] + line.s[n] - line.s[q] > window
     return True
 
 

@@ -231,7 +231,7 @@ def compare_cells(line, ends, before, r, itself, i, j):
         between = other - s
         if ends.held[0] != 0 and ends.held[1] != 0:  # from one held end to the other is a way as well
             gap = sub(get3(r, n), get3(r, 0))
-            between = min(between, s + line.s[n] - other + math.sqrt(dot(gap, gap)))
+            between = min(between, s - line.s[0] + line.s[n] - other + math.sqrt(dot(gap, gap)))
         if distance < TURNED * between:
             found[CLEARANCE], found[DISTANCE], found[S], found[OTHER_S] = clearance, distance, s, other
             itself.cells[0], itself.cells[1] = i, j

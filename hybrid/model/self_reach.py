@@ -8,6 +8,7 @@ from typing import NamedTuple
 from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state import Line
 from hybrid.scene.analysis import CorrectedZone
+from hybrid.scene.payout import Payout
 from hybrid.scene.schema import AdaptiveModel, CatenaryModel, CorrectedModel, Scene, ZonesModel
 
 # Diameters of slack of the smallest loop: WINDOW of kernels.self_contact_pairs less OUTER of kernels.self_contact_law,
@@ -29,13 +30,13 @@ def self_reach(scene: Scene) -> Reach:
     if asked is not None:
         return Reach(asked, False, f"contact.self: {str(asked).lower()}")
     model = scene.model
+    sections = [*scene.cable.sections, *(x for paid in payouts(scene) for x in paid.reel or ())]
     off = {
-        "a section has no diameter": any(x.diameter is None for x in scene.cable.sections),
+        "a section has no diameter": any(x.diameter is None for x in sections),
         "catenaries that stay touch each other with contact: {self: true} alone": isinstance(model, CatenaryModel),
         "corrected catenaries know no contact; those that are not corrected do": is_corrected(model),
         f"solver: {scene.solver} knows no contact": scene.solver != "elimination",
         "dimension: 2, and contact leads out of a plane": scene.dimension == 2,
-        "line is paid out": any(getattr(end, "payout", None) is not None for end in scene.ends.both),
     }
     why = next((text for text, holds in off.items() if holds), "")
     if why:
@@ -60,9 +61,20 @@ def no_contact(scene: Scene) -> str:
     return "parts are in each other, and contact begins where they are apart" if reach.may else reach.why
 
 
+def payouts(scene: Scene) -> list[Payout]:
+    """How line is paid out, at the ends at which it is."""
+    found = [getattr(end, "payout", None) for end in scene.ends.both]
+    return [x for x in found if x is not None]
+
+
 def slack_of(scene: Scene) -> float:
-    """Length, m, by which the line is longer than its ends are apart; infinite where an end moves or may."""
+    """Length, m, by which the line is longer than its ends are apart; infinite where an end moves or may, or it is
+
+    paid out.
+    """
     a, b = (end.held_position for end in scene.ends.both)
+    if payouts(scene):
+        return math.inf
     if a is None or b is None or any(x.prescribed_motion or x.release for x in scene.ends.both):
         return math.inf
     return scene.length - math.dist(a, b)

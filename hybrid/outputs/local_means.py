@@ -6,6 +6,8 @@ import numpy as np
 
 from hybrid.kernels.state import Floats
 
+ROUND_OFF = 1e-9  # of a length: points that are nearer are the same
+
 
 def means_beside(s: Floats, nodes: Floats, values: Floats) -> Floats:
     """Means (ns, nb) of values (nb, N+1) at nodes (N+1,) m, from halfway to the point before to halfway to the next.
@@ -23,3 +25,13 @@ def means_beside(s: Floats, nodes: Floats, values: Floats) -> Floats:
     slope = (values[:, cell + 1] - values[:, cell]) / h[cell]
     upto = total[:, cell] + values[:, cell] * x + 0.5 * slope * x * x
     return np.asarray((np.diff(upto, axis=1) / np.diff(edges)).T)
+
+
+def means_on_line(s: Floats, nodes: Floats, values: Floats) -> Floats:
+    """The same (ns,) of one output (N+1,), whose points s (ns,) m may be the same where line is still on a reel."""
+    points, which = np.unique(s, return_inverse=True)
+    apart = np.append(True, np.diff(points) > ROUND_OFF * (nodes[-1] - nodes[0]))
+    points, which = points[apart], (np.cumsum(apart) - 1)[which]
+    if points.size == 1:
+        return np.full(s.size, np.interp(points[0], nodes, values))
+    return np.asarray(means_beside(points, nodes, values[None])[which, 0])

@@ -32,7 +32,7 @@ from hybrid.kernels.report import (
 )
 from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, Sea
 from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
-from hybrid.outputs.local_means import means_beside
+from hybrid.outputs.local_means import means_beside, means_on_line
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.strains import strains
 from hybrid.outputs.touchdown import Touchdown, carried, contact_pressure, penetration, sinking, touchdown
@@ -389,6 +389,9 @@ class Observation:
         touch = self.batch.touch
         if not touch.size:
             return np.zeros((self.grid.s.size, self.columns))
+        if "s" in self._varied:
+            each = zip(self.grid.points.T, self._varied["s"], touch, strict=True)
+            return np.stack([means_on_line(s, nodes, x) for s, nodes, x in each], axis=1)
         return means_beside(self.grid.s, self.line.s, touch) if self.grid.s.size > 1 else self.grid.chords @ touch.T
 
     @property

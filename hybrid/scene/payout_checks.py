@@ -60,7 +60,7 @@ def payout_at_an_end(ends: Ends, cable: Cable) -> Iterator[Finding]:
 def payout_stands_alone(
     ends: Ends, cable: Cable, model: Model, contact: Contact, solver: str, resolution: Resolution | None
 ) -> Iterator[Finding]:
-    """By elimination, without contact with itself, of models that nodes can enter."""
+    """By elimination, of models that nodes can enter; contact with itself knows the diameters on the reel."""
     found = _winch(ends)
     if found is None:
         return
@@ -81,7 +81,10 @@ def payout_stands_alone(
             expected = f"no swivel, {because}"
             yield Finding(("cable", "attachments", i, "kind"), expected, "leave it out: a pinned end turns freely")
     if contact.self:
-        yield Finding(("contact", "self"), f"false, {because}", LEAVE_OUT.format(name))
+        for i, section in enumerate(getattr(ends, name).payout.reel or ()):
+            if section.diameter is None:
+                expected = "a number > 0, in m, which parts of the cable keep apart (contact.self)"
+                yield Finding(("ends", name, "payout", "reel", i, "diameter"), expected, "add `diameter: ...` (m)")
     if solver == "shooting":
         yield Finding(("solver",), f"elimination, {because}", "leave solver out")
     if resolution is not None:

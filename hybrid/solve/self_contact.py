@@ -151,7 +151,7 @@ class SelfContact:
         return {
             "speed": float(numbers[SPEED]), "faded": float(numbers[FADED]), "quiet": float(numbers[QUIET]),
             "stored": stored, "grips": grips.copy(), "remeshed": bool(counts[REMESHED]) and not latest,
-            "touch": self._touch[0].copy(),
+            "touch": self._touch[0].copy(), "samples": contact.samples.copy(), "mass": contact.mass.copy(),
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any], remeshed: bool = False) -> None:
@@ -165,6 +165,7 @@ class SelfContact:
         touch = saved.get("touch", np.zeros(0))
         if not remeshed and touch.shape == self._touch[0].shape:
             self._touch[0] = touch
+            self.contact.samples[:], self.contact.mass[:] = saved["samples"], saved["mass"]  # as cells were long then
         if self.contact.grips.size:
             grips = grips[: len(self.contact.grips)].copy()
             grips[:, PIECE] = np.clip(np.searchsorted(self._middles, grips[:, AT]), 1, self._middles.size - 1)

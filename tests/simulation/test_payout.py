@@ -432,7 +432,6 @@ RATE: dict[str, Any] = {"rate": 0.5, "ramp": 2.0}
         ({"time": {"duration": 5.0}}, "time.step"),
         ({"output": {"errors": True}}, "output.errors"),
         ({"solver": "shooting"}, "solver"),
-        ({"contact": {"self": True}}, "contact.self"),
     ],
 )
 def test_what_is_not_possible_is_refused(change: dict[str, Any], where: str) -> None:
