@@ -8,7 +8,7 @@ from hybrid.kernels.forces import SELF_CONTACT
 from hybrid.kernels.link import holds_twist, link_of
 from hybrid.kernels.state import State
 from hybrid.model.build import Model
-from hybrid.simulation.self_watch import diameters, least_bending
+from hybrid.simulation.self_watch import deepest_text, diameters, least_bending
 from hybrid.solve.contact_statics import contact_energy, settled
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.statics import Equilibrium
@@ -41,6 +41,18 @@ def with_contact(model: Model, t: float, found: Equilibrium | None) -> Equilibri
         return f"the starting shape has a link of {asked:.6g} turns, the line in contact {has:.6g}: {why}"
 
     return settled(model.line, sea, ends, model.start, model.length, model.tension_scale, contact, keeps_turns)
+
+
+def why_not(model: Model, t: float) -> tuple[str, str]:
+    """Why `with_contact` has nothing to give of a line that contact is asked for: what it takes, and what to do."""
+    if model.layout is not None or not model.line.spin.all():
+        takes = "a line of rods: statics make no damped motion with contact of a line with catenary zones"
+        return takes, "`model: rod`, or `hybrid run` from a start that is apart"
+    contact = SelfContact(model.line, diameters(model), least_bending(model), model.tension_scale)
+    contact_energy(model.line, model.sea.at(t), model.ends.at(t), model.start, contact)
+    where = deepest_text(contact, model)
+    takes = f"a starting shape that is apart, for a damped motion with contact to lead to rest; in this one {where}"
+    return takes, "another `initial_guess`, or `hybrid run` from a start that is apart"
 
 
 def link(model: Model, state: State) -> float:

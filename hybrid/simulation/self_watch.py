@@ -199,8 +199,11 @@ def let_touch_itself(run: CompiledRun, scene: Scene, model: Model, work: Work) -
 
 def within_itself(contact: SelfContact, model: Model) -> str:
     """Where parts of a line are in each other, and contact could not tell to which side they belong; empty: nowhere."""
-    if math.isfinite(contact.energy()):
-        return ""
+    return "" if math.isfinite(contact.energy()) else deepest_text(contact, model)
+
+
+def deepest_text(contact: SelfContact, model: Model) -> str:
+    """Where parts of a line are deepest in each other, of a state that contact has looked at last."""
     p, q = contact.deepest
     s, other = sorted((float(model.line.s[p]), float(model.line.s[q])))
     width = float(0.5 * (contact.contact.width[p] + contact.contact.width[q]))

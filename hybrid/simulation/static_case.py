@@ -21,6 +21,7 @@ from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
+from hybrid.simulation.contact_equilibrium import why_not
 from hybrid.simulation.diagnostics import Diagnostics, stretch_text
 from hybrid.simulation.envelope import Envelope, of_equilibrium
 from hybrid.simulation.equilibrium import equilibrium_of
@@ -133,9 +134,8 @@ def refuse_contact(scene: Scene, model: Model, found: Equilibrium) -> None:
     of_equilibrium(Envelope(scene, model, moves=False), scene, model, found, event)
     for s, other in met:
         given = f"true, where the equilibrium without contact touches itself at s = {s:.6g} m and s = {other:.6g} m"
-        expected = "a line of rods whose starting shape is apart, for a damped motion with contact to lead to rest"
-        fix = "`model: rod`, another `initial_guess`, or `hybrid run` from a start that is apart; or leave it out"
-        raise SceneError([Complaint("contact.self", given, expected, fix)])
+        expected, fix = why_not(model, np.inf)
+        raise SceneError([Complaint("contact.self", given, expected, f"{fix}; or leave it out")])
 
 
 def _values(model: Model, found: Equilibrium, observer: Observer) -> dict[str, object]:
