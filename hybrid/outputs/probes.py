@@ -303,9 +303,12 @@ class Observer:
         """Outputs of which each has a line of its own, and what makes values of them; on a line of constant length."""
         other = copy(self)
         given = self._cuts, self._changes
-        grid = JoinedGrid([Grid(x.line.s, x.zones, self.s, *given, kept=self._unloaded) for x in outputs])
+        within = [x.line.s[[0, -1]] for x in outputs]  # beyond, on the reel: the values of the fairlead
+        s, jumps = ([np.clip(x, *ends) for ends in within] for x in (self.s, self.jumps))
+        of = list(zip(outputs, s, jumps, strict=True))
+        grid = JoinedGrid([Grid(x.line.s, x.zones, at, *given, kept=self._unloaded) for x, at, _ in of])
         if self._right:
-            after = [Grid(x.line.s, x.zones, self.jumps, *given, True, self._unloaded) for x in outputs]
+            after = [Grid(x.line.s, x.zones, at, *given, True, self._unloaded) for x, _, at in of]
             other._after = JoinedGrid(after)
         other.line, other.zones, other.grid = outputs[0].line, outputs[0].zones, grid
         return other, JoinedObservation(outputs, self.sea, grid)

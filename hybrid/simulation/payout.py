@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -24,6 +24,7 @@ from hybrid.model.build import Model
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.mesh import Zone
 from hybrid.model.payout import PayoutPlan, fastest, length_at, payout_of, winch_at
+from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
 from hybrid.scene.payout import SOURCES
@@ -229,19 +230,10 @@ class PayingOut:
         self, observer: Observer, model: Model, batch: Batch
     ) -> tuple[Observer, Observation, list[tuple[Zone, ...]]]:
         """The outputs of a batch, each of a line as long as it was then, and the zones of all but the first."""
-        line = model.line._replace(**{name: getattr(model.line, name).copy() for name in ("s", *CHANGES)})
-        line.force[:, :2] = 0.0  # but for what rounding leaves of the forces on nodes that ride
-        reel = self.reel._replace(numbers=self.reel.numbers.copy(), true=self.reel.true.copy(), stage=np.zeros(1))
-        reel.numbers[p.FADING] = 0.0
-        count = batch.t.size
-        varied = {name: np.empty((count, *getattr(line, name).shape)) for name in VARIES}
+        varied = {name: np.empty((batch.t.size, *getattr(model.line, name).shape)) for name in VARIES}
         zones = []
-        for k, t in enumerate(batch.t.tolist()):
-            if t >= self.law[0, 0] and not self.holds_tension:  # exactly, where samples interpolate
-                batch.report[k, LENGTH_OUT], batch.report[k, PAYOUT_RATE], _ = length_at(self.law, t)
-            length = float(batch.report[k, LENGTH_OUT])
-            self._fit(line, reel, length, t)
-            zones.append(self.plan.zones_of(length, model.zones if model.layout is not None else None))
+        for k, (line, zones_then) in enumerate(self._lines_of(model, batch)):
+            zones.append(zones_then)
             for name, x in varied.items():
                 x[k] = getattr(line, name)
         if model.layout is not None:  # lengths and stiffness of zones that move
@@ -251,6 +243,31 @@ class PayingOut:
         there = observer.on_varied(line, model.sea.values, zones[0], varied["s"])
         there.first_energy = observer.first_energy
         return there, there.look(batch._replace(h=varied["h"], kb=varied["kb"]), varied), zones[1:]
+
+    def _lines_of(self, model: Model, batch: Batch) -> Iterator[tuple[Line, tuple[Zone, ...]]]:
+        """The line of each output of a batch, in arrays that the next one overwrites, and its zones."""
+        line = model.line._replace(**{name: getattr(model.line, name).copy() for name in ("s", *CHANGES)})
+        line.force[:, :2] = 0.0  # but for what rounding leaves of the forces on nodes that ride
+        reel = self.reel._replace(numbers=self.reel.numbers.copy(), true=self.reel.true.copy(), stage=np.zeros(1))
+        reel.numbers[p.FADING] = 0.0
+        self._fitting.bind(line=line, reel=reel, clock=self._clock)
+        moving = model.zones if model.layout is not None else None
+        for k, t in enumerate(batch.t.tolist()):
+            if t >= self.law[0, 0] and not self.holds_tension:  # exactly, where samples interpolate
+                batch.report[k, LENGTH_OUT], batch.report[k, PAYOUT_RATE], _ = length_at(self.law, t)
+            length = float(batch.report[k, LENGTH_OUT])
+            reel.numbers[p.LENGTH], self._clock[b.NOW] = length, t
+            fit_line(self._fitting.numbers)
+            yield line, self.plan.zones_of(length, moving)
+
+    def outputs_in(self, model: Model, batch: Batch) -> list[Output]:
+        """The outputs of a batch, copied, each with the line as it was then; zones do not move."""
+        found = []
+        for k, (line, zones) in enumerate(self._lines_of(model, batch)):
+            arrays: dict[str, Any] = {name: getattr(line, name).copy() for name in VARIES}
+            rows: Any = [x[k : k + 1].copy() if x.ndim and len(x) == batch.t.size else x for x in batch]
+            found.append(Output(line._replace(**arrays), zones, Batch(*rows)))
+        return found
 
     # --- checkpoints ------------------------------------------------------------------------------
 

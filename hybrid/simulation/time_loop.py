@@ -190,7 +190,7 @@ class TimeLoop:
             if code in (PAUSED, FAILED) or (code == AT_STOP and (self._aside or not self.patient)):
                 self.write_down()
             elif not self._may_wait:
-                self.write_down(aside=run.cells_follow and self._may_be_joined)
+                self.write_down(aside=(run.cells_follow or run.pays_out) and self._may_be_joined)
             if code == STEPPED:
                 self.diagnostics.follow(run.model)
                 self._look(int(run.run.count[FLAGS]))
@@ -261,7 +261,10 @@ class TimeLoop:
     def _put_aside(self, line: Line, batch: Batch) -> None:
         """Outputs of a line of the zones of now, to be recorded with others."""
         model = self.run.model
-        self._aside += [(model, x) for x in outputs_in(batch, line, model.zones)]
+        if self.run.payout is not None:
+            self._aside += [(model, x) for x in self.run.payout.outputs_in(model, batch)]
+        else:
+            self._aside += [(model, x) for x in outputs_in(batch, line, model.zones)]
         self._note_torque()
         if sum(x.line.s.size for _, x in self._aside) > MOST_ASIDE:
             self._log()

@@ -191,6 +191,14 @@ class Transient:
         """Whether cells change without Python, so that outputs which wait are each of another line."""
         return self._cells is not None and self._cells.adopted
 
+    @property
+    def pays_out(self) -> bool:
+        """Whether line is paid out, and zones stay, so that outputs which wait are each of another line.
+
+        Those of a line that touches itself do not wait: joined, they would lack the force of that.
+        """
+        return self.payout is not None and self.switching is None and self.run.contact is None
+
     # --- the start ------------------------------------------------------------------------------
 
     def begin(self, equilibrium: Equilibrium | None) -> None:

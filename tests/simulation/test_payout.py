@@ -15,6 +15,8 @@ from hybrid.cli.plan_tables import plan_lines
 from hybrid.errors import SceneError
 from hybrid.model.payout import law_of, length_at
 from hybrid.scene.payout import Payout
+from hybrid.simulation.time_loop import TimeLoop
+from hybrid.simulation.transient import Transient
 
 G = 9.81
 
@@ -541,3 +543,21 @@ def test_a_far_end_that_is_let_go_stays_free_when_nodes_enter() -> None:
     moment = np.linalg.norm(result["moment_start"], axis=1)
     assert moment[result.t < 1.9].min() > 1.0
     assert moment[result.t > 2.1].max() < 1e-9
+
+
+@pytest.mark.parametrize("model", ["catenary", "rod"])
+def test_outputs_looked_at_together_are_those_looked_at_one_by_one(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of lines of another number of cells wait for each other: nothing that is written depends on it."""
+    scene = sagging(model, EA=2e6, EI=2e4 if model == "rod" else None, duration=12.0)
+    together = hybrid.run(scene)
+    calls = []
+    record = TimeLoop._record_aside
+    monkeypatch.setattr(TimeLoop, "_record_aside", lambda loop: (calls.append(len(loop._aside)), record(loop))[1])
+    again = hybrid.run(scene)
+    assert max(calls) > 5  # nodes enter about every 3 s, with six outputs between
+    monkeypatch.setattr(Transient, "pays_out", False)
+    alone = hybrid.run(scene)
+    for name in (x for x in together.names if x != "steps/cpu" and together[x].dtype.kind == "f"):
+        for other in (again, alone):
+            assert np.array_equal(together[name], other[name], equal_nan=True), name
+    assert [*together.zones] == [*alone.zones] and [x.kind for x in together.events] == [x.kind for x in alone.events]

@@ -1,0 +1,54 @@
+"""What paying a line out costs: a sagging line of 100 cells that grows by 43 %, against the same line of fixed length."""
+
+from __future__ import annotations
+
+import time
+from statistics import median
+from typing import Any
+
+import pytest
+
+import hybrid
+from hybrid.simulation.transient import Transient
+
+pytestmark = pytest.mark.bench
+
+RUNS = 5
+
+
+def sagging(paid: bool, every: float = 0.5) -> hybrid.Scene:
+    """1500 steps; 43 nodes enter where it is `paid` out.  every: s, outputs."""
+    winch: dict[str, Any] = {
+        "kind": "pinned", "position": [80, 0, 0], "motion": {"surge": {"amplitude": 1.0, "period": 7.0}, "ramp": 7.0},
+    }  # fmt: skip
+    section = {"length": 100.0, "mass": 5.0, "diameter": 0.05, "axial_stiffness": 2e6}
+    return hybrid.validate_scene({
+        "cable": {"sections": [section]}, "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 100},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": winch | ({"payout": {"rate": 0.6, "ramp": 4.0}} if paid else {}),
+        },
+        "time": {"duration": 75.0, "step": 0.05}, "output": {"every": every},
+    })  # fmt: skip
+
+
+def test_cost_of_paying_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processor time of whole runs in memory, medians, alternating."""
+    cases = {
+        "fixed length": (sagging(False), True),
+        "paid out, 150 outputs": (sagging(True), True),
+        "paid out, 150 outputs, looked at between nodes": (sagging(True), False),
+        "paid out, 2 outputs": (sagging(True, 37.5), True),
+    }
+    together, taken = Transient.pays_out, {name: list[float]() for name in cases}
+    for _ in range(RUNS + 1):
+        for name, (scene, joined) in cases.items():
+            monkeypatch.setattr(Transient, "pays_out", together if joined else False)
+            begin = time.process_time()
+            hybrid.run(scene)
+            taken[name].append(time.process_time() - begin)
+    found = {name: median(times[1:]) for name, times in taken.items()}
+    fixed, joined, alone, _ = found.values()
+    for name, x in found.items():
+        print(f"{name}: {x:.3f} s, {x / fixed:.2f}")
+    assert joined < alone
