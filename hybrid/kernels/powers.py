@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from hybrid.kernels.assembly import JOINED
 from hybrid.kernels.books import CONTACT, FRICTION, RATES, STORED, WORKS
 from hybrid.kernels.compile import inner
 from hybrid.kernels.forces import SEABED, SELF_CONTACT
@@ -51,7 +52,7 @@ def find_powers(line, ends, velocity, state, report, power):
         at = FORCE_A + 3 * k
         if ends.held[k]:
             power[k] -= dot((report[at], report[at + 1], report[at + 2]), get3(velocity, k))
-        else:
+        if not ends.held[k] or ends.held[k] == JOINED:  # of a point that the line carries, the loads on it
             power[APPLIED] += dot(get3(ends.force, k), get3(state.v, node))
         at = MOMENT_A + 3 * k
         if line.element[node] or holds_torque(line, k):

@@ -255,7 +255,8 @@ def error_ratio(tables, allowed):
 def end_system_step(tables, joints, floors, allowed, old, new, work, task, s, t, solved):
     """Rates and books of a step that is `solved`; OK or why it is refused, with its line (-1: a body) and cell.
 
-    A step whose error is too large (kernels.step_law) is none for the books: whoever asked for it takes it back.
+    A step whose error is too large (kernels.step_law) is none for the books: whoever asked for it takes it back; where
+    `allowed` is negative, whoever keeps it books it (book_system_step).
     """
     line, turn, cell = end_lines(tables, floors, s, task, solved)
     turned = end_bodies(old, new, work, s)
@@ -263,10 +264,17 @@ def end_system_step(tables, joints, floors, allowed, old, new, work, task, s, t,
         return (TURNED_TOO_FAR if turn > 0.0 else SLACK), line, cell
     if solved and not turned < LARGEST_STEP_TURN:
         return TURNED_TOO_FAR, -1, -1
-    if solved and not error_ratio(tables, allowed) > REFUSED:
+    if solved and allowed[0] >= 0.0 and not error_ratio(tables, allowed) > REFUSED:
         keep_books(tables, joints, task.dt, t)
         book_bodies(work, task.dt)
     return OK, -1, -1
+
+
+@kernel
+def book_system_step(tables, joints, work, dt, t):
+    """Books of a step of dt (s) to t (s) that was solved and is kept; arguments as of `solve_system`."""
+    keep_books(tables, joints, dt, t)
+    book_bodies(work, dt)
 
 
 @kernel
@@ -283,9 +291,9 @@ def solve_system(
     fairleads: (L, 2, 3) m of ends at bodies, in their axes; seats: (L, 2, SEAT) frames of ends that turn with bodies
     (kernels.carried_frames); gaps: (L, 2, 3) m that ends at bodies have still to go, given for a CORRECTION, else worked
     in as arms (L, 2, 3); floors: (L,) N, tension at or below which a catenary cell is slack; allowed: (L,) m, error of a
-    step, beyond REFUSED times of which it is not booked; first: (L,) where columns (3, .., 5), or (COLUMNS, .., 5) where
-    an end turns, of a line begin that carries some; bodies, old, new, work: rows of numbers of each body
-    (kernels.bodies); functional: (FUNCTIONAL,), answers: (2, ANSWER), q: (COLUMNS,), net: (P, 3),
+    step, beyond REFUSED times of which it is not booked, negative: no step is; first: (L,) where columns (3, .., 5), or
+    (COLUMNS, .., 5) where an end turns, of a line begin that carries some; bodies, old, new, work: rows of numbers of
+    each body (kernels.bodies); functional: (FUNCTIONAL,), answers: (2, ANSWER), q: (COLUMNS,), net: (P, 3),
     S: (HANDED - 1, HANDED), G: (2, 6, 6) and A: (m+3, m+1), m tensions and coordinates, are worked in.
     On return `net` is what does not balance at the points, N.
     Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.

@@ -15,7 +15,16 @@ from pydantic import Field, ValidationError, model_validator
 
 from hybrid.errors import SceneError
 from hybrid.scene.accuracy import AskedAccuracy
-from hybrid.scene.analysis import CatenaryModel, Equilibrium, Mesh, Model, RodModel, Time, ZonesModel
+from hybrid.scene.analysis import (
+    AdaptiveModel,
+    CatenaryModel,
+    CorrectedModel,
+    Equilibrium,
+    Mesh,
+    Model,
+    RodModel,
+    Time,
+)
 from hybrid.scene.attachments import Attachment
 from hybrid.scene.base import Finding, Place, Positive, Table, Text, Truth, Whole, refuse
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, turned, without_turns
@@ -52,7 +61,7 @@ class JoinedLine(Table):
     )
     model: Model | None = Field(
         default=None,
-        description="rod, catenary, or zones of both that stay; absent: rod with bending stiffness, else catenary",
+        description="rod, catenary, zones of both that stay, or adaptive; absent: rod where it bends, else catenary",
     )
     mesh: Mesh | None = Field(default=None, description="how the line is cut into cells; absent: chosen")
     accuracy: AskedAccuracy | None = Field(
@@ -78,9 +87,11 @@ class JoinedLine(Table):
 
     @model_validator(mode="after")
     def _zones_stay(self) -> JoinedLine:
-        if self.model is not None and not isinstance(self.model, RodModel | CatenaryModel | ZonesModel):
-            expected = "rod, catenary, or zones that stay, because several lines are computed together"
+        if isinstance(self.model, CorrectedModel):
+            expected = "rod, catenary, adaptive, or zones that stay, because several lines are computed together"
             refuse([Finding(("model",), expected, "write `model: rod`", f"kind: {self.model.kind}")])
+        if isinstance(self.model, AdaptiveModel):
+            refuse(self._of_moving_zones(self.model))
         for i, section in enumerate(self.sections):
             if section.tension_torque:
                 expected = "nothing or 0, because several lines are computed together, which know no torque of tension"
@@ -89,6 +100,20 @@ class JoinedLine(Table):
         if self.start == self.end:
             refuse([Finding(("end",), f"a point other than {self.start}, where the line starts", "name another point")])
         return self
+
+    def _of_moving_zones(self, model: AdaptiveModel) -> Iterator[Finding]:
+        """What zones that move do not do in a line of several."""
+        alone = "leave it out, or compute this line alone, with `cable` and `ends`"
+        expected = "nothing, because zones move in a line of several"
+        for name, usual in (("curvature_error", None), ("force_catenary", None), ("correct", False)):
+            if (found := getattr(model, name)) != usual:
+                yield Finding(("model", name), expected, alone, str(found))
+        if model.joint != "spherical":
+            yield Finding(("model", "joint"), "spherical, because zones move in a line of several", alone, model.joint)
+        for end in ("start", "end"):
+            if isinstance(getattr(self.connections, end), ClampedConnection):
+                expected = "pinned, because zones of this line move"
+                yield Finding(("connections", end), expected, "write `model: rod`, or leave the clamp out", "clamped")
 
 
 class SystemOutput(Table):
@@ -138,6 +163,11 @@ class System(Table):
         "they are given; parts are of the length, and of the largest force at the ends, of each line",
     )
     output: SystemOutput = Field(default=SystemOutput(), description="what is kept")
+
+    @property
+    def adaptive(self) -> tuple[str, ...]:
+        """Names of the lines whose zones move."""
+        return tuple(name for name, line in self.lines.items() if isinstance(line.model, AdaptiveModel))
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -298,6 +328,20 @@ class System(Table):
         if self.time is None:
             raise SceneError([missing_time(self)])
         return self.time
+
+    @model_validator(mode="after")
+    def _errors_of_fixed_zones(self) -> System:
+        if self.adaptive:
+            name, free = self.adaptive[0], self.time is not None and self.time.controlled
+            expected = f"nothing, because zones of line {name} move: its error is not estimated in several lines"
+            fix = "leave it out, or write `model: rod` in the lines"
+            asked = {("accuracy",): self.accuracy, ("output", "errors"): self.output.errors}
+            asked |= {("lines", x, "accuracy"): line.accuracy for x, line in self.lines.items()}
+            refuse(Finding(at, expected, fix) for at, given in asked.items() if given)
+            if free and self.time is not None and self.time.tolerance is None:
+                expected = f"a step (s) or a tolerance (m), because zones of line {name} move: no accuracy chooses them"
+                refuse([Finding(("time", "step"), expected, "add `step: ...`")])
+        return self
 
     @model_validator(mode="after")
     def _lines_join_points(self) -> System:

@@ -35,6 +35,7 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
         "lines": lines, "broken": [*run.failures.broken], "rest": run.rest,
         "control": run.control.checkpoint() if run.control is not None else [],
         "quantities": run.quantities.checkpoint(),
+        "zones": run.zones.checkpoint() if run.zones is not None else {},
     }  # fmt: skip
 
 
@@ -44,16 +45,17 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         if not isinstance(saved["broken"], list):
             raise ValueError("broken: numbers of what has broken were expected")
         run.failures.again(saved["broken"])
-    saved = {
-        "broken": [],
-        "rest": run.rest,
-        "control": [],
-        **saved,
-    }  # an earlier program took members as at the first guess
+    older = {"broken": [], "rest": run.rest, "control": [], "zones": {}}  # it took members as at the first guess
+    saved = older | dict(saved)
+    if run.zones is not None:
+        run.zones.take_rods(saved["zones"])
+        run.make_solver()
     template = checkpoint(run) | {"dry": None, "broken": None, "control": None}
     saved = {"quantities": run.quantities.unknown(), **saved}  # nor did it keep ranges
     saved["lines"] = of_today(saved.get("lines"), template["lines"])
-    for line in template["lines"].values():
+    for name, line in template["lines"].items():
+        if name in template["zones"]:
+            line["envelope"] = None  # of other meshes as well
         line["report"] = np.full_like(line["report"], np.inf)  # it may have numbers that are not finite
     found = matched(dict(saved), template)
     if not (isinstance(found["dry"], list) and set(found["dry"]) <= set(run.system.bodies)):
@@ -93,6 +95,8 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
         for name, values in mine["state"].items():
             getattr(state, name)[:] = values
         line.restore(mine, work, run.t, x.joints)
+    if run.zones is not None:
+        run.zones.restore(found["zones"])
 
 
 def content(run: SystemRun) -> dict[str, Any]:

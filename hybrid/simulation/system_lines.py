@@ -43,9 +43,10 @@ SAME_PLACE = 1e-9
 def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | None = None) -> Observer:
     """What records the outputs of a line; moves: whether it does, or is in equilibrium; only: quantities, None: all."""
     s, jumps = output_points(scene)
+    kinds = {"rod", "catenary"} if moves and model.layout is not None else None
     return Observer(
-        model.line, model.sea.values, model.zones, s, moves and only is None, model.attached, only=only, jumps=jumps,
-        changes=section_changes(scene), quantities=None if only else quantities_of(scene),
+        model.line, model.sea.values, model.zones, s, moves and only is None, model.attached, kinds, only=only,
+        jumps=jumps, changes=section_changes(scene), quantities=None if only else quantities_of(scene),
     )  # fmt: skip
 
 
@@ -77,7 +78,7 @@ class LineResult:
             recorder.lay_by()
             self.recorder = recorder
         loaded, bodies = model.loaded_ends, scene.ends.bodies()
-        self._carried = [k for k, end in enumerate(("start", "end")) if end in bodies and loaded[k]]
+        self.carried = [k for k, end in enumerate(("start", "end")) if end in bodies and loaded[k]]
         self.books = self._own_books(state)
         self._waiting: list[Batch] = []
         self._log: list[tuple[float, ...]] = []
@@ -86,15 +87,19 @@ class LineResult:
 
     def _own_books(self, state: State) -> Books:
         """Books that keep the extremes of all steps; displacements count from a state."""
+        self.envelope.count_from(self.model, state.r)
+        return self._blank_books(state.r)
+
+    def _blank_books(self, begin: Floats) -> Books:
+        """The same for the cells of now; begin: (N+1, 3) m, from where displacements count."""
         line, marks = self.model.line, marks_of(self.scene, self.model)
         nodes, marked = line.s.size, np.flatnonzero(marks)
         right = np.arange(nodes)
         right[marked] = nodes + np.arange(marked.size)
-        self.envelope.count_from(self.model, state.r)
         books = blank_books(line.h.size)
         books.loaded[:] = self.model.loaded_ends
         return books._replace(
-            strains=np.zeros((nodes, 3)), marks=marks, right=right, start=state.r.copy(),
+            strains=np.zeros((nodes, 3)), marks=marks, right=right, start=begin.copy(),
             extremes=no_extremes(nodes + marked.size),
         )  # fmt: skip
 
@@ -119,6 +124,17 @@ class LineResult:
         self.observer.first_energy = first
         self.diagnostics.follow(model)
 
+    def take_zones(self, model: Model, extremes: bool = True) -> None:
+        """Go on with other zones, whose cells are others; extremes: whether those of now count."""
+        before = self.books
+        if extremes:
+            self.envelope.fold(self.model.line.s, before.extremes)
+        self.follow(model)
+        same = {name: getattr(before, name) for name in ("asked", "reached", "path", "radii", "walls")}
+        self.books = self._blank_books(self.envelope.start_of(model.line.s))._replace(**same)
+        self.books.work[:], self.books.power[:], self.books.clock[:] = before.work, before.power, before.clock
+        self.books.velocity[:] = before.velocity
+
     # --- steps and outputs --------------------------------------------------------------------------
 
     def end_forces(self, state: State, report: Floats) -> Floats:
@@ -128,7 +144,7 @@ class LineResult:
         continued from the last two cells.
         """
         forces = report[FORCE_A : FORCE_A + 6].copy()
-        for k in self._carried:
+        for k in self.carried:
             e, T, h = (x[:2] if k == 0 else x[:-3:-1] for x in (state.e, state.T, self.model.line.h))
             d, over = e / np.linalg.norm(e, axis=1)[:, None], h[0] / (h[0] + h[1]) if len(h) > 1 else 0.0
             along = d[0] + over * (d[0] - d[-1])
@@ -153,7 +169,8 @@ class LineResult:
     def output(self, batch: Batch) -> None:
         """Record a state."""
         self._waiting.append(batch)
-        if len(self._waiting) >= WAITING or not self._moves:
+        varies = self.model.layout is not None  # stiffness and lengths, which outputs are made with, change with time
+        if len(self._waiting) >= WAITING or not self._moves or varies:
             self.write_down()
 
     def write_down(self) -> None:

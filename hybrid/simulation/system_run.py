@@ -5,12 +5,13 @@ from __future__ import annotations
 import io
 import json
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
+from hybrid.adapt.manager import DomainManager
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.bodies import FRAME, PLACE, V
 from hybrid.kernels.cache import cache_folder
@@ -37,6 +38,7 @@ from hybrid.simulation.system_points import fields_of, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, named
 from hybrid.simulation.system_steps import StepControl
+from hybrid.simulation.system_zones import SystemZones, managers_for, zones_at_rest
 from hybrid.simulation.time_loop import SAME_STOP, WORK, apart
 from hybrid.solve.system import SystemSolver, SystemState, SystemTaken
 from hybrid.solve.system_statics import LineFailed
@@ -48,6 +50,7 @@ from hybrid.store.writer import Recorder
 
 # A step that fails is repeated in halves, down to this part of it.
 SHORTEST = 2.0**-12
+_NO_ZONES: Mapping[int, DomainManager] = {}
 # Steps between two reports of the progress, and between two looks at what the mesh resolves.
 LOOK = 16
 
@@ -81,14 +84,19 @@ class SystemRun:
         self.times = output_times(self.scenes[0]) if moves else []
         if moves and one.every > 1:  # a run to compare with has as many times fewer
             self.times = [*self.times[one.every - 1 : -1 : one.every], self.times[-1]]
-        self.found = None
+        self.found, managers = None, _NO_ZONES
         if source is None:
             self.found = equilibrium_of_system(system, self.model, 0.0 if moves else np.inf)
+            if system.adaptive:
+                scenes = dict(zip(names, self.scenes, strict=True))
+                start = zones_at_rest(scenes, self.model, self.found, 0.0 if moves else np.inf)
+                self.model, self.found, managers = start
             self.state: SystemState = self.found.state.copy()
             self.start_from(self.found.state.bodies)
         else:
             blank = [state_for(x.line) for x in self.model.models]
             self.state = SystemState(blank, np.zeros_like(self.model.body_places))
+            managers = managers_for(dict(zip(names, self.scenes, strict=True)), self.model)
             self.start_from(self.model.body_places)
         self.lines = [
             LineResult(k, name, scene, model, self.found, state, len(self.times), target is None)
@@ -103,6 +111,7 @@ class SystemRun:
         self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
         self.dry: set[str] = set()  # bodies that have been said to be out of the water
         self.failures = Failures(self)
+        self.zones = SystemZones(self, managers) if managers and moves else None
         self.loaded = 0.0  # s, loads that have stopped by then act no more
         self._checked = -1  # steps at the last checkpoint
         self._between = False  # whether the state is that between two steps
@@ -152,7 +161,7 @@ class SystemRun:
                 if not point.t - near <= self.t <= self.system.require_time().duration + near:
                     raise ValueError(f"t = {self.t:g} s after an output at {point.t:g} s")
             self.model.load_bodies(self.t, self.solver.bodies, self.loaded)
-            self._other, self._between = self.state.copy(), True
+            self.other, self._between = self.state.copy(), True
             fields = [*fields_of(self.system), *self.quantities.fields]
             recorder = Recorder.again(
                 file, self.target, fields, (), point, {"scene": text}, self._before, (), self._parts
@@ -274,14 +283,21 @@ class SystemRun:
         """A solver for the model as it is."""
         self.solver = SystemSolver(joined_lines(self.model, 0.0), len(self.model.free), self.model.body_numbers(0.0))
         self.solver.keep_books([line.books for line in self.lines])
+        self.solver.books_steps = self.zones is None
         if self.control is not None:
             self.solver.allowed[:] = self.resolution.allowed
+
+    def take_other(self) -> None:
+        """Room for the state after the next step, of lines as they are now."""
+        self.other = self.state.copy()
 
     def begin_motion(self) -> None:
         """Make the start ready for steps, and record it."""
         time = self.system.require_time()
         self.make_solver()
         self._settle(self.solver)
+        if self.zones is not None:
+            self.zones.begin()
         if self.system.environment.waves is not None:
             text = "waves act on lines and points, not on the body, which has no members"
             for body in (x for x in self.model.bodies if x.members is None):
@@ -291,7 +307,7 @@ class SystemRun:
             line.diagnostics.scheme(time.rho_inf)
         self._output(self.solver)
         self.gather_events()
-        self._other, self._between = self.state.copy(), True
+        self.other, self._between = self.state.copy(), True
         self.keep()
 
     def stops(self) -> list[float]:
@@ -307,9 +323,11 @@ class SystemRun:
         while self.t < stop:
             self._between = False
             self._step(self._end_of_step(stop), rho)
+            if self.zones is not None:
+                self.zones.adapt()
             if self.failures.all and self.failures.due(step):
                 self._restart()
-                self._other = self.state.copy()
+                self.other = self.state.copy()
             if self.steps % LOOK == 0:
                 self._look(self.solver)
             if self.t >= stop:
@@ -321,7 +339,8 @@ class SystemRun:
     def _end_of_step(self, stop: float) -> float:
         """When the next step should end (s): after equal ones up to a stop, or as their errors are."""
         if self.control is not None:
-            return self.control.end(self.t, stop)
+            longest = self.zones.longest if self.zones is not None else np.inf
+            return self.control.end(self.t, stop, longest)
         first, k = self.leg
         count = parts(stop - first, self.resolution.one.step)
         end = stop if k >= count - 1 else first + (k + 1) * (stop - first) / count
@@ -386,12 +405,15 @@ class SystemRun:
 
     def _step(self, end: float, rho: float) -> None:
         """To `end` (s), in one step or in halves; where errors choose steps, one step, which may end earlier."""
-        solver, control = self.solver, self.control
+        control, zones = self.control, self.zones
         shortest = SHORTEST * (end - self.t) if control is None else control.shortest
         dt, repeats = end - self.t, 0
         while self.t < end:
             dt = min(dt, end - self.t)
             t = end if end - self.t - dt < 0.5 * shortest else self.t + dt
+            solver = self.solver
+            if zones is not None:
+                zones.prepare(t)
             for line, model in zip(self.lines, self.model.models, strict=True):
                 model.ends.at(t)
                 model.sea.at(t)
@@ -400,7 +422,10 @@ class SystemRun:
             self.model.stir(t, self.state.bodies, t - self.t, solver.bodies)
             # a start counts as a step of fixed length does (kernels.run)
             before = self.last_step or (t - self.t if control is None else 0.0)
-            taken = solver.step(self.state, self._other, t - self.t, rho, before, t)
+            taken = solver.step(self.state, self.other, t - self.t, rho, before, t)
+            if zones is not None and zones.wants_more_rod(taken, t, 0.5 * dt < shortest):
+                repeats += 1
+                continue
             if taken.outcome != Outcome.OK:
                 if 0.5 * dt < shortest:
                     raise self._stopped(solver, taken, dt)
@@ -409,12 +434,16 @@ class SystemRun:
             if control is not None and (again := control.shorter(t - self.t, taken.ratio)):
                 dt, repeats = again, repeats + 1
                 continue
+            if zones is not None:
+                solver.book(t - self.t, t)
             self.last_step = t - self.t
-            self.t, self.state, self._other = t, self._other, self.state
+            self.t, self.state, self.other = t, self.other, self.state
             self.steps += 1
             cpu = clock.process_time() - self._begin
             for line, state, work in zip(self.lines, self.state.lines, solver.work, strict=True):
                 line.log(t, self.last_step, taken, repeats, state, work, cpu)
+            if zones is not None:
+                zones.accepted(self.last_step)
             repeats = 0
             if control is not None:
                 return

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import ComputationError, SceneError
+from hybrid.errors import Complaint, ComputationError, SceneError
 from hybrid.kernels.state import Floats
 from hybrid.model.driven_end import FRAME, TURN, DrivenEnd
 from hybrid.scene.points import FreePoint
@@ -57,6 +57,10 @@ class SystemSimulation:
             raise TypeError("scene: expected several lines; hybrid.Simulation steps one cable")
         if found.time is None:
             raise SceneError([missing_time(found)])
+        if found.adaptive:
+            where = f"lines.{found.adaptive[0]}.model"
+            expected = "rod, catenary or zones that stay, in steps from outside"
+            raise SceneError([Complaint(where, "adaptive", expected, "write `model: rod`")])
         self.scene, self.lock, self._stack = found, threading.RLock(), ExitStack()
         self._target: Path | io.BytesIO = io.BytesIO()
         if output is not None:

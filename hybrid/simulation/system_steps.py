@@ -17,9 +17,9 @@ class StepControl:
         self.next = max(self.largest / FIRST, self.shortest)  # s, of the next step
         self.ratio, self.wary = 1.0, 0  # of the last step; steps until they grow again after a failure
 
-    def end(self, t: float, stop: float) -> float:
-        """When the next step from t is to end, s; stop: s, where one must."""
-        return step_end(t, stop, self.next)
+    def end(self, t: float, stop: float, longest: float) -> float:
+        """When the next step from t is to end, s; stop: s, where one must; longest: s, that it may be."""
+        return step_end(t, stop, min(self.next, longest))
 
     def shorter(self, dt: float, ratio: float) -> float:
         """The length (s) with which a step of dt is repeated, 0: it passes, and the next is chosen."""

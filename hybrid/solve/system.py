@@ -33,7 +33,7 @@ from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.run import blank_books, blank_job, in_space
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work
 from hybrid.kernels.step import friction_axes
-from hybrid.kernels.system import JUNCTIONS, solve_system
+from hybrid.kernels.system import JUNCTIONS, book_system_step, solve_system
 from hybrid.kernels.water import wave_kinematics
 from hybrid.solve.stability import ANCHOR
 from hybrid.solve.statics import (
@@ -139,6 +139,8 @@ class SystemSolver:
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
         self._floors = np.array([x.floor for x in lines])
         self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
+        self.books_steps = True  # whether steps are booked at once; else by `book`
+        self._unbooked = np.full(len(lines), -1.0)
         carried = [x.line.h.size + 1 if _carries(x) else 0 for x in lines]
         columns = COLUMNS if self._seats[:, :, TURNS].any() else 3
         self._first = np.concatenate([[0], np.cumsum(carried)[:-1]]).astype(np.int64)
@@ -178,9 +180,10 @@ class SystemSolver:
             else:
                 table.bind(old=a, new=b)
         self._states = [*old.lines], [*new.lines]
+        allowed = self.allowed if self.books_steps else self._unbooked
         outcome, iterations, left, line, where = solve_system(
             task, t, self._solver, self._numbers, self._numbers.view(np.float64), self.joints, self._fairleads,
-            self._seats, self._arms, self._gaps, self._floors, self.allowed, self._first, self._columns,
+            self._seats, self._arms, self._gaps, self._floors, allowed, self._first, self._columns,
             self._functional, self._answers, self._turned, self.net, self.bodies, old.bodies, new.bodies,
             self.body_work, self._handed, self._follow, self._matrix,
         )  # fmt: skip
@@ -209,6 +212,10 @@ class SystemSolver:
             return taken
         errors = np.array([work.report[LOCAL_ERROR] for work in self.work])  # fairleads move as their bodies
         return replace(taken, error=float(errors.max()), ratio=float((errors / self.allowed).max()))
+
+    def book(self, dt: float, t: float) -> None:
+        """Book the step of dt (s) to t (s) that was computed last, where `books_steps` is off."""
+        book_system_step(self._numbers, self.joints, self.body_work, dt, t)
 
     def consistent_accelerations(
         self, states: SystemState, accelerations: Sequence[Floats], t: float = 0.0

@@ -72,6 +72,7 @@ def test_what_is_asked_is_judged_by_line_and_quantity(result: hybrid.Result) -> 
     assert steps.max() > 2.0 * steps.min()  # and they follow the motion
 
 
+@pytest.mark.slow
 def test_a_stopped_run_goes_on_bit_for_bit(
     result: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,0 +1,306 @@
+"""Zones that move in lines of a system: each line has a domain manager of its own, as one cable has.
+
+Stiffness and lengths of lines whose zones change follow the step that is tried; after it criteria are weighed, and a
+line that needs more rod gets it before the step is repeated.  After an accepted step, and its outputs, what the manager
+proposes is carried out: the line has other cells then, and the system another solver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from hybrid.adapt.manager import Change, DomainManager
+from hybrid.errors import ComputationError, Outcome
+from hybrid.kernels import books as b
+from hybrid.kernels import zone_step as z
+from hybrid.kernels.books import COUNT_SIZE
+from hybrid.kernels.state import Ends, Floats, State, state_for
+from hybrid.kernels.zone_step import follow_zones
+from hybrid.model.build import Model
+from hybrid.model.coarsen import picked
+from hybrid.model.system import SystemModel
+from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.simulation.initial_zones import MOST_ROUNDS, STRICTER, manager_for
+from hybrid.simulation.system_start import joined_lines
+from hybrid.simulation.zone_switching import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, note_change, on_layout
+from hybrid.solve.run import Tried
+from hybrid.solve.system import SystemState, SystemTaken
+from hybrid.solve.system_statics import LineFailed, SystemEquilibrium, solve_system_statics
+from hybrid.store.named_arrays import matched
+
+if TYPE_CHECKING:
+    from hybrid.simulation.system_run import SystemRun
+
+HELD = (
+    "zones stay rod: in equilibrium, catenary where the criteria allow it is further from the rod than the tolerance; "
+    "more mesh.cells, or a larger model.tolerance, let them move"
+)
+
+
+class Start(NamedTuple):
+    """Zones of a system at rest."""
+
+    model: SystemModel
+    found: SystemEquilibrium
+    managers: Mapping[int, DomainManager]  # by the number of the line
+
+
+def managers_for(scenes: Mapping[str, Scene], model: SystemModel) -> dict[int, DomainManager]:
+    """The domain managers of lines that are rod wherever they may be."""
+    return {
+        k: manager_for(scenes[name], x, model.resolution.lines[name], None)
+        for k, (name, x) in enumerate(zip(model.names, model.models, strict=True))
+        if isinstance(scenes[name].model, AdaptiveModel)
+    }
+
+
+def zones_at_rest(scenes: Mapping[str, Scene], model: SystemModel, found: SystemEquilibrium, t: float) -> Start:
+    """Zones for the equilibrium of a system whose lines are all rod, and that equilibrium: rod only where it is needed.
+
+    As of one cable (simulation.initial_zones): where the two equilibria are further apart than the tolerance of a line
+    criteria become stricter, and where that does not help zones stay rod.
+    """
+    managers = managers_for(scenes, model)
+    allowed = {k: manager.tolerance for k, manager in managers.items()}
+    try:
+        for part in STRICTER:
+            for k, manager in managers.items():
+                _take_rods(manager, model.models[k])
+                manager.tolerance = part * allowed[k]
+            answer = _within(model, found, managers, t)
+            if answer is None:
+                return Start(model, found, managers)
+            if all(_apart(k, model, found, *answer) <= allowed[k] for k in managers):
+                return Start(*answer, managers)
+    except ComputationError:
+        pass
+    for k, manager in managers.items():
+        manager.held, manager.tolerance = True, allowed[k]
+        _take_rods(manager, model.models[k])
+    return Start(model, found, managers)
+
+
+def _take_rods(manager: DomainManager, model: Model) -> None:
+    assert model.layout is not None
+    manager.set_layout(model.layout)
+
+
+def _within(
+    model: SystemModel, found: SystemEquilibrium, managers: Mapping[int, DomainManager], t: float
+) -> tuple[SystemModel, SystemEquilibrium] | None:
+    """Zones that satisfy the criteria in their own equilibrium; None: all rod.  ComputationError: there is none."""
+    rods = {k: _asked(manager, model.models[k], found.state.lines[k], t) for k, manager in managers.items()}
+    for _ in range(MOST_ROUNDS):
+        if all(rod.all() for rod in rods.values()):
+            return None
+        models, states = [*model.models], [*found.state.lines]
+        for k, manager in managers.items():
+            full = model.models[k]
+            assert full.layout is not None
+            models[k] = on_layout(full, full.layout._replace(rod=rods[k]))
+            states[k] = _on_fewer(states[k], full, models[k])
+            manager.set_layout(full.layout._replace(rod=rods[k]))
+        other = replace(model, models=tuple(models))
+        start = [("the equilibrium of rods", SystemState(states, found.state.bodies))]
+        answer = solve_system_statics(joined_lines(other, t), len(model.free), found.solver.bodies.copy(), iter(start))
+        more = {
+            k: rods[k] | _asked(manager, models[k], answer.state.lines[k], t) for k, manager in managers.items()
+        }  # fmt: skip
+        if all((more[k] == rods[k]).all() for k in managers):
+            return other, answer
+        rods = more
+    return None
+
+
+def _asked(manager: DomainManager, model: Model, state: State, t: float) -> np.ndarray:
+    """Base cells that the criteria want to be rod in a state."""
+    manager.evaluate_criteria(model.line, model.sea.at(t), model.ends.at(t), state, 0.0)
+    return manager.initial_rods(state)
+
+
+def _on_fewer(state: State, full: Model, model: Model) -> State:
+    """The state of a line at the nodes of one that has fewer.  ComputationError: it folds onto itself there."""
+    s, nodes = full.line.s, model.line.s
+    found = picked(model.line, state, np.searchsorted(s, nodes - 1e-9 * s[-1]))
+    if found is None:
+        raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "base nodes lie at the same place in the start")
+    return found
+
+
+def _apart(
+    k: int, model: SystemModel, found: SystemEquilibrium, other: SystemModel, answer: SystemEquilibrium
+) -> float:
+    """Largest distance (m) of base nodes of a line between two equilibria, the first of them all rod."""
+    full, few = model.models[k].layout, other.models[k].layout
+    assert full is not None and few is not None
+    r, there = found.state.lines[k].r[full.first], answer.state.lines[k].r[few.first]
+    return float(np.linalg.norm(r - there, axis=1).max())
+
+
+class _LineZones:
+    """What moves the zones of one line, with the numbers of a compiled run (kernels.zone_step)."""
+
+    def __init__(self, number: int, model: Model, manager: DomainManager, every: int) -> None:
+        self.number, self.full, self.switching = number, model, ZoneSwitching(model, manager)
+        self.clock, self.counts = np.zeros(b.CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+        longest, clock = LONGEST_IN_PACE * manager.pace * every, manager.zones.clock
+        clock[z.RAMP_STEP], clock[z.CALM_STEP] = longest, longest * READY
+        clock[z.LETTING_GO] = LETTING_GO * manager.pace
+        self.near: Floats = np.zeros(0)
+        self.pending: Change | None = None
+
+    def follow(self, run: SystemRun, phase: int, t: float, end: float, old: State, new: State) -> None:
+        """Before, after a try from t to `end` (s), or, with the states exchanged, after an accepted step."""
+        self.counts[b.PHASE], self.clock[b.NOW], self.clock[b.TRY_END] = phase, t, end
+        model = self.switching.model
+        self.switching.table.bind(
+            line=model.line, sea=model.sea.values, ends=model.ends.values, old=old, new=new, clock=self.clock,
+            counts=self.counts, work=run.lines[self.number].books.work, zones=self.switching.zones, near=self.near,
+        )  # fmt: skip
+        follow_zones(self.switching.table.numbers)
+
+
+class SystemZones:
+    """The zones of all lines of a run whose zones move."""
+
+    def __init__(self, run: SystemRun, managers: Mapping[int, DomainManager]) -> None:
+        every = run.resolution.one.every
+        self._run = run
+        self.lines = [_LineZones(k, run.model.models[k], x, every) for k, x in managers.items()]
+        self._rescues = 0  # of the step that is tried
+
+    def begin(self) -> None:
+        """Weigh the criteria of the first state."""
+        for x in self.lines:
+            x.switching.begin(self._ends(x), self._run.state.lines[x.number])
+            if x.switching.manager.held:
+                length = self._run.model.models[x.number].length
+                self._run.lines[x.number].events.event(0.0, 0.0, length, "zones fixed", HELD)
+
+    def _ends(self, x: _LineZones) -> Ends:
+        return self._run.model.models[x.number].ends.at(self._run.t)
+
+    @property
+    def longest(self) -> float:
+        """Longest step (s) that what is ramped allows."""
+        return min(
+            float(x.switching.zones.clock[z.RAMP_STEP if x.switching.manager.ramping else z.CALM_STEP])
+            for x in self.lines
+        )  # fmt: skip
+
+    # --- checkpoints ------------------------------------------------------------------------------
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Base cells that are rod, and what is under way, of each line by name; between two steps."""
+        return {
+            self._run.lines[x.number].name: {
+                "rod": x.switching.manager.layout.rod.copy(), "switching": x.switching.checkpoint(),
+            }
+            for x in self.lines
+        }  # fmt: skip
+
+    def take_rods(self, saved: Any) -> None:
+        """Give lines, that are all rod as yet, the zones of a checkpoint.  ValueError: they are none of them."""
+        run = self._run
+        models, states = [*run.model.models], [*run.state.lines]
+        for x in self.lines:
+            k, layout, manager = x.number, x.full.layout, x.switching.manager
+            assert layout is not None
+            mine = matched(saved[run.lines[k].name], {"rod": layout.rod, "switching": None}, "zones")
+            model = on_layout(x.full, layout._replace(rod=mine["rod"]))
+            assert model.layout is not None
+            manager.set_layout(model.layout)
+            x.switching = ZoneSwitching(model, manager)
+            models[k], states[k] = model, state_for(model.line)
+            run.lines[k].take_zones(model, extremes=False)
+        run.model, run.state = replace(run.model, models=tuple(models)), run.state._replace(lines=states)
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on as `checkpoint` has written, of lines that have those zones.  ValueError: that cannot be."""
+        for x in self.lines:
+            x.switching.restore(saved[self._run.lines[x.number].name]["switching"])
+
+    # --- steps ------------------------------------------------------------------------------------
+
+    def prepare(self, end: float) -> None:
+        """Before a try that ends at `end` (s): lengths and stiffness as they will be then."""
+        run = self._run
+        for x in self.lines:
+            x.follow(run, b.SOLVE, run.t, end, run.state.lines[x.number], run.other.lines[x.number])
+
+    def wants_more_rod(self, taken: SystemTaken, end: float, last: bool) -> bool:
+        """After a try to `end` (s): whether lines have got more rod, with which the step is to be repeated.
+
+        last: no shorter step is left to try.
+        """
+        run, changed = self._run, False
+        for x in self.lines:
+            k = x.number
+            old, new = run.state.lines[k], run.other.lines[k]
+            how = Tried(taken.outcome, taken.iterations, taken.correction, taken.where)
+            if taken.outcome == Outcome.OK:
+                x.follow(run, b.JUDGE, run.t, end, old, new)
+            elif taken.line not in (k, -1):
+                continue
+            change = x.switching.rescue(how, end, end - run.t, new, self._rescues)
+            if change is None and last:
+                change = x.switching.all_rod(how)
+            if change is not None:
+                self._switch(x, change)
+                changed = True
+        self._rescues += changed
+        if changed:
+            self._go_on()
+        return changed
+
+    def accepted(self, dt: float) -> None:
+        """After an accepted step of dt (s), with the states exchanged: energy, and what should change."""
+        run, self._rescues = self._run, 0
+        for x in self.lines:
+            k = x.number
+            state, before = run.state.lines[k], run.other.lines[k]
+            x.clock[b.LAST_DT] = dt
+            x.follow(run, b.END_STEP, run.t, run.t, state, before)
+            _, x.pending = x.switching.book_step(run.t, before, state)
+
+    def adapt(self) -> None:
+        """After the outputs of a step: carry out what is pending."""
+        changed = False
+        for x in self.lines:
+            if x.pending is not None:
+                self._switch(x, x.pending)
+                x.pending, changed = None, True
+        if changed:
+            self._go_on()
+
+    def _switch(self, x: _LineZones, change: Change) -> None:
+        """Give a line other zones: nothing moves, and what changes energy is booked."""
+        run, k = self._run, x.number
+        sea, line = run.model.models[k].sea.at(run.t), run.lines[k]
+        model, state, booked = x.switching.switch(change, run.t, self._ends(x), run.state.lines[k], sea)
+        line.books.work[0, b.ZONES] += booked
+        note_change(line.events, x.switching.manager.layout.base, run.t, change, booked)
+        models, states = [*run.model.models], [*run.state.lines]
+        models[k], states[k] = model, state
+        run.model, run.state = replace(run.model, models=tuple(models)), run.state._replace(lines=states)
+        line.take_zones(model)
+
+    def _go_on(self) -> None:
+        """Another solver, for lines that have other cells."""
+        run = self._run
+        run.gather_events()  # in the order in which they happen
+        bodies, work = run.solver.bodies.copy(), run.solver.body_work.copy()
+        run.make_solver()
+        run.solver.bodies[:], run.solver.body_work[:] = bodies, work
+        run.take_other()
+        for model in run.model.models:
+            model.ends.at(run.t)
+            model.sea.at(run.t)
+        run.model.load_bodies(run.t, run.solver.bodies, run.loaded)
+        taken = run.solver.evaluate_forces(run.state, 0.0, run.t)
+        if taken.outcome != Outcome.OK:
+            raise LineFailed(taken.line, taken.outcome, run.t, None, "after a change of zones")

@@ -1,0 +1,163 @@
+"""Zones that move in lines of a system: those of the cable, each line by itself, through stops and breaks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bits import FEW_STEPS, Stopping, differences
+
+import hybrid
+import hybrid.simulation.system_run
+from hybrid.errors import SceneError
+
+ROPE = {
+    "length": 60, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 100,
+    "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
+}  # fmt: skip
+SEA = {"fluid": {"density": 1025, "current": [0.3, 0.2, 0]}}
+MODEL = {"kind": "adaptive", "hold_time": 0.5, "tolerance": 1e-3}
+LINE = {"sections": [ROPE], "mesh": {"cells": 30}, "model": MODEL}
+
+
+def slackening(**time: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A rope whose end moves towards its start, as one cable and as a system."""
+    end = {"position": [50, 0, 10], "motion": {"travel": {"by": [-14, 0, 0], "over": 3.0}}}
+    common = {"environment": SEA, "time": {"duration": 3.2, "step": 0.02} | time}
+    output = {"every": 0.1, "points": 31}
+    cable = {
+        "cable": {"sections": [ROPE]}, "mesh": {"cells": 30}, "model": MODEL, "initial": "equilibrium",
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned"} | end},
+        "output": output | {"exact": True}, "contact": {"self": False},
+    }  # fmt: skip
+    system = {
+        "points": {"a": {"position": [0, 0, 0]}, "b": end}, "lines": {"rope": {"start": "a", "end": "b"} | LINE},
+        "output": output,
+    }  # fmt: skip
+    return common | cable, common | system
+
+
+def mooring(**more: Any) -> dict[str, Any]:
+    """Three ropes to a weight that a load draws to one side and then to the other: they go slack in turn."""
+    feet = {"east": [40, 0, -40], "north": [-20, 35, -40], "south": [-20, -35, -40]}
+    rows = [[0, 0, 0, 0], [0.5, 2000, 0, 0], [1.5, 2000, 0, 0], [2.0, -4000, 0, 0], [6.0, -4000, 0, 0]]
+    free = {"initial_guess": [0, 0, -50], "mass": 300, "volume": 0.36, "drag_area": 1, "force": {"history": rows}}
+    angle = {"kind": "end_angle", "end": "end", "direction": [0, 0, -1]}
+    asked = {"angle": angle | {"line": "north"}, "carrying": angle | {"line": "east"}}
+    return {
+        "environment": SEA,
+        "points": {name: {"position": x} for name, x in feet.items()} | {"float": free},
+        "lines": {name: {"start": name, "end": "float"} | LINE for name in feet},
+        "time": {"duration": 5.0, "step": 0.02}, "output": {"every": 0.1, "points": 31, "quantities": asked},
+    } | more  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def three(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
+    path = tmp_path_factory.mktemp("zones") / "three.h5"
+    hybrid.run(mooring(), path).close()
+    return hybrid.open(path)
+
+
+def changes(result: hybrid.Result) -> list[tuple[float, float, float, str]]:
+    return [(round(e.t, 9), e.s_a, e.s_b, e.kind) for e in result.events if e.kind in hybrid.errors.ZONE_EVENTS]
+
+
+def test_a_system_of_one_line_has_the_zones_of_the_cable_at_the_same_times() -> None:
+    cable, system = (hybrid.run(x) for x in slackening())
+    rope = system.lines["rope"]
+    assert changes(rope) == changes(cable) and len(changes(cable)) > 5
+    assert [*rope.zones] == [*cable.zones]
+    assert np.abs(rope.position - cable.position).max() < 1e-9
+    assert np.abs(rope.tension - cable.tension).max() < 1e-6 * cable.tension.max()
+    assert np.isclose(rope["work/zones"][-1], cable["work/zones"][-1], rtol=1e-6)
+    assert np.allclose(rope.envelope["tension_max"], cable.envelope["tension_max"], rtol=1e-6)
+
+
+def test_lines_go_slack_in_turn(three: hybrid.Result) -> None:
+    rods = {
+        name: np.array([sum(z.s_b - z.s_a for z in zones if z.kind == "rod") for zones in line.zones])
+        for name, line in three.lines.items()
+    }
+    first, last = (int(np.argmin(np.abs(three.times - t))) for t in (1.5, 5.0))
+    assert rods["east"][first] > 25.0 and rods["north"][first] == rods["south"][first] == 0.0, rods
+    assert rods["east"][last] < 25.0 < min(rods["north"][last], rods["south"][last]), rods
+    for name, line in three.lines.items():
+        assert three.attributes["lines"] == 3 and line.status == "complete"
+        told = [e for e in three.events if e.text.startswith(f"line {name}: ") and e.kind in hybrid.errors.ZONE_EVENTS]
+        assert len(told) == len(changes(line)) > 0
+
+
+def test_ranges_of_named_quantities_go_on_through_changes(three: hybrid.Result) -> None:
+    (low, high), angle = three["extremes/angle"], three["angle"]
+    assert low <= angle.min() and angle.max() <= high, (low, high, angle)
+    assert "extremes/carrying" not in three and "carrying" in three  # which steps know with the loads of the point
+    assert high < 1.2 * angle.max() and low > 0.5 * angle.min()  # steps see what outputs miss
+
+
+def test_against_rods(three: hybrid.Result) -> None:
+    scene = mooring()
+    for line in scene["lines"].values():
+        line["model"] = "rod"
+    rods = hybrid.run(scene)
+    for name, line in three.lines.items():
+        assert np.abs(line.position - rods.lines[name].position).max() < 0.005 * 60.0, name
+    there, here = (x["points/float/position"] for x in (rods, three))
+    assert np.abs(there - here).max() < 0.002 * 60.0
+
+
+@pytest.mark.slow
+def test_a_stopped_run_goes_on_bit_for_bit(
+    three: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    stopping, path = Stopping(monkeypatch), tmp_path / "run.h5"
+    for k, stop in enumerate([70, 60, -1]):
+        stopping.left = stop
+        try:
+            (hybrid.resume(path, progress=stopping) if k else hybrid.run(mooring(), path, progress=stopping)).close()
+        except KeyboardInterrupt:
+            continue
+        break
+    assert k == 2 and three.file is not None and differences(three.file, path) == []
+
+
+def test_a_line_breaks_while_zones_move() -> None:
+    scene = mooring(time={"duration": 1.5, "step": 0.02})
+    scene["lines"]["north"]["break_at"] = {"time": 0.8}
+    found = hybrid.run(scene)
+    assert found.status == "complete" and any(e.kind == "end released" for e in found.events)
+
+
+@pytest.mark.parametrize(
+    ("line", "scene", "where"),
+    [
+        ({"model": MODEL | {"correct": True}}, {}, "correct"),
+        ({"connections": {"start": {"tangent": [0, 0, 1]}}}, {}, "connections"),
+        ({}, {"accuracy": "1%"}, "accuracy"),
+        ({}, {"output": {"errors": True}}, "errors"),
+        ({}, {"time": {"duration": 1.0}}, "step"),
+    ],
+)
+def test_what_is_not_computed_is_refused(line: dict[str, Any], scene: dict[str, Any], where: str) -> None:
+    given = mooring(**scene)
+    given["lines"]["east"] = given["lines"]["east"] | line
+    with pytest.raises(SceneError) as refused:
+        hybrid.run(given)
+    assert where in refused.value.complaints[0].where
+
+
+def test_steps_from_outside_refuse_zones_that_move() -> None:
+    with pytest.raises(SceneError, match="steps from outside"):
+        hybrid.SystemSimulation(mooring())
+
+
+def test_an_equilibrium_has_zones_too() -> None:
+    scene = mooring()
+    del scene["time"]
+    found = hybrid.static(scene)
+    kinds = {zone.kind for line in found.lines.values() for zone in line.zones[0]}
+    assert kinds == {"rod", "catenary"}
