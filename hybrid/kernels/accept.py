@@ -59,8 +59,9 @@ from hybrid.kernels.books import (
     ZONES,
 )
 from hybrid.kernels.compile import inner
-from hybrid.kernels.forces import SEABED, SELF_FRICTION
+from hybrid.kernels.forces import PLANAR, SEABED, SELF_FRICTION
 from hybrid.kernels.newton import CUT_SHORT, OK, SLACK
+from hybrid.kernels.node_forces import get3
 from hybrid.kernels.powers import book_work, find_powers, pull
 from hybrid.kernels.report import (
     BEND,
@@ -72,6 +73,7 @@ from hybrid.kernels.report import (
     TWIST,
     WRONG_PIVOTS,
 )
+from hybrid.kernels.sampling import end_frame, holds_twist, twist_at_end
 from hybrid.kernels.step_control import halve, passes
 from hybrid.kernels.zone_torque import POWER
 
@@ -131,6 +133,17 @@ def keep_imposed(ends, imposed):
 
 
 @inner
+def keep_end_twist(line, old, books):
+    """Twist of the elements at both ends before the step, and before the one before it."""
+    n = old.T.shape[0]
+    for k in range(2):
+        books.twist[1, k] = books.twist[0, k]
+        if holds_twist(line, k):
+            c = k * (n - 1)
+            books.twist[0, k] = twist_at_end(k, end_frame(books.imposed, 1, k), get3(old.e, c), get3(old.a1, c))
+
+
+@inner
 def accept(line, ends, old, new, books, work, end, dt):
     """The step that was tried is taken: clock, books and log."""
     clock, count, report = books.clock, books.counts, work.report
@@ -148,6 +161,8 @@ def accept(line, ends, old, new, books, work, end, dt):
     for j in range(books.power.shape[1]):
         books.power[1, j] = books.power[0, j]
     keep_imposed(ends, books.imposed)
+    if not line.bits & PLANAR:
+        keep_end_twist(line, old, books)
     find_powers(line, ends, books.velocity, new, report, books.power[0])
     book_work(line, dt, report, books)
     for z in range(new.turn.shape[0]):

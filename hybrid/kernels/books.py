@@ -126,6 +126,7 @@ class Books(NamedTuple):
     work: Floats  # (2, WORKS) J, since the start of the run, likewise
     report: Floats  # (3, REPORT_SIZE) likewise, and before the step before
     tension: Floats  # (2, N) N, before the last step, and before the step before
+    twist: Floats  # (2, 2) rad, of the elements at both ends, likewise
     velocity: Floats  # (2, 3) m/s, of held ends now
     imposed: Floats  # (2, 2, 21) now and before the last step, of each end: position, frame, spin, force, moment
     loaded: NDArray[np.int8]  # (2,) 1 where an end body makes the pull of the end the tension beside it

@@ -137,7 +137,7 @@ def blank_books(cells: int = 1, rows: int = 1) -> Books:
     z, nodes = np.zeros, cells + 1
     return Books(
         clock=z(CLOCK_SIZE), counts=z(COUNT_SIZE, np.int64), outputs=z(0), power=z((2, RATES)), work=z((2, WORKS)),
-        report=z((3, REPORT_SIZE)), tension=z((2, cells)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), base=z(0, np.int64), placed=z((0, 3)),
+        report=z((3, REPORT_SIZE)), tension=z((2, cells)), twist=z((2, 2)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), base=z(0, np.int64), placed=z((0, 3)),
         borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
         samples=z((rows, sample_size(cells))), model_error=z((2, 0)), strains=z((0, 3)), start=z((nodes, 3)), marks=z(nodes, np.int8),
         right=np.arange(nodes),

@@ -2,7 +2,7 @@
 
 Steps end where the motion asks for it, outputs fall where the user asks for them.  Between the two states of a step
 positions are cubic in time by the velocities at both ends (Hermite), chords likewise with lengths that change evenly,
-tensions and reactions lie on the parabola through the step before as well, frames turn as cubics of their spins,
+tensions, reactions and the twist at held ends lie on the parabola through the step before as well, frames turn as cubics of their spins,
 accelerations change evenly: of second order and more (docs/theory.md, 2).
 """
 
@@ -230,23 +230,31 @@ def spin_cells(line, k, angle, e, a1, row):
 
 
 @inner
-def sample_end_twist(line, old, new, imposed, x, row):
-    """Turn the rods at ends that hold the twist so that the twist of their last elements changes evenly in the step.
+def holds_twist(line, k):
+    """Whether end k holds the twist of the line."""
+    i = k * line.h.shape[0]
+    return line.element[i] != 0 and line.kb[i, 2] > 0.0
+
+
+@inner
+def sample_end_twist(line, old, new, imposed, x, k_before, twist, row):
+    """Turn the rods at ends that hold the twist so that the twist of their last elements lies on the parabola through
+    the step before, as tensions do.
 
     That of frames which are interpolated one by one is off by next to nothing, times GJ over half a cell.
+    twist: of these elements before the last step, and before the step before; k_before: as k of `parabola`.
     """
     n = old.T.shape[0]
     at = HEAD + 9 * (n + 1)
     for k in range(2):
-        if not line.element[k * n] or not line.kb[k * n, 2] > 0.0:
+        if not holds_twist(line, k):
             continue
         c, o, a1 = k * (n - 1), SAMPLE_FRAME + 9 * k, at + 4 * n
         R = (row[o], row[o + 1], row[o + 2], row[o + 3], row[o + 4], row[o + 5], row[o + 6], row[o + 7], row[o + 8])
         e = (row[at + 3 * c], row[at + 3 * c + 1], row[at + 3 * c + 2])
         a = (row[a1 + 3 * c], row[a1 + 3 * c + 1], row[a1 + 3 * c + 2])
-        before = twist_at_end(k, end_frame(imposed, 1, k), get3(old.e, c), get3(old.a1, c))
         after = twist_at_end(k, end_frame(imposed, 0, k), get3(new.e, c), get3(new.a1, c))
-        more = (1.0 - x) * before + x * after - twist_at_end(k, R, e, a)
+        more = parabola(x, k_before, twist[1, k], twist[0, k], after) - twist_at_end(k, R, e, a)
         spin_cells(line, k, -more if k else more, at, a1, row)
 
 
@@ -303,7 +311,7 @@ def sample_step(line, sea, old, new, books):
         sample_nodes(old, new, x, dt, row)
         sample_cells(line, old, new, x, dt, k, books.tension, row)
         if x < 1.0 and not line.bits & PLANAR:
-            sample_end_twist(line, old, new, books.imposed, x, row)
+            sample_end_twist(line, old, new, books.imposed, x, k, books.twist, row)
         at = HEAD + 9 * new.r.shape[0] + 8 * new.T.shape[0]
         if count[VARIES]:
             sample_line(line, row)

@@ -38,6 +38,7 @@ def checkpoint(run: Transient) -> dict[str, Any]:
         "_stored": float(clock[b.STORED]),
         "floor": float(clock[b.FLOOR]), "work": books.work[0].copy(), "power": books.power[0].copy(),
         "report": books.report[:2].copy(), "tension": books.tension[0].copy(),
+        "twist": books.twist[0].copy(),
         "last": float(clock[b.NOW] - clock[b.PREVIOUS]), "control": control if run.controlled else None,
         "state": run.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
         "push": run.plane_monitor.checkpoint(run.run), "home": run.plane_monitor.home,
@@ -67,6 +68,9 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     free = dict.fromkeys(("mesh", "plane", "home", "envelope", "payout"))
     template = checkpoint(run) | free | {"report": np.full((2, REPORT_SIZE), np.inf)}
     older = {"report": compiled.books.report[:2], "tension": state.T, "last": 0.0, "_turned": False, "leg": [0.0, 0]}
+    if "twist" not in saved:  # not in 0.6: outputs of the next step know of no step before
+        older |= {"twist": np.zeros(2), "last": 0.0}
+        saved = {name: x for name, x in saved.items() if name != "last"}
     older |= {"envelope": None, "_slackened": False, "self_contact": None, "payout": None, "home": None}
     report = saved.get("report")
     if isinstance(report, np.ndarray) and report.ndim == 2 and FIRST_REPORT <= report.shape[1] < REPORT_SIZE:
@@ -95,7 +99,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     clock[b.MUTE_CUTS], clock[b.MUTE_SLACK] = float(run.turned), float(run.slackened)
     clock[b.LEG_BEGIN], count[b.LEG_PART] = saved["leg"] if complete else (saved["t"], 0)
     books.work[0], books.power[0], books.report[:2] = saved["work"], saved["power"], saved["report"]
-    books.tension[0] = saved["tension"]
+    books.tension[0], books.twist[0] = saved["tension"], saved["twist"]
     for mine, its in ((state, saved["state"]), (compiled.before, saved["state"])):
         for name, x in its.items():
             getattr(mine, name)[:] = x
