@@ -20,7 +20,7 @@ from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
 from hybrid.model.payout import whole_scene
-from hybrid.model.sections import SECTION_LIMITS, limits_along, section_changes
+from hybrid.model.sections import SECTION_LIMITS, limits_along, modules_of, section_changes
 from hybrid.model.self_reach import no_contact
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.pipe import Pipes
@@ -47,12 +47,16 @@ QUANTITIES = {
     b.VON_MISES: ("von_mises", "Pa", "largest von Mises stress in the wall of a pipe", "pipe"),
 }
 
-_S_TEXT = "arc lengths of nodes; point loads and changes of section come twice, with the value before and after them"
+_S_TEXT = (
+    "arc lengths of nodes; point loads, changes of section and ends of modules come twice, with the value before and "
+    "after them"
+)
 
 
 def marked_places(scene: Scene, model: Model) -> tuple[tuple[float, int], ...]:
-    """Arc lengths, m, of point loads and changes of section, with their bits of kernels.books."""
-    loads = tuple((float(x), b.LOADED) for x in model.attached)
+    """Arc lengths, m, of point loads, ends of modules and changes of section, with their bits of kernels.books."""
+    edges = [x for modules in modules_of(scene) for x in modules.range]
+    loads = tuple((float(x), b.LOADED) for x in (*model.attached, *edges))
     return loads + tuple((float(x), b.SEAM) for x in section_changes(scene))
 
 

@@ -99,7 +99,8 @@ class Survey:
         x = np.linspace(0.0, model.length, SAMPLES)
         found = layers(x, demand.s, fade, disturbed, LAYER if self.given is None else self.given)
         if self.along:  # as short where curvature changes within such a length, as where contact begins
-            part = np.sqrt(self._jumps() / demand.curvature.max(initial=1e-300))
+            jumps = np.where(rod, self._jumps(), self._bent())  # a catenary has the bends that it shows, and no sharper
+            part = np.sqrt(jumps / demand.curvature.max(initial=1e-300))
             found = found + np.interp(x, demand.s, LAYER * part / np.maximum(fade, self._reach))
         return found
 
@@ -120,17 +121,22 @@ class Survey:
         before, after = (np.interp(s + x, s, self.demand.curvature) for x in (-reach, reach))
         return before, after
 
-    def _jumps(self) -> Floats:
-        """By how much curvature (K,) 1/m bends over that distance: what a catenary lacks of it, about."""
+    def _bent(self) -> Floats:
+        """By how much curvature (K,) 1/m bends over that distance, as the pre-run shows it."""
         before, after = self._beside()
-        return np.asarray(np.abs(before - 2.0 * self.demand.curvature + after) * self._smeared)
+        return np.asarray(np.abs(before - 2.0 * self.demand.curvature + after))
+
+    def _jumps(self) -> Floats:
+        """The same as it is: what a catenary lacks of it, about."""
+        return np.asarray(self._bent() * self._smeared)
 
     @property
     def _smeared(self) -> Floats:
-        """How much sharper a bend of that length is than cells of the pre-run show (K,)."""
+        """How much sharper a bend of that length is than cells of the pre-run show (K,); 1 without stiffness."""
         line = self.model.line
         cell = np.interp(self.demand.s, 0.5 * (line.s[1:] + line.s[:-1]), line.h)
-        return np.maximum(1.0, 0.5 * cell / np.sqrt(np.maximum(self._square, 1e-300)))
+        stiff = self._square > 0.0
+        return np.where(stiff, np.maximum(1.0, 0.5 * cell / np.sqrt(np.where(stiff, self._square, 1.0))), 1.0)
 
     def tolerance(self, asked: RequestedAccuracy) -> float:
         """Error of position, m, up to which zones may leave bending out for what is asked of values along the line.
