@@ -52,11 +52,30 @@ def beyond(T, h, near, far):
 
 
 @inner
-def end_tension(line, ends, state, report, loaded, k):
+def beside(T, h, marks, i, side):
+    """Tension at node i as the cells on its side (-1, 1) lead to, up to the next kink."""
+    near = i - 1 if side < 0 else i
+    far = near + side
+    if not 0 <= far < h.shape[0] or marks[i + side]:
+        far = near
+    return beyond(T, h, near, far)
+
+
+@inner
+def second_cell(h, marks, k):
+    """The cell from which, beside that at end k, values at the end are extrapolated: none across a kink."""
+    n = h.shape[0]
+    first = k * (n - 1)
+    if n == 1 or marks[n - 1 if k else 1]:
+        return first
+    return first + 1 - 2 * k
+
+
+@inner
+def end_tension(line, ends, state, report, loaded, marks, k):
     """Tension at an end: the force of what holds or loads it along the tangent; of an end body, that of the cable."""
     n = line.h.shape[0]
-    first = k * (n - 1)
-    second = first + 1 - 2 * k if n > 1 else first
+    first, second = k * (n - 1), second_cell(line.h, marks, k)
     if loaded[k]:
         return beyond(state.T, line.h, first, second)
     d, _, _ = chord(get3(state.e, first))
@@ -81,14 +100,13 @@ def note_tension(line, ends, state, books, t):
             books.right,
             TENSION,
             k * n,
-            end_tension(line, ends, state, books.report[0], books.loaded, k),
+            end_tension(line, ends, state, books.report[0], books.loaded, books.marks, k),
             t,
         )
     for i in range(1, n):
         if books.marks[i]:
-            left, right = max(i - 2, 0), min(i + 1, n - 1)
-            widen(books.extremes, TENSION, i, beyond(T, h, i - 1, left), t)
-            widen(books.extremes, TENSION, books.right[i], beyond(T, h, i, right), t)
+            widen(books.extremes, TENSION, i, beside(T, h, books.marks, i, -1), t)
+            widen(books.extremes, TENSION, books.right[i], beside(T, h, books.marks, i, 1), t)
         else:
             widen_both(
                 books.extremes, books.right, TENSION, i, (T[i - 1] * h[i] + T[i] * h[i - 1]) / (h[i - 1] + h[i]), t

@@ -18,7 +18,7 @@ from hybrid.kernels.bed import bed_under
 from hybrid.kernels.books import NOW, PARITY, STEPS
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.extremes import beyond
+from hybrid.kernels.extremes import beyond, second_cell
 from hybrid.kernels.newton import RUN
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.pipes import note_pipes
@@ -60,8 +60,7 @@ def pull_at(job, state, k):
     if not job.books.loaded[k]:
         return (0.0, 0.0, 0.0), False
     n = line.h.shape[0]
-    first = k * (n - 1)
-    second = first + 1 - 2 * k if n > 1 else first
+    first, second = k * (n - 1), second_cell(line.h, job.books.marks, k)
     d, _, _ = chord(get3(state.e, first))
     return scale((1.0 - 2.0 * k) * beyond(state.T, line.h, first, second), d), True
 

@@ -15,7 +15,7 @@ import math
 
 from hybrid.kernels.books import SEAM, VON_MISES, WALL_TENSION
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.extremes import at_rod_end, beside_seam, beyond, end_tension, is_smooth, of_chords, towards, widen
+from hybrid.kernels.extremes import at_rod_end, beside, beside_seam, end_tension, is_smooth, of_chords, towards, widen
 from hybrid.kernels.zone_torque import FIRST, LAST
 from hybrid.kernels.zone_torque import TORQUE as PASSED
 
@@ -30,10 +30,10 @@ def tension_at(line, ends, state, books, i, side):
     """Tension at node i, on its side (-1, 1) where it has two, as kernels.extremes.note_tension has it."""
     T, h, n = state.T, line.h, line.h.shape[0]
     if i == 0 or i == n:
-        return end_tension(line, ends, state, books.report[0], books.loaded, 0 if i == 0 else 1)
+        return end_tension(line, ends, state, books.report[0], books.loaded, books.marks, 0 if i == 0 else 1)
     if not books.marks[i]:
         return (T[i - 1] * h[i] + T[i] * h[i - 1]) / (h[i - 1] + h[i])
-    return beyond(T, h, i - 1, max(i - 2, 0)) if side < 0 else beyond(T, h, i, min(i + 1, n - 1))
+    return beside(T, h, books.marks, i, side)
 
 
 @inner

@@ -197,7 +197,7 @@ class Observation:
         for k in (0, 1):
             t = self.at_end(self.d, k)
             if len(self.d) > 1:
-                t = 1.5 * t - 0.5 * self.at_end(self.d, k, 1)
+                t = np.where(self._kink_beside(k), t, 1.5 * t - 0.5 * self.at_end(self.d, k, 1))
             knows = self.has_element(k) | (self.shift is not None and self.shift.clamped[k])
             if np.any(knows):  # a clamp or guide knows the tangent
                 t = np.where(knows, self.batch.frame[:, k, 2::3].T, t)
@@ -363,7 +363,16 @@ class Observation:
         if len(h) == 1:
             return np.asarray(T[0])
         T0, T1, h0, h1 = (self.at_end(x, k, inward) for x in (T, h) for inward in (0, 1))
-        return np.asarray(T0 + (T0 - T1) * h0 / (h0 + h1))
+        return np.where(self._kink_beside(k), T0, T0 + (T0 - T1) * h0 / (h0 + h1))
+
+    def _kink_beside(self, k: int) -> Floats:
+        """Whether a point load or change of section is one cell away from end k, of all outputs (1,) or of each (nb,).
+
+        Nothing is extrapolated across it.
+        """
+        s = self.line.s[:, None]
+        beside, near = self.at_end(s, k, 1), 1e-9 * self.line.s[-1]
+        return np.any([np.abs(beside - x) < near for x in self.grid.loads] or [np.zeros(1, bool)], axis=0)
 
     # ---- seabed and energies, of what was computed --------------------------------------------
 

@@ -141,12 +141,13 @@ class LineResult:
         """(6,) N: forces of the line on what is at its start and at its end, inertial, of a state and its report.
 
         At a free point that the line carries the report has the loads of the point as well: there it is the tension,
-        continued from the last two cells.
+        continued from the last two cells, from the last alone where a load or a change of section lies between them.
         """
         forces = report[FORCE_A : FORCE_A + 6].copy()
         for k in self.carried:
             e, T, h = (x[:2] if k == 0 else x[:-3:-1] for x in (state.e, state.T, self.model.line.h))
-            d, over = e / np.linalg.norm(e, axis=1)[:, None], h[0] / (h[0] + h[1]) if len(h) > 1 else 0.0
+            smooth = len(h) > 1 and not self.books.marks[-2 if k else 1]
+            d, over = e / np.linalg.norm(e, axis=1)[:, None], h[0] / (h[0] + h[1]) if smooth else 0.0
             along = d[0] + over * (d[0] - d[-1])
             pull = (T[0] + over * (T[0] - T[-1])) / np.linalg.norm(along) * along
             forces[3 * k : 3 * k + 3] = -pull if k else pull
