@@ -44,8 +44,9 @@ def checked(t: ArrayLike, x: ArrayLike, least: int = 2) -> tuple[Floats, Floats]
     if times.ndim != 1 or values.ndim == 0 or values.shape[0] != times.size:
         raise ResultError(f"a history has one value for each time: {times.shape} times and {values.shape} values")
     if times.size < least:
-        count = "one value (an equilibrium has one) is" if times.size == 1 else f"{times.size} values are"
-        raise ResultError(f"{count} too few\n    expected: {least} at least")
+        count = "one value is" if times.size == 1 else f"{times.size} values are"
+        expected = f"{least} at least; an equilibrium has one, a longer window may have more"
+        raise ResultError(f"{count} too few\n    expected: {expected}")
     if not np.all(np.diff(times) > 0.0):
         raise ResultError("the times of a history must grow")
     if not np.all(np.isfinite(values)):

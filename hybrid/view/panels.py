@@ -101,7 +101,8 @@ def framed(result: Result, view: View, items: list[Item], when: str = "") -> Pan
     wider, taller = magnification(view, result)
     factors = zip((view.across_label.split(",")[0], view.up_label), (wider, taller), strict=True)
     stretch = "".join(f", {name} × {factor:g}" for name, factor in factors if factor > 1.0)
-    above = "" if "z" in (view.across_label, view.up_label) else " from above"
+    side = "above" if np.cross(view.across, view.up)[2] > 0.0 else "below"
+    above = "" if "z" in (view.across_label, view.up_label) else f" from {side}"
     box = extent_in(view, result)
     margin = 0.06 * np.ptp(box, axis=1, keepdims=True) + (1e-6 * float(np.ptp(box)) or 0.5)
     (left, right), (low, high) = (box + margin * [-1.0, 1.0]).tolist()

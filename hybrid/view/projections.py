@@ -52,7 +52,7 @@ def views_of(result: Result) -> list[View]:
         return [view_named("xz"), view_named("yz")]
     if np.ptp(level @ sideways[:2]) < 0.08 * min(x, y):  # in x-y it would be a mere line
         return [along, along._replace(up=sideways, up_label="across")]
-    return [view_named("xz"), view_named("xy")] if x >= y else [view_named("yz"), view_named("yx")]
+    return [view_named("xz" if x >= y else "yz"), view_named("xy")]  # y over x is a view from below
 
 
 def _is_flat(position: np.ndarray, normal: np.ndarray) -> bool:
