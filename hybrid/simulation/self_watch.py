@@ -9,6 +9,7 @@ import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.binding import Table
+from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, NOW
 from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT
 from hybrid.kernels.self_contact_law import INNER, OUTER
 from hybrid.kernels.self_distance import (
@@ -33,7 +34,7 @@ from hybrid.kernels.self_distance import (
     blank_itself_job,
     watch_itself,
 )
-from hybrid.kernels.state import Floats, State, Work
+from hybrid.kernels.state import Floats, State, Work, state_for
 from hybrid.model.build import Model
 from hybrid.scene.schema import Scene
 from hybrid.solve.run import CompiledRun
@@ -66,15 +67,18 @@ def least_bending(model: Model) -> Floats:
 REMEDY = "contact: {self: true} does, of catenaries that are not corrected for bending too"
 
 
-def meeting_text(s: float, other: float, distance: float, width: float, dt: float, why: str) -> str:
+def meeting_text(
+    s: float, other: float, distance: float, width: float, dt: float, why: str, remedy: str = REMEDY
+) -> str:
     """Text of the event of a line that comes within `distance`, m, of itself at two arc lengths, m.
 
-    width: m, of the cable; dt: s, the step in which it does, 0: in none; why: no contact is computed.
+    width: m, of the cable; dt: s, the step in which it does, 0: in none; why: no contact is computed; remedy: what
+    computes it.
     """
     passing = f" in a step of {dt:.3g} s" if dt > 0.0 else ""
     return (
         f"s = {s:.6g} m and s = {other:.6g} m come within {distance:.3g} m of each other{passing}, less than the "
-        f"diameter of {width:.3g} m: nothing keeps it from passing through itself here ({why}); {REMEDY}"
+        f"diameter of {width:.3g} m: nothing keeps it from passing through itself here ({why}); {remedy}"
     )
 
 
@@ -89,9 +93,9 @@ def touching_text(s: float, other: float, distance: float, width: float) -> str:
 class SelfWatch:
     """Watches one line for as long as a run lasts; a line without a diameter is not watched."""
 
-    def __init__(self, model: Model, why: str = "statics compute no contact") -> None:
-        """why: no contact is computed, for an event."""
-        self.on, self.why = bool(diameters(model).any()), why
+    def __init__(self, model: Model, why: str = "statics compute no contact", remedy: str = REMEDY) -> None:
+        """why: no contact is computed, for an event; remedy: what computes it."""
+        self.on, self.why, self.remedy = bool(diameters(model).any()), why, remedy
         self.asks = False  # whether it is asked when the line comes near itself, so that contact begins
         self.itself = blank_itself(np.ones(1))
         self._job = Table(blank_itself_job())
@@ -160,7 +164,7 @@ class SelfWatch:
             text = touching_text(s, other, distance, width)
             event(t, s, other, "line touches itself", text, value=distance, threshold=width)
         else:
-            text = meeting_text(s, other, distance, width, dt, self.why)
+            text = meeting_text(s, other, distance, width, dt, self.why, self.remedy)
             event(t, s, other, "line meets itself", text, value=distance, threshold=width)
 
     def fields(self) -> list[Field]:
@@ -179,11 +183,40 @@ class SelfWatch:
         return {x.name: np.array(found[FIELDS[x.name][0]] if near else np.nan) for x in self.fields()}
 
 
+class LineWatch:
+    """Watches a line whose states are handed over one by one, as those of several lines are."""
+
+    def __init__(self, watch: SelfWatch, model: Model) -> None:
+        """watch: what is known of the line so far, which goes on on the cells of `model`."""
+        self._watch = watch
+        self._now, self._before = state_for(model.line), state_for(model.line)
+        self._clock = np.zeros(CLOCK_SIZE)
+        if watch.on:
+            watch.itself = blank_itself(diameters(model))._replace(found=watch.itself.found)
+            self._job = Table(blank_itself_job())
+            self._job.bind(
+                line=model.line, ends=model.ends.values, old=self._now, new=self._before, clock=self._clock,
+                counts=np.zeros(COUNT_SIZE, np.int64), itself=watch.itself,
+            )  # fmt: skip
+
+    def look(self, t: float, dt: float, state: State, before: Floats, event: Callable[..., None]) -> None:
+        """An event if surfaces have met in the step of dt (s) to t (s), from positions (N+1, 3) m to a state."""
+        if not self._watch.on:
+            return
+        if not is_bent(state):
+            self._watch.itself.found[TOLD] = 0.0
+            return
+        self._now.r[:], self._now.e[:], self._before.r[:] = state.r, state.e, before
+        self._clock[NOW] = t
+        if int(watch_itself(self._job.numbers)) & MEETS:
+            self._watch.tell(t, dt, event)
+
+
 def is_bent(state: State) -> bool:
     """As kernels.self_distance.is_bent, which only kernels can call."""
-    along, c = state.e @ (state.r[-1] - state.r[0]), state.r[-1] - state.r[0]
-    size = np.linalg.norm(state.e, axis=1) * np.linalg.norm(c)
-    return bool((~((along > 0.0) & (along >= TURNED * size))).any())
+    c = state.r[-1] - state.r[0]
+    along, size = state.e @ c, TURNED * TURNED * (c @ c) * np.einsum("ij,ij->i", state.e, state.e)
+    return not bool(((along > 0.0) & (along * along > size)).all())
 
 
 def let_touch_itself(run: CompiledRun, scene: Scene, model: Model, work: Work) -> None:

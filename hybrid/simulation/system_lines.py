@@ -27,6 +27,7 @@ from hybrid.simulation.envelope import Envelope, marks_of
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.result_file import result_recorder
 from hybrid.simulation.run_sample import COMPARED
+from hybrid.simulation.self_watch import LineWatch, SelfWatch
 from hybrid.simulation.time_loop import FORCE_COLUMNS
 from hybrid.solve.run import no_extremes
 from hybrid.solve.system import JoinedLine, SystemTaken
@@ -36,6 +37,7 @@ from hybrid.store.writer import Recorder
 
 # Outputs of a line that wait for one another: quantities of all of them are computed together.
 WAITING = 64
+NO_CONTACT = "of several lines no contact with themselves is computed"
 # Of the length: ends that are so near to where they were have not been moved.
 SAME_PLACE = 1e-9
 
@@ -68,7 +70,9 @@ class LineResult:
         self._moves = outputs > 0
         self.observer = observer_of(scene, model, self._moves, COMPARED if compared else None)
         self.envelope = Envelope(scene, model, self._moves)
-        self.envelope.itself.on = False  # lines of a system are not watched for meeting themselves
+        self.envelope.itself = SelfWatch(model, NO_CONTACT, "one cable whose ends move as here does")
+        self.envelope.itself.on &= not compared
+        self._itself = LineWatch(self.envelope.itself, model)
         self.recorder: Recorder | DeferredRecorder | ComparisonRecorder = ComparisonRecorder(FORCE_COLUMNS)
         if not compared:
             recorder = result_recorder(
@@ -113,6 +117,7 @@ class LineResult:
             text = "whether rods would buckle out of an equilibrium of several lines is not judged"
             self.events.event(0.0, 0.0, self.model.length, "stability not judged", text)
         self.judge(t, sharpest(x.line, x.ends, state), state)
+        self._itself.look(t or 0.0, 0.0, state, state.r, self.events.event)
 
     def follow(self, model: Model) -> None:
         """Go on with another model of the same cells, after what waits has been recorded."""
@@ -123,6 +128,7 @@ class LineResult:
         self.observer = self.observer.on(model.line, model.sea.values, model.zones)
         self.observer.first_energy = first
         self.diagnostics.follow(model)
+        self._itself = LineWatch(self.envelope.itself, model)
 
     def take_zones(self, model: Model, extremes: bool = True) -> None:
         """Go on with other zones, whose cells are others; extremes: whether those of now count."""
@@ -153,8 +159,11 @@ class LineResult:
             forces[3 * k : 3 * k + 3] = -pull if k else pull
         return forces
 
-    def log(self, t: float, dt: float, taken: SystemTaken, repeats: int, state: State, work: Work, cpu: float) -> None:
-        """Log a step that ended at t (s) in a state."""
+    def log(
+        self, t: float, dt: float, taken: SystemTaken, repeats: int, state: State, before: State, work: Work, cpu: float
+    ) -> None:
+        """Log a step of dt (s) that ended at t (s) in a state, after the one `before`."""
+        self._itself.look(t, dt, state, before.r, self.events.event)
         forces = self.end_forces(state, work.report)
         pulls = float(np.linalg.norm(forces[:3])), float(np.linalg.norm(forces[3:]))
         error = float(work.report[LOCAL_ERROR])

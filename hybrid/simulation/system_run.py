@@ -440,8 +440,9 @@ class SystemRun:
             self.t, self.state, self.other = t, self.other, self.state
             self.steps += 1
             cpu = clock.process_time() - self._begin
-            for line, state, work in zip(self.lines, self.state.lines, solver.work, strict=True):
-                line.log(t, self.last_step, taken, repeats, state, work, cpu)
+            both = zip(self.state.lines, self.other.lines, strict=True)
+            for line, states, work in zip(self.lines, both, solver.work, strict=True):
+                line.log(t, self.last_step, taken, repeats, *states, work, cpu)
             if zones is not None:
                 zones.accepted(self.last_step)
             repeats = 0
