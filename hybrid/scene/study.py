@@ -121,8 +121,12 @@ class Sample(Table):
 
 TAKES = (
     "max", "min", "mean", "median", "deviation", "skewness", "period", "significant", "extreme", "fractile", "damage",
-    "history", "profile",
+    "exceedance", "utilisation", "history", "profile",
 )  # fmt: skip
+
+
+# Limits of sections that quantities are held against in `utilisation`.
+LIMIT_OF = {"tension": "max_tension", "curvature": "min_bend_radius"}
 
 
 class Kept(Table):
@@ -141,16 +145,31 @@ class Kept(Table):
     ) = Field(default=None, description="arc length, or several; absent: the worst along the line [m]")
     take: Annotated[tuple[Literal[TAKES], ...], Field(min_length=1)] = Field(  # type: ignore[valid-type]
         default=("max",), description="what of its history: max, min, mean, median, deviation, skewness, period, "
-        "significant, extreme (most probable largest in `hours`), fractile (90 % of that), damage, history, "
+        "significant, extreme (most probable largest in `hours`), fractile (90 % of that), damage, exceedance (part of "
+        "the time above `above`), utilisation (part of max_tension or of min_bend_radius that is used), history, "
         "profile (max along s)"
     )  # fmt: skip
     times: tuple[Number, Number] | None = Field(default=None, description="only from one time to another [s]")
     hours: Positive = Field(default=3.0, description="of extreme and fractile [h]")
+    above: Number | None = Field(default=None, description="of exceedance: the value, in the unit of the quantity")
     curve: Text | None = Field(default=None, description="of damage: a curve of fatigue")
     strength: Positive | None = Field(default=None, description="of damage by a T-N curve: reference strength [N]")
     section: tuple[Positive, Positive, Positive] | None = Field(
         default=None, description="of damage by an S-N curve: area m2, outer diameter m, Young's modulus Pa"
     )
+
+    @model_validator(mode="after")
+    def _of_limits(self) -> Self:
+        if ("exceedance" in self.take) != (self.above is not None):
+            refuse([Finding(("above",), "a value with take: [exceedance], and nothing without", "above: 5.0e+4")])
+        if "utilisation" in self.take:
+            if self.quantity not in LIMIT_OF:
+                expected = "tension or curvature, which sections have limits of"
+                refuse([Finding(("quantity",), expected, "quantity: tension")])
+            if self.at is not None or self.times is not None:
+                key = "at" if self.at is not None else "times"
+                refuse([Finding((key,), "nothing: utilisation is the largest of all places and steps")])
+        return self
 
     @model_validator(mode="after")
     def _of_damage(self) -> Self:
@@ -188,6 +207,9 @@ class Study(Table):
     derive: dict[str, Text] = Field(default_factory=dict, description="columns computed from variables, by name")
     collect: dict[str, Kept] | None = Field(
         default=None, description="what is kept of each run, by name; absent: largest tension, end forces, curvature"
+    )
+    files: Truth = Field(
+        default=False, description="keep the whole result of every case, too: STUDY.files/case-000000.h5 and so on"
     )
 
     @model_validator(mode="after")

@@ -61,6 +61,19 @@ def mean_over_time(t: Floats, x: Floats) -> Floats:
     return np.asarray(np.trapezoid(x, t, axis=0) / (t[-1] - t[0]))
 
 
+def exceedance(t: ArrayLike, x: ArrayLike, above: float) -> Floats:
+    """The part of the time (...) for which histories x (nt, ...) at times t (nt,) s are above a value; linear between
+
+    samples.
+    """
+    times, values = checked(t, x)
+    lasts = np.diff(times).reshape(-1, *[1] * (values.ndim - 1))
+    least, most = np.minimum(values[1:], values[:-1]), np.maximum(values[1:], values[:-1])
+    width = np.where(most > least, most - least, 1.0)
+    part = np.where(most > least, np.clip((most - above) / width, 0.0, 1.0), most > above)
+    return np.asarray((part * lasts).sum(axis=0) / (times[-1] - times[0]))
+
+
 def median_over_time(t: ArrayLike, x: ArrayLike) -> Floats:
     """What histories x (nt, ...) at times t (nt,) s are below for half of the time; linear between samples."""
     times, values = checked(t, x)

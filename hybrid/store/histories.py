@@ -13,6 +13,7 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.statistics import extremes, fatigue, moments, spectrum
 from hybrid.store.bends import bends_of
+from hybrid.store.envelope import Judged, judged
 from hybrid.store.names import ALIASES
 
 if TYPE_CHECKING:
@@ -152,6 +153,17 @@ class Histories:
             median_interval=_negated(found.median_interval),
             fractile_interval=_negated(found.fractile_interval), fitted=f"of the negative values: {found.fitted}",
         )  # fmt: skip
+
+    def exceedance(self: Any, name: str, above: float, *, at: Any = None, times: Window | None = None) -> Floats:
+        """The part of the time for which a history is above a value in the unit of its quantity, of the shape of the
+        quantity at one time; at, times: as of `statistics`."""
+        history = history_of(self, name, times, at)
+        return moments.exceedance(history.t, history.values, above)
+
+    def utilisation(self: Any) -> dict[str, Judged]:
+        """How near the line came to each limit of its sections over all steps, by the key of the limit: `used` is the
+        part of max_tension or min_bend_radius that was used, None of min_tension; at s (m) and t (s)."""
+        return {found.limit: found for found in judged(self)}
 
     def spectrum(
         self: Any, name: str, *, at: Any = None, times: Window | None = None, segment: float | None = None

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import HybridError, ResultError
-from hybrid.scene.study import Kept
+from hybrid.scene.study import LIMIT_OF, Kept
 from hybrid.statistics import extremes, moments
+from hybrid.store.envelope import judged
 from hybrid.store.histories import history_of, lies_along
 from hybrid.store.limits import at_every_step
 from hybrid.store.reader import Result
@@ -37,6 +38,7 @@ WORDS = {
     "skewness": "skewness of", "period": "period between up-crossings of the mean of",
     "significant": "significant range of", "extreme": "most probable largest",
     "fractile": "90 % fractile of the largest", "damage": "fatigue damage", "history": "history",
+    "exceedance": "part of the time above", "utilisation": "largest part that is used of",
     "profile": "largest at each place",
 }  # fmt: skip
 
@@ -120,6 +122,12 @@ def _taken(
         known = at_every_step(result, name, "largest" if take == "max" else "smallest")
         if known is not None:
             return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(known[0])
+    if take == "utilisation":
+        limit = LIMIT_OF[name]
+        used = [x.used for x in judged(result) if x.limit == limit and x.used is not None]
+        if not used:
+            raise ResultError(f"no section has a {limit}, which {name} would be held against")
+        return Variable("", f"{WORDS[take]} {limit}, every step", (), {}), np.asarray(used[0])
     if take == "damage":
         assert kept.curve is not None
         s, damage = result.damage(kept.curve, strength=kept.strength, section=kept.section, times=kept.times, at=at)
@@ -162,6 +170,10 @@ def _taken(
     if take in ("max", "min"):
         worst = (np.fmax if take == "max" else np.fmin).reduce(flat, axis=0)
         return _placed(Variable(unit, text, dims, places), worst, take)
+    if take == "exceedance":
+        assert kept.above is not None
+        text = f"{WORDS[take]} {kept.above:g} {unit}: {about}"
+        return _placed(Variable("", text, dims, places), moments.exceedance(history.t, flat, kept.above))
     if take == "median":
         return _placed(Variable(unit, text, dims, places), moments.median_over_time(history.t, flat))
     attribute, other = OF_SUMMARY[take]

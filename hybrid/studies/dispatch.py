@@ -46,9 +46,12 @@ class StudyRunning:
 
 def compute_open_batches(
     file: StudyFile, cases: Cases, wanted: Mapping[str, Kept], workers: int | None, scheduler: str | None,
-    progress: Callable[[StudyRunning], None] | None,
+    progress: Callable[[StudyRunning], None] | None, files: str = "",
 ) -> None:  # fmt: skip
-    """Compute the batches of a study that are not done; ResultError when the scheduler is gone."""
+    """Compute the batches of a study that are not done; files: folder for whole results, "": they are not kept.
+
+    ResultError when the scheduler is gone.
+    """
     begin = clock.perf_counter()
 
     def tell(dashboard: str) -> None:
@@ -57,7 +60,8 @@ def compute_open_batches(
             progress(StudyRunning(file.cases, now["done"], now["failed"], clock.perf_counter() - begin, dashboard))
 
     def job_of(k: int) -> Job:
-        return Job(cases.base, cases.keys, cases.rows[file.slice_of(k)], wanted, cases.static)
+        where = file.slice_of(k)
+        return Job(cases.base, cases.keys, cases.rows[where], wanted, cases.static, where.start, files)
 
     with client_of(workers, scheduler) as client:
         dashboard = str(getattr(client, "dashboard_link", "") or "")
@@ -124,8 +128,8 @@ class _Batches:
         Nothing else may run: of whatever a worker was about to compute, dask counts its death.
         """
         outcomes = []
-        for row in job.rows:
-            future = self._client.submit(compute_batch, job._replace(rows=[row]), pure=False)
+        for k, row in enumerate(job.rows):
+            future = self._client.submit(compute_batch, job._replace(rows=[row], first=job.first + k), pure=False)
             try:
                 outcomes += future.result()
             except self._distributed.KilledWorker:

@@ -69,7 +69,8 @@ def study(
     wanted = asked.collect or usual(asked.static, cases.lines)
     _refuse_collisions(cases, wanted)
     _refuse_unknown_lines(cases, wanted)
-    identity = _identity(cases, wanted, asked.derive)
+    identity = _identity(cases, wanted, asked.derive, asked.files)
+    whole = target.with_suffix(".files") if asked.files else None
     with locked(target):
         if target.exists():
             there = StudyFile(target)  # nothing else is removed
@@ -82,7 +83,9 @@ def study(
             count = workers or os.cpu_count() or 1
             file = _created(target, asked, cases, wanted, identity, batch or _batch_of(cases, count))
         if file.open_batches():
-            compute_open_batches(file, cases, wanted, workers, scheduler, progress)
+            if whole is not None:
+                whole.mkdir(exist_ok=True)
+            compute_open_batches(file, cases, wanted, workers, scheduler, progress, str(whole or ""))
     return open_study(target)
 
 
@@ -138,8 +141,9 @@ def _refuse_unknown_lines(cases: Cases, wanted: Mapping[str, Kept]) -> None:
             raise SceneError([Complaint(f"collect.{name}.line", "nothing", expected, f"line: {cases.lines[0]}")])
 
 
-def _identity(cases: Cases, wanted: Mapping[str, Kept], derived: Mapping[str, str]) -> str:
+def _identity(cases: Cases, wanted: Mapping[str, Kept], derived: Mapping[str, str], files: bool) -> str:
     kept: dict[str, Any] = {name: each.model_dump(mode="json") for name, each in wanted.items()}
+    kept |= {"whole files": True} if files else {}
     kept |= {"derive": dict(derived), "release": version("hybrid-cable")}  # results of two releases are not mixed
     return hashlib.sha256((cases.identity + json.dumps(kept, sort_keys=True)).encode()).hexdigest()[:16]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time as clock
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,8 @@ class Job(NamedTuple):
     rows: list[dict[str, Any]]
     wanted: Mapping[str, Kept]
     static: bool
+    first: int = 0  # number of the first case
+    files: str = ""  # folder for whole results; "": they are not kept
 
 
 class Outcome(NamedTuple):
@@ -45,14 +48,15 @@ class Outcome(NamedTuple):
 def compute_batch(job: Job) -> list[Outcome]:
     """Compute the cases of a batch, one after the other, in one thread."""
     os.environ["HYBRID_THREADS"] = "1"
-    return [_computed(job, row) for row in job.rows]
+    return [_computed(job, row, job.first + k) for k, row in enumerate(job.rows)]
 
 
-def _computed(job: Job, row: dict[str, Any]) -> Outcome:
+def _computed(job: Job, row: dict[str, Any], case: int) -> Outcome:
     begin = clock.process_time()
     try:
         scene = scene_of(job.base, job.keys, row)
-        result = static(scene) if job.static else run(scene)
+        target = Path(job.files) / f"case-{case:06d}.h5" if job.files else None
+        result = static(scene, target) if job.static else run(scene, target)
     except SceneError as error:
         first = error.complaints[0]
         reason = f"refused: {first.where}: given {first.value}, expected {first.expected}"

@@ -1,0 +1,107 @@
+"""What a study keeps of limits: the part that is used, the part of the time above a value, whole results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import SceneError
+from hybrid.scene.study import Kept, study_from
+from hybrid.statistics.moments import exceedance
+from hybrid.store.histories import history_of
+from hybrid.studies.cases import cases_of
+from hybrid.studies.workers import Job, compute_batch
+
+SECTION = "{length: 30, mass: 2, axial_stiffness: 1.0e+6, bending_stiffness: 50, max_tension: 600, min_bend_radius: 2}"
+SCENE = f"""
+cable: {{sections: [{SECTION}]}}
+ends:
+  start: {{kind: pinned, position: [0, 0, 0]}}
+  end: {{kind: pinned, position: [25, 0, 0], motion: {{heave: {{amplitude: 1, period: 4}}, ramp: 4}}}}
+initial: equilibrium
+model: rod
+mesh: {{cells: 30}}
+time: {{duration: 4, step: 0.05}}
+output: {{every: 0.1}}
+"""
+COLLECT: dict[str, Any] = {
+    "strength": {"quantity": "tension", "take": ["utilisation"]},
+    "bend": {"quantity": "curvature", "take": ["utilisation"]},
+    "above": {"quantity": "end_force_end", "take": ["exceedance"], "above": 300.0},
+}
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    return tmp_path / "scene.yaml"
+
+
+def study_of(scene: Path, **more: Any) -> Any:
+    values = {"m": {"key": "cable.sections[0].mass", "values": [2.0, 3.0]}}
+    return study_from({"scene": str(scene), "vary": values, "collect": COLLECT} | more)
+
+
+def test_the_part_of_the_time_above_a_value() -> None:
+    """Of a sine: a half above nothing, a third above half of its amplitude; of a step, to the sample."""
+    t = np.linspace(0.0, 2.0 * np.pi, 20_001)
+    assert exceedance(t, np.sin(t), 0.0) == pytest.approx(0.5, abs=1e-6)
+    assert exceedance(t, np.sin(t), 0.5) == pytest.approx(1.0 / 3.0, abs=1e-6)
+    assert exceedance([0.0, 1.0, 3.0], [[0.0, 5.0], [2.0, 5.0], [0.0, 5.0]], 1.0) == pytest.approx([0.5, 1.0])
+
+
+def test_limits_and_whole_results_of_cases(scene: Path, tmp_path: Path) -> None:
+    cases = cases_of(study_of(scene))
+    wanted = {name: Kept.model_validate(kept) for name, kept in COLLECT.items()}
+    outcomes = compute_batch(Job(cases.base, cases.keys, cases.rows, wanted, False, 7, str(tmp_path)))
+    assert sorted(x.name for x in tmp_path.glob("*.h5")) == ["case-000007.h5", "case-000008.h5"]
+    for k, outcome in enumerate(outcomes):
+        assert outcome.reason == "" and outcome.status == 1
+        with hybrid.open(tmp_path / f"case-{k + 7:06d}.h5") as result:
+            used, kept = result.utilisation(), {name: float(values) for name, (_, values) in outcome.kept.items()}
+            assert kept["strength"] == pytest.approx(result["envelope/tension_max"].max() / 600.0, rel=1e-12)
+            assert kept["strength"] == used["max_tension"].used and used["max_tension"].broken == (kept["strength"] > 1)
+            assert kept["bend"] == pytest.approx(2.0 * result["envelope/curvature_max"].max(), rel=1e-12)
+            history = history_of(result, "end_force_end")
+            assert 0.0 < kept["above"] < 1.0 or k == 1
+            assert kept["above"] == pytest.approx(np.mean(history.values > 300.0), abs=0.05)
+            assert kept["above"] == float(result.exceedance("end_force_end", 300.0))
+    assert outcomes[0].kept["strength"][1] < outcomes[1].kept["strength"][1]
+
+
+@pytest.mark.slow
+def test_a_study_keeps_whole_results(scene: Path, tmp_path: Path) -> None:
+    found = hybrid.study(study_of(scene, files=True), tmp_path / "both.zarr", workers=1)
+    assert (found["status"].values == 1).all() and found["strength"].attrs["units"] == ""
+    with hybrid.open(tmp_path / "both.files" / "case-000001.h5") as result:
+        assert float(found["strength"][1]) == result.utilisation()["max_tension"].used
+    with pytest.raises(hybrid.ResultError, match="another study"):
+        hybrid.study(study_of(scene), tmp_path / "both.zarr", workers=1)
+
+
+@pytest.mark.parametrize(
+    ("kept", "where"),
+    [
+        ({"quantity": "tension", "take": ["exceedance"]}, "above"),
+        ({"quantity": "tension", "above": 3.0}, "above"),
+        ({"quantity": "torque", "take": ["utilisation"]}, "quantity"),
+        ({"quantity": "tension", "take": ["utilisation"], "at": 3.0}, "at"),
+        ({"quantity": "tension", "take": ["utilisation"], "times": [0.0, 1.0]}, "times"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(scene: Path, kept: dict[str, Any], where: str) -> None:
+    with pytest.raises(SceneError) as refused:
+        study_of(scene, collect={"x": kept})
+    assert refused.value.complaints[0].where.endswith(where)
+
+
+def test_without_a_limit_nothing_is_kept(scene: Path) -> None:
+    scene.write_text(SCENE.replace(", max_tension: 600", ""))
+    cases = cases_of(study_of(scene))
+    wanted = {"strength": Kept.model_validate(COLLECT["strength"])}
+    (outcome, _) = compute_batch(Job(cases.base, cases.keys, cases.rows, wanted, False))
+    assert outcome.status == 2 and "no section has a max_tension" in outcome.reason
