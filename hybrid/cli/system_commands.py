@@ -78,7 +78,8 @@ def _ended(console: Console, result: Result, target: Path, plot: bool, text: str
     held = [x._asdict() | {"text": x.text} for x in held_of(result)]
     points, bodies = _last(result, "points"), _last(result, "bodies")
     console.events(result.events)
-    console.show(lambda: _table(lines, points, bodies, held))
+    end = float(result.times[-1]) if len(result.times) > 1 else None
+    console.show(lambda: _table(lines, points, bodies, held, end))
     console.done(
         text, target, *pictures, status=result.status, lines=lines, points=points, bodies=bodies, quantities=held,
         **facts,
@@ -95,25 +96,33 @@ def _last(result: Result, group: str) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _table(lines: dict[str, Any], points: dict[str, Any], bodies: dict[str, Any], held: list[dict[str, Any]]) -> Any:
+def _table(
+    lines: dict[str, Any], points: dict[str, Any], bodies: dict[str, Any], held: list[dict[str, Any]],
+    end: float | None,
+) -> Any:  # fmt: skip
+    """end: s, time of the last output, of which points and bodies are; None: of an equilibrium."""
     from rich.table import Table
 
+    def at(x: dict[str, Any]) -> str:
+        when = "" if end is None else f", t = {x['t']:.5g} s"
+        return f"{x['value']:.5g} N at s = {x['s']:.5g} m{when}"
+
+    last = "" if end is None else f"at t = {end:.5g} s: "
     table = Table.grid(padding=(0, 2))
     for name, facts in lines.items():
         most, least = facts["tension_max"], facts["tension_min"]
-        at = f"{most['value']:.5g} N at s = {most['s']:.5g} m"
-        table.add_row(f"line {name}", f"tension {least['value']:.5g} to {at}")
+        table.add_row(f"line {name}", f"tension {at(least)}, to {at(most)}")
         for each in facts.get("accuracy", ()):
             table.add_row("", verdict_text(each))
     for name, facts in points.items():
         turned = f", turned by {_vector(facts['rotation'], 1e-6)} deg" if "rotation" in facts else ""
         force = f", force of the lines {_vector(facts['force'])} N" if "force" in facts else ""
         moment = f", moment {_vector(facts['moment'])} N m" if "moment" in facts else ""
-        table.add_row(f"point {name}", f"{_vector(facts['position'])} m{turned}{force}{moment}")
+        table.add_row(f"point {name}", f"{last}{_vector(facts['position'])} m{turned}{force}{moment}")
     for name, facts in bodies.items():
         turned = f"{_vector(facts['position'])} m, turned by {_vector(facts['rotation'], 1e-6)} deg"
         loads = f"force of the lines {_vector(facts['force'])} N, moment {_vector(facts['moment'])} N m"
-        table.add_row(f"body {name}", f"{turned}, {loads}")
+        table.add_row(f"body {name}", f"{last}{turned}, {loads}")
     for x in held:
         table.add_row(x["name"], f"{x['text']}, t = {x['t']:.5g} s" + "; BROKEN" * x["broken"])
     table.columns[0].style = "bold"
