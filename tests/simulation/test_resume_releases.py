@@ -71,7 +71,8 @@ def test_a_file_of_0_5_cannot_be_resumed_and_says_what_can_be_done(tmp_path: Pat
 def test_a_file_of_0_6_is_resumed(other: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Catenary and rod in space, in a current; on its own grid, the same as the run that was never stopped.
 
-    Since then the joint is an output point, with the values on its right in right/*, and the diameter is in the file.
+    Since then the joint is an output point, with the values on its right in right/*, the diameter is in the file, and
+    lines of fixed zones may touch themselves.
     """
     path = kept("result_0.6.h5.gz", tmp_path)
     if other:  # as a release will that is not the one that wrote it
@@ -81,7 +82,7 @@ def test_a_file_of_0_6_is_resumed(other: bool, tmp_path: Path, monkeypatch: pyte
     assert point.t == pytest.approx(0.5) and point.program.startswith("0.6.0 ")
     with hybrid.resume(path) as result, hybrid.run(hybrid.parse_scene(result.scene_text)) as fresh:
         assert result.status == "complete" and set(result.names) == {
-            x for x in fresh.names if x != "diameter" and not x.startswith("right/")
+            x for x in fresh.names if x != "diameter" and not x.startswith("right/") and "self_contact" not in x
         }
         assert result.s.size == 5 and np.isin(result.s, fresh.s).all() and fresh["right/s"].size == 1
         assert np.array_equal(result.times, fresh.times) and len(result.times) == 11

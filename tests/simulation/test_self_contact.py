@@ -217,7 +217,7 @@ def test_friction_holds_a_loop_and_its_work_is_booked() -> None:
     assert rough["work/scheme"].max() < 1e-3 * put_in
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.2])
+@pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.slow), 0.2])
 def test_it_resumes_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, friction: float) -> None:
     scene = hybrid.validate_scene(looped(contact={"self": True, "friction": friction}))
     stopping = Stopping(monkeypatch)
