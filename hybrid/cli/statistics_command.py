@@ -28,6 +28,9 @@ def stats(
     ] = None,
     times: Annotated[Any, typer.Option(metavar="A:B", parser=window, help="Only from A to B (s).")] = None,
     hours: Annotated[float, typer.Option(metavar="H", help="Extremes of so many hours.")] = 3.0,
+    above: Annotated[
+        float | None, typer.Option(metavar="X", help="Also the part of the time above X, in the unit of the quantity.")
+    ] = None,
     curve: Annotated[str | None, typer.Option(metavar="NAME", help="Fatigue damage by this curve ..")] = None,
     strength: Annotated[
         float | None, typer.Option(metavar="N", help=".. of tension over this strength (N), or ..")
@@ -48,7 +51,12 @@ def stats(
         if curve is not None:
             s, damage = opened.damage(curve, strength=strength, section=section, times=times, at=at)
             facts = _fatigue_facts(opened, s, damage, times)
-        rows = rows_of(opened, names, at, times, hours * HOUR)
+        if above is not None and (names is None or len(names) > 1):
+            raise ResultError(
+                "--above is of one quantity\n    try:      hybrid stats RUN.h5 --names end_force_end --above 5e4"
+            )
+        rows = rows_of(opened, names, at, times, hours * HOUR, above)
+        used = {name: found._asdict() for name, found in opened.utilisation().items()}
         for row in rows:
             console.json("statistics", **row)
         console.show(lambda: _table(rows, hours))
@@ -56,9 +64,12 @@ def stats(
             console.note(f"note: no extreme of {hours:g} h: {text}")
         for text in [row["beyond_outputs"] for row in rows if "beyond_outputs" in row]:
             console.note(f"note: {text}")
+        lines = _limit_lines(opened, rows, above)
+        if lines:
+            console.show(lambda: "\n".join(lines))
         if curve is not None:
             console.show(lambda: f"fatigue by {curve}: {_fatigue_text(facts)}")
-        console.json("done", file=str(result), status=opened.status, fatigue=facts)
+        console.json("done", file=str(result), status=opened.status, fatigue=facts, utilisation=used)
 
 
 def _table(rows: list[dict[str, Any]], hours: float) -> Any:
@@ -91,6 +102,19 @@ def _table(rows: list[dict[str, Any]], hours: float) -> Any:
             text(extreme and extreme["fractile"]),
         )  # fmt: skip
     return table
+
+
+def _limit_lines(result: Result, rows: list[dict[str, Any]], above: float | None) -> list[str]:
+    """For which part of the time quantities are above a value, and which part of the limits of sections is used."""
+    found = []
+    for row in rows if above is not None else ():
+        place = "" if row["s"] is None else f" at s = {row['s']:.5g} m"
+        part = f"{100.0 * row['exceedance']:.3g} % of the time"
+        found.append(f"{row['quantity']}{place} is above {above:g} {row['unit']} for {part}")
+    for x in result.utilisation().values():
+        part = "" if x.used is None else f"{100.0 * x.used:.4g} % of {x.limit} used: "
+        found.append(f"{part}{x.text}, s = {x.s:.5g} m, t = {x.t:.5g} s, of every step")
+    return found
 
 
 def _fatigue_facts(result: Result, s: np.ndarray, damage: np.ndarray, times: Any) -> dict[str, Any]:

@@ -109,8 +109,9 @@ def of_record(
         threshold = float(np.sort(peaks)[max(peaks.size - math.ceil(part * peaks.size) - 1, 0)])
     over = np.empty(0) if threshold is None else peaks[peaks > threshold] - threshold
     if threshold is None or over.size < LEAST_PEAKS - 1:
+        count = over.size if threshold is not None else peaks.size
         raise ResultError(
-            f"{over.size if threshold is not None else peaks.size} peaks are too few to fit a law\n"
+            f"{f'{count} peaks are' if count != 1 else '1 peak is'} too few to fit a law\n"
             f"    expected: {LEAST_PEAKS} at least\n    try:      a longer run, or a lower threshold"
         )
     number = over.size * duration / (times[-1] - times[0])

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.statistics.extremes import THREE_HOURS, of_record
-from hybrid.statistics.moments import summary
+from hybrid.statistics.moments import exceedance, summary
 from hybrid.store.envelope import extreme
 from hybrid.store.histories import Window, history_of, lies_along, usual_names
 from hybrid.store.limits import at_every_step
@@ -23,12 +23,13 @@ WORTH_A_NOTE = 0.01
 
 def rows_of(
     result: Result, names: Sequence[str] | None = None, at: Sequence[float] | None = None, times: Window | None = None,
-    duration: float = THREE_HOURS,
+    duration: float = THREE_HOURS, above: float | None = None,
 ) -> list[dict[str, Any]]:  # fmt: skip
     """One row for each history: its summary, and the extreme of `duration` (s) or why there is none.
 
     names: None for the usual ones that are not zero throughout and are known at all outputs; at: arc lengths, m, None:
-    where the quantity is largest; times: from and to, s.  A row with `beyond_outputs` says how far all nodes
+    where the quantity is largest; times: from and to, s; above: in the unit of the quantity, `exceedance` is the part
+    of the time above it.  A row with `beyond_outputs` says how far all nodes
     and steps went beyond what its outputs show.
     """
     rows = []
@@ -49,6 +50,8 @@ def rows_of(
             found = summary(history.t, values[:, k])
             row: dict[str, Any] = {"quantity": name, "unit": history.unit, "s": s, "of": history.basis}
             row |= {key: _number(value) for key, value in found._asdict().items()}
+            if above is not None:
+                row["exceedance"] = float(exceedance(history.t, values[:, k], above))
             row["extreme"] = None
             try:
                 row["extreme"] = of_record(history.t, values[:, k], duration)._asdict()

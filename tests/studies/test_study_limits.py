@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.cli.commands import main
 from hybrid.errors import SceneError
 from hybrid.scene.study import Kept, study_from
 from hybrid.statistics.moments import exceedance
@@ -105,3 +106,18 @@ def test_without_a_limit_nothing_is_kept(scene: Path) -> None:
     wanted = {"strength": Kept.model_validate(COLLECT["strength"])}
     (outcome, _) = compute_batch(Job(cases.base, cases.keys, cases.rows, wanted, False))
     assert outcome.status == 2 and "no section has a max_tension" in outcome.reason
+
+
+def test_stats_tell_limits_and_the_time_above_a_value(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    result = hybrid.run(scene, tmp_path / "run.h5", progress=False)
+    used, part = result.utilisation()["max_tension"].used, float(result.exceedance("end_force_end", 400.0))
+    result.close()
+    with pytest.raises(SystemExit) as ended:
+        main(["stats", str(tmp_path / "run.h5"), "--names", "end_force_end", "--above", "400"])
+    assert not ended.value.code
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"end_force_end is above 400 N for {100.0 * part:.3g} % of the time" in said
+    assert used is not None and f"{100.0 * used:.4g} % of max_tension used" in said
+    assert "% of min_bend_radius used" in said
