@@ -20,6 +20,7 @@ from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene_text
 from hybrid.scene.suggestions import nearest
 from hybrid.scene.system import JoinedLine, System
+from hybrid.simulation.envelope import marks_of
 from hybrid.simulation.system_start import equilibrium_of_system
 from hybrid.solve.system import SystemSolver, SystemState
 from hybrid.solve.system_statics import SystemEquilibrium
@@ -172,7 +173,7 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
                         moment += -m if k else m
         forces.append(force)
         moments.append(moment)
-        tensions.append([_largest_tension(x, here.solver.work[l].report) for l, x in enumerate(here.state.lines)])
+        tensions.append([_largest_tension(here, there, moved, l) for l in range(len(here.state.lines))])
     total = np.array(forces).reshape(-1, 3)
     by_line = dict(zip(model.names, np.array(tensions).reshape(len(forces), -1).T, strict=True))
     return Offsets(
@@ -181,12 +182,15 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
     )  # fmt: skip
 
 
-def _largest_tension(state: State, report: Floats) -> float:
-    """Of the cells of a line, and of its ends, where the force of what holds it is known, N."""
+def _largest_tension(found: SystemEquilibrium, model: SystemModel, system: System, l: int) -> float:
+    """Of the cells of line l, and of its ends, where the force of what holds it is known, N."""
+    state, report, line = found.state.lines[l], found.solver.work[l].report, model.models[l]
+    marks = marks_of(system.scene_of(model.names[l]), line)
     d = state.e / np.linalg.norm(state.e, axis=1, keepdims=True)
     largest = float(state.T.max())
     for k in (0, 1):
-        t = 1.5 * d[-k] - 0.5 * d[(1, -2)[k]] if len(d) > 1 else d[0]
+        other = d[-k] if len(d) == 1 or marks[(1, -2)[k]] else d[(1, -2)[k]]  # no tangent is continued across a load
+        t = 1.5 * d[-k] - 0.5 * other
         force = report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3] * (1.0 - 2.0 * k)
         largest = max(largest, float(force @ t / np.linalg.norm(t)))
     return largest

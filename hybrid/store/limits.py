@@ -96,17 +96,7 @@ def held_of(result: Result) -> list[Held]:
         if not np.isnan(used).all():
             n, k = divmod(int(np.nanargmax(used)), used.shape[1])
             value, most = float(stress[n, k]), float(allowed[k])
-            found.append(
-                Held(
-                    "von_mises",
-                    "max_stress",
-                    "Pa",
-                    value,
-                    most,
-                    value > most,
-                    float(result.times[n]),
-                    float(s[k]),
-                    moves,
-                )
-            )
+            where, value, most = float(s[k]), float(stress[n, k]), float(allowed[k])
+            t, broken = float(result.times[n]), value > most
+            found.append(Held("von_mises", "max_stress", "Pa", value, most, broken, t, where, moves))
     return found

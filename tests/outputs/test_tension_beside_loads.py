@@ -62,6 +62,19 @@ def test_the_force_of_a_line_on_a_free_point_beside_a_load() -> None:
     assert pulled.reshape(3) == pytest.approx([0.0, 0.0, -10 * 9.81], abs=0.003 * 5e4)
 
 
+def test_the_largest_tension_at_an_offset_beside_a_load() -> None:
+    """The clump is one cell of 10 m from the upper end, where the tension is largest: the pull there."""
+    line = {"start": "a", "end": "k", "sections": [HEAVY], "mesh": {"cells": 10}}
+    line["attachments"] = [{"kind": "clump", "at": 10, "mass": 150}]
+    scene = {
+        "points": {"a": {"position": [0, 0, 0]}, "k": {"position": [80, 0, -30]}},
+        "lines": {"one": line | {"model": "catenary"}},
+    }
+    found = hybrid.offsets(scene, "point:k", [0.0])
+    pull = np.linalg.norm(hybrid.static(scene).lines["one"]["reaction_start"])
+    assert found.tension["one"][0] == pytest.approx(pull, rel=2e-3)
+
+
 @pytest.mark.parametrize("asked", [{"line_tension": "1%"}, {"curvature": "5%"}])
 def test_what_is_asked_along_a_cable_without_bending_stiffness(asked: dict[str, str]) -> None:
     result = hybrid.static(hung(80.0, sections=[HEAVY]) | {"accuracy": asked})
