@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from adapt_cases import bight
 from random_scenes import random_scene
 
 import hybrid
@@ -225,27 +226,6 @@ def stiff_touchdown(EI: float) -> Text:
     text = sparse(example("touchdown"))
     text["cable"]["sections"][0]["bending_stiffness"] = EI
     return text
-
-
-def bight() -> Text:
-    """1000 m of tether to a vehicle 960 m below that keeps its place: the last 40 m hang slack below it."""
-    section = {
-        "length": 1000, "diameter": 0.025, "mass": 0.65, "axial_stiffness": 2e6, "bending_stiffness": 20,
-        "drag": {"normal": 1.2, "tangential": 0.02}, "added_mass": {"normal": 1.0},
-    }  # fmt: skip
-    current = [{"z": z, "velocity": [u, 0, 0]} for z, u in ((0, 0.4), (-200, 0.1), (-1000, 0.05))]
-    heave = {"heave": {"amplitude": 1.0, "period": 8.0}, "ramp": 16}
-    return {
-        "environment": {"fluid": {"density": 1025, "surface": 0, "current": current}},
-        "cable": {"sections": [section]},
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0], "motion": heave},
-            "end": {"kind": "clamped", "position": [30, 0, -960], "tangent": [0.3, 0, 1]},
-        },
-        "initial": {"kind": "equilibrium"},
-        "time": {"duration": 80.0, "step": 0.1},
-        "output": {"every": 1.0, "points": 401},
-    }
 
 
 SPEED = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import sys
 import time as clock
@@ -33,6 +34,15 @@ BAR_EVERY = 0.5  # s of wall time between two drawings of the bar of a study: be
 KINDS_SHOWN = 3  # kinds of events named at the end of a run; the report has them all
 
 
+def _finite(facts: Any) -> Any:
+    """The same with None for numbers that are not finite."""
+    if isinstance(facts, dict):
+        return {name: _finite(x) for name, x in facts.items()}
+    if isinstance(facts, list | tuple):
+        return [_finite(x) for x in facts]
+    return None if isinstance(facts, float) and not math.isfinite(facts) else facts
+
+
 class Console:
     """What a command prints: for people, for programs (JSON), or errors only (quiet)."""
 
@@ -53,10 +63,10 @@ class Console:
         return RichConsole(stderr=True, highlight=False, markup=False, emoji=False, width=_width(sys.stderr))
 
     def json(self, event: str, **facts: Any) -> None:
-        """A line for programs; nothing for people."""
+        """A line for programs; nothing for people.  A number that is not finite is null: JSON has none."""
         if not self.as_json:
             return
-        sys.stdout.write(json.dumps({"event": event} | facts, default=str) + "\n")
+        sys.stdout.write(json.dumps({"event": event} | _finite(facts), default=str, allow_nan=False) + "\n")
         sys.stdout.flush()
         if event == "progress" and reader_has_gone():
             raise KeyboardInterrupt  # nobody follows the run: end it as by Ctrl-C

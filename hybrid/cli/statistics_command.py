@@ -56,7 +56,7 @@ def stats(
                 "--above is of one quantity\n    try:      hybrid stats RUN.h5 --names end_force_end --above 5e4"
             )
         rows = rows_of(opened, names, at, times, hours * HOUR, above)
-        used = {name: found._asdict() for name, found in opened.utilisation().items()}
+        used = {} if opened.lines else {name: found._asdict() for name, found in opened.utilisation().items()}
         for row in rows:
             console.json("statistics", **row)
         console.show(lambda: _table(rows, hours))
@@ -111,7 +111,7 @@ def _limit_lines(result: Result, rows: list[dict[str, Any]], above: float | None
         place = "" if row["s"] is None else f" at s = {row['s']:.5g} m"
         part = f"{100.0 * row['exceedance']:.3g} % of the time"
         found.append(f"{row['quantity']}{place} is above {above:g} {row['unit']} for {part}")
-    for x in result.utilisation().values():
+    for x in () if result.lines else result.utilisation().values():
         part = "" if x.used is None else f"{100.0 * x.used:.4g} % of {x.limit} used: "
         found.append(f"{part}{x.text}, s = {x.s:.5g} m, t = {x.t:.5g} s, of every step")
     return found

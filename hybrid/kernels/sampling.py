@@ -2,8 +2,8 @@
 
 Steps end where the motion asks for it, outputs fall where the user asks for them.  Between the two states of a step
 positions are cubic in time by the velocities at both ends (Hermite), chords likewise with lengths that change evenly,
-tensions, reactions and the twist at held ends lie on the parabola through the step before as well, frames turn as
-cubics of their spins, accelerations change evenly: of second order and more (docs/theory.md, 2).
+tensions, reactions and the twist at held ends lie on the parabola through the step before as well, frames turn as cubics of their spins,
+accelerations change evenly: of second order and more (docs/theory.md, 2).
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.assembly import JOINED
 from hybrid.kernels.bodies import ARM, FRAME, PLACE, STATE, STIFFNESS, V
 from hybrid.kernels.report import FORCE_A, MOMENT_A
-from hybrid.kernels.state import Floats, State
+from hybrid.kernels.state import Floats
 from hybrid.model.bodies import angles_of, frame_of
 from hybrid.model.clamps import seat_of, seated
 from hybrid.model.system import SystemModel, build_system

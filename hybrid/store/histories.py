@@ -162,7 +162,15 @@ class Histories:
 
     def utilisation(self: Any) -> dict[str, Judged]:
         """How near the line came to each limit of its sections over all steps, by the key of the limit: `used` is the
-        part of max_tension or min_bend_radius that was used, None of min_tension; at s (m) and t (s)."""
+        part of max_tension or min_bend_radius that was used, None of min_tension; at s (m) and t (s).
+
+        ResultError of a result of several lines: each has its own."""
+        if self.lines:
+            first = next(iter(self.lines))
+            raise ResultError(
+                f"utilisation of a result with the lines {', '.join(self.lines)}\n"
+                f"    expected: that of one line\n    try:      result.lines[{first!r}].utilisation()"
+            )
         return {found.limit: found for found in judged(self)}
 
     def spectrum(

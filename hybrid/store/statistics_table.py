@@ -29,7 +29,8 @@ def rows_of(
 
     names: None for the usual ones that are not zero throughout and are known at all outputs; at: arc lengths, m, None:
     where the quantity is largest; times: from and to, s; above: in the unit of the quantity, `exceedance` is the part
-    of the time above it.  A row with `beyond_outputs` says how far all nodes and steps went beyond what its outputs show.
+    of the time above it.  A row with `beyond_outputs` says how far all nodes and steps went beyond what its outputs
+    show.
     """
     rows = []
     for name in usual_names(result) if names is None else names:

@@ -76,10 +76,12 @@ def study(
             there = StudyFile(target)  # nothing else is removed
             if overwrite or (there.attributes["identity"] != identity and (there.status == OPEN).all()):
                 rmtree(target)
+                _remove_cases(target.with_suffix(".files"))
         if target.exists():
             file = StudyFile(target)
             _refuse_other(file, identity)
         else:
+            _refuse_cases(whole)
             count = workers or os.cpu_count() or 1
             file = _created(target, asked, cases, wanted, identity, batch or _batch_of(cases, count))
         if file.open_batches():
@@ -87,6 +89,26 @@ def study(
                 whole.mkdir(exist_ok=True)
             compute_open_batches(file, cases, wanted, workers, scheduler, progress, str(whole or ""))
     return open_study(target)
+
+
+def _cases_in(folder: Path | None) -> list[Path]:
+    return sorted(folder.glob("case-*.h5")) if folder is not None else []
+
+
+def _remove_cases(folder: Path) -> None:
+    """Remove the whole results of a study that begins anew, so that none of the former one is taken for its own."""
+    for file in _cases_in(folder):
+        file.unlink()
+
+
+def _refuse_cases(folder: Path | None) -> None:
+    """ResultError where a study begins beside the whole results of another one."""
+    if found := _cases_in(folder):
+        raise ResultError(
+            f"{folder} holds {len(found)} results of a study whose table is gone\n"
+            "    expected: no case-*.h5 in it, because they would be taken for results of the study that begins\n"
+            f"    try:      move or remove {folder}"
+        )
 
 
 def case_of(path: str | Path, case: int, output: str | Path | None = None) -> Any:

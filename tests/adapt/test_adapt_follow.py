@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from adapt_cases import cable, hanging, helix, layout, on, state_on, still
+from adapt_cases import bight, cable, hanging, helix, layout, on, state_on, still
 from problems import order
 
 import hybrid
@@ -223,32 +223,18 @@ def test_a_run_seldom_returns_from_compiled_code(short: hybrid.Result, monkeypat
         np.testing.assert_array_equal(found[name], short[name], err_msg=name)
 
 
-def bight() -> dict:
-    """1000 m of tether to a vehicle 960 m below, the last 40 m slack below its clamp; cells change at 20.5 s."""
-    section = {
-        "length": 1000, "diameter": 0.025, "mass": 0.65, "axial_stiffness": 2e6, "bending_stiffness": 20,
-        "drag": {"normal": 1.2, "tangential": 0.02}, "added_mass": {"normal": 1.0},
-    }  # fmt: skip
-    current = [{"z": z, "velocity": [u, 0, 0]} for z, u in ((0, 0.4), (-200, 0.1), (-1000, 0.05))]
-    heave = {"heave": {"amplitude": 1.0, "period": 8.0}, "ramp": 16}
-    return {
-        "environment": {"fluid": {"density": 1025, "surface": 0, "current": current}},
-        "cable": {"sections": [section]}, "initial": "equilibrium",
-        "ends": {
-            "start": {"kind": "pinned", "position": [0, 0, 0], "motion": heave},
-            "end": {"kind": "clamped", "position": [30, 0, -960], "tangent": [0.3, 0, 1]},
-        },
-        "model": {"kind": "adaptive", "curvature_error": 0.05}, "mesh": {"cells": 32},
-        "time": {"duration": 22.5, "step": 0.1}, "output": {"every": 7.5, "points": 101, "errors": False},
-    }  # fmt: skip
-
-
 def test_cells_that_become_one_in_a_layer_do_not_kick_the_end_force() -> None:
     """After each step it is near to the cubic through the four beside it: within 0.3 % of its mean.
 
     Two cells of the clamp's layer that became one where the curvature doubles made it 1.6 %.
     """
-    result = hybrid.run(bight())
+    result = hybrid.run(
+        bight()
+        | {
+            "model": {"kind": "adaptive", "curvature_error": 0.05}, "mesh": {"cells": 32},
+            "time": {"duration": 22.5, "step": 0.1}, "output": {"every": 7.5, "points": 101, "errors": False},
+        }
+    )  # fmt: skip
     force = result["steps/end_force_end"][:]
     off = np.abs(np.convolve(force, np.array([-1.0, 4.0, -6.0, 4.0, -1.0]) / 6.0, "valid"))[80:]
     assert len({mesh.s.size for mesh in result.mesh}) > 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import random
 from pathlib import Path
 
@@ -23,6 +24,11 @@ def lines_of(events: list[Event], capsys: pytest.CaptureFixture[str]) -> list[st
     capsys.readouterr()
     Console(False, False).events(events)
     return capsys.readouterr().err.splitlines()
+
+
+def test_json_has_no_numbers_that_are_not_finite(capsys: pytest.CaptureFixture[str]) -> None:
+    Console(True, False).json("done", radius=float("inf"), rows=[{"x": float("nan"), "y": 1.0}])
+    assert json.loads(capsys.readouterr().out) == {"event": "done", "radius": None, "rows": [{"x": None, "y": 1.0}]}
 
 
 def test_few_lines_and_the_worst_first(capsys: pytest.CaptureFixture[str]) -> None:

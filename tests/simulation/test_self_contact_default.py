@@ -17,6 +17,8 @@ from hybrid.kernels.self_distance import INSIDE
 from hybrid.model.build import build
 from hybrid.model.self_reach import LOOP, self_reach
 
+DEFECTS = Path(__file__).parents[1] / "data" / "defects"
+
 WIDTH = 0.02
 
 
@@ -86,19 +88,7 @@ def test_a_file_of_before_goes_on_as_it_began(tmp_path: Path, monkeypatch: pytes
 @pytest.mark.slow  # three seconds of processor time
 def test_a_hose_whose_end_is_lowered_touches_itself() -> None:
     """Its free end goes down past the slack below it: it crossed itself, without a word and in 8 runs, once."""
-    section = {"length": 50, "mass": 3.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 10,
-               "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0}}  # fmt: skip
-    lowered = {"travel": {"by": [0, 0, -45], "over": 20}}
-    result = hybrid.run(
-        {
-            "environment": {"fluid": {"density": 1025}}, "cable": {"sections": [section]}, "initial": "equilibrium",
-            "ends": {
-                "start": {"kind": "pinned", "position": [0, 0, -49.9]},
-                "end": {"kind": "pinned", "position": [0.5, 0, 0], "motion": lowered},
-            },
-            "time": {"duration": 10.5}, "output": {"every": 0.5},
-        }
-    )  # fmt: skip
+    result = hybrid.run(hybrid.load_scene(DEFECTS / "hose_crosses_itself.yaml", ["time.duration=10.5"]))
     (touch,) = [e for e in result.events if e.kind == "line touches itself"]
     assert 9.0 < touch.t < 10.5 and "line meets itself" not in {e.kind for e in result.events}
     assert float(result["self_distance/distance"]) > 0.85 * 0.03

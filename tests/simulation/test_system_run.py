@@ -58,6 +58,11 @@ def moved() -> hybrid.Result:
     return hybrid.run(mooring())
 
 
+def test_each_line_has_its_own_part_of_its_limits(moved: hybrid.Result) -> None:
+    with pytest.raises(hybrid.ResultError, match=r"result\.lines\['\w+'\]\.utilisation\(\)"):
+        moved.utilisation()
+
+
 def test_a_system_of_one_line_is_the_cable_with_a_body_at_its_end() -> None:
     """The same equations, by the small system instead of the march alone: equal to what Newton leaves in 240 steps."""
     one = hybrid.run(

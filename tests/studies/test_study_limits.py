@@ -82,6 +82,19 @@ def test_a_study_keeps_whole_results(scene: Path, tmp_path: Path) -> None:
         assert float(found["strength"][1]) == result.utilisation()["max_tension"].used
     with pytest.raises(hybrid.ResultError, match="another study"):
         hybrid.study(study_of(scene), tmp_path / "both.zarr", workers=1)
+    stale = tmp_path / "both.files" / "case-000009.h5"
+    stale.touch()
+    hybrid.study(study_of(scene, files=True), tmp_path / "both.zarr", workers=1, overwrite=True)
+    assert [x.name for x in sorted(stale.parent.iterdir())] == ["case-000000.h5", "case-000001.h5"]
+
+
+def test_results_of_a_study_whose_table_is_gone_are_not_taken_for_its_own(scene: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "both.files"
+    folder.mkdir()
+    (folder / "case-000009.h5").touch()
+    with pytest.raises(hybrid.ResultError, match=r"holds 1 results.*table is gone"):
+        hybrid.study(study_of(scene, files=True), tmp_path / "both.zarr", workers=1)
+    assert not (tmp_path / "both.zarr").exists() and (folder / "case-000009.h5").exists()
 
 
 @pytest.mark.parametrize(
