@@ -139,7 +139,7 @@ class DomainManager:
         self.calm_since, self.buffer = np.full(n, np.inf), np.zeros(n)
         self.calmed = np.zeros((2, n))  # of rods on their way out: which criterion was the loudest, and its ratio
         self.patience, self.released = np.ones(n), np.full(n, -np.inf)
-        self._table, self.on_base = Table(blank_zone_job()), on_base or LineOnBase(cable, layout.base)
+        self._table, self.on_base = Table(blank_zone_job), on_base or LineOnBase(cable, layout.base)
         self.measure(layout)
         weight = np.abs(cable.submerged_weight)
         floor = tension_floor(cable.mean_bending, weight, scale)

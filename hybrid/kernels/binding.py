@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from struct import pack, unpack
 from typing import Any
 
@@ -21,7 +22,15 @@ class Table:
     """The arguments of one kernel, by the names of its NamedTuple; `numbers` is what the kernel gets."""
 
     def __init__(self, example: Any, room: NDArray[np.int64] | None = None) -> None:
-        """example: with the types that all values have; room: for the numbers, None: of its own."""
+        """example: with the types that all values have, or a function that makes it, called once in all: whatever
+
+        kernels write must then be bound; room: for the numbers, None: of its own.
+        """
+        self.numbers: NDArray[np.int64]
+        if callable(example):
+            other = _table_of(example)
+            self._take(other, np.empty_like(other.numbers) if room is None else room)
+            return
         self._places: dict[str, tuple[int, int, Any]] = {}  # begin and end among the numbers, and types
         self._sizes: dict[str, list[int]] = {}  # of the parts of a tuple
         self._bound: dict[str, Any] = {}
@@ -31,15 +40,19 @@ class Table:
             self._places[name] = at, at + _size(pattern), pattern
             self._sizes[name] = [_size(x) for x in pattern] if isinstance(pattern, tuple) else []
             at += _size(pattern)
-        self.numbers: NDArray[np.int64] = np.zeros(at, np.int64) if room is None else room
+        self.numbers = np.zeros(at, np.int64) if room is None else room
         self.bind(**example._asdict())
 
     def again(self, room: NDArray[np.int64]) -> Table:
         """Another one with the same bound in it, its numbers in `room`."""
         other = Table.__new__(Table)
-        other._places, other._sizes, other._bound, other.numbers = self._places, self._sizes, {**self._bound}, room
-        room[:] = self.numbers
+        other._take(self, room)
         return other
+
+    def _take(self, other: Table, room: NDArray[np.int64]) -> None:
+        """The same as in another one, the numbers in `room`."""
+        self._places, self._sizes, self._bound = other._places, other._sizes, {**other._bound}
+        room[:], self.numbers = other.numbers, room
 
     def bind(self, **values: Any) -> None:
         """Put values in their places; TypeError: an array that the kernel would not understand."""
@@ -82,6 +95,12 @@ class Table:
             if each is not same:
                 self.numbers[at : at + size] = _numbers(each, of, name)
             at += size
+
+
+@cache
+def _table_of(blank: Callable[[], Any]) -> Table:
+    """The table of what a function makes."""
+    return Table(blank())
 
 
 class Series:

@@ -27,7 +27,7 @@ class _OfThread(threading.local):
     """The table of the thread that asks; it keeps what was bound last."""
 
     def __init__(self) -> None:
-        self.table = Table(blank_job())
+        self.table = Table(blank_job)
 
 
 _here = _OfThread()

@@ -45,7 +45,7 @@ def is_definite(band):
 @inner
 def bracket(x, at, first, last):
     """The two of x[first] .. x[last] that interpolation at a place uses, and the weight of the second."""
-    low, high = 0, x.shape[0]
+    low, high = first, last + 1
     while low < high:
         middle = (low + high) // 2
         if x[middle] < at:

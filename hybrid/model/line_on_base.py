@@ -49,7 +49,7 @@ class LineOnBase:
             held=held,
             springs=np.array(material.springs),
         )
-        self._line_job, self._kinds_job = Table(blank_line_job()), Table(blank_kinds_job())
+        self._line_job, self._kinds_job = Table(blank_line_job), Table(blank_kinds_job)
         self._bits, self._of = -1, of
         self._passes_torque = material.passes_torque
 

@@ -6,7 +6,7 @@ is one of in each output (ends, energies) has the outputs last, as in any `Obser
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from hybrid.kernels.observed_outputs import observed_joined
 from hybrid.kernels.state import ALONG_LINE, NODES_OF_LINE, Batch, Floats, Line, Sea
 from hybrid.model.mesh import Zone
 from hybrid.outputs.observation import Observation
-from hybrid.outputs.output_grid import Grid, Rows
+from hybrid.outputs.output_grid import Grid, Rows, linear
 from hybrid.outputs.touchdown import Touchdown, touchdown
 
 # What a batch has of the nodes and of the cells; the rest is of each output as it is.
@@ -64,35 +64,29 @@ class JoinedGrid(Grid):
         for grid, n, o in zip(grids, self.begin.tolist(), sides.tolist(), strict=False):
             self.spans += [(a + n, b + n, c + o) for a, b, c in grid.spans]
             self.side_nodes += [x + n for x in grid.side_nodes]
-        self._sides_before, self.s = sides, np.concatenate([grid.s for grid in grids])
-
-    def _stacked(self, before: NDArray[np.int64], of: Callable[[Grid], Rows]) -> Rows:
-        """Each matrix in its own rows and columns; before: columns before those of each."""
-        rows = [of(grid) for grid in self.of]
-        ends = np.cumsum([0, *(x.columns.size for x in rows)])
-        begin = np.concatenate([*(x.begin[:-1] + end for x, end in zip(rows, ends[:-1], strict=True)), ends[-1:]])
-        columns = np.concatenate([x.columns + n for x, n in zip(rows, before.tolist(), strict=False)])
-        return Rows(begin, columns, np.concatenate([x.weights for x in rows]))
-
-    @cached_property
-    def nodes(self) -> Rows:
-        return self._stacked(self.begin, lambda grid: grid.nodes)
-
-    @cached_property
-    def cells(self) -> Rows:
-        return self._stacked(self.begin, lambda grid: grid.cells)
+        self.s, self._x = (np.concatenate([getattr(grid, name) for grid in grids]) for name in ("s", "_x"))
+        points = [grid.s.size for grid in grids]
+        self._before = np.repeat(self.begin[:-1], points)  # (ns,) of each point: nodes before its line
+        self._sides_before, self._lines_before = np.repeat(sides[:-1], points), np.repeat(np.arange(len(grids)), points)
+        self._stretch = np.concatenate([grid._stretch for grid in grids])
+        self._first = np.concatenate([grid._first for grid in grids]) + self._before
+        self._last = np.concatenate([grid._last for grid in grids]) + self._before
 
     @cached_property
     def chords(self) -> Rows:
-        return self._stacked(self.begin, lambda grid: grid.chords)
+        return linear(self._x, self.s, self._before, np.repeat(self.begin[1:] - 1, [grid.s.size for grid in self.of]))
 
     @cached_property
     def held(self) -> Rows:
-        return self._stacked(self.begin + np.arange(self.begin.size), lambda grid: grid.held)
+        at = np.concatenate([grid._held_at for grid in self.of])
+        start, end = (np.concatenate(x) for x in zip(*(grid._held_between for grid in self.of), strict=True))
+        before = self._before + self._lines_before  # each line before has one column more than nodes
+        return linear(at, self.s, start + before, end + before)
 
     @cached_property
     def sides(self) -> Rows:
-        return self._stacked(self._sides_before, lambda grid: grid.sides)
+        shift = self._stretch + self._sides_before - self._before
+        return linear(self._x, self.s, self._first, self._last, shift)
 
 
 class JoinedObservation(Observation):

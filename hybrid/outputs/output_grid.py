@@ -48,7 +48,7 @@ def _rows(count: int, most: int, make: Callable[..., None], *given: Any) -> Rows
     return Rows(begin, columns[: begin[-1]], weights[: begin[-1]])
 
 
-def _linear(x: Floats, at: Floats, first: np.ndarray, last: np.ndarray, shift: np.ndarray | None = None) -> Rows:
+def linear(x: Floats, at: Floats, first: np.ndarray, last: np.ndarray, shift: np.ndarray | None = None) -> Rows:
     """Interpolation along x[first] .. x[last], and beyond; where first = last, that one counts alone.
 
     shift: (ns,) added to the columns of points.
@@ -139,30 +139,40 @@ class Grid:
 
     @cached_property
     def cells(self) -> Rows:
-        return _linear(self._middles, self.s, self._first, self._last - 1)
+        return linear(self._middles, self.s, self._first, self._last - 1)
 
     @cached_property
     def chords(self) -> Rows:
         n, first = self._x.size, np.zeros_like(self._first)
-        return _linear(self._x, self.s, first, np.full_like(first, n - 1))
+        return linear(self._x, self.s, first, np.full_like(first, n - 1))
 
     @cached_property
     def held(self) -> Rows:
-        """Columns: start, cells, end; next to an end its value takes part.
+        """Columns: start, cells, end; next to an end its value takes part."""
+        return linear(self._held_at, self.s, *self._held_between)
+
+    @property
+    def _held_at(self) -> Floats:
+        return np.concatenate([self._x[:1], self._middles, self._x[-1:]])
+
+    @property
+    def _held_between(self) -> tuple[np.ndarray, np.ndarray]:
+        """Columns of `held` between which each point lies.
 
         In a stretch of one cell the values beside it take part, but across point loads: tension goes on at a joint.
         """
         x, middles = self._x, self._middles
         start, end = self._first + 1, self._last.copy()
         single = start == end
-        loads = np.array([x for x in self.loads if x not in self._kept])
-        goes_on = np.array([not (np.abs(x[k] - loads) < 1e-9 * x[-1]).any() for k in self._cuts])
-        start -= single & goes_on[self._stretch]
-        end += single & goes_on[self._stretch + 1]
+        if single.any():
+            loads = np.array([x for x in self.loads if x not in self._kept])
+            goes_on = np.array([not (np.abs(x[k] - loads) < 1e-9 * x[-1]).any() for k in self._cuts])
+            start -= single & goes_on[self._stretch]
+            end += single & goes_on[self._stretch + 1]
         start[self.s < middles[0]] = 0
         end[self.s > middles[-1]] = x.size
-        return _linear(np.concatenate([x[:1], middles, x[-1:]]), self.s, start, end)
+        return start, end
 
     @cached_property
     def sides(self) -> Rows:
-        return _linear(self._x, self.s, self._first, self._last, self._stretch)
+        return linear(self._x, self.s, self._first, self._last, self._stretch)

@@ -96,7 +96,7 @@ class CellChanges:
         self._room_for_places = np.zeros(self.most + 1 + extra), np.zeros(self.most + 1 + extra, np.int64)
         self._match = Room(Packed(blank_joined), self.most), Room(Packed(blank_single), self.most)
         self._calls, self._at = np.zeros(f.CALLS, np.int64), np.zeros(f.AT_SIZE, np.int64)
-        self._following, self._review = Table(f.blank_following_job()), Table(blank_review_job())
+        self._following, self._review = Table(f.blank_following_job), Table(blank_review_job)
         self._waiting, self._places = np.zeros((MOST_WAITING, 3), np.int64), np.zeros(MOST_PLACES, np.int64)
         self.adopted, self._synced = False, -1  # number of changes that Python knows of
         self._views: dict[Any, Any] = {}  # while tables are bound
@@ -274,7 +274,7 @@ class CellChanges:
         both, pairs = (0, 1), ((0, 0), (0, 1), (1, 0), (1, 1))
         layouts = []
         for k in both:
-            at, table = self._layout(k, self.most), Table(blank_layout_job())
+            at, table = self._layout(k, self.most), Table(blank_layout_job)
             table.bind(
                 plan=zones.plan, rod=zones.next_rod, parts=zones.parts, finest=self._finest, place=at.place, s=at.s,
                 of=at.of, rods=at.rods, first=sides[k].first,
@@ -286,12 +286,12 @@ class CellChanges:
             return found
 
         def for_sides(blank: Any, values: Any) -> list[Shaped]:
-            return [Shaped(Table(blank()), partial(on_new, values, k)) for k in both]
+            return [Shaped(Table(blank), partial(on_new, values, k)) for k in both]
 
         lines, kinds = for_sides(blank_line_job, line_job), for_sides(blank_kinds_job, kinds_job)
         of_run, of_zones = for_sides(blank_job, in_run), for_sides(blank_zone_job, in_zones)
-        switches = [Shaped(Table(blank_switch_job()), partial(switch_job, *pair)) for pair in pairs]
-        renews = [Shaped(Table(blank_renew_job()), partial(renew_job, *pair)) for pair in pairs]
+        switches = [Shaped(Table(blank_switch_job), partial(switch_job, *pair)) for pair in pairs]
+        renews = [Shaped(Table(blank_renew_job), partial(renew_job, *pair)) for pair in pairs]
         self._lines = lines
         self._tables = layouts, kinds, of_run, of_zones, switches, renews  # what is bound there stays alive
         self._bind_following(layouts, lines, kinds, of_run, of_zones, switches, renews)

@@ -74,8 +74,8 @@ class ZoneSwitching:
         """loaded: whether joints carry the moment of the catenary's curvature."""
         self.model, self.manager = model, manager
         self.joints = Joints(model.line) if loaded else None
-        self.table = Table(blank_zone_job())  # of the compiled run
-        self._switch_table, self._plan_table = Table(blank_switch_job()), Table(blank_zone_job())
+        self.table = Table(blank_zone_job)  # of the compiled run
+        self._switch_table, self._plan_table = Table(blank_switch_job), Table(blank_zone_job)
         self.guided = np.array(model.cable.held_tangent, float)
         base = manager.layout.base
         self.kinks = np.zeros(base.size, bool)

@@ -56,7 +56,7 @@ class CompiledRun:
 
         whether lengths and stiffness change, and samples have them.
         """
-        self.table, self._rows = Table(blank_job()), ROWS
+        self.table, self._rows = Table(blank_job), ROWS
         self.books = blank_books()._replace(outputs=outputs, log=np.zeros((ROWS, len(b.LOG))))
         self.clock, self.count = self.books.clock, self.books.counts
         self.keeps_extremes, self._room = extremes, np.zeros(0)

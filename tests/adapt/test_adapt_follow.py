@@ -182,6 +182,20 @@ def short():
     return hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", SHORT))
 
 
+def test_quantities_asked_for_by_name_are_those_of_every_step_where_cells_change() -> None:
+    """With an output at every step, extremes over all steps are those of the outputs."""
+    asked = "{angle: {kind: declination, end: end}, lay: {kind: layback, end: end, to: touchdown}, "
+    asked += "gap: {kind: clearance, point: [150, 0, -50], diameter: 0.1}, up: {kind: vertical_force, end: end}}"
+    sets = [*SHORT, "ends.end.motion.ramp=4.0", "time.step=0.1", f"output.quantities={asked}"]
+    result = hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", sets))
+    assert len({mesh.s.size for mesh in result.mesh}) > 3 and np.allclose(result["steps/t"], result.t[1:])
+    for name in ("angle", "lay", "gap", "up"):
+        values = result[name]
+        np.testing.assert_allclose(result[f"extremes/{name}"], [values.min(), values.max()], rtol=1e-8, err_msg=name)
+        at = [values.argmin(), values.argmax()]
+        np.testing.assert_allclose(result[f"extremes/t/{name}"], result.t[at], atol=1e-9, err_msg=name)
+
+
 def test_what_is_held_after_a_change_is_what_binding_would_give(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a change of cells the numbers of tables are put in their places; what Python then holds has these."""
     held = []

@@ -9,6 +9,8 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from hybrid.model.mesh import Zone
+from hybrid.outputs import output_grid
+from hybrid.outputs.joined_lines import JoinedGrid
 from hybrid.outputs.output_grid import Grid
 
 Floats = np.ndarray
@@ -82,3 +84,25 @@ def test_matrices_are_those_of_a_plain_interpolation(seed: int, after: bool) -> 
             assert (np.diff(matrix.columns[a:b]) > 0).all()
         assert (matrix.weights != 0.0).all()
         np.testing.assert_allclose(matrix @ np.eye(expected.shape[1]), expected, rtol=0.0, atol=1e-12, err_msg=name)
+
+
+def test_grids_of_many_lines_are_made_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The matrices of lines one behind the other are those of each, made in one call for all of them."""
+    rng, s, grids = np.random.default_rng(3), np.linspace(0.0, 10.0, 41), []
+    for cells in (1, 5, 12, 30):
+        x = np.unique(np.concatenate([[0.0, 10.0], rng.choice(s[1:-1], cells - 1, replace=False)]))
+        zones = [Zone("rod", 0.0, 10.0)]
+        if cells > 1:
+            zones = [Zone("rod", 0.0, x[cells // 2]), Zone("catenary", x[cells // 2], 10.0)]
+        grids.append(Grid(x, zones, s, [x[1]] if cells > 1 else []))
+    calls, makes, joined = [], output_grid._rows, JoinedGrid(grids)
+    monkeypatch.setattr(output_grid, "_rows", lambda *given: calls.append(1) or makes(*given))
+    found = {name: getattr(joined, name) for name in ("nodes", "cells", "chords", "held", "sides")}
+    assert len(calls) == 5
+    for name, rows in found.items():
+        gap = name == "cells"  # a cell between two lines belongs to none
+        sizes = [grid._x.size + {"held": 1, "sides": len(grid.spans) - 1}.get(name, 0) for grid in grids]
+        values = [rng.normal(size=n - gap) for n in sizes]
+        at_once = rows @ np.concatenate([np.append(v, [9.9] * gap) for v in values])[:, None]
+        alone = np.concatenate([getattr(grid, name) @ v[:, None] for grid, v in zip(grids, values, strict=True)])
+        np.testing.assert_array_equal(at_once, alone, err_msg=name)
