@@ -15,7 +15,7 @@ import pytest
 
 import hybrid
 from hybrid.kernels.energies import observe
-from hybrid.kernels.newton import ASKED, FINISH, LIMIT, NEAR, PREPARE, TOUCH
+from hybrid.kernels.newton import ASKED, FINISH, LIMIT, PREPARE, TOUCH
 from hybrid.kernels.self_contact import contact_task
 from hybrid.kernels.self_contact_pairs import ENERGY, NODES, POINTS, TRIED
 from hybrid.kernels.self_distance import LEAST_DISTANCE
@@ -23,7 +23,7 @@ from hybrid.simulation.transient import Transient
 
 pytestmark = pytest.mark.bench
 STIFF = 0.1  # N m2
-THROWS, SECONDS = 1000, 120.0
+THROWS = 1000
 
 
 def hairpin(angle: float, gap: float, chord: float) -> np.ndarray:
@@ -102,45 +102,46 @@ def throw(seed: int) -> dict[str, float]:
     run._find_accelerations()
     mass = run.model.line.mass[:, None]
     momentum, first, most, touched = (mass * run.state.v).sum(axis=0), energy(run), 0.0, False
-    last, contact, gained = first, run.run.contact, 0.0
+    contact = run.run.contact
     while simulation.t < duration * (1.0 - 1e-9):
         simulation.advance(min(simulation.t + step, duration))
-        last, before = energy(run), last
-        most, gained = max(most, last), gained + (last - before) * contact.call[NEAR]
+        most = max(most, energy(run))
         touched |= contact.contact.counts[POINTS] > 0
     touched |= float(run.envelope.itself.itself.found[LEAST_DISTANCE]) < 1.03 * width
     moved = np.abs((mass * run.state.v).sum(axis=0) - momentum).max() / (mass.sum() * speed)
     return {
-        "touched": float(touched), "energy": most / first, "gained": gained / first, "momentum": float(moved), "steps": run.steps / (duration / step),
+        "touched": float(touched), "energy": most / first, "momentum": float(moved), "steps": run.steps / (duration / step),
         "space": float(seed % 2), "distance": float(run.envelope.itself.itself.found[LEAST_DISTANCE]) / width,
     }  # fmt: skip
 
 
 def test_throws() -> None:
-    """Speeds of 2 to 20 m/s, diameters of 1 to 4 cm, in steps in which a strand could pass 1 to 10 diameters.
+    """1000 throws with speeds of 2 to 20 m/s, diameters of 1 to 4 cm, in steps in which a strand could pass 1 to 10 of them.
 
-    A ring that flattens gains energy in free flight where steps are long, without contact as with it (rho_inf is 0.5
-    there): what is judged is the energy that steps near contact gain.
+    No energy above 1.001 of the start at the end of any step, near contact or in free flight.
     The least distance is that of polygons on straight ways within steps: above 0 nothing has passed through.
     """
     found: list[dict[str, float]] = []
     failed: list[tuple[int, str]] = []
     begin = time.process_time()
-    while len(found) + len(failed) < THROWS and time.process_time() - begin < SECONDS:
-        seed = len(found) + len(failed)
+    for seed in range(THROWS):
         try:
-            found.append(throw(seed))
+            found.append(throw(seed) | {"seed": float(seed)})
         except hybrid.ComputationError as error:
             failed.append((seed, str(error).splitlines()[0]))
     values = {name: np.array([x[name] for x in found]) for name in found[0]}
-    print(f"\n{len(found)} throws, {values['touched'].mean():.1%} touched, {len(failed)} failed {failed[:5]}")
-    space = values["energy"][values["space"] > 0]
-    kept = (space <= 1.001).mean()
-    print(f"energy in space at most 1.001 of the start in {kept:.1%}, largest {space.max():.4f}")
+    print(f"\n{THROWS} throws in {time.process_time() - begin:.0f} s, {values['touched'].mean():.1%} touched, ", end="")
+    print(f"{len(failed)} failed {failed[:5]}")
+    for name, chosen in (("space", values["space"] > 0), ("the plane", values["space"] == 0)):
+        energy = values["energy"][chosen]
+        print(
+            f"in {name}: {(energy <= 1.001).sum()} of {energy.size} at most 1.001 of the start, largest {energy.max():.5f}"
+        )
+    print(f"above: seeds {values['seed'][values['energy'] > 1.001].astype(int).tolist()}")
+    steps = values["steps"]
     print(
-        f"in the plane {values['energy'][values['space'] == 0].max():.4f}; steps near contact gain at most {values['gained'].max():.1e}"
+        f"momentum {values['momentum'].max():.1e}; steps {np.median(steps):.2f} of those asked (median), {steps.mean():.2f} on average"
     )
-    print(f"momentum {values['momentum'].max():.1e}; steps {values['steps'].mean():.2f} of those asked")
     touched = values["distance"][values["touched"] > 0.0]
     print(f"least distance {touched.min():.3f} D, 1 % {np.percentile(touched, 1):.3f}, median {np.median(touched):.3f}")
     assert not failed and values["touched"].mean() > 0.8

@@ -101,9 +101,14 @@ def note_try(clock, count, report, outcome, iterations, left, where):
 
 
 @inner
-def judge(clock, count, report, dt):
-    """Whether the try over dt is the step (1), is to be repeated in another length (0), or has failed for good (-1)."""
-    if count[OUTCOME] == OK:
+def judge(clock, count, report, dt, gains):
+    """Whether the try over dt is the step (1), is to be repeated in another length (0), or has failed for good (-1).
+
+    gains: whether it is to be repeated in halves because contact has put energy in, as long as it may be halved.
+    """
+    if gains and 0.5 * clock[TRIED_DT] >= clock[SHORTEST]:
+        halve(clock, count, dt)
+    elif count[OUTCOME] == OK:
         if not count[CONTROLLED] or passes(clock, count, dt, report[LOCAL_ERROR]):
             return 1
     elif 0.5 * clock[TRIED_DT] < clock[SHORTEST] or (count[OUTCOME] == SLACK and dt <= clock[WAVE_STEP]):

@@ -77,7 +77,7 @@ from hybrid.kernels.books import (
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.end_motion import ends_at, sea_at
 from hybrid.kernels.extremes import first_strains, note_extremes
-from hybrid.kernels.newton import OK, RUN, STEP, Limits, Task, solve
+from hybrid.kernels.newton import ADDRESS, GAIN, OK, RUN, STEP, Limits, Task, ask_contact, solve
 from hybrid.kernels.powers import find_powers
 from hybrid.kernels.references import caller, reader
 from hybrid.kernels.report import REPORT_SIZE
@@ -179,7 +179,9 @@ def conclude(table, job, old, new):
     line, sea, ends, books, work = job.line, job.sea, job.ends, job.books, job.work
     clock, count, asks = books.clock, books.counts, job.books.counts[ASKS] & ASK_STEPS
     dt = clock[TRY_END] - clock[NOW]
-    verdict = judge(clock, count, work.report, dt)
+    gains = job.contact[ADDRESS] != 0 and count[OUTCOME] == OK and job.reel == 0
+    gains = gains and ask_contact(job.contact, job.contact_table, GAIN) > 0.0
+    verdict = judge(clock, count, work.report, dt, gains)
     if verdict < 0:
         return FAILED
     if verdict > 0:

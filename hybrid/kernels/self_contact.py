@@ -13,12 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, NOW, PARITY, RHO, STEP_BEFORE, TRY_END
+from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, NOW, PARITY, RATES, RHO, STEP_BEFORE, TRY_END
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.generalized_alpha import scheme
-from hybrid.kernels.newton import ASKED, FINISH, LIMIT, NEAR, PREPARE, RADIUS, REST, TOUCH
+from hybrid.kernels.newton import ASKED, FIND, FINISH, GAIN, LIMIT, NEAR, PREPARE, RADIUS, REST, TOUCH
 from hybrid.kernels.references import reader
-from hybrid.kernels.report import FORCE_A, SELF_FRICTION_WORK
+from hybrid.kernels.report import FORCE_A, REPORT_SIZE, SELF_FRICTION_WORK
+from hybrid.kernels.self_contact_energy import puts_energy_in
 from hybrid.kernels.self_contact_friction import (
     GRIP,
     add_held,
@@ -76,7 +77,10 @@ class ContactJob(NamedTuple):
     counts: NDArray[np.int64]
     call: NDArray[np.int64]
     contact: Contact
-    touch: Floats  # (3, N+1) as kernels.books.Books has it
+    touch: Floats  # (3, N+1) as kernels.books.Books has it, and so have
+    velocity: Floats  # (2, 3) m/s
+    power: Floats  # (2, RATES) W
+    report: Floats  # (3, REPORT_SIZE)
 
 
 def blank_contact_job() -> ContactJob:
@@ -86,7 +90,7 @@ def blank_contact_job() -> ContactJob:
     call = np.zeros(3, np.int64)
     return ContactJob(
         blank_line(1), no_ends(), state, state, no_work(), clock, counts, call, blank_contact(1),
-        np.zeros((3, 2)),
+        np.zeros((3, 2)), np.zeros((2, 3)), np.zeros((2, RATES)), np.zeros((3, REPORT_SIZE)),
     )  # fmt: skip
 
 
@@ -235,8 +239,10 @@ def load_ends(line, ends, contact, report):
 def contact_task(table):
     """What is asked by `call[ASKED]` of the configuration old.r + work.u.
 
-    PREPARE, LIMIT: the part of the prediction, of the correction work.x, that is safe; TOUCH: 1, or 0 where it fails;
-    RADIUS: the spectral radius of the step; FINISH, and REST, where no step is tried: the energy of contact, J.
+    PREPARE, LIMIT: the part of the prediction, of the correction work.x, that is safe; TOUCH: 1, or 0 where it fails; FIND: points of contact
+    alone, which kernels.system_contact solves for;
+    RADIUS: the spectral radius of the step; GAIN: 1 where the try has put energy in and has to be repeated in halves,
+    else 0; FINISH, and REST, where no step is tried: the energy of contact, J.
     """
     job = read(table)
     line, ends, contact, work, phase = job.line, job.ends, job.contact, job.work, job.call[ASKED]
@@ -253,6 +259,11 @@ def contact_task(table):
         return contact.numbers[PART]
     if phase == RADIUS:
         return radius(contact, job.clock, job.call[NEAR] != 0)
+    if phase == GAIN:
+        if not puts_energy_in(line, ends, contact, job, job.clock, old, new, work):
+            return 0.0
+        numbers[QUIET] -= 1.0
+        return 1.0
     if phase == LIMIT:
         speed = contact.numbers[SPEED]
         for i in range(work.x.shape[0]):
@@ -281,6 +292,8 @@ def contact_task(table):
         load_ends(line, ends, contact, work.report)
     if phase in (FINISH, REST):
         press(line, contact, job.touch, 2 if phase == FINISH else 0)
+    if phase == FIND:
+        return 1.0
     if phase != TOUCH:
         return numbers[ENERGY] + (numbers[TRIED] if rubs else 0.0)
     if contact.counts[OVERFLOW] or (contact.counts[POINTS] > 0 and not solve_contact(line, ends, contact, work)):

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.books import RATES
 from hybrid.kernels.compile import inner
 from hybrid.kernels.newton import LIMIT, TOUCH
 from hybrid.kernels.node_forces import get3
@@ -68,8 +69,13 @@ LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of wh
     FADED,  # s, time up to which SPEED has faded; nan: it has not begun
     QUIET,  # steps since the last one that was near contact
     TRIES,  # of steps so far
-) = range(17)
-NUMBERS = 17
+    BEGUN, LED,  # s, times of the states of HAD and HAS; nan: of none
+    HAD, HAS,  # J, energy before the step, without that of weight, and where the try has led
+    BALANCE, TRIED_BALANCE,  # J, put in by steps so far though no work accounts for it, likewise
+    LARGEST,  # J, the largest of HAD so far
+    GAINED,  # tries that were given up because they put energy in
+) = range(25)  # fmt: skip
+NUMBERS = 25
 WATCH, COLLECT = -1, -2  # beside LIMIT and TOUCH: how near the line is to itself; keep pairs for all of a step
 # Of `counts`.  STALE: the tree is of other positions; REMESHED: the grips are of other cells.
 POINTS, NODES, OVERFLOW, GRIPS, FRESH, PAIRS, STALE, REMESHED = range(8)
@@ -94,6 +100,8 @@ class Contact(NamedTuple):
     points: Floats  # (C, POINT)
     nodes: NDArray[np.int64]  # (N+1,) those in contact
     marks: NDArray[np.int64]  # (N+1,) 1 for those
+    energy: Floats  # (5,) J, as kernels.energies has it
+    power: Floats  # (RATES,) W, where the try has led
     x: Floats  # (N+1, 4) m, displacements in products, and spins of cells, rad
     y: Floats  # (N+1, 4) N, N m
     b: Floats  # (N+1, 5) right-hand side
@@ -118,7 +126,7 @@ def blank_contact(cells: int, points: int = 1, friction: bool = False) -> Contac
         width=z(nodes), samples=np.ones(nodes, np.int64), stiff=z(nodes), mass=z(nodes), numbers=z(NUMBERS),
         counts=z(COUNTS, np.int64), tree=z((2 * leaves, 12)), stack=z((4 * DEPTH, 2), np.int64),
         pairs=z((PAIRS_OF_NODE * nodes, 2), np.int64), at=z((nodes, 3)),
-        move=z((nodes, 3)), near=z(nodes), points=z((points, POINT)), nodes=z(nodes, np.int64), marks=z(nodes, np.int64),
+        move=z((nodes, 3)), near=z(nodes), points=z((points, POINT)), nodes=z(nodes, np.int64), marks=z(nodes, np.int64), energy=z(5), power=z(RATES),
         x=z((nodes, 4)), y=z((nodes, 4)), b=z((nodes, 5)), z=z((nodes, 5)),
         basis=z((MOST_PRODUCTS + 1, (4 if friction else 3) * nodes)), hessenberg=z((MOST_PRODUCTS + 1, MOST_PRODUCTS + 4)),
         holds=z((held, HOLD)), grips=z((held, GRIP)), fresh=z((held, GRIP)), heads=z(nodes, np.int64),

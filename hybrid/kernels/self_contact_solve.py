@@ -19,11 +19,11 @@ SOLVED = 1e-7  # residual of GMRES, as a part of the first
 
 
 @inner
-def respond(line, ends, contact, work, with_gradient):
-    """contact.z = A^-1 (H x + g), g where asked; x of the nodes in contact."""
+def find_forces(line, contact, with_gradient):
+    """contact.y = H x + g of the nodes in contact, g where asked."""
     held_on = contact.numbers[FRICTION] > 0.0
-    x, y, b, count = contact.x, contact.y, contact.b, contact.counts[NODES]
-    for k in range(count):
+    x, y = contact.x, contact.y
+    for k in range(contact.counts[NODES]):
         i = contact.nodes[k]
         y[i, 0], y[i, 1], y[i, 2], y[i, 3] = 0.0, 0.0, 0.0, 0.0
     for k in range(contact.counts[POINTS]):
@@ -34,6 +34,13 @@ def respond(line, ends, contact, work, with_gradient):
             add_held_product(line, contact, k, x, y)
             if with_gradient:
                 add_held(line, contact, k, y)
+
+
+@inner
+def respond(line, ends, contact, work, with_gradient):
+    """contact.z = A^-1 (H x + g), g where asked; x of the nodes in contact."""
+    find_forces(line, contact, with_gradient)
+    y, b, count = contact.y, contact.b, contact.counts[NODES]
     last = y.shape[0] - 1
     for k in range(count):
         i = contact.nodes[k]

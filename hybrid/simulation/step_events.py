@@ -52,6 +52,17 @@ def count_iterations(moving: Transient) -> None:
         )
 
 
+def count_energy_gains(moving: Transient) -> None:
+    """How many tries of steps were repeated because contact created energy: an event with their number, at the end."""
+    contact = moving.run.contact
+    if contact is not None and contact.given_up:
+        text = (
+            f"{contact.given_up} tries of steps, of a line that touches itself, were repeated with half the length, "
+            f"because the time scheme would have created energy in them; a shorter time.step needs fewer"
+        )
+        moving.events.event(moving.t, 0.0, moving.model.length, "steps cut", text, value=float(contact.given_up))
+
+
 def note_unknown_error(moving: Transient) -> None:
     """The error of neglecting bending could not be followed through the last step: an event, once in a while."""
     assert moving.correction is not None

@@ -26,7 +26,7 @@ from hybrid.simulation.load_change import change_loads
 from hybrid.simulation.releases import due
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import program, resolution_tree
-from hybrid.simulation.step_events import count_iterations
+from hybrid.simulation.step_events import count_energy_gains, count_iterations
 from hybrid.simulation.transient import StepFailed, Transient
 from hybrid.simulation.transient_checkpoint import checkpoint, restore
 from hybrid.solve.run import Tried
@@ -145,6 +145,7 @@ class TimeLoop:
         if run.envelope is not None:
             run.envelope.note_broken(run.envelope_values(), run.events.event)
         count_iterations(run)
+        count_energy_gains(run)
         run.events.write_to(self.recorder)
 
     def write_envelope(self) -> None:

@@ -120,7 +120,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         monitor.restore(saved["push"], compiled)
     if compiled.contact is not None:
         monitor.comes_back = False
-        compiled.contact.restore(saved["self_contact"])
+        compiled.contact.restore(saved["self_contact"], run.t)
     if run.switching is not None:
         run.switching.restore(saved["zoning"])
     if run.correction is not None:

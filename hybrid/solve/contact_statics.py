@@ -16,12 +16,12 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels import entry
 from hybrid.kernels.accept import LARGEST_TWIST
 from hybrid.kernels.binding import Table
-from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, NOW, PARITY, STEP_BEFORE, TRY_END
+from hybrid.kernels.books import NOW, PARITY, STEP_BEFORE, TRY_END
 from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance, workspace_of
 from hybrid.kernels.forces import FRICTION, MASS_DAMPING, ROTARY, SELF_FRICTION, WAVES
 from hybrid.kernels.newton import EQUILIBRIUM, NEAR, STEP, Task
 from hybrid.kernels.report import FORCE_A, SELF_CONTACT_ENERGY, TWIST
-from hybrid.kernels.run import blank_job, in_space
+from hybrid.kernels.run import blank_books, blank_job, in_space
 from hybrid.kernels.self_contact_pairs import KEEPS, SPEED
 from hybrid.kernels.state import Ends, Line, Sea, State
 from hybrid.solve.self_contact import SelfContact
@@ -51,16 +51,14 @@ class _Job:
 
     def __post_init__(self) -> None:
         self.work = workspace_of(self.line, keep=True)
-        self.clock, self.count = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
-        self.touch = np.zeros((3, self.line.s.size))
+        self.books = blank_books(self.line.h.size)._replace(touch=np.zeros((3, self.line.s.size)))
+        self.clock, self.count = self.books.clock, self.books.counts
         self.table = Table(blank_job())
         self.attach()
 
     def attach(self) -> None:
         """Contact is that of this job from now on."""
-        contact_table = self.contact.attach(
-            self.line, self.ends, self.states, self.work, self.clock, self.count, self.touch
-        )
+        contact_table = self.contact.attach(self.line, self.ends, self.states, self.work, self.books)
         self.table.bind(
             line=self.line, sea=self.sea, ends=self.ends, was=NO_PUSH, now=NO_PUSH, work=self.work,
             contact=self.contact.call, contact_table=contact_table,
@@ -194,7 +192,7 @@ def settled(
                     outcome = Outcome.TURNS_LOST
                     break
                 path.append(f"{ROAD}: found ({total + iterations} iterations in all)")
-                touch = found.touch[0].copy()
+                touch = found.books.touch[0].copy()
                 return Equilibrium(
                     rest, tuple(path), total + iterations, residual, found.work.report.copy(), -1, False, False,
                     touch=touch,
@@ -208,7 +206,7 @@ def settled(
 
 def _place(job: _Job) -> float:
     """Arc length, m, where contact is strongest; where nothing touches, of the fastest node."""
-    touch = np.abs(job.touch[0])
+    touch = np.abs(job.books.touch[0])
     node = touch.argmax() if touch.any() else np.linalg.norm(job.state.v, axis=1).argmax()
     return float(job.line.s[node])
 

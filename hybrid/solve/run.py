@@ -156,7 +156,7 @@ class CompiledRun:
 
     def touch_itself(self, contact: SelfContact, line: Line, ends: Ends, work: Work) -> None:
         """The line touches itself from now on (kernels.self_contact)."""
-        table = contact.attach(line, ends, self.states, work, self.clock, self.count, self.books.touch)
+        table = contact.attach(line, ends, self.states, work, self.books)
         self.table.bind(contact=contact.call, contact_table=table)
         self.contact = contact
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.kernels.binding import Table
+from hybrid.kernels.books import Books
 from hybrid.kernels.forces import ROTARY
 from hybrid.kernels.newton import ADDRESS, ASKED, REST
 from hybrid.kernels.report import FORCE_A, SELF_CONTACT_ENERGY
@@ -15,11 +16,18 @@ from hybrid.kernels.self_contact import blank_contact_job, contact_task
 from hybrid.kernels.self_contact_friction import AT, GRIP, HELD, PIECE
 from hybrid.kernels.self_contact_law import DISTANCE, FORCE, NORMAL, WX, WY, P, Q
 from hybrid.kernels.self_contact_pairs import (
+    BALANCE,
+    BEGUN,
     FADED,
     FRESH,
     FRICTION,
+    GAINED,
     GRIPS,
+    HAD,
+    HAS,
     HORIZON,
+    LARGEST,
+    LED,
     NARROWEST,
     POINTS,
     QUIET,
@@ -29,6 +37,7 @@ from hybrid.kernels.self_contact_pairs import (
     SPEED,
     STORED,
     TRIED,
+    TRIED_BALANCE,
     WIDEST,
     blank_contact,
 )
@@ -68,6 +77,7 @@ class SelfContact:
         contact.numbers[WIDEST], contact.numbers[FRICTION] = contact.width.max(), friction
         contact.numbers[SINCE], contact.numbers[FADED], contact.numbers[QUIET] = np.nan, np.nan, np.inf
         contact.numbers[NARROWEST] = contact.width.min()
+        contact.numbers[BEGUN], contact.numbers[LED] = np.nan, np.nan
         holds_twist = (
             line.spin.all()
             and bool((line.element * line.kb[:, 2])[[0, -1]].any())
@@ -152,15 +162,37 @@ class SelfContact:
             "speed": float(numbers[SPEED]), "faded": float(numbers[FADED]), "quiet": float(numbers[QUIET]),
             "stored": stored, "grips": grips.copy(), "remeshed": bool(counts[REMESHED]) and not latest,
             "touch": self._touch[0].copy(), "samples": contact.samples.copy(), "mass": contact.mass.copy(),
+            "energy": self._energy_at(t),
         }  # fmt: skip
 
-    def restore(self, saved: Mapping[str, Any], remeshed: bool = False) -> None:
-        """Go on from `checkpoint`; remeshed: of a line that had other cells.  ValueError: no grips."""
+    def _energy_at(self, t: float) -> list[float]:
+        """Of the energy at the time t, s: that of the line (nan: unknown), balance, the largest; and tries given up."""
+        numbers = self.contact.numbers
+        led, begun = numbers[LED] == t, numbers[BEGUN] == t
+        has = numbers[HAS] if led else numbers[HAD] if begun else np.nan
+        balance = numbers[TRIED_BALANCE] if led else numbers[BALANCE]
+        return [float(has), float(balance), float(numbers[LARGEST]), float(numbers[GAINED])]
+
+    def _restore_energy(self, saved: list[float], t: float) -> None:
+        """Go on from `_energy_at`; t: s, nan: the energy of the line is another one on other cells."""
+        numbers = self.contact.numbers
+        numbers[HAS], numbers[BALANCE], numbers[LARGEST], numbers[GAINED] = saved
+        numbers[TRIED_BALANCE], numbers[BEGUN] = numbers[BALANCE], np.nan
+        numbers[LED] = t if np.isfinite(saved[0]) else np.nan
+
+    @property
+    def given_up(self) -> int:
+        """Tries of steps that were given up because contact put energy in."""
+        return int(self.contact.numbers[GAINED])
+
+    def restore(self, saved: Mapping[str, Any], t: float = np.nan, remeshed: bool = False) -> None:
+        """Go on from `checkpoint` at t, s; remeshed: of a line that had other cells.  ValueError: no grips."""
         grips, numbers, counts = saved["grips"], self.contact.numbers, self.contact.counts
         if grips.ndim != 2 or grips.shape[1] != GRIP or not np.isfinite(grips).all():
             raise ValueError(f"self_contact/grips: expected rows of {GRIP} finite numbers")
         numbers[SPEED], numbers[STORED], numbers[SINCE] = saved["speed"], saved["stored"], np.nan
         numbers[FADED], numbers[QUIET] = saved.get("faded", np.nan), saved.get("quiet", np.inf)
+        self._restore_energy(saved.get("energy", [np.nan, 0.0, 0.0, 0.0]), np.nan if remeshed else t)
         counts[GRIPS], counts[REMESHED] = 0, remeshed or saved.get("remeshed", False)
         touch = saved.get("touch", np.zeros(0))
         if not remeshed and touch.shape == self._touch[0].shape:
@@ -171,16 +203,17 @@ class SelfContact:
             grips[:, PIECE] = np.clip(np.searchsorted(self._middles, grips[:, AT]), 1, self._middles.size - 1)
             self.contact.grips[: len(grips)], counts[GRIPS] = grips, len(grips)
 
-    def attach(
-        self, line: Line, ends: Ends, states: tuple[State, State], work: Work, clock: Floats, count: np.ndarray,
-        touch: Floats,
-    ) -> np.ndarray:  # fmt: skip
-        """The table of the kernel for a run; `call` has its address then.  touch: as Books.touch."""
+    def follow(self, old: State, new: State) -> None:
+        """The states from which and to which the next step leads, where they do not take turns."""
+        self._job.bind(old=old, new=new)
+
+    def attach(self, line: Line, ends: Ends, states: tuple[State, State], work: Work, books: Books) -> np.ndarray:
+        """The table of the kernel for a run; `call` has its address then."""
         old, new = states
         self._job.bind(
-            line=line, ends=ends, old=old, new=new, work=work, clock=clock, counts=count, call=self.call,
-            contact=self.contact, touch=touch,
+            line=line, ends=ends, old=old, new=new, work=work, clock=books.clock, counts=books.counts, call=self.call,
+            contact=self.contact, touch=books.touch, velocity=books.velocity, power=books.power, report=books.report,
         )  # fmt: skip
-        self._table, self._work, self._touch = self._job.numbers, work, touch
+        self._table, self._work, self._touch = self._job.numbers, work, books.touch
         self.call[ADDRESS] = contact_task.address(self._table)
         return self._table
