@@ -1,8 +1,9 @@
-"""What `hybrid plan` prints: a dozen lines, or everything that is on and off, and by which key."""
+"""What `hybrid plan` prints: a row for each thing, or everything that is on and off, and by which key."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from hybrid.cli.progress_line import span
@@ -10,11 +11,13 @@ from hybrid.kernels.forces import FORCES
 from hybrid.store.hockling import kink_torque
 
 if TYPE_CHECKING:
-    from hybrid.model.plan import Plan
+    from hybrid.model.plan import Plan, SystemPlan
+    from hybrid.scene.analysis import Time
     from hybrid.scene.schema import Scene
+    from hybrid.scene.system import System
     from hybrid.simulation.listed_outputs import Listed
 
-LINES, COLUMNS = 14, 80  # of the short form
+NAME, COLUMNS = 13, 80  # columns of names, and of the short form
 # Forces whose names are too long for it.
 SHORT = {
     "mass-proportional damping": "mass damping",
@@ -29,13 +32,12 @@ SHORT = {
 
 
 def plan_lines(scene: Scene, plan: Plan) -> list[str]:
-    """The plan in at most LINES lines of COLUMNS columns."""
+    """The plan in lines of COLUMNS columns."""
     on = {entry.what: entry.why for entry in plan.contents if entry.on}
     sections, attached = scene.cable.sections, len(scene.cable.attachments)
     length = sum(section.length for section in sections)
     line = [f"{length:.6g} m", _count(len(sections), "section")] + ([_count(attached, "attachment")] * bool(attached))
     plane = any(what.startswith("computed in a plane") for what in on)
-    asked = on.get("accuracy", "not asked for") + ("" if _has(on, "error figure") else "; no error figure")
     rows = {
         "implausible": "; ".join(
             f"{entry.what}: {entry.why}" for entry in plan.contents if entry.event == "implausible"
@@ -46,19 +48,77 @@ def plan_lines(scene: Scene, plan: Plan) -> list[str]:
         "dimension": "2: all of the scene lies in a plane" if plane else "3",
         "mesh": _mesh(plan),
         "payout": _payout(plan),
-        "forces": ", ".join(SHORT.get(name, name) for name in ("gravity", "buoyancy", *FORCES) if name in on),
+        "forces": _forces(on),
         "hockling": _hockling(plan),
-        "time": _time(scene, plan),
+        "time": _steps(scene.time, plan),
         "runs": _runs(plan),
-        "accuracy": asked,
+        "accuracy": _accuracy(on),
         "assumed": "; ".join(what for what, why in on.items() if why.startswith("assumed")),
     }
-    body = [f"{name:<13s}{text}" for name, text in rows.items() if text]
-    lines = [scene.title or "untitled scene", *body[: LINES - 2], "all that is on and off, and why: --verbose"]
-    return [text if len(text) <= COLUMNS else text[: COLUMNS - 4] + " ..." for text in lines]
+    return [scene.title or "untitled scene", *_table(rows), "all that is on and off, and why: --verbose"]
 
 
-def _has(on: dict[str, str], what: str) -> bool:
+def system_plan_lines(system: System, plan: SystemPlan) -> list[str]:
+    """The plan of several lines: each of them, what joins them, and what they have in common."""
+    rows: dict[str, str] = {}
+    for name, line in plan.lines.items():
+        joined = system.lines[name]
+        length = sum(section.length for section in joined.sections)
+        ends = f"{joined.start} to {joined.end}"
+        clamps = "".join(f"; {text}" for text in _clamps(system, name))
+        rows[f"line {name}"] = f"{length:.6g} m, {ends}, {_model(line)}, {_count(sum(line.cells), 'cell')}{clamps}"
+        implausible = [f"{x.what}: {x.why}" for x in line.contents if x.event == "implausible"]
+        rows[f"  {name}, implausible"] = "; ".join(implausible)
+        rows[f"  {name}, hockling"] = _hockling(line)
+    every = list(plan.lines.values())
+    on = {entry.what: entry.why for line in every for entry in line.contents if entry.on}
+    rows |= {
+        "free points": ", ".join(plan.free) or "none",
+        "bodies": ", ".join(f"{name} ({body.kind})" for name, body in system.bodies.items()),
+        "mesh": f"{_count(plan.cells, 'cell')}, {plan.unknowns} unknowns",
+        "forces": _forces(on),
+        "time": _steps(system.time, plan),
+        "runs": _runs(max(every, key=lambda x: x.most_runs)),
+        "accuracy": _accuracy(on),
+        "assumed": "; ".join(what for what, why in on.items() if why.startswith("assumed")),
+    }
+    return [system.title or "untitled scene", *_table(rows), "of each line, what is on and off, and why: --verbose"]
+
+
+def _table(rows: Mapping[str, str]) -> list[str]:
+    """Names and texts, those that there are; a text that is too long for a line goes on in the next."""
+    rows = {name: text for name, text in rows.items() if text}
+    wide = max(NAME, *(len(name) + 2 for name in rows))
+    return [
+        line
+        for name, text in rows.items()
+        for line in wrap(
+            text, max(COLUMNS, wide + 40), initial_indent=f"{name:<{wide}s}", subsequent_indent=" " * wide,
+            break_long_words=False, break_on_hyphens=False,
+        )
+    ]  # fmt: skip
+
+
+def _forces(on: Mapping[str, str]) -> str:
+    return ", ".join(SHORT.get(name, name) for name in ("gravity", "buoyancy", *FORCES) if name in on)
+
+
+def _accuracy(on: Mapping[str, str]) -> str:
+    return on.get("accuracy", "not asked for") + ("" if _has(on, "error figure") else "; no error figure")
+
+
+def _clamps(system: System, name: str) -> list[str]:
+    """How the ends of a line are clamped, those that are."""
+    found = []
+    for end in ("start", "end"):
+        held = system.clamp(name, end)
+        if held is not None:
+            spring = "" if held.bend_stiffness is None else f" by {held.bend_stiffness:g} N m/rad"
+            found.append(f"{end} clamped{spring}{', free to spin' if held.swivel else ''}")
+    return found
+
+
+def _has(on: Mapping[str, str], what: str) -> bool:
     return any(name.startswith(what) for name in on)
 
 
@@ -114,13 +174,13 @@ def _hockling(plan: Plan) -> str:
     return text
 
 
-def _time(scene: Scene, plan: Plan) -> str:
-    if scene.time is None:
+def _steps(time: Time | None, plan: Plan | SystemPlan) -> str:
+    if time is None:
         return "no motion, statics only"
-    steps = f"{scene.time.duration:.6g} s in {plan.steps} steps"
-    if scene.time.controlled:
+    steps = f"{time.duration:.6g} s in {plan.steps} steps"
+    if time.controlled:
         return f"{steps} or more, as the motion asks; about {span(plan.seconds)} of CPU"
-    asked = scene.time.step or plan.step
+    asked = time.step or plan.step
     short = f" ({asked:.6g} s asked)" if plan.step < 0.999 * asked else ""
     return f"{steps} of {plan.step:.6g} s{short}; about {span(plan.seconds)} of CPU"
 

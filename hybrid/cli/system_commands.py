@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import hybrid
-from hybrid.cli.plan_tables import contents_table
+from hybrid.cli.plan_tables import contents_table, system_plan_lines
 from hybrid.cli.tables import extremes_facts, verdict_text, verdicts_of
 from hybrid.store.limits import held_of
 
@@ -134,33 +134,11 @@ def _vector(x: list[float], least: float = 0.0) -> str:
     return "[" + ", ".join(f"{c if abs(c) > zero else 0.0:.5g}" for c in x) + "]"
 
 
-def _clamps(asked: System, name: str) -> list[str]:
-    """How the ends of a line are clamped, those that are."""
-    found = []
-    for end in ("start", "end"):
-        held = asked.clamp(name, end)
-        if held is not None:
-            spring = "" if held.bend_stiffness is None else f" by {held.bend_stiffness:g} N m/rad"
-            found.append(f"{end} clamped{spring}{', free to spin' if held.swivel else ''}")
-    return found
-
-
 def plan_of_lines(console: Console, asked: System, verbose: bool) -> None:
     """Show what a run of several lines would compute."""
     made = hybrid.plan(asked)
     console.json("plan", **asdict(made))
-    rows = [asked.title or "untitled scene"]
-    for name, line in made.lines.items():
-        kinds = ", ".join(dict.fromkeys(zone.kind for zone in line.zones))
-        joined = asked.lines[name]
-        clamps = "".join(f"; {text}" for text in _clamps(asked, name))
-        rows.append(f"line {name:<12s}{joined.start} to {joined.end}, {kinds}, {sum(line.cells)} cells{clamps}")
-    rows.append(f"{'free points':<17s}{', '.join(made.free) or 'none'}")
-    if asked.bodies:
-        rows.append(f"{'bodies':<17s}{', '.join(f'{name} ({body.kind})' for name, body in asked.bodies.items())}")
-    steps = f"{made.steps} steps of {made.step:.4g} s" if made.steps else "statics only"
-    rows.append(f"{'time':<17s}{steps}; {made.cells} cells in all")
-    console.show(lambda: "\n".join(rows))
+    console.show(lambda: "\n".join(system_plan_lines(asked, made)))
     if verbose:
         for name, line in made.lines.items():
             console.show(partial(str, f"line {name}"))

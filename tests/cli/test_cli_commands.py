@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -43,6 +44,25 @@ initial: equilibrium
 model: catenary
 mesh: {cells: 20}
 time: {duration: 2.0, step: 0.005}
+"""
+
+BRIDLE = """\
+title: a bridle that tows
+environment: {fluid: {density: 1025, surface: 0, current: {kind: uniform, velocity: [0.8, 0, 0]}}}
+points:
+  ship: {position: [0, 5, 0]}
+  other: {position: [0, -5, 0]}
+  ring: {kind: free, mass: 20, initial_guess: [15, 0, -10], drag_area: 0.1, volume: 0.01}
+  fish: {position: [40, 0, -55]}
+lines:
+  port: {start: ship, end: ring, sections: [&wire {length: 20, mass: 2, diameter: 0.03, axial_stiffness: 1.0e7, drag: {normal: 1.2}, added_mass: {normal: 1}}]}
+  starboard: {start: other, end: ring, sections: [*wire]}
+  tow:
+    start: ring
+    end: fish
+    sections: [{length: 60, mass: 2, diameter: 0.03, axial_stiffness: 1.0e7, bending_stiffness: 50}]
+    connections: {end: {kind: clamped, tangent: [0.6, 0, -0.8]}}
+time: {duration: 10, step: 0.1}
 """
 
 
@@ -141,6 +161,19 @@ def test_plot_zones_has_a_file_of_its_own(call: Call) -> None:
     (done,) = call("plot", "wire.h5", "--zones", "-o", "zones.svg", "--json").lines
     assert done["file"] == "zones.svg" and Path("zones.svg").read_text().startswith("<?xml")
     assert call("plot", "wire.h5", "--zones", "-q") == (0, "", "")
+
+
+def test_plan_of_lines_has_their_forces_their_time_and_no_text_that_is_cut(call: Call) -> None:
+    Path("bridle.yaml").write_text(BRIDLE)
+    said = call("plan", "bridle.yaml")
+    lines = said.out.rstrip("\n").split("\n")
+    rows = {line[:16].strip(): line[16:] for line in lines[1:-1] if not line.startswith(" ")}
+    assert said.code == 0 and max(map(len, lines)) <= 80 and "..." not in said.out
+    assert rows["line port"] == "20 m, ship to ring, catenary, 100 cells"
+    assert rows["line tow"].startswith("60 m, ring to fish, rod, 100 cells; end clamped")
+    assert rows["free points"] == "ring" and rows["mesh"].startswith("300 cells, ")
+    assert all(name in said.out for name in ("gravity", "buoyancy", "drag", "added mass", "current", "bodies"))
+    assert re.fullmatch(r"10 s in 100 steps of 0.1 s; about [\d.]+ m?s of CPU", rows["time"]), rows["time"]
 
 
 def test_plan_says_what_is_on_and_computes_nothing(call: Call) -> None:
