@@ -334,7 +334,7 @@ class Estimate:
         if model is not None:
             out["model"] = model
         if by_mesh is not None:
-            found = {"mesh": magnitude(by_mesh, name)}
+            found = {"mesh": np.maximum(magnitude(by_mesh, name), self.run.at_edges.get(name, 0.0))}
             total = found["mesh"]
             if by_step is not None:
                 found["time"] = magnitude(by_step, name)

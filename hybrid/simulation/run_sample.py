@@ -52,6 +52,8 @@ class RunSample:
     rows: Tree = field(default_factory=dict)  # what store.stored_rows keeps of the outputs; {}: they are in memory
     forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of all steps: s; N, at start and end
     catenary: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (nt,) part of the line, of zones that move
+    # of an equilibrium: errors (ns,) by its cells beside edges of contact (outputs.edge_errors); in no checkpoint
+    at_edges: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def some(self, name: str, numbers: np.ndarray) -> np.ndarray:
         """The values of an output with these numbers, which increase."""
@@ -66,7 +68,8 @@ class RunSample:
 
     def checkpoint(self) -> Tree:
         """All of it, as named arrays and plain values."""
-        out = {x.name: getattr(self, x.name) for x in fields(self)} | {"resolution": resolution_tree(self.resolution)}
+        kept_fields = [x.name for x in fields(self) if x.name != "at_edges"]
+        out = {name: getattr(self, name) for name in kept_fields} | {"resolution": resolution_tree(self.resolution)}
         kept = {} if self.rows else {"values": self.values, "model_error": self.model_error}
         blank: Tree = {"values": {}, "model_error": {}}
         return out | blank | {x: {name: np.asarray(y) for name, y in found.items()} for x, found in kept.items()}

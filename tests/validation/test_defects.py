@@ -134,15 +134,15 @@ def test_the_error_of_bending_at_a_float(quantity: str) -> None:
 
 
 def test_curvature_asked_alone_decides_cells_and_zones() -> None:
-    """Met wherever the line is farther than two cells from the edge of the hard bed.
+    """Met at all of the 4001 points, those beside the edge of the hard bed as well, where curvature begins within 0.01 m.
 
-    Closer to it four of the 4001 points are up to 4 % off: curvature begins there within 0.01 m, and cells have 0.05 m.
+    Four of them were up to 4 % off: meshes whose nodes lie alike beside the edge differ by little of that.
     """
     asked = hybrid.static(load("curvature_asked_alone"))
     truth = hybrid.static(load("curvature_asked_alone", "model=rod", "mesh={cells: 8000}", "accuracy=null"))
     far = np.abs(np.ravel(asked.curvature) - np.ravel(truth.curvature)) / truth.curvature.max()
-    beside = np.abs(np.ravel(asked.s) - 20.0) < 0.1
-    assert far[~beside].max() < 0.01 and far.max() < 0.05
+    said = np.ravel(asked["errors/total/curvature"]) / truth.curvature.max()
+    assert far.max() < 0.01 and far.max() < 1.5 * said.max()
     assert "rod" in {zone.kind for zone in asked.zones[0]}
 
 
