@@ -330,20 +330,6 @@ class System(Table):
         return self.time
 
     @model_validator(mode="after")
-    def _errors_of_fixed_zones(self) -> System:
-        if self.adaptive:
-            name, free = self.adaptive[0], self.time is not None and self.time.controlled
-            expected = f"nothing, because zones of line {name} move: its error is not estimated in several lines"
-            fix = "leave it out, or write `model: rod` in the lines"
-            asked = {("accuracy",): self.accuracy, ("output", "errors"): self.output.errors}
-            asked |= {("lines", x, "accuracy"): line.accuracy for x, line in self.lines.items()}
-            refuse(Finding(at, expected, fix) for at, given in asked.items() if given)
-            if free and self.time is not None and self.time.tolerance is None:
-                expected = f"a step (s) or a tolerance (m), because zones of line {name} move: no accuracy chooses them"
-                refuse([Finding(("time", "step"), expected, "add `step: ...`")])
-        return self
-
-    @model_validator(mode="after")
     def _lines_join_points(self) -> System:
         refuse(self._unknown_names())
         refuse(chain(self._lonely_points(), self._floating_groups()))

@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.errors import ComputationError
+from hybrid.errors import ComputationError, SceneError
+from hybrid.model.build import Model
 from hybrid.model.output_points import output_points
 from hybrid.model.plan import output_interval
 from hybrid.model.resolution import (
@@ -29,20 +30,31 @@ from hybrid.model.resolution import (
     requested_accuracy,
     wants_errors,
     wants_survey,
+    zones_are_free,
 )
-from hybrid.model.system import SystemModel, SystemResolution, build_system
+from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.read import scene_text
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import AdaptiveModel
 from hybrid.scene.system import System
 from hybrid.simulation.error_control import ErrorController, comparison_resolutions
+from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.error_report import effort, error_fields, known
+from hybrid.simulation.error_statistics import statistics_of
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution, with_survey
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.refinement import COSTLY_ACCURACY, Free, costly, verdicts
 from hybrid.simulation.restore import refused, resolution_from, resolution_tree
-from hybrid.simulation.run_sample import COMPARED, NOT_ESTIMATED, RunSample, split_outputs
+from hybrid.simulation.run_sample import (
+    COMPARED,
+    NOT_ESTIMATED,
+    RunSample,
+    catenary_share,
+    compared_cells,
+    split_outputs,
+)
 from hybrid.simulation.system_checkpoint import kept_resolution
 from hybrid.simulation.system_lines import LineResult
+from hybrid.simulation.system_model_errors import Stretches, as_rods, leaves_bending_out, rods_of, with_model_errors
 from hybrid.simulation.system_run import SystemRun, run_system, static_system
 from hybrid.store.amend import amend_lines
 from hybrid.store.checkpoint import read_before
@@ -63,13 +75,34 @@ Samples = dict[str, RunSample]  # of the lines, by name
 def is_refined(system: System, moves: bool) -> bool:
     """Whether a system is computed several times, here: an accuracy is asked, or errors of steps that follow the
 
-    motion, or of an equilibrium.  (Errors of fixed steps alone: simulation.system_errors.)
+    motion, of an equilibrium, or of leaving bending out.  (Others of fixed steps: simulation.system_errors.)
     """
     scenes = [system.scene_of(name) for name in system.lines]
     if not any(wants_errors(x) for x in scenes):
         return False
     open_steps = moves and system.require_time().controlled
-    return not moves or open_steps or any(requested_accuracy(x) is not None for x in scenes)
+    if not moves or open_steps or any(leaves_bending_out(x) for x in system.lines.values()):
+        return True
+    return any(requested_accuracy(x) is not None for x in scenes)
+
+
+class LineController(ErrorController):
+    """The error control of one line; runs to compare with are of all lines, and others compute them."""
+
+    def _compute_comparisons(self, resolution: Resolution) -> None:
+        pass
+
+    def _renew_model_errors(self, estimate: Estimate, resolution: Resolution) -> None:
+        pass
+
+    def takes_model_errors(self, run: RunSample) -> None:
+        """Take what leaving bending out changes from a run, in place of what is known."""
+        assert self.estimate is not None
+        self.estimate.set_model_errors(run)
+        if self.statistics:
+            found = statistics_of(run, self._every)
+            for name, of_statistic in self.statistics.items():
+                of_statistic.set_model_errors(found[name])
 
 
 class SystemPasses:
@@ -86,12 +119,14 @@ class SystemPasses:
         time = system.time
         self._steps_free = moves and time is not None and time.controlled and time.tolerance is None
         self.controls = {
-            name: ErrorController(
-                requested_accuracy(scene), Free(mesh_is_free(scene), self._steps_free, False), moves, _elsewhere,
-                _elsewhere, irregular=moves and is_irregular(scene),
+            name: LineController(
+                requested_accuracy(scene), Free(mesh_is_free(scene), self._steps_free, zones_are_free(scene)), moves,
+                _elsewhere, _elsewhere, irregular=moves and is_irregular(scene),
             )
             for name, scene in self.scenes.items()
         }  # fmt: skip
+        # Of lines, stretches (m) that were rod at any output: of the last run to compare with, and of the result.
+        self._compared_rods, self._result_rods = dict[str, Stretches](), dict[str, Stretches]()
         self._costs: list[float] = []  # s of processor time, of all runs
         self._notes: list[tuple[str, str]] = []  # events of the system
         self._begin = clock.process_time()
@@ -149,11 +184,17 @@ class SystemPasses:
         self._costs.append(clock.process_time() - begin)
         if target is not None:
             return self._samples(target, run.resolution, self._costs[-1])
+        recorders = {x.name: x.recorder for x in run.lines}
+        self._compared_rods = {n: x.rods for n, x in recorders.items() if isinstance(x, ComparisonRecorder)}
         return {x.name: compared(x, run, self._costs[-1]) for x in run.lines}
 
     def _samples(self, target: Path | io.BytesIO, resolution: SystemResolution, cpu: float) -> Samples:
+        """What is compared of a complete result."""
+        system = build_system(self.system, resolution=resolution)
+        models = dict(zip(system.names, system.models, strict=True))
         with open_result(target) as result:
-            return {name: sample_of(line, resolution.lines[name], cpu) for name, line in result.lines.items()}
+            self._result_rods = {name: rods_of(line) for name, line in result.lines.items()}
+            return {n: sample_of(line, resolution.lines[n], models[n], cpu) for n, line in result.lines.items()}
 
     def _surveyed(self, first: SystemResolution) -> SystemResolution:
         """With cells where a coarse run shows that they should be."""
@@ -202,9 +243,23 @@ class SystemPasses:
                 if not k:
                     failed = str(error).splitlines()[0]
                     break
+            if not k and (first_found := found[0]) is not None:
+                found[0] = self._with_model_errors(first_found, resolution, self._compared_rods)
         for name, control in self.controls.items():
             control.runs[:] = self._costs
             control.compare_with([x[name] if x is not None else None for x in found], failed)
+
+    def _with_model_errors(
+        self, runs: Samples, resolution: SystemResolution, rods_then: Mapping[str, Stretches]
+    ) -> Samples:
+        """A run with what leaving bending out changes in it; resolution: of that run; rods_then: m, its rods."""
+        rods, finely, names = as_rods(self.system, resolution, rods_then)
+        found, failed = None, ""
+        try:
+            found = self._record(finely, None, ESTIMATION, system=rods) if names else None
+        except (ComputationError, SceneError) as error:
+            failed = str(error).splitlines()[0]
+        return with_model_errors(runs, found, names, failed)
 
     def _forecast(self, first: SystemResolution) -> SystemResolution:
         """How finely the first result is computed: finer, where the runs to compare with show that it must be."""
@@ -217,7 +272,10 @@ class SystemPasses:
         steps = min(x.step / now.one.step if now.one.step else 1.0 for x in wanted.values())
         free = {name: cells if mesh_is_free(scene) else 1.0 for name, scene in self.scenes.items()}
         steps = steps if self._steps_free else 1.0
-        return SystemResolution({name: x.coarser(1.0 / free[name], steps) for name, x in now.lines.items()})
+        zones = {name: min(x.zones, wanted[name].zones if name in wanted else x.zones) for name, x in now.lines.items()}
+        return SystemResolution(
+            {name: replace(x.coarser(1.0 / free[name], steps), zones=zones[name]) for name, x in now.lines.items()}
+        )
 
     # --- judgement ------------------------------------------------------------------------------
 
@@ -246,18 +304,38 @@ class SystemPasses:
 
     def _judged(self, resolution: SystemResolution, result: Samples) -> dict[str, Resolution]:
         """Take over a result; how finely lines that miss what is asked of them want the next one."""
-        wanted = {}
+        known = {name: x.estimate for name, x in self.controls.items()}
+        stricter = {
+            name
+            for name, x in known.items()
+            if x is not None and resolution.lines[name].zones < x.run.resolution.zones
+        }  # fmt: skip
+        anew = any(known[name].differs_in_zones(result[name]) for name in stricter)  # type: ignore[union-attr]
+        if anew:  # runs to compare with have other zones
+            self._compare(resolution)
+        judged = []
         for name, control in self.controls.items():
             control.runs[:] = self._costs
-            if control.estimate is None:
-                if not control.first_estimate(result[name]):
-                    continue
-            else:
-                control.next_estimate(control.estimate, resolution.lines[name], result[name])
-            found = control.next_resolution()
-            if found is not None:
-                wanted[name] = found
-        return wanted
+            before = known[name]
+            if (before is None or anew) and control.first_estimate(result[name]):
+                judged.append(name)
+            elif before is not None:
+                control.next_estimate(before, resolution.lines[name], result[name])
+                judged.append(name)
+        self._renew_model_errors(resolution, result, bool(stricter) and not anew)
+        wanted = {name: self.controls[name].next_resolution() for name in judged}
+        return {name: x for name, x in wanted.items() if x is not None}
+
+    def _renew_model_errors(self, resolution: SystemResolution, result: Samples, stricter: bool) -> None:
+        """Where zones of the result are others than those whose model error is known: compare it with rods itself."""
+        estimates = [x.estimate for x in self.controls.values() if x.estimate is not None]
+        if not (estimates and (stricter or any(x.lacks_model_errors() for x in estimates))):
+            return
+        for name, run in self._with_model_errors(result, resolution, self._result_rods).items():
+            control = self.controls[name]
+            control.runs[:] = self._costs
+            if control.estimate is not None:
+                control.takes_model_errors(run)
 
     def _warn_of_costs(self, result: Samples, finer: SystemResolution) -> None:
         if not any(kind == COSTLY_ACCURACY for kind, _ in self._notes):
@@ -296,7 +374,7 @@ class SystemPasses:
 
     def _write(self, resolution: SystemResolution, result: Samples) -> None:
         """Add errors, what was asked and whether it is met to the result of each line."""
-        cpu, model = clock.process_time() - self._begin, build_system(self.system, resolution=resolution)
+        cpu = clock.process_time() - self._begin
         fields, values = dict[str, list[Field]](), dict[str, dict[str, np.ndarray]]()
         attributes, notes = dict[str, dict[str, str | float | int]](), dict[str, list[tuple[str, str]]]()
         with open_result(self.target) as found:
@@ -310,7 +388,6 @@ class SystemPasses:
                 if (kept := values[name].get(f"errors/{cause}/{quantity}")) is not None:
                     kept[begin : begin + len(rows)] = rows
             largest, notes[name] = known(scene, control, run, errors, happened[name])
-            notes[name] += _not_estimated(scene, model, name)
             attributes[name] = {**effort(scene, control, run, cpu), **largest}
             if control.asked is not None:
                 kinds = {kind for kind, _ in (*notes[name], *((k, t) for t, k in happened[name]))}
@@ -338,28 +415,26 @@ def compared(line: LineResult, run: SystemRun, cpu: float) -> RunSample:
     found, resolution = line.recorder, run.resolution.lines[line.name]
     assert isinstance(found, ComparisonRecorder)
     values, _ = split_outputs({name: found[name] for name in found.names})
-    return RunSample(resolution, values, line.model.cells, max(run.steps, 1), cpu, resolution.every, forces=found.steps)
+    catenary = found.catenary if isinstance(line.scene.model, AdaptiveModel) else np.zeros(0)
+    return RunSample(
+        resolution, values, compared_cells(line.model), max(run.steps, 1), cpu, resolution.every, forces=found.steps,
+        catenary=catenary,
+    )  # fmt: skip
 
 
-def sample_of(line: Result, resolution: Resolution, cpu: float) -> RunSample:
-    """What is compared of a line in a complete result; cpu: s, of all lines."""
+def sample_of(line: Result, resolution: Resolution, model: Model, cpu: float) -> RunSample:
+    """What is compared of a line in a complete result; model: as it began; cpu: s, of all lines."""
     values = {name: np.asarray(line[name]) for name in COMPARED if name in line}
     columns = [f"steps/{name}" for name in ("t", "end_force_start", "end_force_end")]
     forces = np.zeros((0, 3))
     if len(line.times) > 1 and columns[0] in line:
         forces = np.column_stack([line[name] for name in columns])
     unresolved = any(event.kind == "unresolved bend" for event in line.events)
-    steps, cells = max(len(forces), 1), int(line.attributes["cells"])
-    return RunSample(resolution, values, cells, steps, cpu, resolution.every, unresolved, forces=forces)
-
-
-def _not_estimated(scene: Scene, model: SystemModel, name: str) -> list[tuple[str, str]]:
-    """The event of a line that says what may make it wrong, and is not in its errors."""
-    zones = model.models[model.names.index(name)].zones
-    if any(x.weakest_bending for x in scene.cable.sections) and any(z.kind == "catenary" for z in zones):
-        text = "what bending would change in its catenaries is not estimated in several lines; `model: rod` leaves none"
-        return [(NOT_ESTIMATED, f"{text} out")]
-    return []
+    catenary = np.array([catenary_share(zones) for zones in line.zones]) if model.layout is not None else np.zeros(0)
+    return RunSample(
+        resolution, values, compared_cells(model), max(len(forces), 1), cpu, resolution.every, unresolved,
+        forces=forces, catenary=catenary,
+    )  # fmt: skip
 
 
 def refine_system(

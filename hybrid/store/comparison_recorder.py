@@ -20,6 +20,7 @@ class ComparisonRecorder:
         self.events: list[tuple[str, str]] = []  # kind, text
         self._kept: dict[str, list[np.ndarray]] = {}  # batches (nb, ...)
         self._catenary: list[float] = []
+        self.rods: set[tuple[float, float]] = set()  # m, stretches that were rod at any output
 
     @property
     def last(self) -> float:
@@ -45,6 +46,7 @@ class ComparisonRecorder:
         self.times += times.tolist()
         share = sum((b - a for kind, a, b in zones if kind == "catenary"), 0.0) / zones[-1][2] if zones else 0.0
         self._catenary += [share] * len(times)
+        self.rods |= {(a, b) for kind, a, b in zones if kind == "rod"}
         self._keep(values)
 
     def _keep(self, values: Mapping[str, np.ndarray]) -> None:

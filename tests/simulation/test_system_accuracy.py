@@ -13,8 +13,10 @@ from bits import differences
 import hybrid
 import hybrid.simulation.system_run
 from hybrid.errors import ComputationError
+from hybrid.scene.analysis import RodModel
+from hybrid.scene.system import System
 from hybrid.simulation import progress as reports
-from hybrid.simulation import system_accuracy
+from hybrid.simulation import system_accuracy, system_errors
 
 LEG = {"length": 70, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
 
@@ -38,10 +40,17 @@ def bridle(**tables: Any) -> dict[str, Any]:
     } | tables  # fmt: skip
 
 
+def with_zones() -> dict[str, Any]:
+    """The same with zones that move in the line that bends."""
+    scene = bridle()
+    scene["lines"]["tow"]["model"] = "adaptive"
+    return scene
+
+
 @pytest.fixture(scope="module")
 def result(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
     path = tmp_path_factory.mktemp("accuracy") / "run.h5"
-    hybrid.run(bridle(), path).close()
+    hybrid.run(with_zones(), path).close()
     return hybrid.open(path)
 
 
@@ -50,10 +59,16 @@ def verdicts(line: hybrid.Result) -> dict[str, dict[str, Any]]:
 
 
 def test_what_is_asked_is_judged_by_line_and_quantity(result: hybrid.Result) -> None:
-    scene = bridle(time={"duration": 4.0, "step": 0.0125}, accuracy=None)
+    scene = bridle(time={"duration": 4.0, "step": 0.0125}, accuracy=None)  # all that bends is rod
     for line in scene["lines"].values():
         line["mesh"] = {"cells": 150}
-    fine = hybrid.run(scene)
+    fine, tow = hybrid.run(scene), result.lines["tow"]
+    assert {zone.kind for zones in tow.zones for zone in zones} == {"rod", "catenary"}
+    for quantity in ("position", "curvature", "bending_moment"):
+        wrong = tow[quantity] - fine.lines["tow"][quantity]
+        wrong = float(np.abs(wrong).max() if wrong.ndim == 2 else np.linalg.norm(wrong, axis=2).max())
+        figure, left_out = (float(tow[f"errors/{x}/{quantity}"].max()) for x in ("total", "model"))
+        assert 0.7 < figure / wrong < 3.0 and 0.5 * wrong < left_out, (quantity, figure, left_out, wrong)
     for name, line in result.lines.items():
         wrong = np.linalg.norm(line.position - fine.lines[name].position, axis=2).max()
         figure = line["errors/total/position"].max()
@@ -85,24 +100,66 @@ def test_a_stopped_run_goes_on_bit_for_bit(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        hybrid.run(bridle(), path, progress=stop)
+        hybrid.run(with_zones(), path, progress=stop)
     hybrid.resume(path).close()
     assert result.file is not None and differences(result.file, path) == []
+
+
+def fails(*_: Any, **__: Any) -> None:
+    raise ComputationError(hybrid.errors.Outcome.SLACK, 1.0, 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("bends", "asked"),
+    [
+        ({"model": "adaptive"}, {"accuracy": "1%"}),
+        ({"model": "catenary"}, {"accuracy": "2%"}),
+        ({"model": {"kind": "adaptive", "tolerance": 2e-3}}, {"time": {"duration": 4.0, "step": 0.025}}),
+    ],
+)
+def test_errors_of_leaving_bending_out_against_fine_rods(bends: dict[str, Any], asked: dict[str, Any]) -> None:
+    scene = bridle(**asked)
+    scene["output"] = {"every": 0.2, "points": 31, "errors": True}
+    if "accuracy" not in asked:
+        del scene["accuracy"]
+    for line in scene["lines"].values():
+        line |= bends | {"sections": [line["sections"][0] | {"bending_stiffness": 300}]}
+    found = hybrid.run(scene)
+    fine = bridle(time={"duration": 4.0, "step": 0.01}, accuracy=None, output=scene["output"] | {"errors": False})
+    for name, line in fine["lines"].items():
+        line |= {"model": "rod", "mesh": {"cells": 150}, "sections": scene["lines"][name]["sections"]}
+    rods = hybrid.run(fine)
+    for name, line in found.lines.items():
+        assert "model error not estimated" not in {e.kind for e in line.events}
+        for quantity, called in system_errors.COMPARED.items():
+            if quantity not in line:
+                continue
+            wrong = line[quantity] - rods.lines[name][quantity]
+            vector = quantity == "position" or quantity.startswith("reaction")
+            size = float((np.linalg.norm(wrong, axis=-1) if vector else np.abs(wrong)).max())
+            figure = float(line[f"errors/total/{called}"].max())
+            assert 0.7 < figure / size < 3.0, (name, quantity, figure, size)
 
 
 def test_what_nobody_estimated_is_never_met(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = bridle(accuracy=None, time={"duration": 0.5, "step": 0.05})
     scene["lines"]["tow"] |= {"model": "catenary", "accuracy": "2%"}
-    found = hybrid.run(scene)
+    computed = system_accuracy.run_system
+
+    def without_rods(system: System, *x: Any, **more: Any) -> Any:
+        if isinstance(system.lines["tow"].model, RodModel):
+            fails()
+        return computed(system, *x, **more)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(system_accuracy, "run_system", without_rods)
+        found = hybrid.run(scene)
     tow = verdicts(found.lines["tow"])
     assert tow["position"]["met"] is None and tow["position"]["error"] < tow["position"]["asked"]
     assert [e.kind for e in found.lines["tow"].events].count("model error not estimated") == 1
     assert "accuracy_verdicts" not in found.lines["west"].attributes
 
-    def fails(*_: Any, **__: Any) -> None:
-        raise ComputationError(hybrid.errors.Outcome.SLACK, 1.0, 0.0)
-
-    computed = system_accuracy.run_system
     monkeypatch.setattr(system_accuracy, "run_system", lambda *x: computed(*x) if x[6] == "result" else fails())
     found = hybrid.run(scene)
     assert all(x["met"] is None and x["error"] is None for x in verdicts(found.lines["tow"]).values())

@@ -137,9 +137,6 @@ def test_a_line_breaks_while_zones_move() -> None:
     [
         ({"model": MODEL | {"correct": True}}, {}, "correct"),
         ({"connections": {"start": {"tangent": [0, 0, 1]}}}, {}, "connections"),
-        ({}, {"accuracy": "1%"}, "accuracy"),
-        ({}, {"output": {"errors": True}}, "errors"),
-        ({}, {"time": {"duration": 1.0}}, "step"),
     ],
 )
 def test_what_is_not_computed_is_refused(line: dict[str, Any], scene: dict[str, Any], where: str) -> None:
