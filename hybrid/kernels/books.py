@@ -53,6 +53,9 @@ from hybrid.kernels.state import Floats
 ) = range(41)  # fmt: skip
 CLOCK_SIZE = 41
 
+# What `loaded` says of an end that carries a free point of several lines: forces on it are those of the line alone.
+CARRIED = 2
+
 # --- count -----------------------------------------------------------------------------------------
 
 (
@@ -129,7 +132,8 @@ class Books(NamedTuple):
     twist: Floats  # (2, 2) rad, of the elements at both ends, likewise
     velocity: Floats  # (2, 3) m/s, of held ends now
     imposed: Floats  # (2, 2, 21) now and before the last step, of each end: position, frame, spin, force, moment
-    loaded: NDArray[np.int8]  # (2,) 1 where an end body makes the pull of the end the tension beside it
+    # (2,) 1 where an end body makes the pull of the end the tension beside it; CARRIED: it is of a free point
+    loaded: NDArray[np.int8]
     base: NDArray[np.int64]  # nodes whose displacement is watched
     placed: Floats  # (base.size, 3) m, where they were at the start
     borne: Floats  # (N,) length over unstretched length that each cell bears

@@ -18,11 +18,12 @@ from hybrid.kernels.bed import bed_under
 from hybrid.kernels.books import CURVATURE, DISPLACEMENT, MOMENT, PRESSURE, SEAM, SELF_PRESSURE, TENSION, TORQUE
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.element import bending
 from hybrid.kernels.forces import PLANAR, SEABED
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.report import FORCE_A
 from hybrid.kernels.resolution_checks import sharpest_in_plane, sharpest_in_space
-from hybrid.kernels.rotations import add, cross, dot, scale, sub
+from hybrid.kernels.rotations import add, cross, dot, frame, scale, sub
 from hybrid.kernels.seabed import pressure
 from hybrid.kernels.zone_torque import FIRST, LAST
 from hybrid.kernels.zone_torque import TORQUE as PASSED
@@ -89,6 +90,40 @@ def end_tension(line, ends, state, report, loaded, marks, k):
         at = FORCE_A + 3 * k
         f = scale(1.0 - 2.0 * k, (report[at], report[at + 1], report[at + 2]))
     return dot(f, t) / math.sqrt(dot(t, t))
+
+
+@inner
+def moment_at(line, state, i):
+    """Moment (N m) of what is after an inner node on what is before it, without damping."""
+    if not line.element[i]:
+        return (0.0, 0.0, 0.0)
+    before, _, _ = chord(get3(state.e, i - 1))
+    after, _, _ = chord(get3(state.e, i))
+    Ra, Rb = frame(get3(state.a1, i - 1), before), frame(get3(state.a1, i), after)
+    m, _ = bending(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
+    return m
+
+
+@inner
+def force_in_cell(line, state, i):
+    """Force (N) in the middle of a cell, of what is after it on what is before it; an end of the line bears no moment."""
+    n = line.h.shape[0]
+    d, _, il = chord(get3(state.e, i))
+    first, last = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if i > 0:
+        first = moment_at(line, state, i)
+    if i < n - 1:
+        last = moment_at(line, state, i + 1)
+    return add(scale(state.T[i], d), scale(il, cross(d, sub(last, first))))
+
+
+@inner
+def force_of_line(line, state, marks, k):
+    """Force (N) of the line alone on what is at end k, continued from the last two cells, from one across a kink."""
+    first, second = k * (line.h.shape[0] - 1), second_cell(line.h, marks, k)
+    near, far = force_in_cell(line, state, first), force_in_cell(line, state, second)
+    over = line.h[first] / (line.h[first] + line.h[second])
+    return scale(1.0 - 2.0 * k, add(near, scale(over, sub(near, far))))
 
 
 @inner

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+from hybrid.kernels.assembly import JOINED
 from hybrid.kernels.bodies import (
     LINES,
     book_bodies,
@@ -20,11 +21,11 @@ from hybrid.kernels.bodies import (
     size_of_moves,
     start_here,
 )
-from hybrid.kernels.books import NOW, RATES, STORED
+from hybrid.kernels.books import CARRIED, NOW, RATES, STORED
 from hybrid.kernels.carried_frames import turns
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.configuration import first_bad, measure, update
-from hybrid.kernels.extremes import first_strains, note_extremes
+from hybrid.kernels.extremes import first_strains, force_of_line, note_extremes
 from hybrid.kernels.forces import FRICTION, SEABED
 from hybrid.kernels.generalized_alpha import Scheme, scheme
 from hybrid.kernels.joined_lines import solve_dense
@@ -54,6 +55,7 @@ from hybrid.kernels.node_forces import get3
 from hybrid.kernels.powers import book_work, find_powers
 from hybrid.kernels.references import caller
 from hybrid.kernels.report import (
+    FORCE_A,
     LOCAL_ERROR,
     RESIDUAL,
     RESIDUAL_NODE,
@@ -61,6 +63,7 @@ from hybrid.kernels.report import (
     SLACKEST,
     SLACKEST_CELL,
 )
+from hybrid.kernels.rotations import sub
 from hybrid.kernels.run import call_quantities, read
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
@@ -192,6 +195,21 @@ def move_joints(job, start, end):
 
 
 @inner
+def take_loads_off(line, ends, state, books, report):
+    """Leave in a report the forces of the line alone on free points, without what else is at a point it carries."""
+    for k in range(2):
+        at = FORCE_A + 3 * k
+        if ends.held[k] != JOINED:
+            continue
+        f = (report[at], report[at + 1], report[at + 2])
+        if books.loaded[k] == CARRIED:
+            f = force_of_line(line, state, books.marks, k)
+        else:
+            f = sub(f, get3(ends.force, k))
+        report[at], report[at + 1], report[at + 2] = f
+
+
+@inner
 def keep_report(books, report):
     for k in range(report.shape[0]):
         books.report[0, k] = report[k]
@@ -218,6 +236,7 @@ def begin_books(tables, joints, t):
                 new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
         move_joints(job, joints[l, START], joints[l, END])
         find_powers(line, job.ends, books.velocity, new, report, books.power[0])
+        take_loads_off(line, job.ends, new, books, report)
         if books.extremes.shape[1] > 0:
             keep_report(books, report)
             first_strains(line, job.ends, new, books)
@@ -236,6 +255,7 @@ def keep_books(tables, joints, dt, t):
             books.power[1, k] = books.power[0, k]
         find_powers(line, job.ends, books.velocity, new, report, books.power[0])
         book_work(line, dt, report, books)
+        take_loads_off(line, job.ends, new, books, report)
         if books.extremes.shape[1] > 0:
             keep_report(books, report)
             note_extremes(line, job.sea, job.ends, new, books, t)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.books import LOG, STORED, Books
+from hybrid.kernels.books import CARRIED, LOG, STORED, Books
 from hybrid.kernels.entry import sharpest
 from hybrid.kernels.forces import FRICTION
 from hybrid.kernels.report import FORCE_A, LOCAL_ERROR
@@ -102,6 +102,7 @@ class LineResult:
         right[marked] = nodes + np.arange(marked.size)
         books = blank_books(line.h.size)
         books.loaded[:] = self.model.loaded_ends
+        books.loaded[self.carried] = CARRIED
         return books._replace(
             strains=np.zeros((nodes, 3)), marks=marks, right=right, start=begin.copy(),
             extremes=no_extremes(nodes + marked.size),
@@ -143,28 +144,12 @@ class LineResult:
 
     # --- steps and outputs --------------------------------------------------------------------------
 
-    def end_forces(self, state: State, report: Floats) -> Floats:
-        """(6,) N: forces of the line on what is at its start and at its end, inertial, of a state and its report.
-
-        At a free point that the line carries the report has the loads of the point as well: there it is the tension,
-        continued from the last two cells, from the last alone where a load or a change of section lies between them.
-        """
-        forces = report[FORCE_A : FORCE_A + 6].copy()
-        for k in self.carried:
-            e, T, h = (x[:2] if k == 0 else x[:-3:-1] for x in (state.e, state.T, self.model.line.h))
-            smooth = len(h) > 1 and not self.books.marks[-2 if k else 1]
-            d, over = e / np.linalg.norm(e, axis=1)[:, None], h[0] / (h[0] + h[1]) if smooth else 0.0
-            along = d[0] + over * (d[0] - d[-1])
-            pull = (T[0] + over * (T[0] - T[-1])) / np.linalg.norm(along) * along
-            forces[3 * k : 3 * k + 3] = -pull if k else pull
-        return forces
-
     def log(
         self, t: float, dt: float, taken: SystemTaken, repeats: int, state: State, before: State, work: Work, cpu: float
     ) -> None:
         """Log a step of dt (s) that ended at t (s) in a state, after the one `before`."""
         self._itself.look(t, dt, state, before.r, self.events.event)
-        forces = self.end_forces(state, work.report)
+        forces = work.report[FORCE_A : FORCE_A + 6]
         pulls = float(np.linalg.norm(forces[:3])), float(np.linalg.norm(forces[3:]))
         error = float(work.report[LOCAL_ERROR])
         self._log.append((t, dt, taken.iterations, taken.correction, taken.residual, repeats, error, *pulls, cpu))
@@ -172,9 +157,7 @@ class LineResult:
     def state_for_output(self, t: float, ends: Ends, state: State, work: Work) -> Batch:
         """A state at t (s) as outputs are made of it; both ends count as held, by their points."""
         held = ends._replace(held=np.ones(2, np.int8), position=state.r[[0, -1]])
-        report = work.report.copy()
-        report[FORCE_A : FORCE_A + 6] = self.end_forces(state, report)
-        return batch_of_one(t, held, state, report, self.books.work[0], self.model.sea.values)
+        return batch_of_one(t, held, state, work.report.copy(), self.books.work[0], self.model.sea.values)
 
     def output(self, batch: Batch) -> None:
         """Record a state."""

@@ -33,14 +33,10 @@ class SystemQuantities:
                 self._of_line[line] = found, found.probes()
 
     def keep_ranges(self, lines: Sequence[LineResult]) -> None:
-        """From now on the books of the lines keep the ranges of what is asked of them, over all steps.
-
-        Not of the force at an end that carries a free point, which steps have with the loads of the point.
-        """
+        """From now on the books of the lines keep the ranges of what is asked of them, over all steps."""
         for line in lines:
-            pipes, own = line.envelope.quantities.pipes, [("start", "end")[k] for k in line.carried]
-            mine = {n: q for n, q in self._wanted.items() if q.line == line.name and q.end not in own}
-            found = StepQuantities(line.scene, mine, pipes)
+            mine = {name: q for name, q in self._wanted.items() if q.line == line.name}
+            found = StepQuantities(line.scene, mine, line.envelope.quantities.pipes)
             if found:
                 line.books, self._steps[line.name] = found.given_to(line.books), found
 

@@ -121,6 +121,25 @@ def test_every_line_and_point_is_in_the_result(moved: hybrid.Result) -> None:
         moved["tension"]
 
 
+def test_a_force_on_a_knot_is_no_force_of_the_line_that_carries_it() -> None:
+    rope = {"length": 10, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e6, "bending_stiffness": 50}
+    knot = {"initial_guess": [7, 0, -4], "force": {"value": [0, 0, -500]}}
+    for more in ({}, {"mass": 0.1}):  # of a knot, and of one with a mass, whose forces are continued from the cells
+        found = hybrid.static(
+            {
+                "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [15, 0, 0]}, "knot": knot | more},
+                "lines": {
+                    "left": {"start": "a", "end": "knot", "sections": [rope], "model": "rod"},
+                    "right": {"start": "knot", "end": "b", "sections": [rope], "model": "rod"},
+                },
+            }
+        )
+        left, right = found.lines["left"], found.lines["right"]
+        pull = -left.reaction_end[0] - right.reaction_start[0]
+        assert np.abs(pull - [0, 0, 500 + 9.81 * more.get("mass", 0.0)]).max() < 1e-3, pull
+        assert np.isclose(left.tension[0, -1], right.tension[0, 0], rtol=1e-4)
+
+
 def test_end_forces_at_a_free_point_are_those_of_the_lines_alone() -> None:
     """Together they bear weight, buoyancy, drag and inertia of the float, whichever line carries these."""
     calm = {"fluid": {"density": 1025, "current": [0.4, 0.1, 0], "surface": 0.0}, "gravity": 9.81}
