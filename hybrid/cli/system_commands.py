@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import hybrid
+from hybrid.cli.app import picture_beside
 from hybrid.cli.plan_tables import contents_table, system_plan_lines
 from hybrid.cli.tables import extremes_facts, verdict_text, verdicts_of
 from hybrid.store.limits import held_of
@@ -26,16 +27,16 @@ KERNELS = ("system.solve_system", "run.in_space", "observed_outputs.observe_outp
 def run_lines(console: Console, asked: System, target: Path, plot: bool, keep: bool) -> None:
     """Compute the motion of several lines."""
     console.will_write(target)
-    _moved(console, asked, target, plot, partial(hybrid.run, asked, target, overwrite=not keep))
+    _moved(console, asked, target, picture_beside(target, plot), partial(hybrid.run, asked, target, overwrite=not keep))
 
 
 def resume_lines(console: Console, asked: System, source: Path, target: Path, plot: bool, **more: Any) -> None:
     """Go on with the motion of several lines; more: as of `hybrid.resume`."""
-    _moved(console, asked, target, plot, partial(hybrid.resume, source, target, **more))
+    _moved(console, asked, target, picture_beside(target, plot), partial(hybrid.resume, source, target, **more))
 
 
-def _moved(console: Console, asked: System, target: Path, plot: bool, compute: Callable[..., Result]) -> None:
-    """Compute a motion, and print what it has reached."""
+def _moved(console: Console, asked: System, target: Path, picture: Path | None, compute: Callable[..., Result]) -> None:
+    """Compute a motion, and print what it has reached; picture: where all lines are drawn, None: nowhere."""
     from hybrid.cli.progress_line import span
 
     console.compiling_kernels(KERNELS)
@@ -50,7 +51,7 @@ def _moved(console: Console, asked: System, target: Path, plot: bool, compute: C
         text += f"; estimated error {position:.2g} m, {force:.2g} N at the ends"
     else:
         text += "; error not estimated"
-    _ended(console, result, target, plot, text, steps=steps, wall=wall)
+    _ended(console, result, target, picture, text, steps=steps, wall=wall)
 
 
 def static_lines(console: Console, asked: System, target: Path, plot: bool, keep: bool) -> None:
@@ -58,28 +59,27 @@ def static_lines(console: Console, asked: System, target: Path, plot: bool, keep
     from hybrid.cli.progress_line import span
 
     console.will_write(target)
+    picture = picture_beside(target, plot)
     console.compiling_kernels(KERNELS)
     begin = clock.perf_counter()
     result = hybrid.static(asked, target, overwrite=not keep)
     wall = clock.perf_counter() - begin
     path, residual = (result.attributes[f"static_{x}"] for x in ("path", "residual"))
     text = f"equilibrium in {span(wall)} of wall time ({path}; residual force {residual:.2g} N)"
-    _ended(console, result, target, plot, text, path=path, residual=residual, wall=wall)
+    _ended(console, result, target, picture, text, path=path, residual=residual, wall=wall)
 
 
-def _ended(console: Console, result: Result, target: Path, plot: bool, text: str, **facts: Any) -> None:
-    """Print what lines and points have reached; plot: draw every line."""
-    pictures = []
-    for name, line in result.lines.items():
-        if plot:
-            pictures.append(target.with_suffix(f".{name}.png"))
-            hybrid.plot(line, pictures[-1])
+def _ended(console: Console, result: Result, target: Path, picture: Path | None, text: str, **facts: Any) -> None:
+    """Print what lines and points have reached, and draw them; picture: as of `_moved`."""
+    if picture is not None:
+        hybrid.plot(result, picture)
     lines = {name: extremes_facts(line) | verdicts_of(line) for name, line in result.lines.items()}
     held = [x._asdict() | {"text": x.text} for x in held_of(result)]
     points, bodies = _last(result, "points"), _last(result, "bodies")
     console.events(result.events)
     end = float(result.times[-1]) if len(result.times) > 1 else None
     console.show(lambda: _table(lines, points, bodies, held, end))
+    pictures = [picture] if picture is not None else []
     console.done(
         text, target, *pictures, status=result.status, lines=lines, points=points, bodies=bodies, quantities=held,
         **facts,

@@ -106,17 +106,34 @@ def shape(result: Result, every: AllLines, view: View) -> Panel:
 
 def tensions(result: Result, every: AllLines, output: int | None = None) -> Panel:
     """Tension along every line: the last one over the range of all times; output: that one, without ranges."""
-    peak = max(float(np.abs(line.tension).max()) for line in every.lines.values())
-    factor, unit = prefix("N", peak)
+    title = "tension along the lines" + ", and its range over all times" * (every.outputs > 1 and output is None)
+    return _along_lines(result, every, "tension", "tension", "N", title, output)
+
+
+def moments(result: Result, every: AllLines) -> Panel | None:
+    """The same of the bending moment; None: no line has any."""
+    bent = any("bending_moment" in x and np.abs(x["bending_moment"]).max() > 0.0 for x in every.lines.values())
+    title = "bending moment along the lines" + ", and its range" * (every.outputs > 1)
+    return _along_lines(result, every, "bending_moment", "moment", "N m", title, None) if bent else None
+
+
+def _along_lines(
+    result: Result, every: AllLines, name: str, word: str, unit: str, title: str, output: int | None
+) -> Panel:
+    """A quantity along the lines that have it; word: for its axis."""
+    lines = {x: line for x, line in every.lines.items() if name in line}
+    peak = max(float(np.abs(line[name]).max()) for line in lines.values())
+    factor, unit = prefix(unit, peak)
     items: list[Item] = []
-    for (name, colour), line in zip(colours(result).items(), every.lines.values(), strict=True):
-        found = along(line, "tension")
+    for label, colour in colours(result).items():
+        if label not in lines:
+            continue
+        found = along(lines[label], name)
         values = found.values * factor
         if len(values) > 1 and output is None:
             items.append(Band(found.s, values.min(axis=0), values.max(axis=0), colour=colour, opacity=0.15))
-        items.append(Line(*found.curve(values[-1 if output is None else output]), name, colour, 1.2))
-    title = "tension along the lines" + ", and its range over all times" * (every.outputs > 1 and output is None)
-    return Panel("tension", title, Axis("s", "m"), Axis("tension", unit, peak=peak * factor), items)
+        items.append(Line(*found.curve(values[-1 if output is None else output]), label, colour, 1.2))
+    return Panel(name, title, Axis("s", "m"), Axis(word, unit, peak=peak * factor), items)
 
 
 def largest_tensions(result: Result, every: AllLines) -> Panel:
@@ -168,12 +185,14 @@ def page(result: Result) -> Page:
     names = ["s", "S"][: len(views)]
     panels = {name: shape(result, every, view) for name, view in zip(names, views, strict=True)}
     panels["p"] = tensions(result, every)
-    below = ["p"]
     if every.outputs > 1:
         panels["h"] = largest_tensions(result, every)
         moved = sorted(motions(result, every), key=lambda panel: -(panel.y.peak or 0.0))
         panels |= dict(zip("mn", moved, strict=False))
-        below = [name for name in "phmn" if name in panels]
+    if (bent := moments(result, every)) is not None:
+        panels["b"] = bent
+    below = [name for name in "pbhmn" if name in panels][:4]
+    panels = {name: x for name, x in panels.items() if name in (*names, *below)}
     rows = [names] if aspect_of(views, every.as_result) < 3.0 else [[name] for name in names]
     wide = 2 if len(below) > 1 else 1
     rows = [[name for name in row for _ in range(wide // len(row) or 1)] for row in rows]

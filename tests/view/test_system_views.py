@@ -132,6 +132,20 @@ def test_commands_take_all_lines_or_one(path: Path, tmp_path: Path, monkeypatch:
     assert len(rows) == 22
 
 
+def test_an_equilibrium_is_drawn_as_one_picture_of_all_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    scene = spar()
+    del scene["time"], scene["output"]["every"]
+    for line in scene["lines"].values():
+        line |= {"sections": [SECTION | {"bending_stiffness": 1e4}], "model": "rod"}
+    Path("spar.yaml").write_text(json.dumps(scene))
+    told = CliRunner().invoke(app, ["static", "spar.yaml", "--plot"])
+    assert told.exit_code == 0 and "spar.static.png" in told.output
+    assert {x.name for x in tmp_path.iterdir()} == {"spar.yaml", "spar.static.h5", "spar.static.png"}
+    drawn = page(hybrid.open("spar.static.h5")).panels
+    assert {x.label for x in drawn["b"].items if isinstance(x, Line)} == set(PLACES)  # bending moments of all lines
+
+
 def test_a_stopped_run_is_drawn(tmp_path: Path) -> None:
     """A file with fewer outputs than were asked for, and an equilibrium with one."""
 
