@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.assembly import JOINED
-from hybrid.kernels.bodies import ARM, FRAME, PLACE, STATE, STIFFNESS, V
+from hybrid.kernels.bodies import ARM, FORCE, FRAME, LINES, OWN, PLACE, STATE, STIFFNESS, V
 from hybrid.kernels.report import FORCE_A, MOMENT_A
 from hybrid.kernels.state import Floats
 from hybrid.model.bodies import angles_of, frame_of
@@ -26,6 +26,8 @@ from hybrid.solve.system import SystemSolver, SystemState
 from hybrid.solve.system_statics import SystemEquilibrium
 
 VERTICAL = np.array([0.0, 0.0, 1.0])
+# Where the stiffness is that between equilibria: how far these are apart, of the longest line, and rad.
+SMALL_SHIFT, SMALL_TURN = 2e-5, 2e-4
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,6 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     system = _system(scene)
     kind, name = _target(system, at)
     model = build_system(system)
-    _refuse_torques(model)
     found = equilibrium_of_system(system, model, np.inf)
     solver, state, first = found.solver, found.state, 0
     size = 6 if kind == "body" else 3
@@ -94,9 +95,9 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
         position = np.array(held.position if isinstance(held, FixedBody) else system.first_place(name))
         rotation = np.array(held.rotation) if isinstance(held, FixedBody) else None
         first, own = 3 * len(free[0]) + (6 * len(free[1]) if kind == "body" else 0), np.zeros((size, size))
-    C = solver.compliance(state, solver.anchor)
+    C = _compliance(solver, state, first, size, len(solver.net))
     try:
-        matrix = None if C is None else np.linalg.inv(C[first : first + size, first : first + size])
+        matrix = None if C is None else np.linalg.inv(C)
     except np.linalg.LinAlgError:
         matrix = None
     if matrix is None:
@@ -104,13 +105,73 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     return Stiffness(at, np.asarray(matrix, float), np.asarray(matrix - own, float), position, rotation)
 
 
-def _refuse_torques(model: SystemModel) -> None:
-    """SceneError: the factors know the torque through catenary zones of some line only roughly."""
-    for name, line in zip(model.names, model.models, strict=True):
-        if line.line.torsion.size:
-            fix = f"lines.{name}: model: rod, or a swivel at one end; --offsets takes such lines"
-            expected = "lines without a torque through catenary zones, which the factors know only roughly"
-            raise SceneError([Complaint(f"lines.{name}.model", "zones that a torque passes through", expected, fix)])
+def _compliance(solver: SystemSolver, state: SystemState, first: int, size: int, points: int) -> Floats | None:
+    """(size, size) m/N, rad/N, .. of the point or body that begins at `first` of `SystemSolver.compliance`; points: how
+    many there are.  None: the system is singular.
+
+    From the factors; where a torque passes through catenaries, which these know roughly, from equilibria under small
+    forces and moments both ways.
+    """
+    found = solver.compliance(state, solver.anchor)
+    if found is None:
+        return None
+    C = found[first : first + size, first : first + size]
+    if not _needs_equilibria(solver):
+        return C
+    before = _settled(solver, state)
+    point, b = first // 3, (first - 3 * points) // 6
+    load, out = _load_on(solver, points, first, before), np.zeros((size, size))
+    for k in range(size):
+        small = SMALL_SHIFT * solver.length if k < 3 else SMALL_TURN
+        part, moved = small / max(abs(float(C[k, k])), 1e-300), []
+        for sign in (1.0, -1.0):
+            load[k] += sign * part
+            try:
+                taken, there = solver.newton(before)
+            finally:
+                load[k] -= sign * part
+            if taken.outcome != Outcome.OK:
+                detail = f"under a small force both ways, whose answer is the stiffness: {sign * part:.3g} N or N m"
+                raise ComputationError(taken.outcome, None, None, detail)
+            moved.append(_place_of(solver, there, before, point if first < 3 * points else -1, b)[:size])
+        out[:, k] = (moved[0] - moved[1]) / (2.0 * part)
+    return out
+
+
+def _needs_equilibria(solver: SystemSolver) -> bool:
+    """Whether the factors know the answer of some line only roughly."""
+    return any(x.line.torsion.size for x in solver.lines)
+
+
+def _load_on(solver: SystemSolver, points: int, first: int, state: SystemState) -> Floats:
+    """The force, and of a body the moment behind it, that act from outside on a point or body: a view to change."""
+    if first >= 3 * points:
+        return np.asarray(solver.bodies[(first - 3 * points) // 6, FORCE : FORCE + 6])
+    line, end = next((x, k) for x in solver.lines for k in (0, 1) if x.joints[k] == first // 3)
+    return np.asarray(line.ends.force[end])
+
+
+def _settled(solver: SystemSolver, state: SystemState) -> SystemState:
+    """An equilibrium of these lines, with what was held and is free now loaded as it was held."""
+    solver.evaluate_forces(state, 0.0)
+    for point, net in enumerate(solver.net):
+        _load_on(solver, len(solver.net), 3 * point, state)[:] -= net
+    solver.bodies[:, FORCE : FORCE + 6] -= solver.body_work[:, OWN : OWN + 6] + solver.body_work[:, LINES : LINES + 6]
+    taken, found = solver.newton(state)
+    if taken.outcome != Outcome.OK:
+        raise ComputationError(taken.outcome, None, None, "as it is, under the forces that hold it")
+    return found
+
+
+def _place_of(solver: SystemSolver, state: SystemState, before: SystemState, point: int, b: int) -> Floats:
+    """(6,) how far a point (-1: body b) has moved and turned, m and rad."""
+    if point >= 0:
+        line, end = next((n, k) for n, x in enumerate(solver.lines) for k in (0, 1) if x.joints[k] == point)
+        return np.concatenate([state.lines[line].r[-end] - before.lines[line].r[-end], np.zeros(3)])
+    row, old = state.bodies[b], before.bodies[b]
+    R = row[FRAME:V].reshape(3, 3) @ old[FRAME:V].reshape(3, 3).T
+    turn = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    return np.concatenate([row[PLACE:FRAME] - old[PLACE:FRAME], turn])
 
 
 def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], heading: float = 0.0) -> Offsets:

@@ -10,6 +10,7 @@ import pytest
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.newton import TOLERANCE
+from hybrid.simulation import system_stiffness
 
 LENGTH, CELLS, GJ = 40.0, 40, 150.0
 SECTION = {
@@ -154,6 +155,31 @@ def test_what_is_not_computed_with_it_is_refused(where: str, change: Any) -> Non
     assert where in str(refused.value)
 
 
-def test_stiffness_from_factors_is_refused() -> None:
-    with pytest.raises(SceneError, match="torque"):
-        hybrid.stiffness(on_a_body([1.0, 0, 0]), "body:body")
+@pytest.mark.parametrize("free", [True, False])
+def test_stiffness_with_a_torque_through_catenaries(free: bool) -> None:
+    """A turn about two taut lines: 2 GJ/L; across them: tension over length, with the levers of the body and EI."""
+    scene = on_a_body([1.0, 0, 0])
+    if not free:
+        scene["bodies"]["body"] = {"position": scene["bodies"]["body"]["initial_guess"]}
+    found = hybrid.stiffness(scene, "body:body")
+    K = found.matrix
+    assert K[3, 3] == pytest.approx(2 * GJ / 20.0, rel=1e-6)
+    assert K[0, 0] == pytest.approx(2 * 1e6 / 20.0, rel=1e-4)
+    apart = [-0.01, 0.01]
+    across = hybrid.offsets(scene, "body:body", apart, 90.0)
+    assert K[1, 1] == pytest.approx(-np.diff(across.force[:, 1])[0] / 0.02, rel=2e-4)
+    assert K[2, 2] == pytest.approx(K[1, 1], rel=1e-6) and K[5, 5] == pytest.approx(K[4, 4], rel=1e-6)
+    assert np.array_equal(found.lines, K)  # nothing else holds it
+
+
+def test_stiffness_between_equilibria_is_that_of_the_factors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a body whose lines bear no torque through catenaries, where both are known."""
+    scene = on_a_body([0.0, 0, 0])
+    for each in scene["lines"].values():
+        each |= {"model": "rod", "mesh": {"cells": 20}}
+    scene["environment"] = {"gravity": 9.81}
+    scene["bodies"]["body"]["force"] = {"value": [0, 200, 300.0]}
+    exact = hybrid.stiffness(scene, "body:body").matrix
+    monkeypatch.setattr(system_stiffness, "_needs_equilibria", lambda solver: True)
+    found = hybrid.stiffness(scene, "body:body").matrix
+    assert np.abs(found - exact).max(axis=0) == pytest.approx(0.0, abs=1e-5 * np.abs(exact).max())
