@@ -262,9 +262,12 @@ def twist_ends(l, seats, job, at, A):
 @inner
 def assemble_junctions(
     tables, joints, seats, arms, gaps, first, columns, functional, answers, net, bodies, old, new, work, S, G, A, m,
-    cv, ca,
+    cv, ca, own,
 ):  # fmt: skip
-    """Equations (m, m+1) of the last tensions, the points and the bodies, from what the lines hand over."""
+    """Equations (m, m+1) of the last tensions, the points and the bodies, from what the lines hand over.
+
+    own: whether what bodies are out of balance by themselves is in the right-hand side.
+    """
     for r in range(m):
         for c in range(m + 1):
             A[r, c] = 0.0
@@ -278,7 +281,12 @@ def assemble_junctions(
         spread(l, joints, seats, job, arms, points, tensions, row if end >= 0 else -1, S, G, A, m)
         if end >= 0:
             row += 1
+    for r in range(m):
+        A[m, r] = A[r, m]
     add_own(bodies, old, new, work, A, first_unknown(points, tensions, points), m, cv, ca)
+    if not own:
+        for r in range(m):
+            A[r, m] = A[m, r]
 
 
 @inner

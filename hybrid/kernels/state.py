@@ -225,13 +225,19 @@ class Batch(NamedTuple):
         return self.kb[:, node] if self.kb.size else line.kb[None, node]
 
 
-def batch_of_one(t: float, ends: Ends, state: State, report: Floats, work: Floats, sea: Sea) -> Batch:
-    """The batch of a single output at time t, s, with copies of what the next step overwrites."""
+def batch_of_one(
+    t: float, ends: Ends, state: State, report: Floats, work: Floats, sea: Sea, touch: Floats | None = None
+) -> Batch:
+    """The batch of a single output at time t, s, with copies of what the next step overwrites.
+
+    touch: (N+1,) N/m, force of the line on itself; None: it does not touch itself.
+    """
     now = State(*(x[None].copy() for x in state))
     return Batch(
         np.array([t]), now.r, now.v, now.vd, now.e, now.T, now.a1, now.w, ends.held[None].copy(),
         ends.position[None].copy(), ends.frame[None].copy(), ends.spin[None].copy(), ends.force[None].copy(),
         ends.moment[None].copy(), report[None].copy(), work[None].copy(), sea.now[None].copy(), turn=now.turn,
+        **{} if touch is None else {"touch": touch[None].copy()},
     )  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from hybrid.kernels.bodies import (
     size_of_moves,
     start_here,
 )
-from hybrid.kernels.books import CARRIED, NOW, RATES, STORED
+from hybrid.kernels.books import CARRIED, NOW, RATES, RHO, SHORTEST, STEP_BEFORE, STORED, TRY_END
 from hybrid.kernels.carried_frames import turns
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.configuration import first_bad, measure, update
@@ -31,23 +31,33 @@ from hybrid.kernels.generalized_alpha import Scheme, scheme
 from hybrid.kernels.joined_lines import solve_dense
 from hybrid.kernels.junctions import END, START, add_pull, assemble_junctions, correct_all, place_ends
 from hybrid.kernels.newton import (
+    ADDRESS,
     ASSEMBLY,
     CORRECT,
     CORRECTION,
     EQUILIBRIUM,
+    FINISH,
+    GAIN,
     LARGEST_TURN,
+    LIMIT,
     LOW_TENSION,
+    NEAR,
     NOT_CONVERGED,
     NOT_FINITE,
     OK,
+    PREPARE,
+    RADIUS,
+    REST,
     SINGULAR,
     SLACK,
     STEP,
     TURNED_TOO_FAR,
     WHOLE,
     Task,
+    ask_contact,
     follow_law,
     has_converged,
+    most_turn,
     pass_torque,
     round_off_tension,
 )
@@ -60,6 +70,7 @@ from hybrid.kernels.report import (
     RESIDUAL,
     RESIDUAL_NODE,
     SEABED_ENERGY,
+    SELF_CONTACT_ENERGY,
     SLACKEST,
     SLACKEST_CELL,
 )
@@ -70,7 +81,7 @@ from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_ra
 from hybrid.kernels.step_law import REFUSED
 
 JUNCTIONS = 5
-call_solver = caller((0, 0, 0.0, 0))
+call_solver, call_touch = caller((0, 0, 0.0, 0)), caller(0)
 # Where cv and ca of the task are among the numbers of a job, whose first field it is.
 TASK_CV, TASK_CA, TASK_DT = Task._fields.index("cv"), Task._fields.index("ca"), Task._fields.index("dt")
 
@@ -151,35 +162,47 @@ def follow_laws(tables, s):
 
 
 @inner
-def begin_lines(tables, s):
-    """Predict a step of all lines; returns -1, or a line that turns too far, its turn and its cell."""
+def prepare_contact(tables, task, t):
+    """Before a try of a step to t (s): the part of the prediction that is safe, and the spectral radius, of all lines."""
+    safe, rho = 1.0, task.rho
     for l in range(tables.shape[0]):
         job = read(tables[l])
-        turn, cell = begin_step(None, 1, job.line, job.sea, job.old, job.new, job.work.u, s, 1.0)
-        if not turn < LARGEST_STEP_TURN:
-            return l, turn, cell
-    return -1, 0.0, -1
+        if job.contact[ADDRESS] != 0:
+            clock = job.books.clock
+            clock[NOW], clock[TRY_END], clock[STEP_BEFORE], clock[RHO] = t - task.dt, t, task.before, task.rho
+            safe = min(safe, ask_contact(job.contact, job.contact_table, PREPARE))
+            rho = min(rho, ask_contact(job.contact, job.contact_table, RADIUS))
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        if job.contact[ADDRESS] != 0:  # so that each has that of all
+            own = ask_contact(job.contact, job.contact_table, RADIUS)
+            if own > rho:
+                job.books.clock[RHO] *= rho / own
+    return safe, rho
 
 
 @inner
-def end_lines(tables, floors, s, task, good):
-    """Rates after a step of all lines, and if it is good their reports.
+def safe_part(tables):
+    """The part of a correction by which no line passes through itself."""
+    part = 1.0
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        if job.contact[ADDRESS] != 0:
+            part = min(part, ask_contact(job.contact, job.contact_table, LIMIT))
+    return part
 
-    Returns -1, or a line whose cell turns too far or is slack, and that turn (0: slack) and cell.
+
+@inner
+def begin_lines(tables, s, safe):
+    """Predict a step of all lines; returns -1, or a line that turns too far, its turn and its cell.
+
+    safe: part of the way in which no line passes through itself.
     """
     for l in range(tables.shape[0]):
         job = read(tables[l])
-        find_rates(1, job.line, job.sea, job.old, job.new, job.work.u, s)
-        if good:
-            turn, cell = end_step(
-                None, 1, job.line, job.sea, job.ends, job.old, job.new, s, task, job.was, job.now, job.work,
-                job.books.strains,
-            )  # fmt: skip
-            if not turn < LARGEST_STEP_TURN:
-                return l, turn, cell
-            report = job.work.report
-            if not report[SLACKEST] > floors[l]:
-                return l, 0.0, int(report[SLACKEST_CELL])
+        turn, cell = begin_step(None, 1, job.line, job.sea, job.old, job.new, job.work.u, s, safe)
+        if not turn < most_turn(job.contact):
+            return l, turn, cell
     return -1, 0.0, -1
 
 
@@ -210,6 +233,36 @@ def take_loads_off(line, ends, state, books, report):
 
 
 @inner
+def end_lines(tables, joints, floors, s, task, good):
+    """Rates after a step of all lines, and if it is good their reports.
+
+    Returns -1, or a line whose cell turns too far, or is slack, or whose contact creates energy, and that turn (0: slack)
+    and cell.
+    """
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        find_rates(1, job.line, job.sea, job.old, job.new, job.work.u, s)
+        if good:
+            touches = job.contact[ADDRESS] != 0
+            if touches:
+                job.work.report[SELF_CONTACT_ENERGY] = ask_contact(job.contact, job.contact_table, FINISH)
+            turn, cell = end_step(
+                None, 1, job.line, job.sea, job.ends, job.old, job.new, s, task, job.was, job.now, job.work,
+                job.books.strains,
+            )  # fmt: skip
+            if not turn < most_turn(job.contact):
+                return l, turn, cell
+            report = job.work.report
+            if touches and 0.5 * task.dt >= job.books.clock[SHORTEST]:
+                move_joints(job, joints[l, START], joints[l, END])
+                if ask_contact(job.contact, job.contact_table, GAIN) > 0.0:
+                    return l, turn, cell  # it creates energy: in halves
+            if not report[SLACKEST] > floors[l]:
+                return l, 0.0, int(report[SLACKEST_CELL])
+    return -1, 0.0, -1
+
+
+@inner
 def keep_report(books, report):
     for k in range(report.shape[0]):
         books.report[0, k] = report[k]
@@ -234,6 +287,9 @@ def begin_books(tables, joints, t):
             books.clock[STORED] = report[SEABED_ENERGY]
             for i in range(new.r.shape[0]):
                 new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
+        if job.contact[ADDRESS] != 0:
+            books.clock[NOW] = t
+            report[SELF_CONTACT_ENERGY] = ask_contact(job.contact, job.contact_table, REST)
         move_joints(job, joints[l, START], joints[l, END])
         find_powers(line, job.ends, books.velocity, new, report, books.power[0])
         take_loads_off(line, job.ends, new, books, report)
@@ -256,6 +312,8 @@ def keep_books(tables, joints, dt, t):
         find_powers(line, job.ends, books.velocity, new, report, books.power[0])
         book_work(line, dt, report, books)
         take_loads_off(line, job.ends, new, books, report)
+        for i in range(books.touch.shape[1]):
+            books.touch[0, i] = books.touch[2, i]
         if books.extremes.shape[1] > 0:
             keep_report(books, report)
             note_extremes(line, job.sea, job.ends, new, books, t)
@@ -278,7 +336,7 @@ def end_system_step(tables, joints, floors, allowed, old, new, work, task, s, t,
     A step whose error is too large (kernels.step_law) is none for the books: whoever asked for it takes it back; where
     `allowed` is negative, whoever keeps it books it (book_system_step).
     """
-    line, turn, cell = end_lines(tables, floors, s, task, solved)
+    line, turn, cell = end_lines(tables, joints, floors, s, task, solved)
     turned = end_bodies(old, new, work, s)
     if line >= 0:
         return (TURNED_TOO_FAR if turn > 0.0 else SLACK), line, cell
@@ -300,7 +358,7 @@ def book_system_step(tables, joints, work, dt, t):
 @kernel
 def solve_system(
     task, t, solver, tables, numbers, joints, fairleads, seats, arms, gaps, floors, allowed, first, columns, functional,
-    answers, q, net, bodies, old, new, work, S, G, A,
+    answers, q, net, bodies, old, new, work, S, G, A, touch, touch_table,
 ):  # fmt: skip
     """Do a task (kernels.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a system.
 
@@ -314,18 +372,23 @@ def solve_system(
     step, beyond REFUSED times of which it is not booked, negative: no step is; first: (L,) where columns (3, .., 5), or
     (COLUMNS, .., 5) where an end turns, of a line begin that carries some; bodies, old, new, work: rows of numbers of
     each body (kernels.bodies); functional: (FUNCTIONAL,), answers: (2, ANSWER), q: (COLUMNS,), net: (P, 3),
-    S: (HANDED - 1, HANDED), G: (2, 6, 6) and A: (m+3, m+1), m tensions and coordinates, are worked in.
+    S: (HANDED - 1, HANDED), G: (2, 6, 6) and A: (m+3, m+1), m tensions and coordinates, are worked in; touch: address
+    of kernels.system_contact.touch_system and its table, 0: no line touches itself.
     On return `net` is what does not balance at the points, N.
     Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.
     """
     m, most, count, points = A.shape[1] - 1, task.limits.most, tables.shape[0], net.shape[0]
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
-        s = scheme(task.rho, task.before, task.dt)
+        safe, rho = 1.0, task.rho
+        if touch != 0:
+            safe, rho = prepare_contact(tables, task, t)
+        task = Task(task.what, task.dt, task.before, rho, task.cv, task.ca, task.turning, task.limits, task.cut)
+        s = scheme(rho, task.before, task.dt)
         turn, line = predict_bodies(old, new, work, s)
         if not turn < LARGEST_STEP_TURN:
             return TURNED_TOO_FAR, 0, turn, -1, -1
-        line, turn, cell = begin_lines(tables, s)
+        line, turn, cell = begin_lines(tables, s, safe)
         if line >= 0:
             return TURNED_TOO_FAR, 0, turn, line, cell
     else:
@@ -334,7 +397,10 @@ def solve_system(
     rubs = 0
     for l in range(count):
         numbers[l, TASK_CV], numbers[l, TASK_CA], numbers[l, TASK_DT] = s.cv, s.ca, task.dt
-        rubs |= read(tables[l]).line.bits & FRICTION
+        job = read(tables[l])
+        rubs |= job.line.bits & FRICTION
+        if touch != 0 and job.contact[ADDRESS] != 0:
+            rubs |= job.contact[NEAR]
     before, left = math.inf, math.inf
     outcome, it, line, where = NOT_CONVERGED, 0, -1, -1
     while it < most and outcome == NOT_CONVERGED:
@@ -353,7 +419,7 @@ def solve_system(
             break
         assemble_junctions(
             tables, joints, seats, arms, gaps, first, columns, functional, answers, net, bodies, old, new, work, S, G,
-            A, m, s.cv, s.ca,
+            A, m, s.cv, s.ca, True,
         )  # fmt: skip
         if task.what == JUNCTIONS:
             outcome = OK
@@ -367,6 +433,9 @@ def solve_system(
             outcome, where = NOT_FINITE, first_bad(bad.work.x, bad.new.e)
             break
         correct_torques(tables, s.cv)
+        if touch != 0 and call_touch(touch, touch_table) == 0:
+            before = math.inf
+            break
         if task.what == CORRECTION:
             outcome = OK
             break
@@ -379,6 +448,8 @@ def solve_system(
             part = LARGEST_TURN / turn
         if rubs != 0 and s.cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
             part *= 0.5
+        if touch != 0:
+            part = min(part, safe_part(tables))
         for l in range(count):
             job = read(tables[l])
             update(None, 1, job.line, job.new, s.cv, s.ca, part, False, job.work)

@@ -28,7 +28,7 @@ from hybrid.scene.analysis import (
 from hybrid.scene.attachments import Attachment
 from hybrid.scene.base import Finding, Place, Positive, Table, Text, Truth, Whole, refuse
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, turned, without_turns
-from hybrid.scene.cable import Cable, Environment, Section
+from hybrid.scene.cable import Cable, Contact, Environment, Section
 from hybrid.scene.connections import ClampedConnection, Connections, connection_findings
 from hybrid.scene.ends import Clamped, End, Ends, Free, Pinned, Triple
 from hybrid.scene.motion_checks import motion_findings
@@ -64,6 +64,11 @@ class JoinedLine(Table):
         description="rod, catenary, zones of both that stay, or adaptive; absent: rod where it bends, else catenary",
     )
     mesh: Mesh | None = Field(default=None, description="how the line is cut into cells; absent: chosen")
+    contact: Contact = Field(
+        default=Contact(self=False),
+        description="whether the line touches itself in a run, with friction or without; absent: an event says where "
+        "it meets itself",
+    )
     accuracy: AskedAccuracy | None = Field(
         default=None, description="how wrong the result of this line may be; absent: as `accuracy` of the system"
     )
@@ -92,6 +97,9 @@ class JoinedLine(Table):
             refuse([Finding(("model",), expected, "write `model: rod`", f"kind: {self.model.kind}")])
         if isinstance(self.model, AdaptiveModel):
             refuse(self._of_moving_zones(self.model))
+        if self.contact.self and isinstance(self.model, AdaptiveModel):
+            expected = "false, because zones of this line move, which know no contact in a line of several"
+            refuse([Finding(("contact", "self"), expected, "write `model: rod`, or leave contact out", "true")])
         for i, section in enumerate(self.sections):
             if section.tension_torque:
                 expected = "nothing or 0, because several lines are computed together, which know no torque of tension"
@@ -144,7 +152,7 @@ class System(Table):
         "model": "each line has its own: lines.NAME.model",
         "mesh": "each line has its own: lines.NAME.mesh",
         "resolution": "cells of several lines are given: lines.NAME.mesh",
-        "contact": "lines of a system do not touch each other or themselves",
+        "contact": "each line has its own, for itself: lines.NAME.contact; lines do not touch each other",
         "solver": "leave it out: several lines are solved by elimination",
         "dimension": "leave it out: several lines are computed in space",
     }
@@ -302,7 +310,7 @@ class System(Table):
         tables: dict[str, Any] = {
             "title": f"{self.title}, line {name}" if self.title else f"line {name}", "environment": self.environment,
             "cable": line.cable, "ends": Ends(**ends), "initial": Equilibrium(), "model": line.chosen_model,
-            "mesh": line.mesh, "contact": {"self": False}, "accuracy": line.accuracy or self.accuracy,
+            "mesh": line.mesh, "contact": line.contact.asked, "accuracy": line.accuracy or self.accuracy,
         }  # fmt: skip
         if self.time is not None:
             tables["time"] = self.time

@@ -16,7 +16,7 @@ from hybrid.kernels import books as b
 from hybrid.kernels.accept import LARGEST_TWIST
 from hybrid.kernels.bed import planes_under
 from hybrid.kernels.entry import sharpest
-from hybrid.kernels.forces import FRICTION, PLANAR, SEABED
+from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, SELF_FRICTION
 from hybrid.kernels.report import BEND, TWIST_NODE
 from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.state import Batch, Ends, Floats, State, ends_in, state_in
@@ -154,6 +154,10 @@ class Diagnostics:
         if self._model.line.bits & FRICTION and not found.with_friction:
             text = "this equilibrium is the one without friction: say `initial: {kind: equilibrium, friction: settled}`"
             where = f"{text} for one that lies where it was laid"
+            self.events.event(0.0, 0.0, self._model.length, "static friction neglected", where)
+        if self._model.line.bits & SELF_FRICTION and found.touch.any():
+            text = "this equilibrium is the one without friction where the line touches itself"
+            where = f"{text}: a run with damping that comes to rest in contact has it"
             self.events.event(0.0, 0.0, self._model.length, "static friction neglected", where)
         model = self._model
         line, sea, ends = model.line, model.sea.values, model.ends.values

@@ -117,11 +117,15 @@ class SelfWatch:
             line=model.line, ends=model.ends.values, old=old, new=new, clock=run.clock, counts=run.count,
             itself=self.itself,
         )  # fmt: skip
-        self._touches = bool(model.line.bits & SELF_CONTACT)
-        self.itself.found[MEETING] = OUTER - 1.0 if self._touches else 0.0
+        self.touch(model)
         self.asks = bool(model.line.bits & MAY_TOUCH) and not self._touches
         self.itself.ahead[AHEAD] = 0.0 if self.asks else -1.0
         run.watch_itself(self._job.numbers, self._address)
+
+    def touch(self, model: Model) -> None:
+        """Events tell of contact from now on where it is computed."""
+        self._touches = bool(model.line.bits & SELF_CONTACT)
+        self.itself.found[MEETING] = OUTER - 1.0 if self._touches else 0.0
 
     def look(self, run: CompiledRun) -> int:
         """Look at the last step of a line that is so bent that it could come near itself, and let every step do so from
@@ -193,6 +197,7 @@ class LineWatch:
         self._clock = np.zeros(CLOCK_SIZE)
         if watch.on:
             watch.itself = blank_itself(diameters(model))._replace(found=watch.itself.found)
+            watch.touch(model)
             self._job = Table(blank_itself_job())
             self._job.bind(
                 line=model.line, ends=model.ends.values, old=self._now, new=self._before, clock=self._clock,

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def checkpoint(run: SystemRun) -> dict[str, Any]:
     """What the next steps depend on, between two steps, with no output waiting: named arrays and plain values."""
     lines = {
-        line.name: line.checkpoint(work) | {"state": state._asdict()}
+        line.name: line.checkpoint(work, run.t) | {"state": state._asdict()}
         for line, work, state in zip(run.lines, run.solver.work, run.state.lines, strict=True)
     }
     return {
@@ -57,6 +57,8 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         if name in template["zones"]:
             line["envelope"] = None  # of other meshes as well
         line["report"] = np.full_like(line["report"], np.inf)  # it may have numbers that are not finite
+        if "self_contact" in line:
+            line["self_contact"] = None  # as many places of friction as there are
     found = matched(dict(saved), template)
     if not (isinstance(found["dry"], list) and set(found["dry"]) <= set(run.system.bodies)):
         raise ValueError("dry: names of bodies were expected")

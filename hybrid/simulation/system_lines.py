@@ -10,7 +10,7 @@ import numpy as np
 
 from hybrid.kernels.books import CARRIED, LOG, STORED, Books
 from hybrid.kernels.entry import sharpest
-from hybrid.kernels.forces import FRICTION
+from hybrid.kernels.forces import FRICTION, SELF_CONTACT
 from hybrid.kernels.report import FORCE_A, LOCAL_ERROR
 from hybrid.kernels.run import blank_books
 from hybrid.kernels.state import Batch, Ends, Floats, State, Work, batch_of_one
@@ -27,9 +27,10 @@ from hybrid.simulation.envelope import Envelope, marks_of
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.result_file import result_recorder
 from hybrid.simulation.run_sample import COMPARED
-from hybrid.simulation.self_watch import LineWatch, SelfWatch
+from hybrid.simulation.self_watch import LineWatch, SelfWatch, diameters, least_bending
 from hybrid.simulation.time_loop import FORCE_COLUMNS
 from hybrid.solve.run import no_extremes
+from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.system import JoinedLine, SystemTaken
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
 from hybrid.store.comparison_recorder import ComparisonRecorder
@@ -37,7 +38,7 @@ from hybrid.store.writer import Recorder
 
 # Outputs of a line that wait for one another: quantities of all of them are computed together.
 WAITING = 64
-NO_CONTACT = "of several lines no contact with themselves is computed"
+NO_CONTACT = "its contact is off"
 # Of the length: ends that are so near to where they were have not been moved.
 SAME_PLACE = 1e-9
 
@@ -70,7 +71,7 @@ class LineResult:
         self._moves = outputs > 0
         self.observer = observer_of(scene, model, self._moves, COMPARED if compared else None)
         self.envelope = Envelope(scene, model, self._moves)
-        self.envelope.itself = SelfWatch(model, NO_CONTACT, "one cable whose ends move as here does")
+        self.envelope.itself = SelfWatch(model, NO_CONTACT, "contact: {self: true} of the line does")
         self.envelope.itself.on &= not compared
         self._itself = LineWatch(self.envelope.itself, model)
         self.recorder: Recorder | DeferredRecorder | ComparisonRecorder = ComparisonRecorder(FORCE_COLUMNS)
@@ -84,6 +85,7 @@ class LineResult:
         loaded, bodies = model.loaded_ends, scene.ends.bodies()
         self.carried = [k for k, end in enumerate(("start", "end")) if end in bodies and loaded[k]]
         self.books = self._own_books(state)
+        self.contact: SelfContact | None = None
         self._waiting: list[Batch] = []
         self._log: list[tuple[float, ...]] = []
         if found is not None:
@@ -106,7 +108,25 @@ class LineResult:
         return books._replace(
             strains=np.zeros((nodes, 3)), marks=marks, right=right, start=begin.copy(),
             extremes=no_extremes(nodes + marked.size),
+            touch=np.zeros((3, nodes if self.touches else 0)),
         )  # fmt: skip
+
+    @property
+    def touches(self) -> bool:
+        """Whether contact of the line with itself is computed."""
+        return self._moves and bool(self.model.line.bits & SELF_CONTACT)
+
+    def touch_itself(self, t: float) -> SelfContact | None:
+        """Contact of the line as it is from t (s) on, which goes on with what there was; None: there is none."""
+        if not self.touches:
+            return None
+        before, model = self.contact, self.model
+        self.contact = SelfContact(
+            model.line, diameters(model), least_bending(model), model.tension_scale, self.scene.contact.friction
+        )
+        if before is not None:
+            self.contact.restore(before.checkpoint(t), t)
+        return self.contact
 
     def note_equilibrium(self, x: JoinedLine, state: State, t: float | None) -> None:
         """What an equilibrium leaves open; t: s, where a motion starts from it, None: it is the result."""
@@ -157,7 +177,8 @@ class LineResult:
     def state_for_output(self, t: float, ends: Ends, state: State, work: Work) -> Batch:
         """A state at t (s) as outputs are made of it; both ends count as held, by their points."""
         held = ends._replace(held=np.ones(2, np.int8), position=state.r[[0, -1]])
-        return batch_of_one(t, held, state, work.report.copy(), self.books.work[0], self.model.sea.values)
+        touch = self.books.touch[0] if self.books.touch.size else None
+        return batch_of_one(t, held, state, work.report.copy(), self.books.work[0], self.model.sea.values, touch)
 
     def output(self, batch: Batch) -> None:
         """Record a state."""
@@ -226,13 +247,14 @@ class LineResult:
         self.recorder.close(status, message)
         return noted
 
-    def checkpoint(self, work: Work) -> dict[str, Any]:
-        """What the rest of the run depends on beside the state, between two steps, with no output waiting."""
+    def checkpoint(self, work: Work, t: float) -> dict[str, Any]:
+        """What the rest of the run depends on beside the state at t (s), between two steps, with no output waiting."""
         books, noted = self.books, {name: getattr(self.diagnostics, name) for name in REMEMBERED}
         return {
             "work": books.work[0].copy(), "power": books.power[0].copy(), "stored": float(books.clock[STORED]),
             "report": work.report.copy(), "envelope": self.envelope.checkpoint(books.extremes), "noted": noted,
             "ends": self.model.ends.checkpoint(), "first_energy": self.observer.first_energy or 0.0,
+            **({} if self.contact is None else {"self_contact": self.contact.checkpoint(t)}),
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any], work: Work, t: float, joints: Sequence[int]) -> None:
@@ -244,6 +266,8 @@ class LineResult:
         books.start[:] = self.envelope.start_of(model.line.s)
         vars(self.diagnostics).update(saved["noted"])
         self.observer.first_energy = saved["first_energy"]
+        if self.contact is not None:
+            self.contact.restore(saved["self_contact"], t)
         model.ends.restore(saved["ends"], t)
         apart = np.abs(saved["ends"]["position"] - model.ends.values.position).max(axis=1)
         for k in (0, 1):

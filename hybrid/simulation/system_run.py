@@ -13,6 +13,7 @@ import numpy as np
 
 from hybrid.adapt.manager import DomainManager
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
+from hybrid.kernels import books
 from hybrid.kernels.bodies import FRAME, PLACE, V
 from hybrid.kernels.cache import cache_folder
 from hybrid.kernels.report import BEND, TWIST_NODE
@@ -32,6 +33,7 @@ from hybrid.simulation.system_checkpoint import (
     other_program,
     restore,
 )
+from hybrid.simulation.system_contact import refuse_within_itself
 from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.system_points import fields_of, values_of
@@ -241,6 +243,7 @@ class SystemRun:
         assert self.found is not None
         try:
             solver = self.found.solver
+            refuse_within_itself(zip(self.lines, solver.lines, self.state.lines, strict=True), False)
             solver.keep_books([line.books for line in self.lines])
             solver.evaluate_forces(self.state, 0.0)
             for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
@@ -281,7 +284,9 @@ class SystemRun:
 
     def make_solver(self) -> None:
         """A solver for the model as it is."""
-        self.solver = SystemSolver(joined_lines(self.model, 0.0), len(self.model.free), self.model.body_numbers(0.0))
+        contacts = [line.touch_itself(self.t) for line in self.lines]
+        lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
+        self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts)
         self.solver.keep_books([line.books for line in self.lines])
         self.solver.books_steps = self.zones is None
         if self.control is not None:
@@ -295,6 +300,7 @@ class SystemRun:
         """Make the start ready for steps, and record it."""
         time = self.system.require_time()
         self.make_solver()
+        refuse_within_itself(zip(self.lines, self.solver.lines, self.state.lines, strict=True), True)
         self._settle(self.solver)
         if self.zones is not None:
             self.zones.begin()
@@ -418,6 +424,7 @@ class SystemRun:
                 model.ends.at(t)
                 model.sea.at(t)
                 line.books.velocity[:] = model.ends.velocity
+                line.books.clock[books.SHORTEST] = shortest
             self.model.load_bodies(t, solver.bodies, self.loaded)
             self.model.stir(t, self.state.bodies, t - self.t, solver.bodies)
             # a start counts as a step of fixed length does (kernels.run)

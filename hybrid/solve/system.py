@@ -20,7 +20,7 @@ from hybrid.kernels.assembly import JOINED
 from hybrid.kernels.binding import Table
 from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
 from hybrid.kernels.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, STATE, VD, WA, WD, WORK, A, U, V, W, X
-from hybrid.kernels.books import Books
+from hybrid.kernels.books import NOW, Books
 from hybrid.kernels.carried_frames import ANSWER, SEAT, TURNS
 from hybrid.kernels.entry import NO_PUSH, workspace_of
 from hybrid.kernels.forces import FRICTION, WAVES
@@ -31,10 +31,12 @@ from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, Limit
 from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL
 from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.run import blank_books, blank_job, in_space
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work, blank_state
 from hybrid.kernels.step import friction_axes
 from hybrid.kernels.system import JUNCTIONS, book_system_step, solve_system
+from hybrid.kernels.system_contact import blank_touching_job, room_for_products, touch_system
 from hybrid.kernels.water import wave_kinematics
+from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.stability import ANCHOR
 from hybrid.solve.statics import (
     BALANCED,
@@ -105,14 +107,17 @@ def _carries(x: JoinedLine) -> bool:
     return x.joints[0] >= 0 or bool(x.seats[:, TURNS].any())
 
 
-def _room(x: JoinedLine) -> Work:
-    """Arrays for a line, with room for all its factors where they serve again, for the last where its end is joined."""
+def _room(x: JoinedLine, touches: bool = False) -> Work:
+    """Arrays for a line, with room for all its factors where they serve again, for the last where its end is joined.
+
+    touches: whether it touches itself.
+    """
     cells, joints = x.line.h.size, x.joints
     kept = (cells + 1) * KEPT if _carries(x) else KEPT if joints[1] >= 0 else 0
     rows = np.zeros((1 if joints[0] >= 0 else 0, SIZE * WIDTH))
-    if x.line.torsion.size:  # a torque takes all factors, and those are kept in every march where they serve again
+    if touches or x.line.torsion.size:  # these take all factors, which are kept in every march where they serve again
         kept = (cells + 1) * KEPT
-    work = workspace_of(x.line, keep=_carries(x) or joints[1] >= 0)
+    work = workspace_of(x.line, keep=touches or _carries(x) or joints[1] >= 0)
     return work._replace(X=np.zeros((cells + 1) * ROW + kept), rows=rows)
 
 
@@ -122,9 +127,13 @@ class SystemSolver:
     It works in space: a line whose plane is known must not be marked as planar.
     """
 
-    def __init__(self, lines: Sequence[JoinedLine], points: int, bodies: Floats = NO_BODIES) -> None:
-        """points: how many free points there are; bodies: (B, NUMBERS), what they are, read at every step.
+    def __init__(
+        self, lines: Sequence[JoinedLine], points: int, bodies: Floats = NO_BODIES,
+        contacts: Sequence[SelfContact | None] = (),
+    ) -> None:  # fmt: skip
+        """points: how many free points there are; bodies: (B, NUMBERS), what they are, read at every step; contacts: of
 
+        lines that touch themselves, in the order of the lines, None: of one that does not; empty: none does.
         Each point and body must be at an end of some line.
         """
         self.lines, self.bodies = tuple(lines), bodies
@@ -135,7 +144,8 @@ class SystemSolver:
         self._handed, self._follow = np.zeros((HANDED - 1, HANDED)), np.zeros((2, 6, 6))
         self._answers, self._turned = np.zeros((2, ANSWER)), np.zeros(COLUMNS)
         self.joints: NDArray[np.int64] = np.array([x.joints for x in lines], np.int64).reshape(-1, 2)
-        self.work = [_room(x) for x in lines]
+        self._contacts = {k: x for k, x in enumerate(contacts) if x is not None}
+        self.work = [_room(x, k in self._contacts) for k, x in enumerate(lines)]
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
         self._floors = np.array([x.floor for x in lines])
         self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
@@ -163,6 +173,25 @@ class SystemSolver:
                 task=Task(ASSEMBLY, limits=limits), line=x.line, sea=x.sea, ends=x.ends, work=work, books=books,
                 was=NO_PUSH, now=NO_PUSH,
             )  # fmt: skip
+        self._touching, self._touch_address = Table(blank_touching_job()), 0
+        self._at_rest = np.zeros(1, np.int64)
+
+    def _touch(self) -> None:
+        """Lines that touch themselves do so from now on, with the books as they are."""
+        states = [blank_state(x.line.h.size) for x in self.lines]
+        for k, contact in self._contacts.items():
+            table, both = self._tables[k], (states[k], states[k])
+            numbers = contact.attach(self.lines[k].line, self.lines[k].ends, both, self.work[k], self.books[k])
+            table.bind(contact=contact.call, contact_table=numbers)
+        nodes = sum(x.line.s.size for x in self.lines)
+        self._touching.bind(
+            tables=self._numbers, joints=self.joints, seats=self._seats, arms=self._arms,
+            gaps=np.zeros_like(self._gaps), first=self._first, columns=self._columns, functional=self._functional,
+            answers=self._answers, net=self.net, bodies=self.bodies, work=self.body_work, S=self._handed,
+            G=self._follow, A=self._matrix, q=self._turned, kept=np.zeros((nodes, SIZE)),
+            moved=np.zeros((len(self.bodies), 6)), hessenberg=room_for_products(), asked=self._at_rest,
+        )  # fmt: skip
+        self._touch_address = touch_system.address(self._touching.numbers)
 
     def keep_books(self, books: Sequence[Books]) -> None:
         """Keep powers, work and extremes of the lines in these books from now on."""
@@ -170,6 +199,8 @@ class SystemSolver:
         for table, each in zip(self._tables, books, strict=True):
             asks = each.asked.size or each.walls.size
             table.bind(books=each, quantities=note_quantities.address(self._numbers[0]) if asks else 0)
+        if self._contacts:
+            self._touch()
 
     def _solve(self, task: Task, old: SystemState, new: SystemState, t: float = 0.0) -> SystemTaken:
         both = [*new.lines, *old.lines]
@@ -180,12 +211,16 @@ class SystemSolver:
             else:
                 table.bind(old=a, new=b)
         self._states = [*old.lines], [*new.lines]
+        if self._contacts:
+            self._touching.bind(old=old.bodies, new=new.bodies)
+            for k, contact in self._contacts.items():
+                contact.follow(old.lines[k], new.lines[k])
         allowed = self.allowed if self.books_steps else self._unbooked
         outcome, iterations, left, line, where = solve_system(
             task, t, self._solver, self._numbers, self._numbers.view(np.float64), self.joints, self._fairleads,
             self._seats, self._arms, self._gaps, self._floors, allowed, self._first, self._columns,
             self._functional, self._answers, self._turned, self.net, self.bodies, old.bodies, new.bodies,
-            self.body_work, self._handed, self._follow, self._matrix,
+            self.body_work, self._handed, self._follow, self._matrix, self._touch_address, self._touching.numbers,
         )  # fmt: skip
         return SystemTaken(Outcome(outcome), iterations, left, line, where, self.residual())
 
@@ -245,7 +280,11 @@ class SystemSolver:
             self._around(x, state, work)
             ends = x.ends._replace(position=state.r[[0, -1]])
             table.bind(work=work._replace(gaps=gaps), ends=ends)
+        self._at_rest[0] = 1
+        for k in self._contacts:
+            self.books[k].clock[NOW] = t
         taken = self._solve(Task(CORRECTION, ca=HEAVY, limits=Limits(1.0, 1.0, 1)), states, states)
+        self._at_rest[0] = 0
         for x, table, work in zip(self.lines, self._tables, self.work, strict=True):
             table.bind(work=work, ends=x.ends)
         if taken.outcome != Outcome.OK:

@@ -335,6 +335,7 @@ def test_an_equilibrium_in_contact(resting: tuple[dict[str, Any], hybrid.Result]
     result = resting[1]
     assert result.status == "complete" and "damped motion with contact" in result.message
     assert {"line touches itself", "stability not judged"} <= {event.kind for event in result.events}
+    assert any(e.kind == "static friction neglected" and "touches itself" in e.text for e in result.events)
     assert result["turns/link"][0] == pytest.approx(3.0, abs=1e-9)
     assert result["turns/writhe"][0] > 1.5
     assert 0.94 * WIDTH < float(result["self_distance/distance"]) < 1.05 * WIDTH

@@ -1,0 +1,104 @@
+"""Lines of a system that touch themselves: as one cable does, beside points that move, resumed, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+
+WIDTH, RUBS = 0.02, {"self": True, "friction": 0.3}
+HOSE = {
+    "length": 4.0, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e5, "bending_stiffness": 0.005,
+    "torsional_stiffness": 0.004, "damping": {"mass": 0.5},
+}  # fmt: skip
+TAIL = HOSE | {"length": 0.5}
+LOW, HIGH, CLOSER = [0, 0, 0], [1.2, 0, 0.45], {"travel": {"by": [1.22, 0.95 * WIDTH, 0.0], "over": 2.0}}
+TIME, OUTPUT = {"duration": 1.7, "step": 0.01}, {"every": 0.02, "points": 81}
+
+
+def system(**more: Any) -> dict[str, Any]:
+    """A line hangs in a U between an end that is moved until its legs touch, and a tail; free: where they meet."""
+    line = {"start": "low", "end": "free", "model": "rod", "mesh": {"cells": 80}, "sections": [HOSE], "contact": RUBS}
+    tail = {"start": "free", "end": "high", "model": "catenary", "mesh": {"cells": 5}, "sections": [TAIL]}
+    return {
+        "points": {
+            "low": {"position": LOW, "motion": CLOSER}, "high": {"position": HIGH},
+            "free": {"kind": "free", "initial_guess": [1.1, 0, 0]},
+        },
+        "lines": {"hose": line | more, "tail": tail}, "time": TIME, "output": OUTPUT,
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("contact") / "whole.h5"
+    hybrid.run(system(), path, progress=False).close()
+    return path
+
+
+def test_a_line_touches_itself_as_one_cable_does(whole: Path) -> None:
+    """The same as a rod and a catenary of one cable, whose joint is the free point."""
+    cells = [*np.linspace(0.0, 4.0, 81), 4.1, 4.2, 4.3, 4.4, 4.5]
+    alone = hybrid.run({
+        "cable": {"sections": [HOSE, TAIL]}, "contact": RUBS, "initial": "equilibrium",
+        "model": {"zones": [{"rod": 4.0}, {"catenary": 0.5}]}, "mesh": {"nodes": [float(x) for x in cells]},
+        "ends": {"start": {"kind": "pinned", "position": LOW, "motion": CLOSER},
+                 "end": {"kind": "pinned", "position": HIGH}},
+        "time": TIME, "output": OUTPUT | {"points": 91}, "dimension": 3,
+    }, progress=False)  # fmt: skip
+    with hybrid.open(whole) as result:
+        hose = result.lines["hose"]
+        assert {"line touches itself"} <= {event.kind for event in hose.events}
+        assert "line meets itself" not in {event.kind for event in hose.events}
+        assert float(hose["self_distance/distance"]) > 0.85 * WIDTH
+        touches = hose["energy/self_contact"] > 0.0
+        assert 2 <= touches.sum() < 20 and np.array_equal(touches, alone["energy/self_contact"] > 0.0)
+        assert (hose["self_contact"].max(axis=1)[touches] > 0.0).all() and not hose["self_contact"][~touches].any()
+        assert np.nanmax(hose["envelope/self_contact_max"]) >= hose["self_contact"].max()
+        rubbed = float(alone["work/friction"][-1])
+        assert rubbed < 0.0 and hose["work/friction"][-1] == pytest.approx(rubbed, rel=1e-3)
+        put_in = np.abs(hose["work/start"]).max() + np.ptp(hose["energy/potential"])
+        assert hose["work/scheme"].max() < 1e-3 * put_in
+        assert np.linalg.norm(hose["position"] - alone["position"][:, :81], axis=2).max() < 1e-5
+
+
+@pytest.mark.slow
+def test_it_resumes_bit_for_bit(whole: Path, tmp_path: Path) -> None:
+    with hybrid.open(whole) as result:
+        touching = result.times[np.flatnonzero(result.lines["hose"]["energy/self_contact"])]
+    scene = system()
+    scene["time"] = TIME | {"duration": float(touching[0])}
+    hybrid.run(scene, tmp_path / "part.h5", progress=False).close()
+    with hybrid.open(whole) as one, hybrid.resume(tmp_path / "part.h5", until=1.7) as more:
+        for name in ("position", "tension", "self_contact", "energy/self_contact", "work/friction"):
+            assert np.array_equal(one.lines["hose"][name], more.lines["hose"][name])
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ({"model": "adaptive"}, r"contact\.self[\s\S]*zones of this line move"),
+        ({"contact": {"friction": 0.2}}, r"contact\.friction[\s\S]*without contact\.self"),
+        ({"sections": [{k: x for k, x in HOSE.items() if k != "diameter"}]}, r"diameter"),
+    ],
+)
+def test_what_is_not_computed_is_refused(more: dict[str, Any], says: str) -> None:
+    with pytest.raises(hybrid.SceneError, match=says):
+        hybrid.validate_scene(system(**more))
+
+
+def test_an_equilibrium_that_touches_itself_is_refused() -> None:
+    """A weight pulls the legs of a line straight, 0.95 diameters apart."""
+    thin = HOSE | {"bending_stiffness": 1e-4}
+    clump = {"kind": "clump", "at": 2.0, "mass": 50.0}
+    scene = system(sections=[thin], attachments=[clump], end="high")
+    scene["points"] = {"low": {"position": [0, 0, 0]}, "high": {"position": [0, 0.8 * WIDTH, 0]}}
+    del scene["lines"]["tail"]
+    with pytest.raises(hybrid.SceneError, match=r"lines\.hose\.contact[\s\S]*s = .* m and s = .* m[\s\S]*hybrid run"):
+        hybrid.static(scene)
+    with pytest.raises(hybrid.SceneError, match=r"lines\.hose\.contact[\s\S]*not within itself"):
+        hybrid.run(scene, progress=False)
