@@ -87,11 +87,12 @@ class Console:
     def compiling_kernels(self, names: Sequence[str]) -> bool:
         """The same of kernels by name, as file.function."""
         from hybrid.kernels.cache import is_warm
+        from hybrid.simulation.progress import COMPILING
 
         if is_warm(list(names)):
             return False
         self.json("compiling")
-        self.note("compiling the kernels for this machine (first use only, 5 to 40 s) ...")
+        self.note(COMPILING)
         return True
 
     def show(self, content: Callable[[], Any]) -> None:

@@ -60,8 +60,14 @@ def stats(
         for row in rows:
             console.json("statistics", **row)
         console.show(lambda: _table(rows, hours))
-        for text in dict.fromkeys(row["no_extreme"] for row in rows if "no_extreme" in row):
-            console.note(f"note: no extreme of {hours:g} h: {text}")
+        if opened.status != "complete":
+            console.note(f"note: of a run that has not come to its end; {opened.status_text}")
+        without: dict[str, dict[str, None]] = {}
+        for row in rows:
+            if "no_extreme" in row:
+                without.setdefault(row["no_extreme"], {})[row["quantity"]] = None
+        for text, of in without.items():
+            console.note(f"note: no extreme of {hours:g} h of {', '.join(of)}: {text}")
         for text in [row["beyond_outputs"] for row in rows if "beyond_outputs" in row]:
             console.note(f"note: {text}")
         lines = _limit_lines(opened, rows, above)
@@ -105,7 +111,10 @@ def _table(rows: list[dict[str, Any]], hours: float) -> Any:
 
 
 def _limit_lines(result: Result, rows: list[dict[str, Any]], above: float | None) -> list[str]:
-    """For which part of the time quantities are above a value, and which part of the limits of sections is used."""
+    """For which part of the time quantities are above a value, which part of the limits of sections is used, and the
+    limits of quantities."""
+    from hybrid.store.limits import held_of
+
     found = []
     for row in rows if above is not None else ():
         place = "" if row["s"] is None else f" at s = {row['s']:.5g} m"
@@ -114,7 +123,7 @@ def _limit_lines(result: Result, rows: list[dict[str, Any]], above: float | None
     for x in () if result.lines else result.utilisation().values():
         part = "" if x.used is None else f"{100.0 * x.used:.4g} % of {x.limit} used: "
         found.append(f"{part}{x.text}, s = {x.s:.5g} m, t = {x.t:.5g} s, of every step")
-    return found
+    return found + [f"{x.text}{x.when}" + "; BROKEN" * x.broken for x in held_of(result)]
 
 
 def _fatigue_facts(result: Result, s: np.ndarray, damage: np.ndarray, times: Any) -> dict[str, Any]:

@@ -12,16 +12,13 @@ from typing import TYPE_CHECKING, Any
 import hybrid
 from hybrid.cli.app import picture_beside
 from hybrid.cli.plan_tables import contents_table, system_plan_lines
-from hybrid.cli.tables import extremes_facts, verdict_text, verdicts_of
+from hybrid.cli.tables import extremes_facts, judged_text, verdict_text, verdicts_of
 from hybrid.store.limits import held_of
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
     from hybrid.scene.system import System
     from hybrid.store.reader import Result
-
-# Kernels beside those of a line, by the last.
-KERNELS = ("system.solve_system", "run.in_space", "observed_outputs.observe_outputs")
 
 
 def run_lines(console: Console, asked: System, target: Path, plot: bool, keep: bool) -> None:
@@ -38,8 +35,9 @@ def resume_lines(console: Console, asked: System, source: Path, target: Path, pl
 def _moved(console: Console, asked: System, target: Path, picture: Path | None, compute: Callable[..., Result]) -> None:
     """Compute a motion, and print what it has reached; picture: where all lines are drawn, None: nowhere."""
     from hybrid.cli.progress_line import span
+    from hybrid.simulation.first_use import OF_LINES
 
-    console.compiling_kernels(KERNELS)
+    console.compiling_kernels(OF_LINES)
     begin = clock.perf_counter()
     with console.progress() as tell:
         result = compute(progress=tell)
@@ -51,33 +49,35 @@ def _moved(console: Console, asked: System, target: Path, picture: Path | None, 
         text += f"; estimated error {position:.2g} m, {force:.2g} N at the ends"
     else:
         text += "; error not estimated"
-    _ended(console, result, target, picture, text, steps=steps, wall=wall)
+    ended(console, result, target, picture, text, steps=steps, wall=wall)
 
 
 def static_lines(console: Console, asked: System, target: Path, plot: bool, keep: bool) -> None:
     """Find the equilibrium of several lines."""
     from hybrid.cli.progress_line import span
+    from hybrid.simulation.first_use import OF_LINES
 
     console.will_write(target)
     picture = picture_beside(target, plot)
-    console.compiling_kernels(KERNELS)
+    console.compiling_kernels(OF_LINES)
     begin = clock.perf_counter()
     result = hybrid.static(asked, target, overwrite=not keep)
     wall = clock.perf_counter() - begin
     path, residual = (result.attributes[f"static_{x}"] for x in ("path", "residual"))
     text = f"equilibrium in {span(wall)} of wall time ({path}; residual force {residual:.2g} N)"
-    _ended(console, result, target, picture, text, path=path, residual=residual, wall=wall)
+    ended(console, result, target, picture, text, path=path, residual=residual, wall=wall)
 
 
-def _ended(console: Console, result: Result, target: Path, picture: Path | None, text: str, **facts: Any) -> None:
+def ended(console: Console, result: Result, target: Path, picture: Path | None, text: str, **facts: Any) -> None:
     """Print what lines and points have reached, and draw them; picture: as of `_moved`."""
     if picture is not None:
         hybrid.plot(result, picture)
     lines = {name: extremes_facts(line) | verdicts_of(line) for name, line in result.lines.items()}
-    held = [x._asdict() | {"text": x.text} for x in held_of(result)]
+    moves = len(result.times) > 1
+    held = [x._asdict() | {"text": x.text, "when": x.when * moves} for x in held_of(result)]
     points, bodies = _last(result, "points"), _last(result, "bodies")
     console.events(result.events)
-    end = float(result.times[-1]) if len(result.times) > 1 else None
+    end = float(result.times[-1]) if moves else None
     console.show(lambda: _table(lines, points, bodies, held, end))
     pictures = [picture] if picture is not None else []
     console.done(
@@ -111,7 +111,16 @@ def _table(
     table = Table.grid(padding=(0, 2))
     for name, facts in lines.items():
         most, least = facts["tension_max"], facts["tension_min"]
-        table.add_row(f"line {name}", f"tension {at(least)}, to {at(most)}")
+        limits = {x["limit"]: x for x in facts["limits"]}
+        low, high = (
+            at(x) + judged_text(limits.get(limit), "N", x)
+            for x, limit in ((least, "min_tension"), (most, "max_tension"))
+        )
+        table.add_row(f"line {name}", f"tension {low}, to {high}")
+        bent, bend = facts.get("bend_radius_min"), limits.get("min_bend_radius")
+        if bent is not None and bend is not None:
+            radius = f"{bent['value']:.5g} m at s = {bent['s']:.5g} m" + f", t = {bent['t']:.5g} s" * (end is not None)
+            table.add_row("", f"smallest bend radius {radius}" + judged_text(bend, "m", bent))
         for each in facts.get("accuracy", ()):
             table.add_row("", verdict_text(each))
     for name, facts in points.items():
@@ -124,7 +133,7 @@ def _table(
         loads = f"force of the lines {_vector(facts['force'])} N, moment {_vector(facts['moment'])} N m"
         table.add_row(f"body {name}", f"{last}{turned}, {loads}")
     for x in held:
-        table.add_row(x["name"], f"{x['text']}, t = {x['t']:.5g} s" + "; BROKEN" * x["broken"])
+        table.add_row(x["name"], x["text"] + x["when"] + "; BROKEN" * x["broken"])
     table.columns[0].style = "bold"
     return table
 

@@ -46,6 +46,7 @@ def extremes_facts(result: Result) -> dict[str, Any]:
     from hybrid.view.worst import limits_of, worst
 
     found: dict[str, Any] = {}
+    moves = len(result.times) > 1
     for key, low in (("tension_max", False), ("tension_min", True)):
         x = worst(result, "tension", lowest=low)
         found[key] = {"value": x.value, "s": x.s, "t": x.t}
@@ -53,7 +54,7 @@ def extremes_facts(result: Result) -> dict[str, Any]:
         x = worst(result, "curvature")
         straight = not x.value * float(result.s[-1] - result.s[0]) > 1e-6
         found["bend_radius_min"] = None if straight else {"value": 1.0 / x.value, "s": x.s, "t": x.t}
-    found["quantities"] = [x._asdict() | {"text": x.text} for x in held_of(result)]
+    found["quantities"] = [x._asdict() | {"text": x.text, "when": x.when * moves} for x in held_of(result)]
     return found | {"limits": [x._asdict() for x in limits_of(result)]}
 
 
@@ -69,15 +70,19 @@ def extremes_rows(facts: dict[str, Any], moves: bool) -> Iterator[tuple[str, str
         if x is None:
             continue
         text = f"{x['value']:.5g} {unit} at s = {x['s']:.5g} m" + f", t = {x['t']:.5g} s" * moves
-        if held is not None and held["broken"]:
-            there = "" if (held["s"], held["t"]) == (x["s"], x["t"]) else f" at s = {held['s']:.5g} m"
-            text += f"; {limit} of {held['allowed']:.5g} {unit} BROKEN{there}"
-        elif held is not None:
-            text += f"; within {limit}"
-        yield title, text
+        yield title, text + judged_text(held, unit, x)
     for x in facts["quantities"]:
-        when = f", t = {x['t']:.5g} s" * moves + (f", s = {x['s']:.5g} m" if x["s"] is not None else "")
-        yield x["name"], x["text"] + when + "; BROKEN" * x["broken"]
+        yield x["name"], x["text"] + x["when"] + "; BROKEN" * x["broken"]
+
+
+def judged_text(held: dict[str, Any] | None, unit: str, extreme: dict[str, Any]) -> str:
+    """Whether a limit of sections is kept, behind the extreme that it is about; "" without a limit."""
+    if held is None:
+        return ""
+    if not held["broken"]:
+        return f"; within {held['limit']}"
+    there = "" if (held["s"], held["t"]) == (extreme["s"], extreme["t"]) else f" at s = {held['s']:.5g} m"
+    return f"; {held['limit']} of {held['allowed']:.5g} {unit} BROKEN{there}"
 
 
 def extremes_table(facts: dict[str, Any]) -> Any:

@@ -195,6 +195,14 @@ def of_several_lines(wanted: Mapping[str, Quantity], lines: Mapping[str, Any], s
             yield from _of_line(name, each, wanted, lines[each.line].cable.length, seabed)
         if each.other is not None and each.other == each.line:
             yield Finding((*here, "other"), "a line other than the one it is the clearance of", "another line")
+        one, two = lines.get(each.line or ""), lines.get(each.other or "")
+        if each.range is None and one is not None and two is not None and one is not two:
+            met = {one.start, one.end} & {two.start, two.end}
+            if met:
+                length = one.cable.length
+                expected = f"a part of {each.line} that leaves out point {min(met)}, where it meets {each.other}"
+                fix = f"such as `range: [{0.1 * length:.4g}, {0.9 * length:.4g}]`"
+                yield Finding((*here, "range"), expected, fix, "nothing: the clearance of two lines that meet is none")
         if each.kind == "touchdown_excursion" and each.reference is None:
             expected = "a place [x, y], in m, in a scene of several lines"
             yield Finding((*here, "reference"), expected, "that of the touchdown point of `hybrid static`", "nothing")

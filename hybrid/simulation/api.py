@@ -38,11 +38,19 @@ from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.simulation.case import Case
 from hybrid.simulation.error_control import ErrorController, comparison_resolutions
 from hybrid.simulation.error_report import write_errors
-from hybrid.simulation.first_use import compile_beside
+from hybrid.simulation.first_use import OF_LINES, compile_beside, kernels_of
 from hybrid.simulation.interrupts import interrupts
 from hybrid.simulation.mesh_survey import survey_resolution
 from hybrid.simulation.model_choice import choose_model, rods_instead, surveyed
-from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT, Listener, ProgressReporter, listener_of
+from hybrid.simulation.progress import (
+    ESTIMATION,
+    PRE_RUN,
+    RESULT,
+    Listener,
+    ProgressReporter,
+    listener_of,
+    tell_of_compiling,
+)
 from hybrid.simulation.refinement import Free
 from hybrid.simulation.restart import RemainingRun, remaining_run, remaining_system
 from hybrid.simulation.restore import refused
@@ -205,8 +213,9 @@ def _move_lines(
     from hybrid.simulation.system_accuracy import is_refined, refine_system
     from hybrid.simulation.system_run import run_system
 
-    duration = system.require_time().duration
-    with interrupts() as stopped, ProgressReporter(listener_of(progress), duration) as reporter:
+    duration, listener = system.require_time().duration, listener_of(progress)
+    tell_of_compiling(listener, OF_LINES)
+    with interrupts() as stopped, ProgressReporter(listener, duration) as reporter:
         if is_refined(system, moves=True):
             refine_system(system, target, reporter, stopped, source)
             return
@@ -394,7 +403,9 @@ def _target(output: str | Path | None, overwrite: bool, amended: bool) -> Target
 @contextmanager
 def _supervised(case: Case, progress: bool | Listener) -> Iterator[None]:
     """Hear of interrupts, and report the progress, until a run is done."""
-    duration = case.scene.require_time().duration
-    with interrupts() as interrupted, ProgressReporter(listener_of(progress), duration) as reporter:
+    duration, listener = case.scene.require_time().duration, listener_of(progress)
+    if listener is not None:
+        tell_of_compiling(listener, kernels_of(case.scene))
+    with interrupts() as interrupted, ProgressReporter(listener, duration) as reporter:
         case.progress, case.interrupted = reporter, interrupted
         yield

@@ -44,12 +44,20 @@ class NotebookBar:
         self._shown = False
 
     def __call__(self, progress: Reported) -> None:
+        self._show()
+        self._bar.value, self._text.value = progress.fraction, progress.text
+
+    def say(self, text: str) -> None:
+        """A text beside the bar, until the first report."""
+        self._show()
+        self._text.value = text
+
+    def _show(self) -> None:
         if not self._shown:
             from IPython.display import display
 
             display(self._box)
             self._shown = True
-        self._bar.value, self._text.value = progress.fraction, progress.text
 
     def close(self) -> None:
         """Mark a bar that did not reach its end."""

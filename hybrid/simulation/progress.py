@@ -16,12 +16,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TextIO
 
+from hybrid.kernels.cache import is_warm
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import Resolution
-from hybrid.simulation.notebook_progress import in_notebook, notebook_bar
+from hybrid.simulation.notebook_progress import NotebookBar, in_notebook, notebook_bar
 
 PRE_RUN, ESTIMATION, RESULT, REFINEMENT = "mesh pre-run", "error estimation", "result", "refinement"
 
+COMPILING = "compiling the kernels for this machine (first use only, 5 to 40 s) ..."
 REPORT_EVERY = 0.1  # s of wall time between two calls of a listener
 # The speed of the last so many reports (about 5 s) gives the time left: the compilation of the first step, or a slow
 # stretch long past, says nothing about it.
@@ -66,6 +68,15 @@ def listener_of(progress: bool | Listener) -> Listener | None:
     if progress is not True:
         return progress or None
     return (notebook_bar() if in_notebook() else None) or StatusLine()
+
+
+def tell_of_compiling(listener: Listener | None, kernels: Sequence[str]) -> None:
+    """Say that kernels, as file.function, must be compiled first, if so: nothing else is heard for as long as it takes.
+
+    A listener of the caller's own is called with steps alone.
+    """
+    if isinstance(listener, StatusLine | NotebookBar) and not is_warm(kernels):
+        listener.say(COMPILING)
 
 
 def cost_of(resolution: Resolution, result: Resolution) -> float:
@@ -176,6 +187,12 @@ class StatusLine:
         self._stream.write("\r" + text.ljust(self._width))
         self._stream.flush()
         self._width = len(text)
+
+    def say(self, text: str) -> None:
+        """A line of its own."""
+        self.close()
+        self._stream.write(text + "\n")
+        self._stream.flush()
 
     def close(self) -> None:
         """End the line, if one was begun."""

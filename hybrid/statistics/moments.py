@@ -45,13 +45,14 @@ def checked(t: ArrayLike, x: ArrayLike, least: int = 2) -> tuple[Floats, Floats]
         raise ResultError(f"a history has one value for each time: {times.shape} times and {values.shape} values")
     if times.size < least:
         count = "one value is" if times.size == 1 else f"{times.size} values are"
-        expected = f"{least} at least; an equilibrium has one, a longer window may have more"
+        expected = f"{least} at least; an equilibrium has one, a longer window or shorter output.every may have more"
         raise ResultError(f"{count} too few\n    expected: {expected}")
     if not np.all(np.diff(times) > 0.0):
         raise ResultError("the times of a history must grow")
     if not np.all(np.isfinite(values)):
         raise ResultError(
-            "a history has values that are no finite numbers\n    try:      leave out when it is not there"
+            "it has no finite value at some times, as the touchdown of a line that touches nothing\n"
+            "    try:      a window of times in which it has, or leave the quantity out"
         )
     return times, values
 

@@ -88,6 +88,14 @@ def history_of(result: Result, name: str, times: Window | None = None, at: Any =
     return History(name, result.units[stored], t[inside], np.asarray(values)[inside], s, basis)
 
 
+def summary_of(history: History) -> moments.Summary:
+    """Its summary; ResultError with its name where there is none."""
+    try:
+        return moments.summary(history.t, history.values)
+    except ResultError as error:
+        raise ResultError(f"'{history.name}': {error}") from None
+
+
 def _window(times: Window | None) -> tuple[float, float]:
     """From and to, s; ResultError for what is no window."""
     if times is None:
@@ -129,7 +137,7 @@ class Histories:
             history = history_of(self, name, times, at if lies_along(self, name) else None)
             if names is None and not np.isfinite(history.values).all():
                 continue
-            found[name] = moments.summary(history.t, history.values)
+            found[name] = summary_of(history)
         return found
 
     def extreme(

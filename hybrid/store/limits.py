@@ -21,6 +21,7 @@ class Held(NamedTuple):
     """A quantity against a limit of its own: its worst value, in `unit`, when (t, s) and where (s, m; None: no place).
 
     limit: key in the scene: smallest, largest, or max_stress.  by_outputs: whether steps between outputs are not known.
+    value and t are NaN of a quantity that never had a value, as the touchdown of a line that touches nothing.
     """
 
     name: str
@@ -36,9 +37,20 @@ class Held(NamedTuple):
     @property
     def text(self) -> str:
         """What was reached, and what is allowed."""
+        allowed = f"the {self.allowed:.4g} {self.unit} allowed"
+        if np.isnan(self.value):
+            bound = "least" if self.limit == "smallest" else "most"
+            return f"{self.name} had no value at any time: not judged by {allowed} at {bound}"
         at = " at the outputs" * self.by_outputs
-        side = {"smallest": "below", "largest": "above", "max_stress": "above"}[self.limit] if self.broken else "within"
-        return f"{self.name} of {self.value:.4g} {self.unit}{at}, {side} the {self.allowed:.4g} {self.unit} allowed"
+        below = ("not below", "below") if self.limit == "smallest" else ("within", "above")
+        return f"{self.name} of {self.value:.4g} {self.unit}{at}, {below[self.broken]} {allowed}"
+
+    @property
+    def when(self) -> str:
+        """Where and when, behind the text; "" of what had no value."""
+        if np.isnan(self.value):
+            return ""
+        return f", t = {self.t:.5g} s" + (f", s = {self.s:.5g} m" if self.s is not None else "")
 
 
 def at_every_step(result: Result, name: str, bound: str) -> tuple[float, float, float | None] | None:
@@ -75,9 +87,12 @@ def held_of(result: Result) -> list[Held]:
         name = full.removeprefix(f"{GROUP}/")
         values, unit = result[name], result.units[name]
         for limit, allowed in zip(("smallest", "largest"), result[full].tolist(), strict=True):
-            if np.isnan(allowed) or np.isnan(values).all():
+            if np.isnan(allowed):
                 continue
             known = at_every_step(result, name, limit)
+            if known is None and np.isnan(values).all():
+                found.append(Held(name, limit, unit, np.nan, allowed, False, np.nan, None, moves))
+                continue
             if known is not None:
                 value, t, where = known
             else:

@@ -9,9 +9,9 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.statistics.extremes import THREE_HOURS, of_record
-from hybrid.statistics.moments import exceedance, summary
+from hybrid.statistics.moments import exceedance
 from hybrid.store.envelope import extreme
-from hybrid.store.histories import Window, history_of, lies_along, usual_names
+from hybrid.store.histories import Window, history_of, lies_along, summary_of, usual_names
 from hybrid.store.limits import at_every_step
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def rows_of(
         else:
             picked = [(float(s), k) for k, s in enumerate(history.s)]
         for s, k in picked:
-            found = summary(history.t, values[:, k])
+            found = summary_of(history._replace(values=values[:, k]))
             row: dict[str, Any] = {"quantity": name, "unit": history.unit, "s": s, "of": history.basis}
             row |= {key: _number(value) for key, value in found._asdict().items()}
             if above is not None:

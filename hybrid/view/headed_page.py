@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hybrid.errors import ResultError
+from hybrid.store.limits import held_of
 from hybrid.store.reader import Result
 from hybrid.view.figure import Page
 from hybrid.view.style import NEWS, short
@@ -26,9 +27,20 @@ def page_of(result: Result, facts: list[str], **more: Any) -> Page:
         note = f"Warning: {names}; at t = {short(alarms[0][0].t, 4)} s: {note}"
     elif found:
         note = f"Note: {note}"
-    texts = "; ".join(filter(None, [*head, *facts]))
+    broken = [x for x in held_of(result) if x.broken]
+    if broken:
+        more_of = f" and {len(broken) - 1} more" * (len(broken) > 1)
+        note = f"{note or 'Warning'}{';' if note else ':'} {broken[0].text}{broken[0].when}{more_of}"
+    texts, alarm = "; ".join(filter(None, [*head, *facts])), (not complete, bool(alarms or broken))
     empty = "" if n else "no output was saved"
-    return Page(result.title or "(no title)", texts, note=note, alarm=(not complete, bool(alarms)), empty=empty, **more)
+    return Page(
+        result.title or "(no title)",
+        texts,
+        note=note,
+        alarm=alarm,
+        empty=empty,
+        **more,
+    )
 
 
 def refuse_several(result: Result, what: str) -> None:

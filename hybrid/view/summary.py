@@ -129,7 +129,9 @@ def _warnings(result: Result) -> list[Fact]:
         middle = 0.5 * (event.s_a + event.s_b)
         facts.append(Fact("warning", event.kind.capitalize(), text, weight, values, event.t, middle))
     if not any(fact.weight == "alarm" for fact in facts):
-        none = "None were given." if result.status == "complete" else "None, beside how it ended."
+        broken = any(event.kind in LIMIT_EVENTS.values() for event in result.events)
+        beside = [*["limits that are broken"] * broken, *["how it ended"] * (result.status != "complete")]
+        none = f"None, beside {' and '.join(beside)}." if beside else "None were given."
         facts.insert(0, Fact("warning", "Warnings", none, values={"count": 0}))
     return facts
 
@@ -293,11 +295,13 @@ def _quantities(result: Result) -> list[Fact]:
     """Quantities that the scene gives limits for, each at the output where it is nearest to them."""
     facts = []
     for x in held_of(result):
+        known = x.value == x.value
         there = f" {place(result, x.s)}" if x.s is not None else ""
-        weight = "alarm" if x.broken else "plain"
-        text = f"{x.text}{there}{moment(result, x.t)}."
-        values = {"value": x.value, "allowed": x.allowed, "limit": x.limit}
-        facts.append(Fact("quantity", x.name.replace("_", " ").capitalize(), text, weight, values, x.t, x.s))
+        weight = "alarm" if x.broken else "plain" if known else "note"
+        text = f"{x.text}{there}{moment(result, x.t) if known else ''}."
+        values = {"value": x.value if known else None, "allowed": x.allowed, "limit": x.limit}
+        t = x.t if known else None
+        facts.append(Fact("quantity", x.name.replace("_", " ").capitalize(), text, weight, values, t, x.s))
     return facts
 
 

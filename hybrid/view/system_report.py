@@ -38,6 +38,8 @@ from hybrid.view.zones import COLOURS
 MOST_VALUES = 80_000
 # Lines whose statistics are on the page: of more the first ones, `hybrid stats --line` has all.
 MOST_STATISTICS = 20
+# Facts of a line that are alarms where a limit of its sections is broken.
+LIMITED = ("tension", "bend", "slack")
 # Extremes of each line in the table: quantity, bound, heading, unit.
 EXTREMES = (
     ("tension", "max", "largest tension", "N"), ("tension", "min", "smallest tension", "N"),
@@ -92,6 +94,9 @@ def facts_of_all(result: Result) -> list[Fact]:
         for fact in facts_of(line) if len(line.times) else []:
             if fact.key in ("limits", "errors") and fact.weight != "absent":
                 facts.append(fact._replace(title=f"{fact.title} of line {name}", key=f"{fact.key}-{name}"))
+            elif fact.key in LIMITED and fact.weight == "alarm":
+                title = f"Line {name}: {fact.title[:1].lower()}{fact.title[1:]}"
+                facts.append(fact._replace(title=title, key=f"{fact.key}-{name}", values={}))
     return facts
 
 

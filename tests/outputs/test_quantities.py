@@ -17,6 +17,7 @@ from hybrid.outputs.probes import PROBES
 from hybrid.scene.quantities import TAKEN
 from hybrid.scene.read import parse_either
 from hybrid.store.limits import held_of
+from hybrid.view.summary import facts_of
 
 MASS, DIAMETER, DEPTH, LENGTH, SPAN = 141.0, 0.151, 88.0, 700.0, 655.0
 W = (MASS - 1025.0 * math.pi / 4 * DIAMETER**2) * 9.81  # N/m
@@ -275,6 +276,23 @@ output:
 """
 
 
+def test_a_limit_of_what_never_had_a_value_is_not_judged() -> None:
+    """The chain lies above the bed: it has no touchdown point."""
+    asked = {"td": {"kind": "touchdown", "end": "end", "smallest": 10}}
+    bed = {"fluid": {"density": 1025, "surface": 0}, "seabed": {"z": -1000, "stiffness": 1e6}}
+    result = chain(asked, environment=bed)
+    (held,) = held_of(result)
+    assert not held.broken and held.when == ""
+    assert held.text == "td had no value at any time: not judged by the 10 m allowed at least"
+    (fact,) = [fact for fact in facts_of(result) if fact.key == "quantity"]
+    assert fact.weight == "note" and fact.text == f"{held.text}." and fact.values["value"] is None
+
+
+LINKED = SYSTEM.replace(
+    "output:", "  three: {start: b, end: c, sections: [{length: 30, mass: 1, axial_stiffness: 1.0e5}]}\noutput:"
+)
+
+
 def test_clearance_of_two_lines(tmp_path: Path) -> None:
     still = hybrid.static(_system(SYSTEM))
     assert still.gap[0] == pytest.approx(2.0 - 0.15, abs=1e-9) and still.gap_at[0] == pytest.approx(3 / 1.001, rel=1e-6)
@@ -336,7 +354,8 @@ def test_names_of_results_are_taken() -> None:
     ("{kind: clearance, line: one, other: one}", "a line other than"),
     ("{kind: declination, end: end}", "line(.|\n)*name of a line"),
     ("{kind: touchdown, line: one, end: end}", "without a seabed"),
+    ("{kind: clearance, line: one, other: three}", r"leaves out point b, where it meets three(.|\n)*range: \[1, 9\]"),
 ])  # fmt: skip
 def test_refused_of_several_lines(change: str, match: str) -> None:
     with pytest.raises(hybrid.SceneError, match=match):
-        _system(SYSTEM[: SYSTEM.index("    gap:")] + f"    gap: {change}\n")
+        _system(LINKED[: LINKED.index("    gap:")] + f"    gap: {change}\n")

@@ -96,6 +96,14 @@ def test_true_shows_a_line_on_the_error_stream(capsys: pytest.CaptureFixture[str
     assert out == "" and "t = 1 of 1 s, 100 % done" in err and err.endswith("\n")
 
 
+def test_a_first_use_says_beforehand_that_it_compiles(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "is_warm", lambda kernels: False)
+    hybrid.run(hybrid.parse_scene(HANGING + "time: {duration: 1.0, step: 0.1}\n"), progress=True).close()
+    assert capsys.readouterr().err.startswith(module.COMPILING + "\n\r")
+
+
 def test_a_shorter_line_covers_a_longer_one() -> None:
     stream = io.StringIO()
     line = StatusLine(stream)

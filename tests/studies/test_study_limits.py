@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bits import Stopping
 
 import hybrid
 from hybrid.cli.commands import main
@@ -134,3 +135,23 @@ def test_stats_tell_limits_and_the_time_above_a_value(
     assert f"end_force_end is above 400 N for {100.0 * part:.3g} % of the time" in said
     assert used is not None and f"{100.0 * used:.4g} % of max_tension used" in said
     assert "% of min_bend_radius used" in said
+
+
+def test_stats_of_a_run_that_was_stopped_say_so(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stopping = Stopping(monkeypatch)
+    stopping.left = 20
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(scene, tmp_path / "run.h5", progress=stopping)
+    with pytest.raises(SystemExit) as ended:
+        main(["stats", str(tmp_path / "run.h5"), "--names", "end_force_end"])
+    assert not ended.value.code
+    assert "note: of a run that has not come to its end; interrupted" in " ".join(capsys.readouterr().err.split())
+
+
+def test_statistics_name_what_has_none(scene: Path) -> None:
+    result = hybrid.run(scene, progress=False)
+    with pytest.raises(hybrid.ResultError, match=r"^'end_force_end': one value is too few"):
+        t = float(result["steps/t"][3])
+        result.statistics(["end_force_end"], times=(t, t))

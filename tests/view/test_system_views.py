@@ -15,6 +15,8 @@ from typer.testing import CliRunner
 import hybrid
 import hybrid.cli.commands  # registers them
 from hybrid.cli.app import app
+from hybrid.cli.console import Console
+from hybrid.cli.system_commands import ended
 from hybrid.errors import ResultError
 from hybrid.view.animation import animate
 from hybrid.view.figure import Line, Marks
@@ -97,7 +99,15 @@ def test_a_report_has_all_lines_points_and_bodies(result: hybrid.Result) -> None
         assert f"Line {name}: " in text
     force = np.linalg.norm(result["points/east/force"], axis=1).max()
     assert f"{force / 1e3:.4g} kN" in text.split("<h3>Points</h3>")[1].split("<h3>Bodies</h3>")[0]
-    assert "tension above limit" in text or "Tension above limit" in text
+    first = text.split("Look at this first")[1].split("</ul>")[0]
+    assert "Line east: largest tension" in first and "north" not in first
+    assert "None, beside limits that are broken." in text and "None were given." not in text
+
+
+def test_the_table_of_a_run_judges_each_line(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    ended(Console(False, False), hybrid.open(path), path, None, "ended")
+    rows = {row.split()[1]: row for row in capsys.readouterr().out.splitlines() if row.startswith("line ")}
+    assert "; max_tension of 1000 N BROKEN" in rows["east"] and "BROKEN" not in rows["north"]
 
 
 def test_a_film_moves_all_lines(result: hybrid.Result, tmp_path: Path) -> None:
