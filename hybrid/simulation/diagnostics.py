@@ -170,7 +170,8 @@ class Diagnostics:
             if found.blurred:
                 why = "round-off of the bending of so short cells hides it"
             if found.touch.size:
-                why = "the line touches itself; a damped motion with contact, without friction, led there"
+                there = "the line touches itself; " if found.touch.any() else ""
+                why = f"{there}a damped motion with contact, without friction, led there"
             text = f"the stability of this equilibrium is not judged, because {why}"
             self.events.event(0.0, 0.0, self._model.length, "stability not judged", text)
 

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.forces import FRICTION, PLANAR
+from hybrid.kernels.forces import FRICTION, MAY_TOUCH, PLANAR
 from hybrid.kernels.state import Line, State
 from hybrid.kernels.zone_criteria import twist_of_rods
 from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
 from hybrid.model.equilibrium_hints import reasons_against
 from hybrid.model.plane import leaves_plane, planar, untwist
+from hybrid.model.self_reach import touching
 from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.schema import Scene
 from hybrid.simulation.contact_equilibrium import with_contact
@@ -31,19 +32,23 @@ MANY = 1000
 def equilibrium_of(scene: Scene, model: Model, t: float) -> Equilibrium:
     """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size.
 
-    Of a line that touches itself, where contact is asked for, that to which a damped motion with contact leads.
+    Of a line that touches itself, where contact is asked for, that to which a damped motion with contact leads; so too
+    of a line that may touch itself and has lost turns of its ends on the other ways, on which it passed through itself.
     """
     try:
         found = _without_contact(scene, model, t)
     except ComputationError as failed:
+        keeps = model
+        if failed.outcome == Outcome.TURNS_LOST and model.line.bits & MAY_TOUCH:
+            keeps = replace(model, line=touching(model.line, 0.0))
         try:
-            touching = with_contact(model, t, None)
+            settled = with_contact(keeps, t, None)
         except ComputationError as too:
             tried = "\n              ".join(x for x in (failed.detail, too.detail) if x)
             raise ComputationError(failed.outcome, None, failed.s, tried) from None
-        if touching is None:
+        if settled is None:
             raise
-        return touching
+        return settled
     return with_contact(model, t, found) or found
 
 
@@ -90,11 +95,11 @@ def _count_turns(scene: Scene, model: Model, t: float, state: State) -> None:
 
 def solve_model(
     model: Model, t: float, start: State, settle: str, quick: bool = False, take_slack: bool = False,
-    others: Sequence[tuple[str, State]] = (),
+    others: Sequence[tuple[str, State]] = (), keeps_turns: Callable[[State], bool] | None = None,
 ) -> Equilibrium:  # fmt: skip
     """Equilibrium of a model with the loads of time t: in its plane where it holds in space too, else in space.
 
-    settle, quick, take_slack, others: as of `solve_statics`.
+    settle, quick, take_slack, others, keeps_turns: as of `solve_statics`.
     """
     sea, ends = model.sea.at(t), model.ends.at(t)
     rest = model.length, model.tension_scale, model.slack_floor
@@ -112,7 +117,7 @@ def solve_model(
             pass
     return solve_statics(
         model.line, sea, ends, start, *rest, take_slack=take_slack, shape=model.start_shape, settle=settle,
-        others=others, quick=quick,
+        others=others, quick=quick, keeps_turns=keeps_turns,
     )  # fmt: skip
 
 
@@ -126,7 +131,16 @@ def _untwisted(model: Model, line: Line, start: State) -> State:
 def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equilibrium:
     settle = _settling(scene)
     slack = model.slack == "warn" and not quick
-    return solve_model(model, t, model.start, settle, quick, slack, model.other_starts)
+
+    def keeps_turns(state: State) -> bool:
+        try:
+            _count_turns(scene, model, t, state)
+        except ComputationError:
+            return False
+        return True
+
+    counts = keeps_turns if scene.ends.turns and keeps_turns(model.start) else None  # too few cells: no way helps
+    return solve_model(model, t, model.start, settle, quick, slack, model.other_starts, counts)
 
 
 def _settles(scene: Scene, model: Model, t: float) -> bool:

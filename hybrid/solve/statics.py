@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 
@@ -319,6 +319,7 @@ def solve_statics(
     settle: str = "",
     others: Sequence[tuple[str, State]] = (),
     quick: bool = False,
+    keeps_turns: Callable[[State], bool] | None = None,
 ) -> Equilibrium:
     """Equilibrium of a line from a starting shape, however poor.
 
@@ -326,7 +327,8 @@ def solve_statics(
     (None: 1e-6 of the scale); at rest a catenary needs LEAST_TENSION times that; shape: what the
     start is, for people; settle: on a bed with friction, "start": let it come to rest from the start and try nothing
     else, "pull": pull it tight from where it would lie without tension along the equilibrium without friction, else
-    the same; others: further starts with their names; quick: try nothing but Newton from the start.
+    the same; others: further starts with their names; quick: try nothing but Newton from the start;
+    keeps_turns: whether a state has the turns of the ends, where Newton may end without: the next way is tried then.
 
     Tries Newton; then a soft line that is hardened; then Newton with turning chords along
     ladders of end loads; then a damped motion that settles, and Newton again; then a push
@@ -352,7 +354,9 @@ def solve_statics(
         if rubs and (settle or not quick):
             yield rough, _settled(rough, ends, start, shape)
 
-    for solver, (how, outcome, where, state) in roads():
+    for solver, (how, reached, where, state) in roads():
+        lost = reached == Outcome.OK and keeps_turns is not None and not keeps_turns(state)
+        outcome = Outcome.TURNS_LOST if lost else reached
         path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations in all)")
         if outcome == Outcome.OK:
             return _found(solver, ends, state, path)
