@@ -20,11 +20,11 @@ ONE = 0.01  # the requested error that the guesses below are for
 ZONES = 1e-3  # tolerance of zones of a scene that requests nothing, as a part of the length
 # Fineness of the mesh for 1 % of tension at the ends, and for 1 % of the length; it grows as second order wants it.
 # First guesses after runs of the examples, as are those of the step below: the error figure decides, not they.
-FOR_TENSION, FOR_POSITION = 1.5, 0.4
+FOR_TENSION, FOR_POSITION = 1.5, 0.27
 # Fewer cells do not resolve the shape; more are not needed before the first error figure is known.
 COARSEST, FINEST = 0.5, 20.0
 # What a step may be wrong by, as a part of the length, for 1 % of tension and for 1 % of the length; of third order.
-STEP_FOR_TENSION, STEP_FOR_POSITION = 3e-5, 5e-4
+STEP_FOR_TENSION, STEP_FOR_POSITION = 3e-5, 1.5e-3
 # Steps to the shortest period that the scene names: fewer cannot show it, whatever the error control thinks.
 PER_PERIOD = 12
 # An end may turn so far in a step (rad), in runs of longer steps twice as far: with LARGEST_TWIST of

@@ -336,6 +336,14 @@ def test_what_is_asked_is_met_and_the_figure_is_true(truth, model, percent):
         assert 0.5 <= said[1] / force <= 6.0
 
 
+def test_positions_are_met_without_much_to_spare():
+    """Asked for alone: cells and steps are no finer than it takes by more than a factor of 4.5 of the error."""
+    sets = ["accuracy={position: 0.03%}", "time.step=null", "mesh=null", "model=rod", "output.every=1"]
+    result = hybrid.run(hybrid.load_scene(EXAMPLES / "s_tether.yaml", sets))
+    assert 1.0 / 4.5 < result.attributes["error_total_position"] / (3e-4 * result.s[-1]) <= 1.0
+    assert result.attributes["effort_runs"] <= 5  # with the pre-run
+
+
 def test_what_the_file_holds():
     result = hybrid.run(swinging(accuracy="3%"))
     for kind in ("mesh", "time", "total"):
