@@ -25,7 +25,7 @@ import numpy as np
 
 from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.model.plan import plan
-from hybrid.scene.study import Kept, Study, read_study, study_from
+from hybrid.scene.study import LIMIT_OF, Kept, Study, read_study, study_from
 from hybrid.simulation.api import run, static
 from hybrid.store.lock import locked
 from hybrid.store.study_file import OPEN, OWN, Column, StudyFile, open_study
@@ -69,6 +69,7 @@ def study(
     wanted = asked.collect or usual(asked.static, cases.lines)
     _refuse_collisions(cases, wanted)
     _refuse_unknown_lines(cases, wanted)
+    _refuse_limits_not_there(cases, wanted)
     identity = _identity(cases, wanted, asked.derive, asked.files)
     whole = target.with_suffix(".files") if asked.files else None
     with locked(target):
@@ -96,8 +97,11 @@ def _cases_in(folder: Path | None) -> list[Path]:
 
 
 def _remove_cases(folder: Path) -> None:
-    """Remove the whole results of a study that begins anew, so that none of the former one is taken for its own."""
-    for file in _cases_in(folder):
+    """Remove the whole results of a study that begins anew, and snapshots of cases that failed, so that none of the
+
+    former one is taken for its own.
+    """
+    for file in (*_cases_in(folder), *folder.glob("case-*.snapshot.npz")):
         file.unlink()
 
 
@@ -161,6 +165,27 @@ def _refuse_unknown_lines(cases: Cases, wanted: Mapping[str, Kept]) -> None:
         if kept.line is None and cases.lines and (kept.curve or {"profile"} & set(kept.take)):
             expected = f"one of {', '.join(cases.lines)}: what lies along a line is of one of them"
             raise SceneError([Complaint(f"collect.{name}.line", "nothing", expected, f"line: {cases.lines[0]}")])
+
+
+def _refuse_limits_not_there(cases: Cases, wanted: Mapping[str, Kept]) -> None:
+    """SceneError where the part of a limit is to be kept that no section of any case has."""
+    for name, kept in wanted.items():
+        limit = LIMIT_OF.get(kept.quantity, "")
+        varied = any(limit in path for paths in cases.keys.values() for path in paths) or _has(cases.rows, limit)
+        if "utilisation" not in kept.take or varied:
+            continue
+        line = cases.lines and kept.line
+        if not _has(cases.base["lines"][line] if line else cases.base, limit):
+            expected = f"a quantity with a limit: no section{f' of line {line}' if line else ''} has a {limit}"
+            fix = f"{limit} in the sections of the scene, or leave utilisation of {kept.quantity} out"
+            raise SceneError([Complaint(f"collect.{name}.take", "utilisation", expected, fix)])
+
+
+def _has(data: Any, key: str) -> bool:
+    """Whether a scene as data has a key in any of its tables."""
+    if isinstance(data, Mapping):
+        return data.get(key) is not None or any(_has(x, key) for x in data.values())
+    return isinstance(data, list | tuple) and any(_has(x, key) for x in data)
 
 
 def _identity(cases: Cases, wanted: Mapping[str, Kept], derived: Mapping[str, str], files: bool) -> str:

@@ -15,7 +15,8 @@ from hybrid.errors import SceneError
 from hybrid.scene.study import Kept, study_from
 from hybrid.statistics.moments import exceedance
 from hybrid.store.histories import history_of
-from hybrid.studies.cases import cases_of
+from hybrid.studies.cases import Cases, cases_of
+from hybrid.studies.study import _refuse_limits_not_there, _remove_cases
 from hybrid.studies.workers import Job, compute_batch
 
 SECTION = "{length: 30, mass: 2, axial_stiffness: 1.0e+6, bending_stiffness: 50, max_tension: 600, min_bend_radius: 2}"
@@ -120,6 +121,35 @@ def test_without_a_limit_nothing_is_kept(scene: Path) -> None:
     wanted = {"strength": Kept.model_validate(COLLECT["strength"])}
     (outcome, _) = compute_batch(Job(cases.base, cases.keys, cases.rows, wanted, False))
     assert outcome.status == 2 and "no section has a max_tension" in outcome.reason
+
+
+def test_a_limit_that_no_section_has_is_refused_before_the_first_run(scene: Path, tmp_path: Path) -> None:
+    """Known from the scene alone; not where the limit is what is varied."""
+    scene.write_text(SCENE.replace(", max_tension: 600", ""))
+    with pytest.raises(SceneError) as refused:
+        hybrid.study(study_of(scene), tmp_path / "none.zarr", workers=1)
+    (complaint,) = refused.value.complaints
+    assert complaint.where == "collect.strength.take" and "no section has a max_tension" in complaint.expected
+    assert not (tmp_path / "none.zarr").exists()
+    varied = study_of(scene, vary={"most": {"key": "cable.sections[0].max_tension", "values": [500.0, 600.0]}})
+    _refuse_limits_not_there(cases_of(varied), varied.collect)
+
+
+def test_of_several_lines_the_line_itself_must_have_the_limit() -> None:
+    """Another line's limit is of no use."""
+    base = {"lines": {"a": {"sections": [{"max_tension": 5.0}]}, "b": {"sections": [{"max_tension": None}]}}}
+    cases = Cases(base, {}, [{}], {}, {}, False, {})
+    kept = {"quantity": "tension", "take": ("utilisation",)}
+    _refuse_limits_not_there(cases, {"x": Kept(**kept, line="a")})
+    with pytest.raises(SceneError, match="no section of line b has a max_tension"):
+        _refuse_limits_not_there(cases, {"x": Kept(**kept, line="b")})
+
+
+def test_a_study_that_begins_anew_removes_snapshots_of_failed_cases(tmp_path: Path) -> None:
+    for name in ("case-000015.h5", "case-000015.snapshot.npz", "mine.txt"):
+        (tmp_path / name).touch()
+    _remove_cases(tmp_path)
+    assert [x.name for x in tmp_path.iterdir()] == ["mine.txt"]
 
 
 def test_stats_tell_limits_and_the_time_above_a_value(
