@@ -14,8 +14,11 @@ from typing import TYPE_CHECKING, Any
 from hybrid.errors import OMITTED, ZONE_EVENTS
 
 ANCHORED = 1.0  # m
+LEVEL = 1e-9  # of the length: heights that differ by less are one, because equilibria are solved to about this
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from hybrid.interop.moordyn import ImportedDeck
     from hybrid.store.reader import Result
     from hybrid.store.tradeoff_table import Row, TradeTable
@@ -25,7 +28,7 @@ if TYPE_CHECKING:
 def equilibrium_facts(result: Result) -> dict[str, Any]:
     """What one asks of an equilibrium first; None for what its solver does not report."""
     s, position = result.s, result.position[-1]
-    bottom = int(position[:, 2].argmin())
+    bottom = lowest_node(s, position)
     force = {end: result[f"reaction_{end}"][-1].tolist() for end in ("start", "end") if f"reaction_{end}" in result}
     return {
         "path": result.attributes.get("static_path", result.message),
@@ -35,6 +38,12 @@ def equilibrium_facts(result: Result) -> dict[str, Any]:
         "force": force,
         "zones": [zone._asdict() if hasattr(zone, "_asdict") else asdict(zone) for zone in result.zones[-1]],
     } | _on_the_seabed(result)
+
+
+def lowest_node(s: np.ndarray, r: np.ndarray) -> int:
+    """The first of the nodes s (n,) m, r (n, 3) m, that are as low as the lowest one, to within LEVEL."""
+    z = r[:, 2]
+    return int((z <= z.min() + LEVEL * (s[-1] - s[0])).argmax())
 
 
 def extremes_facts(result: Result) -> dict[str, Any]:

@@ -11,10 +11,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 
 import hybrid
 from hybrid.cli.commands import main
+from hybrid.cli.tables import lowest_node
 
 WIRE = """\
 title: a wire that swings
@@ -143,6 +145,15 @@ def test_static_prints_a_table_and_writes_a_file(call: Call) -> None:
     assert facts["residual"] < 1e-6
     assert facts["tension_max"]["s"] == 0.0
     assert facts["lowest"]["s"] == 2.0
+
+
+def test_the_lowest_point_of_a_flat_line_is_not_chosen_by_round_off() -> None:
+    """The first node that is as low as any; one that is lower by more than round-off is the lowest."""
+    s, r = np.linspace(0.0, 100.0, 11), np.zeros((11, 3))
+    r[:, 2] = [-5.0, *(-7.0 - 1e-12 * np.random.default_rng(3).random(9)), -6.0]
+    assert lowest_node(s, r) == 1
+    r[7, 2] -= 1e-6
+    assert lowest_node(s, r) == 7
 
 
 def test_plot_takes_its_format_from_the_name(call: Call) -> None:
