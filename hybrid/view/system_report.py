@@ -32,6 +32,7 @@ from hybrid.view.system_views import (
     points_of,
     shape,
 )
+from hybrid.view.worst import is_without_moment
 from hybrid.view.zones import COLOURS
 
 # Numbers of the moving picture, all lines together: frames times points, as of one cable.
@@ -125,6 +126,16 @@ def _kept(every: AllLines) -> dict[str, Kept]:
 # ---- tables ---------------------------------------------------------------------------------------
 
 
+def _extreme_text(line: Result, quantity: str, bound: str, unit: str) -> str:
+    """A number of the table with its place and time, or why there is none."""
+    found = extreme(line, quantity, bound)
+    if found is None:
+        return "–"
+    if quantity == "bending_moment" and is_without_moment(line):
+        return "– (a catenary, which has none; model: rod computes it)"
+    return f"{amount(found.value, unit)} at s = {short(found.s, 5)} m, t = {short(found.t, 5)} s"
+
+
 def _tables(result: Result) -> str:
     """Extremes of all lines, forces at points, and where bodies were."""
     heads = [x for x in EXTREMES if any(extreme(line, x[0], x[1]) for line in result.lines.values())]
@@ -132,9 +143,7 @@ def _tables(result: Result) -> str:
     for name, line in result.lines.items():
         row = [name, f"{short(float(line.attributes.get('length', line.s[-1])), 6)} m"]
         for quantity, bound, _, unit in heads:
-            found = extreme(line, quantity, bound)
-            where = f" at s = {short(found.s, 5)} m, t = {short(found.t, 5)} s" if found else ""
-            row.append(amount(found.value, unit) + where if found else "–")
+            row.append(_extreme_text(line, quantity, bound, unit))
         rows.append(row)
     out = "<h3>Lines: extremes of all steps</h3>"
     out += parts.table_html(rows, ["line", "length", *(x[2] for x in heads)], numbers=len(heads) + 1)

@@ -21,6 +21,7 @@ from hybrid.view.style import BODY, INK, earlier_grey, prefix, short
 
 LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31", "#000000", "#7F7F7F")
 MOST_NAMED = 12  # lines in a legend: more would hide the picture
+AT_REST = 1e-6  # of the longest line: steps are solved to no less, and a motion below it is round-off
 _EARLIER = 4  # shapes of the motion behind the last one
 
 
@@ -148,20 +149,27 @@ def largest_tensions(result: Result, every: AllLines) -> Panel:
 
 
 def motions(result: Result, every: AllLines) -> list[Panel]:
-    """How bodies and points that move leave their first places: one panel for each direction with motion."""
+    """How bodies and points that move leave their first places: one panel for each direction with motion.
+
+    Of less than AT_REST of the longest line it is drawn flat: it is below what a step is solved to.
+    """
     named = {f"body {name}": result[f"bodies/{name}/position"] for name in bodies_of(result)}
     held = fairleads_of(result)
     named |= {f"point {x}": result[f"points/{x}/position"] for x in points_of(result) if x not in held}
     moved = {name: at[: every.outputs] - at[0] for name, at in named.items() if np.ptp(at, axis=0).max() > 0.0}
-    panels = []
+    panels, least = [], AT_REST * max(float(np.ptp(line.s)) for line in every.lines.values())
     for k, axis in enumerate("xyz"):
         peak = max((float(np.abs(x[:, k]).max()) for x in moved.values()), default=0.0)
         if peak > 0.0 and every.outputs > 1:
-            factor, unit = prefix("m", peak)
+            rests = peak < least
+            factor, unit = prefix("m", max(peak, least))
             lines = zip(list(moved.items())[:MOST_NAMED], cycle(LINE_COLOURS), strict=False)
             items: list[Item] = [Line(every.times, x[:, k] * factor, name, c) for (name, x), c in lines]
-            y = Axis(axis, unit, peak=peak * factor)
+            bound = least * factor
+            y = Axis(axis, unit, -bound, bound) if rests else Axis(axis, unit, peak=peak * factor)
             title = f"motion along {axis}, from the first place"
+            if rests:
+                title = f"motion along {axis}: at rest, to {short(bound, 2)} {unit}"
             panels.append(Panel(f"motion-{axis}", title, Axis("t", "s"), y, items, legend=True, cursor=True))
     return panels
 

@@ -43,6 +43,13 @@ def worst(result: Result, name: str, lowest: bool = False) -> Worst:
     return Worst(best.value, best.s, best.t, output, int(near[-1 if best.side > 0 else 0]), best.side)
 
 
+def is_without_moment(result: Result) -> bool:
+    """Whether no output has a rod and no step a bending moment: catenaries have none, and 0 is not that of the line."""
+    found = extreme(result, "bending_moment", "max")
+    rods = any(zone.kind != "catenary" for zones in result.zones for zone in zones)
+    return found is not None and found.value == 0.0 and not rods
+
+
 def limits_of(result: Result) -> list[Judged]:
     """Every limit that the sections have, where it was broken most or nearly."""
     found: dict[str, Judged] = {}

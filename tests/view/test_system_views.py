@@ -18,10 +18,11 @@ from hybrid.cli.app import app
 from hybrid.cli.console import Console
 from hybrid.cli.system_commands import ended
 from hybrid.errors import ResultError
+from hybrid.store.records import Zone
 from hybrid.view.animation import animate
 from hybrid.view.figure import Line, Marks
-from hybrid.view.system_report import html
-from hybrid.view.system_views import AllLines, arms_of, page
+from hybrid.view.system_report import _extreme_text, html
+from hybrid.view.system_views import AllLines, arms_of, motions, page, points_of
 
 SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
 PLACES = {"east": (100, 0), "north": (-50, 87), "south": (-50, -87)}
@@ -75,6 +76,56 @@ def test_a_page_has_every_line_where_it_is(result: hybrid.Result) -> None:
     factor = largest["east"].max() / result.lines["east"].tension.max()
     assert factor in (1.0, 1e-3)
     assert "tension above limit" in drawn.note and "line east" in drawn.note
+
+
+@pytest.mark.parametrize("part", [1e-10, 3e-6])
+def test_motion_below_what_is_resolved_is_drawn_flat(result: hybrid.Result, part: float) -> None:
+    """Round-off of a body at rest does not fill a panel; a motion of 3e-6 of the longest line does."""
+    every = AllLines(result)
+    way = 120.0 * part * np.sin(np.arange(every.outputs))[:, None] * [1.0, 0.0, 0.0]
+    still = dict.fromkeys((f"points/{n}/position" for n in points_of(result)), np.zeros((every.outputs, 3)))
+    seen = Moved(result, still | {"bodies/spar/position": way})
+    (panel,) = motions(seen, every)  # type: ignore[arg-type]
+    (low, high), drawn = panel.limits()[1], next(x.y for x in panel.items if isinstance(x, Line))
+    assert ("at rest, to 0.12 mm" in panel.title) == (part < 1e-6)
+    assert (np.ptp(drawn) < 1e-3 * (high - low)) == (part < 1e-6)
+
+
+class Moved:
+    """A result with other motions."""
+
+    def __init__(self, result: hybrid.Result, other: dict[str, Any]) -> None:
+        self._result, self._other = result, other
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._result, name)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._other or name in self._result
+
+    def __iter__(self) -> Any:
+        return iter(self._result)
+
+    def __getitem__(self, name: str) -> Any:
+        return self._other[name] if name in self._other else self._result[name]
+
+
+class Extremes(dict[str, Any]):
+    """A line as the table of extremes sees it: of one kind of zone, with a largest moment and curvature."""
+
+    def __init__(self, kind: str, moment: float) -> None:
+        names = {"envelope/s": [0.0, 1.0], "envelope/curvature_max": [0.1, 0.2], "envelope/curvature_t_max": [0.0, 0.0],
+                 "envelope/bending_moment_max": [0.0, moment], "envelope/bending_moment_t_max": [0.0, 0.0]}  # fmt: skip
+        super().__init__({name: np.array(x) for name, x in names.items()})
+        self.zones = [[Zone(kind, 0.0, 1.0)]]
+
+
+def test_a_line_that_was_catenary_throughout_has_no_moment() -> None:
+    """0 N m beside a curvature would say that it does not bend; a rod without moment, or with one, shows its number."""
+    ask = "bending_moment", "max", "N m"
+    assert "a catenary, which has none" in _extreme_text(Extremes("catenary", 0.0), *ask)  # type: ignore[arg-type]
+    assert _extreme_text(Extremes("rod", 0.0), *ask).startswith("0 N m at s")  # type: ignore[arg-type]
+    assert _extreme_text(Extremes("catenary", 2.0), *ask).startswith("2 N m at s")  # type: ignore[arg-type]
 
 
 def test_arms_lead_from_a_body_to_its_fairleads(result: hybrid.Result) -> None:
