@@ -1,0 +1,207 @@
+"""What the time loop of several lines costs: beside MoorDyn and CableDyn, and per cell as lines become many.
+
+    pip install -e ".[dev,bench]"
+    pytest bench/test_bench_system_speed.py -m bench -s
+
+A bridle: two legs from the bed to a junction with mass, and a pennant from there to a fairlead that heaves; 3 x 100 cells.
+CPU time of the loop alone, medians of three, alternating in one run.  Errors are those of the tension at the fairlead in
+the last two periods, in per cent of a run of ours with three times the cells and an eighth of the step.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time as clock
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import hybrid
+
+pytestmark = pytest.mark.bench
+Vector = NDArray[np.float64]
+
+CELLS, PERIOD, DURATION, HEAVE, RAMP = 100, 8.0, 40.0, 1.0, 16.0
+ANCHORS, JUNCTION, FAIRLEAD = (
+    [(-60.0, 40.0, -120.0), (-60.0, -40.0, -120.0)],
+    (50.8330, 0.0, -104.7824),
+    (130.0, 0.0, -20.0),
+)
+LEG, PENNANT, MASS, VOLUME = 124.0, 116.0, 500.0, 0.2
+ROPE = {"mass": 20.0, "diameter": 0.06, "axial_stiffness": 2e7}
+TIMES_FASTER = 10.0
+
+
+def scene(cells: int, step: float) -> dict[str, Any]:
+    section = ROPE | {"drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0}}
+    heave = {"heave": {"amplitude": HEAVE, "period": PERIOD}, "ramp": RAMP}
+    lines = {
+        f"leg{k}": {"start": f"anchor{k}", "end": "junction", "sections": [section | {"length": LEG}]} for k in (0, 1)
+    }
+    lines["pennant"] = {"start": "junction", "end": "fairlead", "sections": [section | {"length": PENNANT}]}
+    for line in lines.values():
+        line["mesh"] = {"cells": cells}
+    points: dict[str, Any] = {f"anchor{k}": {"position": list(ANCHORS[k])} for k in (0, 1)}
+    points["junction"] = {"initial_guess": list(JUNCTION), "mass": MASS, "volume": VOLUME}
+    points["fairlead"] = {"position": list(FAIRLEAD), "motion": heave}
+    return {
+        "environment": {"fluid": {"density": 1025}}, "points": points, "lines": lines,
+        "time": {"duration": DURATION, "step": step}, "output": {"every": max(step, 0.1), "points": 11},
+    }  # fmt: skip
+
+
+def ours(cells: int, step: float) -> tuple[Vector, float]:
+    """Pull at the fairlead (nt,) N every 0.1 s, and CPU time of the loop (s)."""
+    found = hybrid.run(scene(cells, step))
+    line = found.lines["pennant"]
+    return np.linalg.norm(found["points/fairlead/force"], axis=1), float(line["steps/cpu"][-1])
+
+
+def heaved(t: float) -> float:
+    ramp = min(t / RAMP, 1.0)
+    return HEAVE * ramp**3 * (10.0 - 15.0 * ramp + 6.0 * ramp**2) * np.sin(2.0 * np.pi * t / PERIOD)
+
+
+def deck(cells: int, step: float, program: str) -> str:
+    """The same for MoorDyn or CableDyn, whose conventions of drag and added mass these are."""
+    kind = "Attachment" if program == "MoorDyn" else "Type"
+    units = "Diam MassDen EA BA/-zeta EI Cd Ca CdAx CaAx" if program == "MoorDyn" else (
+        "Diam MassDenInAir EA BA/-zeta EI Cd_n Cd_t Ca_n Ca_t"
+    )  # fmt: skip
+    drag = "1.2 1.0 %g 0.0" % (0.05 / np.pi) if program == "MoorDyn" else "1.2 0.05 1.0 0.0"
+    rows = [f"{k + 1} Fixed {x} {y} {z} 0 0 0 0" for k, (x, y, z) in enumerate(ANCHORS)]
+    rows += [
+        "3 Free {} {} {} {} {} 0 0".format(*JUNCTION, MASS, VOLUME),
+        "4 Coupled {} {} {} 0 0 0 0".format(*FAIRLEAD),
+    ]
+    ends = [(1, 3, LEG), (2, 3, LEG), (3, 4, PENNANT)]
+    if program == "MoorDyn":
+        lines = ["ID LineType AttachA AttachB UnstrLen NumSegs Outputs", "(-) (-) (-) (-) (m) (-) (-)"]
+        lines += [f"{k + 1} rope {a} {b} {length} {cells} -" for k, (a, b, length) in enumerate(ends)]
+        options = [f"{step} dtM", "RK2 tScheme", "1 disableOutput", "1 disableOutTime", "0 writeLog", "60 TmaxIC"]
+    else:
+        lines = [
+            "ID NodeA NodeB Outputs",
+            "(-) (-) (-) (-)",
+            *(f"{k + 1} {b} {a} -" for k, (a, b, _) in enumerate(ends)),
+        ]
+        lines += ["--- SECTIONS ---", "LineID LineType Length NumSegs", "(-) (-) (m) (-)"]
+        lines += [f"{k + 1} rope {length} {cells}" for k, (_, _, length) in enumerate(ends)]
+        options = [f"{step} dtM", f"{DURATION} TMax"]
+    text = [
+        "--- Input File ---", "bridle", "--- LINE TYPES ---", f"TypeName {units}", "(-) (m) (kg/m) (N) (-) (N-m^2) (-) (-) (-) (-)",
+        f"rope {ROPE['diameter']} {ROPE['mass']} {ROPE['axial_stiffness']} -0.8 0 {drag}",
+        "--- POINTS ---", f"ID {kind} X Y Z M V CdA Ca", "(-) (-) (m) (m) (m) (kg) (m^3) (m^2) (-)", *rows,
+        "--- LINES ---", *lines, "--- OPTIONS ---", "9.81 g", "1025 rhoW", "200 WtrDpth", "3e6 kBot", "3e5 cBot", *options,
+        *(["--- OUTPUTS ---", '"FairTen3"'] if program == "CableDyn" else []), "--- need this line ---", "",
+    ]  # fmt: skip
+    return "\n".join(text)
+
+
+def of_moordyn(cells: int, step: float) -> tuple[Vector, float]:
+    import moordyn
+    from peers.moordyn_touchdown import silence
+
+    with tempfile.TemporaryDirectory() as folder, silence():
+        path = Path(folder) / "deck.txt"
+        path.write_text(deck(cells, step, "MoorDyn"))
+        system = moordyn.Create(str(path))
+        here = np.array(FAIRLEAD)
+        assert moordyn.Init(system, here.tolist(), [0.0] * 3) == 0
+        point, begin = moordyn.GetPoint(system, 4), clock.process_time()
+        pull = [np.linalg.norm(moordyn.GetPointForce(point))]
+        for k in range(round(DURATION / 0.1)):
+            now, then = heaved(0.1 * k), heaved(0.1 * (k + 1))
+            at = [here[0], here[1], here[2] + now]
+            moordyn.Step(system, at, [0.0, 0.0, (then - now) / 0.1], 0.1 * k, 0.1)
+            pull.append(np.linalg.norm(moordyn.GetPointForce(point)))
+        cpu = clock.process_time() - begin
+        moordyn.Close(system)
+    return np.array(pull), cpu
+
+
+def of_cabledyn(cells: int, step: float) -> tuple[Vector, float]:
+    import cabledyn
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bridle.dat"
+        path.write_text(deck(cells, step, "CableDyn"))
+        model = cabledyn.CableDyn(path)
+    with model:
+        position, velocity, acceleration = model.get_coupled_motion()
+        velocity[:], acceleration[:], up = 0.0, 0.0, position.size - 1  # the fairlead is the last point
+        pull, begin, d = [float(model.channel("FairTen3"))], clock.process_time(), 1e-4
+        for k in range(1, round(DURATION / step) + 1):
+            t = k * step
+            before, now, after = heaved(t - d), heaved(t), heaved(t + d)
+            position[up], velocity[up] = FAIRLEAD[2] + now, (after - before) / (2 * d)
+            acceleration[up] = (after - 2 * now + before) / d**2
+            model.step(step, position, velocity, acceleration)
+            if abs(round(t / 0.1) * 0.1 - t) < 1e-9:
+                pull.append(float(model.channel("FairTen3")))
+        cpu = clock.process_time() - begin
+    return np.array(pull), cpu
+
+
+def errors(pull: Vector, fine: Vector) -> str:
+    """Of mean, largest and smallest tension of the last two periods, at the outputs of the coarser of both."""
+    fine = fine[:: (fine.size - 1) // (pull.size - 1)]
+    last = round(2 * PERIOD * (pull.size - 1) / DURATION)
+    found = [100.0 * (f(pull[-last:]) / f(fine[-last:]) - 1.0) for f in (np.mean, np.max, np.min)]
+    return "errors of mean, largest, smallest " + ", ".join(f"{x:.2f}" for x in found) + " %"
+
+
+def test_a_bridle_against_moordyn_and_cabledyn() -> None:
+    """With its own step each: those of CableDyn that are longer ring at the junction."""
+    pytest.importorskip("moordyn")
+    pytest.importorskip("cabledyn")
+    ours(10, 0.1)
+    fine, _ = ours(3 * CELLS, 0.0125)
+    runs = {
+        "hybrid, 0.1 s": lambda: ours(CELLS, 0.1), "hybrid, 0.4 s": lambda: ours(CELLS, 0.4),
+        "CableDyn, 0.1 s": lambda: of_cabledyn(CELLS, 0.1), "CableDyn, 0.025 s": lambda: of_cabledyn(CELLS, 0.025),
+        "MoorDyn, 0.0004 s": lambda: of_moordyn(CELLS, 0.0004),
+    }  # fmt: skip
+    cpu: dict[str, list[float]] = {name: [] for name in runs}
+    print()
+    for again in range(3):
+        for name, run in runs.items():
+            pull, used = run()
+            cpu[name].append(used)
+            if not again:
+                print(f"{name}: {used:.2f} s; {errors(pull, fine)}", flush=True)
+    spent = {name: float(np.median(x)) for name, x in cpu.items()}
+    for name, x in spent.items():
+        mine = spent["hybrid, 0.1 s"], spent["hybrid, 0.4 s"]
+        print(f"{name}: loop {x:.3f} s, {x / mine[0]:.1f} and {x / mine[1]:.1f} times those of hybrid")
+    nearest = min(spent["CableDyn, 0.025 s"], spent["MoorDyn, 0.0004 s"])
+    assert nearest > TIMES_FASTER * spent["hybrid, 0.4 s"]
+
+
+def test_cost_per_cell_of_a_hundred_lines() -> None:
+    """Lines of 50 cells to fairleads that heave alike; the time of the loop per line, against that of one line."""
+    rope = ROPE | {"length": 120, "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}}
+    heave = {"heave": {"amplitude": 1, "period": 8}, "ramp": 8}
+
+    def loop(count: int) -> float:
+        points = {f"a{k}": {"position": [20.0 * k, 0, -80]} for k in range(count)}
+        points |= {f"b{k}": {"position": [20.0 * k, 80, 0], "motion": heave} for k in range(count)}
+        lines = {
+            f"l{k}": {"start": f"a{k}", "end": f"b{k}", "sections": [rope], "mesh": {"cells": 50}} for k in range(count)
+        }
+        tables = {"environment": {"fluid": {"density": 1025}}, "points": points, "lines": lines}
+        time = {"duration": 20.0, "step": 0.1} if count > 1 else {"duration": 200.0, "step": 0.1}
+        found = hybrid.run(tables | {"time": time, "output": {"every": 10.0, "points": 11}})
+        used = found.lines["l0"]["steps/cpu"]
+        return float(used[-1] - used[0]) / (len(used) - 1) / count
+
+    loop(1)
+    each = [(loop(1), loop(100)) for _ in range(3)]
+    one, many = np.median(each, axis=0)
+    print(
+        f"\nper step and line of 50 cells: 1 line {1e6 * one:.0f} us, 100 lines {1e6 * many:.0f} us: {many / one:.2f}"
+    )
+    assert many < 1.3 * one
