@@ -11,6 +11,7 @@ import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels import winch as w
+from hybrid.kernels.payout_nodes import LEAVES
 from hybrid.kernels.reel import PER_LENGTH
 from hybrid.kernels.state import Floats, Line
 from hybrid.model.layout import Layout
@@ -21,8 +22,6 @@ from hybrid.model.mesh import Zone
 from hybrid.scene.payout import Payout
 from hybrid.scene.schema import AdaptiveModel, Modules, Scene, Section
 
-# Parts of a cell: a node enters when that much of the cell after it is out, and leaves when only that much is left.
-ENTERS, LEAVES = 0.85, 0.35
 # The fewest cells that may be left.
 FEWEST_CELLS = 4
 # Nodes that ride with the fairlead behind a clamp, where the line bends most, and of other rods.
@@ -97,10 +96,6 @@ class PayoutPlan:
     def cell(self, node: int) -> float:
         """Length, m, of the cell after a material node."""
         return float(self.nodes[node + 1] - self.nodes[node])
-
-    def limits(self, count: int) -> tuple[float, float]:
-        """Lengths, m, of the last cell of a line of `count` material nodes beyond which a node enters or leaves."""
-        return self.cell(count - 1) + ENTERS * self.cell(count), LEAVES * self.cell(count - 1)
 
     def forecast(self, duration: float) -> PayoutForecast:
         """What will be out up to a time, s."""

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.adapt.payout_cells import Flow, enter, from_far_end, leave, line_from_far_end
 from hybrid.kernels import books as b
 from hybrid.kernels import reel as p
 from hybrid.kernels import winch as w
@@ -17,9 +16,10 @@ from hybrid.kernels.binding import Table
 from hybrid.kernels.books import CLOCK_SIZE
 from hybrid.kernels.energies import observe
 from hybrid.kernels.payout import fit_line, iterate, lengthen, pay_out, stand_still
+from hybrid.kernels.payout_nodes import blank_carry_job, carry_node, put_places
 from hybrid.kernels.reel import MovingZones, Reel, blank_reel, blank_reel_job
 from hybrid.kernels.report import LENGTH_OUT, PAYOUT_RATE
-from hybrid.kernels.state import Batch, Ends, Floats, Line, State
+from hybrid.kernels.state import Batch, Ends, Floats, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.mesh import Zone
@@ -55,19 +55,16 @@ class PayingOut:
         self.reel = self._blank(self.count)
         self._rod: np.ndarray | None = None  # (N,) of a line whose zones move
         self.table, self._fitting, self._clock = Table(blank_reel_job()), Table(blank_reel_job()), np.zeros(CLOCK_SIZE)
+        self._carrying = Table(blank_carry_job())
 
     def _blank(self, count: int) -> Reel:
         """Arrays of a line of so many material nodes, none of whose cells lacks anything."""
         plan = self.plan
         reel = blank_reel(count + self.rides, self.law, plan.pieces, self.winch, plan.layer, self.at_start)
-        place, before = float(plan.nodes[count - 1]), float(plan.nodes[count - 2])
         numbers = reel.numbers
         numbers[p.SIDE], numbers[p.FAR] = (1.0 if plan.side else -1.0), plan.far
         numbers[p.SPRING] = plan.cable.springs[plan.side]
-        numbers[p.PLACE], numbers[p.FADING] = place, -np.inf
-        numbers[p.LONGEST], numbers[p.SHORTEST] = plan.limits(count)
-        reel.rest[:-1], reel.rest[-1] = amount_between(plan.pieces, before, place), place - before
-        reel.true[: count - 1], reel.true[count:] = np.diff(plan.nodes[:count]), -np.diff(plan.layer)
+        put_places(reel, plan.nodes, count)
         return reel
 
     def on(self, model: Model, length: float, rod: np.ndarray | None = None) -> Model:
@@ -153,27 +150,22 @@ class PayingOut:
         carry: lets zones that move go on, with the model and (N,) which old cell each of its cells comes from.
         """
         state, old, plan = run.state, self.reel, self.plan
-        numbers = old.numbers
-        enters = old.true[self.count - 1] > numbers[p.LONGEST]
-        flow = self._flow(run)
+        enters = old.true[self.count - 1] > old.numbers[p.LONGEST]
         source = self._came_from(enters, old.true.size)
         self.count += 1 if enters else -1
-        length = float(numbers[p.LENGTH])
+        length = float(old.numbers[p.LENGTH])
         changed = self.on(model, length, model.layout.rod[source] if model.layout is not None else None)
         if model.line.law.size:  # laws as the last step has linearised them
             changed.line.ck[:], changed.line.law[:, SHIFT:] = model.line.ck[source], model.line.law[source, SHIFT:]
-        reel, side = self._blank(self.count), plan.side
-        line, target = line_from_far_end(model.line, side, plan.far), line_from_far_end(changed.line, side, plan.far)
-        seen = from_far_end(state, side)
-        if enters:
-            out = enter(line, target, seen, old, reel, flow, float(plan.nodes[self.count - 1]))
-        else:
-            out = leave(line, target, seen, old, reel, flow)
-        out = from_far_end(out, side)
-        reel.numbers[p.FADING] = (reel.since + reel.span).max()
+        reel, out = self._blank(self.count), state_for(changed.line)
+        self._carrying.bind(
+            line=model.line, target=changed.line, state=state, out=out, reel=old, new=reel, clock=run.clock,
+            tension=run.books.tension, nodes=plan.nodes,
+        )  # fmt: skip
+        carry_node(self._carrying.numbers)
         reel.true[self.count - 1] = length - plan.layer[0] - plan.nodes[self.count - 1]
         self.reel = reel
-        self._fit(changed.line, reel, length, flow.t)
+        self._fit(changed.line, reel, length, run.t)
         if carry is not None:
             carry(changed, source)
         ends = model.ends.at(run.t)
@@ -213,18 +205,6 @@ class PayingOut:
         reel.numbers[p.LENGTH], self._clock[b.NOW] = length, t
         self._fitting.bind(line=line, reel=reel, clock=self._clock)
         fit_line(self._fitting.numbers)
-
-    def _flow(self, run: CompiledRun) -> Flow:
-        t, dt = run.t, float(run.clock[b.LAST_DT])
-        rho = float(run.clock[b.RHO])
-        am, af = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
-        _, rate, acceleration = length_at(self.law, t)
-        later = length_at(self.law, t + (am - af) * dt)[1:]
-        if self.holds_tension:
-            _, rate, acceleration, then = self.winch[w.LENGTH_NOW : w.ALGORITHMIC_NOW + 1].tolist()
-            later = rate + (am - af) * dt * acceleration, then
-        cell = self.plan.cell(self.count - 1)
-        return Flow(t, dt, rate, acceleration, (later[0], later[1]), cell, self._ordered(run.books.tension[0]).copy())
 
     def look(
         self, observer: Observer, model: Model, batch: Batch
@@ -381,12 +361,3 @@ def energy(line: Line, ends: Ends, state: State) -> float:
         found,
     )
     return float(found.sum() - (line.force * state.r).sum())
-
-
-def amount_between(pieces: Floats, begin: float, end: float) -> Floats:
-    """What the material between two arc lengths, m, has of all that it has per length (kernels.payout)."""
-    edges = np.append(pieces[1:, 0], np.inf)
-    starts = np.append(-np.inf, pieces[1:, 0])
-    way = np.maximum(np.minimum(edges, end) - np.maximum(starts, begin), 0.0)
-    some = way > 0.0
-    return np.asarray(way[some] @ pieces[some, 1:])
