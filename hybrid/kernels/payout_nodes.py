@@ -101,7 +101,7 @@ def move_row(old, new, forward, cut, step):
     """Values of cells or nodes counted from the far end: up to `cut` they stay, the others move by `step`."""
     n, m = old.shape[0], new.shape[0]
     for k in range(m):
-        j = k if k < cut else k - step
+        j = k if k < cut else max(k - step, 0)
         if forward:
             new[k] = old[j]
         else:
@@ -113,7 +113,7 @@ def move_rows(old, new, forward, cut, step):
     """The same of rows."""
     n, m = old.shape[0], new.shape[0]
     for k in range(m):
-        j = k if k < cut else k - step
+        j = k if k < cut else max(k - step, 0)
         to, of = (k, j) if forward else (m - 1 - k, n - 1 - j)
         for i in range(old.shape[1]):
             new[to, i] = old[of, i]

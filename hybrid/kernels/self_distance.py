@@ -64,16 +64,21 @@ class Itself(NamedTuple):
     ahead: Floats  # (2,)
 
 
+def boxes_of(cells: int) -> int:
+    """Rows of the tree of a line of so many cells."""
+    leaves = 1
+    while leaves * LEAF < cells:
+        leaves *= 2
+    return 2 * leaves
+
+
 def blank_itself(width: Floats) -> Itself:
     """For a line of cells of these diameters (N,) m."""
-    leaves = 1
-    while leaves * LEAF < width.size:
-        leaves *= 2
     found = np.zeros(FOUND)
     found[[CLEARANCE, DISTANCE, LEAST]] = np.inf
     stack = np.zeros((4 * DEPTH, 2), np.int64)
     ahead = np.array([-1.0, 0.0])
-    return Itself(width, np.zeros((2 * leaves, BOX)), stack, found, np.full(2, -1, np.int64), ahead)
+    return Itself(width, np.zeros((boxes_of(width.size), BOX)), stack, found, np.full(2, -1, np.int64), ahead)
 
 
 class ItselfJob(NamedTuple):

@@ -125,7 +125,14 @@ class PayoutPlan:
 
         cable: as of `held_as`.
         """
-        s = self.along(np.concatenate([self.nodes[:count], length - self.layer]))
+        return self._line_on(self.along(np.concatenate([self.nodes[:count], length - self.layer])), like, cable)
+
+    def whole_line(self, like: Line, cable: Material) -> Line:
+        """The line with all material nodes that there may be; like, cable: as of `line`."""
+        return self._line_on(self.along(self.nodes), like, cable)
+
+    def _line_on(self, s: Floats, like: Line, cable: Material) -> Line:
+        """The line with nodes s, m; like, cable: as of `line`."""
         middle = 0.5 * (s[:-1] + s[1:])
         ends = [zone.s_b for zone in self.zones]
         rod = np.array([x.kind == "rod" for x in self.zones])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from hybrid.errors import Complaint, SceneError
 from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.analysis import (
     AdaptiveModel,
@@ -92,6 +93,18 @@ def payout_stands_alone(
         yield Finding(("resolution",), expected, "place cells by `mesh`")
 
 
+def check_fixed_step(ends: Ends, time: Time) -> None:
+    """SceneError where a motion is to be computed whose line is paid out, and whose step is not given.
+
+    An equilibrium, and a plan, need none.
+    """
+    found = _winch(ends)
+    if found is not None and time.step is None:
+        expected = f"a fixed step, in s, because line is paid out (ends.{found[0]}.payout): no error is estimated"
+        fix = "add `step: ...` (s) to time, and halve it to see its error; the equilibrium alone: hybrid static FILE"
+        raise SceneError([Complaint("time.step", "nothing", expected, fix)])
+
+
 def payout_has_fixed_steps(
     ends: Ends, time: Time | None, accuracy: Accuracy | None, output: Output
 ) -> Iterator[Finding]:
@@ -100,9 +113,8 @@ def payout_has_fixed_steps(
     if found is None or time is None:
         return
     because = f"because line is paid out (ends.{found[0]}.payout), of which no error is estimated"
-    if time.controlled:
-        fix = "add `step: ...` (s)" if time.step is None else "leave tolerance out"
-        yield Finding(("time", "step" if time.step is None else "tolerance"), f"a fixed step, in s, {because}", fix)
+    if time.tolerance is not None:
+        yield Finding(("time", "tolerance"), f"nothing, and a fixed step, {because}", "give time.step (s) instead")
     if accuracy is not None:
         yield Finding(("accuracy",), f"nothing, {because}", "leave it out; halve time.step to see its error")
     if output.errors:

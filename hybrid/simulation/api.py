@@ -33,6 +33,7 @@ from hybrid.model.resolution import (
     zones_are_free,
 )
 from hybrid.scene.motion_checks import check_motions
+from hybrid.scene.payout_checks import check_fixed_step
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.simulation.case import Case
@@ -96,6 +97,7 @@ def run(
             raise TypeError("a criterion is for zones that move: several lines have none")
         return _several_lines(scene, output, overwrite, progress)
     check_motions(scene)
+    check_fixed_step(scene.ends, scene.time)
     if scene.solver == "shooting":
         from hybrid.simulation.arbiter import run_shooting
 

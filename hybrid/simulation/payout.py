@@ -14,12 +14,12 @@ from hybrid.kernels import winch as w
 from hybrid.kernels.axial_law import SHIFT, stretch_energy
 from hybrid.kernels.binding import Table
 from hybrid.kernels.books import CLOCK_SIZE
-from hybrid.kernels.energies import observe
 from hybrid.kernels.payout import fit_line, iterate, lengthen, pay_out, stand_still
 from hybrid.kernels.payout_nodes import blank_carry_job, carry_node, put_places
+from hybrid.kernels.payout_run import energy_of
 from hybrid.kernels.reel import MovingZones, Reel, blank_reel, blank_reel_job
 from hybrid.kernels.report import LENGTH_OUT, PAYOUT_RATE
-from hybrid.kernels.state import Batch, Ends, Floats, Line, State, state_for
+from hybrid.kernels.state import ALONG_LINE, Batch, Ends, Floats, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.mesh import Zone
@@ -34,11 +34,7 @@ from hybrid.solve.stepper import Stepper
 from hybrid.store.named_arrays import matched
 
 ROUND_OFF = 1e-9  # of a length
-# Arrays of a line that its length changes, and those that outputs ask for.
-CHANGES = (
-    "h", "ck", "mass", "force", "kb", "k0", "hn", "rotary", "polar", "drag_n", "drag_t", "added_n", "added_t", "damp",
-    "tau", "buoy", "displaced", "diameter",
-)  # fmt: skip
+# Arrays of a line that its length changes, and that outputs ask for.
 VARIES = ("s", "h", "ck", "mass", "force", "kb", "k0", "hn", "rotary", "polar")
 # What a checkpoint keeps of a reel.
 KEPT = ("numbers", "lack", "rate", "since", "span", "winch")
@@ -212,7 +208,8 @@ class PayingOut:
         """The outputs of a batch, each of a line as long as it was then, and the zones of all but the first."""
         varied = {name: np.empty((batch.t.size, *getattr(model.line, name).shape)) for name in VARIES}
         zones = []
-        for k, (line, zones_then) in enumerate(self._lines_of(model, batch)):
+        moving = model.zones if model.layout is not None else None
+        for k, (line, zones_then) in enumerate(self._lines_of(model.line, self.reel, batch, moving)):
             zones.append(zones_then)
             for name, x in varied.items():
                 x[k] = getattr(line, name)
@@ -224,14 +221,18 @@ class PayingOut:
         there.first_energy = observer.first_energy
         return there, there.look(batch._replace(h=varied["h"], kb=varied["kb"]), varied), zones[1:]
 
-    def _lines_of(self, model: Model, batch: Batch) -> Iterator[tuple[Line, tuple[Zone, ...]]]:
-        """The line of each output of a batch, in arrays that the next one overwrites, and its zones."""
-        line = model.line._replace(**{name: getattr(model.line, name).copy() for name in ("s", *CHANGES)})
+    def _lines_of(
+        self, line: Line, reel: Reel, batch: Batch, moving: tuple[Zone, ...] | None = None
+    ) -> Iterator[tuple[Line, tuple[Zone, ...]]]:
+        """The line of each output of a batch, in arrays that the next one overwrites, and its zones.
+
+        line, reel: with the cells of the outputs; moving: zones, if they move.
+        """
+        line = line._replace(**{name: getattr(line, name).copy() for name in ALONG_LINE})
         line.force[:, :2] = 0.0  # but for what rounding leaves of the forces on nodes that ride
-        reel = self.reel._replace(numbers=self.reel.numbers.copy(), true=self.reel.true.copy(), stage=np.zeros(1))
+        reel = reel._replace(numbers=reel.numbers.copy(), true=reel.true.copy(), stage=np.zeros(1))
         reel.numbers[p.FADING] = 0.0
         self._fitting.bind(line=line, reel=reel, clock=self._clock)
-        moving = model.zones if model.layout is not None else None
         for k, t in enumerate(batch.t.tolist()):
             if t >= self.law[0, 0] and not self.holds_tension:  # exactly, where samples interpolate
                 batch.report[k, LENGTH_OUT], batch.report[k, PAYOUT_RATE], _ = length_at(self.law, t)
@@ -240,13 +241,16 @@ class PayingOut:
             fit_line(self._fitting.numbers)
             yield line, self.plan.zones_of(length, moving)
 
-    def outputs_in(self, model: Model, batch: Batch) -> list[Output]:
-        """The outputs of a batch, copied, each with the line as it was then; zones do not move."""
+    def outputs_in(self, line: Line, reel: Reel, batch: Batch) -> list[Output]:
+        """The outputs of a batch, copied, each with the line as it was then; zones do not move.
+
+        line, reel: with the cells of the outputs.
+        """
         found = []
-        for k, (line, zones) in enumerate(self._lines_of(model, batch)):
-            arrays: dict[str, Any] = {name: getattr(line, name).copy() for name in VARIES}
+        for k, (then, zones) in enumerate(self._lines_of(line, reel, batch)):
+            arrays: dict[str, Any] = {name: getattr(then, name).copy() for name in VARIES}
             rows: Any = [x[k : k + 1].copy() if x.ndim and len(x) == batch.t.size else x for x in batch]
-            found.append(Output(line._replace(**arrays), zones, Batch(*rows)))
+            found.append(Output(then._replace(**arrays), zones, Batch(*rows)))
         return found
 
     # --- checkpoints ------------------------------------------------------------------------------
@@ -346,18 +350,5 @@ def length_asked(scene: Scene, paying: PayingOut | None, length: Any, rate: Any)
 
 def energy(line: Line, ends: Ends, state: State) -> float:
     """Kinetic, elastic and potential energy, J."""
-    n, found = line.h.size, np.zeros(4)
-    observe(
-        line,
-        ends,
-        state.e,
-        state.v,
-        state.a1,
-        state.w,
-        state.T,
-        state.turn,
-        np.zeros((n + 1, 3)),
-        np.zeros((n + 1, 3)),
-        found,
-    )
-    return float(found.sum() - (line.force * state.r).sum())
+    n = line.s.size
+    return float(energy_of(line, ends, state, np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(5)))

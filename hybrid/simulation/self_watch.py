@@ -127,6 +127,11 @@ class SelfWatch:
         self._touches = bool(model.line.bits & SELF_CONTACT)
         self.itself.found[MEETING] = OUTER - 1.0 if self._touches else 0.0
 
+    @property
+    def table(self) -> Table:
+        """What compiled steps know of it."""
+        return self._job
+
     def look(self, run: CompiledRun) -> int:
         """Look at the last step of a line that is so bent that it could come near itself, and let every step do so from
 

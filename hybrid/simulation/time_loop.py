@@ -12,10 +12,10 @@ import numpy as np
 
 from hybrid.errors import ComputationError
 from hybrid.kernels.books import AT_STOP, FAILED, FLAGS, JUMPED, LOG, PAUSED, ROWS, SAMPLES, STEPPED, STRETCHED
-from hybrid.kernels.state import Batch, Line, batch_of_one
+from hybrid.kernels.state import Batch, batch_of_one
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
-from hybrid.outputs.joined_lines import Output, outputs_in
+from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
@@ -238,13 +238,13 @@ class TimeLoop:
         are put aside, to be recorded with others.
         """
         run = self.run
-        for line, outputs in run.waiting():
-            self._put_aside(line, outputs)
+        for outputs in run.waiting():
+            self._put_aside(outputs)
         batch = run.run.samples(run.model.ends.values)
         run.empty()
         if aside:
             if batch is not None:
-                self._put_aside(run.model.line, batch)
+                self._put_aside(run.outputs_of_now(batch))
             return
         if everything or batch is not None or self._aside or run.run.count[ROWS] > LOGGED:
             self._log()
@@ -259,13 +259,9 @@ class TimeLoop:
         of_states = not observer.writes_criteria and observer.quantities is None and self.run.correction is None
         return of_states and not line.law.size and line.h.size >= FEWEST_JOINED
 
-    def _put_aside(self, line: Line, batch: Batch) -> None:
+    def _put_aside(self, outputs: list[Output]) -> None:
         """Outputs of a line of the zones of now, to be recorded with others."""
-        model = self.run.model
-        if self.run.payout is not None:
-            self._aside += [(model, x) for x in self.run.payout.outputs_in(model, batch)]
-        else:
-            self._aside += [(model, x) for x in outputs_in(batch, line, model.zones)]
+        self._aside += [(self.run.model, x) for x in outputs]
         self._note_torque()
         if sum(x.line.s.size for _, x in self._aside) > MOST_ASIDE:
             self._log()

@@ -16,12 +16,13 @@ from hybrid.errors import Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT
 from hybrid.kernels.report import SEABED_ENERGY, SELF_CONTACT_ENERGY
-from hybrid.kernels.state import Batch, Line, State, Work, state_for
+from hybrid.kernels.state import Batch, State, Work, state_for
 from hybrid.kernels.step_law import FIRST
 from hybrid.model.build import Model
 from hybrid.model.plan import parts
 from hybrid.model.resolution import Resolution
 from hybrid.model.scales import wave_step
+from hybrid.outputs.joined_lines import Output, outputs_in
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.blended import note_blended, rotate_ends_in
@@ -31,6 +32,7 @@ from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.payout import PayingOut
+from hybrid.simulation.payout_nodes import NodeChanges, outputs_of_now
 from hybrid.simulation.payout_zones import PaidZones, moving_zones
 from hybrid.simulation.plane_monitor import PlaneMonitor
 from hybrid.simulation.releases import let_go, overloaded, watch_forces
@@ -106,6 +108,7 @@ class Transient:
         self._pending: Change | None = None
         self._reviewed: Change | None = None  # what a review asks for that is done already
         self._cells: CellChanges | None = None  # of cells that change without Python
+        self._nodes: NodeChanges | None = None  # of nodes that enter and leave so
         self._overloaded: dict[int, str] = {}  # ends that are let go after the outputs of this step, and why
         self._leaves = self._returns = False  # whether it leaves its plane, or is back in it, after this step
         self._rescues = 0, 0  # the step before, and repetitions with more rod since
@@ -173,18 +176,24 @@ class Transient:
         leaves = self._leaves or self._returns or self.nears_itself
         return not (self._pending is not None or leaves or self._overloaded or joints or paid)
 
-    def waiting(self) -> Iterator[tuple[Line, Batch]]:
-        """Outputs before those in the buffer of the run, of cells that have changed since, each overwritten by the
-
-        next; `empty` when done.
-        """
+    def waiting(self) -> Iterator[list[Output]]:
+        """Outputs before those in the buffer of the run, of cells that have changed since; `empty` when done."""
         if self._cells is not None:
-            yield from self._cells.waiting()
+            yield from (outputs_in(batch, line, self.model.zones) for line, batch in self._cells.waiting())
+        if self._nodes is not None:
+            yield from self._nodes.waiting()
+
+    def outputs_of_now(self, batch: Batch) -> list[Output]:
+        """The outputs of a batch of the line of now, copied."""
+        if self.payout is not None:
+            return outputs_of_now(self, batch)
+        return outputs_in(batch, self.model.line, self.model.zones)
 
     def empty(self) -> None:
         """What `waiting` gave, and the samples of the run, have been taken."""
-        if self._cells is not None:
-            self._cells.empty()
+        for changes in (self._cells, self._nodes):
+            if changes is not None:
+                changes.empty()
 
     @property
     def cells_follow(self) -> bool:
@@ -328,6 +337,9 @@ class Transient:
 
     def _go(self) -> int:
         """Let the compiled run go on, through changes of cells that need nothing else; a code of kernels.books."""
+        nodes = self._changes_of_nodes()
+        if nodes is not None:
+            return nodes.go()
         cells = self._changes_of_cells()
         if cells is None:
             return self.run.go()
@@ -353,6 +365,18 @@ class Transient:
         if not self._cells.adopted:
             self._cells.adopt()
         return self._cells
+
+    def _changes_of_nodes(self) -> NodeChanges | None:
+        """What lets nodes enter and leave, with the line of now; None: no line is paid out, or Python is asked."""
+        if self.payout is None or not NodeChanges.applies(self):
+            return None
+        if self._nodes is None or not self._nodes.still_fits() or not self._nodes.adopted:
+            if self.run.count[b.SAMPLES] or (self._nodes is not None and self._nodes.waits):
+                return None  # in the arrays of before: Python changes nodes until they go
+            if self._nodes is None or not self._nodes.still_fits():
+                self._nodes = NodeChanges(self)
+            self._nodes.adopt()
+        return self._nodes
 
     def begin_leg(self) -> None:
         """Count fixed steps from here."""
@@ -455,6 +479,10 @@ class Transient:
     def _change_length(self) -> None:
         """A node enters at the winch, or leaves."""
         assert self.payout is not None
+        nodes = self._changes_of_nodes()
+        if nodes is not None:
+            nodes.change()
+            return
         zones = self.paid_zones
         rods = zones.rods_before_leaving() if zones is not None else None
         if rods is not None:
@@ -520,6 +548,8 @@ class Transient:
         self.model = model
         if self._cells is not None:
             self._cells.adopted = False
+        if self._nodes is not None:
+            self._nodes.adopted = False
         if self.switching is not None:
             self.switching.model = model
         if self.correction is not None and self.correction.model is not model:

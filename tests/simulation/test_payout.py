@@ -176,18 +176,14 @@ def forces(scene: dict[str, Any], skip: int | None = None, last: int | None = No
     with hybrid.Simulation(scene) as sim:
         paying = sim._loop.run.payout
         assert paying is not None
-        change = paying.change
-
-        def counted(run: Any, model: Any) -> Any:
-            changes.append(len(found))
-            return change(run, model)
-
-        paying.change = counted
         steps = round(scene["time"]["duration"] / scene["time"]["step"]) - 1
         for _ in range(min(steps, last or steps)):
             if skip is not None and len(changes) == skip:
                 paying.reel.numbers[4:6] = 1e9, -1e9  # no cell is too long or too short
+            count = paying.count
             sim.step()
+            if paying.count != count:
+                changes.append(len(found))
             found.append(np.linalg.norm(sim.forces().end))
     return np.array(found), changes
 

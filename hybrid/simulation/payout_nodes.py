@@ -1,0 +1,377 @@
+"""Nodes that enter and leave at a winch without Python's help: on arrays with room for the longest line.
+
+Two sets of arrays take turns: a change goes from one to the other (kernels.payout_run), and the tables of the run get
+the numbers of the other one.  What Python has of the line is made anew when the run comes back to it (`sync`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from hybrid.adapt.state_transfer import states
+from hybrid.kernels import books as b
+from hybrid.kernels import payout_run as f
+from hybrid.kernels.binding import Packed, Room, Table
+from hybrid.kernels.books import Books, sample_size
+from hybrid.kernels.cell_changes import after_forces, before_forces
+from hybrid.kernels.entry import NO_PUSH, workspace
+from hybrid.kernels.newton import RUN, Task
+from hybrid.kernels.payout import stand_still
+from hybrid.kernels.payout_nodes import CarryJob
+from hybrid.kernels.payout_run import NodeJob, blank_line_job, blank_node_job, blank_paid_run_job, make_line
+from hybrid.kernels.reel import Reel, blank_reel, blank_reel_job
+from hybrid.kernels.run import blank_job
+from hybrid.kernels.run import run as steps
+from hybrid.kernels.self_distance import blank_itself, blank_itself_job, boxes_of
+from hybrid.kernels.state import (
+    NO_TENSION_TORQUE,
+    NO_TORSION,
+    NO_TURN,
+    TENSION_TORQUE,
+    Batch,
+    Floats,
+    Line,
+    Sea,
+    State,
+    Work,
+)
+from hybrid.model.line_on_base import lines
+from hybrid.model.sea import Surroundings
+from hybrid.outputs.joined_lines import Output
+from hybrid.simulation.cell_arrays import REST_OF_SEA, Kept, Shaped, blank_kept, seas
+from hybrid.simulation.envelope import marks_on
+from hybrid.solve.run import MOST_SAMPLED, ROWS
+from hybrid.solve.stepper import HEAVY
+
+if TYPE_CHECKING:
+    from hybrid.simulation.transient import Transient
+
+# Of the tables of a run, what depends on the cells.
+IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
+IN_PAID = ("line", "sea", "old", "new", "report", "reel", "X", "W")
+IN_ITSELF = ("line", "old", "new", "itself")
+OF_REEL = ("law", "pieces", "winch", "layer")  # what all reels of a line share
+MOST_WAITING = 512  # lines whose outputs may wait
+
+
+class Pushes(NamedTuple):
+    """A push out of the plane, and room for the next."""
+
+    push: Floats
+    next_push: Floats
+
+
+class Side:
+    """One of the two sets of arrays."""
+
+    def __init__(self, most: int, reels: Packed, kept: Packed) -> None:
+        self.line, self.reel, self.kept = Room(lines, most), Room(reels, most), Room(kept, most)
+        self.states = Room(states, most), Room(states, most)
+        self.pushes = Room(Packed(lambda n: Pushes(np.zeros((n + 1, 4)), np.zeros((n + 1, 4)))), most)
+
+
+class NodeChanges:
+    """Nodes of a run (`Transient`) that enter and leave, where zones stay."""
+
+    def __init__(self, owner: Transient) -> None:
+        """Room for all; `adopt` before the first change."""
+        assert owner.payout is not None
+        self._owner, self._run, self._paying = owner, owner.run, owner.payout
+        self._fixed_to = self._key(owner)
+        plan, model, reel = owner.payout.plan, owner.model, owner.payout.reel
+        self.most = plan.nodes.size - 2 + owner.payout.rides
+        some, at_start = owner.envelope is not None, owner.payout.at_start
+        extra = int((marks_on(model.line.s, owner.marked) != 0).sum())
+        reels = Packed(lambda n: blank_reel(n, reel.law, reel.pieces, reel.winch, reel.layer, at_start), given=OF_REEL)
+        kept = Packed(lambda n: blank_kept(n, extra, some))
+        self._sides = Side(self.most, reels, kept), Side(self.most, reels, kept)
+        self._sea = Room(seas, self.most)
+        self._work = Room(Packed(partial(workspace, keep=at_start), given=("torsion",)), self.most)
+        size = sample_size(self.most)
+        self._rows = max(1, min(ROWS, MOST_SAMPLED // size))
+        self._samples = np.zeros(self._rows * size)
+        self._watch = owner.itself if owner.itself is not None and owner.itself.on else None
+        self._itself = blank_itself(np.zeros(self.most))
+        self._base = np.zeros(owner.run.books.base.size, np.int64)
+        self._calls, self._at = np.zeros(f.CALLS, np.int64), np.zeros(f.AT_SIZE, np.int64)
+        self._waiting = np.zeros((MOST_WAITING, 3), np.int64)
+        self._following, self._line_table = Table(blank_paid_run_job()), Table(blank_line_job())
+        self._whole = plan.whole_line(model.line, plan.held_as(model.cable))
+        self.adopted, self._synced, self._bound = False, -1, False
+
+    @staticmethod
+    def applies(owner: Transient) -> bool:
+        """Whether nodes of a run can enter and leave so: nothing asks Python on the way."""
+        line = owner.model.line
+        plain = not (line.torsion.size or line.tension_twist.size or line.law.size)
+        return owner.pays_out and owner.correction is None and plain
+
+    @staticmethod
+    def _key(owner: Transient) -> tuple[Any, ...]:
+        """What the tables hold as it is."""
+        model, paying = owner.model, owner.payout
+        assert paying is not None
+        same = id(model.line.plane), id(model.ends), id(paying.reel.law), id(owner.envelope)
+        return model.line.bits, bool(owner.run.push.size), *same
+
+    def still_fits(self) -> bool:
+        """Whether the line is of the kind that the arrays were made for."""
+        return self._fixed_to == self._key(self._owner)
+
+    @property
+    def cells(self) -> int:
+        """Cells of the line now."""
+        return int(self._at[f.CELLS])
+
+    @property
+    def waits(self) -> bool:
+        """Whether there are outputs of lines of before."""
+        return bool(self._at[f.WAITING])
+
+    # --- arrays -------------------------------------------------------------------------------------
+
+    def _line(self, k: int, cells: int) -> Line:
+        line = self._owner.model.line
+        absent = {"torsion": NO_TORSION} | dict.fromkeys(TENSION_TORQUE, NO_TENSION_TORQUE)
+        found: Line = self._sides[k].line.view(cells, bits=line.bits, plane=line.plane, **absent)
+        return found
+
+    def _state(self, k: int, which: int, cells: int) -> State:
+        found: State = self._sides[k].states[which].view(cells, turn=NO_TURN)
+        return found
+
+    def _reel(self, k: int, cells: int) -> Reel:
+        now = self._paying.reel
+        found: Reel = self._sides[k].reel.view(cells, **{name: getattr(now, name) for name in OF_REEL})
+        return found
+
+    def _push(self, k: int, which: int, cells: int) -> Floats:
+        """Of a run that carries one, else none."""
+        if not self._run.push.size:
+            return NO_PUSH
+        found: Floats = self._sides[k].pushes.view(cells)[which]
+        return found
+
+    def _sea_on(self, cells: int) -> Sea:
+        values = self._owner.model.sea.values
+        found: Sea = self._sea.view(cells, **{x: getattr(values, x) for x in REST_OF_SEA})
+        return found
+
+    def _work_on(self, cells: int) -> Work:
+        found: Work = self._work.view(cells, torsion=self._owner.stepper.work.torsion)
+        return found
+
+    def _books(self, k: int, cells: int) -> Books:
+        size, used = sample_size(cells), int(self._at[f.USED])
+        rows = min(self._rows, (self._samples.size - used) // size)
+        samples = self._samples[used : used + rows * size].reshape(rows, size)
+        kept = self._sides[k].kept.view(cells)
+        return self._run.books._replace(samples=samples, base=self._base, **kept._asdict())
+
+    # --- tables -------------------------------------------------------------------------------------
+
+    def _node_job(self, k: int, parity: int, n: int, m: int) -> dict[str, Any]:
+        """What a change from n cells, in the arrays of side k, to m is bound to."""
+        owner, to = self._owner, 1 - k
+        before = self._books(k, n)
+        carry = CarryJob(
+            self._line(k, n), self._line(to, m), self._state(k, parity, n), self._state(to, 0, m), self._reel(k, n),
+            self._reel(to, m), self._run.clock, before.tension, self._paying.plan.nodes,
+        )  # fmt: skip
+        job = NodeJob(
+            carry, self._whole, owner.model.ends.values, self._sea_on(m), self._work_on(m), self._state(to, 1, m),
+            before, self._books(to, m), self._push(k, parity, n), self._push(to, 0, m), self._push(to, 1, m),
+            self._width(m), self._itself.cells, *self._along, *self._moments, owner.model.tension_scale,
+        )  # fmt: skip
+        return job._asdict()
+
+    def _in_run(self, k: int, _: int, m: int) -> dict[str, Any]:
+        return {
+            "line": self._line(k, m), "sea": self._sea_on(m), "old": self._state(k, 0, m), "new": self._state(k, 1, m),
+            "was": self._push(k, 0, m), "now": self._push(k, 1, m), "work": self._work_on(m),
+            "books": self._books(k, m),
+        }  # fmt: skip
+
+    def _in_paid(self, k: int, _: int, m: int) -> dict[str, Any]:
+        work = self._work_on(m)
+        return {
+            "line": self._line(k, m), "sea": self._sea_on(m), "old": self._state(k, 0, m), "new": self._state(k, 1, m),
+            "report": work.report, "reel": self._reel(k, m), "X": work.X, "W": work.W,
+        }  # fmt: skip
+
+    def _width(self, cells: int) -> Floats:
+        """Diameters of cells; none where nobody watches whether the line meets itself."""
+        return self._itself.width[: cells if self._watch is not None else 0]
+
+    def _in_itself(self, k: int, _: int, m: int) -> dict[str, Any]:
+        states = self._state(k, 0, m), self._state(k, 1, m)
+        itself = self._itself._replace(width=self._itself.width[:m])
+        return {"line": self._line(k, m), "old": states[0], "new": states[1], "itself": itself}
+
+    def _bind_all(self) -> None:
+        """Tables of changes from either side to the other, and of runs on either."""
+        run, paying = self._run, self._paying
+        envelope, plan, most = self._owner.envelope, paying.plan, self.most + 2
+        borne = np.ascontiguousarray(1.0 + plan.cable.max_strain[:: 1 if plan.side else -1])
+        start, bounds = np.zeros((plan.nodes.size, 3)), np.zeros((4, b.EXTREMES, 1))
+        if envelope is not None:
+            start, bounds = envelope.start, envelope.bounds
+        widths = np.ascontiguousarray(plan.cable.outer_diameter[:: 1 if plan.side else -1])
+        self._along = borne, widths, start, bounds
+        self._moments = np.zeros((most, 3)), np.zeros((most, 3)), np.zeros(5)
+
+        def shaped(blank: Callable[[], Any], values: Callable[..., dict[str, Any]], *first: int) -> Shaped:
+            return Shaped(Table(blank), partial(values, *first))
+
+        of_run = [shaped(blank_job, self._in_run, k) for k in (0, 1)]
+        of_paid = [shaped(blank_reel_job, self._in_paid, k) for k in (0, 1)]
+        nodes = [shaped(blank_node_job, self._node_job, *pair) for pair in ((0, 0), (0, 1), (1, 0), (1, 1))]
+        of_itself: list[Shaped] = []
+        in_itself, itself, tables = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((2, 3, 0), np.int64)
+        if self._watch is not None:
+            of_itself = [shaped(blank_itself_job, self._in_itself, k) for k in (0, 1)]
+            in_itself, itself = of_itself[0].places(IN_ITSELF), self._watch.table.numbers
+            tables = np.array([x.numbers[:, in_itself] for x in of_itself])
+        self._tables = of_run, of_paid, of_itself, nodes  # what is bound there stays alive
+        in_run, in_paid = of_run[0].places(IN_RUN), of_paid[0].places(IN_PAID)
+        numbers: dict[str, Any] = {
+            "calls": self._calls, "at": self._at, "clock": run.clock, "counts": run.count, "outputs": run.books.outputs,
+            "winch": paying.reel.winch, "first": self._reel(0, self.most), "second": self._reel(1, self.most),
+            "run": run.table.numbers, "run_places": in_run, "in_run": np.array([x.numbers[:, in_run] for x in of_run]),
+            "paid": paying.table.numbers, "paid_places": in_paid,
+            "in_paid": np.array([x.numbers[:, in_paid] for x in of_paid]), "node": nodes[0].table.numbers,
+            "itself": itself, "itself_places": in_itself,
+            "in_itself": tables,
+            "nodes": np.array([x.numbers for x in nodes]), "waiting": self._waiting, "room": self._samples,
+        }  # fmt: skip
+        self._following.bind(**numbers)
+        at, samples = self._at, self._samples.__array_interface__["data"][0]
+        at[f.ROOM], at[f.MOST_ROWS], at[f.MOST] = samples, self._rows, self.most
+        at[f.TASK] = run.table.part("task").start
+        (at[f.SAMPLES_AT],) = np.flatnonzero(of_run[0].numbers[0] == samples)
+        if self._watch is not None:
+            tree = self._itself.tree.__array_interface__["data"][0]
+            at[f.BOXES_AT] = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
+        calls = {
+            f.STEPS: (steps, run.table), f.CHANGE: (f.change_node, nodes[0].table),
+            f.BEFORE_FORCES: (before_forces, run.table), f.STAND_STILL: (stand_still, paying.table),
+            f.AFTER_FORCES: (after_forces, run.table),
+        }  # fmt: skip
+        for k, (kernel, table) in calls.items():
+            self._calls[k] = kernel.address(table.numbers)
+
+    # --- steps --------------------------------------------------------------------------------------
+
+    def adopt(self) -> None:
+        """Go on with the line of the run as it is now, in these arrays."""
+        owner, run, model, n = self._owner, self._run, self._owner.model, self._owner.model.cells
+        if not self._bound:
+            self._bind_all()
+            self._bound = True
+        self._at[f.ON], self._at[f.CELLS] = 0, n
+        parity = int(run.count[b.PARITY])
+        for which in (0, 1):
+            _copy(run.states[which], self._state(0, which, n), ("turn",))
+            if run.push.size:
+                self._push(0, which, n)[:] = run.pushes[which]
+        _copy(model.line, self._line(0, n), ("bits", "plane", "torsion", *TENSION_TORQUE))
+        _copy(model.sea.values, self._sea_on(n), REST_OF_SEA)
+        _copy(owner.stepper.work, self._work_on(n), ("torsion",))
+        _copy(self._paying.reel, self._reel(0, n), OF_REEL)
+        self._base[:] = run.books.base
+        if self._watch is not None:
+            _copy(self._watch.itself, self._itself._replace(width=self._width(n)), ("tree", "stack"))
+        _copy(run.books, self._books(0, n), tuple(x for x in Books._fields if x not in Kept._fields))
+        run.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
+        self._calls[f.SOLVER] = run.solver_address()
+        f.put_paid(self._following.numbers)
+        self.adopted, self._synced = True, -1
+        run.count[b.PARITY] = parity
+        self.sync()
+
+    def go(self) -> int:
+        """Steps, and nodes that enter and leave; a code of kernels.books."""
+        self._at[f.MAY_WAIT] = self._owner.outputs_may_wait
+        code = self._run.go(lambda: int(f.go_on(self._following.numbers)))
+        self.sync()
+        return code
+
+    def change(self) -> None:
+        """A node enters or leaves now; no outputs wait."""
+        f.change_paid(self._following.numbers)
+        self.sync()
+
+    def sync(self) -> None:
+        """What Python has of the line is that of now."""
+        if self._at[f.CHANGES] == self._synced:
+            return
+        self._synced = int(self._at[f.CHANGES])
+        owner, run, paying, k, n = self._owner, self._run, self._paying, int(self._at[f.ON]), self.cells
+        line, sea, work, books, reel = (
+            self._line(k, n), self._sea_on(n), self._work_on(n), self._books(k, n), self._reel(k, n),
+        )  # fmt: skip
+        now, length = sea.now.copy(), float(line.s[-1] - line.s[0])
+        model = replace(
+            owner.model, line=line, zones=paying.plan.zones_of(length), sea=Surroundings(sea), length=length
+        )
+        sea.now[:] = now
+        paying.count, paying.reel = n - paying.rides, reel
+        run.books, run.states = books, (self._state(k, 0, n), self._state(k, 1, n))
+        run.pushes = self._push(k, 0, n), self._push(k, 1, n)
+        run.table.hold(
+            line=line, sea=sea, old=run.states[0], new=run.states[1], was=run.pushes[0], now=run.pushes[1], work=work,
+            books=books,
+        )  # fmt: skip
+        paying.table.hold(
+            line=line, sea=sea, old=run.states[0], new=run.states[1], report=work.report, reel=reel, X=work.X, W=work.W
+        )
+        owner.take(model, work)
+        if self._watch is not None:
+            tree = self._itself.tree[: boxes_of(n)]
+            itself = self._watch.itself = self._itself._replace(width=self._width(n), tree=tree)
+            self._watch.table.hold(line=line, old=run.states[0], new=run.states[1], itself=itself)
+        run.set_quota(n)
+
+    # --- outputs that wait --------------------------------------------------------------------------
+
+    def waiting(self) -> Iterator[list[Output]]:
+        """Outputs of lines of before, copied."""
+        k, paying, model = int(self._at[f.ON]), self._paying, self._owner.model
+        for offset, count, cells in self._waiting[: self._at[f.WAITING]].tolist():
+            size = sample_size(cells)
+            end = offset + count * size
+            batch = self._run.batch_of(self._samples[offset:end].reshape(count, size), cells, model.ends.values)
+            lacks = self._samples[end : end + f.OF_REEL * cells].reshape(f.OF_REEL, cells)
+            line, reel = self._line(1 - k, cells), self._reel(1 - k, cells)
+            reel.numbers[:] = paying.reel.numbers
+            self._line_table.bind(line=model.line, whole=self._whole, out=line, reel=reel, nodes=paying.plan.nodes)
+            make_line(self._line_table.numbers)
+            reel.lack[:], reel.rate[:], reel.since[:], reel.span[:] = lacks
+            yield paying.outputs_in(line, reel, batch)
+
+    def empty(self) -> None:
+        """No output waits any longer."""
+        waits = self.waits
+        self._at[[f.WAITING, f.USED]] = 0
+        if waits and self.adopted:
+            self._synced = -1
+            f.put_paid(self._following.numbers)
+            self.sync()
+
+
+def outputs_of_now(owner: Transient, batch: Batch) -> list[Output]:
+    """The outputs of a batch of the line of now, copied."""
+    paying = owner.payout
+    assert paying is not None
+    return paying.outputs_in(owner.model.line, paying.reel, batch)
+
+
+def _copy(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:
+    for name in old._fields:
+        if name not in but:
+            getattr(new, name)[:] = getattr(old, name)
