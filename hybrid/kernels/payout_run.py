@@ -20,7 +20,7 @@ from hybrid.kernels.energies import observe
 from hybrid.kernels.following_run import call, call_count, call_solver, put, put_at
 from hybrid.kernels.newton import ASSEMBLY, RUN
 from hybrid.kernels.paid_length import cell, node, prepare
-from hybrid.kernels.payout_nodes import CarryJob, blank_carry_job, carry, move_row, move_rows, place_reel
+from hybrid.kernels.payout_nodes import CarryJob, blank_carry_job, move_row, move_rows, place_reel
 from hybrid.kernels.reel import DUE, FAR, LONGEST, SIDE, Reel, blank_reel
 from hybrid.kernels.references import reader
 from hybrid.kernels.run import blank_books
@@ -238,30 +238,50 @@ def energy_of(line, ends, state, moment, strain, parts):
     return found
 
 
+# Parts of a change, in this order; between the first two comes kernels.payout_nodes.carry_node, whose table begins this one.
+
+
 @kernel
-def change_node(table):
-    """One node more, or less, at the fairlead; the energy, J, that it puts in is booked."""
-    job = read_node(table)
-    carried, work, clock = job.carry, job.before.work, job.before.clock
-    line, target, reel, new, out = carried.line, carried.target, carried.reel, carried.new, carried.out
-    n, m = line.h.shape[0], target.h.shape[0]
-    g, forward = n - reel.layer.shape[0], reel.numbers[SIDE] > 0.0
-    count = m - reel.layer.shape[0] + 1  # material nodes
-    cut = g + 1 if m > n else g
+def change_line(table):
+    """One node more, or less, at the fairlead: the line and its reel."""
+    job = read_node(table).carry
+    reel, new = job.reel, job.new
     for k in range(reel.numbers.shape[0]):
         new.numbers[k] = reel.numbers[k]
-    place_reel(new, carried.nodes, count)
     new.stage[0], new.numbers[DUE] = 0.0, 0.0
-    line_as(line, job.whole, target, new)
-    before = energy_of(line, job.ends, carried.state, job.moment, job.strain, job.energy)
-    carry(carried)
-    prepare(target, new, clock[b.NOW])
-    work[0, b.ZONES] += energy_of(target, job.ends, out, job.moment, job.strain, job.energy) - before
-    copy_state(out, job.twin)
+    place_reel(new, job.nodes, job.target.h.shape[0] - reel.layer.shape[0] + 1)
+    line_as(job.line, read_node(table).whole, job.target, new)
+
+
+@kernel
+def fit_changed(table):
+    """The new line has the length of now."""
+    job = read_node(table).carry
+    prepare(job.target, job.new, job.clock[b.NOW])
+
+
+@kernel
+def book_change(table):
+    """The energy, J, that the new nodes put in."""
+    job = read_node(table)
+    more = 0.0
+    for k in range(2):  # one call for both: it is compiled once
+        line, state = (job.carry.target, job.carry.out) if k else (job.carry.line, job.carry.state)
+        more = energy_of(line, job.ends, state, job.moment, job.strain, job.energy) - more
+    job.before.work[0, b.ZONES] += more
+
+
+@kernel
+def renew_run(table):
+    """What a run knows beside the line and its state, as of the beginning; what it knew is kept where it must be."""
+    job = read_node(table)
+    line, target, clock, forward = job.carry.line, job.carry.target, job.carry.clock, job.carry.new.numbers[SIDE] > 0.0
+    n, m = line.h.shape[0], target.h.shape[0]
+    copy_state(job.carry.out, job.twin)
     if job.push.shape[0] > 0:
         carry_push(job.push, line.s, target.s, job.new_push)
         clear(job.next_push)
-    renew_books(job, n, m, forward, cut)
+    renew_books(job, n, m, forward, min(n, m) - job.carry.new.layer.shape[0] + 1)
     clear(job.sea.axis)
     clear(job.sea.slip)
     clear(job.sea.slid)
@@ -301,8 +321,8 @@ def make_line(table):
 # --- steps and changes ----------------------------------------------------------------------------
 
 # Addresses in `calls`.
-STEPS, SOLVER, CHANGE, BEFORE_FORCES, STAND_STILL, AFTER_FORCES = range(6)
-CALLS = 6
+STEPS, SOLVER, CHANGE, CARRY, FIT, BOOK, RENEW, BEFORE_FORCES, STAND_STILL, AFTER_FORCES = range(10)
+CALLS = 10
 # Numbers of `at`.
 (
     ON, CELLS,  # the arrays that are in use, and cells of the line now
@@ -341,7 +361,7 @@ class PaidRunJob(NamedTuple):
     itself: Numbers  # of kernels.self_distance.watch_itself
     itself_places: Numbers  # empty: nobody watches
     in_itself: NDArray[np.int64]
-    node: Numbers  # table of change_node
+    node: Numbers  # table of a change
     nodes: NDArray[np.int64]  # (2 old sides x 2 parities, 3, size)
     waiting: NDArray[np.int64]  # (lines, 3)
     room: Floats  # for samples
@@ -387,6 +407,10 @@ def change(job):
     m = n + 1 if reel.true[n - reel.layer.shape[0]] > reel.numbers[LONGEST] else n - 1
     put(job.nodes[2 * k + counts[b.PARITY]], n, m, job.node)
     call(calls[CHANGE], job.node)
+    call(calls[CARRY], job.node)
+    call(calls[FIT], job.node)
+    call(calls[BOOK], job.node)
+    call(calls[RENEW], job.node)
     at[ON], at[CELLS], at[CHANGES] = 1 - k, m, at[CHANGES] + 1
     put_all(job)
     call(calls[BEFORE_FORCES], job.run)

@@ -22,7 +22,7 @@ from hybrid.kernels.cell_changes import after_forces, before_forces
 from hybrid.kernels.entry import NO_PUSH, workspace
 from hybrid.kernels.newton import RUN, Task
 from hybrid.kernels.payout import stand_still
-from hybrid.kernels.payout_nodes import CarryJob
+from hybrid.kernels.payout_nodes import CarryJob, blank_carry_job, carry_node
 from hybrid.kernels.payout_run import NodeJob, blank_line_job, blank_node_job, blank_paid_run_job, make_line
 from hybrid.kernels.reel import Reel, blank_reel, blank_reel_job
 from hybrid.kernels.run import blank_job
@@ -257,8 +257,10 @@ class NodeChanges:
         if self._watch is not None:
             tree = self._itself.tree.__array_interface__["data"][0]
             at[f.BOXES_AT] = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
+        node = nodes[0].table
         calls = {
-            f.STEPS: (steps, run.table), f.CHANGE: (f.change_node, nodes[0].table),
+            f.STEPS: (steps, run.table), f.CHANGE: (f.change_line, node), f.CARRY: (carry_node, Table(blank_carry_job)),
+            f.FIT: (f.fit_changed, node), f.BOOK: (f.book_change, node), f.RENEW: (f.renew_run, node),
             f.BEFORE_FORCES: (before_forces, run.table), f.STAND_STILL: (stand_still, paying.table),
             f.AFTER_FORCES: (after_forces, run.table),
         }  # fmt: skip

@@ -557,3 +557,11 @@ def test_outputs_looked_at_together_are_those_looked_at_one_by_one(model: str, m
         for other in (again, alone):
             assert np.array_equal(together[name], other[name], equal_nan=True), name
     assert [*together.zones] == [*alone.zones] and [x.kind for x in together.events] == [x.kind for x in alone.events]
+
+
+def test_an_equilibrium_and_a_plan_need_no_step() -> None:
+    scene = hanging(RATE, 5.0) | {"time": {"duration": 5.0}}
+    assert hybrid.static(scene).tension[-1, -1] == pytest.approx(2.0 * 40.0 * G, rel=1e-6)
+    assert hybrid.plan(scene).payout is not None
+    with pytest.raises(SceneError, match=r"time\.step"):
+        hybrid.Simulation(scene)
