@@ -85,7 +85,7 @@ density below 15 or above 30 000 kg/m³; a fluid of 1.02 to 1.03 kg/m³ (sea wat
 over a seabed one that is neither air (0.5 to 2 kg/m³) nor a liquid (400 to 3000), with a surface one that is no
 liquid.
 
-A computation stops, with time and place, where a section is stretched beyond its `max_strain`.
+A computation stops, with time and place, where a section is stretched, or compressed, beyond its `max_strain`.
 
 ## Roll, pitch and yaw
 

@@ -173,7 +173,7 @@ _CAUSE = {
     Outcome.BURIED: "the only equilibrium found lies deep in the seabed",
     Outcome.TURNS_LOST: "the equilibrium found is not twisted by the turns asked for",
     Outcome.WINCH_AT_END: "the winch has no more line to pay out, or none to take in",
-    Outcome.OVERSTRETCHED: "the cable is stretched beyond what a section bears",
+    Outcome.OVERSTRETCHED: "the cable is stretched, or compressed, beyond what a section bears",
 }
 
 _REMEDY = {

@@ -222,7 +222,8 @@ def watch(line, ends, old, new, books, report, t, dt):
         peak, before = max(peak, new.T[c]), max(before, old.T[c])
         slack |= not (line.spin[c] or new.T[c] > clock[SLACK_LIMIT])
         e, longest = new.e[c], books.borne[c] * line.h[c]
-        stretched |= e[0] * e[0] + e[1] * e[1] + e[2] * e[2] > longest * longest
+        e2, shortest = e[0] * e[0] + e[1] * e[1] + e[2] * e[2], max(2.0 * line.h[c] - longest, 0.0)
+        stretched |= e2 > longest * longest or e2 < shortest * shortest
     clock[LEAST_PEAK], clock[LARGEST_PEAK] = min(clock[LEAST_PEAK], peak), max(clock[LARGEST_PEAK], peak)
     for j in range(books.base.shape[0]):
         for k in range(3):

@@ -227,8 +227,8 @@ class Section(Table):
     )
     max_strain: Positive | None = Field(
         default=None,
-        description="strain that the section bears; a computation that exceeds it stops; absent: 0.05, or the last of "
-        "tension_strain; an inextensible section has none [-]",
+        description="strain that the section bears, stretched or compressed; a computation that exceeds it stops; "
+        "absent: 0.05, or the last of tension_strain; an inextensible section has none [-]",
     )
     bending_stiffness: OneOrTwo | None = Field(
         default=None,

@@ -78,8 +78,8 @@ def run_shooting(scene: Scene, output: str | Path | None, overwrite: bool) -> Re
 
 
 def _refuse_stretch(scene: Scene, state: ShootingState, t: float | None) -> None:
-    """ComputationError where a section is stretched beyond what it bears."""
-    used = state.tension / borne_tension(scene, state.s)
+    """ComputationError where a section is stretched or compressed beyond what it bears."""
+    used = np.abs(state.tension) / borne_tension(scene, state.s)
     worst = int(np.argmax(used))
     if used[worst] > 1.0:
         detail = f"{100.0 * used[worst]:.4g} % of max_strain, under {state.tension[worst]:.4g} N"

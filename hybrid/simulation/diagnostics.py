@@ -83,12 +83,12 @@ def borne_strain(model: Model) -> Floats:
 
 
 def most_stretched(model: Model, state: State) -> int:
-    """The cell that is stretched most, of what it bears."""
-    return int(np.argmax((np.linalg.norm(state.e, axis=1) / model.line.h - 1.0) / borne_strain(model)))
+    """The cell that is stretched or compressed most, of what it bears."""
+    return int(np.argmax(np.abs(np.linalg.norm(state.e, axis=1) / model.line.h - 1.0) / borne_strain(model)))
 
 
 def stretch_text(model: Model, state: State) -> str:
-    """How far the cable is stretched, and how far it may be."""
+    """How far the cable is stretched or compressed (a negative strain), and how far it may be."""
     cell = most_stretched(model, state)
     strain, borne = np.linalg.norm(state.e[cell]) / model.line.h[cell] - 1.0, borne_strain(model)[cell]
     return f"a strain of {100.0 * strain:.3g} % under {state.T[cell]:.4g} N, where max_strain is {100.0 * borne:.3g} %"
@@ -285,10 +285,11 @@ class Diagnostics:
             self._left_out = True
 
     def stretch(self, state: State) -> Stop:
-        """A section that is stretched beyond what it bears."""
+        """A section that is stretched or compressed beyond what it bears."""
         if self._model.inextensible:
             return None
-        over = np.einsum("ij,ij->i", state.e, state.e) > (self._longest * self._model.line.h) ** 2
+        length, h = np.sqrt(np.einsum("ij,ij->i", state.e, state.e)), self._model.line.h
+        over = (length > self._longest * h) | (length < (2.0 - self._longest) * h)
         return (Outcome.OVERSTRETCHED, most_stretched(self._model, state)) if over.any() else None
 
     def outputs(self, seen: Observation, values: Mapping[str, Floats]) -> Stop:
