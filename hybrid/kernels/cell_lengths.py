@@ -1,9 +1,10 @@
-"""How long the cells of rods may be: from the curvature as it is, at every step of a run whose cells follow it.
+"""How long the cells of rods may be: from curvature and twist as they are, at every step of a run whose cells follow.
 
     symbol   meaning                                                        unit
     kappa    curvature at a node                                            1/m
     W        wanted length of cells at a node                               m
     l0       min(sqrt(EI/T), (EI/w)^(1/3)), over which a rod bends          m
+    twist    of a rod per length                                            rad/m
     delta    what the chord of a cell is shorter by than its arc            m
 
 A cell of length h interpolates the curvature with the error h^2 |kappa''| / 8.  Cells are dyadic parts of base cells: a
@@ -23,6 +24,7 @@ from hybrid.kernels.rotations import dot, scale, sub
 from hybrid.kernels.zone_criteria import depth
 
 TURN = 0.3  # rad that a cell turns through
+TWIST = 0.25  # rad that a cell of a rod is twisted by: cells that stay have as much (model.build)
 SHORTEST_CELL = 0.6  # of l0
 SHARP = 0.5  # rad: a kink that runs along a line may be as short as this over its curvature, which l0 at rest is not
 NEAR = 3  # nodes to either side whose curvature counts
@@ -70,6 +72,17 @@ def wanted_length(line, kinds, T, i, limits):
     if k > 0.0:
         W = min(W, TURN / k)
     return max(W, shortest_length(bending_length(kinds, T, i), largest, limits))
+
+
+@inner
+def lower_by_twist(zones):
+    """W at the nodes of rods: no cell is twisted by more than TWIST, however little the line bends."""
+    of, W = zones.kinds.base_of_cell, zones.wanted
+    n = of.shape[0]
+    for i in range(n + 1):
+        twist = zones.kinds.twist[i]
+        if twist > 0.0 and (zones.next_rod[of[max(i - 1, 0)]] or zones.next_rod[of[min(i, n - 1)]]):
+            W[i] = min(W[i], TWIST / twist)
 
 
 @inner
@@ -125,6 +138,7 @@ def find_wanted(line, sea, state, zones, dt):
     """Wanted lengths at nodes for the next HORIZON steps of dt into zones.wanted, graded; whether the next needs others."""
     for i in range(line.h.shape[0] + 1):
         zones.wanted[i] = wanted_length(line, zones.kinds, state.T, i, zones.limits)
+    lower_by_twist(zones)
     lower_at_edges(line, sea, state, zones, dt)
     now = is_too_long(zones, line.s)
     if line.bits & SEABED:

@@ -81,13 +81,13 @@ def depth(sea, r, i):
 
 
 @inner
-def find_turns(line, tangents, e, a1, T, torque, turn, twisting):
-    """Turns of the nodes, rad, and torques of the nodes between cells, N m, into `turn` and `twisting`.
+def find_turns(line, tangents, e, a1, T, torque, kinds):
+    """Turns of the nodes, rad, torques of the nodes between cells, N m, and twists per length, rad/m, into `kinds`.
 
     tangents: (2, 3) of clamped ends, zero where there is none; torque: N m, of all the line as far as its rods do not
     know it.
     """
-    n = e.shape[0]
+    n, turn, twisting, twist = e.shape[0], kinds.turn, kinds.twisting, kinds.twist
     turn[0], turn[n] = 0.0, 0.0
     d0 = get3(tangents, 0)
     d1, _, _ = chord(get3(e, 0))
@@ -100,14 +100,17 @@ def find_turns(line, tangents, e, a1, T, torque, turn, twisting):
         x = sub(d1, d0)
         turn[i] = math.sqrt(dot(x, x))
         twisting[i] = torque
+        twist[i] = abs(torque) / kinds.GJ[i] if kinds.GJ[i] > 0.0 else 0.0
         if line.element[i]:
             b, carried = get3(a1, i), transport(get3(a1, i - 1), d0, d1)
             angle = math.atan2(dot(cross(carried, b), d1), dot(carried, b))
             twisting[i] = line.kb[i, 2] * (angle - rest_strain(line, T, i)[2])
+            twist[i] = abs(angle) / line.hn[i] if kinds.GJ[i] > 0.0 else 0.0
     d0 = get3(tangents, 1)
     if dot(d0, d0) > 0.0:
         x = sub(d1, d0)
         turn[n] = math.sqrt(dot(x, x))
+    twist[0], twist[n] = twist[min(1, n)], twist[max(n - 1, 0)]
 
 
 @inner
@@ -141,6 +144,7 @@ class NodeKinds(NamedTuple):
     """What the criteria know of the nodes of a line."""
 
     EI: Floats  # (N+1,) N m2
+    GJ: Floats  # (N+1,) N m2, the smaller one where it jumps; 0: twist has no meaning
     w: Floats  # (N+1,) N/m, weight per length
     bent: Floats  # (N+1,) 1/m, curvature without stress
     node: NDArray[np.int8]  # (N+1,) SMOOTH, STEP or LOAD
@@ -149,14 +153,15 @@ class NodeKinds(NamedTuple):
     free: NDArray[np.int8]  # (n,) of base cells
     turn: Floats  # (N+1,) rad, turns of nodes (written)
     twisting: Floats  # (N+1,) N m, torques of nodes (written)
+    twist: Floats  # (N+1,) rad/m, of rods, and of what would be a rod under the torque of the line (written)
 
 
 def blank_kinds(cells: int, base: int) -> NodeKinds:
     """Room for what criteria know of a line of so many cells and base cells."""
     z, nodes = np.zeros, cells + 1
     return NodeKinds(
-        z(nodes), z(nodes), z(nodes), z(nodes, np.int8), z(nodes), z(cells, np.int64), z(base, np.int8), z(nodes),
-        z(nodes),
+        z(nodes), z(nodes), z(nodes), z(nodes), z(nodes, np.int8), z(nodes), z(cells, np.int64), z(base, np.int8),
+        z(nodes), z(nodes), z(nodes),
     )  # fmt: skip
 
 

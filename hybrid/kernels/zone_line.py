@@ -182,6 +182,7 @@ def fill_kinds(table):
     for i in range(n + 1):
         a, b = of[max(i - 1, 0)], of[min(i, n - 1)]
         kinds.EI[i], kinds.w[i] = max(cable.EI[a], cable.EI[b]), max(cable.w[a], cable.w[b])
+        kinds.GJ[i] = min(cable.B[a, 2], cable.B[b, 2])
         bent = max(cable.kappa[a, 0] ** 2 + cable.kappa[a, 1] ** 2, cable.kappa[b, 0] ** 2 + cable.kappa[b, 1] ** 2)
         kinds.bent[i] = bent**0.5
         kinds.node[i] = STEP if cable.EI[a] != cable.EI[b] else SMOOTH

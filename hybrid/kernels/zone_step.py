@@ -285,7 +285,7 @@ def evaluate(line, sea, ends, state, zones, near, dt):
     for k in range(2):
         for j in range(3):
             zones.tangents[k, j] = ends.frame[k, 2 + 3 * j] * zones.clamped[k]
-    find_turns(line, zones.tangents, state.e, state.a1, state.T, z[TORQUE], zones.kinds.turn, zones.kinds.twisting)
+    find_turns(line, zones.tangents, state.e, state.a1, state.T, z[TORQUE], zones.kinds)
     find_shares(line, state, zones)
     raise_ratios(line, sea, state, zones.past, ahead, zones.shares, zones.kinds, zones.ratios)
     if flags[LOADED]:

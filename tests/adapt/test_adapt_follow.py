@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from adapt_cases import bight, cable, hanging, helix, layout, on, state_on, still
+from adapt_cases import along, bight, cable, hanging, helix, layout, on, state_on, still
 from problems import order
 
 import hybrid
@@ -33,14 +33,21 @@ TOUCHDOWN = (
 )  # fmt: skip
 
 
-def planned(curvature_error, shape, n=8, parts=64, length=10.0):
-    """The layout that a state on a shape asks for, from the finest mesh, and the manager that made it."""
+def planned(curvature_error, shape, n=8, parts=64, length=10.0, twist=None, rod=True):
+    """The layout that a state on a shape asks for, from the finest mesh.
+
+    twist: (N-1,) rad, from each cell to the next; rod: (n,) what is rod then.
+    """
     what, zones = cable(length), layout(np.linspace(0, length, n + 1), parts, "R" * n)
     line = on(what, zones)
     state = state_on(line, shape, 1e4)  # taut: the layer is as short as the cells
+    if twist is not None:
+        d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+        angle = np.append(0.0, np.cumsum(twist))[:, None]
+        state.a1[:] = np.cos(angle) * state.a1 + np.sin(angle) * np.cross(d, state.a1)
     manager = DomainManager(what, zones, 1e-2, 1.0, np.ones(n, int), 1.0, curvature_error=curvature_error)
     manager.evaluate_criteria(line, no_sea(line.h.size), still(), state, 0.0)
-    manager.zones.next_rod[:] = True
+    manager.zones.next_rod[:] = rod
     table = Table(blank_zone_job())
     table.bind(line=line, new=state, zones=manager.zones)
     for _ in range(5):  # for so long two cells must be too short before they become one
@@ -81,6 +88,20 @@ def test_cells_are_as_long_as_the_curvature_allows(share: float) -> None:
     assert ratio.min() > 1 / 4.01 and ratio.max() < 4.01
     size = np.diff(found.places)
     assert ((size & (size - 1)) == 0).all() and (found.places[:-1] % size == 0).all()
+
+
+def test_no_cell_of_a_rod_is_twisted_by_more_than_a_quarter_rad() -> None:
+    """However straight it is, as cells that stay; where there is little twist, or no rod, cells may be long."""
+    line = on(cable(10.0), layout(np.linspace(0.0, 10.0, 9), 64, "R" * 8))
+    rate = np.where(line.s[1:-1] < 5.0, 4.0, 0.01)
+    straight = along((1.0, 0.0, 0.0))
+    found = planned(0.1, straight, twist=rate * line.h[1:])
+    h, middle = np.diff(found.nodes), 0.5 * (found.nodes[1:] + found.nodes[:-1])
+    twisted = 4.0 * h[middle < 5.0]
+    assert twisted.max() < 0.25 < 4.0 * twisted.min()
+    assert h[middle > 7.5].min() > 10.0 * twisted.max() / 4.0
+    left = planned(0.1, straight, twist=rate * line.h[1:], rod=np.arange(8) > 3)
+    assert np.diff(left.nodes)[:2].min() > 1.0
 
 
 @pytest.mark.parametrize("shape", ["hanging", "helix"])

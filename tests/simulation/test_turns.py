@@ -199,3 +199,22 @@ def test_a_rotated_scene_is_the_rotated_scene(tmp_path):
     np.testing.assert_allclose(other.position[-1], turned, atol=2e-5)
     scale = np.abs(one["torque"][-1]).max()
     np.testing.assert_allclose(other["torque"][-1], one["torque"][-1], atol=1e-3 * scale)
+
+
+FOLLOWS = {"kind": "adaptive", "curvature_error": 0.1}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turns", [4, 12])
+def test_cells_that_follow_take_the_twist_of_the_ends(turns):
+    """A slack cable whose ends come nearer: no cell near half a turn, and none that is said to be twisted too far."""
+    section = {"length": 10.0, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e5, "bending_stiffness": 2.0,
+               "torsional_stiffness": 1.5, "damping": {"mass": 0.5, "stiffness": 0.01}}  # fmt: skip
+    travel = {"travel": {"by": [-1.5, 0, 0], "over": 20.0}}
+    end = clamped([9.95, 0, 0], turns=turns, motion=travel)
+    scene = {"cable": {"sections": [section]}, "environment": {"fluid": {"density": 1025.0}},
+             "ends": {"start": clamped([0, 0, 0]), "end": end}, "initial": "equilibrium", "model": FOLLOWS,
+             "time": {"duration": 0.4, "step": 0.02}}  # fmt: skip
+    result = hybrid.run(scene)
+    assert "unresolved twist" not in kinds(result)
+    assert abs(result["torque"][-1]).max() == pytest.approx(1.5 * 2.0 * math.pi * turns / 10.0, rel=0.02)
