@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from hybrid.kernels import self_contact as k
-from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, TRY_END
+from hybrid.kernels.books import TRY_END
 from hybrid.kernels.compile import kernel
 from hybrid.kernels.entry import workspace
 from hybrid.kernels.newton import ASKED, LIMIT, PREPARE, REST
+from hybrid.kernels.run import blank_books
 from hybrid.kernels.self_contact_law import INNER, OUTER, add_gradient, add_product
 from hybrid.kernels.self_contact_pairs import POINTS, SPEED
 from hybrid.kernels.state import blank_line, blank_state, no_ends
@@ -52,9 +53,10 @@ class Tangle:
         self.contact = SelfContact(line, np.full(n, width), np.ones(n), 1.0, friction)
         ends = no_ends()
         ends.held[:] = 0
-        self.clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+        books = blank_books(n)._replace(touch=np.zeros((3, n + 1)))
+        self.clock = books.clock
         self.states = states
-        self.table = self.contact.attach(line, ends, states, self.work, self.clock, counts, np.zeros((3, n + 1)))
+        self.table = self.contact.attach(line, ends, states, self.work, books)
 
     def energy(self, u: np.ndarray) -> float:
         """Energy (J) with the nodes displaced by u, m; the points of contact are then those."""
