@@ -62,6 +62,7 @@ A plan costs nothing: it says which forces are on, by which key, and how many ce
 """,
     ("hybrid static tow.yaml --plot", "tow.static.png"),
     """The current carries the cable back; the clump pulls it down.
+Of a line that lies flat the lowest point is the first one that is as low as any, within 1e-9 of the length.
 
 ## 4. A mistake
 
