@@ -196,21 +196,20 @@ def _several_lines(
     from hybrid.simulation.system_accuracy import is_refined, refine_system
     from hybrid.simulation.system_run import static_system
 
-    target = _target(output, overwrite, True)
-    assert not isinstance(target, MemoryTarget)
+    refined = is_refined(system, moves=progress is not None)
+    target = _target(output, overwrite, refined or (progress is not None and bool(system.output.errors)))
     with locked(_path(output)):
-        if progress is None and is_refined(system, moves=False):
+        if progress is None and refined:
+            assert not isinstance(target, MemoryTarget)
             refine_system(system, target, ProgressReporter(None, 1.0), lambda: False, moves=False)
         elif progress is None:
             static_system(system, target, scene_text(system))
         else:
             _move_lines(system, target, progress)
-    return open_result(target)
+    return written_result(target)
 
 
-def _move_lines(
-    system: System, target: Path | io.BytesIO, progress: bool | Listener, source: Path | None = None
-) -> None:
+def _move_lines(system: System, target: Target, progress: bool | Listener, source: Path | None = None) -> None:
     """Compute the motion of several lines; source: the result to go on with."""
     from hybrid.simulation.system_accuracy import is_refined, refine_system
     from hybrid.simulation.system_run import run_system
@@ -219,10 +218,12 @@ def _move_lines(
     tell_of_compiling(listener, OF_LINES)
     with interrupts() as stopped, ProgressReporter(listener, duration) as reporter:
         if is_refined(system, moves=True):
+            assert not isinstance(target, MemoryTarget), "errors are written into a file"
             refine_system(system, target, reporter, stopped, source)
             return
         run_system(system, target, scene_text(system), reporter, stopped, source)
         if system.output.errors:
+            assert not isinstance(target, MemoryTarget), "errors are written into a file"
             from hybrid.simulation.system_errors import write_system_errors
 
             def compare(other: System, memory: io.BytesIO) -> None:
@@ -393,7 +394,7 @@ def _path(output: str | Path | None) -> Path | None:
 def _target(output: str | Path | None, overwrite: bool, amended: bool) -> Target:
     """Where the result goes; ResultError, before anything is computed, if it cannot go there.
 
-    amended: whether it is changed when it is complete, or has several lines: a result in memory is then that of a file.
+    amended: whether it is changed when it is complete: a result in memory is then that of a file.
     """
     path = _path(output)
     if path is None:

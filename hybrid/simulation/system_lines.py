@@ -33,6 +33,7 @@ from hybrid.solve.run import no_extremes
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.system import JoinedLine, SystemTaken
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
+from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.writer import Recorder
 
@@ -58,29 +59,30 @@ class LineResult:
 
     def __init__(
         self, number: int, name: str, scene: Scene, model: Model, found: SystemEquilibrium | None, state: State,
-        outputs: int, compared: bool = False,
+        outputs: int, target: Target | None = None,
     ) -> None:  # fmt: skip
         """number: of the line in its system; found: the equilibrium that it starts from, None: it goes on; state: from
 
-        which displacements count; outputs: after the first, 0 of an equilibrium; compared: whether it is only to be
-        compared with, in arrays.
+        which displacements count; outputs: after the first, 0 of an equilibrium; target: of the system, None: it is
+        only to be compared with.
         """
         self.number, self.name, self.model, self.scene = number, name, model, scene
         self.events = EventLog()
         self.diagnostics = Diagnostics(model, self.events)
         self._moves = outputs > 0
-        self.observer = observer_of(scene, model, self._moves, COMPARED if compared else None)
+        self.observer = observer_of(scene, model, self._moves, COMPARED if target is None else None)
         self.envelope = Envelope(scene, model, self._moves)
         self.envelope.itself = SelfWatch(model, NO_CONTACT, "contact: {self: true} of the line does")
-        self.envelope.itself.on &= not compared
+        self.envelope.itself.on &= target is not None
         self._itself = LineWatch(self.envelope.itself, model)
-        self.recorder: Recorder | DeferredRecorder | ComparisonRecorder = ComparisonRecorder(FORCE_COLUMNS)
-        if not compared:
-            recorder = result_recorder(
-                scene, model, self.observer, io.BytesIO(), {"scene": scene_text(scene)}, found, self.envelope, outputs
-            )
-            assert isinstance(recorder, Recorder)
-            recorder.lay_by()
+        self.target = MemoryTarget() if isinstance(target, MemoryTarget) else None  # else it will be a part of a file
+        self.recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder
+        self.recorder = ComparisonRecorder(FORCE_COLUMNS)
+        if target is not None:
+            to, texts = self.target or io.BytesIO(), {"scene": scene_text(scene)}
+            recorder = result_recorder(scene, model, self.observer, to, texts, found, self.envelope, outputs)
+            if isinstance(recorder, Recorder):
+                recorder.lay_by()
             self.recorder = recorder
         loaded, bodies = model.loaded_ends, scene.ends.bodies()
         self.carried = [k for k, end in enumerate(("start", "end")) if end in bodies and loaded[k]]

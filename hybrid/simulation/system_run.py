@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import time as clock
 from collections.abc import Callable, Mapping
@@ -44,6 +43,7 @@ from hybrid.simulation.system_zones import SystemZones, managers_for, zones_at_r
 from hybrid.simulation.time_loop import SAME_STOP, WORK, apart
 from hybrid.solve.system import SystemSolver, SystemState, SystemTaken
 from hybrid.solve.system_statics import LineFailed
+from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.hdf5_file import opened
@@ -61,7 +61,7 @@ class SystemRun:
     """One system, computed into a file or into memory."""
 
     def __init__(
-        self, system: System, target: Path | io.BytesIO | None, text: str, moves: bool, kept: bool = False,
+        self, system: System, target: Target | None, text: str, moves: bool, kept: bool = False,
         source: Path | None = None, resolution: SystemResolution | None = None, found: Tree | None = None,
     ) -> None:  # fmt: skip
         """target: None: the run is only to be compared with; text: the scene as YAML; moves: whether its motion is
@@ -101,7 +101,7 @@ class SystemRun:
             managers = managers_for(dict(zip(names, self.scenes, strict=True)), self.model)
             self.start_from(self.model.body_places)
         self.lines = [
-            LineResult(k, name, scene, model, self.found, state, len(self.times), target is None)
+            LineResult(k, name, scene, model, self.found, state, len(self.times), target)
             for k, (name, scene, model, state) in enumerate(
                 zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
             )
@@ -118,7 +118,7 @@ class SystemRun:
         self._checked = -1  # steps at the last checkpoint
         self._between = False  # whether the state is that between two steps
         self._begin = clock.process_time()
-        self.recorder: Recorder | DeferredRecorder | ComparisonRecorder = ComparisonRecorder()
+        self.recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder = ComparisonRecorder()
         if source is not None:
             self.recorder = self._go_on(source, text)
         elif target is not None:
@@ -130,7 +130,7 @@ class SystemRun:
     def _parts(self) -> dict[str, Recorder]:
         return {line.name: line.recorder for line in self.lines if isinstance(line.recorder, Recorder)}
 
-    def _new_recorder(self, text: str) -> Recorder:
+    def _new_recorder(self, text: str) -> Recorder | ArrayRecorder:
         """The result of the points and bodies, with those of the lines in it."""
         assert self.found is not None and self.target is not None
         attributes: dict[str, str | float | int] = {
@@ -141,10 +141,16 @@ class SystemRun:
         on_bodies = {x: point.body for x, point in self.system.points.items() if isinstance(point, Fairlead)}
         if on_bodies:
             attributes["fairleads"] = json.dumps(on_bodies)
+        fields = [*fields_of(self.system), *self.quantities.fields]
+        fixed, texts = [*self.quantities.limits, *self.quantities.ranges], {"scene": text}
+        if isinstance(self.target, MemoryTarget):
+            return ArrayRecorder(
+                self.target, grid_s=np.zeros(1), fields=fields, step_fields=(), attributes=attributes, texts=texts,
+                fixed=fixed, parts={line.name: line.target for line in self.lines if line.target is not None},
+            )  # fmt: skip
         recorder = Recorder(
-            self.target, grid_s=np.zeros(1), fields=[*fields_of(self.system), *self.quantities.fields],
-            step_fields=(), attributes=attributes, fixed=[*self.quantities.limits, *self.quantities.ranges],
-            texts={"scene": text}, outputs=len(self.times) + 1, overwrite=True,
+            self.target, grid_s=np.zeros(1), fields=fields, step_fields=(), attributes=attributes, fixed=fixed,
+            texts=texts, outputs=len(self.times) + 1, overwrite=True,
             before=self._before if self.kept else None, templates=cache_folder().parent, parts=self._parts,
         )  # fmt: skip
         recorder.files = files_of(self.system)
@@ -474,7 +480,7 @@ class SystemRun:
 
 
 def run_system(
-    system: System, target: Path | io.BytesIO | None, text: str, reporter: ProgressReporter,
+    system: System, target: Target | None, text: str, reporter: ProgressReporter,
     interrupted: Callable[[], bool], source: Path | None = None, name: str = RESULT,
     resolution: SystemResolution | None = None, found: Tree | None = None,
 ) -> SystemRun:  # fmt: skip
@@ -490,7 +496,7 @@ def run_system(
 
 
 def static_system(
-    system: System, target: Path | io.BytesIO | None, text: str, resolution: SystemResolution | None = None
+    system: System, target: Target | None, text: str, resolution: SystemResolution | None = None
 ) -> SystemRun:
     """Compute the equilibrium of a system under full loads; target, resolution: as of `run_system`."""
     run = SystemRun(system, target, text, moves=False, resolution=resolution)

@@ -53,15 +53,22 @@ class ArrayDataset:
 class ArrayContents:
     """What a `Result` reads from, as `store.contents.FileContents`, of a result that is complete and in memory."""
 
-    order: tuple[str, ...] = ()
-
     def __init__(
         self, data: Mapping[str, ArrayDataset], groups: Sequence[str], attributes: dict[str, Any],
-        texts: Mapping[str, str],
+        texts: Mapping[str, str], parts: Mapping[str, ArrayContents] | None = None,
     ) -> None:  # fmt: skip
+        """parts: results of lines by name, of a result of several."""
+        self._parts = dict(parts or {})
+        self.order = tuple(self._parts)
         self.data: dict[str, Any] = dict(sorted(data.items(), key=lambda item: item[0].split("/")))
         self.groups, self._texts = sorted(groups), dict(texts)
         self.attributes, self.is_open = attributes, True
+
+    def part(self, name: str) -> ArrayContents:
+        """The result of a line, which is closed by itself."""
+        found = self._parts[name]
+        data = {key: ArrayDataset(x.field, x.dims, x.values) for key, x in found.data.items()}
+        return ArrayContents(data, found.groups, found.attributes, found._texts)
 
     def is_scale(self, data: ArrayDataset) -> bool:
         return data.dims == (data.field.name,)
@@ -93,13 +100,17 @@ class ArrayContents:
 
 
 class ArrayRecorder(BaseRecorder):
-    """Keeps one result in memory; arguments and errors as of `store.writer.Recorder`.  It has no checkpoints."""
+    """Keeps one result in memory; arguments and errors as of `store.writer.Recorder`.  It has no checkpoints.
+
+    parts: where results of lines go that are parts of this one; they are closed before it.
+    """
 
     def __init__(
         self, target: MemoryTarget, *, grid_s: np.ndarray, fields: Sequence[Field], step_fields: Sequence[Field],
         attributes: Mapping[str, str | float | int], texts: Mapping[str, str],
-        fixed: Sequence[tuple[Field, np.ndarray]] = (),
+        fixed: Sequence[tuple[Field, np.ndarray]] = (), parts: Mapping[str, MemoryTarget] | None = None,
     ) -> None:  # fmt: skip
+        self._parts = dict(parts or {})
         check_names(fields, step_fields, fixed)
         self._target = target
         scales = scales_of(np.size(grid_s), fields, [field for field, _ in fixed])
@@ -146,4 +157,5 @@ class ArrayRecorder(BaseRecorder):
                 groups |= {name.split("/")[0]} if "/" in name else set()
             table.drop()
         self._attributes |= status_attributes(status, message)
-        self._target.contents = ArrayContents(data, list(groups), self._attributes, self._texts)
+        parts = {name: part.contents for name, part in self._parts.items() if part.contents is not None}
+        self._target.contents = ArrayContents(data, list(groups), self._attributes, self._texts, parts)

@@ -79,7 +79,7 @@ class Result(Histories):
         source = self._source
         if isinstance(source, MemoryTarget):
             assert source.contents is not None, "nothing was recorded"
-            self._contents: Contents = source.contents
+            self._contents: Contents = source.contents.part(self._line) if self._line else source.contents
         else:
             self._contents = FileContents(source, summed, self._line)
         try:
