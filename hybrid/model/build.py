@@ -188,25 +188,9 @@ def build(
     touch |= contact_bits(scene)
     moves = layout is not None
     line = line_on(cable, s, rod, touch, sections_turn=not moves or spins_freely(cable), comes_and_goes=moves)
-    h, compliance = line.h, line.ck
 
-    start = state_for(line)
-    start.r[:], shape_name = initial_nodes(scene, s)
-    start.T[:] = scale
     shape = hung(scene, line, sea.values) if like is None else Hanging(like.start.r, like.start.T)
-    if shape is not None:
-        start.r[:], start.T[:] = shape
-        shape_name = HUNG
-    start.e[:] = np.diff(start.r, axis=0)
-    if isinstance(scene.initial, Points):
-        _exact_lengths(start, h, compliance == 0.0, scene)
-        _refuse_folds(start.e, s, rod)
-    if isinstance(scene.initial, Straight):  # exact chords: no round-off of the positions in the strain
-        start.e[:] = h[:, None] * np.array(scene.initial.direction) / np.linalg.norm(scene.initial.direction)
-        start.v[:] = scene.initial.velocity or (0.0, 0.0, 0.0)
-    ends, start.a1[:], start.turn[:, 0] = ends_and_frames(scene, start.e, line, sea)
-    if isinstance(scene.initial, Equilibrium):  # what is not at rest begins without tension
-        twist_by_tension(line, cable, start)
+    start, shape_name, ends = _first_state(scene, line, cable, sea, scale, shape)
     others = [
         (name, _spare_start(scene, r, line, cable, scale, sea))
         for name, r in (spare_shapes(scene, s) if shape is not None else from_joint(scene, s))
@@ -222,12 +206,45 @@ def build(
         contents=contents_of(scene, line, zones, flat, corrected), length=float(s[-1]), tension_scale=scale,
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),
-        inextensible=not compliance.any(),
+        inextensible=not line.ck.any(),
         attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
         on_base=LineOnBase(cable, layout.base) if layout is not None else None,
         plane=plane, corrected=corrected, follows_error=follows,
         payout=payout_plan(scene, line, zones),
     )  # fmt: skip
+
+
+def first_state(scene: Scene, model: Model) -> State:
+    """The first shape of a line whose model has been made, between ends that are elsewhere in `scene`."""
+    line, sea = model.line, model.sea
+    return _first_state(scene, line, model.cable, sea, model.tension_scale, hung(scene, line, sea.values))[0]
+
+
+def _first_state(
+    scene: Scene, line: Line, cable: Material, sea: Surroundings, scale: float, shape: Hanging | None
+) -> tuple[State, str, EndConditions]:
+    """The state that a computation begins with, the name of its shape, and the ends; scale: N, its tensions where
+
+    nothing is known of them; shape: an elastic catenary, None: the first nodes of the scene.
+    """
+    start = state_for(line)
+    if shape is not None:
+        shape_name = HUNG
+        start.r[:], start.T[:] = shape
+    else:
+        start.r[:], shape_name = initial_nodes(scene, line.s)
+        start.T[:] = scale
+    start.e[:] = np.diff(start.r, axis=0)
+    if isinstance(scene.initial, Points):
+        _exact_lengths(start, line.h, line.ck == 0.0, scene)
+        _refuse_folds(start.e, line.s, line.spin == 1)
+    if isinstance(scene.initial, Straight):  # exact chords: no round-off of the positions in the strain
+        start.e[:] = line.h[:, None] * np.array(scene.initial.direction) / np.linalg.norm(scene.initial.direction)
+        start.v[:] = scene.initial.velocity or (0.0, 0.0, 0.0)
+    ends, start.a1[:], start.turn[:, 0] = ends_and_frames(scene, start.e, line, sea)
+    if isinstance(scene.initial, Equilibrium):  # what is not at rest begins without tension
+        twist_by_tension(line, cable, start)
+    return start, shape_name, ends
 
 
 def _nodes(

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybrid.kernels.bodies import FORCE, FRAME, LEVEL, LIFT, NUMBERS, PLACE, STATE, STIFFNESS, V
 from hybrid.kernels.carried_frames import SEAT, TURNS, WITH_BODY, WITH_POINT
 from hybrid.kernels.members import PIECE
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state import Floats, State
 from hybrid.model.bodies import BodyModel, FairleadMotion, KnownMotion, body_model, frame_of
-from hybrid.model.build import Model, build
+from hybrid.model.build import Model, build, first_state
 from hybrid.model.catenary_guess import pulls
 from hybrid.model.clamps import (
     axes_of_point,
@@ -109,19 +109,13 @@ class SystemModel:
                 body.members.stir(t, state, dt, row[NUMBERS : body.numbers.size].reshape(-1, PIECE))
 
 
-def build_system(
-    system: System, places: Floats | None = None, bodies: Floats | None = None, before: SystemModel | None = None,
-    resolution: SystemResolution | None = None,
-) -> SystemModel:  # fmt: skip
-    """Make the model that a system requires.
+def build_system(system: System, resolution: SystemResolution | None = None) -> SystemModel:
+    """Make the model that a system requires, with its points and bodies where the scene has them first.
 
-    places: (P, 3) m of the free points, bodies: (B, STATE) of the free bodies and the points behind them, None: where
-    the scene has them; before: a model of the same system that was made before, whose seats and cells hold, None: as
-    the first shapes lie; resolution: how finely, None: as the scene asks for.
+    resolution: how finely, None: as the scene asks for.
     Raises SceneError where a line cannot be meshed.
     """
     rigid = system.rigid
-    free, free_bodies = tuple(x for x in system.free if x not in rigid), list(system.free_bodies)
     environment = system.environment
     density = environment.fluid.density if environment.fluid is not None else 0.0
     around = None
@@ -130,28 +124,16 @@ def build_system(
     made = tuple(
         body_model(name, body, density, environment.gravity, around) for name, body in system.free_bodies.items()
     )
-    if places is None:
-        places = np.array([system.first_place(x) for x in free], float).reshape(-1, 3)
-    if bodies is None:
-        points = np.zeros((len(rigid), STATE))
-        points[:, PLACE:FRAME] = np.array([system.first_place(x) for x in rigid]).reshape(-1, 3)
-        points[:, FRAME:V] = np.eye(3).ravel()
-        bodies = np.vstack([np.array([body.start for body in made]).reshape(-1, STATE), points])
-    carriers = [*free_bodies, *rigid]
-    at: dict[str, Any] = dict(zip(free, map(tuple, places.tolist()), strict=True))
-    joint = {name: k for k, name in enumerate(free)}
-    fairleads = {}
-    for name, point in system.points.items():
-        carrier = point.body if isinstance(point, Fairlead) else name
-        if carrier in (free_bodies if isinstance(point, Fairlead) else rigid):
-            row = bodies[carriers.index(carrier)]
-            place = point.place if isinstance(point, Fairlead) else (0.0, 0.0, 0.0)
-            at[name] = tuple((row[PLACE:FRAME] + row[FRAME:V].reshape(3, 3) @ np.array(place)).tolist())
-            joint[name], fairleads[name] = len(free) + carriers.index(carrier), place
-    seats, scenes = (None, {}) if before is None else (before.seats, before.scenes)
-    if resolution is None:
-        resolution = before.resolution if before is not None else SystemResolution.first(system)
-    maker = _Lines(system, at, bodies, {x: joint[x] - len(free) for x in fairleads}, seats, scenes, resolution)
+    points = np.zeros((len(rigid), STATE))
+    points[:, PLACE:FRAME] = np.array([system.first_place(x) for x in rigid]).reshape(-1, 3)
+    points[:, FRAME:V] = np.eye(3).ravel()
+    bodies = np.vstack([np.array([body.start for body in made]).reshape(-1, STATE), points])
+    free = tuple(x for x in system.free if x not in rigid)
+    places = np.array([system.first_place(x) for x in free], float).reshape(-1, 3)
+    resolution = resolution or SystemResolution.first(system)
+    joined = _joined(system, places, bodies)
+    joint, fairleads = joined.joint, joined.fairleads
+    maker = _Lines(system, joined, bodies, resolution)
     maker.turn_points()
     models = [maker.model(name) for name in system.lines]
     known = maker.known
@@ -160,24 +142,61 @@ def build_system(
             known[name] = KnownMotion(body, models[0].sea)
     ends = [(x.start, x.end) for x in system.lines.values()]
     return SystemModel(
-        tuple(system.lines), tuple(models), free, rigid, tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends),
-        places, made, maker.bodies, np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
+        tuple(system.lines), tuple(models), free, system.rigid,
+        tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends), places, made, maker.bodies,
+        np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
         maker.seats, known, maker.scenes, resolution,
     )  # fmt: skip
+
+
+class _Joined(NamedTuple):
+    """The points that something free carries, by name."""
+
+    at: dict[str, Any]  # m, where they are
+    joint: dict[str, int]  # number of the free point, or behind these of the body, that they are or are on
+    fairleads: dict[str, Any]  # m, of those on bodies, in axes of these
+    rows: dict[str, int]  # of those the body
+
+
+def _joined(system: System, places: Floats, bodies: Floats) -> _Joined:
+    """places: (P, 3) m of the free points; bodies: (B, STATE) of the free bodies and the points behind them."""
+    rigid = system.rigid
+    free, free_bodies = tuple(x for x in system.free if x not in rigid), list(system.free_bodies)
+    carriers = [*free_bodies, *rigid]
+    at: dict[str, Any] = dict(zip(free, map(tuple, places.tolist()), strict=True))
+    joint = {name: k for k, name in enumerate(free)}
+    fairleads: dict[str, Any] = {}
+    for name, point in system.points.items():
+        carrier = point.body if isinstance(point, Fairlead) else name
+        if carrier in (free_bodies if isinstance(point, Fairlead) else rigid):
+            row = bodies[carriers.index(carrier)]
+            place = point.place if isinstance(point, Fairlead) else (0.0, 0.0, 0.0)
+            at[name] = tuple((row[PLACE:FRAME] + row[FRAME:V].reshape(3, 3) @ np.array(place)).tolist())
+            joint[name], fairleads[name] = len(free) + carriers.index(carrier), place
+    return _Joined(at, joint, fairleads, {x: joint[x] - len(free) for x in fairleads})
+
+
+def starts_between(system: System, places: Floats, bodies: Floats, model: SystemModel) -> tuple[list[State], Floats]:
+    """Shapes of the lines of a model to begin with, hung between other places of its points and bodies.
+
+    places: (P, 3) m of the free points; bodies: (B, STATE), which are returned too, with the axes of points that lines
+    are clamped to.
+    """
+    maker = _Lines(system, _joined(system, places, bodies), bodies, model.resolution, model)
+    maker.turn_points()
+    return [maker.start(name, each) for name, each in zip(model.names, model.models, strict=True)], maker.bodies
 
 
 class _Lines:
     """Makes the models of lines, with their clamps."""
 
     def __init__(
-        self, system: System, at: Mapping[str, Any], bodies: Floats, rows: Mapping[str, int], seats: Floats | None,
-        scenes: Mapping[str, Scene], resolution: SystemResolution,
+        self, system: System, joined: _Joined, bodies: Floats, resolution: SystemResolution,
+        before: SystemModel | None = None,
     ) -> None:  # fmt: skip
-        """at: places of the points that are joined; rows: of `bodies`, of the points that are carried by one; scenes:
-
-        of lines, that are known.
-        """
-        self._system, self._at, self.bodies, self._rows = system, at, bodies.copy(), rows
+        """before: a model that was made before, whose seats and scenes hold; None: as the first shapes lie."""
+        seats, scenes = (None, {}) if before is None else (before.seats, before.scenes)
+        self._system, self._at, self.bodies, self._rows = system, joined.at, bodies.copy(), joined.rows
         self._given, self._names, self._resolution = seats, list(system.lines), resolution.lines
         self.seats = np.zeros((len(self._names), 2, SEAT)) if seats is None else seats
         self._at_rigid = {end: x for p in system.rigid for end, x in directions_at_rigid(system, p).items()}
@@ -245,6 +264,10 @@ class _Lines:
         if all(x is not None and not x.swivel for x in clamps) and found["start"] and found["end"]:
             found["start"], found["end"] = untwisted(found["start"], found["end"])
         return found
+
+    def start(self, name: str, model: Model) -> State:
+        """The first shape of a line, whose model has been made, between the places of now."""
+        return first_state(self._scene(name, (), self._directions(name)), model)
 
     def model(self, name: str) -> Model:
         """The model of a line: its loads with the points that it carries, its first shape between held places."""

@@ -280,6 +280,32 @@ class System(Table):
         ValidationError of pydantic.  directions: as of `direction` by end, in place of those.  scene: of the line with
         its points where the scene has them, if it is known.
         """
+        if places is not None or directions is not None:
+            return self._scene_of(name, carrying, places, directions, scene)
+        known, key = self._known_scenes, (name, tuple(carrying))
+        if key not in known:
+            known[key] = self._scene_of(name, carrying)
+        return known[key]
+
+    @property
+    def _known_scenes(self) -> dict[tuple[str, tuple[str, ...]], Scene]:
+        """Scenes of lines that have been made, by line and ends that carry: to validate one takes 2 ms."""
+        tables, known = self._made_scenes
+        if any(getattr(self, name) is not table for name, table in tables.items()):  # of what this was copied from
+            del self._made_scenes
+            _, known = self._made_scenes
+        return known
+
+    @cached_property
+    def _made_scenes(self) -> tuple[dict[str, Any], dict[tuple[str, tuple[str, ...]], Scene]]:
+        """The tables of this system, and `_known_scenes`."""
+        return {name: getattr(self, name) for name in type(self).model_fields}, {}
+
+    def _scene_of(
+        self, name: str, carrying: Sequence[str], places: Mapping[str, Triple] | None = None,
+        directions: Mapping[str, tuple[Triple, Triple | None]] | None = None, scene: Scene | None = None,
+    ) -> Scene:  # fmt: skip
+        """As `scene_of`, made anew."""
         line = self.lines[name]
         first = self._places(line)
         ends: dict[str, End] = {}

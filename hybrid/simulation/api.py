@@ -203,7 +203,7 @@ def _several_lines(
             assert not isinstance(target, MemoryTarget)
             refine_system(system, target, ProgressReporter(None, 1.0), lambda: False, moves=False)
         elif progress is None:
-            static_system(system, target, scene_text(system))
+            static_system(system, target, partial(scene_text, system))
         else:
             _move_lines(system, target, progress)
     return written_result(target)

@@ -87,8 +87,11 @@ class Envelope:
     Places are nodes; those where a quantity may have two values come twice, the left value first.
     """
 
-    def __init__(self, scene: Scene, model: Model, moves: bool) -> None:
-        """moves: whether there are steps; of an equilibrium the nodes are those of its line."""
+    def __init__(self, scene: Scene, model: Model, moves: bool, itself: SelfWatch | None = None) -> None:
+        """moves: whether there are steps; of an equilibrium the nodes are those of its line.  itself: what watches the
+
+        line, None: as one cable is watched.
+        """
         layout = model.layout if moves else None
         nodes = model.line.s.copy() if layout is None else layout.finest.nodes
         if moves and model.payout is not None:
@@ -121,7 +124,7 @@ class Envelope:
         self._grows = model.payout is not None
         if moves and model.line.bits & MAY_TOUCH and not model.line.bits & SELF_CONTACT:
             self.bounds[:, b.SELF_PRESSURE] = 0.0  # there is no contact before it is computed
-        self.itself = SelfWatch(model, no_contact(scene)) if moves else SelfWatch(model)
+        self.itself = itself or (SelfWatch(model, no_contact(scene)) if moves else SelfWatch(model))
         asked = scene.output.quantities if moves and not model.corrected else {}
         self.quantities = StepQuantities(scene, asked, pipes)
 

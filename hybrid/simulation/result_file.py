@@ -19,7 +19,7 @@ from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import Scene
 from hybrid.simulation.envelope import Envelope
 from hybrid.solve.statics import Equilibrium
-from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
+from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target, Text
 from hybrid.store.format import Field
 from hybrid.store.named_arrays import Tree
 from hybrid.store.recorder import BaseRecorder
@@ -50,7 +50,7 @@ def result_recorder(
     model: Model,
     observer: Observer,
     target: Target,
-    texts: Mapping[str, str],
+    texts: Mapping[str, Text],
     found: Equilibrium | SystemEquilibrium | None,
     envelope: Envelope,
     outputs: int = 0,
@@ -88,8 +88,9 @@ def result_recorder(
         )  # fmt: skip
     else:
         recorder = Recorder(
-            target, grid_s=observer.s, fields=observer.fields, step_fields=steps, attributes=attributes, texts=texts,
-            fixed=fixed, outputs=outputs + 1, overwrite=True, before=before, templates=cache_folder().parent,
+            target, grid_s=observer.s, fields=observer.fields, step_fields=steps, attributes=attributes, fixed=fixed,
+            texts={name: x if isinstance(x, str) else x() for name, x in texts.items()}, outputs=outputs + 1,
+            overwrite=True, before=before, templates=cache_folder().parent,
         )  # fmt: skip
     if model.layout is not None:
         _note_neglected_bending(scene, model, recorder)

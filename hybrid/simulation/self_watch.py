@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 
@@ -98,9 +99,13 @@ class SelfWatch:
         self.on, self.why, self.remedy = bool(diameters(model).any()), why, remedy
         self.asks = False  # whether it is asked when the line comes near itself, so that contact begins
         self.itself = blank_itself(np.ones(1))
-        self._job = Table(blank_itself_job())
         self._address = UNBENT
         self._touches = False  # whether contact is computed
+
+    @cached_property
+    def _job(self) -> Table:
+        """What the kernel gets."""
+        return Table(blank_itself_job())
 
     @property
     def watching(self) -> bool:
@@ -197,17 +202,22 @@ class LineWatch:
 
     def __init__(self, watch: SelfWatch, model: Model) -> None:
         """watch: what is known of the line so far, which goes on on the cells of `model`."""
-        self._watch = watch
-        self._now, self._before = state_for(model.line), state_for(model.line)
-        self._clock = np.zeros(CLOCK_SIZE)
+        self._watch, self._model = watch, model
+        self._job: Table | None = None
         if watch.on:
             watch.itself = blank_itself(diameters(model))._replace(found=watch.itself.found)
             watch.touch(model)
-            self._job = Table(blank_itself_job())
-            self._job.bind(
-                line=model.line, ends=model.ends.values, old=self._now, new=self._before, clock=self._clock,
-                counts=np.zeros(COUNT_SIZE, np.int64), itself=watch.itself,
-            )  # fmt: skip
+
+    def _bind(self) -> Table:
+        """Get ready for the kernel, when the line is so bent for the first time that it could come near itself."""
+        model, job = self._model, Table(blank_itself_job())
+        self._now, self._before = state_for(model.line), state_for(model.line)
+        self._clock = np.zeros(CLOCK_SIZE)
+        job.bind(
+            line=model.line, ends=model.ends.values, old=self._now, new=self._before, clock=self._clock,
+            counts=np.zeros(COUNT_SIZE, np.int64), itself=self._watch.itself,
+        )  # fmt: skip
+        return job
 
     def look(self, t: float, dt: float, state: State, before: Floats, event: Callable[..., None]) -> None:
         """An event if surfaces have met in the step of dt (s) to t (s), from positions (N+1, 3) m to a state."""
@@ -216,6 +226,8 @@ class LineWatch:
         if not is_bent(state):
             self._watch.itself.found[TOLD] = 0.0
             return
+        if self._job is None:
+            self._job = self._bind()
         self._now.r[:], self._now.e[:], self._before.r[:] = state.r, state.e, before
         self._clock[NOW] = t
         if int(watch_itself(self._job.numbers)) & MEETS:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -71,15 +72,15 @@ class LineResult:
         self.diagnostics = Diagnostics(model, self.events)
         self._moves = outputs > 0
         self.observer = observer_of(scene, model, self._moves, COMPARED if target is None else None)
-        self.envelope = Envelope(scene, model, self._moves)
-        self.envelope.itself = SelfWatch(model, NO_CONTACT, "contact: {self: true} of the line does")
+        itself = SelfWatch(model, NO_CONTACT, "contact: {self: true} of the line does")
+        self.envelope = Envelope(scene, model, self._moves, itself)
         self.envelope.itself.on &= target is not None
         self._itself = LineWatch(self.envelope.itself, model)
         self.target = MemoryTarget() if isinstance(target, MemoryTarget) else None  # else it will be a part of a file
         self.recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder
         self.recorder = ComparisonRecorder(FORCE_COLUMNS)
         if target is not None:
-            to, texts = self.target or io.BytesIO(), {"scene": scene_text(scene)}
+            to, texts = self.target or io.BytesIO(), {"scene": partial(scene_text, scene)}
             recorder = result_recorder(scene, model, self.observer, to, texts, found, self.envelope, outputs)
             if isinstance(recorder, Recorder):
                 recorder.lay_by()

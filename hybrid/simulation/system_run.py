@@ -43,7 +43,7 @@ from hybrid.simulation.system_zones import SystemZones, managers_for, zones_at_r
 from hybrid.simulation.time_loop import SAME_STOP, WORK, apart
 from hybrid.solve.system import SystemSolver, SystemState, SystemTaken
 from hybrid.solve.system_statics import LineFailed
-from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
+from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target, Text
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.hdf5_file import opened
@@ -61,14 +61,14 @@ class SystemRun:
     """One system, computed into a file or into memory."""
 
     def __init__(
-        self, system: System, target: Target | None, text: str, moves: bool, kept: bool = False,
+        self, system: System, target: Target | None, text: Text, moves: bool, kept: bool = False,
         source: Path | None = None, resolution: SystemResolution | None = None, found: Tree | None = None,
     ) -> None:  # fmt: skip
-        """target: None: the run is only to be compared with; text: the scene as YAML; moves: whether its motion is
+        """target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether
 
-        wanted, else its equilibrium under full loads; kept: whether a file gets checkpoints; source: the result to go
-        on with, from its checkpoint, in place of a start; resolution: how finely, None: as the scene asks for, or the
-        checkpoint says; found: what was found before the run, for whoever goes on with its file.
+        its motion is wanted, else its equilibrium under full loads; kept: whether a file gets checkpoints; source: the
+        result to go on with, from its checkpoint, in place of a start; resolution: how finely, None: as the scene asks
+        for, or the checkpoint says; found: what was found before the run, for whoever goes on with its file.
         """
         self._before = found or {}
         self.system, self.target, self.moves = system, target, moves
@@ -120,7 +120,7 @@ class SystemRun:
         self._begin = clock.process_time()
         self.recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder = ComparisonRecorder()
         if source is not None:
-            self.recorder = self._go_on(source, text)
+            self.recorder = self._go_on(source, text if isinstance(text, str) else text())
         elif target is not None:
             self.recorder = self._new_recorder(text)
 
@@ -130,7 +130,7 @@ class SystemRun:
     def _parts(self) -> dict[str, Recorder]:
         return {line.name: line.recorder for line in self.lines if isinstance(line.recorder, Recorder)}
 
-    def _new_recorder(self, text: str) -> Recorder | ArrayRecorder:
+    def _new_recorder(self, text: Text) -> Recorder | ArrayRecorder:
         """The result of the points and bodies, with those of the lines in it."""
         assert self.found is not None and self.target is not None
         attributes: dict[str, str | float | int] = {
@@ -142,15 +142,16 @@ class SystemRun:
         if on_bodies:
             attributes["fairleads"] = json.dumps(on_bodies)
         fields = [*fields_of(self.system), *self.quantities.fields]
-        fixed, texts = [*self.quantities.limits, *self.quantities.ranges], {"scene": text}
+        fixed = [*self.quantities.limits, *self.quantities.ranges]
         if isinstance(self.target, MemoryTarget):
             return ArrayRecorder(
-                self.target, grid_s=np.zeros(1), fields=fields, step_fields=(), attributes=attributes, texts=texts,
-                fixed=fixed, parts={line.name: line.target for line in self.lines if line.target is not None},
+                self.target, grid_s=np.zeros(1), fields=fields, step_fields=(), attributes=attributes,
+                fixed=fixed, texts={"scene": text},
+                parts={line.name: line.target for line in self.lines if line.target is not None},
             )  # fmt: skip
         recorder = Recorder(
             self.target, grid_s=np.zeros(1), fields=fields, step_fields=(), attributes=attributes, fixed=fixed,
-            texts=texts, outputs=len(self.times) + 1, overwrite=True,
+            texts={"scene": text if isinstance(text, str) else text()}, outputs=len(self.times) + 1, overwrite=True,
             before=self._before if self.kept else None, templates=cache_folder().parent, parts=self._parts,
         )  # fmt: skip
         recorder.files = files_of(self.system)
@@ -496,7 +497,7 @@ def run_system(
 
 
 def static_system(
-    system: System, target: Target | None, text: str, resolution: SystemResolution | None = None
+    system: System, target: Target | None, text: Text, resolution: SystemResolution | None = None
 ) -> SystemRun:
     """Compute the equilibrium of a system under full loads; target, resolution: as of `run_system`."""
     run = SystemRun(system, target, text, moves=False, resolution=resolution)

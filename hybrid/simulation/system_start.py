@@ -10,7 +10,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.bodies import NUMBERS
 from hybrid.kernels.members import PIECE, PUSH, WATER, WET
 from hybrid.kernels.state import Floats
-from hybrid.model.system import SystemModel, balanced_places, build_system
+from hybrid.model.system import SystemModel, balanced_places, starts_between
 from hybrid.scene.system import System
 from hybrid.solve.system import JoinedLine, SystemState, joined_ends
 from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
@@ -61,8 +61,7 @@ def _starts(system: System, model: SystemModel) -> Iterator[Start]:
     yield "lines hung between the first places", SystemState([x.start for x in model.models], model.body_places)
     places = balanced_places(system, model)
     if places is not None and len(model.places) + len(model.body_places):
-        there = build_system(system, *places, model)
-        yield "lines hung between places that balance", SystemState([x.start for x in there.models], there.body_places)
+        yield "lines hung between places that balance", SystemState(*starts_between(system, *places, model))
 
 
 def joined_lines(model: SystemModel, t: float) -> list[JoinedLine]:

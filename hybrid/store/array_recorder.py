@@ -38,6 +38,8 @@ class MemoryTarget:
     contents: ArrayContents | None = None
 
 
+# A text, or what makes it when it is asked for: YAML takes a tenth of the equilibrium of some lines.
+Text = str | Callable[[], str]
 # A file, the bytes of one in memory, which can be amended, or arrays.
 Target = Path | io.BytesIO | MemoryTarget
 
@@ -55,7 +57,7 @@ class ArrayContents:
 
     def __init__(
         self, data: Mapping[str, ArrayDataset], groups: Sequence[str], attributes: dict[str, Any],
-        texts: Mapping[str, str], parts: Mapping[str, ArrayContents] | None = None,
+        texts: Mapping[str, Text], parts: Mapping[str, ArrayContents] | None = None,
     ) -> None:  # fmt: skip
         """parts: results of lines by name, of a result of several."""
         self._parts = dict(parts or {})
@@ -90,7 +92,8 @@ class ArrayContents:
         return np.asarray(self.data[name].values)
 
     def text(self, name: str) -> str:
-        return self._texts.get(name, "")
+        text = self._texts.get(name, "")
+        return text if isinstance(text, str) else text()
 
     def close(self) -> None:
         """Let go of all arrays; those that were asked for stay with the result."""
@@ -107,7 +110,7 @@ class ArrayRecorder(BaseRecorder):
 
     def __init__(
         self, target: MemoryTarget, *, grid_s: np.ndarray, fields: Sequence[Field], step_fields: Sequence[Field],
-        attributes: Mapping[str, str | float | int], texts: Mapping[str, str],
+        attributes: Mapping[str, str | float | int], texts: Mapping[str, Text],
         fixed: Sequence[tuple[Field, np.ndarray]] = (), parts: Mapping[str, MemoryTarget] | None = None,
     ) -> None:  # fmt: skip
         self._parts = dict(parts or {})
