@@ -16,15 +16,16 @@ import numpy as np
 from hybrid.kernels.assembly import get9
 from hybrid.kernels.bed import bed_under
 from hybrid.kernels.books import CURVATURE, DISPLACEMENT, MOMENT, PRESSURE, SEAM, SELF_PRESSURE, TENSION, TORQUE
-from hybrid.kernels.cell import chord
+from hybrid.kernels.cell import chord, turning
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.element import bending
-from hybrid.kernels.forces import PLANAR, SEABED
+from hybrid.kernels.element import bending, damped_bending
+from hybrid.kernels.forces import PLANAR, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.report import FORCE_A
 from hybrid.kernels.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.rotations import add, cross, dot, frame, scale, sub
 from hybrid.kernels.seabed import pressure
+from hybrid.kernels.tension_torque import rest_strain
 from hybrid.kernels.zone_torque import FIRST, LAST
 from hybrid.kernels.zone_torque import TORQUE as PASSED
 
@@ -93,14 +94,27 @@ def end_tension(line, ends, state, report, loaded, marks, k):
 
 
 @inner
+def rate_of_cell(state, i):
+    """Angular velocity (rad/s) of the frame of a cell."""
+    d, _, il = chord(get3(state.e, i))
+    d1, _ = turning(d, il, sub(get3(state.v, i + 1), get3(state.v, i)), 0.0)
+    return add(cross(d, d1), scale(state.w[i], d))
+
+
+@inner
 def moment_at(line, state, i):
-    """Moment (N m) of what is after an inner node on what is before it, without damping."""
+    """Moment (N m) of what is after an inner node on what is before it."""
     if not line.element[i]:
         return (0.0, 0.0, 0.0)
     before, _, _ = chord(get3(state.e, i - 1))
     after, _, _ = chord(get3(state.e, i))
     Ra, Rb = frame(get3(state.a1, i - 1), before), frame(get3(state.a1, i), after)
-    m, _ = bending(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
+    kb, k0 = get3(line.kb, i), rest_strain(line, state.T, i)
+    if line.bits & STIFFNESS_DAMPING:
+        tau = 0.5 * (line.tau[i - 1] + line.tau[i])
+        m, _, _, _ = damped_bending(Ra, Rb, kb, k0, tau, rate_of_cell(state, i - 1), rate_of_cell(state, i))
+        return m
+    m, _ = bending(Ra, Rb, kb, k0)
     return m
 
 

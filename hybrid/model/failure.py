@@ -1,7 +1,7 @@
 """Lines that break from their points, and points that give way: what may break, and the system after it.
 
 The ends that come loose are joined to a free point of their own without mass, which is what a free end is; one that
-was clamped bends there no more.
+was clamped bends there no more, and no torque passes through the catenary zones of its line.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.kernels.state import NO_TORSION
 from hybrid.model.release import without_clamp
 from hybrid.model.system import SystemModel
 from hybrid.scene.points import Failure, FreePoint
@@ -60,6 +61,8 @@ def after_failure(model: SystemModel, weakness: Weakness) -> SystemModel:
     models, seats = [*model.models], model.seats.copy()
     for line, k in ends:
         bare = without_clamp(models[line].line, -k)
+        if bare.torsion.size:  # a torque passes only where both ends hold the twist
+            bare = bare._replace(torsion=NO_TORSION)
         if bare is not models[line].line:
             models[line] = replace(models[line], line=bare)
         seats[line, k] = 0.0

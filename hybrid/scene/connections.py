@@ -78,18 +78,11 @@ class Connections(Table):
 
 def connection_findings(system: System) -> Iterator[Finding]:
     """What is wrong with the connections of a system of lines."""
-    for name, line in system.lines.items():
+    for name in system.lines:
         for key in ("start", "end"):
             held = system.clamp(name, key)
             if held is not None:
                 yield from _clamp_findings(system, name, key, held)
-        model = line.chosen_model
-        both = [system.clamp(name, key) for key in ("start", "end")]
-        twisted = isinstance(model, ZonesModel) and all(x is not None and not x.swivel for x in both)
-        if twisted and line.break_at is not None:
-            expected = "nothing, because a torque passes through the catenary zones of this line"
-            fix = f"leave it out, or lines.{name}.connections.end.swivel: true, or model: rod"
-            yield Finding(("lines", name, "break_at"), expected, fix)
     for name, point in system.points.items():
         if isinstance(point, FixedPoint) and point.motion is not None and not system.clamped_at(name):
             for turn in (x for x in point.motion.harmonics() if x in TURNS):

@@ -79,6 +79,11 @@ class EndTable(Table):
         return position
 
     @property
+    def is_placed(self) -> bool:
+        """Whether a position that is held is known, and no first guess of what lines move."""
+        return True
+
+    @property
     def first_position(self) -> Triple | None:
         """Where the search of the equilibrium puts the end first [m]."""
         return self.held_position or self._own("initial_guess")

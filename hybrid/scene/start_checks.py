@@ -75,7 +75,7 @@ def span(cable: Cable, ends: Ends) -> Iterator[Finding]:
 
 def span_in_motion(cable: Cable, ends: Ends, time: Time | None) -> Iterator[Finding]:
     """Two held ends that travel apart farther than the cable joins them, unless line is paid out."""
-    if any(getattr(end, "payout", None) is not None for end in ends.both):
+    if any(getattr(end, "payout", None) is not None or not end.is_placed for end in ends.both):
         return
     held = ends.held()
     motions = {name: ends.named()[name].prescribed_motion for name in held}

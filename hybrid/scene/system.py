@@ -36,9 +36,26 @@ from hybrid.scene.points import Failure, Fairlead, FixedPoint, FreePoint, Name, 
 from hybrid.scene.quantities import Quantities, of_several_lines
 from hybrid.scene.schema import Scene, missing_time
 from hybrid.scene.suggestions import nearest
+from hybrid.scene.travels import travel_findings
 
 # Of the length of a line: how far a free point may be looked for from the other one.
 REACHED = 0.95
+
+
+class _JoinedPin(Pinned):
+    """The end of a line at a point that is free, or on a free body, held where that is looked for first."""
+
+    @property
+    def is_placed(self) -> bool:
+        return False
+
+
+class _JoinedClamp(Clamped):
+    """The same of an end that is clamped there."""
+
+    @property
+    def is_placed(self) -> bool:
+        return False
 
 
 class LineFailure(Failure):
@@ -324,10 +341,11 @@ class System(Table):
             if key in carrying and isinstance(point, FreePoint):
                 ends[key] = point.end.model_copy(update={"initial_guess": first[key]} if point.is_body else {})
             elif held is None:
-                ends[key] = Pinned(position=place, motion=motion)
+                kind = _JoinedPin if self.is_joined(getattr(line, key)) else Pinned
+                ends[key] = kind(position=place, motion=motion)
             else:
                 clamp = getattr(line.connections, key)
-                ends[key] = Clamped(
+                ends[key] = (_JoinedClamp if self.is_joined(getattr(line, key)) else Clamped)(
                     position=place, tangent=held[0], normal=held[1], swivel=clamp.swivel,
                     bend_stiffness=clamp.bend_stiffness, motion=motion,
                 )  # fmt: skip
@@ -370,6 +388,7 @@ class System(Table):
         refuse(connection_findings(self))
         refuse(chain.from_iterable(self._body_findings(name) for name in self.bodies))
         refuse(chain.from_iterable(self._line_findings(name) for name in self.lines))
+        refuse(travel_findings(self))
         refuse(of_several_lines(self.output.quantities, self.lines, self.environment.seabed is not None))
         return self
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from hybrid.kernels import books as b
 from hybrid.kernels.self_distance import MEETS, NEARS, TOLD
-from hybrid.simulation.events import slack_steps_text, steps_cut_text
+from hybrid.simulation.events import energy_gains_text, slack_steps_text, steps_cut_text
 
 if TYPE_CHECKING:
     from hybrid.simulation.transient import Transient
@@ -56,10 +56,7 @@ def count_energy_gains(moving: Transient) -> None:
     """How many tries of steps were repeated because contact created energy: an event with their number, at the end."""
     contact = moving.run.contact
     if contact is not None and contact.given_up:
-        text = (
-            f"{contact.given_up} tries of steps, of a line that touches itself, were repeated with half the length, "
-            f"because the time scheme would have created energy in them; a shorter time.step needs fewer"
-        )
+        text = energy_gains_text(contact.given_up)
         moving.events.event(moving.t, 0.0, moving.model.length, "steps cut", text, value=float(contact.given_up))
 
 

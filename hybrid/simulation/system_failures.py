@@ -1,7 +1,7 @@
 """Lines of a system that break in mid-motion: when, what goes on, and the event.
 
 Nothing is stored between a line that turns freely and its point, so no energy goes with it; what bends between the
-end of a line and its clamp goes with the clamp.
+end of a line and its clamp goes with the clamp, and the twist of catenary zones with the torque that passed through.
 """
 
 from __future__ import annotations
@@ -12,8 +12,12 @@ import numpy as np
 
 from hybrid.kernels.bodies import DONE, WORK
 from hybrid.kernels.report import FORCE_A
+from hybrid.kernels.state import NO_TURN, State
+from hybrid.kernels.zone_torque import TURN, torsion_energy
+from hybrid.model.build import Model
 from hybrid.model.failure import Weakness, after_failure, weaknesses
 from hybrid.simulation.releases import elastic
+from hybrid.solve.system import SystemState
 
 if TYPE_CHECKING:
     from hybrid.simulation.system_run import SystemRun
@@ -66,11 +70,11 @@ class Failures:
     def _break(self, k: int, why: str) -> None:
         run, x = self._run, self.all[k]
         line, end = x.ends[0]
-        old, state = run.model.models[line], run.state.lines[line]
+        old, before = run.model.models[line], run.state.lines[line]
         self._part(k)
         new, energy = run.model.models[line], 0.0
         if new is not old:
-            energy = elastic(new, run.t, state) - elastic(old, run.t, state)
+            energy = _elastic(new, run.t, run.state.lines[line]) - _elastic(old, run.t, before)
             run.lines[line].books.work[0, end] += energy
         text = f"{x.name} {why}; what came loose is free from here on"
         s = float(run.model.models[line].line.s[-end])
@@ -83,6 +87,17 @@ class Failures:
         self.broken.append(k)
         for line, model in zip(run.lines, run.model.models, strict=True):
             line.follow(model)
+        states = [
+            x if x.turn.size == 3 * len(model.line.torsion) else x._replace(turn=NO_TURN)
+            for x, model in zip(run.state.lines, run.model.models, strict=True)
+        ]
+        run.state = SystemState(states, run.state.bodies)
         done = run.solver.body_work[:, DONE:WORK].copy()
         run.make_solver()
         run.solver.body_work[:, DONE:WORK] = done
+
+
+def _elastic(model: Model, t: float, state: State) -> float:
+    """Energy of bending and torsion, J, at t (s), with that of zones that a torque passes through."""
+    twist = float(torsion_energy(model.line, state.turn[:, TURN], state.T)) if model.line.torsion.size else 0.0
+    return elastic(model, t, state) + twist

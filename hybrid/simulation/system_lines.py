@@ -25,7 +25,7 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.diagnostics import REMEMBERED, Diagnostics, stretch_text
 from hybrid.simulation.envelope import Envelope, marks_of
-from hybrid.simulation.events import EventLog
+from hybrid.simulation.events import EventLog, energy_gains_text
 from hybrid.simulation.result_file import result_recorder
 from hybrid.simulation.run_sample import COMPARED
 from hybrid.simulation.self_watch import LineWatch, SelfWatch, diameters, least_bending
@@ -246,6 +246,8 @@ class LineResult:
         values = self.envelope.values(self.model.line.s, self.books.extremes, t)
         self.recorder.replace(values)
         self.envelope.note_broken(values, self.events.event)
+        if self.contact is not None and (tries := self.contact.given_up):
+            self.events.event(t, 0.0, self.model.length, "steps cut", energy_gains_text(tries), value=float(tries))
         noted = self.take_events()
         self.recorder.close(status, message)
         return noted

@@ -85,6 +85,30 @@ def test_a_guess_out_of_reach_is_only_a_guess() -> None:
     assert abs(result["points/buoy/position"][-1, 0]) < 1e-6 and result["points/buoy/position"][-1, 2] < 30
 
 
+TOW = """\
+environment: {fluid: {density: 1025}}
+points:
+  anchor: {position: [0, 0, -50]}
+  float: {initial_guess: [0, 0, -20], mass: 100, volume: 0.5}
+  tug: {position: [30, 0, -20], motion: {travel: {by: [40, 0, 0], over: 20}}}
+lines:
+  leg: {start: anchor, end: float, sections: [{length: 60, mass: 2, diameter: 0.03, axial_stiffness: 1.0e+7}]}
+  tow: {start: float, end: tug, sections: [{length: 40, mass: 2, diameter: 0.03, axial_stiffness: 1.0e+7}]}
+time: {duration: 30, step: 0.1}
+"""
+
+
+def test_a_float_may_follow_a_tug_that_leaves_its_first_guess() -> None:
+    """The tug goes 50 m from where the float is first looked for, at the end of a line of 40 m: the float follows."""
+    assert hybrid.plan(system(TOW)).steps == 300
+    with pytest.raises(SceneError) as refused:
+        system(TOW.replace("[40, 0, 0]", "[80, 0, 0]"))
+    (told,) = refused.value.complaints
+    assert told.where == "points.tug.motion.travel" and "from point anchor" in str(refused.value)
+    text = TOW.replace("{start: anchor,", "{start: anchor, break_at: {time: 1, end: start},")
+    assert system(text.replace("[40, 0, 0]", "[80, 0, 0]")).lines["leg"].break_at is not None
+
+
 def test_points_farther_apart_than_lines_reach_are_refused_with_the_line() -> None:
     with pytest.raises(ComputationError, match=r"line (west|east)"):
         hybrid.static(system(TEXT.replace("[150, 0, -100]", "[900, 0, -100]")))

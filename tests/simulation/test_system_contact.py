@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.solve.self_contact import SelfContact
 
 WIDTH, RUBS = 0.02, {"self": True, "friction": 0.3}
 HOSE = {
@@ -102,3 +103,14 @@ def test_an_equilibrium_that_touches_itself_is_refused() -> None:
         hybrid.static(scene)
     with pytest.raises(hybrid.SceneError, match=r"lines\.hose\.contact[\s\S]*not within itself"):
         hybrid.run(scene, progress=False)
+
+
+def test_steps_that_contact_cuts_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of one cable, with the number of tries, in the result of the line."""
+    monkeypatch.setattr(SelfContact, "given_up", property(lambda _: 3))
+    scene = system()
+    scene["time"] = TIME | {"duration": 0.04}
+    result = hybrid.run(scene, progress=False)
+    (told,) = (x for x in result.lines["hose"].events if x.kind == "steps cut")
+    assert told.value == 3.0 and "3 tries" in told.text
+    assert any(x.kind == "steps cut" and "line hose" in x.text for x in result.events)

@@ -243,3 +243,28 @@ def test_a_force_on_a_point_that_is_let_go_ends_where_it_says() -> None:
     assert np.abs(result.lines["west"]["steps/t"] - 1.13).min() < 1e-9
     side = result["points/float/position"][:, 1]
     assert side[0] > 1.0 and side[4] == pytest.approx(side[0], abs=0.1) and side[-1] < side[0] - 0.3
+
+
+def test_end_forces_of_a_damped_rod_do_not_depend_on_which_line_carries_the_point() -> None:
+    """Continued from the cells, where the rod carries the float, they have the moment of stiffness damping, too."""
+    hose = {"length": 8, "mass": 5, "diameter": 0.1, "axial_stiffness": 1e6, "bending_stiffness": 2000}
+    hose["damping"] = {"stiffness": 0.5}
+    lines = {
+        "rod": {"start": "ship", "end": "float", "sections": [hose], "model": "rod", "mesh": {"cells": 32}},
+        "leg": {
+            "start": "anchor",
+            "end": "float",
+            "sections": [{"length": 8, "mass": 2, "axial_stiffness": 1e6}],
+            "model": "catenary",
+            "mesh": {"cells": 8},
+        },
+    }
+    moved = {"heave": {"amplitude": 0.5, "period": 2.0}, "ramp": 1.0}
+    scene = {
+        "points": {"ship": {"position": [0, 0, 0], "motion": moved}, "anchor": {"position": [12, 0, -4]},
+                   "float": {"initial_guess": [6, 0, -3], "mass": 20}},
+        "time": {"duration": 2.0, "step": 0.02}, "output": {"every": 0.02},
+    }  # fmt: skip
+    carried, alone = (hybrid.run(scene | {"lines": {x: lines[x] for x in order}}) for order in (lines, ("leg", "rod")))
+    one, two = (x.lines["rod"]["reaction_end"] for x in (carried, alone))
+    assert np.abs(one - two).max() < 0.01 * np.ptp(two, axis=0).max()

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import hybrid
-from hybrid.errors import SceneError
 from hybrid.kernels.newton import TOLERANCE
 from hybrid.simulation import system_stiffness
 
@@ -141,18 +141,29 @@ def test_a_body_swings_about_lines_that_hold_it_by_torque() -> None:
     assert angle == pytest.approx(angle[0] * np.cos(w * t), abs=0.02 * angle[0])
 
 
-@pytest.mark.parametrize(
-    ("where", "change"),
-    [
-        ("lines.one.break_at", lambda t: t["lines"]["one"].update(break_at={"time": 1.0, "end": "start"})),
-    ],
-)
-def test_what_is_not_computed_with_it_is_refused(where: str, change: Any) -> None:
-    tables = on_a_body([1.0, 0, 0]) | {"time": {"duration": 4.0, "step": 0.1}}
-    change(tables)
-    with pytest.raises(SceneError) as refused:
-        hybrid.plan(tables)
-    assert where in str(refused.value)
+def test_a_line_that_breaks_passes_no_torque_any_more(tmp_path: Path) -> None:
+    """A twisted line that hangs: its twist goes, and the event has the energy of what lost it; resumed bit for bit."""
+    down = {"tangent": [0, 0, -1]}
+    hanging = line("top", "low", [("rod", 4), ("catenary", 12), ("rod", 4)], {})
+    hanging["connections"] = {"start": down | {"normal": [1, 0, 0]}, "end": down | {"normal": [1, 1, 0]}}
+    scene = {
+        "environment": {"fluid": {"density": 1025}}, "time": {"duration": 0.06, "step": 0.001},
+        "points": {"top": {"position": [0, 0, 0]}, "low": {"position": [0, 0, -20.0026]}}, "output": {"every": 0.005},
+        "lines": {"line": hanging | {"break_at": {"time": 0.02}}},
+    }  # fmt: skip
+    with hybrid.run(scene, tmp_path / "whole.h5") as result:
+        (told,) = (x for x in result.events if x.kind == "end released")
+        hung = result.lines["line"]
+        torque, after = hung["torque"], result.times >= told.t
+        assert np.abs(torque[~after]) == pytest.approx(0.25 * np.pi * GJ / 20.0, rel=1e-3)
+        assert not torque[after][:, (hung.s > 4.0) & (hung.s < 16.0)].any()
+        # the zone from cell to cell, and the half element between the end and its clamp
+        assert told.energy == pytest.approx(-0.5 * GJ * (0.25 * np.pi / 20.0) ** 2 * 13.5, rel=1e-3)
+        assert abs(hung["work/scheme"][-1]) < 0.05 * hung["energy/torsion"][0]
+    hybrid.run(scene | {"time": {"duration": 0.04, "step": 0.001}}, tmp_path / "part.h5").close()
+    with hybrid.open(tmp_path / "whole.h5") as one, hybrid.resume(tmp_path / "part.h5", until=0.06) as more:
+        for name in ("position", "tension", "torque", "energy/torsion", "energy/kinetic"):
+            assert np.array_equal(one.lines["line"][name], more.lines["line"][name])
 
 
 @pytest.mark.parametrize("free", [True, False])
