@@ -5,7 +5,8 @@
 
 A bridle: two legs from the bed to a junction with mass, and a pennant from there to a fairlead that heaves; 3 x 100 cells.
 CPU time of the loop alone, medians of three, alternating in one run.  Errors are those of the tension at the fairlead in
-the last two periods, in per cent of a run of ours with three times the cells and an eighth of the step.
+the last two periods, in per cent: of a run of the same program that is finer (MoorDyn in both, CableDyn in a quarter of the step), and of
+ours.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ def deck(cells: int, step: float, program: str) -> str:
     units = "Diam MassDen EA BA/-zeta EI Cd Ca CdAx CaAx" if program == "MoorDyn" else (
         "Diam MassDenInAir EA BA/-zeta EI Cd_n Cd_t Ca_n Ca_t"
     )  # fmt: skip
-    drag = "1.2 1.0 %g 0.0" % (0.05 / np.pi) if program == "MoorDyn" else "1.2 0.05 1.0 0.0"
+    drag = "1.2 1.0 0.05 0.0" if program == "MoorDyn" else "1.2 0.05 1.0 0.0"
     rows = [f"{k + 1} Fixed {x} {y} {z} 0 0 0 0" for k, (x, y, z) in enumerate(ANCHORS)]
     rows += [
         "3 Free {} {} {} {} {} 0 0".format(*JUNCTION, MASS, VOLUME),
@@ -146,39 +147,53 @@ def of_cabledyn(cells: int, step: float) -> tuple[Vector, float]:
     return np.array(pull), cpu
 
 
-def errors(pull: Vector, fine: Vector) -> str:
-    """Of mean, largest and smallest tension of the last two periods, at the outputs of the coarser of both."""
+def errors(pull: Vector, fine: Vector) -> Vector:
+    """Of mean, largest and smallest tension of the last two periods (%), at the outputs of the coarser of both."""
     fine = fine[:: (fine.size - 1) // (pull.size - 1)]
     last = round(2 * PERIOD * (pull.size - 1) / DURATION)
-    found = [100.0 * (f(pull[-last:]) / f(fine[-last:]) - 1.0) for f in (np.mean, np.max, np.min)]
-    return "errors of mean, largest, smallest " + ", ".join(f"{x:.2f}" for x in found) + " %"
+    return np.array([100.0 * (f(pull[-last:]) / f(fine[-last:]) - 1.0) for f in (np.mean, np.max, np.min)])
 
 
 def test_a_bridle_against_moordyn_and_cabledyn() -> None:
-    """With its own step each: those of CableDyn that are longer ring at the junction."""
+    """Each with a step that leaves it about as far from its own converged run as ours is, and shorter ones than that.
+
+    Through its C interface CableDyn steps free points by a staggered scheme, whose error at the junction falls as the
+    square of the step and grows with the cells: 11 % with 0.025 s, 2 % with 0.0125 s, with drag or without.
+    """
     pytest.importorskip("moordyn")
     pytest.importorskip("cabledyn")
     ours(10, 0.1)
-    fine, _ = ours(3 * CELLS, 0.0125)
+    converged = {
+        "hybrid": ours(3 * CELLS, 0.0125)[0], "CableDyn": of_cabledyn(CELLS, 0.0015625)[0],
+        "MoorDyn": of_moordyn(2 * CELLS, 0.0002)[0],
+    }  # fmt: skip
     runs = {
         "hybrid, 0.1 s": lambda: ours(CELLS, 0.1), "hybrid, 0.4 s": lambda: ours(CELLS, 0.4),
-        "CableDyn, 0.1 s": lambda: of_cabledyn(CELLS, 0.1), "CableDyn, 0.025 s": lambda: of_cabledyn(CELLS, 0.025),
+        "CableDyn, 0.025 s": lambda: of_cabledyn(CELLS, 0.025),
+        "CableDyn, 0.00625 s": lambda: of_cabledyn(CELLS, 0.00625),
         "MoorDyn, 0.0004 s": lambda: of_moordyn(CELLS, 0.0004),
     }  # fmt: skip
     cpu: dict[str, list[float]] = {name: [] for name in runs}
-    print()
+    own: dict[str, float] = {}
+    print("\nerrors of mean, largest, smallest tension (%)")
+    for program, pull in converged.items():
+        print(f"{program}, converged, of ours: {errors(pull, converged['hybrid']).round(2)}", flush=True)
     for again in range(3):
         for name, run in runs.items():
             pull, used = run()
             cpu[name].append(used)
             if not again:
-                print(f"{name}: {used:.2f} s; {errors(pull, fine)}", flush=True)
+                of_own, of_ours = (errors(pull, converged[x]) for x in (name.split(",")[0], "hybrid"))
+                own[name] = float(np.abs(of_own).max())
+                print(f"{name}: {used:.2f} s; of its own {of_own.round(2)}, of ours {of_ours.round(2)}", flush=True)
     spent = {name: float(np.median(x)) for name, x in cpu.items()}
     for name, x in spent.items():
         mine = spent["hybrid, 0.1 s"], spent["hybrid, 0.4 s"]
         print(f"{name}: loop {x:.3f} s, {x / mine[0]:.1f} and {x / mine[1]:.1f} times those of hybrid")
-    nearest = min(spent["CableDyn, 0.025 s"], spent["MoorDyn, 0.0004 s"])
-    assert nearest > TIMES_FASTER * spent["hybrid, 0.4 s"]
+    nearest = min(spent["CableDyn, 0.00625 s"], spent["MoorDyn, 0.0004 s"])
+    assert (
+        own["hybrid, 0.4 s"] < min(own["CableDyn, 0.00625 s"], 0.3) and nearest > TIMES_FASTER * spent["hybrid, 0.4 s"]
+    )
 
 
 def test_cost_per_cell_of_a_hundred_lines() -> None:
