@@ -19,13 +19,16 @@ from hybrid.kernels.reel import (
     ACCELERATION,
     ADDED_N,
     ADDED_T,
+    BALANCE_ON,
     BEND_1,
     BUOY,
+    CHANGED,
     DAMP,
     DIAMETER,
     DISPLACED,
     DRAG_N,
     DRAG_T,
+    EASING,
     FADING,
     FAR,
     KAPPA_1,
@@ -35,6 +38,7 @@ from hybrid.kernels.reel import (
     PLACE,
     POLAR,
     RATE,
+    RIDING_ON,
     ROTARY,
     SIDE,
     SPRING,
@@ -169,13 +173,44 @@ def find_length(reel, t):
 @inner
 def take_riding_off(line, reel):
     """The forces on the line without those by which nodes that ride have more."""
-    if reel.stage[0] > 0.0:
+    if reel.stage[RIDING_ON] > 0.0:
         first = growing(line, reel) + 1
         for k in range(reel.layer.shape[0] - 1):
             i = node(line, reel, first + k)
             for j in range(3):
                 line.force[i, j] -= reel.riding[k, j]
-        reel.stage[0] = 0.0
+        reel.stage[RIDING_ON] = 0.0
+
+
+@inner
+def eased(reel, t):
+    """What part of the forces that balanced the neighbours of the last new node still acts at t: a quintic from 1 to 0."""
+    if reel.numbers[CHANGED] == -np.inf:
+        return 0.0
+    x = min(max((t - reel.numbers[CHANGED]) / reel.numbers[EASING], 0.0), 1.0)
+    return 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+
+
+@inner
+def put_balance_on(line, reel, t):
+    """The forces on the line with those that balanced the neighbours of the last new node, as far as they act at t."""
+    part = eased(reel, t)
+    if part > 0.0:
+        for i in range(line.h.shape[0] + 1):
+            for j in range(3):
+                reel.plain[i, j] = line.force[i, j]
+                line.force[i, j] += part * reel.balance[i, j]
+        reel.stage[BALANCE_ON] = 1.0
+
+
+@inner
+def take_balance_off(line, reel):
+    """The forces on the line without them, to the last bit; those on nodes that ride are off."""
+    if reel.stage[BALANCE_ON] > 0.0:
+        for i in range(line.h.shape[0] + 1):
+            for j in range(3):
+                line.force[i, j] = reel.plain[i, j]
+        reel.stage[BALANCE_ON] = 0.0
 
 
 @inner
@@ -183,6 +218,7 @@ def prepare(line, reel, t):
     """The line with the length of now at t."""
     numbers = reel.numbers
     take_riding_off(line, reel)
+    take_balance_off(line, reel)
     fill_cells(line, reel)
     for k in range(growing(line, reel), line.h.shape[0]):
         line.h[cell(line, reel, k)] = reel.true[k]

@@ -26,7 +26,18 @@ from hybrid.kernels.cell import Chord, chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import relative_rotation
 from hybrid.kernels.node_forces import Z3, get3, inertia_and_water
-from hybrid.kernels.paid_length import cell, find_length, growing, node, prepare, take_riding_off
+from hybrid.kernels.paid_length import (
+    cell,
+    eased,
+    find_length,
+    growing,
+    node,
+    prepare,
+    put_balance_on,
+    take_balance_off,
+    take_riding_off,
+)
+from hybrid.kernels.payout_balance import find_balance
 from hybrid.kernels.reel import (
     ACCELERATION,
     DUE,
@@ -36,8 +47,10 @@ from hybrid.kernels.reel import (
     LENGTH,
     LONGEST,
     RATE,
+    RIDING_ON,
     SHORTEST,
     SIDE,
+    UNBALANCED,
     read,
 )
 from hybrid.kernels.report import FORCE_A, FORCE_B, LENGTH_OUT, PAYOUT_POWER, PAYOUT_RATE
@@ -142,7 +155,7 @@ def put_riding_on(line, sea, ends, state, reel):
         i = node(line, reel, first + k)
         for j in range(3):
             line.force[i, j] += reel.riding[k, j]
-    reel.stage[0] = 1.0
+    reel.stage[RIDING_ON] = 1.0
 
 
 @inner
@@ -253,6 +266,16 @@ def book(line, old, new, reel, dt):
     return booked
 
 
+@inner
+def work_of_balance(old, new, reel, t, dt):
+    """Work, J, through an accepted step of dt of the forces that balanced the neighbours of the last new node."""
+    part, done = 0.5 * (eased(reel, t - dt) + eased(reel, t)), 0.0
+    if part > 0.0:
+        for i in range(reel.balance.shape[0]):
+            done += dot(get3(reel.balance, i), sub(get3(new.r, i), get3(old.r, i)))
+    return part * done
+
+
 # --- entries --------------------------------------------------------------------------------------
 
 
@@ -277,10 +300,12 @@ def pay_out(table):
                 winch, clock[b.RHO], clock[b.STEP_BEFORE], dt
             )
         prepare(line, reel, clock[b.TRY_END])
+        put_balance_on(line, reel, clock[b.TRY_END])
         return 0
     if phase == b.JUDGE:
         tried = job.old if count[b.PARITY] else job.new
         take_riding_off(line, reel)
+        take_balance_off(line, reel)
         pull = correct_force(line, job.sea, job.ends, tried, job.velocity, reel, job.report)
         note_pull(reel, clock[b.TRY_END], pull)
         leave_to_reel(line, job.zones, reel)
@@ -292,6 +317,7 @@ def pay_out(table):
     if winch[TENSION] > 0.0:
         accept(winch, numbers[LENGTH], numbers[RATE], numbers[ACCELERATION])
     job.work[0, end_of(reel)] += book(line, before, state, reel, clock[b.LAST_DT])
+    job.work[0, b.ZONES] += work_of_balance(before, state, reel, clock[b.NOW], clock[b.LAST_DT])
     remember(line, reel)
     last = reel.true[growing(line, reel)]
     if clock[b.NOW] >= numbers[FADING]:
@@ -310,7 +336,7 @@ def iterate(table):
     job = read(table)
     line, reel, clock = job.line, job.reel, job.clock
     numbers, winch, t = reel.numbers, reel.winch, clock[b.TRY_END]
-    if reel.stage[0] == 0.0:
+    if reel.stage[RIDING_ON] == 0.0:
         put_riding_on(line, job.sea, job.ends, job.old if job.counts[b.PARITY] else job.new, reel)
         return 0
     take_riding_off(line, reel)
@@ -333,6 +359,7 @@ def iterate(table):
     numbers[RATE] += winch[CV] * change
     numbers[ACCELERATION] += winch[CA] * change
     prepare(line, reel, t)
+    put_balance_on(line, reel, t)
     if starts:
         lengthen_start(line, job.X, change, reel.columns)
     else:
@@ -367,3 +394,8 @@ def stand_still(table):
     pull = correct_force(job.line, job.sea, job.ends, state, job.velocity, job.reel, job.report)
     note_pull(job.reel, job.clock[b.NOW], pull)
     remember(job.line, job.reel)
+    if job.reel.stage[UNBALANCED] > 0.0:
+        put_riding_on(job.line, job.sea, job.ends, state, job.reel)
+        find_balance(job.line, job.sea, job.ends, state, job.reel)
+        take_riding_off(job.line, job.reel)
+        job.reel.stage[UNBALANCED] = 0.0

@@ -19,7 +19,20 @@ from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.paid_length import amount_between, cell, length_at, node
 from hybrid.kernels.payout import slope_at, velocity_at
-from hybrid.kernels.reel import FADING, FAR, LONGEST, PER_LENGTH, PLACE, SHORTEST, SIDE, Reel, blank_reel
+from hybrid.kernels.reel import (
+    CHANGED,
+    EASING,
+    FADING,
+    FAR,
+    LONGEST,
+    PER_LENGTH,
+    PLACE,
+    SHORTEST,
+    SIDE,
+    UNBALANCED,
+    Reel,
+    blank_reel,
+)
 from hybrid.kernels.references import reader
 from hybrid.kernels.rotations import add, dot, scale, sub
 from hybrid.kernels.state import Floats, Line, State, blank_line, blank_state
@@ -350,6 +363,9 @@ def carry(job):
     for c in range(m):
         until = max(until, new.since[c] + new.span[c])
     new.numbers[FADING] = until
+    plain = line.torsion.shape[0] == 0 and line.tension_twist.shape[0] == 0  # no force that payout_balance does not know
+    new.stage[UNBALANCED] = 1.0 if plain else 0.0
+    new.numbers[CHANGED], new.numbers[EASING] = job.clock[b.NOW] if plain else -np.inf, span_of(job, flow, g)
 
 
 @kernel

@@ -21,7 +21,7 @@ from hybrid.kernels.following_run import call, call_count, call_solver, put, put
 from hybrid.kernels.newton import ASSEMBLY, RUN
 from hybrid.kernels.paid_length import cell, node, prepare
 from hybrid.kernels.payout_nodes import CarryJob, blank_carry_job, move_row, move_rows, place_reel
-from hybrid.kernels.reel import DUE, FAR, LONGEST, SIDE, Reel, blank_reel
+from hybrid.kernels.reel import BALANCE_ON, DUE, FAR, LONGEST, RIDING_ON, SIDE, Reel, blank_reel
 from hybrid.kernels.references import reader
 from hybrid.kernels.run import blank_books
 from hybrid.kernels.sampling import SAME_TIME
@@ -248,7 +248,7 @@ def change_line(table):
     reel, new = job.reel, job.new
     for k in range(reel.numbers.shape[0]):
         new.numbers[k] = reel.numbers[k]
-    new.stage[0], new.numbers[DUE] = 0.0, 0.0
+    new.stage[RIDING_ON], new.stage[BALANCE_ON], new.numbers[DUE] = 0.0, 0.0, 0.0
     place_reel(new, job.nodes, job.target.h.shape[0] - reel.layer.shape[0] + 1)
     line_as(job.line, read_node(table).whole, job.target, new)
 

@@ -39,8 +39,11 @@ PER_LENGTH = 20
     SIDE,  # 1 where the fairlead is the end of the line, -1 where it is the start
     FAR,  # m, arc length of the far end
     SPRING,  # N m/rad, of an angular spring between the fairlead and a clamped line; infinite: rigid
-) = range(13)  # fmt: skip
-NUMBERS = 13
+    CHANGED, EASING,  # s, when the last node entered or left; over which forces that balance its neighbours end
+) = range(15)  # fmt: skip
+NUMBERS = 15
+# Parts of `Reel.stage`.
+RIDING_ON, BALANCE_ON, UNBALANCED = range(3)
 
 
 class Reel(NamedTuple):
@@ -60,7 +63,9 @@ class Reel(NamedTuple):
     amount: Floats  # (2, 1 + PER_LENGTH)
     layer: Floats  # (m+1,) m, how far before the fairlead the nodes that ride with it are; that is the last, 0
     riding: Floats  # (m+1, 3) N, by which the forces on them are more because they do not move as the material does
-    stage: Floats  # (1,) 1 while these are among the forces on the line
+    stage: Floats  # (3,) 1 while these, or `balance`, are among the forces on the line; while `balance` is to be found
+    balance: Floats  # (N+1, 3) N, forces on nodes, in the order of the line, that balanced them at CHANGED
+    plain: Floats  # (N+1, 3) N, the forces on the line without them
     winch: Floats  # (WINCH,) of a winch that holds a tension (kernels.winch)
     columns: Floats  # (3, N+1, 5) that such a winch at the start works in; else empty
 
@@ -71,11 +76,13 @@ def blank_reel(
 ) -> Reel:  # fmt: skip
     """A reel of a line of so many cells; columns: whether a winch at its start holds a tension."""
     z = np.zeros
+    numbers = z(NUMBERS)
+    numbers[CHANGED] = -np.inf
     return Reel(
-        z(NUMBERS), z((1, 8)) if law is None else law, z((1, 1 + PER_LENGTH)) if pieces is None else pieces,
+        numbers, z((1, 8)) if law is None else law, z((1, 1 + PER_LENGTH)) if pieces is None else pieces,
         z(1 + PER_LENGTH), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 1, 6)),
         z(REPORT_SIZE), z((2, 1 + PER_LENGTH)), z(1) if layer is None else layer,
-        z((1 if layer is None else layer.size, 3)), z(1), z(WINCH) if winch is None else winch,
+        z((1 if layer is None else layer.size, 3)), z(3), z((cells + 1, 3)), z((cells + 1, 3)), z(WINCH) if winch is None else winch,
         z((3, cells + 1, 5) if columns else (3, 0, 5)),
     )  # fmt: skip
 

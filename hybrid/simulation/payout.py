@@ -37,7 +37,7 @@ ROUND_OFF = 1e-9  # of a length
 # Arrays of a line that its length changes, and that outputs ask for.
 VARIES = ("s", "h", "ck", "mass", "force", "kb", "k0", "hn", "rotary", "polar")
 # What a checkpoint keeps of a reel.
-KEPT = ("numbers", "lack", "rate", "since", "span", "winch")
+KEPT = ("numbers", "lack", "rate", "since", "span", "winch", "balance")
 
 
 class PayingOut:
@@ -126,6 +126,10 @@ class PayingOut:
     def _ordered(self, x: Floats) -> Floats:
         """Values of cells, given from the far end on, in the order of the line; and back."""
         return x if self.plan.side else x[::-1]
+
+    def leave_unbalanced(self) -> None:
+        """Nothing balances the neighbours of a node that has just entered or left."""
+        self.reel.stage[p.UNBALANCED], self.reel.numbers[p.CHANGED] = 0.0, -np.inf
 
     @property
     def due(self) -> bool:
@@ -230,7 +234,7 @@ class PayingOut:
         """
         line = line._replace(**{name: getattr(line, name).copy() for name in ALONG_LINE})
         line.force[:, :2] = 0.0  # but for what rounding leaves of the forces on nodes that ride
-        reel = reel._replace(numbers=reel.numbers.copy(), true=reel.true.copy(), stage=np.zeros(1))
+        reel = reel._replace(numbers=reel.numbers.copy(), true=reel.true.copy(), stage=np.zeros_like(reel.stage))
         reel.numbers[p.FADING] = 0.0
         self._fitting.bind(line=line, reel=reel, clock=self._clock)
         for k, t in enumerate(batch.t.tolist()):
@@ -279,9 +283,10 @@ class PayingOut:
         self.count, self.law = count, law
         self.reel = self._blank(count)
         numbers = np.asarray(given.get("numbers", np.zeros(0)))
-        if numbers.shape in ((p.SIDE,), (p.SPRING,)):  # of a file from before winches at the start, or before springs
+        if numbers.shape in ((p.SIDE,), (p.SPRING,), (p.CHANGED,)):  # of a file of an earlier version
             given["numbers"] = np.concatenate([numbers, self.reel.numbers[numbers.size :]])
-        kept = matched({"winch": self.winch} | given, {name: getattr(self.reel, name) for name in KEPT}, "payout")
+        absent = {"winch": self.winch, "balance": self.reel.balance}
+        kept = matched(absent | given, {name: getattr(self.reel, name) for name in KEPT}, "payout")
         if not (kept["span"].min() > 0.0 and kept["numbers"][p.LENGTH] > kept["numbers"][p.PLACE]):
             raise ValueError("a length that no line has")
         for name, x in kept.items():

@@ -1,0 +1,87 @@
+"""The forces that balance the nodes around one that has just entered a line at its winch, or left it.
+
+The discrete line is in balance on cells of unequal lengths with places that lie on no smooth curve: where the lengths
+of neighbours jump, so do second differences.  A node that is put on the curve through them, or left out, unbalances its
+neighbours, which would send waves of bending along the line.  The forces that are missing are put on the nodes and
+taken off slowly (paid_length.eased), as the new cells get their lengths (docs/theory.md, 19).
+"""
+
+from __future__ import annotations
+
+from hybrid.kernels.cell import Chord, chord, moment_force, rotary_force, turning
+from hybrid.kernels.compile import inner
+from hybrid.kernels.element import bending
+from hybrid.kernels.forces import ROTARY
+from hybrid.kernels.node_forces import Z3, Z9, get3, node_loads
+from hybrid.kernels.paid_length import growing, node
+from hybrid.kernels.rotations import add, frame, scale, sub
+
+# Nodes before the cell that grows, and behind it, whose elements and cells are others than before; one to spare.
+AROUND = 3
+
+
+@inner
+def frame_of(ends, k):
+    f = ends.frame
+    return (f[k, 0], f[k, 1], f[k, 2], f[k, 3], f[k, 4], f[k, 5], f[k, 6], f[k, 7], f[k, 8])
+
+
+@inner
+def frame_beside(line, ends, state, j, c):
+    """The frame of cell c beside node j; that of the end beyond an end."""
+    if c < 0 or c >= line.h.shape[0]:
+        return frame_of(ends, 0 if c < 0 else 1)
+    d, _, _ = chord(get3(state.e, c))
+    return frame(get3(state.a1, c), d)
+
+
+@inner
+def moment_at(line, ends, state, j):
+    """Moment at node j: of its element, or what acts on an end."""
+    n = line.h.shape[0]
+    M = Z3
+    if line.element[j]:
+        before, after = frame_beside(line, ends, state, j, j - 1), frame_beside(line, ends, state, j, j)
+        M, _ = bending(before, after, get3(line.kb, j), get3(line.k0, j))
+    elif j == 0:
+        M = scale(-1.0, get3(ends.moment, 0))
+    elif j == n:
+        M = get3(ends.moment, 1)
+    return M
+
+
+@inner
+def force_in(line, ends, state, c):
+    """Force in cell c."""
+    d, _, il = chord(get3(state.e, c))
+    f = scale(state.T[c], d)
+    if line.element[c] or line.element[c + 1]:
+        Q = sub(moment_at(line, ends, state, c + 1), moment_at(line, ends, state, c))
+        if line.bits & ROTARY:
+            e1 = sub(get3(state.v, c + 1), get3(state.v, c))
+            e2 = sub(get3(state.vd, c + 1), get3(state.vd, c))
+            d1, D1 = turning(d, il, e1, 0.0)
+            Q = sub(Q, scale(line.polar[c] * state.w[c], d1))
+            more, _ = rotary_force(d, il, e1, e2, d1, D1, line.rotary[c], 0.0, 0.0)
+            f = add(f, more)
+        V, _ = moment_force(d, il, Q, Z9)
+        f = add(f, V)
+    return f
+
+
+@inner
+def find_balance(line, sea, ends, state, reel):
+    """The forces that balance the nodes around the cell that grows; those on nodes that ride are on."""
+    n, g = line.h.shape[0], growing(line, reel)
+    for i in range(n + 1):
+        for j in range(3):
+            reel.balance[i, j], reel.plain[i, j] = 0.0, 0.0
+    for k in range(max(g - AROUND, 1), min(g + AROUND, n - 1) + 1):
+        i = node(line, reel, k)
+        da, la, ia = chord(get3(state.e, i - 1))
+        db, lb, ib = chord(get3(state.e, i))
+        before, after = Chord(da, la, ia), Chord(db, lb, ib)
+        F, _, _, _ = node_loads(line, sea, i, state.r, reel.plain, state, before, after, 0.0, 0.0, reel.report)
+        F = add(F, sub(force_in(line, ends, state, i), force_in(line, ends, state, i - 1)))
+        for j in range(3):
+            reel.balance[i, j] = -F[j]
