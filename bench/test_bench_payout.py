@@ -6,6 +6,7 @@ import time
 from statistics import median
 from typing import Any
 
+import numpy as np
 import pytest
 
 import hybrid
@@ -54,3 +55,50 @@ def test_cost_of_paying_out(monkeypatch: pytest.MonkeyPatch) -> None:
         print(f"{name}: {x:.3f} s, {x / fixed:.2f}")
     print(f"with 2 outputs, against as many cells: {few / as_many:.2f}")
     assert joined < alone
+
+
+# Ripple: the largest difference, %, of the pull at the winch from a line of 160 cells before neighbours of a new node were
+# balanced (behind a clamp from a line that rippled itself).
+RIPPLES = {
+    "catenary": ("catenary", None, None, 40, False, 0.06),
+    "catenary, EA 2e6": ("catenary", 2e6, None, 40, False, 0.08),
+    "rod EI 2e4": ("rod", None, 2e4, 40, False, 0.09),
+    "rod EI 2e4, EA 2e6": ("rod", 2e6, 2e4, 40, False, 0.28),
+    "clamped": ("rod", None, 2e4, 40, True, 1.43),
+    "clamped, EA 2e6": ("rod", 2e6, 2e4, 40, True, 1.22),
+    "clamped, 80 cells": ("rod", None, 2e4, 80, True, 0.74),
+    "clamped, EA 2e6, 80 cells": ("rod", 2e6, 2e4, 80, True, 0.46),
+}
+
+
+def swinging(model: str, EA: float | None, EI: float | None, clamp: bool, cells: int) -> hybrid.Scene:
+    """100 m over 80 m, paid out at 0.8 m/s; the winch surges by 1 m in 7 s."""
+    section: dict[str, Any] = {"length": 100.0, "mass": 5.0, "diameter": 0.05}
+    section |= ({"axial_stiffness": EA} if EA else {}) | ({"bending_stiffness": EI} if EI else {})
+    winch: dict[str, Any] = {
+        "kind": "pinned", "position": [80, 0, 0], "payout": {"rate": 0.8, "ramp": 4.0},
+        "motion": {"surge": {"amplitude": 1.0, "period": 7.0}, "ramp": 7.0},
+    }  # fmt: skip
+    winch |= {"kind": "clamped", "tangent": [1.0, 0.0, 0.5]} if clamp else {}
+    return hybrid.validate_scene({
+        "cable": {"sections": [section]}, "initial": "equilibrium", "model": model, "mesh": {"cells": cells},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": winch},
+        "time": {"duration": 20.0, "step": 0.05}, "output": {"every": 0.05},
+    })  # fmt: skip
+
+
+def pull(scene: hybrid.Scene) -> np.ndarray:
+    """Force at the winch, N."""
+    return np.asarray(np.linalg.norm(hybrid.run(scene)["reaction_end"], axis=1))
+
+
+def test_ripple_of_the_pull() -> None:
+    """All of a run but its first two seconds, so that the error of the mesh is in it."""
+    fine: dict[Any, np.ndarray] = {}
+    for name, (model, EA, EI, cells, clamp, before) in RIPPLES.items():
+        line = model, EA, EI, clamp
+        if line not in fine:
+            fine[line] = pull(swinging(*line, 160))
+        found = np.abs(pull(swinging(*line, cells)) - fine[line])[40:].max() / fine[line].mean()
+        print(f"{name}: {100.0 * found:.3f} % (before: {before} %)")
+        assert found < 2e-3

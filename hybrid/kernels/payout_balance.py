@@ -2,8 +2,8 @@
 
 The discrete line is in balance on cells of unequal lengths with places that lie on no smooth curve: where the lengths
 of neighbours jump, so do second differences.  A node that is put on the curve through them, or left out, unbalances its
-neighbours, which would send waves of bending along the line.  The forces that are missing are put on the nodes and
-taken off slowly (paid_length.eased), as the new cells get their lengths (docs/theory.md, 19).
+neighbours, which would send waves of bending along the line.  The forces across the line that are missing are put on the
+nodes and taken off slowly (paid_length.eased), as the new cells get their lengths (docs/theory.md, 19).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from hybrid.kernels.element import bending
 from hybrid.kernels.forces import ROTARY
 from hybrid.kernels.node_forces import Z3, Z9, get3, node_loads
 from hybrid.kernels.paid_length import growing, node
-from hybrid.kernels.rotations import add, frame, scale, sub
+from hybrid.kernels.rotations import add, dot, frame, scale, sub
 
 # Nodes before the cell that grows, and behind it, whose elements and cells are others than before; one to spare.
 AROUND = 3
@@ -83,5 +83,7 @@ def find_balance(line, sea, ends, state, reel):
         before, after = Chord(da, la, ia), Chord(db, lb, ib)
         F, _, _, _ = node_loads(line, sea, i, state.r, reel.plain, state, before, after, 0.0, 0.0, reel.report)
         F = add(F, sub(force_in(line, ends, state, i), force_in(line, ends, state, i - 1)))
+        both = add(da, db)
+        F = sub(F, scale(dot(F, both) / max(dot(both, both), 1e-300), both))  # tensions balance the rest
         for j in range(3):
             reel.balance[i, j] = -F[j]

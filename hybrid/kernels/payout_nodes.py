@@ -363,7 +363,9 @@ def carry(job):
     for c in range(m):
         until = max(until, new.since[c] + new.span[c])
     new.numbers[FADING] = until
-    plain = line.torsion.shape[0] == 0 and line.tension_twist.shape[0] == 0  # no force that payout_balance does not know
+    plain = (
+        line.torsion.shape[0] == 0 and line.tension_twist.shape[0] == 0
+    )  # no force that payout_balance does not know
     new.stage[UNBALANCED] = 1.0 if plain else 0.0
     new.numbers[CHANGED], new.numbers[EASING] = job.clock[b.NOW] if plain else -np.inf, span_of(job, flow, g)
 
