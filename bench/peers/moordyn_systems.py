@@ -1,8 +1,8 @@
 """Decks of several lines from the tests of MoorDyn, as numbers.
 
 From the folder tests/Mooring of MoorDyn, Copyright Matt Hall and contributors, BSD 3-clause licence
-(https://github.com/FloatingArrayDesign/MoorDyn): lines.txt, lines_body.txt, local_euler/duplicated.txt and
-local_euler/complex_system.txt.
+(https://github.com/FloatingArrayDesign/MoorDyn): lines.txt, lines_body.txt, local_euler/duplicated.txt,
+local_euler/hanging.txt and local_euler/complex_system.txt.
 """
 
 from __future__ import annotations
@@ -52,6 +52,10 @@ DECKS = {
     "duplicated": _deck(
         _CHAIN, _points("Fixed 700 0 -200", "Vessel 0 0 0"), _lines("chain 1 2 760 76", "chain 1 2 760 152"),
         kBot=1e5, cBot=1e4, WtrDnsty=1025, WtrDpth=200,
+    ),
+    "hanging": _deck(
+        _CHAIN, _points("Vessel -350 0 0", "Vessel 350 0 0", "Free 0 0 -140"),
+        _lines("chain 1 3 380 76", "chain 2 3 380 152"), kBot=1e5, cBot=1e4, WtrDnsty=1025, WtrDpth=1000,
     ),
     # Its columns are named Can Cat Cdn Cdt; MoorDyn 2 reads them as they are named here.
     "complex_system": _deck(

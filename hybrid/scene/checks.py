@@ -184,7 +184,11 @@ def _stretch_by_a_law(cable: Cable, model: Model, ends: Ends, solver: str) -> It
         key = "dynamic_stiffness" if section.dynamic_stiffness is not None else "tension_strain"
         if isinstance(model, AdaptiveModel):
             fix = "write `model: rod`, `model: catenary`, or zones of both"
-            yield Finding((*here, key), "nothing, because zones move (model: adaptive)", fix)
+            expected = (
+                "nothing, because zones that move (model: adaptive) make new cells, which are not given the tables of "
+                "tension over strain, nor the mean tension that a slow part of the stretch remembers"
+            )
+            yield Finding((*here, key), expected, fix)
         if solver == "shooting":
             yield Finding(("solver",), f"elimination, because of {key} of a section", "leave solver out")
     for name in paid:

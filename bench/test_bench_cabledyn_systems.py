@@ -1,0 +1,179 @@
+"""hybrid and CableDyn on CableDyn's own decks of several lines: tensions at rest, and with fairleads that heave.
+
+    pip install -e ".[dev,bench]"
+    pytest bench/test_bench_cabledyn_systems.py -m bench -s
+
+The decks are not in its package but in the folder examples of its repository, Copyright SMI Lab, Inha University, and
+contributors, Apache License 2.0 (https://github.com/SMI-Lab-Inha/CableDyn): spread_3line_chain.dat,
+spread_4line_chain.dat and connect_weighted_point.dat, here as numbers, with as many segments for both programs.
+Fairleads heave alike by 1 m at 8 s (ramp 16 s).  The deck with a free point has no fairleads: it is compared at rest.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import hybrid
+
+pytestmark = pytest.mark.bench
+Vector = NDArray[np.float64]
+
+PERIOD, RAMP, DURATION, STEP, EVERY = 8.0, 16.0, 48.0, 0.05, 0.1
+GRAVITY, DENSITY = 9.80665, 1025.0
+MEAN, PEAK = 0.5, 2.0  # per cent: figures that are asked for
+# Diameter, mass, EA; drag and added mass are the same in all: 1.37 and 0.64, 1 and 0.
+R4_185, R4_155 = (0.333, 685.0, 3.270e9), (0.2791, 480.93, 2.058e9)
+# Chain; radius and depth of anchors and fairleads, length, segments of the deck times 2, lines.
+SPREADS: dict[str, int] = {"spread_3line_chain": 3, "spread_4line_chain": 4}
+ANCHORS, FAIRLEADS, DEPTH, LENGTH, SEGMENTS, BED, BED_DAMPING = (
+    (837.6, -200.0),
+    (58.0, -14.0),
+    200.0,
+    850.0,
+    100,
+    3e6,
+    1e4,
+)
+
+
+def around(count: int, place: tuple[float, float], k: int) -> tuple[float, float, float]:
+    angle = 2.0 * math.pi * k / count
+    return place[0] * math.cos(angle), place[0] * math.sin(angle), place[1]
+
+
+def section(chain: tuple[float, float, float], length: float) -> dict[str, Any]:
+    return {
+        "length": length, "mass": chain[1], "diameter": chain[0], "axial_stiffness": chain[2],
+        "drag": {"normal": 1.37, "tangential": 0.64}, "added_mass": {"normal": 1.0},
+    }  # fmt: skip
+
+
+def deck(
+    chain: tuple[float, float, float], points: list[str], lines: list[tuple[int, int, float]], cells: int,
+    *rows: str,
+) -> str:  # fmt: skip
+    """Lines: points at their upper and lower end, length."""
+    text = [
+        "--- Input File ---", "deck", "--- LINE TYPES ---", "TypeName Diam MassDenInAir EA BA/-zeta EI Cd_n Cd_t Ca_n Ca_t",
+        "(-) (m) (kg/m) (N) (N-s/-) (N-m^2) (-) (-) (-) (-)", f"chain {chain[0]} {chain[1]} {chain[2]} -1.0 0.0 1.37 0.64 1.0 0.0",
+        "--- POINTS ---", "ID Type X Y Z Mass Vol CdA Ca", "(-) (-) (m) (m) (m) (kg) (m^3) (m^2) (-)",
+        *(f"{k} {row}" for k, row in enumerate(points, 1)),
+        "--- LINES ---", "ID NodeA NodeB Outputs", "(-) (-) (-) (-)",
+        *(f"{k} {a} {b} -" for k, (a, b, _) in enumerate(lines, 1)),
+        "--- SECTIONS ---", "LineID LineType Length NumSegs", "(-) (-) (m) (-)",
+        *(f"{k} chain {length} {cells}" for k, (_, _, length) in enumerate(lines, 1)),
+        "--- OPTIONS ---", f"{GRAVITY} g", f"{DENSITY} rhoW", *rows,
+        "--- OUTPUTS ---", *(f'"FairTen{k}"' for k in range(1, len(lines) + 1)), "--- need this line ---", "",
+    ]  # fmt: skip
+    return "\n".join(text)
+
+
+def model_of(text: str) -> Any:
+    import cabledyn
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "deck.dat"
+        path.write_text(text)
+        return cabledyn.CableDyn(path)
+
+
+def heaved(t: float) -> float:
+    ramp = min(t / RAMP, 1.0)
+    return ramp**3 * (10.0 - 15.0 * ramp + 6.0 * ramp**2) * math.sin(2.0 * math.pi * t / PERIOD)
+
+
+def theirs(count: int) -> Vector:
+    """Tension (nt,) N at the fairlead of the first line, every EVERY s."""
+    points, lines = [], []
+    for k in range(count):
+        points += [
+            "Fixed {} {} {} 0 0 0 0".format(*around(count, ANCHORS, k)),
+            "Coupled {} {} {} 0 0 0 0".format(*around(count, FAIRLEADS, k)),
+        ]
+        lines.append((2 * k + 2, 2 * k + 1, LENGTH))
+    rows = f"{DEPTH} WtrDpth", f"{BED} kBot", f"{BED_DAMPING} cBot", f"{STEP} dtM", f"{DURATION} TMax"
+    with model_of(deck(R4_185, points, lines, SEGMENTS, *rows)) as model:
+        position, velocity, acceleration = model.get_coupled_motion()
+        velocity[:], acceleration[:] = 0.0, 0.0
+        rest, d = np.array(position, float).copy(), 1e-4
+        up = slice(2, rest.size, 3)
+        pull = [float(model.channel("FairTen1"))]
+        for k in range(1, round(DURATION / STEP) + 1):
+            t = k * STEP
+            before, now, after = heaved(t - d), heaved(t), heaved(t + d)
+            position.ravel()[up] = rest.ravel()[up] + now
+            velocity.ravel()[up], acceleration.ravel()[up] = (
+                (after - before) / (2 * d),
+                (after - 2 * now + before) / d**2,
+            )
+            model.step(STEP, position, velocity, acceleration)
+            if k % round(EVERY / STEP) == 0:
+                pull.append(float(model.channel("FairTen1")))
+    return np.array(pull)
+
+
+def ours(count: int) -> Vector:
+    """The same of hybrid: the pull of the line on its fairlead."""
+    motion = {"heave": {"amplitude": 1.0, "period": PERIOD}, "ramp": RAMP}
+    points: dict[str, Any] = {}
+    for k in range(count):
+        points[f"anchor{k}"] = {"position": around(count, ANCHORS, k)}
+        points[f"fairlead{k}"] = {"position": around(count, FAIRLEADS, k), "motion": motion}
+    lines = {
+        f"line{k}": {"start": f"anchor{k}", "end": f"fairlead{k}", "sections": [section(R4_185, LENGTH)],
+                     "mesh": {"cells": SEGMENTS}, "model": "catenary"}
+        for k in range(count)
+    }  # fmt: skip
+    bed = {"z": -DEPTH, "stiffness": BED * R4_185[0], "damping": BED_DAMPING * R4_185[0]}
+    result = hybrid.run(
+        {
+            "environment": {"gravity": GRAVITY, "fluid": {"density": DENSITY}, "seabed": bed}, "points": points,
+            "lines": lines, "time": {"duration": DURATION, "step": STEP}, "output": {"every": EVERY, "points": 11},
+        }
+    )  # fmt: skip
+    return np.linalg.norm(result["points/fairlead0/force"], axis=1)
+
+
+@pytest.mark.parametrize("name", SPREADS)
+def test_a_spread_mooring_pulls_as_in_cabledyn(name: str) -> None:
+    pytest.importorskip("cabledyn")
+    mine, other = ours(SPREADS[name]), theirs(SPREADS[name])
+    last = round(2 * PERIOD / EVERY)
+    rest = 100.0 * (other[0] / mine[0] - 1.0)
+    mean, most, least = (100.0 * (f(other[-last:]) / f(mine[-last:]) - 1.0) for f in (np.mean, np.max, np.min))
+    print(f"\n| {name} | {mine[0] / 1e3:.2f} kN | {rest:+.3f} % | {mean:+.3f} % | {most:+.3f} % | {least:+.3f} % |")
+    assert max(abs(rest), abs(mean)) < MEAN and max(abs(most), abs(least)) < PEAK
+
+
+def test_a_weight_on_two_chains_pulls_as_in_cabledyn() -> None:
+    pytest.importorskip("cabledyn")
+    place, weight, volume, length = (0.0, 0.0, -100.0), 50000.0, 2.0, 240.0
+    points = [
+        "Fixed -200.0 0.0 0.0 0 0 0 0", "Connect {} {} {} 50000 2.0 0 0".format(*place), "Fixed 200.0 0.0 0.0 0 0 0 0",
+    ]  # fmt: skip
+    text = deck(
+        R4_155, points, [(1, 2, length), (3, 2, length)], 60, "1.0e5 kBot", "1.0e4 cBot", "0.01 dtM", "2.0 TMax"
+    )
+    with model_of(text) as model:
+        there = np.array([float(model.channel(f"FairTen{k}")) for k in (1, 2)])
+    line = {"end": "knot", "sections": [section(R4_155, length)], "mesh": {"cells": 60}, "model": "catenary"}
+    result = hybrid.static(
+        {
+            "environment": {"gravity": GRAVITY, "fluid": {"density": DENSITY, "surface": 0.0}},
+            "points": {
+                "west": {"position": [-200, 0, 0]}, "east": {"position": [200, 0, 0]},
+                "knot": {"initial_guess": place, "mass": weight, "volume": volume},
+            },
+            "lines": {name: line | {"start": name} for name in ("west", "east")},
+        }
+    )  # fmt: skip
+    here = np.array([np.linalg.norm(result[f"points/{name}/force"][-1]) for name in ("west", "east")])
+    print(f"\n| connect_weighted_point | {here[0] / 1e3:.2f} kN | {100 * (there / here - 1)} % |")
+    assert np.abs(there / here - 1.0).max() < MEAN / 100.0
