@@ -8,11 +8,13 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Thread
+from typing import Any
 
 import numpy as np
 
 from hybrid.kernels.cache import is_warm
 from hybrid.model.build import Model, build
+from hybrid.model.payout import payout_of
 from hybrid.model.resolution import first_resolution, wants_errors
 from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
@@ -23,6 +25,7 @@ from hybrid.scene.schema import Scene
 SOLVER = ("run.in_plane", "run.in_space")
 OUTPUTS, ZONES = "observed_outputs.observe_outputs", "zone_step.follow_zones"
 MODEL_ERROR = "bending_error.advance_error"
+PAYOUT = "payout_run.go_on"
 STEPS = "run.run"  # around the solver of either kind
 OF_LINES = ("system.solve_system", SOLVER[1], OUTPUTS)  # of several lines
 STABILITY = "out_of_plane.wrong_pivots_at_rest"
@@ -61,6 +64,8 @@ def _has_rods(scene: Scene) -> bool:
 def _beside_solver(scene: Scene, static: bool) -> list[str]:
     """In the order in which they are best compiled beside the solver."""
     needed = [OUTPUTS] if static or scene.time is None else [STEPS, OUTPUTS]
+    if scene.time is not None and not static and payout_of(scene) is not None:
+        needed.insert(1, PAYOUT)  # asked for before the first step
     if scene.time is not None and scene.model.kind == "adaptive":
         needed.append(ZONES)
     if scene.model.kind == "corrected" or (wants_errors(scene) and scene.model.kind != "rod"):
@@ -103,6 +108,9 @@ def compile_all(names: Sequence[str]) -> None:
     table = np.zeros(0, np.int64)  # of which only the type counts
     if STEPS in names:
         run.compile_unless_busy(table)
+    if PAYOUT in names:
+        for kernel in payout_kernels():
+            kernel.compile_unless_busy(table)
     scene = validate_scene(SAMPLE)
     model = build(scene)
     if OUTPUTS in names:
@@ -113,6 +121,23 @@ def compile_all(names: Sequence[str]) -> None:
         _compile_zones(scene, model)
     if MODEL_ERROR in names:
         _compile_model_error(model)
+
+
+def payout_kernels() -> tuple[Any, ...]:
+    """All that a line calls that is paid out, in the order in which a run asks for it; each takes one table."""
+    from hybrid.kernels import cell_changes, payout, payout_nodes, payout_run
+
+    first = (
+        payout.pay_out,
+        payout.iterate,
+        payout.fit_line,
+        payout.stand_still,
+        payout.lengthen,
+        payout_nodes.carry_node,
+    )
+    line = payout_run.change_line, payout_run.fit_changed, payout_run.book_change, payout_run.renew_run
+    forces = cell_changes.before_forces, cell_changes.after_forces
+    return *first, *line, *forces, payout_run.put_paid, payout_run.change_paid, payout_run.make_line, payout_run.go_on
 
 
 def _compile_outputs(model: Model) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 import hybrid
+from hybrid.kernels import payout, payout_nodes, payout_run
 from hybrid.simulation import first_use
 
 
@@ -38,3 +39,22 @@ def test_a_frozen_application_does_not_start_itself(frozen: bool, monkeypatch: p
     monkeypatch.setattr(first_use, "Thread", Started)
     first_use.compile_beside(hybrid.validate_scene(first_use.SAMPLE))
     assert len(started) == (not frozen)
+
+
+def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
+    """All entries that take a table, of which none is forgotten."""
+    entry = type(payout_run.go_on)
+    used = {
+        x.__qualname__
+        for module in (payout, payout_nodes, payout_run)
+        for x in vars(module).values()
+        if isinstance(x, entry) and list(x.py_func.__code__.co_varnames[: x.py_func.__code__.co_argcount]) == ["table"]
+    }
+    assert used <= {x.__qualname__ for x in first_use.payout_kernels()}
+    ends = {"start": {"kind": "free"}, "end": {"kind": "pinned", "position": [0, 0, 0], "payout": {"longest": 60}}}
+    scene = hybrid.validate_scene({
+        "cable": {"sections": [{"length": 40.0, "mass": 2.0}]}, "ends": ends, "initial": "equilibrium",
+        "model": "catenary", "mesh": {"cells": 20}, "time": {"duration": 10, "step": 0.05},
+    })  # fmt: skip
+    assert first_use.PAYOUT in first_use.kernels_of(scene)
+    assert first_use.PAYOUT not in first_use.kernels_of(scene, static=True)
