@@ -129,6 +129,9 @@ class JoinedObservation(Observation):
     def at_end(self, x: Floats, k: int, inward: int = 0) -> Floats:
         return np.moveaxis(x[self._end(x, k, inward)][..., 0], 0, -1)
 
+    def put_at_end(self, x: Floats, k: int, value: Floats) -> None:
+        x[self._end(x, k, 0), ..., 0] = np.moveaxis(value, -1, 0)
+
     def with_ends(self, x: Floats, ends: Sequence[Floats]) -> Floats:
         lines = np.arange(self.batch.t.size)
         of_cell = np.repeat(lines, np.diff(self.begin))[:-1]

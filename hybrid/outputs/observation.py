@@ -68,7 +68,7 @@ class Observation:
         """The same on other points of the same stretches."""
         other = copy(self)
         other.grid = grid
-        for name in ("tension", "tangent", "moment", "torque", "curvature_twist"):
+        for name in ("tension", "tangent", "moment", "torque", "bending_moment", "curvature_twist"):
             other.__dict__.pop(name, None)
         return other
 
@@ -104,6 +104,10 @@ class Observation:
         """Of values (n, ..., nb) on cells or nodes that at end k, or so many inward: (..., nb)."""
         return x[-1 - inward if k else inward]
 
+    def put_at_end(self, x: Floats, k: int, value: Floats) -> None:
+        """Set values (n, ..., nb) on cells or nodes at end k to (..., nb)."""
+        x[-1 if k else 0] = value
+
     def with_ends(self, x: Floats, ends: Sequence[Floats]) -> Floats:
         """Values (N, nb) of cells between those (nb,) of both ends."""
         return np.concatenate([ends[0][None], x, ends[1][None]])
@@ -116,7 +120,7 @@ class Observation:
         """First directors (n, 3, nb) of cells."""
         return np.moveaxis(self.batch.a1[:, cells], 0, -1)
 
-    def stiffness(self, nodes: NDArray[np.int64]) -> Floats:
+    def stiffness(self, nodes: slice | NDArray[np.int64]) -> Floats:
         """Stiffness (n, 3, nb or 1) N m of the elements at nodes."""
         return np.moveaxis(self.batch.kb[:, nodes], 0, -1) if self.batch.kb.size else self.line.kb[nodes, :, None]
 
@@ -259,10 +263,39 @@ class Observation:
         return self.grid.sides @ self.node_moment[self.grid.side_nodes]
 
     @cached_property
+    def _node_tangent(self) -> Floats:
+        """(N+1, 3, nb) of what was computed: halfway between the cells; at an end that of its holder or cell."""
+        d = self._plain.d
+        t = np.concatenate([d[:1], d[1:] + d[:-1], d[-1:]])
+        for k in (0, 1):
+            cell = self.at_end(d, k)
+            held = np.asarray(self.has_element(k))
+            self.put_at_end(t, k, np.where(held, self.batch.frame[:, k, 2::3].T, cell))
+        return np.asarray(t / np.maximum(size(t), 1e-12)[:, None])
+
+    @cached_property
     def torque(self) -> Floats:
-        """(ns, nb) N m, about the tangent."""
-        torque = dot(self.moment, self.tangent)
-        return torque + self.grid.sides @ self._passed if self.batch.turn.size else torque
+        """(ns, nb) N m, about the tangent.
+
+        Found at the nodes, and interpolated: the tangent between nodes, off by the square of the cell length, would
+        make a torque of the bending moment.
+        """
+        torque = self._node_torque[self.grid.side_nodes]
+        return self.grid.sides @ (torque + self._passed if self.batch.turn.size else torque)
+
+    @cached_property
+    def _node_torque(self) -> Floats:
+        """(N+1, nb) N m: of the twist of elements; at ends of the moment there."""
+        line, nodes = self.line, slice(None)
+        strain = self.element_strains[:, 2] - self.of_line("k0", nodes)[:, 2]
+        if line.tension_twist.size:
+            by_tension = line.tension_twist[:, None] * self._plain.T
+            strain = strain + np.pad(by_tension, ((0, 1), (0, 0))) + np.pad(by_tension, ((1, 0), (0, 0)))
+        torque = np.where(line.element[:, None], self.stiffness(nodes)[:, 2] * strain, 0.0)
+        for k in (0, 1):
+            moment, tangent = (self.at_end(x, k) for x in (self._plain.node_moment, self._node_tangent))
+            self.put_at_end(torque, k, (moment * tangent).sum(axis=0))
+        return torque
 
     @cached_property
     def _passed(self) -> Floats:
@@ -283,10 +316,10 @@ class Observation:
             moment = moment + (self.batch.turn[:, -k, TORQUE, None] * tangent).T
         return moment
 
-    @property
+    @cached_property
     def bending_moment(self) -> Floats:
         """(ns, nb) N m."""
-        return size(self.moment - self.torque[:, None] * self.tangent)
+        return size(self.grid.sides @ self._bending(self.node_moment)[self.grid.side_nodes])
 
     @property
     def shear(self) -> Floats:
@@ -319,11 +352,12 @@ class Observation:
 
     def _square_of_moment(self, moment: Floats) -> Floats:
         """Of moments (N+1, 3, nb) N m the square of what bends (n sides, nb)."""
-        d = self._plain.d
-        t = np.concatenate([d[:1], d[1:] + d[:-1], d[-1:]])
-        t /= np.maximum(size(t), 1e-12)[:, None]
-        bending = moment - dot(moment, t)[:, None] * t
-        return np.asarray((bending * bending).sum(axis=1)[self.grid.side_nodes])
+        return np.asarray((self._bending(moment) ** 2).sum(axis=1)[self.grid.side_nodes])
+
+    def _bending(self, moment: Floats) -> Floats:
+        """Of moments at nodes (N+1, 3, nb) N m what is across the tangent."""
+        t = self._node_tangent
+        return np.asarray(moment - dot(moment, t)[:, None] * t)
 
     @cached_property
     def link(self) -> Floats:

@@ -132,10 +132,20 @@ class Plain:
 
     def _bending(self, moment: Floats) -> Floats:
         """Size (N+1,) of what of moments (N+1, 3) N m bends."""
+        return np.asarray(np.linalg.norm(self._across(moment), axis=1))
+
+    def _across(self, moment: Floats) -> Floats:
+        t = self._node_tangent()
+        return np.asarray(moment - np.einsum("ij,ij->i", moment, t)[:, None] * t)
+
+    def _node_tangent(self) -> Floats:
+        """(N+1, 3): halfway between the cells, at an end with an element what holds it, else its cell."""
         d = self.computed.e / np.linalg.norm(self.computed.e, axis=1)[:, None]
         t = np.vstack([d[:1], d[1:] + d[:-1], d[-1:]])
-        t /= np.maximum(np.linalg.norm(t, axis=1), 1e-12)[:, None]
-        return np.asarray(np.linalg.norm(moment - np.einsum("ij,ij->i", moment, t)[:, None] * t, axis=1))
+        for k, end in enumerate((0, -1)):
+            if self.line.element[end]:
+                t[end] = self.ends.frame[k].reshape(3, 3)[:, 2]
+        return np.asarray(t / np.maximum(np.linalg.norm(t, axis=1), 1e-12)[:, None])
 
     @cached_property
     def tangent(self) -> Floats:
@@ -173,7 +183,11 @@ class Plain:
 
     @cached_property
     def torque(self) -> Floats:
-        return np.einsum("ij,ij->i", self.moment, self.tangent)
+        line = self.line
+        of_nodes = np.where(line.element, line.kb[:, 2] * (self._observed[1][:, 2] - line.k0[:, 2]), 0.0)
+        of_ends = np.einsum("ij,ij->i", self._observed[0], self._node_tangent())
+        of_nodes[[0, -1]] = of_ends[[0, -1]]
+        return np.asarray(self.grid.sides @ of_nodes[self.grid.side_nodes])
 
     @cached_property
     def _strains(self) -> Floats:
@@ -256,7 +270,8 @@ class Plain:
         return np.asarray(np.linalg.norm(self.grid.cells @ V, axis=1))
 
     def bending_moment(self) -> Floats:
-        return np.asarray(np.linalg.norm(self.moment - self.torque[:, None] * self.tangent, axis=1))
+        across = self._across(self.node_moment)[self.grid.side_nodes]
+        return np.asarray(np.linalg.norm(self.grid.sides @ across, axis=1))
 
     def reaction(self, k: int) -> Floats:
         """Force of the support, or of an end body, on the cable at end k; else the force applied there."""
