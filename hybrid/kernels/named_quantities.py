@@ -37,9 +37,12 @@ from hybrid.kernels.run import read
 KIND, END, DIRECTION, TO_TOUCHDOWN, POINT, IS_PLANE, FIRST, LAST, PATH, PATH_END, RADIUS = 0, 1, 2, 5, 6, 9, 10, 11, 12, 13, 14  # fmt: skip
 ASKED = 15
 # Columns of `reached`: smallest, largest, when, s; arc length where a clearance was, m; the place x, y, m, from which
-# excursions count, NaN: not known; the cell that was nearest last.
+# excursions count, or the azimuth, deg, from which azimuths are within half a turn, NaN: not known; the cell that was
+# nearest last.
 SMALLEST, LARGEST, TIMES, PLACES, REFERENCE, NEAREST = 0, 1, 2, 4, 6, 8
 REACHED = 9
+# The first azimuth is above it, deg, and at most a turn more: lines along an axis are far from both bounds.
+LEAST_AZIMUTH = -170.0
 # Rows of `path`: first point (3), chord (3), its square.
 CHORD, SQUARE = 3, 6
 PATH_ROW = 7
@@ -209,7 +212,18 @@ def on_bed(job, state, asked, reached, k, begins):
 
 
 @inner
-def of_pull(job, state, asked, k):
+def azimuth(f, reached, begins):
+    """Azimuth of the pull, deg, within half a turn of the reference; begins: whether the state is the first of all."""
+    x = math.degrees(math.atan2(f[1] + 0.0, f[0]))
+    if begins and math.isnan(reached[REFERENCE]):
+        reached[REFERENCE] = x + 360.0 if x <= LEAST_AZIMUTH else x
+    if math.isnan(reached[REFERENCE]):
+        return x
+    return x + 360.0 * math.floor((reached[REFERENCE] - x) / 360.0 + 0.5)
+
+
+@inner
+def of_pull(job, state, asked, reached, k, begins):
     """What follows from the pull at end k; angles in degrees, NaN where there is no pull."""
     kind = asked[KIND]
     f, taken = pull_at(job, state, k)
@@ -231,7 +245,7 @@ def of_pull(job, state, asked, k):
     if kind == DECLINATION:
         return math.degrees(math.atan2(math.hypot(f[0], f[1]), f[2]))
     if kind == AZIMUTH:
-        return math.degrees(math.atan2(f[1] + 0.0, f[0]))
+        return azimuth(f, reached, begins)
     aside = cross(f, along)
     return math.degrees(math.atan2(math.sqrt(dot(aside, aside)), dot(along, f)))
 
@@ -257,7 +271,7 @@ def note_quantities(table):
         elif kind >= TOUCHDOWN:
             x = on_bed(job, state, asked, reached, k, begins)
         else:
-            x = of_pull(job, state, asked, k)
+            x = of_pull(job, state, asked, reached, k, begins)
         if x < reached[SMALLEST]:
             reached[SMALLEST], reached[TIMES], reached[PLACES] = x, t, place
         if x > reached[LARGEST]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid.kernels.bed import planes_under
+from hybrid.kernels.named_quantities import LEAST_AZIMUTH
 from hybrid.kernels.state import Floats
 from hybrid.model.payout import whole_scene
 from hybrid.model.sections import outer_diameter
@@ -46,14 +47,20 @@ class Quantities:
         self.first = np.array([
             q.reference or (np.nan, np.nan) for q in self.wanted.values() if q.kind == "touchdown_excursion"
         ]).reshape(-1, 2)  # fmt: skip
+        # (n,) deg, from which azimuths are within half a turn, in their order; NaN until there is a pull
+        self.turns = np.array([q.middle for q in self.wanted.values() if q.kind == "azimuth"])
 
     def probes(self) -> dict[str, Probe]:
         """Probes by name."""
-        found, excursions = self.pipes.probes() if self.pipes is not None else {}, 0
+        found = self.pipes.probes() if self.pipes is not None else {}
+        excursions = azimuths = 0
         for name, q in self.wanted.items():
             if q.kind == "touchdown_excursion":
                 value = partial(self._excursion, q, excursions)
                 excursions += 1
+            elif q.kind == "azimuth":
+                value = partial(self._azimuth, q, azimuths)
+                azimuths += 1
             elif q.kind == "clearance":
                 value = partial(self._clearance, q, 0)
                 text = f"arc length at which {name} is least"
@@ -79,9 +86,13 @@ class Quantities:
         x, y, z = pull(v, q)
         return known(np.degrees(np.arctan2(np.hypot(x, y), z)), v, q)
 
-    def _azimuth(self, q: Quantity, v: Observation) -> Floats:
+    def _azimuth(self, q: Quantity, k: int, v: Observation) -> Floats:
         x, y, _ = pull(v, q)
-        return known(np.degrees(np.arctan2(y + 0.0, x)), v, q)  # no -0, which is half a turn away
+        found = known(np.degrees(np.arctan2(y + 0.0, x)), v, q)  # no -0, which is half a turn away
+        if np.isnan(self.turns[k]) and np.isfinite(found).any():
+            first = float(found[np.isfinite(found).argmax()])
+            self.turns[k] = first + 360.0 if first <= LEAST_AZIMUTH else first
+        return found if np.isnan(self.turns[k]) else found + 360.0 * np.floor((self.turns[k] - found) / 360.0 + 0.5)
 
     def _end_angle(self, q: Quantity, v: Observation) -> Floats:
         along, force = unit(q), pull(v, q)

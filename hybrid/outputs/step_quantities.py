@@ -45,6 +45,8 @@ class StepQuantities:
             row[k.TO_TOUCHDOWN] = q.ends_at(seabed) == "touchdown"
             if q.reference is not None:
                 reached[k.REFERENCE : k.REFERENCE + 2] = q.reference
+            if q.kind == "azimuth":
+                reached[k.REFERENCE] = q.middle
             along = q.direction or q.normal
             if along is not None:
                 row[k.DIRECTION : k.DIRECTION + 3] = np.array(along, float) / np.linalg.norm(along)

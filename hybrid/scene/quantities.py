@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Literal
 
@@ -28,7 +29,10 @@ KINDS: dict[str, tuple[str, str, tuple[str, ...], tuple[str, ...]]] = {
     "vertical_force": ("N", "upward part of the pull of the line at its {end}", ("end",), ()),
     "force_along": ("N", "part of the pull of the line at its {end} along a direction", ("end", "direction"), ()),
     "declination": ("deg", "angle of the pull at the {end} to straight up (down: 180)", ("end",), ()),
-    "azimuth": ("deg", "direction of the pull at the {end} in plan, from the x axis towards y", ("end",), ()),
+    "azimuth": (
+        "deg", "direction of the pull at the {end} in plan, from the x axis towards y, within half a turn of the first",
+        ("end",), (),
+    ),
     "end_angle": ("deg", "angle of the pull at the {end} to a direction (hang-off angle)", ("end", "direction"), ()),
     "uplift": ("N", "force that lifts what holds the {end} off the seabed, along its normal", ("end",), ()),
     "uplift_angle": ("deg", "angle of the pull at the {end} to the seabed; 0 where it does not lift", ("end",), ()),
@@ -53,6 +57,7 @@ TAKEN = (
     "right", "mesh", "envelope", "limits", "zones", "events", "points", "bodies", "lines", "times", "checkpoint",
     "scene", "template", "word", "plane", "bounds", "ends", "self_distance", "extremes",
 )  # fmt: skip
+HALF_TURN = 180.0  # deg
 # The field with the arc length at which a clearance is least: its name after that of the clearance.
 WHERE = "_at"
 # Of what lies on a seabed.
@@ -106,6 +111,14 @@ class Quantity(Table):
         default=None,
         description="largest value allowed, in the unit of the quantity (N, deg, m); changes nothing that is computed",
     )
+
+    @property
+    def middle(self) -> float:
+        """Of an azimuth, deg: from which its values are within half a turn, by its limits; NaN: the first value."""
+        limits = [x for x in (self.smallest, self.largest) if x is not None]
+        if len(limits) == 1 and abs(limits[0]) <= HALF_TURN:
+            return math.nan
+        return sum(limits) / len(limits) if limits else math.nan
 
     @property
     def unit(self) -> str:

@@ -52,6 +52,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         run.make_solver()
     template = checkpoint(run) | {"dry": None, "broken": None, "control": None}
     saved = {"quantities": run.quantities.unknown(), **saved}  # nor did it keep ranges
+    saved["quantities"] = run.quantities.of_today(saved["quantities"])
     saved["lines"] = of_today(saved.get("lines"), template["lines"])
     for name, line in template["lines"].items():
         if name in template["zones"]:

@@ -50,8 +50,14 @@ class SystemQuantities:
         return {name: x for each in self._steps.values() for name, x in each.values().items()}
 
     def checkpoint(self) -> dict[str, np.ndarray]:
-        """Ranges by line."""
-        return {name: x.reached.copy() for name, x in self._steps.items()}
+        """Ranges by line, and from what excursions and azimuths count."""
+        return {name: x.reached.copy() for name, x in self._steps.items()} | self.references()
+
+    def references(self) -> dict[str, np.ndarray]:
+        """From where excursions, m, and from which azimuths, deg, of a line count, by `line/first` and `line/turns`."""
+        found = {f"{line}/first": x.first for line, (x, _) in self._of_line.items()}
+        found |= {f"{line}/turns": x.turns for line, (x, _) in self._of_line.items()}
+        return {name: x.copy() for name, x in found.items() if x.size}
 
     def unknown(self) -> dict[str, np.ndarray]:
         """The same of a run that has kept none so far."""
@@ -59,10 +65,22 @@ class SystemQuantities:
             x.restore(None)
         return self.checkpoint()
 
+    def of_today(self, saved: object) -> object:
+        """What a checkpoint has, of a file of before with unknown references: it kept none, and azimuths to 180 deg."""
+        if not isinstance(saved, dict):
+            return saved
+        older = self.references()
+        for name, x in older.items():
+            x[:] = 0.0 if name.endswith("/turns") else x
+        return older | saved
+
     def restore(self, saved: Mapping[str, np.ndarray]) -> None:
         """Go on with ranges that a checkpoint has; of one from before there were any, they stay unknown."""
         for name, x in self._steps.items():
             x.restore(saved.get(name))
+        for line, (found, _) in self._of_line.items():
+            found.first[:] = saved.get(f"{line}/first", found.first)
+            found.turns[:] = saved.get(f"{line}/turns", found.turns)
 
     @property
     def fields(self) -> list[Field]:

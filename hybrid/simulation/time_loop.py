@@ -423,15 +423,20 @@ class TimeLoop:
         } | self._first_places()  # fmt: skip
 
     def _first_places(self) -> dict[str, np.ndarray]:
-        """Places from which excursions count (n, 2), m, if there are any; NaN: none yet."""
+        """Places from which excursions count (n, 2), m, and azimuths (n,), deg, if there are any; NaN: none yet."""
         found = self.observer.quantities
-        return {"first_places": found.first.copy()} if found is not None and found.first.size else {}
+        if found is None:
+            return {}
+        places = {"first_places": found.first.copy()} if found.first.size else {}
+        return places | ({"first_turns": found.turns.copy()} if found.turns.size else {})
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue as `checkpoint` has said; ValueError or ResultError where that cannot be."""
         mine = {"watch": self.diagnostics.checkpoint(self.run.run), "cpu": 0.0, "first_energy": 0.0}
         mine |= {name: np.full_like(x, np.nan) for name, x in self._first_places().items()}
         restore(self.run, {name: x for name, x in saved.items() if name not in mine})
+        if "first_turns" in mine:
+            saved = {"first_turns": np.zeros_like(mine["first_turns"]), **saved}  # a file of before has -180 to 180 deg
         older = {name: saved[name] for name in mine}
         if isinstance(older["watch"], dict):
             older["watch"] = UNWATCHED | older["watch"]
@@ -440,4 +445,6 @@ class TimeLoop:
         self.observer.first_energy = found["first_energy"]
         if self.observer.quantities is not None and "first_places" in found:
             self.observer.quantities.first[:] = found["first_places"]
+        if self.observer.quantities is not None and "first_turns" in found:
+            self.observer.quantities.turns[:] = found["first_turns"]
         self.diagnostics.restore(found["watch"], self.run.run)

@@ -84,17 +84,21 @@ def extreme(values: Arrays, name: str, bound: str) -> Extreme | None:
 
 
 def judged(values: Arrays) -> list[Judged]:
-    """Every limit that the sections have, at the place of the envelope where the cable is worst off."""
+    """Every limit that the sections have, at the place of the envelope where the cable is worst off.
+
+    A place without a value, on a reel to the end, is not judged; nor is a limit without any place that has one.
+    """
     found = []
     for limit, (name, bound) in _HELD.items():
         full = f"{GROUP}/{name}_{bound}"
-        if f"{GROUP}/{limit}" not in values or full not in values or not np.isfinite(values[full]).all():
+        if f"{GROUP}/{limit}" not in values or full not in values:
             continue
         allowed, x, t = values[f"{GROUP}/{limit}"], values[full], values[f"{GROUP}/{name}_t_{bound}"]
-        if np.isnan(allowed).all():
+        x = np.where(np.isfinite(x), x, np.nan)
+        if np.isnan(allowed + x).all():
             continue
         if limit == "min_tension":
-            worse, most = allowed - x, NOTHING * float(np.abs(x).max())
+            worse, most = allowed - x, NOTHING * float(np.nanmax(np.abs(x)))
         else:
             worse, most = x * allowed if limit == "min_bend_radius" else x / allowed, 1.0
         k = int(np.nanargmax(worse))

@@ -42,6 +42,8 @@ output:
     along: {kind: force_along, end: end, direction: [1, 2, 3]}
     steep: {kind: declination, end: end}
     heading: {kind: azimuth, end: start}
+    back: {kind: azimuth, end: end}
+    other_turn: {kind: azimuth, end: end, smallest: -190, largest: -170}
     hang_off: {kind: end_angle, end: end, direction: [0, 0, -1], largest: 7}
     lift: {kind: uplift, end: end, largest: 1}
     lift_angle: {kind: uplift_angle, end: start}
@@ -103,6 +105,12 @@ def test_ranges_are_those_of_all_steps(dense: hybrid.Result, tmp_path: Path) -> 
     gone_on = hybrid.parse_scene(SPARSE.replace("duration: 3", "duration: 1.5"))
     hybrid.run(gone_on, tmp_path / "half.h5").close()
     check_ranges(hybrid.resume(tmp_path / "half.h5", tmp_path / "rest.h5", until=3.0), dense)
+
+
+def test_azimuths_go_on_beyond_half_a_turn(dense: hybrid.Result) -> None:
+    """The pull at the end is along -x, and swings to both sides of it."""
+    assert dense.back.min() < 180.0 < dense.back.max() and np.abs(np.diff(dense.back)).max() < 90.0
+    np.testing.assert_allclose(dense.other_turn, dense.back - 360.0, atol=1e-9)
 
 
 def test_stress_and_wall_tension_at_every_node_and_step(dense: hybrid.Result) -> None:
