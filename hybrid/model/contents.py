@@ -14,6 +14,7 @@ from hybrid.model.mesh import Zone
 from hybrid.model.resolution import (
     USUAL,
     first_resolution,
+    follows_curvature,
     mesh_is_free,
     requested_accuracy,
     wants_errors,
@@ -114,6 +115,7 @@ def _accuracy(scene: Scene) -> Iterator[Entry]:
         yield Entry("steps that follow the motion", False, "time.step fixes them")
     graded = wants_survey(scene)
     why = "no accuracy is asked for" if mesh_is_free(scene) else "the scene places the cells"
+    why = "they follow the curvature" if follows_curvature(scene) else why
     by = "accuracy" if scene.resolution is None else "resolution.cells_per_layer"
     yield Entry("cells graded by bends", graded, f"{by}; as a first, coarse run shows them" if graded else why)
     wants = wants_errors(scene)

@@ -168,8 +168,9 @@ def mesh_is_free(scene: Scene) -> bool:
 
 
 def wants_survey(scene: Scene) -> bool:
-    """Whether a coarse run comes first that shows where cells should be short."""
-    return mesh_is_free(scene) and (requested_accuracy(scene) is not None or scene.resolution is not None)
+    """Whether a coarse run comes first that shows where cells should be short; not where they follow the curvature."""
+    wanted = requested_accuracy(scene) is not None or scene.resolution is not None
+    return mesh_is_free(scene) and wanted and not follows_curvature(scene)
 
 
 def follows_curvature(scene: Scene) -> bool:

@@ -337,7 +337,8 @@ def _free(scene: Scene) -> Free:
     """What the scene leaves to the program."""
     time = scene.time
     steps = time is not None and time.controlled and time.tolerance is None
-    return Free(mesh_is_free(scene), steps, zones_are_free(scene))
+    # where cells follow the curvature its share decides kinds, and the tolerance cells as well: both stay
+    return Free(mesh_is_free(scene), steps, zones_are_free(scene) and not follows_curvature(scene))
 
 
 def _expect(case: Case, resolution: Resolution, surveys: bool) -> None:

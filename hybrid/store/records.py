@@ -181,10 +181,11 @@ class MeshHistory(Sequence[Mesh]):
         zones, s = self._zones[i], self._s
         bounds = np.array([zone.s_b for zone in zones[:-1]])
         names = np.array([zone.kind for zone in zones])
-        rod = names[np.searchsorted(bounds, s)] == "rod"  # of a bound, the zone before it
-        if self._words is not None:
-            rod &= np.unpackbits(self._words[i].astype("<i8").view(np.uint8), bitorder="little")[: s.size] == 1
-        nodes = s[self._always | rod]
+        if self._words is not None:  # of rods and catenaries
+            there = np.unpackbits(self._words[i].astype("<i8").view(np.uint8), bitorder="little")[: s.size] == 1
+        else:
+            there = self._always | (names[np.searchsorted(bounds, s)] == "rod")  # of a bound, the zone before it
+        nodes = s[there]
         return Mesh(nodes, names[np.searchsorted(bounds, 0.5 * (nodes[1:] + nodes[:-1]))])
 
 
