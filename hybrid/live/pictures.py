@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from hybrid.errors import Complaint, ComputationError, HybridError, SceneError
@@ -19,7 +19,7 @@ from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.system_run import static_system
 from hybrid.store.array_recorder import MemoryTarget
-from hybrid.store.reader import Result, open_result, written_result
+from hybrid.store.reader import Result, written_result
 
 if TYPE_CHECKING:
     from hybrid.scene.system import System
@@ -66,9 +66,9 @@ def equilibrium(scene: Scene | System, made: Plan | SystemPlan) -> Result:
     another one, where there are several.
     """
     if not isinstance(scene, Scene):
-        memory = io.BytesIO()
-        static_system(scene, memory, scene_text(scene))
-        return open_result(memory)
+        memory = MemoryTarget()
+        static_system(scene, memory, partial(scene_text, scene))
+        return written_result(memory)
     check_motions(scene)
     if scene.solver == "shooting":
         return static(scene)
