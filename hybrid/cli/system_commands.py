@@ -121,6 +121,8 @@ def _table(
         if bent is not None and bend is not None:
             radius = f"{bent['value']:.5g} m at s = {bent['s']:.5g} m" + f", t = {bent['t']:.5g} s" * (end is not None)
             table.add_row("", f"smallest bend radius {radius}" + judged_text(bend, "m", bent))
+        for x in facts["quantities"]:
+            table.add_row("", x["text"] + x["when"] + "; BROKEN" * x["broken"])
         for each in facts.get("accuracy", ()):
             table.add_row("", verdict_text(each))
     for name, facts in points.items():

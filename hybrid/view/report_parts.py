@@ -134,7 +134,7 @@ def _error_table(fact: Fact) -> str:
 def _limit_table(fact: Fact) -> str:
     rows = []
     for x in fact.values["limits"]:
-        unit = "m" if x["limit"] == "min_bend_radius" else "N"
+        unit = {"min_bend_radius": "m", "max_stress": "Pa"}.get(x["limit"], "N")
         used = "–" if x["used"] is None else f"{short(100 * x['used'], 3)} %"
         part = 1.0 if x["broken"] else min(x["used"] or 0.0, 1.0)
         look, verdict = ("broken", "broken") if x["broken"] else ("kept", "kept")

@@ -129,7 +129,8 @@ def _warnings(result: Result) -> list[Fact]:
         middle = 0.5 * (event.s_a + event.s_b)
         facts.append(Fact("warning", event.kind.capitalize(), text, weight, values, event.t, middle))
     if not any(fact.weight == "alarm" for fact in facts):
-        broken = any(event.kind in LIMIT_EVENTS.values() for event in result.events)
+        held = [x for one in (result, *result.lines.values()) for x in held_of(one)]
+        broken = any(event.kind in LIMIT_EVENTS.values() for event in result.events) or any(x.broken for x in held)
         beside = [*["limits that are broken"] * broken, *["how it ended"] * (result.status != "complete")]
         none = f"None, beside {' and '.join(beside)}." if beside else "None were given."
         facts.insert(0, Fact("warning", "Warnings", none, values={"count": 0}))
@@ -281,14 +282,17 @@ def _slack(result: Result) -> Fact:
 
 def _limits(result: Result) -> Fact:
     """All limits of the sections in one table."""
-    found, title = limits_of(result), "Limits of the sections"
-    if not found:
-        return Fact("limits", title, "None given: min_bend_radius, max_tension or min_tension of a section.", "absent")
-    broken = sum(x.broken for x in found)
-    text = f"{broken} of {len(found)} broken" if broken else "All are kept"
+    title, keys = "Limits of the sections", ("limit", "value", "allowed", "broken", "s", "t")
+    stresses = [x for x in held_of(result) if x.limit == "max_stress"]
+    rows = [x._asdict() for x in limits_of(result)]
+    rows += [{key: getattr(x, key) for key in keys} | {"used": x.value / x.allowed} for x in stresses]
+    if not rows:
+        none = "None given: min_bend_radius, max_tension, min_tension, or max_stress of the pipe, of a section."
+        return Fact("limits", title, none, "absent")
+    broken = sum(x["broken"] for x in rows)
+    text = f"{broken} of {len(rows)} broken" if broken else "All are kept"
     text += ", over every accepted step." if has_envelope(result) else ", at the outputs that were saved."
-    values = {"limits": [x._asdict() for x in found]}
-    return Fact("limits", title, text, "plain", values)
+    return Fact("limits", title, text, "plain", {"limits": rows})
 
 
 def _quantities(result: Result) -> list[Fact]:

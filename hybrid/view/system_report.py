@@ -40,7 +40,7 @@ MOST_VALUES = 80_000
 # Lines whose statistics are on the page: of more the first ones, `hybrid stats --line` has all.
 MOST_STATISTICS = 20
 # Facts of a line that are alarms where a limit of its sections is broken.
-LIMITED = ("tension", "bend", "slack")
+LIMITED = ("tension", "bend", "slack", "quantity")
 # Extremes of each line in the table: quantity, bound, heading, unit.
 EXTREMES = (
     ("tension", "max", "largest tension", "N"), ("tension", "min", "smallest tension", "N"),

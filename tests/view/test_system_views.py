@@ -162,6 +162,20 @@ def test_the_table_of_a_run_judges_each_line(path: Path, capsys: pytest.CaptureF
     assert "; max_tension of 1000 N BROKEN" in east and "BROKEN" not in north
 
 
+def test_the_stress_of_pipes_is_judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As the only limit of a line it went by in the table of commands and in the report."""
+    pipe = {"bending_stiffness": 300, "diameter": 0.04, "pipe": {"wall": 0.004, "max_stress": 1e6}}
+    line = {"start": "a", "end": "b", "sections": [SECTION | pipe], "mesh": {"cells": 12}}
+    points = {"a": {"position": [0, 0, -60]}, "b": {"position": [100, 0, 0]}}
+    path = tmp_path / "pipe.h5"
+    result = hybrid.static({"points": points, "lines": {"l": line}}, path)
+    ended(Console(False, False), result, path, None, "ended")
+    assert re.search(r"von_mises of \S+ Pa, above the 1e\+06 Pa allowed; BROKEN", capsys.readouterr().out)
+    text = html(result)
+    assert "Line l: von mises." in text and "None, beside limits that are broken." in text
+    assert "<td>max_stress</td><td>broken</td>" in text and "1 of 1 broken" in text
+
+
 def test_a_film_moves_all_lines(result: hybrid.Result, tmp_path: Path) -> None:
     film = animate(result, tmp_path / "spar.gif")
     with Image.open(film.path) as image:
