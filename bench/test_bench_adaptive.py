@@ -1,7 +1,8 @@
 """Zones that move, measured: error against what was asked, switches, cost, and CPU time at equal accuracy.
 
     pytest bench -m bench -s -k adaptive                 # all, about 15 minutes
-    pytest bench -m bench -s -k "adaptive and random"    # or one: random, suspension, switches, flicker,
+    HYBRID_BENCH_SEEDS=60 pytest bench -m bench -s -k "adaptive and random"    # or one: random (200 seeds if none are
+                                                               # given), suspension, switches, flicker,
                                                                # speed, joints, slack, limits
 
 "All rod" is the same scene with the same base cells, each as finely divided as the manager's rods, and rod throughout.
@@ -11,6 +12,7 @@ CPU times are of the time loop, medians of runs that alternate; errors are again
 from __future__ import annotations
 
 import copy
+import os
 from collections import Counter
 from pathlib import Path
 from statistics import median
@@ -72,14 +74,27 @@ def changes(result: hybrid.Result) -> list[Any]:
 # --- random scenes ----------------------------------------------------------------------------------------------
 
 
+SEEDS = int(os.environ.get("HYBRID_BENCH_SEEDS", "200"))
+
+
 def test_adaptive_random() -> None:
-    """200 seeds: all finish, and the distance to all rod over the tolerance."""
-    ratios, ratio_cpu, worst = [], [], []
-    for seed in range(200):
+    """SEEDS seeds: all finish, and the distance to all rod over the tolerance."""
+    ratios, ratio_cpu, worst, failed = [], [], [], []
+    for seed in range(SEEDS):
         kind, text = random_scene(seed)
         L, tolerance = length(text), text["model"]["tolerance"]
-        a, r = run(text), run(text, force_rod=[[0, L]])
-        assert a.status == "complete", seed
+        try:
+            a = run(text)
+        except hybrid.ComputationError as error:
+            failed.append(f"seed {seed} {kind}, zones that move: {str(error).splitlines()[0]}")
+        try:
+            r = run(text, force_rod=[[0, L]])
+        except hybrid.ComputationError as error:
+            failed.append(f"seed {seed} {kind}, all rod: {str(error).splitlines()[0]}")
+        now = [x for x in failed if x.startswith(f"seed {seed} ")]
+        if now:
+            print("\n".join(now), flush=True)
+            continue
         ratio = apart(a, r) / L / tolerance
         ratios.append(ratio)
         ratio_cpu.append(cpu(r) / cpu(a))
@@ -91,13 +106,17 @@ def test_adaptive_random() -> None:
             own = [apart(x, r) / L / tolerance for x in (finer, run(shorter, force_rod=[[0, L]]))]
             worst.append((seed, kind, ratio, *own))
     x = np.array(ratios)
-    print(f"\n200 random runs, distance to all rod over the tolerance: median {np.median(x):.2f}, ", end="")
+    print(
+        f"\n{SEEDS} random runs, {len(failed)} of them failed; of the others, distance to all rod over the tolerance: median {np.median(x):.2f}, ",
+        end="",
+    )
     print(", ".join(f"{p} % {np.percentile(x, p):.2f}" for p in (75, 90, 95, 98, 99)), f", largest {x.max():.1f}")
     print(f"<= 1: {np.mean(x <= 1):.1%}, <= 2: {np.mean(x <= 2):.1%}, <= 5: {np.mean(x <= 5):.1%}")
     print(f"CPU all rod/adaptive: median {median(ratio_cpu):.2f}, {min(ratio_cpu):.2f} to {max(ratio_cpu):.2f}")
     print("seed kind       adaptive   all rod itself: 66 base cells, half the step")
     for seed, kind, ratio, *own in worst:
         print(f"{seed:4d} {kind:10s} {ratio:8.2f}   {own[0]:8.2f} {own[1]:8.2f}")
+    assert not failed
     assert np.mean(x <= 2) >= 0.95
     assert all(ratio <= max(5.0, 2.0 * max(own)) for _, _, ratio, *own in worst)
 
