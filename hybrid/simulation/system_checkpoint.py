@@ -34,7 +34,7 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
         "cpu": run.cpu, "dry": sorted(run.dry), "bodies": run.state.bodies, "body_work": run.solver.body_work,
         "lines": lines, "broken": [*run.failures.broken], "rest": run.rest,
         "control": run.control.checkpoint() if run.control is not None else [],
-        "quantities": run.quantities.checkpoint(),
+        "quantities": run.quantities.checkpoint(), "rotations": run.rotations.last.copy(),
         "zones": run.zones.checkpoint() if run.zones is not None else {},
     }  # fmt: skip
 
@@ -45,7 +45,8 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         if not isinstance(saved["broken"], list):
             raise ValueError("broken: numbers of what has broken were expected")
         run.failures.again(saved["broken"])
-    older = {"broken": [], "rest": run.rest, "control": [], "zones": {}}  # it took members as at the first guess
+    # It took members as at the first guess, and rotations were within half a turn of 0.
+    older = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "rotations": run.rotations.last}
     saved = older | dict(saved)
     if run.zones is not None:
         run.zones.take_rods(saved["zones"])
@@ -93,6 +94,7 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
         run.control.restore(found["control"])
     run.state.bodies[:], run.solver.body_work[:] = found["bodies"], found["body_work"]
     run.quantities.restore(found["quantities"])
+    run.rotations.last[:] = found["rotations"]
     for line, x, work, state in zip(run.lines, run.solver.lines, run.solver.work, run.state.lines, strict=True):
         mine = found["lines"][line.name]
         for name, values in mine["state"].items():

@@ -44,7 +44,7 @@ def fields_of(system: System) -> list[Field]:
     for name, body in system.bodies.items():
         at = f"bodies/{name}"
         fields.append(vector(f"{at}/position", "m", f"position of the origin of body {name}"))
-        turns = f"rotation of body {name}: roll, pitch and yaw, about x, then y, then z"
+        turns = f"rotation of body {name}: roll, pitch and yaw, about x, then y, then z; beyond half a turn, too"
         fields.append(Field(f"{at}/rotation", "deg", turns, (3,), ("xyz",), "inertial"))
         fields.append(vector(f"{at}/velocity", "m/s", f"velocity of the origin of body {name}"))
         fields.append(vector(f"{at}/angular_velocity", "rad/s", f"angular velocity of body {name}"))
@@ -98,6 +98,36 @@ def values_of(
         values[f"{at_body}/energy/kinetic"], values[f"{at_body}/energy/potential"] = work[KINETIC], work[POTENTIAL]
         values |= {f"{at_body}/work/{key}": work[DONE + k] for k, key in enumerate(WORKS)}
     return values
+
+
+class Rotations:
+    """Roll, pitch and yaw of bodies and points that go on from output to output, beyond half a turn."""
+
+    def __init__(self, system: System, model: SystemModel) -> None:
+        """They begin within half a turn of what the scene gives for bodies, and of 0 for points."""
+        begin = {f"points/{name}/rotation": np.zeros(3) for name in model.rigid}
+        for name, body in system.bodies.items():
+            given = body.initial_rotation if isinstance(body, FreeBody) else body.rotation
+            begin[f"bodies/{name}/rotation"] = np.array(given, float)
+        self.names = list(begin)
+        self.last = np.array(list(begin.values())).reshape(-1, 3)  # (n, 3) deg
+
+    def go_on(self, values: dict[str, Any]) -> None:
+        """Put in place of the rotations in `values` the same ones, deg, that are nearest to those of the last call."""
+        for k, name in enumerate(self.names):
+            if name in values:
+                self.last[k] = nearest_angles(values[name], self.last[k])
+                values[name] = self.last[k].copy()
+
+
+def nearest_angles(angles: Floats, before: Floats) -> Floats:
+    """Roll, pitch and yaw (3,) deg of the same rotation as `angles`, nearest to `before`.
+
+    The same: whole turns of each, or half a turn more of roll and yaw with 180 deg - pitch in place of pitch.
+    """
+    other = np.array([angles[0] + 180.0, 180.0 - angles[1], angles[2] + 180.0])
+    both = [x + 360.0 * np.round((before - x) / 360.0) for x in (np.asarray(angles, float), other)]
+    return min(both, key=lambda x: float(((x - before) ** 2).sum()))
 
 
 def clamp_moment(system: System, model: SystemModel, solver: SystemSolver, point: str) -> Floats | None:

@@ -35,7 +35,7 @@ from hybrid.simulation.system_checkpoint import (
 from hybrid.simulation.system_contact import refuse_within_itself
 from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_lines import LineResult
-from hybrid.simulation.system_points import fields_of, values_of
+from hybrid.simulation.system_points import Rotations, fields_of, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, named
 from hybrid.simulation.system_steps import StepControl
@@ -106,6 +106,7 @@ class SystemRun:
                 zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
             )
         ]
+        self.rotations = Rotations(system, self.model)
         self.quantities = SystemQuantities(system, dict(zip(names, self.scenes, strict=True)))
         if moves and target is not None:
             self.quantities.keep_ranges(self.lines)
@@ -214,6 +215,7 @@ class SystemRun:
         }
         if self.target is not None:
             values = values_of(self.system, self.model, solver, self.state, self.t)
+            self.rotations.go_on(values)
             values |= self.quantities.values(seen, {line.name: line for line in self.lines})
             self.recorder.save(self.t, values, [("lines", 0.0, 0.0)])
         self._look_for_dry_bodies()

@@ -30,6 +30,7 @@ from hybrid.view.system_views import (
     largest_tensions,
     motions,
     points_of,
+    rotations,
     shape,
 )
 from hybrid.view.worst import is_without_moment
@@ -208,7 +209,11 @@ def _vector(x: np.ndarray, digits: int = 5) -> str:
 def _panels(result: Result, every: AllLines, shown: dict[str, Kept]) -> dict[str, list[Panel]]:
     if not every.outputs:
         return {"histories": [], "ranges": []}
-    over = [largest_tensions(result, every), *motions(result, every)] if every.outputs > 1 else []
+    over = (
+        [largest_tensions(result, every), *motions(result, every), *rotations(result, every)]
+        if every.outputs > 1
+        else []
+    )
     along = [
         panel._replace(key=f"{panel.key}-{name}", title=f"line {name}: {panel.title}")
         for name, line in every.lines.items()

@@ -22,6 +22,7 @@ from hybrid.view.style import BODY, INK, earlier_grey, prefix, short
 LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31", "#000000", "#7F7F7F")
 MOST_NAMED = 12  # lines in a legend: more would hide the picture
 AT_REST = 1e-6  # of the longest line: steps are solved to no less, and a motion below it is round-off
+NAME_ROOM = 0.13  # of the range of a panel, for a name in its legend
 _EARLIER = 4  # shapes of the motion behind the last one
 
 
@@ -153,25 +154,73 @@ def motions(result: Result, every: AllLines) -> list[Panel]:
 
     Of less than AT_REST of the longest line it is drawn flat: it is below what a step is solved to.
     """
+    return [panel for _, panel in _shifts(result, every)]
+
+
+def rotations(result: Result, every: AllLines) -> list[Panel]:
+    """How bodies turn from their first attitude: one panel for each of roll, pitch and yaw that moves a fairlead.
+
+    Of less than AT_REST of the longest line, at the fairlead that is farthest from the origin, there is none.
+    """
+    return [panel for _, panel in _turns(result, every)]
+
+
+def _shifts(result: Result, every: AllLines) -> list[tuple[float, Panel]]:
+    """Panels of `motions`, and the largest motion in each, m."""
     named = {f"body {name}": result[f"bodies/{name}/position"] for name in bodies_of(result)}
     held = fairleads_of(result)
     named |= {f"point {x}": result[f"points/{x}/position"] for x in points_of(result) if x not in held}
     moved = {name: at[: every.outputs] - at[0] for name, at in named.items() if np.ptp(at, axis=0).max() > 0.0}
-    panels, least = [], AT_REST * max(float(np.ptp(line.s)) for line in every.lines.values())
+    panels, least = [], _least(every)
     for k, axis in enumerate("xyz"):
         peak = max((float(np.abs(x[:, k]).max()) for x in moved.values()), default=0.0)
         if peak > 0.0 and every.outputs > 1:
             rests = peak < least
             factor, unit = prefix("m", max(peak, least))
-            lines = zip(list(moved.items())[:MOST_NAMED], cycle(LINE_COLOURS), strict=False)
-            items: list[Item] = [Line(every.times, x[:, k] * factor, name, c) for (name, x), c in lines]
             bound = least * factor
             y = Axis(axis, unit, -bound, bound) if rests else Axis(axis, unit, peak=peak * factor)
             title = f"motion along {axis}, from the first place"
             if rests:
                 title = f"motion along {axis}: at rest, to {short(bound, 2)} {unit}"
-            panels.append(Panel(f"motion-{axis}", title, Axis("t", "s"), y, items, legend=True, cursor=True))
+            curves = {name: x[:, k] * factor for name, x in moved.items()}
+            panels.append((peak, _over_time(f"motion-{axis}", title, y, every, curves)))
     return panels
+
+
+def _turns(result: Result, every: AllLines) -> list[tuple[float, Panel]]:
+    """Panels of `rotations`, and the largest way of a fairlead by each of them, m."""
+    arms, turned = {}, {}
+    for name in bodies_of(result):
+        arms[f"body {name}"] = float(np.ptp(arms_of(result, name, np.zeros(1, int))[0], axis=0).max())
+        angles = result[f"bodies/{name}/rotation"][: every.outputs]
+        turned[f"body {name}"] = angles - angles[0]
+    panels = []
+    for k, angle in enumerate(("roll", "pitch", "yaw")):
+        curves = {name: x[:, k] for name, x in turned.items()}
+        peak = max((float(np.abs(x).max()) for x in curves.values()), default=0.0)
+        way = max((arms[name] * float(np.radians(np.abs(x).max())) for name, x in curves.items()), default=0.0)
+        if way > _least(every) and every.outputs > 1:
+            title = f"{angle}, from the first attitude"
+            panels.append((way, _over_time(f"rotation-{angle}", title, Axis(angle, "deg", peak=peak), every, curves)))
+    return panels
+
+
+def _least(every: AllLines) -> float:
+    """Motion, m, below which there is only round-off."""
+    return AT_REST * max(float(np.ptp(line.s)) for line in every.lines.values())
+
+
+def _over_time(key: str, title: str, y: Axis, every: AllLines, curves: dict[str, np.ndarray]) -> Panel:
+    """Curves by name over time; room is left above them for their names."""
+    items: list[Item] = [
+        Line(every.times, x, name, c)
+        for (name, x), c in zip(list(curves.items())[:MOST_NAMED], cycle(LINE_COLOURS), strict=False)
+    ]
+    if y.low is None:
+        low, high = min(float(x.min()) for x in curves.values()), max(float(x.max()) for x in curves.values())
+        room = (0.14 + NAME_ROOM * min(len(items), 5)) * (high - low)
+        y = y._replace(low=low - 0.1 * (high - low), high=high + room)
+    return Panel(key, title, Axis("t", "s"), y, items, legend=True, cursor=True)
 
 
 # ---- pages ----------------------------------------------------------------------------------------
@@ -195,8 +244,8 @@ def page(result: Result) -> Page:
     panels["p"] = tensions(result, every)
     if every.outputs > 1:
         panels["h"] = largest_tensions(result, every)
-        moved = sorted(motions(result, every), key=lambda panel: -(panel.y.peak or 0.0))
-        panels |= dict(zip("mn", moved, strict=False))
+        moved = sorted([*_shifts(result, every), *_turns(result, every)], key=lambda x: -x[0])
+        panels |= dict(zip("mn", [panel for _, panel in moved], strict=False))
     if (bent := moments(result, every)) is not None:
         panels["b"] = bent
     below = [name for name in "pbhmn" if name in panels][:4]

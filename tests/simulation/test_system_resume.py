@@ -133,6 +133,23 @@ def test_a_stopped_run_goes_on_bit_for_bit(name: str, tmp_path: Path, stopping: 
     assert {x.suffix for x in tmp_path.iterdir()} == {".h5"}, "something is left behind"
 
 
+def test_rotations_go_on_beyond_half_a_turn(tmp_path: Path) -> None:
+    """The yaw of a body that is turned, through 180 deg and across a resume, is that of its motion."""
+    turns = {"yaw": {"amplitude": 20.0, "period": 2.0}, "ramp": 1.0}
+    scene = {
+        "environment": SEA,
+        "points": {"foot": {"position": [0, 0, -30]}, "lug": {"body": "ship", "place": [0.1, 0, -1]}},
+        "bodies": {"ship": {"position": [1, 0, 0], "rotation": [0, 0, 180], "motion": turns}},
+        "lines": {"leg": {"start": "foot", "end": "lug", "sections": [LEG | {"length": 32}], "mesh": {"cells": 6}}},
+        "time": {"duration": 1.3, "step": 0.1}, "output": {"every": 0.1},
+    }  # fmt: skip
+    path = tmp_path / "run.h5"
+    hybrid.run(scene, path).close()
+    with hybrid.resume(path, until=4.0) as result:
+        yaw = result["bodies/ship/rotation"][:, 2]
+    assert yaw.min() < 165.0 and yaw.max() > 195.0 and np.abs(np.diff(yaw)).max() < 10.0
+
+
 def test_a_run_goes_on_beyond_its_end_as_if_it_had_been_that_long(tmp_path: Path) -> None:
     every = {"output": {"every": 0.2}}
     hybrid.run(mooring(**every), tmp_path / "long.h5").close()

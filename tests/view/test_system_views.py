@@ -22,7 +22,7 @@ from hybrid.store.records import Zone
 from hybrid.view.animation import animate
 from hybrid.view.figure import Line, Marks
 from hybrid.view.system_report import _extreme_text, html
-from hybrid.view.system_views import AllLines, arms_of, motions, page, points_of
+from hybrid.view.system_views import AllLines, arms_of, motions, page, points_of, rotations
 
 SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
 PLACES = {"east": (100, 0), "north": (-50, 87), "south": (-50, -87)}
@@ -89,6 +89,23 @@ def test_motion_below_what_is_resolved_is_drawn_flat(result: hybrid.Result, part
     (low, high), drawn = panel.limits()[1], next(x.y for x in panel.items if isinstance(x, Line))
     assert ("at rest, to 0.12 mm" in panel.title) == (part < 1e-6)
     assert (np.ptp(drawn) < 1e-3 * (high - low)) == (part < 1e-6)
+
+
+def test_a_body_that_only_yaws_is_shown_to_yaw(result: hybrid.Result) -> None:
+    """Its panel comes before a motion of millimetres, and its name stands above the curve."""
+    every = AllLines(result)
+    still = {
+        f"points/{n}/position": np.tile(result[f"points/{n}/position"][0], (every.outputs, 1))
+        for n in points_of(result)
+    }
+    wave = np.sin(np.arange(every.outputs))[:, None]
+    seen: Any = Moved(result, still | {
+        "bodies/spar/position": 3e-3 * wave * [0.0, 0.0, 1.0], "bodies/spar/rotation": [0, 0, 180] + 10.0 * wave * [0, 0, 1],
+    })  # fmt: skip
+    (panel,) = rotations(seen, every)
+    assert panel.key == "rotation-yaw" and page(seen).panels["m"].title == panel.title
+    drawn = next(x.y for x in panel.items if isinstance(x, Line))
+    assert np.ptp(drawn) > 19.0 and panel.limits()[1][1] > drawn.max() + 0.2 * np.ptp(drawn)
 
 
 class Moved:
