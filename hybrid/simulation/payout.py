@@ -49,6 +49,9 @@ class PayingOut:
         self.law, self.winch = self.plan.law.copy(), self.plan.winch.copy()
         self.count = self.plan.count(self.plan.first)  # material nodes that are out
         self.reel = self._blank(self.count)
+        # Rate, m/s, by which the rods of zones that move have been given at the winch: at the start, or by the last
+        # node that has entered or left.
+        self.foreseen = fastest(self.law)
         self._rod: np.ndarray | None = None  # (N,) of a line whose zones move
         self.table, self._fitting, self._clock = Table(blank_reel_job()), Table(blank_reel_job()), np.zeros(CLOCK_SIZE)
         self._carrying = Table(blank_carry_job())
@@ -263,13 +266,13 @@ class PayingOut:
         """What the next steps depend on."""
         kept = {name: getattr(self.reel, name).copy() for name in KEPT}
         rods = {} if self._rod is None else {"rod": self._rod.copy()}
-        return {"count": self.count, "law": self.law.copy(), **kept, **rods}
+        return {"count": self.count, "law": self.law.copy(), "foreseen": self.foreseen, **kept, **rods}
 
     def restore(self, tree: Any, model: Model) -> Model:
         """Go on as `checkpoint` has written: the model as it was then.  ValueError: it is that of another line."""
         template = {"count": 0, "law": np.zeros((0, 8))}
         given = dict(tree)
-        rod = given.pop("rod", None)
+        rod, foreseen = given.pop("rod", None), given.pop("foreseen", None)
         saved = matched({name: given.pop(name) for name in template}, template, "payout")
         count, law = saved["count"], saved["law"]
         if not (law.ndim == 2 and law.shape[1] == 8 and len(law) and (np.diff(law[:, 0]) >= 0.0).all()):
@@ -281,6 +284,8 @@ class PayingOut:
         ):
             raise ValueError(f"{count} nodes, of a line that has {self.plan.nodes.size} at most")
         self.count, self.law = count, law
+        # A file of an earlier version has none.
+        self.foreseen = matched(foreseen, 0.0, "payout/foreseen") if foreseen is not None else self.fastest
         self.reel = self._blank(count)
         numbers = np.asarray(given.get("numbers", np.zeros(0)))
         if numbers.shape in ((p.SIDE,), (p.SPRING,), (p.CHANGED,)):  # of a file of an earlier version

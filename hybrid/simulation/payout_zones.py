@@ -69,6 +69,7 @@ class PaidZones:
         """A node has entered or left: `model` has the cells of now; source: (N,) which old cells they were."""
         switching, zones = self.switching, self.switching.zones
         lengths, line = zones.lengths[source], model.line
+        self.paying.foreseen = self.paying.fastest
         self._change_base(model, source)
         kept = ~self.paying.changing
         line.h[kept] = lengths[kept]
@@ -85,7 +86,7 @@ class PaidZones:
     def _change_base(self, model: Model, source: np.ndarray) -> None:
         assert model.layout is not None and model.on_base is not None
         paying, manager = self.paying, self.manager
-        given = rods_at_winch(self.scene, paying.plan, model, paying.count, manager.pace, paying.fastest)
+        given = rods_at_winch(self.scene, paying.plan, model, paying.count, manager.pace, paying.foreseen)
         manager.cable = paying.plan.held_as(model.cable)
         change_base(manager, model.layout, source, given, model.on_base)
         self.switching.take_cells(model)
