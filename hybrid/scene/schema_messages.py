@@ -192,6 +192,11 @@ def _entry(annotation: Any, marks: tuple[Any, ...]) -> str:
 def _number_for_more(key: str, value: float, spot: Spot) -> str:
     """One number where a vector or a table is expected: how it would be written there."""
     marks = [mark for _, found in arms(spot.annotation, spot.metadata) for mark in found]
+    if not key:  # an entry of a list
+        for words in (mark.text for mark in marks if isinstance(mark, Words)):
+            shape = "[x, y]" if words == "two numbers" else "[x, y, z]" if words.startswith("three numbers") else ""
+            if shape:
+                return f"write each entry as a list of its own, `[{shape}]` where there is one"
     if key and any(isinstance(mark, Words) and mark.text.startswith("three numbers") for mark in marks):
         return f"write `{key}: [0, 0, {value}]`" if key in ("force", "value") else f"write `{key}: [{value}, 0, 0]`"
     if key and any(isinstance(mark, Words) and mark.text == "two numbers" for mark in marks):
@@ -252,7 +257,7 @@ def _usual_fix(key: str, words: str, spot: Spot) -> str:
     if any(get_origin(a) is Literal for a, _ in found) or words.startswith("one of"):
         return f"write one of these{without}"
     if shape != "...":
-        return f"write `{key}: {shape}`{without}"
+        return f"write `{key}: {shape}`{without}" if key else f"write `{shape}`"
     if tables(spot.annotation) and key:
         return f"write `{key}: {words.removeprefix('a table ')}`{without}"
     if any(a is float or a is int for a, _ in found):

@@ -233,7 +233,7 @@ def shares(result: Result) -> str:
     part = 100.0 * rod_share(result)
     low, high = float(part.min()), float(part.max())
     changes = sum(a != b for a, b in pairwise(result.zones))
-    if not changes:
+    if not changes or low == high == 100.0:  # of rods alone only the length changes, as it is paid out
         return (
             f"{short(low, 3)} % of the cable is rod, all the time."
             if len(result.times) > 1
