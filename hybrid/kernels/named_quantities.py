@@ -212,18 +212,16 @@ def on_bed(job, state, asked, reached, k, begins):
 
 
 @inner
-def azimuth(f, reached, begins):
-    """Azimuth of the pull, deg, within half a turn of the reference; begins: whether the state is the first of all."""
+def azimuth(f, reached):
+    """Azimuth of the pull, deg, within half a turn of the reference, which is the first one where none is given."""
     x = math.degrees(math.atan2(f[1] + 0.0, f[0]))
-    if begins and math.isnan(reached[REFERENCE]):
-        reached[REFERENCE] = x + 360.0 if x <= LEAST_AZIMUTH else x
     if math.isnan(reached[REFERENCE]):
-        return x
+        reached[REFERENCE] = x + 360.0 if x <= LEAST_AZIMUTH else x
     return x + 360.0 * math.floor((reached[REFERENCE] - x) / 360.0 + 0.5)
 
 
 @inner
-def of_pull(job, state, asked, reached, k, begins):
+def of_pull(job, state, asked, reached, k):
     """What follows from the pull at end k; angles in degrees, NaN where there is no pull."""
     kind = asked[KIND]
     f, taken = pull_at(job, state, k)
@@ -245,7 +243,7 @@ def of_pull(job, state, asked, reached, k, begins):
     if kind == DECLINATION:
         return math.degrees(math.atan2(math.hypot(f[0], f[1]), f[2]))
     if kind == AZIMUTH:
-        return azimuth(f, reached, begins)
+        return azimuth(f, reached)
     aside = cross(f, along)
     return math.degrees(math.atan2(math.sqrt(dot(aside, aside)), dot(along, f)))
 
@@ -271,7 +269,7 @@ def note_quantities(table):
         elif kind >= TOUCHDOWN:
             x = on_bed(job, state, asked, reached, k, begins)
         else:
-            x = of_pull(job, state, asked, reached, k, begins)
+            x = of_pull(job, state, asked, reached, k)
         if x < reached[SMALLEST]:
             reached[SMALLEST], reached[TIMES], reached[PLACES] = x, t, place
         if x > reached[LARGEST]:

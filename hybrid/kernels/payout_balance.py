@@ -8,11 +8,13 @@ nodes and taken off slowly (paid_length.eased), as the new cells get their lengt
 
 from __future__ import annotations
 
+from hybrid.kernels.assembly import get9
 from hybrid.kernels.cell import Chord, chord, moment_force, rotary_force, turning
 from hybrid.kernels.compile import inner
 from hybrid.kernels.element import bending
+from hybrid.kernels.extremes import moment_at
 from hybrid.kernels.forces import ROTARY
-from hybrid.kernels.node_forces import Z3, Z9, get3, node_loads
+from hybrid.kernels.node_forces import Z9, get3, node_loads
 from hybrid.kernels.paid_length import growing, node
 from hybrid.kernels.rotations import add, dot, frame, scale, sub
 
@@ -21,32 +23,19 @@ AROUND = 3
 
 
 @inner
-def frame_of(ends, k):
-    f = ends.frame
-    return (f[k, 0], f[k, 1], f[k, 2], f[k, 3], f[k, 4], f[k, 5], f[k, 6], f[k, 7], f[k, 8])
-
-
-@inner
-def frame_beside(line, ends, state, j, c):
-    """The frame of cell c beside node j; that of the end beyond an end."""
-    if c < 0 or c >= line.h.shape[0]:
-        return frame_of(ends, 0 if c < 0 else 1)
-    d, _, _ = chord(get3(state.e, c))
-    return frame(get3(state.a1, c), d)
-
-
-@inner
-def moment_at(line, ends, state, j):
+def moment_of(line, ends, state, j):
     """Moment at node j: of its element, or what acts on an end."""
     n = line.h.shape[0]
-    M = Z3
-    if line.element[j]:
-        before, after = frame_beside(line, ends, state, j, j - 1), frame_beside(line, ends, state, j, j)
-        M, _ = bending(before, after, get3(line.kb, j), get3(line.k0, j))
-    elif j == 0:
-        M = scale(-1.0, get3(ends.moment, 0))
-    elif j == n:
-        M = get3(ends.moment, 1)
+    if 0 < j < n:
+        return moment_at(line, state, j)
+    k = 0 if j == 0 else 1
+    if not line.element[j]:
+        return scale(2.0 * k - 1.0, get3(ends.moment, k))
+    c = 0 if j == 0 else n - 1
+    d, _, _ = chord(get3(state.e, c))
+    held, beside = get9(ends.frame, k), frame(get3(state.a1, c), d)
+    before, after = (held, beside) if j == 0 else (beside, held)
+    M, _ = bending(before, after, get3(line.kb, j), get3(line.k0, j))
     return M
 
 
@@ -56,7 +45,7 @@ def force_in(line, ends, state, c):
     d, _, il = chord(get3(state.e, c))
     f = scale(state.T[c], d)
     if line.element[c] or line.element[c + 1]:
-        Q = sub(moment_at(line, ends, state, c + 1), moment_at(line, ends, state, c))
+        Q = sub(moment_of(line, ends, state, c + 1), moment_of(line, ends, state, c))
         if line.bits & ROTARY:
             e1 = sub(get3(state.v, c + 1), get3(state.v, c))
             e2 = sub(get3(state.vd, c + 1), get3(state.vd, c))

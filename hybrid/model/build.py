@@ -15,18 +15,16 @@ import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.forces import FRICTION, SEABED
-from hybrid.kernels.state import Floats, Line, State, state_for
+from hybrid.kernels.state import Floats, Line, State
 from hybrid.model.catenary_guess import Hanging
 from hybrid.model.contents import Entry, contents_of, followed
 from hybrid.model.ends import EndConditions
+from hybrid.model.first_state import first_state, other_state
 from hybrid.model.initial_shape import (
     corners,
-    ends_and_frames,
     from_joint,
     hung,
-    initial_nodes,
     spare_shapes,
-    twist_by_tension,
 )
 from hybrid.model.layout import Layout, of_rods
 from hybrid.model.line import line_on, spins_freely
@@ -46,19 +44,15 @@ from hybrid.scene.schema import (
     AdaptiveModel,
     CorrectedModel,
     CorrectedZone,
-    Equilibrium,
-    Points,
     RodModel,
     RodZone,
     Scene,
-    Straight,
     ZonesModel,
 )
 
 # A catenary cell counts as slack when its tension is not above this part of the tension
 # scale: a line that starts in free fall has no tension at all, but for what Newton leaves.
 SLACK_FLOOR = -1e-6
-SHARPEST_START = np.radians(150.0)
 
 
 @dataclass(frozen=True)
@@ -131,9 +125,6 @@ class Model:
         return 3 * (self.cells + 1) + self.cells + int(self.line.spin.sum())
 
 
-HUNG = "an elastic catenary under all loads"  # a first shape that has the tensions of an equilibrium, but for bending
-
-
 def zone_plans(scene: Scene) -> tuple[ZonePlan, ...]:
     """The zones a scene's model stands for, in order."""
     model = scene.model
@@ -190,9 +181,9 @@ def build(
     line = line_on(cable, s, rod, touch, sections_turn=not moves or spins_freely(cable), comes_and_goes=moves)
 
     shape = hung(scene, line, sea.values) if like is None else Hanging(like.start.r, like.start.T)
-    start, shape_name, ends = _first_state(scene, line, cable, sea, scale, shape)
+    start, shape_name, ends = first_state(scene, line, cable, sea, scale, shape)
     others = [
-        (name, _spare_start(scene, r, line, cable, scale, sea))
+        (name, other_state(scene, r, line, cable, scale, sea))
         for name, r in (spare_shapes(scene, s) if shape is not None else from_joint(scene, s))
         if spare and like is None
     ]
@@ -214,39 +205,6 @@ def build(
     )  # fmt: skip
 
 
-def first_state(scene: Scene, model: Model) -> State:
-    """The first shape of a line whose model has been made, between ends that are elsewhere in `scene`."""
-    line, sea = model.line, model.sea
-    return _first_state(scene, line, model.cable, sea, model.tension_scale, hung(scene, line, sea.values))[0]
-
-
-def _first_state(
-    scene: Scene, line: Line, cable: Material, sea: Surroundings, scale: float, shape: Hanging | None
-) -> tuple[State, str, EndConditions]:
-    """The state that a computation begins with, the name of its shape, and the ends; scale: N, its tensions where
-
-    nothing is known of them; shape: an elastic catenary, None: the first nodes of the scene.
-    """
-    start = state_for(line)
-    if shape is not None:
-        shape_name = HUNG
-        start.r[:], start.T[:] = shape
-    else:
-        start.r[:], shape_name = initial_nodes(scene, line.s)
-        start.T[:] = scale
-    start.e[:] = np.diff(start.r, axis=0)
-    if isinstance(scene.initial, Points):
-        _exact_lengths(start, line.h, line.ck == 0.0, scene)
-        _refuse_folds(start.e, line.s, line.spin == 1)
-    if isinstance(scene.initial, Straight):  # exact chords: no round-off of the positions in the strain
-        start.e[:] = line.h[:, None] * np.array(scene.initial.direction) / np.linalg.norm(scene.initial.direction)
-        start.v[:] = scene.initial.velocity or (0.0, 0.0, 0.0)
-    ends, start.a1[:], start.turn[:, 0] = ends_and_frames(scene, start.e, line, sea)
-    if isinstance(scene.initial, Equilibrium):  # what is not at rest begins without tension
-        twist_by_tension(line, cable, start)
-    return start, shape_name, ends
-
-
 def _nodes(
     scene: Scene, cable: Material, resolution: Resolution, mesh: Layout | tuple[Floats, tuple[Zone, ...]] | None
 ) -> tuple[Layout | None, Floats, tuple[Zone, ...]]:
@@ -262,17 +220,6 @@ def _nodes(
         layout = _layout(scene, cable, sorted({*cuts, *edges}), resolution)
         return layout, layout.nodes, layout.zones
     return None, *_placed(scene, cable, zone_plans(scene), cuts, resolution, DEFAULT_CELLS)
-
-
-def _spare_start(scene: Scene, r: Floats, line: Line, cable: Material, scale: float, sea: Surroundings) -> State:
-    """Another shape to find the equilibrium from: nodes r (N+1, 3) m, tensions of the scale (N)."""
-    spare = state_for(line)
-    spare.r[:], spare.T[:] = r, scale
-    spare.e[:] = np.diff(r, axis=0)
-    _, spare.a1[:], spare.turn[:, 0] = ends_and_frames(scene, spare.e, line, sea)
-    if isinstance(scene.initial, Equilibrium):
-        twist_by_tension(line, cable, spare)
-    return spare
 
 
 # Base cells of a line whose zones move, when the scene does not say; rod cells as a part of (EI/w)^(1/3), the length
@@ -411,33 +358,6 @@ def rod_cells(scene: Scene, cable: Material, s: Floats, grading: Grading | None 
         return np.asarray(ROD_CELL * bend)
     cell = np.minimum(grading.cell(s), GRADED_ROD_CELL * bend)
     return np.asarray(cell if grading.rods is None else np.minimum(cell, np.interp(s, grading.s, grading.rods)))
-
-
-def _exact_lengths(start: State, h: Floats, stiff: np.ndarray, scene: Scene) -> None:
-    """Give inextensible cells exactly their length: points carry round-off, which would be an impact at the first step.
-
-    The gap this leaves at a held end is closed by small shifts of all chords, until both are met.
-    """
-    to = scene.ends.end.held_position if scene.ends.start.held_position else None
-    for _ in range(50 if to else 1):
-        if to:
-            gap = np.array(to, float) - start.r[0] - start.e.sum(axis=0)
-            start.e[:] += gap * (h / h.sum())[:, None]
-        lengths = np.linalg.norm(start.e, axis=1)
-        start.e[stiff] *= (h / lengths)[stiff, None]
-    start.r[1:] = start.r[0] + np.cumsum(start.e, axis=0)
-
-
-def _refuse_folds(chords: Floats, s: Floats, rod: np.ndarray) -> None:
-    """A rod cannot start folded back onto itself: its bend has no direction there."""
-    d = chords / np.linalg.norm(chords, axis=1)[:, None]
-    cosine = np.einsum("ij,ij->i", d[:-1], d[1:])
-    folded = np.flatnonzero((cosine < np.cos(SHARPEST_START)) & rod[:-1] & rod[1:])
-    if folded.size:
-        angle = np.degrees(np.arccos(cosine[folded[0]]))
-        given = f"a corner of {angle:.0f} deg at s = {s[folded[0] + 1]:g} m in a rod zone"
-        fix = "round it with a few points, or make the zone a catenary"
-        raise SceneError([Complaint("initial.points", given, "corners below 150 deg, because a rod bends", fix)])
 
 
 def _refuse_single_rod_cells(zones: Sequence[Zone], zone_of: np.ndarray) -> None:

@@ -1,15 +1,13 @@
-"""A line that is paid out: how long it is when, the nodes that it may have, and its arrays for any length."""
+"""A line that is paid out: the nodes that it may have, and its arrays for any length."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.errors import Complaint, SceneError
 from hybrid.kernels import winch as w
 from hybrid.kernels.payout_nodes import LEAVES
 from hybrid.kernels.reel import PER_LENGTH
@@ -19,6 +17,7 @@ from hybrid.model.line import line_on
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import Zone
+from hybrid.model.payout_law import extremes, law_of, least_length, length_at, refuse
 from hybrid.scene.payout import Payout
 from hybrid.scene.schema import AdaptiveModel, Modules, Scene, Section
 
@@ -111,7 +110,7 @@ class PayoutPlan:
         lengths = np.array([length_at(self.law, x)[:2] for x in t])
         counts = np.searchsorted(self.nodes, lengths[:, 0])
         last, rate = float(lengths[-1, 0]), float(np.abs(lengths[:, 1]).max())
-        low, high = _extremes(self.law, self.first, duration)
+        low, high = extremes(self.law, self.first, duration)
         return PayoutForecast("", self.first, last, low, high, rate, self.cells(high), float(counts.mean()))
 
     def along(self, places: Floats) -> Floats:
@@ -188,10 +187,10 @@ def payout_plan(scene: Scene, line: Line, zones: tuple[Zone, ...]) -> PayoutPlan
     length, duration = scene.length, scene.time.duration if scene.time is not None else 0.0
     side, where = winch_side(scene), winch_at(scene)
     law = law_of(payout, length, duration, where)
-    low, high = _extremes(law, length, duration)
+    low, high = extremes(law, length, duration)
     longest = max(high, payout.longest or 0.0)
     if payout.longest is not None and high > payout.longest:
-        _refuse(f"{where}.longest", f"{payout.longest:g}", f"at least {high:.6g} m, which is paid out", "leave it out")
+        refuse(f"{where}.longest", f"{payout.longest:g}", f"at least {high:.6g} m, which is paid out", "leave it out")
     sections = _from_far_end(scene, longest)
     s = line.s if side else length - line.s[::-1]
     joint = max((zone.s_a if side else length - zone.s_b for zone in zones), default=0.0)
@@ -201,21 +200,21 @@ def payout_plan(scene: Scene, line: Line, zones: tuple[Zone, ...]) -> PayoutPlan
     changes = [x for x in np.cumsum([x.length for x in out]).tolist() if x < length * (1 - 1e-9)]
     fixed = max([joint, *points, *changes, _catenary_up_to(scene)])
     near = int(np.searchsorted(s, fixed * (1 + 1e-12)))
-    least = -np.inf if payout.from_outside or payout.winch is not None else _least(law, length)
+    least = -np.inf if payout.from_outside or payout.winch is not None else least_length(law, length)
     ride = riding_nodes(scene, line, s, least - s[min(near + FEWEST_CELLS, s.size - 1)])
     fewest = FEWEST_CELLS + ride
     if near + fewest >= s.size:
         place = fixed if side else length - fixed
         what = "last" if side else "first"
         expected = f"{fewest} cells between the {what} joint, load or change of section, s = {place:g} m, and the winch"
-        _refuse(where, "payout", expected, "more cells, or a longer cable")
+        refuse(where, "payout", expected, "more cells, or a longer cable")
     layer = s[-1] - s[s.size - 1 - ride :]
     shortest = float(s[near + FEWEST_CELLS - 1] + layer[0])
     if low < shortest:
         given, fix = f"a length of {low:.6g} m", "take less in, or take more cells"
         left = f"{fewest} cells must be left behind the {'last' if side else 'first'} joint, load or change of section"
         expected = f"at least {shortest:.6g} m: {left}"
-        _refuse(where, given, expected, fix)
+        refuse(where, given, expected, fix)
     h = float(s[-1 - ride] - s[-2 - ride])
     nodes: list[float] = s[: s.size - ride].tolist()
     for end in np.cumsum([x.length for x in sections[:-1]]).tolist():
@@ -224,7 +223,7 @@ def payout_plan(scene: Scene, line: Line, zones: tuple[Zone, ...]) -> PayoutPlan
     while nodes[-3 - ride] < longest:
         nodes.append(nodes[-1] + h)
     if any(x.intrinsic_curvature and any(x.intrinsic_curvature) for x in sections) and line.spin[-side]:
-        _refuse(where, "intrinsic_curvature", "straight sections, because a rod is paid out", "take a catenary there")
+        refuse(where, "intrinsic_curvature", "straight sections, because a rod is paid out", "take a catenary there")
     winch = winch_of(payout, length)
     winch[w.LEAST], winch[w.MOST] = shortest, longest
     cable, far = _whole_material(scene), 0.0 if side else length
@@ -267,10 +266,6 @@ def winch_of(payout: Payout, length: float) -> Floats:
     return out
 
 
-def _refuse(where: str, given: str, expected: str, fix: str) -> NoReturn:
-    raise SceneError([Complaint(where, given, expected, fix)])
-
-
 def _from_far_end(scene: Scene, longest: float) -> list[Section]:
     """The sections that are out and those on the reel, from the far end on."""
     payout, out, more = payout_of(scene), list(scene.cable.sections), longest - scene.length
@@ -281,7 +276,7 @@ def _from_far_end(scene: Scene, longest: float) -> list[Section]:
         if held < more * (1 - 1e-9):
             fix = "a longer last section"
             where = f"{winch_at(scene)}.reel"
-            _refuse(where, f"{held:.6g} m", f"at least {more:.6g} m, which leaves the reel", fix)
+            refuse(where, f"{held:.6g} m", f"at least {more:.6g} m, which leaves the reel", fix)
         return [*out, *payout.reel, payout.reel[-1].model_copy(update={"length": scene.length})]
     return [*out, out[-1].model_copy(update={"length": more + scene.length})]
 
@@ -292,7 +287,7 @@ def longest_out(scene: Scene) -> float:
     if payout is None or scene.time is None:
         return scene.length
     law = law_of(payout, scene.length, scene.time.duration, winch_at(scene))
-    high = _extremes(law, scene.length, scene.time.duration)[1]
+    high = extremes(law, scene.length, scene.time.duration)[1]
     return max(high, payout.longest or 0.0)
 
 
@@ -336,131 +331,3 @@ def _pieces(cable: Material, side: int, far: float) -> Floats:
 
 
 # --- the law of length ----------------------------------------------------------------------------
-
-
-def _rows(rows: list[tuple[float, list[float]]]) -> Floats:
-    """(K, 8) rows from times and coefficients, highest power first, of any number."""
-    out = np.zeros((len(rows), 8))
-    for k, (t, c) in enumerate(rows):
-        out[k, 0] = t
-        out[k, 8 - len(c) :] = c
-    return out
-
-
-def law_of(payout: Payout, length: float, duration: float, where: str = "payout") -> Floats:
-    """The length, m, that is out over time, as polynomials: (K, 8) as of kernels.payout.Reel.
-
-    length: m, at t = 0; duration: s, of the motion; where: the key in the scene, for messages.
-    """
-    if payout.rate is not None:
-        return _law_of_rate(payout, length)
-    if payout.file is not None:
-        payout = payout.model_copy(update=_rows_of(payout.file, where))
-    if payout.rates is not None:
-        return _law_of_rates(np.array(payout.rates, float), length, duration)
-    if payout.lengths is not None:
-        return _law_of_lengths(np.array(payout.lengths, float), length, where)
-    return _rows([(0.0, [length])])
-
-
-def _rows_of(path: str, where: str) -> dict[str, Floats]:
-    """Rates or lengths over time of a file, by their key in the scene."""
-    from hybrid.scene.motion_file import RecordRefused, check_file, read_table
-
-    name = Path(path).name
-
-    def checked(_: str, header: list[str]) -> list[str]:
-        if sorted(header) not in (["rate", "t"], ["length", "t"]):
-            given = f"{name} with columns {', '.join(header)[:60]}"
-            raise RecordRefused("columns t,rate or t,length", "name the columns in the first line of the file", given)
-        return header
-
-    try:
-        check_file(path)
-        header, table, lines = read_table(path, checked)
-    except RecordRefused as refused:
-        found = refused.finding
-        _refuse(f"{where}.file", found.given or name, found.expected, found.fix)
-    key, rows = ("rates", 2) if "rate" in header else ("lengths", 3)
-    t, x = table[:, header.index("t")], table[:, 1 - header.index("t")]
-    if len(t) < rows:
-        _refuse(f"{where}.file", f"{name}, {len(t)} rows", f"at least {rows} rows", "sample more finely")
-    for k in np.flatnonzero(np.diff(t) <= 0.0)[:1]:
-        given = f"{name}, line {lines[k + 1]}: t = {t[k + 1]:.9g} after t = {t[k]:.9g}"
-        _refuse(f"{where}.file", given, "times that increase strictly", "sort the rows and drop duplicates")
-    if t[0] != 0.0 or (key == "rates" and x[0] != 0.0):
-        expected = "a first row at t = 0" + (" with rate 0, because the line is at rest" if key == "rates" else "")
-        _refuse(f"{where}.file", f"{name}, line {lines[0]}: t = {t[0]:.9g}, {x[0]:.9g}", expected, "add that row")
-    return {key: np.column_stack([t, x])}
-
-
-def _law_of_rate(payout: Payout, length: float) -> Floats:
-    """A rate that grows with the ramp, and ends with it."""
-    rate, T, begin = payout.rate or 0.0, payout.ramp or 1.0, payout.begin
-    grows = [rate / T**5, -3.0 * rate / T**4, 2.5 * rate / T**3, 0.0, 0.0, 0.0]
-    rows = [(0.0, [length]), (begin, [*grows, length]), (begin + T, [rate, length + 0.5 * rate * T])]
-    if payout.until is not None:
-        out = length + rate * (payout.until - begin - 0.5 * T)
-        ends = [-x for x in grows[:-1]]
-        rows.append((payout.until, [*ends, rate, out]))
-        rows.append((payout.until + T, [out + 0.5 * rate * T]))
-    return _rows(rows)
-
-
-def _law_of_rates(table: Floats, length: float, duration: float) -> Floats:
-    """Rates at times, a cubic spline between them; beyond the last it is constant."""
-    from scipy.interpolate import CubicSpline  # slow to import
-
-    t, c = table.T
-    spline = CubicSpline(t, c, bc_type=("natural", (1, 0.0) if t[-1] < duration else "natural"))
-    way = spline.antiderivative()
-    rows = [(float(x), [*a[:-1].tolist(), float(a[-1]) + length]) for x, a in zip(way.x, way.c.T, strict=False)]
-    return _rows([*rows, (float(t[-1]), [float(c[-1]), float(way(t[-1])) + length])])
-
-
-def _law_of_lengths(table: Floats, length: float, where: str) -> Floats:
-    """Lengths at times, a spline of fifth degree between them, which begins and ends without rate and acceleration."""
-    from scipy.interpolate import PPoly, make_interp_spline
-
-    t, out = table.T
-    if abs(out[0] - length) > 1e-9 * length:
-        given, expected = f"{out[0]:.9g} m at t = 0", f"{length:.9g} m, the length of the cable"
-        _refuse(f"{where}.lengths", given, expected, "the same length")
-    rest = [(1, 0.0), (2, 0.0)]
-    spline = PPoly.from_spline(make_interp_spline(t, out, k=5, bc_type=(rest, rest)))
-    pieces = [(float(x), a.tolist()) for x, y, a in zip(spline.x[:-1], spline.x[1:], spline.c.T, strict=True) if y > x]
-    return _rows([*pieces, (float(t[-1]), [float(out[-1])])])
-
-
-def length_at(law: Floats, t: float) -> tuple[float, float, float]:
-    """Length (m) that is out at t (s), its rate (m/s) and the rate of that (m/s2), just before t where it jumps."""
-    row = law[max(int(np.searchsorted(law[:, 0], t)) - 1, 0)].tolist()
-    x, value, rate, twice = max(t - row[0], 0.0), 0.0, 0.0, 0.0
-    for c in row[1:]:
-        twice = twice * x + 2.0 * rate
-        rate = rate * x + value
-        value = value * x + c
-    return value, rate, twice
-
-
-def fastest(law: Floats) -> float:
-    """Largest size of the rate, m/s, that a law of length has."""
-    last = float(law[-1, 0])
-    t = np.unique(np.concatenate([np.linspace(0.0, last + 1.0, 501), law[:, 0], law[:, 0] + 1e-9 * (last + 1.0)]))
-    return max(abs(length_at(law, x)[1]) for x in t.tolist())
-
-
-def _least(law: Floats, length: float) -> float:
-    """Shortest length, m, at any time, also beyond the end of a run, so that a resumed run has the same nodes."""
-    last = float(law[-1, 0])
-    return -np.inf if law[-1, 1:7].min() < 0.0 else _extremes(law, length, last)[0]
-
-
-def _extremes(law: Floats, length: float, duration: float) -> tuple[float, float]:
-    """Shortest and longest length, m, up to a time, s."""
-    t = np.unique(np.concatenate([np.linspace(0.0, duration, 2001), law[(law[:, 0] <= duration), 0]]))
-    rows = law[np.maximum(np.searchsorted(law[:, 0], t) - 1, 0)]
-    x, found = np.maximum(t - rows[:, 0], 0.0), np.zeros(t.size)
-    for j in range(1, law.shape[1]):
-        found = found * x + rows[:, j]
-    return float(min(found.min(), length)), float(max(found.max(), length))

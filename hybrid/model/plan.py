@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, NamedTuple, overload
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.model.build import HUNG, Model, build
+from hybrid.model.build import Model, build
 from hybrid.model.contents import Entry
+from hybrid.model.first_state import HUNG
 from hybrid.model.initial_shape import hung
 from hybrid.model.material import material
 from hybrid.model.mesh import Zone

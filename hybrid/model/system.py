@@ -13,7 +13,7 @@ from hybrid.kernels.carried_frames import SEAT, TURNS, WITH_BODY, WITH_POINT
 from hybrid.kernels.members import PIECE
 from hybrid.kernels.state import Floats, State
 from hybrid.model.bodies import BodyModel, FairleadMotion, KnownMotion, body_model, frame_of
-from hybrid.model.build import Model, build, first_state
+from hybrid.model.build import Model, build
 from hybrid.model.catenary_guess import pulls
 from hybrid.model.clamps import (
     axes_of_point,
@@ -23,7 +23,8 @@ from hybrid.model.clamps import (
     untwisted,
     with_clamps,
 )
-from hybrid.model.initial_shape import dead_loads
+from hybrid.model.first_state import first_state
+from hybrid.model.initial_shape import dead_loads, hung
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
@@ -267,7 +268,9 @@ class _Lines:
 
     def start(self, name: str, model: Model) -> State:
         """The first shape of a line, whose model has been made, between the places of now."""
-        return first_state(self._scene(name, (), self._directions(name)), model)
+        scene, line, sea = self._scene(name, (), self._directions(name)), model.line, model.sea
+        shape = hung(scene, line, sea.values)
+        return first_state(scene, line, model.cable, sea, model.tension_scale, shape)[0]
 
     def model(self, name: str) -> Model:
         """The model of a line: its loads with the points that it carries, its first shape between held places."""

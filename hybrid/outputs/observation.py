@@ -33,10 +33,11 @@ from hybrid.kernels.report import (
 from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, Sea
 from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.outputs.local_means import means_beside, means_on_line
+from hybrid.outputs.moments import across, node_tangents, node_torques, passed_torques
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.strains import strains
 from hybrid.outputs.touchdown import Touchdown, carried, contact_pressure, penetration, sinking, touchdown
-from hybrid.outputs.vectors import cross, dot, size
+from hybrid.outputs.vectors import cross, size
 from hybrid.solve.bending_corrector import Shift
 
 
@@ -263,50 +264,19 @@ class Observation:
         return self.grid.sides @ self.node_moment[self.grid.side_nodes]
 
     @cached_property
-    def _node_tangent(self) -> Floats:
-        """(N+1, 3, nb) of what was computed: halfway between the cells; at an end that of its holder or cell."""
-        d = self._plain.d
-        t = np.concatenate([d[:1], d[1:] + d[:-1], d[-1:]])
-        for k in (0, 1):
-            cell = self.at_end(d, k)
-            held = np.asarray(self.has_element(k))
-            self.put_at_end(t, k, np.where(held, self.batch.frame[:, k, 2::3].T, cell))
-        return np.asarray(t / np.maximum(size(t), 1e-12)[:, None])
-
-    @cached_property
     def torque(self) -> Floats:
         """(ns, nb) N m, about the tangent.
 
         Found at the nodes, and interpolated: the tangent between nodes, off by the square of the cell length, would
         make a torque of the bending moment.
         """
-        torque = self._node_torque[self.grid.side_nodes]
-        return self.grid.sides @ (torque + self._passed if self.batch.turn.size else torque)
+        torque = node_torques(self._plain)[self.grid.side_nodes]
+        return self.grid.sides @ (torque + passed_torques(self) if self.batch.turn.size else torque)
 
     @cached_property
-    def _node_torque(self) -> Floats:
-        """(N+1, nb) N m: of the twist of elements; at ends of the moment there."""
-        line, nodes = self.line, slice(None)
-        strain = self.element_strains[:, 2] - self.of_line("k0", nodes)[:, 2]
-        if line.tension_twist.size:
-            by_tension = line.tension_twist[:, None] * self._plain.T
-            strain = strain + np.pad(by_tension, ((0, 1), (0, 0))) + np.pad(by_tension, ((1, 0), (0, 0)))
-        torque = np.where(line.element[:, None], self.stiffness(nodes)[:, 2] * strain, 0.0)
-        for k in (0, 1):
-            moment, tangent = (self.at_end(x, k) for x in (self._plain.node_moment, self._node_tangent))
-            self.put_at_end(torque, k, (moment * tangent).sum(axis=0))
-        return torque
-
-    @cached_property
-    def _passed(self) -> Floats:
-        """Torque (n sides, nb) N m that catenary zones pass on, on their nodes and the joints of rods beside them."""
-        out = np.zeros((len(self.grid.side_nodes), self.batch.t.size))
-        for z, (first, last) in enumerate(self.line.torsion[:, :2].astype(int)):
-            for a, b, o in self.grid.spans:
-                low, high = max(a, first), min(b, last)
-                if low <= high:
-                    out[o + low - a : o + high - a + 1] = self.batch.turn[:, z, TORQUE]
-        return out
+    def node_tangent(self) -> Floats:
+        """(N+1, 3, nb) of what was computed."""
+        return node_tangents(self) if self._corrects is None else self._corrects.node_tangent
 
     def end_moment(self, k: int) -> Floats:
         """(3, nb) N m, inertial, at end k: moment of what is after it on what is before it."""
@@ -319,7 +289,7 @@ class Observation:
     @cached_property
     def bending_moment(self) -> Floats:
         """(ns, nb) N m."""
-        return size(self.grid.sides @ self._bending(self.node_moment)[self.grid.side_nodes])
+        return size(self.grid.sides @ across(self.node_moment, self.node_tangent)[self.grid.side_nodes])
 
     @property
     def shear(self) -> Floats:
@@ -352,12 +322,8 @@ class Observation:
 
     def _square_of_moment(self, moment: Floats) -> Floats:
         """Of moments (N+1, 3, nb) N m the square of what bends (n sides, nb)."""
-        return np.asarray((self._bending(moment) ** 2).sum(axis=1)[self.grid.side_nodes])
-
-    def _bending(self, moment: Floats) -> Floats:
-        """Of moments at nodes (N+1, 3, nb) N m what is across the tangent."""
-        t = self._node_tangent
-        return np.asarray(moment - dot(moment, t)[:, None] * t)
+        bending = across(moment, self.node_tangent)
+        return np.asarray((bending * bending).sum(axis=1)[self.grid.side_nodes])
 
     @cached_property
     def link(self) -> Floats:

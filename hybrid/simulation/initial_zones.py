@@ -17,7 +17,7 @@ from hybrid.model.bending_reference import LEFT
 from hybrid.model.build import Model, given_zones
 from hybrid.model.coarsen import picked
 from hybrid.model.layout import Layout
-from hybrid.model.payout import fastest
+from hybrid.model.payout_law import fastest
 from hybrid.model.resolution import Resolution, follows_curvature, requested_accuracy
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction

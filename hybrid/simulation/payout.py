@@ -23,7 +23,8 @@ from hybrid.kernels.state import ALONG_LINE, Batch, Ends, Floats, Line, State, s
 from hybrid.model.build import Model
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.mesh import Zone
-from hybrid.model.payout import PayoutPlan, fastest, length_at, payout_of, winch_at
+from hybrid.model.payout import PayoutPlan, payout_of, winch_at
+from hybrid.model.payout_law import fastest, length_at
 from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer

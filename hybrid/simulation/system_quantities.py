@@ -66,13 +66,8 @@ class SystemQuantities:
         return self.checkpoint()
 
     def of_today(self, saved: object) -> object:
-        """What a checkpoint has, of a file of before with unknown references: it kept none, and azimuths to 180 deg."""
-        if not isinstance(saved, dict):
-            return saved
-        older = self.references()
-        for name, x in older.items():
-            x[:] = 0.0 if name.endswith("/turns") else x
-        return older | saved
+        """What a checkpoint has, of a file of before with unknown references: it kept none."""
+        return self.references() | saved if isinstance(saved, dict) else saved
 
     def restore(self, saved: Mapping[str, np.ndarray]) -> None:
         """Go on with ranges that a checkpoint has; of one from before there were any, they stay unknown."""

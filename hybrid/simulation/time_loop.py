@@ -436,7 +436,7 @@ class TimeLoop:
         mine |= {name: np.full_like(x, np.nan) for name, x in self._first_places().items()}
         restore(self.run, {name: x for name, x in saved.items() if name not in mine})
         if "first_turns" in mine:
-            saved = {"first_turns": np.zeros_like(mine["first_turns"]), **saved}  # a file of before has -180 to 180 deg
+            saved = {"first_turns": mine["first_turns"], **saved}  # files of before have none
         older = {name: saved[name] for name in mine}
         if isinstance(older["watch"], dict):
             older["watch"] = UNWATCHED | older["watch"]
