@@ -17,7 +17,7 @@ from hybrid.couple.moordyn_places import PlacesAlone, frame_of_angles, spin_of_r
 from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.cables import chain_of
 from hybrid.interop.moordyn.deck import Deck, read_deck
-from hybrid.interop.moordyn.rows import read_source
+from hybrid.interop.moordyn.rows import number, read_source
 from hybrid.interop.moordyn.systems import JOINTS, system_of
 from hybrid.kernels.state import Floats
 from hybrid.scene.analysis import CatenaryModel
@@ -57,6 +57,11 @@ class MoorDynPoint:
         self.system, self.id, self.name = system, id, name
 
 
+def _is_some(cell: str) -> bool:
+    """Whether a cell of a deck, such as 0|0|1, has a number other than 0."""
+    return any(number(x) != 0.0 for x in cell.split("|"))
+
+
 class MoorDynLine:
     """A line of a system: nodes `first` to `last` of a line of the scene, from its end A."""
 
@@ -78,6 +83,7 @@ class MoorDyn:
         self.deck: Deck = read_deck(read_source(path), needs_lines=False)
         self.simulation: SystemSimulation | PlacesAlone | None = None
         self.dt, self.origin, self.closed = LONGEST_STEP, inf, False
+        self._refuse_loads()
         if not self.deck.lines:
             self._without_lines()
             return
@@ -100,6 +106,23 @@ class MoorDyn:
             x.name for x in self.points if self.deck.points[x.id].kind == "coupled" and x.name in scene.points
         ]
         self.lines = [self._line(id) for id in sorted(self.deck.lines)]
+
+    def _refuse_loads(self) -> None:
+        """Forces on what the caller moves are those of the lines: nothing there may have a weight of its own."""
+        moved = {id for id, body in self.deck.bodies.items() if body.kind == "coupled"}
+        rows = [
+            b.row
+            for id, b in self.deck.bodies.items()
+            if id in moved and any(_is_some(b.rest[i]) for i in (0, 2, 3, 4))
+        ]
+        rows += [
+            p.row for p in self.deck.points.values()
+            if p.has_loads and (p.kind == "coupled" or (p.kind == "body" and p.on in moved))
+        ]  # fmt: skip
+        expected = "no mass, volume or drag on what the caller moves; its force is that of the lines"
+        fix = "write 0 there, and count the weight, lift and drag in the program that calls"
+        if rows:
+            raise SceneError([Complaint("left out", r.shown, expected, fix, r.line) for r in rows], self.deck.file)
 
     def _without_lines(self) -> None:
         """A deck of points alone, that are held or on bodies that the caller moves."""

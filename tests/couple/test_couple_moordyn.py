@@ -48,6 +48,21 @@ def started(path: Path = DECK) -> moordyn.MoorDyn:
     return system
 
 
+@pytest.mark.parametrize("what", ["point", "body", "point of a body"])
+def test_loads_of_what_the_caller_moves_are_refused(what: str, tmp_path: Path) -> None:
+    """MoorDyn adds their weight to the force it returns."""
+    text = (DECK if what == "point" else on_a_body(tmp_path / "deck.txt")).read_text(encoding="utf-8")
+    old, new = {
+        "point": ("-14    0      0       0      0", "-14    5000   3       0      0"),
+        "body": ("1 Coupled 0 0 -14 0 0 0 0 0 0 0", "1 Coupled 0 0 -14 0 0 0 0 0 5 0"),
+        "point of a body": ("0  0 0 0 0", "0  0 3 0 0"),
+    }[what]
+    assert old in text
+    (tmp_path / "deck.txt").write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(hybrid.SceneError, match="no mass, volume or drag on what the caller moves"):
+        moordyn.Create(str(tmp_path / "deck.txt"))
+
+
 def test_it_starts_from_the_equilibrium_of_the_imported_scene() -> None:
     system = started()
     result = hybrid.static(next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from moordyn_decks import DECKS, FOLDER, one_scene, text_of
@@ -121,6 +122,44 @@ def test_a_force_on_a_point_of_version_1(tmp_path: Path) -> None:
     scene = one_scene(text.replace(last, last + "\n" + third), tmp_path).scene
     (free,) = [p for p in scene.points.values() if isinstance(p, FreePoint)]
     assert free.force == (0.0, 0.0, 2.0)
+
+
+PARTS = ["5 Body1 1 0 0 8 0.02 0 0.5", "5 Body1 -0.5 0.8 0.3 2 0 0.4 0", "5 Body1 0 0 0 1 0.01 0 1.0"]
+
+
+def test_points_on_a_free_body_are_part_of_it(tmp_path: Path) -> None:
+    """A load of the body and its points does the same work on each: mass, weight and lift of every one at its place."""
+    row, heavy = "4 Coupled 0 0 -60 0 0 0 0\n", RISER.replace("29.5 0 0.1", "29.5 0.5|0|0 3")
+    text = heavy.replace("3 Body1 0 0", "3 Body1 0.1 0").replace(row, f"{row}{PARTS[0]}\n")
+    deck = one_scene(text, tmp_path)
+    body = deck.scene.bodies["body1"]
+    density, parts = 1025.0, [(29.5, (0.5, 0.0, 0.0)), (8.0, (1.0, 0.0, 0.0))]
+    assert (body.mass, body.volume) == pytest.approx((37.5, 0.034))
+    M = np.zeros((6, 6))  # T = 1/2 q M q, of a velocity of the origin and a rate of turning, point by point
+    for (m, place), added in zip(parts, (density * 0.014, density * 0.02 * 0.5), strict=True):
+        for kilograms, at in ((m, place), (added, (0.0, 0.0, 0.0) if m == 29.5 else place)):
+            J = np.hstack([np.eye(3), -np.cross(np.eye(3), at)])  # velocity there: v - at x w
+            M += kilograms * J.T @ J
+    M[3:, 3:] += np.diag([3.0, 3.0, 3.0])
+    assert np.array(body.mass_matrix) == pytest.approx(M, abs=1e-9)
+    lift = (0.014 * np.array([0.5, 0.0, 0.0]) + 0.02 * np.array([1.0, 0.0, 0.0])) / 0.034
+    assert body.centre_of_buoyancy == pytest.approx(lift)
+    with pytest.raises(hybrid.SceneError, match="products of inertia"):
+        one_scene(heavy.replace(row, f"{row}{PARTS[1]}\n"), tmp_path)
+    centred = one_scene(RISER.replace(row, f"{row}{PARTS[2]}\n"), tmp_path).scene.points["body1"]
+    assert (centred.mass, centred.volume, centred.drag_area) == pytest.approx((30.5, 0.024, 0.5))
+    assert centred.added_mass == pytest.approx(density * 0.024)
+
+
+@pytest.mark.parametrize("row", ["2 Fixed 452 0 -320", "4 Coupled 0 0 -60", "3 Body1 0 0 0"])
+def test_loads_of_held_points_are_said_to_be_left_out(row: str, tmp_path: Path) -> None:
+    held = RISER.replace("1 Free 450", "1 Fixed 450")
+    assert held.count(f"{row} 0 0 0 0") == 1
+    one_scene(held.replace(f"{row} 0 0 0 0", f"{row} 500 0 0.1 0"), tmp_path)
+    for separate in (False, True):
+        scenes = import_moordyn(tmp_path / "deck.txt", separate=separate).scenes.values()
+        notes = [n for scene in scenes for n in scene.notes]
+        assert any(n.kind == "left out" and "its own weight" in n.why and n.text.startswith(row[:6]) for n in notes)
 
 
 @pytest.mark.parametrize(

@@ -183,6 +183,14 @@ def test_the_share_of_rod_is_that_of_the_zones() -> None:
     assert "share of rod: 25 % of the cable\n" in texts(plot_zones(made(sag))) + "\n"
 
 
+def test_rods_that_are_paid_out_are_no_change_of_zones() -> None:
+    longer = made(sag, zones=lambda t: ROD if t < 5.0 else [("rod", 0.0, 60.0), ("rod", 60.0, 100.0)])
+    assert zoneplot.shares(longer) == "100 % of the cable is rod, all the time."
+    assert zoneplot.shares(made(sag, zones=moving, nt=21)).startswith(
+        "Rod is 0 to 26.4 % of the cable; zones changed at "
+    )
+
+
 def touching(when: Sequence[bool]) -> Result:
     """On the bed between s = 30 and 60 m at the outputs that are named, else above it."""
 

@@ -7,14 +7,16 @@ Free: Mass, CG, I about the CG   mass, centre, inertia
 Volume                           volume, its centre at the CG, as measured with MoorDyn 2.7
 Ca (rho V)                       added_mass of translations
 CdA                              none: the damping of a body is linear
+points on a free body: M, V, Ca  part of it, at their places, as MoorDyn counts them
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
-from hybrid.interop.moordyn.deck import Body, Triple
+from hybrid.interop.moordyn.deck import Body, Point, Triple
 from hybrid.interop.moordyn.rows import number
 
 Matrix = tuple[Triple, Triple, Triple]
@@ -108,8 +110,11 @@ def body_row(body: Any, place: Triple, rotation: Triple, density: float, surface
     return f"{kind} {' '.join(f'{x:.12g}' for x in numbers)} {' '.join(rest)}", wrong
 
 
-def body_table(body: Body, density: float) -> tuple[dict[str, Any], list[str]] | str:
-    """The table of a body, and what is lost of it; or why there is none."""
+def body_table(body: Body, density: float, parts: Sequence[Point] = ()) -> tuple[dict[str, Any], list[str]] | str:
+    """The table of a body, and what is lost of it; or why there is none.
+
+    parts: points on it that have a mass, a volume or a drag area of their own.
+    """
     turned = rotation_of(body.angles)
     if body.kind in ("fixed", "coupled"):
         return {"kind": "fixed", "position": body.place} | ({"rotation": turned} if any(turned) else {}), []
@@ -122,19 +127,69 @@ def body_table(body: Body, density: float) -> tuple[dict[str, Any], list[str]] |
         return "a rigid body whose mass, CG, I, Volume, CdA and Ca are not all numbers"
     if mass[0] <= 0.0 or min(inertia) <= 0.0:
         return "a free rigid body without mass or moments of inertia"
-    found: dict[str, Any] = {"kind": "free", "initial_guess": body.place, "mass": mass[0]}
+    masses = [(mass[0], centre), *((p.mass, p.place) for p in parts)]
+    whole, about = _centre(masses)
+    turning = _inertia(inertia, masses, about)
+    if max(abs(turning[i][j]) for i in range(3) for j in range(i)) > _PRODUCTS * min(turning[i][i] for i in range(3)):
+        return "a free rigid body that the masses of its points give products of inertia"
+    found: dict[str, Any] = {"kind": "free", "initial_guess": body.place, "mass": whole}
     found |= {"initial_rotation": turned} if any(turned) else {}
-    found |= {"centre": centre} if any(centre) else {}
-    found["inertia"] = inertia
+    found |= {"centre": about} if any(about) else {}
+    found["inertia"] = (turning[0][0], turning[1][1], turning[2][2])
     lost = []
-    if density and volume[0]:
-        found["volume"] = volume[0]
-        found |= {"centre_of_buoyancy": centre} if any(centre) else {}
+    if density:
+        volumes = [(volume[0], centre), *((p.volume, p.place) for p in parts)]
+        displaced, lift = _centre(volumes)
+        found |= {"volume": displaced} if displaced else {}
+        found |= {"centre_of_buoyancy": lift} if displaced and any(lift) else {}
         moved = (added * 3)[:3] if len(added) == 1 else added[:3]
-        if any(added):
-            found["added_mass"] = [*(density * volume[0] * ca for ca in moved), 0.0, 0.0, 0.0]
-        if any(added[3:]):
+        found |= _added([density * volume[0] * ca for ca in moved], parts, density)
+        if volume[0] and any(added[3:]):
             lost.append("added inertia of its rotations (Ca)")
-    if density and any(drag):
-        lost.append("its drag (CdA); `damping` of a body of hybrid is linear")
+        if any(drag):
+            lost.append("its drag (CdA); `damping` of a body of hybrid is linear")
+        if any(p.drag_area for p in parts):
+            which = ", ".join(str(p.id) for p in parts if p.drag_area)
+            lost.append(f"the drag (CdA) of its points {which}; `damping` of a body of hybrid is linear")
     return found, lost
+
+
+# Products of inertia that round-off leaves, of the smallest moment of inertia.
+_PRODUCTS = 1e-9
+
+
+def _centre(parts: Sequence[tuple[float, Triple]]) -> tuple[float, Triple]:
+    """The sum of masses or volumes, and its centre."""
+    total = sum(m for m, _ in parts)
+    x, y, z = (sum(m * place[i] for m, place in parts) / total if total else 0.0 for i in range(3))
+    return total, (x, y, z)
+
+
+def _inertia(own: Triple, masses: Sequence[tuple[float, Triple]], centre: Triple) -> list[list[float]]:
+    """(3, 3) about the common centre, kg m^2, of the first mass with its own moments and of mass points."""
+    found = [[own[i] if i == j else 0.0 for j in range(3)] for i in range(3)]
+    for m, place in masses:
+        r = [a - b for a, b in zip(place, centre, strict=True)]
+        square = sum(x * x for x in r)
+        for i in range(3):
+            for j in range(3):
+                found[i][j] += m * ((square if i == j else 0.0) - r[i] * r[j])
+    return found
+
+
+def _added(own: Sequence[float], parts: Sequence[Point], density: float) -> dict[str, Any]:
+    """Added mass about the origin: of translations of the body, and of its points at their places."""
+    pieces = [(density * p.volume * p.added, p.place) for p in parts if p.volume and p.added]
+    if not pieces:
+        return {"added_mass": [*own, 0.0, 0.0, 0.0]} if any(own) else {}
+    M = [[own[i] if i == j < 3 else 0.0 for j in range(6)] for i in range(6)]
+    for m, (x, y, z) in pieces:
+        offset = ((0.0, m * z, -m * y), (-m * z, 0.0, m * x), (m * y, -m * x, 0.0))
+        turning = _inertia((0.0, 0.0, 0.0), [(m, (x, y, z))], (0.0, 0.0, 0.0))
+        for i in range(3):
+            M[i][i] += m
+            for j in range(3):
+                M[i][3 + j] += offset[i][j]
+                M[3 + j][i] += offset[i][j]
+                M[3 + i][3 + j] += turning[i][j]
+    return {"added_mass": M}

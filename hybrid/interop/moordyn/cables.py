@@ -156,7 +156,20 @@ def _turned(end: End, into: bool) -> End:
 
 def end_of(deck: Deck, end: tuple[str, int, str]) -> End:
     kind, id, letter = end
-    return _at_point(deck, deck.points[id]) if kind == "point" else _at_rod(deck, deck.rods[id], letter)
+    if kind != "point":
+        return _at_rod(deck, deck.rods[id], letter)
+    point = deck.points[id]
+    found = _at_point(deck, point)
+    loads = found.lost is None and point.kind != "free" and point.has_loads
+    return replace(found, notes=(*found.notes, held_loads(point))) if loads else found
+
+
+def held_loads(point: Point) -> Note:
+    """Of a held point with a weight, a lift or a drag of its own."""
+    why = (
+        "its own weight, lift and drag (Mass, Volume, CdA), which MoorDyn counts in the force on the point or its body"
+    )
+    return note(LEFT_OUT, point.row, why, "add them to the force of the lines, which they do not change")
 
 
 def _at_point(deck: Deck, point: Point) -> End:

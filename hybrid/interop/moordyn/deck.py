@@ -57,6 +57,11 @@ class Point:
     added: float
     force: Triple = (0.0, 0.0, 0.0)  # steady, N; of MoorDyn 1
 
+    @property
+    def has_loads(self) -> bool:
+        """Whether it has a weight, a lift or a drag of its own."""
+        return bool(self.mass or self.volume or self.drag_area)
+
 
 @dataclass(frozen=True)
 class Body:
@@ -241,7 +246,8 @@ def _line(source: Source, row: Row, notes: list[Note]) -> Line | None:
         source.complain("unstretched length (m)", length, "a number other than 0", "check the columns", row.line)
     if cells[6] != "-":
         why = "output flags of a line; hybrid keeps position, velocity, tension along the whole cable"
-        notes.append(note(NOT_NEEDED, row, why, "output.points and output.every say where and how often"))
+        instead = "output.points and output.every say where and how often"
+        notes.append(Note(NOT_NEEDED, row.line, f"output flags {cells[6]} of line {cells[0]}", why, instead))
     count = source.whole(row, segments, "NumSegs", 1)
     return Line(source.whole(row, cells[0], "ID", 1), row, cells[1], (ends[0], ends[1]), unstretched, count)
 

@@ -22,7 +22,7 @@ from typing import Any
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.bodies import body_table
-from hybrid.interop.moordyn.cables import chain_of, end_of, next_line
+from hybrid.interop.moordyn.cables import chain_of, end_of, held_loads, next_line
 from hybrid.interop.moordyn.deck import Body, Deck, Line, Point
 from hybrid.interop.moordyn.notes import LEFT_OUT, TAKEN, Note, in_order, note
 from hybrid.interop.moordyn.rows import Row, number, show
@@ -204,18 +204,24 @@ class _SystemMaker(Tables):
         return {"kind": "fairlead", "body": name, "place": rod.a if letter == "A" or rod.segments == 0 else rod.b}
 
     def _body(self, body: Body, name: str) -> dict[str, Any]:
-        made = body_table(body, self.options.density)
+        parts = self._parts(body)
+        made = body_table(body, self.options.density, parts)
         if isinstance(made, str) or (body.kind == "free" and any(rod.on == body.id for rod in self.deck.rods.values())):
             why = made if isinstance(made, str) else "a free rigid body with rods, whose mass and drag it has"
             self._refuse(body.row, why, "write Fixed or Coupled and its place at rest")
             return {}
         found, lost = made
+        self.notes += [held_loads(point) for point in parts if body.kind != "free"]
         if body.kind == "coupled":
             why = "the calling program of MoorDyn moves this body; a deck does not say how, and the scene holds it"
             instead = f"give bodies.{name}.motion: harmonics, a file, or a vessel with its RAOs"
             self.notes.append(note(TAKEN, body.row, why, instead))
         self.notes += [note(LEFT_OUT, body.row, why, "give `damping`, about its mean motion") for why in lost]
         return found
+
+    def _parts(self, body: Body) -> list[Point]:
+        """The points on a body that have a weight, a lift or a drag of their own."""
+        return [p for p in self.deck.points.values() if p.kind == "body" and p.on == body.id and p.has_loads]
 
     def _free(self, point: Point) -> dict[str, Any]:
         found: dict[str, Any] = {"initial_guess": point.place}
@@ -244,4 +250,9 @@ class _SystemMaker(Tables):
         if any("|" in body.rest[i] for i in (4, 5)):
             why += "; of several coefficients the first is taken, for all directions"
         self.notes.append(note(TAKEN, body.row, why))
+        displaced = volume * added
+        for point in self._parts(body):
+            mass, volume, area = mass + point.mass, volume + point.volume, area + point.drag_area
+            displaced += point.volume * point.added
+        added = displaced / volume if volume else 0.0
         return self._free(Point(body.id, body.row, "free", 0, body.place, mass, volume, area, added))
