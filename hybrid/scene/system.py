@@ -8,10 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
-from itertools import chain
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from hybrid.errors import SceneError
 from hybrid.scene.accuracy import AskedAccuracy
@@ -26,17 +25,15 @@ from hybrid.scene.analysis import (
     Time,
 )
 from hybrid.scene.attachments import Attachment
-from hybrid.scene.base import Finding, Place, Positive, Table, Text, Truth, Whole, refuse
+from hybrid.scene.base import Finding, Positive, Table, Text, Truth, Whole, refuse
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, turned, without_turns
 from hybrid.scene.cable import Cable, Contact, Environment, Section
-from hybrid.scene.connections import ClampedConnection, Connections, connection_findings
-from hybrid.scene.ends import Clamped, End, Ends, Free, Pinned, Triple
-from hybrid.scene.motion_checks import motion_findings
+from hybrid.scene.connections import ClampedConnection, Connections
+from hybrid.scene.ends import Clamped, End, Ends, Pinned, Triple
 from hybrid.scene.points import Failure, Fairlead, FixedPoint, FreePoint, Name, Point
-from hybrid.scene.quantities import Quantities, of_several_lines
+from hybrid.scene.quantities import Quantities
 from hybrid.scene.schema import Scene, missing_time
-from hybrid.scene.suggestions import nearest
-from hybrid.scene.travels import travel_findings
+from hybrid.scene.system_checks import system_findings
 
 # Of the length of a line: how far a free point may be looked for from the other one.
 REACHED = 0.95
@@ -383,138 +380,6 @@ class System(Table):
 
     @model_validator(mode="after")
     def _lines_join_points(self) -> System:
-        refuse(self._unknown_names())
-        refuse(chain(self._lonely_points(), self._floating_groups()))
-        refuse(connection_findings(self))
-        refuse(chain.from_iterable(self._body_findings(name) for name in self.bodies))
-        refuse(chain.from_iterable(self._line_findings(name) for name in self.lines))
-        refuse(travel_findings(self))
-        refuse(of_several_lines(self.output.quantities, self.lines, self.environment.seabed is not None))
+        for findings in system_findings(self):
+            refuse(findings)
         return self
-
-    def _unknown_names(self) -> Iterator[Finding]:
-        for name, line in self.lines.items():
-            for key in ("start", "end"):
-                yield from _unknown(getattr(line, key), self.points, ("lines", name, key), "point")
-        for name, point in self.points.items():
-            if isinstance(point, Fairlead):
-                yield from _unknown(point.body, self.bodies, ("points", name, "body"), "body")
-
-    def _lonely_points(self) -> Iterator[Finding]:
-        for name, point in self.points.items():
-            if not self.lines_at(name):
-                kind = "a free point" if isinstance(point, FreePoint) else "a point"
-                expected = f"{kind} at which a line starts or ends"
-                yield Finding(
-                    ("points", name), expected, f"leave it out, or let a line end there: `end: {name}`", "no line"
-                )
-            elif isinstance(point, FreePoint) and all(self.breaks(*at) for at in self.lines_at(name)):
-                line, _ = self.lines_at(name)[0]
-                expected = f"a line at point {name} that does not break there and carries what is left"
-                fix = "leave it out of one of them, or let it break at its other end"
-                yield Finding(("lines", line, "break_at"), expected, fix)
-        for name, failure, at in self._failures():
-            if self.time is not None and failure.time is not None and failure.time >= self.time.duration:
-                expected = f"a time before the end, {self.time.duration:g} s"
-                yield Finding((*at, "break_at", "time"), expected, "a longer duration, or leave it out", name)
-        on = {point.body for point in self.points.values() if isinstance(point, Fairlead)}
-        for name in self.bodies:
-            if name not in on:
-                fix = f"add a point `{{body: {name}, place: [0, 0, 0]}}` and a line to it, or leave the body out"
-                yield Finding(("bodies", name), "a body with a fairlead among the points", fix, "no fairlead")
-
-    def _failures(self) -> Iterator[tuple[str, Failure, Place]]:
-        """What may break: its name, when, and where that stands."""
-        for name, line in self.lines.items():
-            if line.break_at is not None:
-                yield f"line {name}", line.break_at, ("lines", name)
-        for name, point in self.points.items():
-            if not isinstance(point, FreePoint) and point.break_at is not None:
-                yield f"point {name}", point.break_at, ("points", name)
-
-    def _floating_groups(self) -> Iterator[Finding]:
-        """Free points and bodies from which no way along lines leads to what is fixed."""
-        ways = [{x.start, x.end} for x in self.lines.values()]
-        ways += [{p, f"body {x.body}"} for p, x in self.points.items() if isinstance(x, Fairlead)]
-        held = {name for name, point in self.points.items() if isinstance(point, FixedPoint)}
-        held |= {f"body {name}" for name, body in self.bodies.items() if isinstance(body, FixedBody)}
-        while more := {p for way in ways if way & held for p in way} - held:
-            held |= more
-        for name, point in self.points.items():
-            if name not in held and isinstance(point, FreePoint):
-                expected = "a free point that lines join to a fixed one, at least by way of others"
-                yield Finding(("points", name), expected, "make one of these points `kind: fixed`", "nothing holds it")
-        for name in self.bodies:
-            if f"body {name}" not in held:
-                expected = "a free body that lines join to what is fixed, at least by way of other points"
-                yield Finding(
-                    ("bodies", name), expected, "let one of its lines end at a fixed point", "nothing holds it"
-                )
-
-    def _body_findings(self, name: str) -> Iterator[Finding]:
-        """What is wrong with the motion of a body, or with what is given to act on it."""
-        body, still = self.bodies[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
-        if isinstance(body, FreeBody):
-            in_water = [
-                key for key in ("volume", "hydrostatics", "damping", "added_mass", "members") if getattr(body, key)
-            ]
-            if in_water and self.environment.fluid is None:
-                expected = f"a fluid, because body {name} has {in_water[0]}"
-                yield Finding(("environment",), expected, "add `fluid: {density: 1025}`", "no fluid")
-        line = next(x for x in self.lines.values() for p in (x.start, x.end) if self.body_of(p) is body)
-        ends = Ends(start=still, end=body.end) if isinstance(body, FreeBody) else None
-        if isinstance(body, FixedBody):
-            moved = Clamped(position=body.position, tangent=(1.0, 0.0, 0.0), motion=body.motion)
-            ends = Ends(start=moved, end=Free())
-        tables = {"ends": ends, "time": self.time, "cable": line.cable, "environment": self.environment}
-        for found in motion_findings(tables):
-            at = ("bodies", name, *found.at[2:]) if found.at[:1] == ("ends",) else found.at
-            yield Finding(at, found.expected, found.fix, found.given)
-
-    def _line_findings(self, name: str) -> Iterator[Finding]:
-        """What is wrong with a line and its points, each under its own key of the system."""
-        line = self.lines[name]
-        wrong: dict[Finding, None] = {}  # each once
-        for carrying in ((), *((key,) for key in self.carried(name))):
-            try:
-                scene = self.scene_of(name, carrying)
-                wrong |= dict.fromkeys(motion_findings({key: getattr(scene, key) for key in Scene.model_fields}))
-            except ValidationError as error:
-                for each in error.errors(include_url=False):
-                    at = tuple(x for x in each["loc"] if not str(x).startswith("<"))
-                    for found in (each.get("ctx") or {}).get("findings", ()):
-                        wrong[Finding((*at, *found.at), found.expected, found.fix, found.given)] = None
-            if wrong:
-                break
-        yield from (self._of_system(name, line, found) for found in wrong)
-
-    def _of_system(self, name: str, line: JoinedLine, found: Finding) -> Finding:
-        at: Place = found.at
-        if at[:1] == ("cable",):
-            at = ("lines", name, *at[1:])
-        elif at[:1] in (("model",), ("mesh",)) or (at[:1] == ("accuracy",) and line.accuracy is not None):
-            at = ("lines", name, *at)
-        elif at[:1] == ("accuracy",):
-            expected = f"{found.expected}, in line {name}"
-            return Finding(
-                at, expected, f"{found.fix}; or give the other lines an `accuracy` of their own", found.given
-            )
-        elif at[:1] == ("ends",) and len(at) > 1:
-            point = getattr(line, str(at[1]))
-            rest = at[2:]
-            if isinstance(self.points[point], FreePoint) and rest:
-                rest = ({"position": "initial_guess", "thrust": "force"}.get(str(rest[0]), rest[0]), *rest[1:])
-            at = ("points", point, *rest)
-            if isinstance(found_point := self.points[point], Fairlead):
-                moved = rest[:1] == ("motion",)
-                at = ("bodies", found_point.body, *rest) if moved else ("points", point, "place")
-        given = f"of line {name}: {found.given}" if found.given else None
-        return Finding(at, found.expected.replace("ends.", "line's "), found.fix, given)
-
-
-def _unknown(name: str, known: Mapping[str, Any], at: Place, what: str) -> Iterator[Finding]:
-    if name not in known:
-        tables = {"point": "points", "body": "bodies"}[what]
-        expected = f"the name of a {what}: {', '.join(known) or 'there is none'}"
-        fix = nearest(name, dict.fromkeys(known, "")) or f"add `{name}: ...` to {tables}"
-        yield Finding(at, expected, fix)

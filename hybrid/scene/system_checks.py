@@ -1,0 +1,161 @@
+"""Contradictions between the points, bodies and lines of a scene of several lines, and those of each line alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from hybrid.scene.base import Finding, Place
+from hybrid.scene.bodies import FixedBody, FreeBody
+from hybrid.scene.connections import connection_findings
+from hybrid.scene.ends import Clamped, Ends, Free
+from hybrid.scene.motion_checks import motion_findings
+from hybrid.scene.points import Failure, Fairlead, FixedPoint, FreePoint
+from hybrid.scene.quantities import of_several_lines
+from hybrid.scene.schema import Scene
+from hybrid.scene.suggestions import nearest
+from hybrid.scene.travels import travel_findings
+
+if TYPE_CHECKING:
+    from hybrid.scene.system import System
+
+
+def system_findings(system: System) -> Iterator[Iterator[Finding]]:
+    """What contradicts in a system, in groups: of the first one with findings no later one makes sense."""
+    yield _unknown_names(system)
+    yield chain(_lonely_points(system), _floating_groups(system))
+    yield connection_findings(system)
+    yield chain.from_iterable(_body_findings(system, name) for name in system.bodies)
+    yield chain.from_iterable(_line_findings(system, name) for name in system.lines)
+    yield travel_findings(system)
+    yield of_several_lines(system.output.quantities, system.lines, system.environment.seabed is not None)
+
+
+def _unknown_names(system: System) -> Iterator[Finding]:
+    for name, line in system.lines.items():
+        for key in ("start", "end"):
+            yield from _unknown(getattr(line, key), system.points, ("lines", name, key), "point")
+    for name, point in system.points.items():
+        if isinstance(point, Fairlead):
+            yield from _unknown(point.body, system.bodies, ("points", name, "body"), "body")
+
+
+def _lonely_points(system: System) -> Iterator[Finding]:
+    for name, point in system.points.items():
+        if not system.lines_at(name):
+            kind = "a free point" if isinstance(point, FreePoint) else "a point"
+            expected = f"{kind} at which a line starts or ends"
+            yield Finding(
+                ("points", name), expected, f"leave it out, or let a line end there: `end: {name}`", "no line"
+            )
+        elif isinstance(point, FreePoint) and all(system.breaks(*at) for at in system.lines_at(name)):
+            line, _ = system.lines_at(name)[0]
+            expected = f"a line at point {name} that does not break there and carries what is left"
+            fix = "leave it out of one of them, or let it break at its other end"
+            yield Finding(("lines", line, "break_at"), expected, fix)
+    for name, failure, at in _failures(system):
+        if system.time is not None and failure.time is not None and failure.time >= system.time.duration:
+            expected = f"a time before the end, {system.time.duration:g} s"
+            yield Finding((*at, "break_at", "time"), expected, "a longer duration, or leave it out", name)
+    on = {point.body for point in system.points.values() if isinstance(point, Fairlead)}
+    for name in system.bodies:
+        if name not in on:
+            fix = f"add a point `{{body: {name}, place: [0, 0, 0]}}` and a line to it, or leave the body out"
+            yield Finding(("bodies", name), "a body with a fairlead among the points", fix, "no fairlead")
+
+
+def _failures(system: System) -> Iterator[tuple[str, Failure, Place]]:
+    """What may break: its name, when, and where that stands."""
+    for name, line in system.lines.items():
+        if line.break_at is not None:
+            yield f"line {name}", line.break_at, ("lines", name)
+    for name, point in system.points.items():
+        if not isinstance(point, FreePoint) and point.break_at is not None:
+            yield f"point {name}", point.break_at, ("points", name)
+
+
+def _floating_groups(system: System) -> Iterator[Finding]:
+    """Free points and bodies from which no way along lines leads to what is fixed."""
+    ways = [{x.start, x.end} for x in system.lines.values()]
+    ways += [{p, f"body {x.body}"} for p, x in system.points.items() if isinstance(x, Fairlead)]
+    held = {name for name, point in system.points.items() if isinstance(point, FixedPoint)}
+    held |= {f"body {name}" for name, body in system.bodies.items() if isinstance(body, FixedBody)}
+    while more := {p for way in ways if way & held for p in way} - held:
+        held |= more
+    for name, point in system.points.items():
+        if name not in held and isinstance(point, FreePoint):
+            expected = "a free point that lines join to a fixed one, at least by way of others"
+            yield Finding(("points", name), expected, "make one of these points `kind: fixed`", "nothing holds it")
+    for name in system.bodies:
+        if f"body {name}" not in held:
+            expected = "a free body that lines join to what is fixed, at least by way of other points"
+            yield Finding(("bodies", name), expected, "let one of its lines end at a fixed point", "nothing holds it")
+
+
+def _body_findings(system: System, name: str) -> Iterator[Finding]:
+    """What is wrong with the motion of a body, or with what is given to act on it."""
+    body, still = system.bodies[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
+    if isinstance(body, FreeBody):
+        in_water = [key for key in ("volume", "hydrostatics", "damping", "added_mass", "members") if getattr(body, key)]
+        if in_water and system.environment.fluid is None:
+            expected = f"a fluid, because body {name} has {in_water[0]}"
+            yield Finding(("environment",), expected, "add `fluid: {density: 1025}`", "no fluid")
+    line = next(x for x in system.lines.values() for p in (x.start, x.end) if system.body_of(p) is body)
+    ends = Ends(start=still, end=body.end) if isinstance(body, FreeBody) else None
+    if isinstance(body, FixedBody):
+        moved = Clamped(position=body.position, tangent=(1.0, 0.0, 0.0), motion=body.motion)
+        ends = Ends(start=moved, end=Free())
+    tables = {"ends": ends, "time": system.time, "cable": line.cable, "environment": system.environment}
+    for found in motion_findings(tables):
+        at = ("bodies", name, *found.at[2:]) if found.at[:1] == ("ends",) else found.at
+        yield Finding(at, found.expected, found.fix, found.given)
+
+
+def _line_findings(system: System, name: str) -> Iterator[Finding]:
+    """What is wrong with a line and its points, each under its own key of the system."""
+    wrong: dict[Finding, None] = {}  # each once
+    for carrying in ((), *((key,) for key in system.carried(name))):
+        try:
+            scene = system.scene_of(name, carrying)
+            wrong |= dict.fromkeys(motion_findings({key: getattr(scene, key) for key in Scene.model_fields}))
+        except ValidationError as error:
+            for each in error.errors(include_url=False):
+                at = tuple(x for x in each["loc"] if not str(x).startswith("<"))
+                for found in (each.get("ctx") or {}).get("findings", ()):
+                    wrong[Finding((*at, *found.at), found.expected, found.fix, found.given)] = None
+        if wrong:
+            break
+    yield from (_of_system(system, name, found) for found in wrong)
+
+
+def _of_system(system: System, name: str, found: Finding) -> Finding:
+    line, at = system.lines[name], found.at
+    if at[:1] == ("cable",):
+        at = ("lines", name, *at[1:])
+    elif at[:1] in (("model",), ("mesh",)) or (at[:1] == ("accuracy",) and line.accuracy is not None):
+        at = ("lines", name, *at)
+    elif at[:1] == ("accuracy",):
+        expected = f"{found.expected}, in line {name}"
+        return Finding(at, expected, f"{found.fix}; or give the other lines an `accuracy` of their own", found.given)
+    elif at[:1] == ("ends",) and len(at) > 1:
+        point = getattr(line, str(at[1]))
+        rest = at[2:]
+        if isinstance(system.points[point], FreePoint) and rest:
+            rest = ({"position": "initial_guess", "thrust": "force"}.get(str(rest[0]), rest[0]), *rest[1:])
+        at = ("points", point, *rest)
+        if isinstance(found_point := system.points[point], Fairlead):
+            moved = rest[:1] == ("motion",)
+            at = ("bodies", found_point.body, *rest) if moved else ("points", point, "place")
+    given = f"of line {name}: {found.given}" if found.given else None
+    return Finding(at, found.expected.replace("ends.", "line's "), found.fix, given)
+
+
+def _unknown(name: str, known: Mapping[str, Any], at: Place, what: str) -> Iterator[Finding]:
+    if name not in known:
+        tables = {"point": "points", "body": "bodies"}[what]
+        expected = f"the name of a {what}: {', '.join(known) or 'there is none'}"
+        fix = nearest(name, dict.fromkeys(known, "")) or f"add `{name}: ...` to {tables}"
+        yield Finding(at, expected, fix)
