@@ -38,6 +38,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "live": (*COMPUTING, "simulation", "view"),
     "cli": (*COMPUTING, "simulation", "view", "exports", "interop", "studies", "couple", "live", "__init__"),
     "__init__": (*COMPUTING, "simulation", "view", "exports", "interop", "studies", "couple"),
+    "__main__": ("cli",),
 }
 
 # Packages from outside that only these rooms may import.

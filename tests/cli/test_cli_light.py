@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -75,6 +76,15 @@ def test_schema_is_valid_json_schema(several: bool) -> None:
                 check(inside)
 
     check(schema)
+
+
+def test_python_runs_the_package_as_the_command(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["hybrid", "--version"])
+    with pytest.raises(SystemExit) as left:
+        runpy.run_module("hybrid", run_name="__main__")
+    assert not left.value.code and capsys.readouterr().out == f"hybrid {hybrid.__version__}\n"
 
 
 def test_version_and_help() -> None:
