@@ -33,9 +33,9 @@ from hybrid.kernels.run import read
 ) = range(12)  # fmt: skip
 # Columns of `asked`: kind, end (0, 1), unit direction or normal (3), whether layback goes to the touchdown point, a
 # point of the plane (3), whether it is one, range of arc lengths, m, NaN: all of the line, first and last row of `path`,
-# radius around it, m.
-KIND, END, DIRECTION, TO_TOUCHDOWN, POINT, IS_PLANE, FIRST, LAST, PATH, PATH_END, RADIUS = 0, 1, 2, 5, 6, 9, 10, 11, 12, 13, 14  # fmt: skip
-ASKED = 15
+# radius around it, m; 1 where the end is joined to a point that nothing else is at, whose pull is what Newton left.
+KIND, END, DIRECTION, TO_TOUCHDOWN, POINT, IS_PLANE, FIRST, LAST, PATH, PATH_END, RADIUS, IDLE = 0, 1, 2, 5, 6, 9, 10, 11, 12, 13, 14, 15  # fmt: skip
+ASKED = 16
 # Columns of `reached`: smallest, largest, when, s; arc length where a clearance was, m; the place x, y, m, from which
 # excursions count, or the azimuth, deg, from which azimuths are within half a turn, NaN: not known; the cell that was
 # nearest last.
@@ -224,7 +224,9 @@ def azimuth(f, reached):
 def of_pull(job, state, asked, reached, k):
     """What follows from the pull at end k; angles in degrees, NaN where there is no pull."""
     kind = asked[KIND]
-    f, taken = pull_at(job, state, k)
+    f, taken = (0.0, 0.0, 0.0), False
+    if asked[IDLE] == 0.0:
+        f, taken = pull_at(job, state, k)
     if kind == HORIZONTAL_FORCE:
         return math.hypot(f[0], f[1])
     if kind == VERTICAL_FORCE:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.observed_outputs import observed_joined
 from hybrid.kernels.state import ALONG_LINE, NODES_OF_LINE, Batch, Floats, Line, Sea
 from hybrid.model.mesh import Zone
-from hybrid.outputs.observation import Observation
+from hybrid.outputs.observation import Observation, links
 from hybrid.outputs.output_grid import Grid, Rows, linear
 from hybrid.outputs.touchdown import Touchdown, touchdown
 
@@ -115,6 +115,10 @@ class JoinedObservation(Observation):
     def changes(self) -> list[int]:
         pairs = zip(self.outputs, self.begin.tolist(), strict=False)
         return [n + int(np.argmin(np.abs(one.line.s - x))) for one, n in pairs for x in self.grid.changes]
+
+    @cached_property
+    def link(self) -> Floats:
+        return np.concatenate([links(x.batch, x.line) for x in self.outputs], axis=1)
 
     @cached_property
     def end_nodes(self) -> NDArray[np.int64]:

@@ -46,6 +46,14 @@ def last(x: Floats) -> Floats:
     return np.ascontiguousarray(x.transpose(*range(1, x.ndim), 0))
 
 
+def links(batch: Batch, line: Line) -> Floats:
+    """(4, nb): turns of twist, writhe and link, crossings, of the outputs of a line."""
+    ends = map(Ends, batch.held, batch.position, batch.frame, batch.spin, batch.force, batch.moment)
+    turns = batch.turn if batch.turn.size else [NO_TURN] * batch.t.size
+    each = zip(ends, batch.r, batch.e, batch.a1, turns, strict=True)
+    return np.stack([link_of(batch.line(k, line), *row) for k, row in enumerate(each)], axis=1)
+
+
 class Observation:
     """A batch of states looked at, as computed and (`corrected`) with what leaving bending out shifts it by."""
 
@@ -330,13 +338,7 @@ class Observation:
         """(4, nb): turns of twist, writhe and link, crossings; of what was computed."""
         if self._corrects is not None:
             return self._corrects.link
-        b, rows = self.batch, []
-        ends = map(Ends, b.held, b.position, b.frame, b.spin, b.force, b.moment)
-        for k, row in enumerate(
-            zip(ends, b.r, b.e, b.a1, b.turn if b.turn.size else [NO_TURN] * b.t.size, strict=True)
-        ):
-            rows.append(link_of(b.line(k, self.line), *row))
-        return np.stack(rows, axis=1)
+        return links(self.batch, self.line)
 
     # ---- at the ends --------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ The compiled run keeps them (kernels.named_quantities); here is what it is told,
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -71,6 +71,10 @@ class StepQuantities:
         return books._replace(
             asked=self.asked, reached=self.reached, path=self.path, radii=self.radii, walls=self.walls
         )
+
+    def set_idle(self, ends: Collection[int]) -> None:
+        """Ends (0, 1) of a line of several at which nothing takes its pull from now on; at the others it is taken."""
+        self.asked[:, k.IDLE] = np.isin(self.asked[:, k.END], list(ends))
 
     def restore(self, saved: object) -> None:
         """Go on with ranges that a checkpoint has; of one from before there were any, they stay unknown."""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from hybrid.kernels.state import Batch, Floats
+from hybrid.model.system import SystemModel
 from hybrid.outputs.probes import Probe
 from hybrid.outputs.quantities import Quantities
 from hybrid.outputs.step_quantities import StepQuantities
+from hybrid.scene.points import FreePoint
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.simulation.result_file import limits_of
@@ -17,12 +20,26 @@ from hybrid.simulation.system_lines import LineResult
 from hybrid.store.format import Field
 
 
+def idle_ends(system: System, model: SystemModel) -> list[tuple[int, int]]:
+    """Ends (line, 0 or 1) that are alone at a free point on which nothing acts."""
+    lines = Counter(joint for pair in model.joints for joint in pair)
+    found = []
+    for end in ((line, k) for line in range(len(model.joints)) for k in (0, 1)):
+        joint = model.joints[end[0]][end[1]]
+        if 0 <= joint < len(model.free) and lines[joint] == 1:
+            point = system.points.get(model.free[joint])
+            knot = isinstance(point, FreePoint) and not point.is_body and point.force is None
+            found += [end] if knot or end in model.loose else []
+    return found
+
+
 class SystemQuantities:
     """The quantities of all lines, each computed from a state of its line."""
 
     def __init__(self, system: System, scenes: Mapping[str, Scene]) -> None:
         """scenes: of the lines, by name."""
-        self._wanted, self._scenes = system.output.quantities, scenes
+        self._wanted, self._scenes, self._system = system.output.quantities, scenes, system
+        self._idle: frozenset[tuple[str, int]] = frozenset()
         self._of_line: dict[str, tuple[Quantities, dict[str, Probe]]] = {}
         self._steps: dict[str, StepQuantities] = {}  # their ranges over all steps, of a motion
         for line, scene in scenes.items():
@@ -39,6 +56,12 @@ class SystemQuantities:
             found = StepQuantities(line.scene, mine, line.envelope.quantities.pipes)
             if found:
                 line.books, self._steps[line.name] = found.given_to(line.books), found
+
+    def follow(self, model: SystemModel) -> None:
+        """Know from now on which ends came loose: nothing takes their pull, which has no direction."""
+        self._idle = frozenset((model.names[line], k) for line, k in idle_ends(self._system, model))
+        for name, x in self._steps.items():
+            x.set_idle([k for line, k in self._idle if line == name])
 
     @property
     def ranges(self) -> list[tuple[Field, np.ndarray]]:
@@ -101,9 +124,15 @@ class SystemQuantities:
                 for q in found.wanted.values()
                 if q.other is not None
             }
-            seen = lines[name].observer.look(states[name])
+            seen = lines[name].observer.look(self._seen(name, states[name]))
             out |= {key: float(probe.value(seen)[0]) for key, probe in probes.items()}
         return out
+
+    def _seen(self, name: str, states: Batch) -> Batch:
+        """States of a line with ends that nothing takes as the free ends that they are."""
+        held = states.held.copy()
+        held[:, [k for line, k in self._idle if line == name]] = 0
+        return states._replace(held=held)
 
     def _radii(self, line: LineResult) -> Floats:
         return Quantities(line.scene, {}).radii(line.model.line.s)

@@ -293,6 +293,7 @@ class SystemRun:
 
     def make_solver(self) -> None:
         """A solver for the model as it is."""
+        self.quantities.follow(self.model)
         contacts = [line.touch_itself(self.t) for line in self.lines]
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts)

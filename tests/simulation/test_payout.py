@@ -53,6 +53,21 @@ def sagging(
 # --- exact solutions --------------------------------------------------------------------------------
 
 
+def test_turns_between_held_ends_stay_while_the_line_grows() -> None:
+    """Both ends hold the twist, and do not turn: link is what it was at every output, of lines of different cells."""
+    up = {"tangent": [0, 0, 1], "normal": [1, 0, 0]}
+    scene = hanging({"rate": 2.0, "ramp": 0.2}, 2.0, model="rod", output={"every": 0.1}, mesh={"cells": 16})
+    scene["cable"]["sections"] = [{"length": 8.0, "mass": 4.0, "bending_stiffness": 30, "torsional_stiffness": 20}]
+    scene["ends"]["start"] = {"kind": "guided", **up, "force": [0, 0, -800]}
+    scene["ends"]["end"] |= {"kind": "clamped", "turns": -2, **up}
+    result = hybrid.run(scene)
+    assert result["payout/length"][-1] > 11.0  # nodes have entered
+    assert np.abs(result["turns/link"] - result["turns/link"][0]).max() < 1e-6
+    assert np.abs(result["turns/writhe"]).max() < 1e-9  # it hangs straight
+    twist = 2.0 * np.pi * 20.0 * result["turns/twist"] / result["payout/length"]
+    assert np.abs(result["torque"][:, 0] - twist).max() < 0.02 * np.abs(twist).max()
+
+
 @pytest.mark.parametrize("dimension", [None, 3])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_hanging_line_weighs_what_is_out_less_its_inertia(dimension: int | None, sign: float) -> None:

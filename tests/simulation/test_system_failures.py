@@ -69,6 +69,27 @@ def test_lines_that_break_from_all_fall_as_bodies(end: str) -> None:
         np.testing.assert_allclose(centre[7:, 2] - centre[6, 2], -0.5 * 9.81 * t**2, rtol=0, atol=2e-5)
 
 
+def test_the_pull_of_an_end_that_came_loose_has_no_direction() -> None:
+    """Its force is what Newton leaves: from then on angles are unknown, and ranges are those of before."""
+    kinds = ("azimuth", "declination", "end_angle", "vertical_force")
+    asked = {kind: {"kind": kind, "line": "b", "end": "end"} for kind in kinds}
+    asked["end_angle"]["direction"] = [0, 0, 1]
+    output = {"every": 0.01, "points": 13, "quantities": asked}
+    breaking = hybrid.run(scene(lines={"b": {"break_at": {"time": 0.5}}}, output=output))
+    with breaking as result, hybrid.run(scene(output=output)) as whole:
+        after = result.t > 0.5 - 1e-9
+        for kind in kinds:
+            known = whole[kind][whole.t < 0.5 + 1e-9]
+            assert np.isfinite(known).all()
+            np.testing.assert_array_equal(result[kind][~after], known[:-1])
+            if kind == "vertical_force":
+                assert (result[kind][after] == 0.0).all()
+                known = np.append(known, 0.0)
+            else:
+                assert np.isnan(result[kind][after]).all()
+            np.testing.assert_allclose(result[f"extremes/{kind}"], [known.min(), known.max()], rtol=1e-9)
+
+
 def test_a_line_breaks_after_the_step_in_which_its_force_is_too_large() -> None:
     with hybrid.run(scene()) as still:
         pull = float(np.linalg.norm(still["points/right/force"][0]))
