@@ -111,6 +111,7 @@ class DomainManager:
         on_base: LineOnBase | None = None,
         curvature_error: float | None = None,
         asked: Mapping[int, float] = MappingProxyType({}),
+        fineness: float = 1.0,
     ) -> None:
         """tolerance: m; given: (n,) 1 force_rod, -1 force_catenary, 0 adaptive; scale: tension scale, N.
 
@@ -118,7 +119,8 @@ class DomainManager:
         dwell: hold time, s; pace: ramp time of bending stiffness, s (None: dwell); on_base: of the model.
         curvature_error: part of the largest curvature that the length of cells, which follow it, may make it wrong by;
         None: they stay as they are.  asked: parts of the largest tension, curvature and moment (numbers of
-        kernels.cell_errors) that leaving bending out may make, where one is asked.
+        kernels.cell_errors) that leaving bending out may make, where one is asked.  fineness: cells that follow the
+        curvature are so many times as short as that asks for.
         """
         n = layout.rod.size
         self.cable, self.layout, self.dwell, self.given = cable, layout, dwell, given
@@ -128,7 +130,7 @@ class DomainManager:
         self.zones = blank_zones(1, n)._replace(  # what the compiled run knows of them
             here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=np.zeros(places, np.int64)
         )
-        self.zones.clock[z.SHARE] = curvature_error or 0.0
+        self.zones.clock[z.SHARE], self.zones.clock[z.FINENESS] = curvature_error or 0.0, fineness
         self.tolerance, self.zones.clock[z.LEFT] = tolerance, left
         for quantity, part in asked.items():
             self.zones.asked[quantity] = part

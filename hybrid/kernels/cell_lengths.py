@@ -3,6 +3,7 @@
     symbol   meaning                                                        unit
     kappa    curvature at a node                                            1/m
     W        wanted length of cells at a node                               m
+    finer    fineness: all lengths asked for are so many times as short     1
     l0       min(sqrt(EI/T), (EI/w)^(1/3)), over which a rod bends          m
     twist    of a rod per length                                            rad/m
     delta    what the chord of a cell is shorter by than its arc            m
@@ -26,6 +27,7 @@ from hybrid.kernels.zone_criteria import depth
 TURN = 0.3  # rad that a cell turns through
 TWIST = 0.25  # rad that a cell of a rod is twisted by: cells that stay have as much (model.build)
 SHORTEST_CELL = 0.6  # of l0
+JOINT_LAYER = 3.0  # of l0: over which a rod bends less beside a hinge, which is no bend of the line
 SHARP = 0.5  # rad: a kink that runs along a line may be as short as this over its curvature, which l0 at rest is not
 NEAR = 3  # nodes to either side whose curvature counts
 EDGE_CELL, EDGE_WIDTH = 1.0, 3.0  # of l0: cells beside a contact edge, and how far from it
@@ -50,39 +52,77 @@ def bending_length(kinds, T, i):
 
 
 @inner
-def shortest_length(l0, kappa, limits):
+def shortest_length(l0, kappa, limits, finer):
     """Below which cells need not be: what a layer, or a kink on its way, of largest curvature kappa asks for."""
-    least = SHORTEST_CELL * l0
+    least = SHORTEST_CELL * l0 / finer
     if kappa > 0.0:
         least = min(least, 0.9 * math.sqrt(8.0 * limits[CURVATURE] / kappa) * min(l0, SHARP / kappa))
     return least
 
 
 @inner
-def wanted_length(line, kinds, T, i, limits):
-    """W at node i; limits: (4,) errors that interpolation may make."""
+def length_by_turn(kinds, i, k, bends, limits, finer):
+    """What curvature k of node i, and |kappa''| there, ask for, m."""
+    W = longest_cell(kinds.EI[i], kinds.w[i], k, bends, limits)
+    return min(W, TURN / (k * finer)) if k > 0.0 else W
+
+
+@inner
+def wanted_length(line, kinds, T, i, limits, finer):
+    """W at node i; limits: (4,) errors that interpolation may make, by cells as fine as asked."""
     n, turn = T.shape[0], kinds.turn
     bends, largest = 0.0, node_curvature(line, turn, i)
     for k in range(max(i - 1, 1), min(i + 2, n)):
         bends = max(bends, second_difference(line, turn, k))
     for k in range(max(i - NEAR, 1), min(i + NEAR + 1, n)):  # flanks of a kink are as sharp as it
         largest = max(largest, node_curvature(line, turn, k))
-    k = node_curvature(line, turn, i)
-    W = longest_cell(kinds.EI[i], kinds.w[i], k, bends, limits)
-    if k > 0.0:
-        W = min(W, TURN / k)
-    return max(W, shortest_length(bending_length(kinds, T, i), largest, limits))
+    W = length_by_turn(kinds, i, node_curvature(line, turn, i), bends, limits, finer)
+    return max(W, shortest_length(bending_length(kinds, T, i), largest, limits, finer))
 
 
 @inner
-def lower_by_twist(zones):
+def is_hinge(line, zones, j):
+    """Whether a joint of a rod and a catenary is at inner node j, or of rods one of which is being let go or blended in."""
+    if line.spin[j] != line.spin[j - 1]:
+        return True
+    a, b = zones.kinds.base_of_cell[j - 1], zones.kinds.base_of_cell[j]
+    return a != b and line.spin[j] == 1 and (zones.leaving[a] != zones.leaving[b] or zones.grown[a] != zones.grown[b])
+
+
+@inner
+def raise_beside(line, zones, j, way, reach, finer):
+    """W at nodes from j on, up or down the line: over `reach`, m, and those whose kappa'' the hinge is part of."""
+    kinds, s, count = zones.kinds, line.s, 0
+    i = j
+    while 0 <= i < s.shape[0] and (count <= 2 or abs(s[i] - s[j]) <= reach):
+        k = node_curvature(line, kinds.turn, i)
+        zones.wanted[i] = max(zones.wanted[i], length_by_turn(kinds, i, k, 0.0, zones.limits, finer))
+        i, count = i + way, count + 1
+
+
+@inner
+def raise_at_hinges(line, state, zones, finer):
+    """W beside hinges: the layer in which a rod bends less there is of the model.
+
+    Cells as short as it would show a curvature that falls to that of a hinge, sharper with every refinement, and be as
+    many at each as a contact edge needs.
+    """
+    for j in range(1, line.h.shape[0]):
+        if is_hinge(line, zones, j):
+            reach = JOINT_LAYER * bending_length(zones.kinds, state.T, j)
+            raise_beside(line, zones, j, 1, reach, finer)
+            raise_beside(line, zones, j, -1, reach, finer)
+
+
+@inner
+def lower_by_twist(zones, finer):
     """W at the nodes of rods: no cell is twisted by more than TWIST, however little the line bends."""
     of, W = zones.kinds.base_of_cell, zones.wanted
     n = of.shape[0]
     for i in range(n + 1):
         twist = zones.kinds.twist[i]
         if twist > 0.0 and (zones.next_rod[of[max(i - 1, 0)]] or zones.next_rod[of[min(i, n - 1)]]):
-            W[i] = min(W[i], TWIST / twist)
+            W[i] = min(W[i], TWIST / (twist * finer))
 
 
 @inner
@@ -95,7 +135,7 @@ def lower_between(W, s, a, b, to):
 
 
 @inner
-def lower_at_edge(line, sea, state, zones, i, dt):
+def lower_at_edge(line, sea, state, zones, i, dt, finer):
     """W about a contact edge in cell i, and over the way that it will go in dt."""
     p, q = depth(sea, state.r, i), depth(sea, state.r, i + 1)
     s, h = line.s, line.s[i + 1] - line.s[i]
@@ -106,17 +146,17 @@ def lower_at_edge(line, sea, state, zones, i, dt):
     at, way = s[i] + part * h, dt * rises * h / (q - p)
     way = min(max(way, -FARTHEST * l0), FARTHEST * l0)
     a, b = at + min(way, 0.0) - EDGE_WIDTH * l0, at + max(way, 0.0) + EDGE_WIDTH * l0
-    lower_between(zones.wanted, s, a, b, EDGE_CELL * l0)
+    lower_between(zones.wanted, s, a, b, EDGE_CELL * l0 / finer)
 
 
 @inner
-def lower_at_edges(line, sea, state, zones, dt):
+def lower_at_edges(line, sea, state, zones, dt, finer):
     """W about all contact edges, and over the way that they will go in dt; graded."""
     n, W, s = line.h.shape[0], zones.wanted, line.s
     if line.bits & SEABED:
         for i in range(n):
             if (depth(sea, state.r, i) > 0.0) != (depth(sea, state.r, i + 1) > 0.0):
-                lower_at_edge(line, sea, state, zones, i, dt)
+                lower_at_edge(line, sea, state, zones, i, dt, finer)
     for i in range(1, n + 1):
         W[i] = min(W[i], W[i - 1] + STEEPEST * (s[i] - s[i - 1]))
     for i in range(n - 1, -1, -1):
@@ -134,15 +174,16 @@ def is_too_long(zones, s):
 
 
 @inner
-def find_wanted(line, sea, state, zones, dt):
+def find_wanted(line, sea, state, zones, dt, finer):
     """Wanted lengths at nodes for the next HORIZON steps of dt into zones.wanted, graded; whether the next needs others."""
     for i in range(line.h.shape[0] + 1):
-        zones.wanted[i] = wanted_length(line, zones.kinds, state.T, i, zones.limits)
-    lower_by_twist(zones)
-    lower_at_edges(line, sea, state, zones, dt)
+        zones.wanted[i] = wanted_length(line, zones.kinds, state.T, i, zones.limits, finer)
+    raise_at_hinges(line, state, zones, finer)
+    lower_by_twist(zones, finer)
+    lower_at_edges(line, sea, state, zones, dt, finer)
     now = is_too_long(zones, line.s)
     if line.bits & SEABED:
-        lower_at_edges(line, sea, state, zones, HORIZON * dt)
+        lower_at_edges(line, sea, state, zones, HORIZON * dt, finer)
     return now
 
 
@@ -202,12 +243,12 @@ def plan_base_cell(line, zones, p, begin, size, unit):
 
 
 @inner
-def plan_cells(line, sea, state, zones, dt):
+def plan_cells(line, sea, state, zones, dt, finer):
     """Places of the finest mesh where nodes should be into zones.plan; whether some are needed at once, or many
 
-    may go; dt: s, of the step before, which the next one is taken to be as long as.
+    may go; dt: s, of the step before, which the next one is taken to be as long as; finer: fineness.
     """
-    at_once = find_wanted(line, sea, state, zones, dt)
+    at_once = find_wanted(line, sea, state, zones, dt, finer)
     begin, p = 0, 0
     for k in range(zones.plan.shape[0]):
         zones.plan[k] = False

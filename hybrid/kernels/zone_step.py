@@ -68,8 +68,9 @@ REJECT_RATIO = 4.0  # a step that ends with a catenary above this is rejected, a
     CALM_STEP, RAMP_STEP,  # longest steps: while nothing is ramped, and else
     SHARE,  # of the largest curvature that the length of cells may make it wrong by, where they follow it; 0: they stay
     LEFT,  # part of what catenaries leave out that remains in results: 1, but for results that are corrected
-) = range(16)  # fmt: skip
-CLOCK_SIZE = 16
+    FINENESS,  # of cells that follow the curvature: those that lengths ask for are so many times as short
+) = range(17)  # fmt: skip
+CLOCK_SIZE = 17
 # Flags of `counts`.
 (
     KNOWN,  # tensions of earlier are of these cells
@@ -131,7 +132,7 @@ def blank_zones(cells: int, base: int) -> Zones:
     """Zones of a line of so many cells and base cells, all catenary."""
     z, nodes = np.zeros, cells + 1
     return Zones(
-        clock=z(CLOCK_SIZE), counts=z(FLAG_COUNT, np.int64),
+        clock=np.where(np.arange(CLOCK_SIZE) == FINENESS, 1.0, 0.0), counts=z(FLAG_COUNT, np.int64),
         kinds=blank_kinds(cells, base),
         clamped=z(2), tangents=z((2, 3)), moments=z((2, 3)), past=z(cells), recent=z(cells),
         asked=z(QUANTITIES), largest=z(QUANTITIES), shares=z(QUANTITIES), limits=z(QUANTITIES), ratios=z((len(CRITERIA), base)), rod=z(base, bool), leaving=z(base, bool), grown=np.ones(base),
@@ -263,9 +264,10 @@ def find_shares(line, state, zones):
         zones.largest[k] = max(zones.largest[k], size)
         share = zones.asked[k] * zones.largest[k] / z[LEFT]
         zones.shares[k], zones.limits[k] = share if share > 0.0 else math.inf, math.inf
-    zones.shares[POSITION], zones.limits[POSITION] = z[TOLERANCE] / z[LEFT], z[TOLERANCE]
+    finer = 1.0 / (z[FINENESS] * z[FINENESS])  # of second order
+    zones.shares[POSITION], zones.limits[POSITION] = z[TOLERANCE] / z[LEFT], z[TOLERANCE] * finer
     if z[SHARE] > 0.0 and zones.largest[CURVATURE] > 0.0:
-        zones.limits[CURVATURE] = z[SHARE] * zones.largest[CURVATURE]
+        zones.limits[CURVATURE] = z[SHARE] * zones.largest[CURVATURE] * finer
 
 
 @inner
@@ -344,7 +346,7 @@ def other_cells(line, sea, state, zones, dt):
     for j in range(zones.rod.shape[0]):
         zones.next_rod[j] = zones.rod[j]
     z[DT] = dt
-    return plan_cells(line, sea, state, zones, dt)
+    return plan_cells(line, sea, state, zones, dt, z[FINENESS])
 
 
 @inner
@@ -379,7 +381,8 @@ def take_arcs(table):
 def plan_nodes(table):
     """Places of nodes for the state `new` of a job and rods zones.next_rod, into zones.plan."""
     job = read(table)
-    plan_cells(job.line, job.sea, job.new, job.zones, job.zones.clock[DT])
+    clock = job.zones.clock
+    plan_cells(job.line, job.sea, job.new, job.zones, clock[DT], clock[FINENESS])
 
 
 @kernel

@@ -59,15 +59,12 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
     pace = max(HOLD * model.time_scale, LEAST_STEPS_HELD * step)
     hold = wanted.hold_time if wanted.hold_time is not None else pace
     curvature_error = wanted.curvature_error if follows_curvature(scene) else None
-    asked = shares_asked(scene, curvature_error)
-    if curvature_error is not None:  # finer meshes have smaller errors: of second order
-        curvature_error /= resolution.fineness**2
     ramp = min(max(hold, FASTEST * step), SLOWEST * pace)
     manager = DomainManager(
         model.cable, model.layout, resolution.zones * model.length, hold, _given(scene, model, ramp),
         model.tension_scale, criterion, ramp,
         LEFT if model.corrected else 1.0, model.on_base,
-        curvature_error, asked,
+        curvature_error, shares_asked(scene, curvature_error), resolution.fineness,
     )  # fmt: skip
     manager.load(model.ends.moments)
     return manager

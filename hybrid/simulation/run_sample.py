@@ -41,7 +41,7 @@ class RunSample:
 
     resolution: Resolution
     values: Mapping[str, Outputs]
-    cells: int  # of zones that move: base cells
+    cells: int  # of zones that move: base cells; of cells that follow: those beyond these (`compared_cells`)
     steps: int
     cpu: float  # s
     every: int = 1  # outputs of the result to one of these; the last is there always
@@ -75,9 +75,22 @@ class RunSample:
         return out | blank | {x: {name: np.asarray(y) for name, y in found.items()} for x, found in kept.items()}
 
 
-def compared_cells(model: Model) -> int:
-    """Cells by which meshes of one scene are compared: of zones that move, their base cells."""
-    return model.cells if model.layout is None else int(model.layout.rod.size)
+def compared_cells(model: Model, cells: float = 0.0) -> int:
+    """Cells by which meshes of one scene are compared: of zones that move, their base cells.
+
+    cells: the mean number of cells that follow the curvature, which counts those beyond their base cells: base cells
+    stay whatever the fineness, and where there are no others finer runs are no finer.  0: cells follow nothing.
+    """
+    if model.layout is None:
+        return model.cells
+    base = int(model.layout.rod.size)
+    return max(1, round(cells) - base) if cells else base
+
+
+def mean_cells(nodes: np.ndarray) -> float:
+    """The mean number of cells of outputs, from the words of `store.records.there` (nt, words)."""
+    bits = np.unpackbits(np.ascontiguousarray(nodes, "<i8").view(np.uint8), axis=1)
+    return float(bits.sum(axis=1).mean()) - 1.0
 
 
 def catenary_share(zones: Sequence[Zone | ZoneRow]) -> float:
