@@ -17,12 +17,21 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.bed import bed_under
-from hybrid.kernels.cell_errors import CURVATURE, layer_length, longest_cell, node_curvature, second_difference
+from hybrid.kernels.cell_errors import (
+    CURVATURE,
+    lack_at_edge,
+    layer_length,
+    longest_cell,
+    node_curvature,
+    over_shares,
+    second_difference,
+)
 from hybrid.kernels.compile import inner
+from hybrid.kernels.criteria import EDGE
 from hybrid.kernels.forces import SEABED
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.rotations import dot, scale, sub
-from hybrid.kernels.zone_criteria import depth
+from hybrid.kernels.zone_criteria import FORESEEN, depth, raise_ratio
 
 TURN = 0.3  # rad that a cell turns through
 TWIST = 0.25  # rad that a cell of a rod is twisted by: cells that stay have as much (model.build)
@@ -32,6 +41,7 @@ SHARP = 0.5  # rad: a kink that runs along a line may be as short as this over i
 NEAR = 3  # nodes to either side whose curvature counts
 EDGE_CELL, EDGE_WIDTH = 1.0, 3.0  # of l0: cells beside a contact edge, and how far from it
 FARTHEST = 30.0  # of l0: how far an edge is foreseen to go in a step
+FARTHEST_KIND = 0.1  # of the line: how far where kinds are chosen, for a ramp time ahead
 HORIZON = 2.5  # steps of the way of an edge for which cells are made when they change, so that fewer steps do
 STEEPEST = 0.8  # by which W may grow with s: cells beside each other differ by little more than 2
 AHEAD = 0.75  # of W from which cells are halved where others must be: changes become fewer
@@ -135,18 +145,56 @@ def lower_between(W, s, a, b, to):
 
 
 @inner
-def lower_at_edge(line, sea, state, zones, i, dt, finer):
-    """W about a contact edge in cell i, and over the way that it will go in dt."""
+def edge_at(line, sea, state, i):
+    """Where in cell i contact with the bed begins or ends, m, and how fast that place goes along the line, m/s."""
     p, q = depth(sea, state.r, i), depth(sea, state.r, i + 1)
-    s, h = line.s, line.s[i + 1] - line.s[i]
-    part = p / (p - q)
+    h, part = line.s[i + 1] - line.s[i], p / (p - q)
     normal, _ = bed_under(sea, get3(state.r, i))
     rises = (1.0 - part) * dot(normal, get3(state.v, i)) + part * dot(normal, get3(state.v, i + 1))
+    return line.s[i] + part * h, rises * h / (q - p)
+
+
+@inner
+def is_edge(line, sea, state, i):
+    """Whether contact with the bed begins or ends in cell i."""
+    return (depth(sea, state.r, i) > 0.0) != (depth(sea, state.r, i + 1) > 0.0)
+
+
+@inner
+def lower_at_edge(line, sea, state, zones, i, dt, finer):
+    """W about a contact edge in cell i, and over the way that it will go in dt."""
     l0 = bending_length(zones.kinds, state.T, i)
-    at, way = s[i] + part * h, dt * rises * h / (q - p)
-    way = min(max(way, -FARTHEST * l0), FARTHEST * l0)
+    at, speed = edge_at(line, sea, state, i)
+    way = min(max(dt * speed, -FARTHEST * l0), FARTHEST * l0)
     a, b = at + min(way, 0.0) - EDGE_WIDTH * l0, at + max(way, 0.0) + EDGE_WIDTH * l0
-    lower_between(zones.wanted, s, a, b, EDGE_CELL * l0 / finer)
+    lower_between(zones.wanted, line.s, a, b, EDGE_CELL * l0 / finer)
+
+
+@inner
+def foresee_edge(line, sea, state, zones, i, time):
+    """Raise the ratio of base cells over the way that a contact edge in cell i goes in `time`, s: the stiffness of
+
+    rods takes so long to come, and the edge would be there before them.
+    """
+    kinds, length = zones.kinds, line.s[line.h.shape[0]] - line.s[0]
+    low = max(state.T[i], kinds.floor[i], 1e-300)
+    x = min(over_shares(lack_at_edge(kinds.EI[i], kinds.w[i], low), zones.shares), FORESEEN)
+    at, speed = edge_at(line, sea, state, i)
+    way = min(max(time * speed, -FARTHEST_KIND * length), FARTHEST_KIND * length)
+    a, b, begin = at + min(way, 0.0), at + max(way, 0.0), line.s[0]
+    for j in range(zones.H.shape[0]):
+        if begin <= b and begin + zones.H[j] >= a:
+            raise_ratio(zones.ratios, EDGE, j, j, x)
+        begin += zones.H[j]
+
+
+@inner
+def foresee_edges(line, sea, state, zones, time):
+    """`foresee_edge` of all contact edges."""
+    if line.bits & SEABED:
+        for i in range(line.h.shape[0]):
+            if is_edge(line, sea, state, i):
+                foresee_edge(line, sea, state, zones, i, time)
 
 
 @inner
@@ -155,7 +203,7 @@ def lower_at_edges(line, sea, state, zones, dt, finer):
     n, W, s = line.h.shape[0], zones.wanted, line.s
     if line.bits & SEABED:
         for i in range(n):
-            if (depth(sea, state.r, i) > 0.0) != (depth(sea, state.r, i + 1) > 0.0):
+            if is_edge(line, sea, state, i):
                 lower_at_edge(line, sea, state, zones, i, dt, finer)
     for i in range(1, n + 1):
         W[i] = min(W[i], W[i - 1] + STEEPEST * (s[i] - s[i - 1]))

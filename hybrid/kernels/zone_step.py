@@ -25,7 +25,7 @@ from hybrid.kernels.cell_errors import (
     lack_of_torque,
     over_shares,
 )
-from hybrid.kernels.cell_lengths import FADE, arc_less_chord, follow_arcs, plan_cells
+from hybrid.kernels.cell_lengths import FADE, arc_less_chord, follow_arcs, foresee_edges, plan_cells
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.criteria import CLAMP, CONTACT, CRITERIA, TORSION
 from hybrid.kernels.energies import observe
@@ -290,6 +290,8 @@ def evaluate(line, sea, ends, state, zones, near, dt):
     find_turns(line, zones.tangents, state.e, state.a1, state.T, z[TORQUE], zones.kinds)
     find_shares(line, state, zones)
     raise_ratios(line, sea, state, zones.past, ahead, zones.shares, zones.kinds, zones.ratios)
+    if z[SHARE] > 0.0:
+        foresee_edges(line, sea, state, zones, z[PACE])
     if flags[LOADED]:
         weigh_moments(state, zones)
     weigh_contact(near, zones)

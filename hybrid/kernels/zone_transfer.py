@@ -119,38 +119,60 @@ def secant(x, s, c):
 
 
 @inner
-def slope(x, s, single, i, c):
-    """Derivative at node i on the side of cell c, of the parabola; one-sided where it may jump."""
+def third_derivative(x, s, single, i):
+    """At inner node i, from the second divided differences of the nodes beside it that are smooth.
+
+    That of a node belongs to the mean of the three places that it is made of.
+    """
+    lo, hi = i if single[i - 1] else i - 1, i if single[i + 1] else i + 1
+    if lo == hi:
+        return (0.0, 0.0, 0.0)
+    one = scale(2.0 / (s[lo + 1] - s[lo - 1]), sub(secant(x, s, lo), secant(x, s, lo - 1)))
+    two = scale(2.0 / (s[hi + 1] - s[hi - 1]), sub(secant(x, s, hi), secant(x, s, hi - 1)))
+    way = (s[hi - 1] + s[hi] + s[hi + 1] - s[lo - 1] - s[lo] - s[lo + 1]) / 3.0
+    return scale(1.0 / way, sub(two, one))
+
+
+@inner
+def slope(x, s, single, i, c, third):
+    """Derivative at node i on the side of cell c, of the parabola; one-sided where it may jump.
+
+    third: less what the third derivative makes of it, without which the second one of the cubic is off by a part of a
+    cell times that.
+    """
     n = s.shape[0] - 1
     if not single[i]:
         ha, hb = s[i] - s[i - 1], s[i + 1] - s[i]
-        return scale(1.0 / (ha + hb), add(scale(hb, secant(x, s, i - 1)), scale(ha, secant(x, s, i))))
+        found = scale(1.0 / (ha + hb), add(scale(hb, secant(x, s, i - 1)), scale(ha, secant(x, s, i))))
+        if third:
+            found = sub(found, scale(ha * hb / 6.0, third_derivative(x, s, single, i)))
+        return found
     far = min(max(c + 1 if c == i else c - 1, 0), n - 1)
     near, hn, hf = secant(x, s, c), s[c + 1] - s[c], s[far + 1] - s[far]
     return add(near, scale(hn / (hn + hf), sub(near, secant(x, s, far))))
 
 
 @inner
-def between(x, s, single, c, part):
+def between(x, s, single, c, part, third):
     """Value at a part of cell c, on a cubic."""
     H, q = s[c + 1] - s[c], part
     a = scale((1.0 + 2.0 * q) * (1.0 - q) ** 2, get3(x, c))
     b = scale(q * q * (3.0 - 2.0 * q), get3(x, c + 1))
-    ma = scale(H * q * (1.0 - q) ** 2, slope(x, s, single, c, c))
-    mb = scale(H * q * q * (q - 1.0), slope(x, s, single, c + 1, c))
+    ma = scale(H * q * (1.0 - q) ** 2, slope(x, s, single, c, c, third))
+    mb = scale(H * q * q * (q - 1.0), slope(x, s, single, c + 1, c, third))
     return add(add(a, b), add(ma, mb))
 
 
 @inner
-def carry_nodes(x, out, s, at, match):
-    """What is smooth along the line (N+1, 3) to the new nodes."""
+def carry_nodes(x, out, s, at, match, third):
+    """What is smooth along the line (N+1, 3) to the new nodes; third: as of `slope`."""
     for i in range(out.shape[0]):
         a = match.same[i]
         if a >= 0:
             put3(out, i, get3(x, a))
         else:
             c = match.left[i]
-            put3(out, i, between(x, s, match.single, c, (at[i] - s[c]) / (s[c + 1] - s[c])))
+            put3(out, i, between(x, s, match.single, c, (at[i] - s[c]) / (s[c + 1] - s[c]), third))
 
 
 @inner
@@ -425,10 +447,11 @@ def carry_frames(job):
 def transfer_state(job):
     line, target, state, out, match = job.line, job.target, job.state, job.out, job.match
     find_match(job)
-    carry_nodes(state.r, out.r, line.s, target.s, match)
-    carry_nodes(state.v, out.v, line.s, target.s, match)
-    carry_nodes(state.a, out.a, line.s, target.s, match)
-    carry_nodes(state.vd, out.vd, line.s, target.s, match)
+    third = not job.shifts[0]  # where cells follow the curvature, and are what it is known by
+    carry_nodes(state.r, out.r, line.s, target.s, match, third)
+    carry_nodes(state.v, out.v, line.s, target.s, match, third)
+    carry_nodes(state.a, out.a, line.s, target.s, match, third)
+    carry_nodes(state.vd, out.vd, line.s, target.s, match, third)
     carry_linearly(state.slip, out.slip, line.s, target.s, match)
     carry_cells(job)
     if job.shifts[0]:  # of cells that follow it would be a kick at every change

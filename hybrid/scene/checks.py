@@ -372,6 +372,8 @@ def _layers_are_meshed(
         why = f"{'mesh' if mesh is not None else 'model.zones'} already says where the cells are"
     elif isinstance(model, AdaptiveModel) and model.rod_cell is not None:
         why = "model.rod_cell already says how long the cells of rods are"
+    elif isinstance(model, AdaptiveModel) and model.curvature_error is not None:
+        why = "cells follow the curvature, as model.curvature_error has it"
     elif not rods:
         why = "no part of the cable is a rod (model), and bending fades in rods alone"
     if why:

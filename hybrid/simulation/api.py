@@ -338,7 +338,8 @@ def _free(scene: Scene) -> Free:
     time = scene.time
     steps = time is not None and time.controlled and time.tolerance is None
     # where cells follow the curvature its share decides kinds, and the tolerance cells as well: both stay
-    return Free(mesh_is_free(scene), steps, zones_are_free(scene) and not follows_curvature(scene))
+    follows = follows_curvature(scene)
+    return Free(mesh_is_free(scene), steps, zones_are_free(scene) and not follows, follows)
 
 
 def _expect(case: Case, resolution: Resolution, surveys: bool) -> None:

@@ -48,9 +48,9 @@ from hybrid.simulation.run_sample import (
     RunSample,
     catenary_share,
     compared_cells,
-    mean_cells,
     rows_key,
     split_outputs,
+    usual_cells,
 )
 from hybrid.simulation.time_loop import FORCE_COLUMNS, SAME_STOP, TimeLoop
 from hybrid.simulation.transient import Transient
@@ -240,7 +240,7 @@ class Case:
 
     def _compared(self, run: Transient, target: Target, cpu: float) -> RunSample:
         """What is to be compared of a complete result."""
-        resolution, cells = run.resolution, compared_cells(run.model)  # base cells, until the file is read
+        resolution, cells = run.resolution, compared_cells(run.model)
         if not wants_errors(self.scene):
             return RunSample(resolution, {}, cells, run.steps, 0.0)
         assert not isinstance(target, MemoryTarget), "errors are written into a file"
@@ -252,8 +252,8 @@ class Case:
             stay = target if many and isinstance(target, Path) and requested_accuracy(self.scene) is None else None
             found = {name: StoredArray(stay, name) if stay is not None else x[()] for name, x in stored.items()}
             unresolved = b"unresolved bend" in file["events/kind"][()]
-            if THERE in file:
-                cells = compared_cells(run.model, mean_cells(file[THERE][()]))
+            if follows_curvature(self.scene):
+                cells = compared_cells(run.model, resolution.fineness, usual_cells(file[THERE][()]))
             forces = np.column_stack([file[f"steps/{name}"][()] for name in FORCES])
         values, model_error = split_outputs(found)
         notes: Notes = ()
@@ -313,7 +313,7 @@ class Case:
         return RunSample(
             resolution,
             values,
-            compared_cells(model, loop.mean_cells if follows_curvature(self.scene) else 0.0),
+            compared_cells(model, resolution.fineness if follows_curvature(self.scene) else 0.0),
             loop.run.steps,
             cpu,
             resolution.every,

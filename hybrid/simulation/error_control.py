@@ -282,8 +282,13 @@ class ErrorController:
         estimate = Estimate(result, *self.comparisons)
         self._set_statistics(result, *self.comparisons)
         if not estimate.has_mesh:
-            text = f"no error figure: {result.cells} cells are so few that there is nothing coarser to compare with"
-            self._notes.append(("no error figure", text))
+            few = f"{result.cells} cells are so few that there is nothing coarser to compare with"
+            if self.free.follows:
+                few = (
+                    "cells follow the curvature, and nearly all are base cells, which stay: coarser runs have the same "
+                    "ones; a smaller model.curvature_error, or fewer base cells (mesh.cells)"
+                )
+            self._notes.append(("no error figure", f"no error figure: {few}"))
             self._notes += [*result.notes, *estimate.notes]
             return False
         if self.moves and not estimate.has_step:

@@ -35,6 +35,7 @@ class Free(NamedTuple):
     mesh: bool
     steps: bool
     zones: bool
+    follows: bool = False  # whether cells follow the curvature
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,9 @@ END_FORCES = {"reaction_start": "end_force_start", "reaction_end": "end_force_en
 # What datasets of errors of neglected bending begin with, and the kind of events that say they are not known.
 MODEL_ERRORS, NOT_ESTIMATED = "errors/model/", "model error not estimated"
 
+# What cells that follow the curvature count as at fineness 1; and the part of base cells that must have been halved.
+OF_FOLLOWING, FEWEST_HALVED = 1000, 0.1
+
 # In memory, in the file of a complete result, or in a file beside that.
 Outputs = np.ndarray | StoredArray | StoredRows
 Notes = tuple[tuple[str, str], ...]  # events of the whole line, at t = 0: kind and text
@@ -41,7 +44,7 @@ class RunSample:
 
     resolution: Resolution
     values: Mapping[str, Outputs]
-    cells: int  # of zones that move: base cells; of cells that follow: those beyond these (`compared_cells`)
+    cells: int  # of zones that move: base cells; of cells that follow: by their fineness (`compared_cells`)
     steps: int
     cpu: float  # s
     every: int = 1  # outputs of the result to one of these; the last is there always
@@ -75,22 +78,26 @@ class RunSample:
         return out | blank | {x: {name: np.asarray(y) for name, y in found.items()} for x, found in kept.items()}
 
 
-def compared_cells(model: Model, cells: float = 0.0) -> int:
+def compared_cells(model: Model, fineness: float = 0.0, cells: float = np.inf) -> int:
     """Cells by which meshes of one scene are compared: of zones that move, their base cells.
 
-    cells: the mean number of cells that follow the curvature, which counts those beyond their base cells: base cells
-    stay whatever the fineness, and where there are no others finer runs are no finer.  0: cells follow nothing.
+    fineness: of cells that follow the curvature, 0: they do not.  All that sets their lengths goes with it, and their
+    number with the steps as well, over which contact edges go: it counts as `OF_FOLLOWING` at fineness 1.  cells: how
+    many there are in most outputs; where nearly all are base cells, which stay, a finer run is
+    no finer, and counts as one.
     """
     if model.layout is None:
         return model.cells
     base = int(model.layout.rod.size)
-    return max(1, round(cells) - base) if cells else base
+    if not fineness:
+        return base
+    return max(1, round(OF_FOLLOWING * fineness)) if cells > base + max(FEWEST_HALVED * base, 1.0) else 1
 
 
-def mean_cells(nodes: np.ndarray) -> float:
-    """The mean number of cells of outputs, from the words of `store.records.there` (nt, words)."""
+def usual_cells(nodes: np.ndarray) -> float:
+    """The median number of cells of outputs, from the words of `store.records.there` (nt, words)."""
     bits = np.unpackbits(np.ascontiguousarray(nodes, "<i8").view(np.uint8), axis=1)
-    return float(bits.sum(axis=1).mean()) - 1.0
+    return float(np.median(bits.sum(axis=1))) - 1.0
 
 
 def catenary_share(zones: Sequence[Zone | ZoneRow]) -> float:

@@ -90,7 +90,6 @@ class TimeLoop:
         self._aside: list[tuple[Model, Output]] = []  # outputs that wait, each of a line of its own
         self._ratios: list[np.ndarray] = []  # (criteria, points) of outputs that wait, where criteria are written
         run.asks_samples = run.switching is not None and observer.writes_criteria
-        self._seen = np.zeros(2)  # cells of all outputs, and their number
         self._kept = (-1, 0)  # steps and changes at the last checkpoint
         self._logged = 0.0  # s of processor time since then, at the last row of the log
 
@@ -260,11 +259,6 @@ class TimeLoop:
         of_states = not observer.writes_criteria and observer.quantities is None and self.run.correction is None
         return of_states and not line.law.size and line.h.size >= FEWEST_JOINED
 
-    @property
-    def mean_cells(self) -> float:
-        """The mean number of cells of the outputs since the run began, or was taken up again."""
-        return float(self._seen[0] / max(self._seen[1], 1.0))
-
     def _put_aside(self, outputs: list[Output]) -> None:
         """Outputs of a line of the zones of now, to be recorded with others."""
         self._aside += [(self.run.model, x) for x in outputs]
@@ -282,7 +276,6 @@ class TimeLoop:
         observer, seen = self.observer.look_at(outputs)
         values = observer.values_of(seen)
         self.observer.first_energy = observer.first_energy
-        self._seen += [sum(x.line.h.size for x in outputs), len(outputs)]
         zones = [observer.rows_of(x.zones) for x in outputs]
         self.recorder.save_batch(seen.batch.t.copy(), values, zones[0], zones[1:])
         if self.target is not None:
@@ -303,7 +296,6 @@ class TimeLoop:
     def _record(self, batch: Batch, errors: np.ndarray) -> None:
         """Record outputs, and look at them; errors: of the model, as sampled with them."""
         run, model = self.run, self.run.model
-        self._seen += [batch.t.size * model.cells, batch.t.size]
         if model is not self._observed:
             self.observer, self._observed = self.observer.on(model.line, model.sea.values, model.zones), model
         observer, ratios, count = self.observer, None, batch.t.size

@@ -6,17 +6,18 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from adapt_cases import cable, hanging, layout, on, state_on, still
+from adapt_cases import Z, cable, hanging, layout, on, state_on, still
 
-import hybrid
 from hybrid.adapt.manager import DomainManager
+from hybrid.adapt.state_transfer import transfer_to
 from hybrid.kernels.binding import Table
+from hybrid.kernels.criteria import EDGE
+from hybrid.kernels.forces import SEABED
 from hybrid.kernels.state import Floats, no_sea
 from hybrid.kernels.zone_step import blank_zone_job, plan_nodes
-from hybrid.model.resolution import wants_survey
-from hybrid.simulation.run_sample import compared_cells, mean_cells
-from hybrid.store.records import MeshHistory, ZoneHistory, there
-from hybrid.store.records import Zone as ZoneRow
+from hybrid.kernels.zone_transfer import blank_transfer, transfer
+from hybrid.simulation.run_sample import compared_cells, usual_cells
+from hybrid.store.records import there
 
 
 def planned(shape, fineness=1.0, share=0.02, leaving=(), every=1) -> Floats:
@@ -67,36 +68,51 @@ def test_no_cells_are_spent_on_the_layer_of_a_hinge() -> None:
     assert near[1] > 4.0 * near[0], near
 
 
-FOLLOWS = {
-    "environment": {"fluid": {"density": 1025}},
-    "cable": {"sections": [{"length": 60, "mass": 1.0, "diameter": 0.03, "bending_stiffness": 20.0}]},
-    "ends": {
-        "start": {"kind": "pinned", "position": [0, 0, 0]},
-        "end": {"kind": "pinned", "position": [40, 0, -20], "motion": {"surge": {"amplitude": 1, "period": 6}, "ramp": 12}},
-    },
-    "initial": "equilibrium",
-    "model": {"kind": "adaptive", "curvature_error": 0.1},
-    "time": {"duration": 6.0},
-    "accuracy": {"curvature": "10%"},
-}  # fmt: skip
-
-
-def test_runs_are_compared_by_the_cells_beyond_those_that_stay() -> None:
-    """Base cells are as many at any fineness; where there are no others a finer run is no finer."""
-    zones = layout(np.linspace(0.0, 10.0, 9), 8, "R" * 8)
-    model = type("Model", (), {"layout": zones, "cells": 64})
-    assert (compared_cells(model, 30.4), compared_cells(model, 8.0), compared_cells(model)) == (22, 1, 8)
+def test_runs_are_compared_by_their_fineness() -> None:
+    """Base cells are as many at any fineness; where there are hardly any others a finer run is no finer."""
+    zones = layout(np.linspace(0.0, 10.0, 21), 8, "R" * 20)
+    model = type("Model", (), {"layout": zones, "cells": 160})
+    fine, coarse = compared_cells(model, 1.5, 31.0), compared_cells(model, 0.75)
+    assert fine == 2 * coarse
+    assert compared_cells(model, 1.5, 22.0) < coarse
+    assert compared_cells(model) == 20
     s = np.linspace(0.0, 1.0, 101)
     words = np.array([there(s, s[::k]) for k in (1, 10, 50)])
-    assert mean_cells(words) == pytest.approx((100 + 10 + 2) / 3.0)
-    assert not wants_survey(hybrid.validate_scene(FOLLOWS))
+    assert usual_cells(words) == 10
 
 
-def test_mesh_of_a_result_has_the_nodes_of_catenaries_too() -> None:
-    """Cells of catenaries follow as those of rods do."""
-    s = np.linspace(0.0, 4.0, 9)
-    words = np.array([there(s, s[[0, 1, 4, 6, 8]])])
-    zones = ZoneHistory(np.array([0, 0]), [ZoneRow("rod", 0.0, 2.0), ZoneRow("catenary", 2.0, 4.0)], 1)
-    (mesh,) = MeshHistory(s, np.isin(s, (0.0, 2.0, 4.0)), zones, words)
-    assert mesh.s.tolist() == [0.0, 0.5, 2.0, 3.0, 4.0]
-    assert list(mesh.kinds) == ["rod", "rod", "catenary", "catenary"]
+@pytest.mark.parametrize(
+    ("speed", "share", "raised"),
+    [(10.0, 0.05, range(9, 13)), (-10.0, 0.05, range(8, 12)), (10.0, None, range(9, 12))],
+)
+def test_contact_is_foreseen_where_its_edge_goes_in_a_ramp_time(speed: float, share: float | None, raised) -> None:
+    """A straight line lies on a bed up to s = 52 m, and 20 m further 2 s later, of which a tenth of the line counts."""
+    what, zones = cable(100.0), layout(np.linspace(0.0, 100.0, 21), 1, "C" * 20)
+    line = on(what, zones, SEABED)
+    sea = no_sea(line.h.size)._replace(normal=Z, offset=0.0, onset=0.0, stiffness=1e3)
+    state = state_on(line, lambda s: np.column_stack([s, 0.0 * s, 0.01 * (s - 52.0)]), 50.0)
+    state.v[:, 2] = -0.01 * speed
+    manager = DomainManager(what, zones, 1.0, 2.0, np.zeros(20, int), 1.0, curvature_error=share)
+    manager.evaluate_criteria(line, sea, still(), state, 0.0)
+    assert np.flatnonzero(manager.ratios[EDGE]).tolist() == list(raised)
+
+
+@pytest.mark.parametrize("follows", [True, False])
+def test_new_nodes_have_the_curvature_of_the_line(follows: bool) -> None:
+    """A long cell beside short ones is cut into four: the second derivative there is that of the curve.
+
+    That of a cubic with the slopes of parabolas is off by half a cell times the change of curvature.
+    """
+    what, zones = cable(10.0), layout(np.linspace(0.0, 10.0, 6), 8, "R" * 5)
+    old = zones._replace(here=np.isin(np.arange(41), [0, 4, *range(8, 17), 24, 32, 40]))
+    new = old._replace(here=old.here | np.isin(np.arange(41), range(16, 25, 2)))
+    line, target = on(what, old), on(what, new)
+    change = 1e-3  # of the curvature, 1/m2
+    state = state_on(line, lambda s: np.column_stack([s, 0.0 * s, change * (s - 2.0) ** 3 / 6.0]))
+    job = transfer_to(old, new, line, target, state, np.zeros(6, bool), np.zeros(5), shifts=not follows)
+    transfer(Table(blank_transfer()._replace(**job._asdict())).numbers)
+    s, z = new.nodes, job.out.r[:, 2]
+    bend = 2.0 * np.diff(np.diff(z) / np.diff(s)) / (s[2:] - s[:-2])
+    place = (s[:-2] + s[1:-1] + s[2:]) / 3.0  # that a second divided difference belongs to
+    error = abs(bend - change * (place - 2.0))[(s[1:-1] > 3.9) & (s[1:-1] < 6.1)].max()
+    assert (error < 1e-9 * change) == follows, error / change
