@@ -17,7 +17,7 @@ from hybrid.model.line import line_on
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import Zone
-from hybrid.model.payout_law import extremes, law_of, least_length, length_at, refuse
+from hybrid.model.payout_law import extremes, law_of, least_length, lengths_at, refuse
 from hybrid.scene.payout import Payout
 from hybrid.scene.schema import AdaptiveModel, Modules, Scene, Section
 
@@ -107,9 +107,9 @@ class PayoutPlan:
             cells = self.cells(self.longest)
             return PayoutForecast(by, self.first, math.nan, self.shortest, self.longest, math.nan, cells, math.nan)
         t = np.linspace(0.0, duration, 2001)
-        lengths = np.array([length_at(self.law, x)[:2] for x in t])
-        counts = np.searchsorted(self.nodes, lengths[:, 0])
-        last, rate = float(lengths[-1, 0]), float(np.abs(lengths[:, 1]).max())
+        lengths, rates = lengths_at(self.law, t)
+        counts = np.searchsorted(self.nodes, lengths)
+        last, rate = float(lengths[-1]), float(np.abs(rates).max())
         low, high = extremes(self.law, self.first, duration)
         return PayoutForecast("", self.first, last, low, high, rate, self.cells(high), float(counts.mean()))
 
@@ -167,8 +167,9 @@ class PayoutPlan:
         """The zones of a line of that length, m; zones: those that it has, if they move."""
         zones = zones or self.zones
         if self.side:
-            return (*zones[:-1], replace(zones[-1], s_b=length))
-        return (replace(zones[0], s_a=self.far - length), *zones[1:])
+            last = zones[-1]
+            return (*zones[:-1], Zone(last.kind, last.s_a, length))
+        return (Zone(zones[0].kind, self.far - length, zones[0].s_b), *zones[1:])
 
     def _footing(self, like: Line, nodes: int) -> Floats:
         """Bodies that press on the seabed; those of the nodes that come are none."""

@@ -125,7 +125,17 @@ def fastest(law: Floats) -> float:
     """Largest size of the rate, m/s, that a law of length has."""
     last = float(law[-1, 0])
     t = np.unique(np.concatenate([np.linspace(0.0, last + 1.0, 501), law[:, 0], law[:, 0] + 1e-9 * (last + 1.0)]))
-    return max(abs(length_at(law, x)[1]) for x in t.tolist())
+    return float(np.abs(lengths_at(law, t)[1]).max())
+
+
+def lengths_at(law: Floats, t: Floats) -> tuple[Floats, Floats]:
+    """Lengths (n,) m that are out at times t (n,) s, and their rates, m/s, just before t where they jump."""
+    rows = law[np.maximum(np.searchsorted(law[:, 0], t) - 1, 0)]
+    x, value, rate = np.maximum(t - rows[:, 0], 0.0), np.zeros(t.size), np.zeros(t.size)
+    for c in rows.T[1:]:
+        rate = rate * x + value
+        value = value * x + c
+    return value, rate
 
 
 def least_length(law: Floats, length: float) -> float:
@@ -137,8 +147,5 @@ def least_length(law: Floats, length: float) -> float:
 def extremes(law: Floats, length: float, duration: float) -> tuple[float, float]:
     """Shortest and longest length, m, up to a time, s."""
     t = np.unique(np.concatenate([np.linspace(0.0, duration, 2001), law[(law[:, 0] <= duration), 0]]))
-    rows = law[np.maximum(np.searchsorted(law[:, 0], t) - 1, 0)]
-    x, found = np.maximum(t - rows[:, 0], 0.0), np.zeros(t.size)
-    for j in range(1, law.shape[1]):
-        found = found * x + rows[:, j]
+    found, _ = lengths_at(law, t)
     return float(min(found.min(), length)), float(max(found.max(), length))

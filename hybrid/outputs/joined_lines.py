@@ -78,10 +78,20 @@ class JoinedGrid(Grid):
 
     @cached_property
     def held(self) -> Rows:
-        at = np.concatenate([grid._held_at for grid in self.of])
-        start, end = (np.concatenate(x) for x in zip(*(grid._held_between for grid in self.of), strict=True))
         before = self._before + self._lines_before  # each line before has one column more than nodes
-        return linear(at, self.s, start + before, end + before)
+        if any(b - a == 1 for a, b, _ in self.spans):  # where values beside a stretch may count
+            at = np.concatenate([grid._held_at for grid in self.of])
+            start, end = (np.concatenate(x) for x in zip(*(grid._held_between for grid in self.of), strict=True))
+            return linear(at, self.s, start + before, end + before)
+        x, first, last, lines = self._x, self.begin[:-1], self.begin[1:] - 1, np.arange(len(self.of))
+        at = np.empty(x.size + lines.size)
+        middle = 0.5 * (x[:-1] + x[1:])  # those between two lines are overwritten
+        at[np.arange(x.size - 1) + np.repeat(lines, np.diff(self.begin))[:-1] + 1] = middle
+        at[first + lines], at[last + lines + 1] = x[first], x[last]
+        of = self._lines_before
+        start = np.where(self.s < middle[first][of], first[of], self._first + 1) + of
+        end = np.where(self.s > middle[last - 1][of], last[of] + 1, self._last) + of
+        return linear(at, self.s, start, end)
 
     @cached_property
     def sides(self) -> Rows:

@@ -98,7 +98,7 @@ class Grid:
         """
         nodes_s = np.require(nodes_s, float, ("C", "W"))  # so that kernels have one signature
         self.loads, self.changes, self.after = tuple(loads), tuple(changes), after
-        self.parts = stretches(zones, loads)
+        self.parts, self._kinds = stretches(zones, loads), [zone.kind for zone in zones]
         bounds = np.array([self.parts[0].s_a, *(part.s_b for part in self.parts)])
         cuts = np.abs(nodes_s - bounds[:, None]).argmin(axis=1)  # their nodes
         # first node, last node, offset of the stretch's sides: every joint before it has one side more
@@ -114,10 +114,38 @@ class Grid:
         self._stretch = np.searchsorted(self._joints, s)
         self._first, self._last = self._cuts[self._stretch], self._cuts[self._stretch + 1]  # of each point's stretch
 
+    def suits(self, nodes_s: Floats, zones: Sequence[Zone]) -> bool:
+        """Whether a line of these nodes (N+1,) m and zones has the same cells in the same stretches, but for its ends.
+
+        Its nodes are the same except the first or the last few, and it is cut at nodes that stay.
+        """
+        if nodes_s.size != self._x.size or [zone.kind for zone in zones] != self._kinds:
+            return False
+        if not self.loads and len(zones) == 1:
+            return True
+        inside = self._cuts[1:-1]
+        low, high, near = nodes_s[0], nodes_s[-1], 1e-9 * nodes_s[-1]
+        cuts = [x for x in self.loads if low + near < x < high - near]
+        cuts += [zone.s_a for zone in zones[1:]]
+        found = np.unique(cuts) if cuts else np.zeros(0)
+        same = found.size == inside.size and bool(np.all(found == nodes_s[inside]))
+        return same and bool(np.all(found == self._x[inside]))
+
     def moved(self, nodes_s: Floats, s: Floats) -> Grid:
         """The grid of the same stretches with nodes (N+1,) m elsewhere in them, and points s (ns,) m."""
         other = Grid.__new__(Grid)
-        for name in ("loads", "changes", "after", "parts", "spans", "side_nodes", "_cuts", "_kept", "_joints"):
+        for name in (
+            "loads",
+            "changes",
+            "after",
+            "parts",
+            "spans",
+            "side_nodes",
+            "_cuts",
+            "_kept",
+            "_joints",
+            "_kinds",
+        ):
             setattr(other, name, getattr(self, name))
         other._put(nodes_s, s)
         return other

@@ -302,16 +302,25 @@ class Observer:
     def look_at(self, outputs: Sequence[Output]) -> tuple[Observer, JoinedObservation]:
         """Outputs of which each has a line of its own, and what makes values of them; on a line of constant length."""
         other = copy(self)
-        given = self._cuts, self._changes
         within = [x.line.s[[0, -1]] for x in outputs]  # beyond, on the reel: the values of the fairlead
         s, jumps = ([np.clip(x, *ends) for ends in within] for x in (self.s, self.jumps))
         of = list(zip(outputs, s, jumps, strict=True))
-        grid = JoinedGrid([Grid(x.line.s, x.zones, at, *given, kept=self._unloaded) for x, at, _ in of])
+        grid = JoinedGrid(self._grids([(x, at) for x, at, _ in of], False))
         if self._right:
-            after = [Grid(x.line.s, x.zones, at, *given, True, self._unloaded) for x, _, at in of]
-            other._after = JoinedGrid(after)
+            other._after = JoinedGrid(self._grids([(x, at) for x, _, at in of], True))
         other.line, other.zones, other.grid = outputs[0].line, outputs[0].zones, grid
         return other, JoinedObservation(outputs, self.sea, grid)
+
+    def _grids(self, of: Sequence[tuple[Output, Floats]], after: bool) -> list[Grid]:
+        """Grids of outputs with lines of their own, and their points (ns,) m; after: as of `Grid`."""
+        found: list[Grid] = []
+        for x, at in of:
+            last = found[-1] if found else None
+            if last is not None and last.suits(x.line.s, x.zones):
+                found.append(last.moved(x.line.s, at))
+            else:
+                found.append(Grid(x.line.s, x.zones, at, self._cuts, self._changes, after, self._unloaded))
+        return found
 
     @property
     def zone_rows(self) -> list[tuple[str, float, float]]:

@@ -52,11 +52,14 @@ def blank_cells(n: int) -> Cells:
 class Shaped:
     """A table whose numbers follow from the number of cells of the old and of the new line."""
 
-    def __init__(self, table: Table, values: Callable[[int, int], dict[str, Any]]) -> None:
-        """values: what is bound for so many old and new cells."""
+    def __init__(self, table: Table, values: Callable[[int, int], dict[str, Any]], like: Shaped | None = None) -> None:
+        """values: what is bound for so many old and new cells; like: a table of arrays of the same shapes."""
         self.table, self._values = table, values
         one = self._of(2, 2)
-        self._by_old, self._by_new = self._of(3, 2) - one, self._of(2, 3) - one
+        if like is not None:
+            self._by_old, self._by_new = like._by_old, like._by_new
+        else:
+            self._by_old, self._by_new = self._of(3, 2) - one, self._of(2, 3) - one
         assert max(abs(self._by_old).max(), abs(self._by_new).max()) < 1000  # of shapes; addresses stay
         self._fixed = one - 2 * (self._by_old + self._by_new)
 

@@ -7,6 +7,7 @@ worse; what makes going on pointless is returned as an Outcome, with its node or
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -299,15 +300,17 @@ class Diagnostics:
         self.rest(seen.batch, values)
         return self.energy(seen.batch, values)
 
-    def joined_outputs(self, seen: JoinedObservation, values: Mapping[str, Floats], models: Sequence[Model]) -> Stop:
-        """Look at outputs as computed of which each has a line of its own, and a model."""
+    def joined_outputs(
+        self, seen: JoinedObservation, values: Mapping[str, Floats], lines: Sequence[tuple[Model, Output]]
+    ) -> Stop:
+        """Look at outputs as computed of which each has a line of its own; lines: each with a model of its cable."""
         for k in np.flatnonzero(doubtful(seen, values, self._bounds)).tolist():
-            self.follow(models[k])
+            self.follow(_with_line(*lines[k]))
             one = seen.one(k)
             self.mesh(one)
             self.rest(one.batch, {name: x[k : k + 1] for name, x in values.items()})
         self.loops(seen.batch.t, values, seen.points)
-        return self.energy(seen.batch, values, list(zip(models, seen.outputs, strict=True)))
+        return self.energy(seen.batch, values, lines)
 
     @property
     def _bounds(self) -> Bounds:
@@ -402,7 +405,7 @@ class Diagnostics:
     def energy(self, batch: Batch, values: Mapping[str, Floats], lines: Sequence[tuple[Model, Output]] = ()) -> Stop:
         """Energy that the time scheme creates or dissipates, held against all that was put in.
 
-        lines: of each output its model and what it is, where they differ.
+        lines: of each output a model of its cable and what it is, where they differ.
         """
         gained, potential = values["work/scheme"], values["energy/potential"]
         alive = sum((values[x] for x in values if x.startswith("energy/")), -potential)
@@ -416,7 +419,7 @@ class Diagnostics:
         noted = (gained > self._gain * put_in + floor) | (-gained > self._loss * put_in + floor)
         for k in np.flatnonzero(noted & (batch.t > 0.0)).tolist():
             if lines:
-                self.follow(lines[k][0])
+                self.follow(_with_line(*lines[k]))
             v = lines[k][1].batch.v[0] if lines else batch.v[k]
             fastest = int(np.argmax(np.abs(v).sum(axis=1)))
             if gained[k] > GAIN_STOPS * put_in[k] + floor:
@@ -466,3 +469,8 @@ class Diagnostics:
                 self.note(float(batch.t[k]), int(np.argmin(state.T)), "unstable", text)
                 self._rested = True
                 return
+
+
+def _with_line(model: Model, output: Output) -> Model:
+    """A model with the line of an output."""
+    return replace(model, line=output.line, zones=output.zones)

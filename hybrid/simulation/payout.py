@@ -24,7 +24,7 @@ from hybrid.model.build import Model
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.mesh import Zone
 from hybrid.model.payout import PayoutPlan, payout_of, winch_at
-from hybrid.model.payout_law import fastest, length_at
+from hybrid.model.payout_law import fastest, length_at, lengths_at
 from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
@@ -217,7 +217,8 @@ class PayingOut:
         varied = {name: np.empty((batch.t.size, *getattr(model.line, name).shape)) for name in VARIES}
         zones = []
         moving = model.zones if model.layout is not None else None
-        for k, (line, zones_then) in enumerate(self._lines_of(model.line, self.reel, batch, moving)):
+        scratch = model.line._replace(**{name: getattr(model.line, name).copy() for name in ALONG_LINE})
+        for k, (line, zones_then) in enumerate(self._lines_of(scratch, self.reel, batch, moving)):
             zones.append(zones_then)
             for name, x in varied.items():
                 x[k] = getattr(line, name)
@@ -234,31 +235,33 @@ class PayingOut:
     ) -> Iterator[tuple[Line, tuple[Zone, ...]]]:
         """The line of each output of a batch, in arrays that the next one overwrites, and its zones.
 
-        line, reel: with the cells of the outputs; moving: zones, if they move.
+        line (written), reel: with the cells of the outputs; moving: zones, if they move.
         """
-        line = line._replace(**{name: getattr(line, name).copy() for name in ALONG_LINE})
         line.force[:, :2] = 0.0  # but for what rounding leaves of the forces on nodes that ride
         reel = reel._replace(numbers=reel.numbers.copy(), true=reel.true.copy(), stage=np.zeros_like(reel.stage))
         reel.numbers[p.FADING] = 0.0
         self._fitting.bind(line=line, reel=reel, clock=self._clock)
-        for k, t in enumerate(batch.t.tolist()):
-            if t >= self.law[0, 0] and not self.holds_tension:  # exactly, where samples interpolate
-                batch.report[k, LENGTH_OUT], batch.report[k, PAYOUT_RATE], _ = length_at(self.law, t)
-            length = float(batch.report[k, LENGTH_OUT])
+        if not self.holds_tension:  # exactly, where samples interpolate
+            known = np.flatnonzero(batch.t >= self.law[0, 0])
+            there = lengths_at(self.law, batch.t[known])
+            batch.report[known, LENGTH_OUT], batch.report[known, PAYOUT_RATE] = there
+        lengths = batch.report[:, LENGTH_OUT].tolist()
+        for t, length in zip(batch.t.tolist(), lengths, strict=True):
             reel.numbers[p.LENGTH], self._clock[b.NOW] = length, t
             fit_line(self._fitting.numbers)
             yield line, self.plan.zones_of(length, moving)
 
     def outputs_in(self, line: Line, reel: Reel, batch: Batch) -> list[Output]:
-        """The outputs of a batch, copied, each with the line as it was then; zones do not move.
+        """The outputs of a batch, each with the line as it was then; zones do not move.
 
-        line, reel: with the cells of the outputs.
+        line (written), reel: with the cells of the outputs.  They keep the arrays of `line` and `batch`.
         """
         found = []
+        of_each = [x.ndim > 0 and len(x) == batch.t.size for x in batch]
         for k, (then, zones) in enumerate(self._lines_of(line, reel, batch)):
             arrays: dict[str, Any] = {name: getattr(then, name).copy() for name in VARIES}
-            rows: Any = [x[k : k + 1].copy() if x.ndim and len(x) == batch.t.size else x for x in batch]
-            found.append(Output(then._replace(**arrays), zones, Batch(*rows)))
+            rows = [x[k : k + 1] if each else x for x, each in zip(batch, of_each, strict=True)]
+            found.append(Output(then._replace(**arrays), zones, Batch._make(rows)))
         return found
 
     # --- checkpoints ------------------------------------------------------------------------------

@@ -29,6 +29,7 @@ from hybrid.kernels.run import blank_job
 from hybrid.kernels.run import run as steps
 from hybrid.kernels.self_distance import blank_itself, blank_itself_job, boxes_of
 from hybrid.kernels.state import (
+    ALONG_LINE,
     NO_TENSION_TORQUE,
     NO_TORSION,
     NO_TURN,
@@ -56,6 +57,7 @@ IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
 IN_PAID = ("line", "sea", "old", "new", "report", "reel", "X", "W")
 IN_ITSELF = ("line", "old", "new", "itself")
 OF_REEL = ("law", "pieces", "winch", "layer")  # what all reels of a line share
+ABSENT: dict[str, Floats] = {"torsion": NO_TORSION} | dict.fromkeys(TENSION_TORQUE, NO_TENSION_TORQUE)
 MOST_WAITING = 512  # lines whose outputs may wait
 
 
@@ -94,7 +96,7 @@ class NodeChanges:
         self._work = Room(Packed(partial(workspace, keep=at_start), given=("torsion",)), self.most)
         size = sample_size(self.most)
         self._rows = max(1, min(ROWS, MOST_SAMPLED // size))
-        self._samples = np.zeros(self._rows * size)
+        self._samples = np.empty(self._rows * size)  # some MB, of which a run with few outputs touches little
         self._watch = owner.itself if owner.itself is not None and owner.itself.on else None
         self._itself = blank_itself(np.zeros(self.most))
         self._base = np.zeros(owner.run.books.base.size, np.int64)
@@ -137,8 +139,7 @@ class NodeChanges:
 
     def _line(self, k: int, cells: int) -> Line:
         line = self._owner.model.line
-        absent = {"torsion": NO_TORSION} | dict.fromkeys(TENSION_TORQUE, NO_TENSION_TORQUE)
-        found: Line = self._sides[k].line.view(cells, bits=line.bits, plane=line.plane, **absent)
+        found: Line = self._sides[k].line.view(cells, bits=line.bits, plane=line.plane, **ABSENT)
         return found
 
     def _state(self, k: int, which: int, cells: int) -> State:
@@ -225,16 +226,22 @@ class NodeChanges:
         self._along = borne, widths, start, bounds
         self._moments = np.zeros((most, 3)), np.zeros((most, 3)), np.zeros(5)
 
-        def shaped(blank: Callable[[], Any], values: Callable[..., dict[str, Any]], *first: int) -> Shaped:
-            return Shaped(Table(blank), partial(values, *first))
+        def shaped(
+            blank: Callable[[], Any], values: Callable[..., dict[str, Any]], *of: tuple[int, ...]
+        ) -> list[Shaped]:
+            """Tables of arrays of the same shapes, that differ by their addresses."""
+            found: list[Shaped] = []
+            for which in of:
+                found.append(Shaped(Table(blank), partial(values, *which), *found[:1]))
+            return found
 
-        of_run = [shaped(blank_job, self._in_run, k) for k in (0, 1)]
-        of_paid = [shaped(blank_reel_job, self._in_paid, k) for k in (0, 1)]
-        nodes = [shaped(blank_node_job, self._node_job, *pair) for pair in ((0, 0), (0, 1), (1, 0), (1, 1))]
+        of_run = shaped(blank_job, self._in_run, (0,), (1,))
+        of_paid = shaped(blank_reel_job, self._in_paid, (0,), (1,))
+        nodes = shaped(blank_node_job, self._node_job, (0, 0), (0, 1), (1, 0), (1, 1))
         of_itself: list[Shaped] = []
         in_itself, itself, tables = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((2, 3, 0), np.int64)
         if self._watch is not None:
-            of_itself = [shaped(blank_itself_job, self._in_itself, k) for k in (0, 1)]
+            of_itself = shaped(blank_itself_job, self._in_itself, (0,), (1,))
             in_itself, itself = of_itself[0].places(IN_ITSELF), self._watch.table.numbers
             tables = np.array([x.numbers[:, in_itself] for x in of_itself])
         self._tables = of_run, of_paid, of_itself, nodes  # what is bound there stays alive
@@ -347,9 +354,10 @@ class NodeChanges:
         for offset, count, cells in self._waiting[: self._at[f.WAITING]].tolist():
             size = sample_size(cells)
             end = offset + count * size
-            batch = self._run.batch_of(self._samples[offset:end].reshape(count, size), cells, model.ends.values)
+            rows = self._samples[offset:end].reshape(count, size).copy()
+            batch = self._run.batch_of(rows, cells, model.ends.values)
             lacks = self._samples[end : end + f.OF_REEL * cells].reshape(f.OF_REEL, cells)
-            line, reel = self._line(1 - k, cells), self._reel(1 - k, cells)
+            line, reel = lines(cells, bits=model.line.bits, plane=model.line.plane, **ABSENT), self._reel(1 - k, cells)
             reel.numbers[:] = paying.reel.numbers
             self._line_table.bind(line=model.line, whole=self._whole, out=line, reel=reel, nodes=paying.plan.nodes)
             make_line(self._line_table.numbers)
@@ -368,9 +376,10 @@ class NodeChanges:
 
 def outputs_of_now(owner: Transient, batch: Batch) -> list[Output]:
     """The outputs of a batch of the line of now, copied."""
-    paying = owner.payout
+    paying, line = owner.payout, owner.model.line
     assert paying is not None
-    return paying.outputs_in(owner.model.line, paying.reel, batch)
+    own = line._replace(**{name: getattr(line, name).copy() for name in ALONG_LINE})
+    return paying.outputs_in(own, paying.reel, Batch._make(x.copy() for x in batch))
 
 
 def _copy(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:

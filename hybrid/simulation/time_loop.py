@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -279,8 +278,7 @@ class TimeLoop:
         zones = [observer.rows_of(x.zones) for x in outputs]
         self.recorder.save_batch(seen.batch.t.copy(), values, zones[0], zones[1:])
         if self.target is not None:
-            models = [replace(model, line=x.line, zones=x.zones) for model, x in aside]
-            stop = self.diagnostics.joined_outputs(seen, values, models)
+            stop = self.diagnostics.joined_outputs(seen, values, aside)
             self.run.events.write_to(self.recorder)
             self._stop_if(stop)
 

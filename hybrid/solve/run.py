@@ -88,7 +88,7 @@ class CompiledRun:
         touches = bool(line.bits & SELF_CONTACT)
         size = sample_size(cells, bool(self.count[b.VARIES]), len(line.torsion), touches) + followed.shape[1]
         if not self._room.size:
-            self._room = np.zeros(max(1, min(self._rows, MOST_SAMPLED // size)) * size)
+            self._room = np.empty(max(1, min(self._rows, MOST_SAMPLED // size)) * size)  # some MB, touched as needed
         rows = max(1, min(self._rows, self._room.size // size))
         nodes, some = cells + 1, self.keeps_extremes
         marked = np.flatnonzero(marks)
@@ -102,7 +102,7 @@ class CompiledRun:
         )  # fmt: skip
         if books.samples.shape != (rows, size):  # in the same room, which a new one of some MB would cost a ms
             if self._room.size < rows * size:
-                self._room = np.zeros(rows * size)
+                self._room = np.empty(rows * size)
             books = books._replace(samples=self._room[: rows * size].reshape(rows, size))
         if books.tension.shape[1] != cells:
             books = books._replace(tension=np.zeros((2, cells)))
