@@ -11,6 +11,7 @@ import pytest
 
 import hybrid
 from hybrid.simulation.transient import Transient
+from hybrid.solve.run import CompiledRun
 
 pytestmark = pytest.mark.bench
 
@@ -37,23 +38,41 @@ def test_cost_of_paying_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Processor time of whole runs in memory, medians, alternating."""
     cases = {
         "fixed length": (sagging(False), True),
+        "fixed length, as many cells as there are on average, 150 outputs": (sagging(False, 0.5, 121), True),
         "fixed length, as many cells as there are on average, 2 outputs": (sagging(False, 37.5, 121), True),
         "paid out, 150 outputs": (sagging(True), True),
         "paid out, 150 outputs, looked at between nodes": (sagging(True), False),
         "paid out, 2 outputs": (sagging(True, 37.5), True),
     }
     together, taken = Transient.pays_out, {name: list[float]() for name in cases}
+    in_steps, within, go = {name: list[float]() for name in cases}, [0.0], CompiledRun.go
+
+    def timed(run: CompiledRun, *by: Any) -> int:
+        begin = time.process_time()
+        code = go(run, *by)
+        within[0] += time.process_time() - begin
+        return code
+
+    monkeypatch.setattr(CompiledRun, "go", timed)
     for _ in range(RUNS + 1):
         for name, (scene, joined) in cases.items():
             monkeypatch.setattr(Transient, "pays_out", together if joined else False)
+            within[0] = 0.0
             begin = time.process_time()
             hybrid.run(scene)
             taken[name].append(time.process_time() - begin)
+            in_steps[name].append(within[0])
     found = {name: median(times[1:]) for name, times in taken.items()}
-    fixed, as_many, joined, alone, few = found.values()
+    compiled = {name: median(times[1:]) for name, times in in_steps.items()}
+    fixed, as_many, as_many_few, joined, alone, few = found.values()
     for name, x in found.items():
-        print(f"{name}: {x:.3f} s, {x / fixed:.2f}")
-    print(f"with 2 outputs, against as many cells: {few / as_many:.2f}")
+        part = compiled[name]
+        print(
+            f"{name}: {x:.3f} s, {x / fixed:.2f}; {part:.3f} s of it in compiled steps, {1e3 * (x - part):.0f} ms not"
+        )
+    print(f"150 outputs, against as many cells: {joined / as_many:.2f}; 2 outputs: {few / as_many_few:.2f}")
+    _, _, steps, *_, paid = compiled.values()
+    print(f"compiled steps alone, per cell and step, against a fixed line's: {paid / steps:.2f}")
     assert joined < alone
 
 

@@ -91,7 +91,8 @@ class DeferredRecorder:
     def commit_old(self) -> None:
         """Hand on what waits where nothing was marked, or too much waits."""
         if not self._marked or self.full:
-            self.commit()
+            if self._waiting:
+                self.commit()
             if self._unseen and self._recorder.due:
                 self._recorder.flush()
                 self._unseen = False

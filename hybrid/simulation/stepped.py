@@ -52,7 +52,7 @@ def one_thread(method: Callable[Concatenate[L, P], R]) -> Callable[Concatenate[L
 
     @wraps(method)
     def alone(self: L, *args: P.args, **options: P.kwargs) -> R:
-        if not self.lock.acquire(blocking=False):
+        if not self.lock.acquire(False):
             raise ValueError("another thread is using this Simulation: one at a time, or a Simulation for each")
         try:
             return method(self, *args, **options)

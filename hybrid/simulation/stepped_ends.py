@@ -10,6 +10,7 @@ import numpy as np
 
 from hybrid.kernels.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B
 from hybrid.kernels.state import Floats
+from hybrid.model.build import Model
 from hybrid.model.driven_end import DrivenEnd, rotation_vector
 from hybrid.scene.schema import Scene
 from hybrid.simulation.deferred_recorder import DeferredRecorder
@@ -23,6 +24,8 @@ ENDS = ("start", "end")
 # Of the largest component: what is out of a plane by no more is in it.
 IN_PLANE = 1e-9
 STILL: Floats = np.zeros(3)
+# Where the report of a step has the forces and the moments at both ends.
+OF_ENDS = np.concatenate([np.arange(k, k + 3) for k in (FORCE_A, FORCE_B, MOMENT_A, MOMENT_B)])
 
 
 class SteppedEnds:
@@ -36,6 +39,9 @@ class SteppedEnds:
     _driven: dict[int, DrivenEnd]
     _next: dict[int, tuple[Floats, Floats, Floats | None]]  # what ends are set to, for the next step
     _wound: tuple[float | None, float] | None  # length and rate that are set for the next step
+    _driven_of: Model | None = None  # whose ends those that are set were last looked for among
+    _signed: Model | None = None  # of which the next are
+    _signs: Floats  # (12,) what of the report of a step is a force or a moment on what holds an end, with its sign
 
     @property
     def t(self) -> float:
@@ -146,7 +152,10 @@ class SteppedEnds:
 
     def _forget_released(self) -> None:
         """Ends that are free now are no longer set."""
-        held = self._loop.run.model.ends.values.held
+        model = self._loop.run.model
+        if model is self._driven_of:
+            return
+        self._driven_of, held = model, model.ends.values.held
         for k in [k for k, end in self._driven.items() if end.held and not held[k]]:
             self._driven.pop(k)
             self._next.pop(k, None)
@@ -176,10 +185,14 @@ class SteppedEnds:
     @one_thread
     def forces(self) -> EndForces:
         """Forces and moments of the cable on what holds its ends, now."""
-        report, held = self._loop.run.run.report, self._loop.run.model.ends.values.held
-        start, end = (report[k : k + 3] * held[j] for j, k in enumerate((FORCE_A, FORCE_B)))
-        first, last = report[MOMENT_A : MOMENT_A + 3], report[MOMENT_B : MOMENT_B + 3]
-        return EndForces(start, end, first * self._turns(0), -last * self._turns(1))
+        moving = self._loop.run
+        if moving.model is not self._signed:
+            self._signed, held = moving.model, moving.model.ends.values.held
+            parts = held[0], held[1], self._turns(0), -1.0 * self._turns(1)
+            self._signs = np.repeat(np.array(parts, float), 3)
+        found = moving.run.books.report[0][OF_ENDS]
+        found *= self._signs
+        return EndForces(found[:3], found[3:6], found[6:9], found[9:])
 
     @one_thread
     def stiffness(self, end: str) -> Floats:

@@ -28,6 +28,7 @@ from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import missing_time
 from hybrid.simulation.case import Case
 from hybrid.simulation.deferred_recorder import DeferredRecorder
+from hybrid.simulation.direct_steps import DirectSteps
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.stepped import CableState, Saved, in_space, iterations_allowed, one_thread, tension_now
 from hybrid.simulation.stepped_ends import STILL, SteppedEnds
@@ -90,6 +91,10 @@ class Simulation(SteppedEnds):
             self._stack.close()
             raise
         assert isinstance(recorder, Recorder)
+        time = self.scene.time
+        self._fixed_step = None if time.controlled else time.step
+        self._duration, self._sliver = time.duration, SLIVER * self._loop.run.resolution.step
+        self._direct: DirectSteps | None = None
         self._loop.recorder = self._recorder = DeferredRecorder(recorder)
         self._driven: dict[int, DrivenEnd] = {}
         self._wound: tuple[float | None, float] | None = None  # length and rate that are set for the next step
@@ -116,10 +121,10 @@ class Simulation(SteppedEnds):
 
         ValueError: steps follow the motion (`advance` says where to), or the duration is over.
         """
-        time = self.scene.require_time()
-        if time.controlled or time.step is None:
+        step, duration = self._fixed_step, self._duration
+        if step is None:
             raise ValueError("steps follow the motion: use advance(until), or give time.step")
-        now, step, duration = self.t, time.step, time.duration
+        now = self._loop.run.t
         taken, until = round(now / step), now + step
         if abs(taken * step - now) < SLIVER * step:
             until = (taken + 1) * step  # a multiple of the step, without round-off that adds up
@@ -137,8 +142,7 @@ class Simulation(SteppedEnds):
             raise ValueError(f"a step has failed ({reason}): restore() what save() returned, or close()")
         if isinstance(until, bool) or not isinstance(until, NUMBER):
             raise ValueError(f"until: expected a number, in s, found {until!r:.60}")
-        now, duration = self.t, self.scene.require_time().duration
-        sliver = SLIVER * self._loop.run.resolution.step
+        now, duration, sliver = self.t, self._duration, self._sliver
         if not now + sliver < until <= duration + sliver:
             raise ValueError(
                 f"until = {until:.9g} s, expected a time after {now:.9g} s, up to time.duration, {duration:g} s"
@@ -164,7 +168,9 @@ class Simulation(SteppedEnds):
 
     def _step_to(self, until: float) -> None:
         try:
-            self._loop.until(until, exact=False)
+            if self._direct is None or not self._direct.still_of(self._loop):
+                self._direct = DirectSteps(self._loop)
+            self._direct.take(until)
         except StepFailed as failed:
             self._loop.fail(failed.tried, failed.dt)
 

@@ -182,10 +182,13 @@ class TimeLoop:
         self.run.events.write_to(self.recorder)
         self._settle()
 
-    def go_to(self, stop: float) -> None:
-        """Steps up to `stop` (s), where one ends; StepFailed or ComputationError: they stop before."""
+    def go_to(self, stop: float, begun: int | None = None) -> None:
+        """Steps up to `stop` (s), where one ends; StepFailed or ComputationError: they stop before.
+
+        begun: as of `Transient.advance`.
+        """
         run = self.run
-        for code in run.advance(stop):
+        for code in run.advance(stop, begun):
             self._keep_ratios(int(run.run.count[SAMPLES]))
             if code in (PAUSED, FAILED) or (code == AT_STOP and (self._aside or not self.patient)):
                 self.write_down()

@@ -295,22 +295,30 @@ class Transient:
 
     # --- steps ----------------------------------------------------------------------------------
 
-    def advance(self, stop: float) -> Iterator[int]:
+    def set_stop(self, stop: float) -> None:
+        """The next steps end at `stop` (s)."""
+        clock, count = self.run.clock, self.run.count
+        clock[b.STOP] = stop
+        if not count[b.CONTROLLED] and stop > clock[b.NOW]:
+            step, whole = self.resolution.step, stop - float(clock[b.LEG_BEGIN])
+            count[b.LEG_PARTS] = n = parts(whole, step)
+            clock[b.LEG_STEP] = step if abs(n * step - whole) <= WHOLE_STEPS * step else whole / n
+
+    def advance(self, stop: float, begun: int | None = None) -> Iterator[int]:
         """To `stop` (s), where a step ends; yields codes of kernels.books: STEPPED where there is something to look at.
 
         Between two yields steps are logged and outputs sampled in the books of `run`, which whoever asks empties.
+        begun: code with which the compiled run has come back on its way there; None: it has not been called yet.
         StepFailed: steps fail however small.
         """
         run = self.run
         clock, count = run.clock, run.count
-        clock[b.STOP] = stop
-        if not self.controlled and stop > self.t:
-            step, whole = self.resolution.step, stop - float(clock[b.LEG_BEGIN])
-            count[b.LEG_PARTS] = n = parts(whole, step)
-            clock[b.LEG_STEP] = step if abs(n * step - whole) <= WHOLE_STEPS * step else whole / n
+        if begun is None:
+            self.set_stop(stop)
         while True:
-            self._choose_asks()
-            code = self._go()
+            if begun is None:
+                self._choose_asks()
+            code, begun = self._go() if begun is None else begun, None
             if code == b.TRYING:
                 assert self.switching is not None
                 self.switching.prepare_step(float(clock[b.TRY_END]) - self.t, self.state)
