@@ -55,6 +55,8 @@ class Shaped:
     def __init__(self, table: Table, values: Callable[[int, int], dict[str, Any]], like: Shaped | None = None) -> None:
         """values: what is bound for so many old and new cells; like: a table of arrays of the same shapes."""
         self.table, self._values = table, values
+        self._by_old: np.ndarray
+        self._by_new: np.ndarray
         one = self._of(2, 2)
         if like is not None:
             self._by_old, self._by_new = like._by_old, like._by_new
