@@ -63,10 +63,10 @@ from hybrid.kernels.winch import (
     INERTIA,
     TENSION,
     accept,
-    answer_of_start,
+    answer_of_cell,
     at_its_end,
     last_change,
-    lengthen_start,
+    lengthen_cell,
     losses,
     predict,
     softness,
@@ -342,17 +342,27 @@ def iterate(table):
     take_riding_off(line, reel)
     if t <= winch[BEGIN] or not winch[TENSION] > 0.0:
         return 0
-    state, at, starts = job.old if job.counts[b.PARITY] else job.new, last_change(line), end_of(reel) == 0
-    more, slope = of_material(line, job.sea, job.ends, state, reel, line.h.shape[0])
+    state, at, n, g = (
+        job.old if job.counts[b.PARITY] else job.new,
+        last_change(line),
+        line.h.shape[0],
+        growing(line, reel),
+    )
+    apart = end_of(reel) == 0 or g < n - 1  # the cell that grows is not the last one of the line
+    more, slope = of_material(line, job.sea, job.ends, state, reel, n)
     force, _ = force_of_fairlead(reel, job.report, more)
-    if starts:
-        answer, more_pull = answer_of_start(line, state, job.X, job.W, reel.columns)
+    if apart:
+        answer, more_pull = answer_of_cell(
+            line, state, job.X, job.W, reel.columns, cell(line, reel, g), n if end_of(reel) else 1
+        )
     else:
         answer, more_pull = softness(line, state, job.X), job.X[at]
     pull = pull_at(force, slope) + more_pull
     lost, steep = losses(winch, numbers[RATE])
     left = winch[INERTIA] * numbers[ACCELERATION] + lost + tension_held(winch, t) - pull
-    carried = line.mass[node(line, reel, line.h.shape[0])] * math.sqrt(dot(slope, slope))
+    carried = 0.0  # with the fairlead and the nodes that ride with it
+    for j in range(g + 1, n + 1):
+        carried += line.mass[node(line, reel, j)] * math.sqrt(dot(slope, slope))
     stiff = (winch[INERTIA] + carried) * winch[CA] + steep * winch[CV] - answer
     change = -left / stiff
     numbers[LENGTH] += change
@@ -360,8 +370,8 @@ def iterate(table):
     numbers[ACCELERATION] += winch[CA] * change
     prepare(line, reel, t)
     put_balance_on(line, reel, t)
-    if starts:
-        lengthen_start(line, job.X, change, reel.columns)
+    if apart:
+        lengthen_cell(line, job.X, change, reel.columns)
     else:
         job.X[at] += answer * change
     return 0

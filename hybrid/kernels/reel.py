@@ -67,14 +67,14 @@ class Reel(NamedTuple):
     balance: Floats  # (N+1, 3) N, forces on nodes, in the order of the line, that balanced them at CHANGED
     plain: Floats  # (N+1, 3) N, the forces on the line without them
     winch: Floats  # (WINCH,) of a winch that holds a tension (kernels.winch)
-    columns: Floats  # (3, N+1, 5) that such a winch at the start works in; else empty
+    columns: Floats  # (3, N+1, 5) that such a winch at the start, or at a clamp, works in; else empty
 
 
 def blank_reel(
     cells: int, law: Floats | None = None, pieces: Floats | None = None, winch: Floats | None = None,
     layer: Floats | None = None, columns: bool = False,
 ) -> Reel:  # fmt: skip
-    """A reel of a line of so many cells; columns: whether a winch at its start holds a tension."""
+    """A reel of a line of so many cells; columns: whether such a winch needs another right-hand side."""
     z = np.zeros
     numbers = z(NUMBERS)
     numbers[CHANGED] = -np.inf

@@ -122,19 +122,20 @@ def softness(line, state, X):
 
 
 @inner
-def answer_of_start(line, state, X, W, columns):
-    """The same of a first cell that changes its length, the fairlead at the start: how its tension answers, N/m, and
+def answer_of_cell(line, state, X, W, columns, c, at):
+    """The same of any cell c, behind nodes that ride or with the fairlead at the start: how the tension before node
 
-    its change in the equations eliminated in X, N.  X has room for the factors of another right-hand side; columns:
-    (3, N+1, 5), of which the first keeps what `lengthen_start` adds to the right-hand sides.
+    `at` answers to its length, N/m, and the change of that tension in the equations eliminated in X, N.  X has room for
+    the factors of another right-hand side; columns: (3, N+1, 5), of which the first keeps what `lengthen_cell` adds to
+    the right-hand sides.
     """
     forward, column, x = columns[0], columns[1], columns[2]
     n = line.h.shape[0]
     for i in range(n + 1):
         for k in range(5):
             x[i, k] = 0.0
-    shift = line.law[0, SHIFT] if has_law(line, 0) else 0.0
-    x[1, 0] = 1.0 + shift + line.ck[0] * state.T[0]
+    shift = line.law[c, SHIFT] if has_law(line, c) else 0.0
+    x[c + 1, 0] = 1.0 + shift + line.ck[c] * state.T[c]
     if line.bits & PLANAR:
         solve_forward_planar(line.plane, X, x, forward)
     else:
@@ -148,12 +149,12 @@ def answer_of_start(line, state, X, W, columns):
     else:
         solve_backward(X, column)
         substitute(X, x)
-    return column[1, 0], x[1, 0]
+    return column[at, 0], x[at, 0]
 
 
 @inner
-def lengthen_start(line, X, change, columns):
-    """The equations eliminated in X with a first cell that is longer by a change, m, behind `answer_of_start`."""
+def lengthen_cell(line, X, change, columns):
+    """The equations eliminated in X with a cell that is longer by a change, m, behind `answer_of_cell`."""
     if line.bits & PLANAR:
         add_to_right_planar(X, change, columns[0])
     else:

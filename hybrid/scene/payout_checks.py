@@ -42,9 +42,6 @@ def payout_at_an_end(ends: Ends, cable: Cable) -> Iterator[Finding]:
     at: Place = ("ends", name, "payout")
     if name == "end" and getattr(ends.start, "payout", None) is not None:
         yield Finding(("ends", "start", "payout"), "nothing, because line is paid out at ends.end", "leave one out")
-    if payout.winch is not None and isinstance(end, Clamped):
-        fix = "write kind: pinned, or give the rate"
-        yield Finding((*at, "winch"), "nothing, because a winch holds a tension at a pinned end alone", fix)
     if end.release_at is not None:
         expected = "nothing, because line is paid out there"
         yield Finding(("ends", name, "release_at"), expected, LEAVE_OUT.format(name))

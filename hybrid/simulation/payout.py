@@ -60,7 +60,7 @@ class PayingOut:
     def _blank(self, count: int) -> Reel:
         """Arrays of a line of so many material nodes, none of whose cells lacks anything."""
         plan = self.plan
-        reel = blank_reel(count + self.rides, self.law, plan.pieces, self.winch, plan.layer, self.at_start)
+        reel = blank_reel(count + self.rides, self.law, plan.pieces, self.winch, plan.layer, self.solves_twice)
         numbers = reel.numbers
         numbers[p.SIDE], numbers[p.FAR] = (1.0 if plan.side else -1.0), plan.far
         numbers[p.SPRING] = plan.cable.springs[plan.side]
@@ -99,9 +99,9 @@ class PayingOut:
         return self.plan.layer.size - 1
 
     @property
-    def at_start(self) -> bool:
-        """Whether a winch at the start holds a tension: an iteration then takes another right-hand side."""
-        return self.holds_tension and not self.plan.side
+    def solves_twice(self) -> bool:
+        """Whether a winch holds a tension at the start, or at a clamp: an iteration takes another right-hand side."""
+        return self.holds_tension and (not self.plan.side or self.rides > 0)
 
     @property
     def holds_tension(self) -> bool:
@@ -257,10 +257,11 @@ class PayingOut:
         line (written), reel: with the cells of the outputs.  They keep the arrays of `line` and `batch`.
         """
         found = []
-        of_each = [x.ndim > 0 and len(x) == batch.t.size for x in batch]
+        fields: tuple[Any, ...] = tuple(batch)
+        of_each = [x.ndim > 0 and len(x) == batch.t.size for x in fields]
         for k, (then, zones) in enumerate(self._lines_of(line, reel, batch)):
             arrays: dict[str, Any] = {name: getattr(then, name).copy() for name in VARIES}
-            rows = [x[k : k + 1] if each else x for x, each in zip(batch, of_each, strict=True)]
+            rows = [x[k : k + 1] if each else x for x, each in zip(fields, of_each, strict=True)]
             found.append(Output(then._replace(**arrays), zones, Batch._make(rows)))
         return found
 

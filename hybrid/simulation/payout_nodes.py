@@ -87,13 +87,13 @@ class NodeChanges:
         self._fixed_to = self._key(owner)
         plan, model, reel = owner.payout.plan, owner.model, owner.payout.reel
         self.most = plan.nodes.size - 2 + owner.payout.rides
-        some, at_start = owner.envelope is not None, owner.payout.at_start
+        some, twice = owner.envelope is not None, owner.payout.solves_twice
         extra = int((marks_on(model.line.s, owner.marked) != 0).sum())
-        reels = Packed(lambda n: blank_reel(n, reel.law, reel.pieces, reel.winch, reel.layer, at_start), given=OF_REEL)
+        reels = Packed(lambda n: blank_reel(n, reel.law, reel.pieces, reel.winch, reel.layer, twice), given=OF_REEL)
         kept = Packed(lambda n: blank_kept(n, extra, some))
         self._sides = Side(self.most, reels, kept), Side(self.most, reels, kept)
         self._sea = Room(seas, self.most)
-        self._work = Room(Packed(partial(workspace, keep=at_start), given=("torsion",)), self.most)
+        self._work = Room(Packed(partial(workspace, keep=twice), given=("torsion",)), self.most)
         size = sample_size(self.most)
         self._rows = max(1, min(ROWS, MOST_SAMPLED // size))
         self._samples = np.empty(self._rows * size)  # some MB, of which a run with few outputs touches little
