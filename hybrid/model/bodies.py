@@ -29,6 +29,7 @@ from hybrid.model.ends import EndLoad, end_load
 from hybrid.model.members import Members, pieces_of
 from hybrid.model.sea import Surroundings
 from hybrid.scene.bodies import FixedBody, FreeBody, turned
+from hybrid.scene.end_loads import GivenLoad
 from hybrid.scene.motion import EndMotion
 
 
@@ -42,6 +43,11 @@ def angles_of(frame: Floats) -> Floats:
     """Roll, pitch and yaw (3,) deg of axes (3, 3)."""
     roll, pitch = np.arctan2(frame[2, 1], frame[2, 2]), np.arcsin(np.clip(-frame[2, 0], -1.0, 1.0))
     return np.degrees([roll, pitch, np.arctan2(frame[1, 0], frame[0, 0])])
+
+
+def loads_of(given: tuple[GivenLoad, ...]) -> tuple[EndLoad, ...]:
+    """Forces and moments that a scene gives."""
+    return tuple(end_load(x.what, 0, x.values, np.inf if x.until is None else x.until, x.ramp, x.rows) for x in given)
 
 
 @dataclass(frozen=True)
@@ -95,15 +101,13 @@ def body_model(
         numbers[LEVEL], numbers[STIFFNESS : STIFFNESS + 3] = floats.level, (floats.heave, floats.roll, floats.pitch)
     start[PLACE:FRAME] = body.initial_guess
     start[FRAME:V] = frame_of(body.initial_rotation).ravel()
-    loads = [
-        end_load(x.what, 0, x.values, np.inf if x.until is None else x.until, x.ramp, x.rows) for x in body.end.loads
-    ]
+    loads = loads_of(body.end.loads)
     if not body.members or around is None:
-        return BodyModel(name, numbers, start, tuple(loads))
+        return BodyModel(name, numbers, start, loads)
     members = Members(*pieces_of(body, density), around)
     numbers[PIECES] = len(members.pieces)
     own_mass = numbers[MASS : MASS + 36].copy()
-    made = BodyModel(name, np.append(numbers, members.pieces), start, tuple(loads), members, own_mass)
+    made = BodyModel(name, np.append(numbers, members.pieces), start, loads, members, own_mass)
     made.take_added_mass(start)
     return made
 

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.bodies import FORCE, FRAME, LEVEL, LIFT, NUMBERS, PLACE, STATE, STIFFNESS, V
+from hybrid.kernels.bodies import FORCE, FRAME, LEVEL, LIFT, MOMENT, NUMBERS, PLACE, STATE, STIFFNESS, V
 from hybrid.kernels.carried_frames import SEAT, TURNS, WITH_BODY, WITH_POINT
 from hybrid.kernels.members import PIECE
 from hybrid.kernels.state import Floats, State
-from hybrid.model.bodies import BodyModel, FairleadMotion, KnownMotion, body_model, frame_of
+from hybrid.model.bodies import BodyModel, FairleadMotion, KnownMotion, body_model, frame_of, loads_of
 from hybrid.model.build import Model, build
 from hybrid.model.catenary_guess import pulls
 from hybrid.model.clamps import (
@@ -23,6 +23,7 @@ from hybrid.model.clamps import (
     untwisted,
     with_clamps,
 )
+from hybrid.model.ends import EndLoad
 from hybrid.model.first_state import first_state
 from hybrid.model.initial_shape import dead_loads, hung
 from hybrid.model.resolution import Resolution, first_resolution
@@ -78,6 +79,7 @@ class SystemModel:
     known: Mapping[str, KnownMotion]  # of bodies that are held or moved
     scenes: Mapping[str, Scene]  # of the lines by name, with their points where the system has them
     resolution: SystemResolution
+    moments: tuple[tuple[EndLoad, ...], ...]  # that are given to each of the points in `rigid`
     loose: frozenset[tuple[int, int]] = frozenset()  # ends (line, 0 or 1) that have left their points
 
     @property
@@ -92,6 +94,14 @@ class SystemModel:
         """
         for body, row in zip(self.bodies, out, strict=False):
             body.load(t, since, row)
+        for moments, row in zip(self.moments, out[len(self.bodies) :], strict=True):
+            row[MOMENT : MOMENT + 3] = sum((x.grown(t) for x in moments if since < x.until), np.zeros(3))
+
+    @property
+    def breaks(self) -> list[float]:
+        """Times (s) at which a load on a body, or a moment on a point, stops."""
+        stops = [x.until for moments in self.moments for x in moments if np.isfinite(x.until)]
+        return [*stops, *(x for body in self.bodies for x in body.breaks)]
 
     def body_numbers(self, t: float) -> Floats:
         """(B, NUMBERS or, with pieces of members, more) of the free bodies at t (s), where they are first; behind them
@@ -146,7 +156,7 @@ def build_system(system: System, resolution: SystemResolution | None = None) -> 
         tuple(system.lines), tuple(models), free, system.rigid,
         tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends), places, made, maker.bodies,
         np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
-        maker.seats, known, maker.scenes, resolution,
+        maker.seats, known, maker.scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
     )  # fmt: skip
 
 

@@ -113,8 +113,12 @@ def _clamp_findings(system: System, name: str, key: str, held: ClampedConnection
 
 def _rigid_point_findings(system: System, name: str) -> Iterator[Finding]:
     """What is wrong with lines that are clamped to a free point."""
-    here = system.clamped_at(name)
+    here, point = system.clamped_at(name), system.points[name]
     if not here:
+        if isinstance(point, FreePoint) and point.moment is not None:
+            expected = "nothing, because all lines turn freely at this point: nothing there takes a moment"
+            fix = "leave it out, or clamp two lines there: `connections: {end: clamped}` of one, `{start: clamped}`"
+            yield Finding(("points", name, "moment"), expected, fix)
         return
     line, key = here[0]
     at = ("lines", line, "connections", key)

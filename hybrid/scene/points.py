@@ -8,7 +8,8 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape
 from hybrid.scene.base import Finding, Kinds, NonNegative, Positive, Table, Text, Vector, by_kind, refuse
-from hybrid.scene.ends import Body, Free, Loading
+from hybrid.scene.end_loads import GivenLoad, Loading
+from hybrid.scene.ends import Body, Free
 from hybrid.scene.motion_tables import Motion
 
 _BREAK = (
@@ -66,6 +67,9 @@ class FreePoint(Table):
     drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
     added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
     force: Loading | None = Field(default=None, description="force on the point, inertial frame [N]")
+    moment: Loading | None = Field(
+        default=None, description="moment on a point to which lines are clamped, inertial frame [N m]"
+    )
 
     @model_validator(mode="after")
     def _added_mass_has_a_body(self) -> FreePoint:
@@ -79,6 +83,11 @@ class FreePoint(Table):
     def is_body(self) -> bool:
         """Whether the point is more than a knot."""
         return bool(self.mass or self.volume or self.drag_area)
+
+    @property
+    def moments(self) -> tuple[GivenLoad, ...]:
+        """Moments that are given; they turn the point, and with it the lines that are clamped there."""
+        return Free(moment=self.moment).loads
 
     @property
     def end(self) -> Body | Free:

@@ -29,6 +29,7 @@ from hybrid.scene.base import Finding, Positive, Table, Text, Truth, Whole, refu
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, turned, without_turns
 from hybrid.scene.cable import Cable, Contact, Environment, Section
 from hybrid.scene.connections import ClampedConnection, Connections
+from hybrid.scene.end_loads import GivenLoad
 from hybrid.scene.ends import Clamped, End, Ends, Pinned, Triple
 from hybrid.scene.points import Failure, Fairlead, FixedPoint, FreePoint, Name, Point
 from hybrid.scene.quantities import Quantities
@@ -252,6 +253,11 @@ class System(Table):
     def clamped_at(self, point: str) -> list[tuple[str, Literal["start", "end"]]]:
         """Names of the lines that are clamped at a point, each with the end that is."""
         return [at for at in self.lines_at(point) if self.clamp(*at) is not None]
+
+    def moments_on(self, point: str) -> tuple[GivenLoad, ...]:
+        """Moments that are given to a free point."""
+        found = self.points[point]
+        return found.moments if isinstance(found, FreePoint) else ()
 
     @property
     def rigid(self) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from hybrid.scene.suggestions import nearest
 from hybrid.scene.travels import travel_findings
 
 if TYPE_CHECKING:
-    from hybrid.scene.system import System
+    from hybrid.scene.system import JoinedLine, System
 
 
 def system_findings(system: System) -> Iterator[Iterator[Finding]]:
@@ -29,6 +29,7 @@ def system_findings(system: System) -> Iterator[Iterator[Finding]]:
     yield chain(_lonely_points(system), _floating_groups(system))
     yield connection_findings(system)
     yield chain.from_iterable(_body_findings(system, name) for name in system.bodies)
+    yield chain.from_iterable(_moment_findings(system, name) for name in system.points)
     yield chain.from_iterable(_line_findings(system, name) for name in system.lines)
     yield travel_findings(system)
     yield of_several_lines(system.output.quantities, system.lines, system.environment.seabed is not None)
@@ -108,10 +109,23 @@ def _body_findings(system: System, name: str) -> Iterator[Finding]:
     if isinstance(body, FixedBody):
         moved = Clamped(position=body.position, tangent=(1.0, 0.0, 0.0), motion=body.motion)
         ends = Ends(start=moved, end=Free())
+    yield from _load_findings(system, ends, line, ("bodies", name))
+
+
+def _moment_findings(system: System, name: str) -> Iterator[Finding]:
+    """What is wrong with the moment on a free point."""
+    point, still = system.points[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
+    if isinstance(point, FreePoint) and point.moment is not None:
+        ends, (line, _) = Ends(start=still, end=Free(moment=point.moment)), system.lines_at(name)[0]
+        yield from _load_findings(system, ends, system.lines[line], ("points", name))
+
+
+def _load_findings(system: System, ends: Ends | None, line: JoinedLine, at: Place) -> Iterator[Finding]:
+    """What is wrong with motions and loads of ends that stand for what is at another place of the system."""
     tables = {"ends": ends, "time": system.time, "cable": line.cable, "environment": system.environment}
     for found in motion_findings(tables):
-        at = ("bodies", name, *found.at[2:]) if found.at[:1] == ("ends",) else found.at
-        yield Finding(at, found.expected, found.fix, found.given)
+        where = (*at, *found.at[2:]) if found.at[:1] == ("ends",) else found.at
+        yield Finding(where, found.expected, found.fix, found.given)
 
 
 def _line_findings(system: System, name: str) -> Iterator[Finding]:

@@ -138,6 +138,8 @@ def files_of(system: System) -> dict[str, str]:
             found |= {x for x in (body.motion.file, vessel.rao if vessel is not None else None) if x is not None}
         elif isinstance(body, FreeBody):
             found |= {given.load.file for given in body.end.loads if given.load.file is not None}
+    for name in system.rigid:
+        found |= {given.load.file for given in system.moments_on(name) if given.load.file is not None}
     return {path: digest_of(Path(path)) for path in sorted(found)}
 
 

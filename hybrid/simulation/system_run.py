@@ -329,7 +329,7 @@ class SystemRun:
     def stops(self) -> list[float]:
         """Times (s) at which a step ends: outputs, and where loads jump."""
         time = self.system.require_time()
-        given = [*(m.ends.breaks for m in self.model.models), *(b.breaks for b in self.model.bodies)]
+        given = [*(m.ends.breaks for m in self.model.models), self.model.breaks]
         self._breaks = sorted({x for each in (*given, self.failures.times) for x in each if x < time.duration})
         return apart([*self.times, *self._breaks], self.t, self.resolution.one.step)
 

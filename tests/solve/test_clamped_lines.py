@@ -395,6 +395,48 @@ def test_three_rods_that_meet_rigidly_balance_their_moments() -> None:
     assert moved[0] == pytest.approx(0.1 * np.linalg.inv(point)[0, 0], rel=1e-3)
 
 
+def beam(moment: Any, **more: Any) -> dict[str, Any]:
+    """A straight weightless rod of 2 m, clamped at both ends, in two pieces; the moment acts where they meet."""
+    piece = {"mass": 1.0, "diameter": 0.03, "axial_stiffness": 1e7, "bending_stiffness": 200.0, "length": 1.0}
+    ends = {"a": {"tangent": [1, 0, 0]}, "b": {"tangent": [1, 0, 0]}}
+    line = {"model": "rod", "mesh": {"cells": 40}, "sections": [piece]}
+    return {
+        "environment": {"gravity": 0},
+        "points": {
+            "a": {"position": [0, 0, 0]}, "b": {"position": [2, 0, 0]},
+            "middle": {"initial_guess": [1, 0, 0], "moment": moment},
+        },
+        "lines": {
+            "one": line | {"start": "a", "end": "middle", "connections": {"start": ends["a"], "end": "clamped"}},
+            "two": line | {"start": "middle", "end": "b", "connections": {"start": "clamped", "end": ends["b"]}},
+        },
+        "output": {"points": 2},
+    } | more  # fmt: skip
+
+
+def test_a_moment_on_a_point_turns_it() -> None:
+    """M L/(16 EI) in the middle of a clamped beam, whose ends bear -M/4 each; as a history, too."""
+    still = hybrid.static(beam([0, 1.0, 0]))
+    assert np.radians(still["points/middle/rotation"][-1][1]) == pytest.approx(1.0 * 2.0 / (16 * 200.0), rel=2e-3)
+    for end in ("a", "b"):
+        assert still[f"points/{end}/moment"][-1] == pytest.approx([0, -0.25, 0], abs=1e-3)
+    history = {"history": [[0, 0, 0, 0], [2, 0, 1, 0], [4, 0, 1, 0]]}
+    times = {"time": {"duration": 3.0, "step": 0.02}, "output": {"points": 2, "every": 0.5}}
+    moved = hybrid.run(beam(history, **times))
+    slow = np.radians(moved["points/middle/rotation"][:, 1]) * 16 * 200.0 / 2.0
+    assert np.abs(slow - np.minimum(moved.times / 2.0, 1.0)).max() < 0.02  # it follows, and hardly swings
+    stopped = hybrid.run(beam({"value": [0, 1.0, 0], "until": 0.5}, **times))["points/middle/rotation"][:, 1]
+    assert abs(stopped[-3:]).max() < 1.1 * stopped[0] and stopped[0] > 0.03
+
+
+def test_a_moment_needs_lines_that_are_clamped() -> None:
+    tables = beam([0, 1.0, 0])
+    for line in tables["lines"].values():
+        line["connections"] = {key: x for key, x in line["connections"].items() if x != "clamped"}
+    with pytest.raises(SceneError, match=r"points\.middle\.moment(.|\n)*turn freely(.|\n)*clamp two lines"):
+        hybrid.static(tables)
+
+
 def test_rods_that_may_all_spin_find_their_equilibrium_at_once() -> None:
     """Two rods through a point, pinned at their far ends: nothing holds them against spinning about themselves."""
     tables = in_pieces([16], (0, 0), UNTWISTED)
