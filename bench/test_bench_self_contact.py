@@ -179,7 +179,7 @@ def coil(cells: int) -> hybrid.Simulation:
 def test_search_for_contact_that_is_not_there(shape: str) -> None:
     """What a step spends on it, beside the whole step: the calls that a step makes, repeated at its end.
 
-    The energy balance of the step, which is no search, is told beside it.
+    The energy balance of the step, which is no search, is told beside it; both together are asked to stay below 5 %.
     """
     print(
         f"\n{shape}: cells, step (us), Newton iterations, search for contact (us), % of the step, of its energy balance"
@@ -212,7 +212,7 @@ def test_search_for_contact_that_is_not_there(shape: str) -> None:
         print(
             f"{cells:6} {1e6 * whole:9.0f} {each:5.2f} {1e6 * found:8.1f} {100.0 * share:6.2f} % {100.0 * balance:6.2f} %"
         )
-        assert share < 0.05
+        assert share + balance < 0.05
 
 
 def approaching(cells: int) -> hybrid.Simulation:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from hybrid.kernels.assembly import get9
 from hybrid.kernels.books import NOW, RATES, STORED, TRY_END
+from hybrid.kernels.cell import chord, turning
 from hybrid.kernels.compile import inner
+from hybrid.kernels.element import strain_of_element
 from hybrid.kernels.energies import observe
-from hybrid.kernels.forces import AXIAL_LAW, SEABED
+from hybrid.kernels.forces import AXIAL_LAW, ROTARY, SEABED
+from hybrid.kernels.node_forces import get3
 from hybrid.kernels.powers import find_powers
 from hybrid.kernels.report import (
     CONTACT_WORK,
@@ -15,6 +19,7 @@ from hybrid.kernels.report import (
     SELF_FRICTION_WORK,
     STRETCH_ENERGY,
 )
+from hybrid.kernels.rotations import dot, frame, sub
 from hybrid.kernels.self_contact_pairs import (
     BALANCE,
     BEGUN,
@@ -28,6 +33,7 @@ from hybrid.kernels.self_contact_pairs import (
     TRIED_BALANCE,
     farthest_from_mean,
 )
+from hybrid.kernels.tension_torque import couples
 from hybrid.kernels.zone_torque import twist_energy
 
 # Energy that a step may put in, and all steps together, as a part of the largest energy so far.
@@ -37,14 +43,50 @@ LEAST_TRAVEL = 0.05
 
 
 @inner
+def energy_of_line(line, ends, state):
+    """Energies, J, of motion and bending, and of stretch, of a line in which tension makes no torque.
+
+    As `kernels.energies.observe` has them, without the moments, which take most of its time.
+    """
+    n = line.h.shape[0]
+    moving, bent, twisted, longer = 0.0, 0.0, 0.0, 0.0
+    before = after = get9(ends.frame, 0)
+    for i in range(n + 1):
+        vi = get3(state.v, i)
+        moving += 0.5 * line.mass[i] * dot(vi, vi)
+        if i < n:
+            d, l, il = chord(get3(state.e, i))
+            if line.ck[i] > 0.0 and not line.bits & AXIAL_LAW:
+                more = l - line.h[i]
+                longer += 0.5 * more * more / (line.h[i] * line.ck[i])
+            if line.bits & ROTARY and line.spin[i]:
+                d1, _ = turning(d, il, sub(get3(state.v, i + 1), vi), 0.0)
+                moving += 0.5 * line.rotary[i] * dot(d1, d1) + 0.5 * line.polar[i] * state.w[i] * state.w[i]
+            after = frame(get3(state.a1, i), d)
+        else:
+            after = get9(ends.frame, 1)
+        if line.element[i]:
+            kb, k0 = get3(line.kb, i), get3(line.k0, i)
+            x = sub(strain_of_element(before, after, kb, k0), k0)
+            bent += 0.5 * (kb[0] * x[0] * x[0] + kb[1] * x[1] * x[1])
+            twisted += 0.5 * kb[2] * x[2] * x[2]
+        before = after
+    return moving + bent + twisted, longer
+
+
+@inner
 def energy_without_weight(line, ends, contact, state, report):
     """Energy, J, of motion, strain and contact of a state with its report; contact.at and .move are used as room."""
-    parts = contact.energy
-    observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, contact.at, contact.move, parts)
-    contact.counts[STALE] = 1
+    if couples(line):
+        parts = contact.energy
+        observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, contact.at, contact.move, parts)
+        contact.counts[STALE] = 1
+        held, stretched = parts[0] + parts[1] + parts[2], parts[3]
+    else:
+        held, stretched = energy_of_line(line, ends, state)
     if line.bits & AXIAL_LAW:
-        parts[3] = report[STRETCH_ENERGY]
-    return parts[0] + parts[1] + parts[2] + parts[3] + twist_energy(line, state) + report[SELF_CONTACT_ENERGY]
+        stretched = report[STRETCH_ENERGY]
+    return held + stretched + twist_energy(line, state) + report[SELF_CONTACT_ENERGY]
 
 
 @inner

@@ -265,8 +265,9 @@ class Torsion(NamedTuple):
     directions: Floats  # (K, 2, 3) how it answers to the directions of ends that hold the zone
     floating: NDArray[np.int64]  # (F,) cells that are held meanwhile: one of each rod that no end holds
     columns: Floats  # (K+F, N+1, 5) how the line answers to the torque of each zone, to a torque on each such cell
-    # (4,) cv of the columns, 1/s (< 0: they are not known); how often they have served; whether they are made anew, from
-    # factors that the march keeps; whether it keeps them in any case; empty: it keeps them where there is room
+    # (5,) cv of the columns, 1/s (< 0: they are not known); how often they have served; whether they are made anew, from
+    # factors that the march keeps; whether it keeps them in any case; iterations of the step; empty: it keeps them where
+    # there is room
     known: Floats
     right: Floats  # (N+1, 5) a right-hand side
     coupling: Floats  # (K+F, K+F) how turns and those spins answer to the columns

@@ -38,9 +38,14 @@ BEFORE_MARCH, CORRECT, AFTER_STEP = range(3)
 TURN, TORQUE, POWER = 0, 1, 2  # columns of State.turn
 FIRST, LAST, COMPLIANCE, FREE, TAU = range(5)  # columns of Line.torsion
 LOAD, HOLD = 0, 1  # rows of Torsion.passed
-# Iterations of steps of one length for which the answers to torques serve: they are mostly those of torsion, which does
-# not change, and torques themselves are those of the configuration, so that this touches convergence alone.
-SERVES = 24
+# Iterations for which the answers to torques serve: they are mostly those of torsion, which does not change, and torques
+# themselves are those of the configuration, so that this touches convergence alone.  They are found anew in a step that
+# takes more than so many iterations, and where cv has changed by more than that part of it: round-off of the length of
+# steps does not count.
+SERVES, ITERATIONS, SAME_STEP = 96, 3, 1e-3
+# Torsion.known: cv of the answers, iterations they have served, whether the march keeps its factors now, whether it
+# always does, iterations of this step.
+OF_CV, SERVED, KEEPS_NOW, KEEPS_ALWAYS, OF_STEP = range(5)
 
 
 @inner
@@ -323,15 +328,15 @@ def correct(line, state, work, cv, joined):
     torsion, x = work.torsion, work.x
     zones, m = line.torsion.shape[0], torsion.columns.shape[0]
     known = torsion.known
-    if known[2] > 0.0:
-        known[0], known[1] = cv, 0.0
+    if known[KEEPS_NOW] > 0.0:
+        known[OF_CV], known[SERVED] = cv, 0.0
         if not solve_columns(line, work, joined):
             x[0, 1] = math.nan
             return
         for j in range(m):
             for k in range(m):
                 torsion.coupling[j, k] = unknown_of(line, torsion, j, torsion.columns[k], cv)
-    known[1] += 1.0
+    known[SERVED] += 1.0
     A = torsion.dense
     for j in range(m):
         for k in range(m):
@@ -370,11 +375,14 @@ def pass_torque(line, ends, state, work, part, cv):
             find_torques(line, ends, state, work)
         work.report[STIFFNESS_DAMPING_POWER] += finish(line, ends, state, work.torsion)
         report_end_moments(line, ends, state, work.report)
+        work.torsion.known[OF_STEP] = 0.0
     elif felt and part == CORRECT:
         correct(line, state, work, cv, ends.held[1] == JOINED)
     elif felt:
         known = work.torsion.known
-        known[2] = 1.0 if cv == 0.0 or known[0] != cv or known[1] >= SERVES else 0.0
+        known[OF_STEP] += 1.0
+        other = cv == 0.0 or not abs(known[OF_CV] - cv) <= SAME_STEP * cv
+        known[KEEPS_NOW] = 1.0 if other or known[SERVED] >= SERVES or known[OF_STEP] > ITERATIONS else 0.0
         find_torques(line, ends, state, work)
     return 0
 
@@ -418,7 +426,7 @@ def torsion_of(line: Line, keep: bool) -> Torsion:
     passed[HOLD, floating] = 1.0 / line.torsion[:, COMPLIANCE].min()
     return Torsion(
         address=0, passed=passed, slope=z((n, 3)), directions=z((zones, 2, 3)), floating=floating,
-        columns=z((unknowns, n + 1, SIZE)), known=np.array([-1.0, 0.0, 1.0, float(keep)]), right=z((n + 1, SIZE)),
+        columns=z((unknowns, n + 1, SIZE)), known=np.array([-1.0, 0.0, 1.0, float(keep), 0.0]), right=z((n + 1, SIZE)),
         coupling=z((unknowns, unknowns)), dense=z((unknowns, unknowns + 1)),
     )  # fmt: skip
 

@@ -43,6 +43,7 @@ def checkpoint(run: Transient) -> dict[str, Any]:
         "state": run.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
         "push": run.plane_monitor.checkpoint(run.run), "home": run.plane_monitor.home,
         "self_contact": run.run.contact and run.run.contact.checkpoint(run.t),
+        "torsion": {name: x.copy() for name, x in run.run.answers.items()},
         "envelope": run.envelope and run.envelope.checkpoint(books.extremes),
     }  # fmt: skip
 
@@ -72,6 +73,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         older |= {"twist": np.zeros(2), "last": 0.0}
         saved = {name: x for name, x in saved.items() if name != "last"}
     older |= {"envelope": None, "_slackened": False, "self_contact": None, "payout": None, "home": None}
+    older |= {"torsion": template["torsion"]}  # not in 0.6: found anew
     report = saved.get("report")
     if isinstance(report, np.ndarray) and report.ndim == 2 and FIRST_REPORT <= report.shape[1] < REPORT_SIZE:
         saved = {**saved, "report": np.pad(report, ((0, 0), (0, REPORT_SIZE - report.shape[1])))}
@@ -116,6 +118,8 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     books.imposed[0] = np.hstack([ends.position, ends.frame, ends.spin, ends.force, ends.moment])
     if saved["control"] is not None:
         _restore_control(run, saved["control"])
+    for name, x in compiled.answers.items():
+        x[:] = saved["torsion"][name]
     if saved["push"] is not None:
         monitor.restore(saved["push"], compiled)
     if compiled.contact is not None:

@@ -21,7 +21,7 @@ from hybrid.kernels.named_quantities import note_quantities
 from hybrid.kernels.newton import RUN, Limits, Task
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.run import blank_books, blank_job, in_plane, in_space, run
-from hybrid.kernels.state import NOT_VARYING, Batch, Ends, Floats, Line, Moves, Sea, State, Work
+from hybrid.kernels.state import NOT_VARYING, Batch, Ends, Floats, Line, Moves, Sea, State, Work, no_torsion
 from hybrid.kernels.zone_step import follow_zones
 from hybrid.solve.bending_corrector import Corrector
 from hybrid.solve.self_contact import SelfContact
@@ -67,6 +67,7 @@ class CompiledRun:
         self._zones_address = 0  # of what follows zones; 0: not known yet
         self._solver, self._address = in_space, 0
         self.pushes: tuple[Floats, Floats] = (NO_PUSH, NO_PUSH)
+        self._torsion = no_torsion()
         self.contact: SelfContact | None = None  # of a line that touches itself
         self.sampled_errors: Floats = np.zeros((0, 0))  # of the model error, at the outputs that `samples` gave last
 
@@ -108,6 +109,7 @@ class CompiledRun:
             books = books._replace(tension=np.zeros((2, cells)))
         self.books = books
         self.states = (state, state.copy())
+        self._torsion = work.torsion
         if self.count[b.PARITY]:
             self.pushes, self.count[b.PARITY] = self.pushes[::-1], 0
         self.clock[b.PREVIOUS] = self.clock[b.NOW]
@@ -224,6 +226,7 @@ class CompiledRun:
         skipped.add("model_error")  # where it is followed, simulation.stepping packs a checkpoint instead
         yield from (x for state in self.states for x in state)
         yield from self.pushes
+        yield from self.answers.values()
         if self.contact is not None:
             yield from self.contact.changing()
         yield from (x for name, x in self.books._asdict().items() if name not in skipped)
@@ -243,6 +246,14 @@ class CompiledRun:
     def before(self) -> State:
         """The state before the last step; while a try is judged, the one that it led to."""
         return self.states[1 - self.count[b.PARITY]]
+
+    @property
+    def answers(self) -> dict[str, Floats]:
+        """How the line answers to torques through its zones, which serves for several steps (kernels.zone_torque)."""
+        torsion = self._torsion
+        if not torsion.known.size:
+            return {}
+        return {"known": torsion.known, "columns": torsion.columns, "coupling": torsion.coupling}
 
     @property
     def solver(self) -> Any:
