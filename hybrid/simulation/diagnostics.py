@@ -441,7 +441,7 @@ class Diagnostics:
             self._loss *= 1.3
 
     def rest(self, batch: Batch, values: Mapping[str, Floats]) -> None:
-        """A rod at rest, or nearly, on an equilibrium that it would buckle out of if anything touched it."""
+        """A rod at rest, or nearly, in a shape that is not stable: its stiffness is negative for some displacement."""
         model, line = self._model, self._model.line
         rod = line.spin == 1
         if self._rested or not rod.any():
@@ -463,9 +463,12 @@ class Diagnostics:
         for k in np.flatnonzero(pressed & calm):
             ends, state = ends_in(batch, int(k)), state_in(batch, int(k))
             if not is_stable(line, model.sea.values, ends, state, model.length, model.tension_scale):
-                text = (
-                    "the rod rests where it would buckle: only its perfect symmetry keeps it there; give it a small bow"
-                )
+                text = "the rod rests where it would buckle: only its perfect symmetry keeps it there"
+                text += "; give it a small bow"
+                # a bent one may be on its way, and has no symmetry that is known
+                if values["energy/bending"][int(k)] > least[min(int(k), least.size - 1)]:
+                    text = "the rod is almost at rest in a shape that is not stable (its stiffness against some "
+                    text += "displacement is negative): it is leaving it, or nothing in the scene disturbs it there"
                 self.note(float(batch.t[k]), int(np.argmin(state.T)), "unstable", text)
                 self._rested = True
                 return
