@@ -10,6 +10,7 @@ import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.forces import FRICTION, MAY_TOUCH, PLANAR
+from hybrid.kernels.link import LINK, holds_twist, link_of
 from hybrid.kernels.state import Line, State
 from hybrid.kernels.zone_criteria import twist_of_rods
 from hybrid.model.build import Model
@@ -77,7 +78,10 @@ def _count_turns(scene: Scene, model: Model, t: float, state: State) -> None:
     the equilibrium, less than half a turn unless the cable forms a loop.
     """
     asked = scene.ends.turns
-    if not asked or not model.line.element[1:-1].all():
+    if not asked:
+        return
+    if not model.line.element[1:-1].all():
+        _count_link(scene, model, t, state)
         return
     frames = model.ends.at(t).frame
     wound, found = (twist_of_rods(model.line, frames, x.e, x.a1) / (2.0 * np.pi) for x in (model.start, state))
@@ -91,6 +95,19 @@ def _count_turns(scene: Scene, model: Model, t: float, state: State) -> None:
     if abs(found - wound) > 0.5:
         detail = f"{where}; the rods start with {wound:.4g} turns, those of the equilibrium have {found:.4g}"
         raise ComputationError(Outcome.TURNS_LOST, None, s, detail)
+
+
+def _count_link(scene: Scene, model: Model, t: float, state: State) -> None:
+    """ComputationError where a line with zones has passed through itself, or around a clamp, and lost turns so."""
+    if not holds_twist(model.line):
+        return
+    ends = model.ends.at(t)
+    wound, found = (link_of(model.line, ends, x.r, x.e, x.a1, x.turn)[LINK] for x in (model.start, state))
+    if abs(found - wound) > 0.5:
+        name = "end" if scene.ends.end.held_turns else "start"
+        where = f"ends.{name}.turns: {getattr(scene.ends, name).held_turns:g}"
+        detail = f"{where}; the line starts with a link of {wound:.4g} turns, that of the equilibrium is {found:.4g}"
+        raise ComputationError(Outcome.TURNS_LOST, None, model.length if name == "end" else 0.0, detail)
 
 
 def solve_model(
