@@ -43,8 +43,11 @@ def stats(
     """Statistics of a result: means, deviations, extremes, periods, what three hours bring; fatigue damage."""
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
         if opened.lines and (names is None or not all(name in opened for name in names)):
-            first = next(iter(opened.lines))
-            raise ResultError(f"{result} holds the lines {', '.join(opened.lines)}\n    try:      --line {first}")
+            from hybrid.store.histories import usual_names
+
+            own = ",".join(usual_names(opened))
+            fix = f"--line {next(iter(opened.lines))}" + (f", or --names {own}" if own else "")
+            raise ResultError(f"{result} holds the lines {', '.join(opened.lines)}\n    try:      {fix}")
         from hybrid.store.statistics_table import rows_of
 
         facts: dict[str, Any] = {}

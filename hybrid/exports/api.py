@@ -56,7 +56,7 @@ def export(
     path: str | Path | None = None,
     *,
     format: str | None = None,
-    names: Sequence[str] | None = None,
+    names: str | Sequence[str] | None = None,
     times: Window | None = None,
     at: Numbers | None = None,
     overwrite: bool = True,
@@ -68,7 +68,7 @@ def export(
     all (of a CSV: the ends, and those recorded as `history`).  An older export is replaced if `overwrite`; what is
     not one never is.  ResultError when something is unknown, a package is missing, or the file cannot be written.
     """
-    kind = _format(path, format)
+    kind, names = _format(path, format), [names] if isinstance(names, str) else names
     if path is None and result.file is None:
         raise ResultError(f"a result in memory has no name of its own\n    try:      path='run{SUFFIXES[kind]}'")
     file = Path(path).expanduser() if path is not None else beside(result.file or Path(), kind)

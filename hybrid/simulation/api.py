@@ -166,6 +166,10 @@ def resume(
 
     Raises ResultError when there is nothing to continue or the file is another program's, and else as `run`.
     """
+    if not isinstance(source, str | Path):
+        raise TypeError(
+            f"resume: expected the path of a result file, found {type(source).__name__}; a Result has `.file`"
+        )
     path = Path(source).expanduser().resolve()
     target = _path(output) or path
     if not path.is_file():

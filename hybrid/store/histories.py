@@ -164,7 +164,9 @@ class Histories:
 
     def exceedance(self: Any, name: str, above: float, *, at: Any = None, times: Window | None = None) -> Floats:
         """The part of the time for which a history is above a value in the unit of its quantity, of the shape of the
-        quantity at one time; at, times: as of `statistics`."""
+        quantity at one time; at, times: as of `statistics`.  ResultError: `above` is no number."""
+        if isinstance(above, bool) or not isinstance(above, int | float | np.integer | np.floating):
+            raise ResultError(f"above: expected a number in the unit of {name!r}, found {above!r:.60}")
         history = history_of(self, name, times, at)
         return moments.exceedance(history.t, history.values, above)
 

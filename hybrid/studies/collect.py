@@ -142,8 +142,11 @@ def _taken(
     history = memory.get((own, "history")) or history_of(result, name, kept.times, at)
     memory[own, "history"] = history
     if history.s is None and history.values.ndim > 1:
+        fix = "end_force_end"
+        if name in ("touchdown", "touchdown_position"):
+            fix = "output.quantities of the scene: {td: {kind: touchdown, end: end}}, and collect td"
         raise ResultError(
-            f"'{name}' has {history.values[0].size} values at a time, and one is kept\n    try:      end_force_end"
+            f"'{name}' has {history.values[0].size} values at a time, and one is kept\n    try:      {fix}"
         )
     dims, places = ((), {}) if at is None or history.s is None else _places(own, history.s)
     unit, about = history.unit, f"{name}, {history.basis}"

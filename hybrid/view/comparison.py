@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from difflib import unified_diff
 from html import escape
 from pathlib import Path
@@ -35,13 +35,18 @@ EXTREMES = (
 )  # fmt: skip
 
 
-def write_comparison(results: Mapping[str, Result], path: str | Path, *, overwrite: bool = False) -> Path:
+def write_comparison(
+    results: Mapping[str, Result] | Sequence[Result], path: str | Path, *, overwrite: bool = False
+) -> Path:
     """Write one page that lays 2 to 6 results over each other and return where it is.
 
-    results: by the name that each has on the page; the first is the one that others are compared with.  Differences
+    results: by the name that each has on the page, or in order, which are called by their files; the first is the one
+    that others are compared with.  Differences
     at an instant are taken where outputs of both have the same time, at the places of the first, on the left of
     jumps.  ResultError: one or more than six results, several lines in one, or a page that cannot be written.
     """
+    if not isinstance(results, Mapping):
+        results = {f"{k}: {'in memory' if x.file is None else x.file.stem}": x for k, x in enumerate(results, 1)}
     if not 2 <= len(results) <= len(COLOURS):
         raise ResultError(f"a comparison is of 2 to {len(COLOURS)} results, and {len(results)} were given")
     for result in results.values():

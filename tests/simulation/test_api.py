@@ -54,6 +54,18 @@ def test_anything_else_is_refused_with_what_is_expected(given: Any, tmp_path: Pa
         assert type(given).__name__ in str(refused.value)
 
 
+def test_results_are_taken_as_a_user_may_give_them(file: Path, tmp_path: Path) -> None:
+    with hybrid.run(file) as result:
+        with pytest.raises(TypeError, match=r"path of a result file, found Result"):
+            hybrid.resume(result)  # type: ignore[arg-type]
+        with pytest.raises(hybrid.ResultError, match="above: expected a number in the unit of 'tension', found 'a'"):
+            result.exceedance("tension", "a")
+        named = hybrid.export(result, tmp_path / "a.csv", names="tension").files[0].read_text()
+        assert named == hybrid.export(result, tmp_path / "b.csv", names=["tension"]).files[0].read_text()
+        page = hybrid.compare([result, result], tmp_path / "both.html").read_text()
+        assert "1: in memory" in page and "2: in memory" in page
+
+
 def test_a_bad_dict_is_refused_like_a_bad_file() -> None:
     with pytest.raises(hybrid.SceneError, match="model"):
         hybrid.run(WIRE | {"model": "string"})
