@@ -22,8 +22,10 @@ from hybrid.kernels.payout import slope_at, velocity_at
 from hybrid.kernels.reel import (
     CHANGED,
     EASING,
+    ENTERS,
     FADING,
     FAR,
+    LEAVES,
     LONGEST,
     PER_LENGTH,
     PLACE,
@@ -38,8 +40,6 @@ from hybrid.kernels.rotations import add, dot, scale, sub
 from hybrid.kernels.state import Floats, Line, State, blank_line, blank_state
 from hybrid.kernels.winch import ALGORITHMIC_NOW, RATE_NOW, TENSION, TRUE_NOW
 
-# Parts of a cell: a node enters when that much of the cell after it is out, and leaves when only that much is left.
-ENTERS, LEAVES = 0.85, 0.35
 # Steps over which new cells get their true lengths, at most and at least.
 MOST_STEPS, FEWEST_STEPS = 40, 8
 

@@ -27,6 +27,8 @@ from hybrid.kernels.winch import WINCH
     BEND_1, BEND_2, TWIST, KAPPA_1, KAPPA_2, KAPPA_3,
 ) = range(20)  # fmt: skip
 PER_LENGTH = 20
+# Parts of a cell: a node enters when that much of the cell after it is out, and leaves when only that much is left.
+ENTERS, LEAVES = 0.85, 0.35
 # Numbers of a reel.
 (
     LENGTH, RATE, ACCELERATION,  # L, c and the rate of c at the end of the try

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.kernels import winch as w
-from hybrid.kernels.payout_nodes import LEAVES
-from hybrid.kernels.reel import PER_LENGTH
+from hybrid.kernels.reel import LEAVES, PER_LENGTH
 from hybrid.kernels.state import Floats, Line
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
