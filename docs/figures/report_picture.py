@@ -31,7 +31,7 @@ def main() -> None:
         browser = play.chromium.launch(executable_path=program, args=FLAGS)
         page = browser.new_page(viewport={"width": 1120, "height": 2140}, reduced_motion="reduce")
         page.goto(file.as_uri())
-        page.wait_for_function("window.report && window.report.ready")
+        page.wait_for_function("window.report && window.report.cable")  # it is in view
         page.click("#fact-bend button.show")
         page.evaluate("scrollTo(0, 0)")
         page.wait_for_timeout(2000)

@@ -38,11 +38,16 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 class Visit(Visited):
     """A report that is open, with the seconds that it took."""
 
-    def __init__(self, browser: Any, file: Path, **screen: Any) -> None:
+    def __init__(self, browser: Any, file: Path, cable: bool = True, **screen: Any) -> None:
+        """cable: whether to look at the cable, which is drawn then, and go back to the top."""
         begin = time.perf_counter()
         super().__init__(browser, file.resolve().as_uri(), **({"viewport": {"width": 1280, "height": 900}} | screen))
         self.page.wait_for_function("window.report && window.report.ready", timeout=60_000)
         self.seconds = time.perf_counter() - begin
+        if cable and self.page.query_selector("#cable-plot"):
+            self.shown("#cable-plot")
+            self.page.wait_for_function("window.report.cable", timeout=60_000)
+            self.page.evaluate("scrollTo(0, 0)")
 
     def shown(self, selector: str) -> Any:
         """Scroll to an element and wait until plotly has drawn it."""
@@ -215,6 +220,23 @@ def test_other_results_open_without_complaint(browser: Any, tmp_path: Path, aske
     opened.context.close()
 
 
+def test_the_cable_is_drawn_when_it_is_looked_at_as_it_is_then(browser: Any, page_file: Path) -> None:
+    """Until then its still drawing is there; time that went on before is that of the drawing."""
+    opened = Visit(browser, page_file, cable=False, viewport={"width": 1280, "height": 500})
+    assert opened.page.query_selector("#cable-plot svg.poster").is_visible()
+    assert opened.page.evaluate("window.report.cable === undefined && !document.querySelector('#cable-plot canvas')")
+    high = opened.page.evaluate("document.getElementById('cable-plot').clientHeight")
+    opened.page.eval_on_selector("#time", "x => { x.value = '25'; x.dispatchEvent(new Event('input')); }")
+    opened.shown("#cable-plot")
+    opened.page.wait_for_function("window.report.cable", timeout=60_000)
+    assert not opened.page.query_selector("#cable-plot svg.poster").is_visible()
+    assert opened.page.evaluate("document.getElementById('cable-plot').clientHeight") == high, "nothing moves"
+    moved, first = opened.cable(), Visit(browser, page_file).cable()
+    assert moved[2] - first[2] == pytest.approx(2.0 * np.linspace(0.0, 100.0, 41) / 100.0, abs=1e-4)
+    assert not opened.complaints
+    opened.context.close()
+
+
 def test_without_webgl_the_cable_is_shown_still(browser: Any, page_file: Path) -> None:
     context = browser.new_context()
     context.add_init_script("HTMLCanvasElement.prototype.getContext = () => null;")
@@ -228,7 +250,8 @@ def test_without_webgl_the_cable_is_shown_still(browser: Any, page_file: Path) -
 def test_paper_has_every_picture(browser: Any, page_file: Path) -> None:
     """Printed from a dark screen before anything was scrolled to: A4, light, every graph drawn, folds open."""
     pdfium = pytest.importorskip("pypdfium2", reason="pypdfium2 is not installed")
-    opened = Visit(browser, page_file, color_scheme="dark")
+    opened = Visit(browser, page_file, cable=False, color_scheme="dark")
+    assert opened.page.query_selector("#cable-plot svg.poster").is_visible()
     sheets = pdfium.PdfDocument(opened.page.pdf(prefer_css_page_size=True, print_background=True))
     graphs = len(opened.page.query_selector_all(".plot[data-figure]"))
     text, ink = "", []
@@ -281,7 +304,7 @@ def test_the_report_of_a_touchdown_opens_in_two_seconds(browser: Any, tmp_path: 
     begin = time.perf_counter()
     file = write_report(hybrid.run(scene, progress=False), tmp_path / "touchdown.html")
     wrote = time.perf_counter() - begin
-    visits = sorted((Visit(browser, file) for _ in range(5)), key=lambda visit: visit.seconds)
+    visits = sorted((Visit(browser, file, cable=False) for _ in range(5)), key=lambda visit: visit.seconds)
     marks = "Object.fromEntries(performance.getEntriesByType('mark').map(m => [m.name, m.startTime / 1000]))"
     when = visits[2].page.evaluate(marks)
     seconds = [visit.seconds for visit in visits]

@@ -212,8 +212,7 @@
       return;
     }
     const traces = [{ type: "scatter3d", mode: "lines", ...shape(0), line: { color: shade("#b5b5b5"), width: 2 }, hoverinfo: "skip" }];
-    space = { cable: 1, marks: 2 };
-    traces.push({ type: "scatter3d", mode: "lines", ...shape(0), line: line(), customdata: flat(scene.s),
+    traces.push({ type: "scatter3d", mode: "lines", ...shape(state.frame), line: line(), customdata: flat(scene.s),
       hovertemplate: "s = %{customdata:.4g} m<br>x = %{x:.4g}, y = %{y:.4g}, z = %{z:.4g} m<extra></extra>" });
     const each = (value) => scene.marks.flatMap((mark) => Array(mark.x.shape[1]).fill(value(mark)));
     traces.push({ type: "scatter3d", mode: "markers", ...marks(), text: [...each((m) => m.name), "chosen"],
@@ -232,8 +231,11 @@
     const layout = { margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, scene: sceneLayout(),
       font: { family: "system-ui, sans-serif", color: shade(scene.ink) }, paper_bgcolor: shade("#ffffff") };
     if (drawn) return Plotly.react(box3d, traces, layout, config);
-    await Plotly.newPlot(box3d, traces, layout, config);
     drawn = true;
+    await Plotly.newPlot(box3d, traces, layout, config);
+    space = { cable: 1, marks: 2 };
+    moveCable();  // time may have gone on
+    window.report.cable = true;
     let width = box3d.clientWidth;
     new ResizeObserver(() => {
       if (box3d.clientWidth === width) return;  // it also calls at the start
@@ -367,7 +369,18 @@
     }
   }
   sayTime();
-  if (box3d && scene) { say3d(); await drawCable(); }
+  if (box3d && scene) {  // its still drawing is there; plotly's takes a second or more, and is made when it is looked at
+    say3d();
+    if (!hasWebGL()) drawCable();  // which says so
+    else {
+      view();  // as high as it will be
+      new IntersectionObserver((entries, watcher) => {
+        if (!entries.some((entry) => entry.isIntersecting)) return;
+        watcher.disconnect();
+        drawCable();
+      }, { rootMargin: "-100px 0px" }).observe(box3d);
+    }
+  }
   const places2d = [...document.querySelectorAll(".plot[data-figure]")];
   const figureOf = (element) => index.figures[Number(element.dataset.figure)];
   const watcher = new IntersectionObserver((entries) => {
