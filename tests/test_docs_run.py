@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -246,4 +247,5 @@ def test_tests_named_in_validation_exist(collected: dict[str, Any]) -> None:
 
 def test_quoted_scripts_exist() -> None:
     for page, text in quoted("python"):
-        assert (ROOT / text.split()[1]).is_file(), f"{page.name}: {text}"
+        first, *rest = text.split()[1:]
+        assert find_spec(rest[0]) if first == "-m" else (ROOT / first).is_file(), f"{page.name}: {text}"
