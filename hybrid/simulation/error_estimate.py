@@ -19,13 +19,11 @@ from hybrid.simulation.error_order import (
     MOST,
     MOST_ORDER,
     ORDERS,
-    Falls,
     around,
     as_halved,
     at_all_outputs,
     blended,
     falls,
-    force_orders,
     magnitude,
     order,
     refinement,
@@ -117,6 +115,7 @@ class Estimate:
     An error of order p is k^p times as large on cells k times as long.
     """
 
+    orders = ORDERS  # bounds of the order of convergence
     cancels = True  # whether errors by mesh and time step add with their signs; else their sizes add
     _errors: Errors | None = None  # of the result and the model error as they are; None: not asked for yet
 
@@ -141,7 +140,7 @@ class Estimate:
             for name, found in fall.items():
                 fall[name] = as_halved(found, finer, step_share(name, coarse, rough, coarsest))
         self.falls = {name: found.mean for name, found in fall.items()}
-        self.order = {name: order(max(x.mean, x.largest), self._bounds(name, x)) for name, x in fall.items()}
+        self.order = {name: order(max(found.mean, found.largest), self.orders) for name, found in fall.items()}
         # Root mean square of the last change of each output, and of that before.
         self.changes = {name: (found.change, found.before) for name, found in fall.items()}
         self.start = start_change(result, coarse), start_change(coarse, coarsest)
@@ -155,10 +154,6 @@ class Estimate:
         self.by_mesh: dict[str, np.ndarray] | None = None  # the same by the mesh
         self.has_step = self._rough is not None and any(name in self._rough.values for name in self.order)
         self.has_mesh = bool(self.order) and result.cells >= LEAST_RATIO * coarse.cells
-
-    def _bounds(self, name: str, found: Falls) -> tuple[float, float]:
-        """Bounds of the order of convergence of an output."""
-        return force_orders(found) if name in END_FORCES else ORDERS
 
     def _signed(self, name: str, a: int, b: int) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Errors by time step and mesh of the outputs from number a to b, with their sign; None: not known."""
