@@ -17,7 +17,7 @@ from hybrid.couple.moordyn_places import PlacesAlone, frame_of_angles, spin_of_r
 from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.cables import chain_of
 from hybrid.interop.moordyn.deck import Deck, read_deck
-from hybrid.interop.moordyn.rows import number, read_source
+from hybrid.interop.moordyn.rows import read_source
 from hybrid.interop.moordyn.systems import JOINTS, system_of
 from hybrid.kernels.state import Floats
 from hybrid.scene.analysis import CatenaryModel
@@ -55,11 +55,6 @@ class MoorDynPoint:
 
     def __init__(self, system: MoorDyn, id: int, name: str) -> None:
         self.system, self.id, self.name = system, id, name
-
-
-def _is_some(cell: str) -> bool:
-    """Whether a cell of a deck, such as 0|0|1, has a number other than 0."""
-    return any(number(x) != 0.0 for x in cell.split("|"))
 
 
 class MoorDynLine:
@@ -110,11 +105,7 @@ class MoorDyn:
     def _refuse_loads(self) -> None:
         """Forces on what the caller moves are those of the lines: nothing there may have a weight of its own."""
         moved = {id for id, body in self.deck.bodies.items() if body.kind == "coupled"}
-        rows = [
-            b.row
-            for id, b in self.deck.bodies.items()
-            if id in moved and any(_is_some(b.rest[i]) for i in (0, 2, 3, 4))
-        ]
+        rows = [b.row for id, b in self.deck.bodies.items() if id in moved and b.has_loads]
         rows += [
             p.row for p in self.deck.points.values()
             if p.has_loads and (p.kind == "coupled" or (p.kind == "body" and p.on in moved))

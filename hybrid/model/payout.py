@@ -328,6 +328,3 @@ def _pieces(cable: Material, side: int, far: float) -> Floats:
     pieces = np.ascontiguousarray(np.stack(columns, axis=1)[:: 1 if side else -1])
     assert pieces.shape[1] == 1 + PER_LENGTH
     return pieces
-
-
-# --- the law of length ----------------------------------------------------------------------------

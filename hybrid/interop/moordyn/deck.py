@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from hybrid.interop.moordyn.notes import NOT_NEEDED, TAKEN, Note, note
 from hybrid.interop.moordyn.options import Options, read_options
-from hybrid.interop.moordyn.rows import TITLES, Row, Section, Source, check_names, simple
+from hybrid.interop.moordyn.rows import TITLES, Row, Section, Source, check_names, number, simple
 from hybrid.interop.moordyn.types import LineType, line_type
 from hybrid.scene.suggestions import did_you_mean
 
@@ -76,6 +76,11 @@ class Body:
     place: Triple
     angles: Triple
     rest: tuple[str, ...] = ()
+
+    @property
+    def has_loads(self) -> bool:
+        """Whether it has a mass, an inertia, a volume or a drag of its own."""
+        return any(number(x) != 0.0 for cell in (self.rest[i] for i in (0, 2, 3, 4)) for x in cell.split("|"))
 
 
 @dataclass(frozen=True)
