@@ -8,12 +8,12 @@ docs/accuracy.md
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from hybrid.scene.schema import Scene
+from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.error_order import (
     COARSER,
     MOST,
@@ -34,7 +34,6 @@ from hybrid.simulation.error_order import (
 )
 from hybrid.simulation.run_sample import (
     END_FORCES,
-    NOT_ESTIMATED,
     RIGHT,
     Notes,
     Outputs,
@@ -59,8 +58,6 @@ NOT_CONVERGED, NOTHING = 0.9, 0.005
 HARDLY_CONVERGES = 0.75
 # Ratio of step or cell lengths of two runs below which their difference does not show the effect of either.
 LEAST_RATIO = 1.1
-# Model errors beyond so many times what the criteria of zones let pass are not believed: a loose line drifts for ever.
-BELIEVED = 30.0
 # Part of the length of catenaries, or of rods, by which two runs may differ whose model errors count as the same.
 OTHER_ZONES = 0.1
 # What a checkpoint calls the cells, the outputs and the catenaries of the run that model errors are of.
@@ -195,17 +192,16 @@ class Estimate:
         return self.by_step, self.by_mesh
 
     def _take(self, result: RunSample) -> Notes:
-        """Take over a result, without the model error that it knows of itself if that is implausible: what to say."""
-        doubtful, self._errors = _implausible(result), None
-        self.run = replace(result, model_error={}) if doubtful else result
-        return ((NOT_ESTIMATED, doubtful),) if doubtful else ()
+        """Take over a result, the model error that it knows of itself bounded if it is implausible: what to say."""
+        self.run, self._errors = result, None
+        self._bound, doubt = bounded(result)
+        return doubt
 
     def set_model_errors(self, coarse: RunSample) -> None:
         """Take the model error of a coarser run: it hardly depends on cells and steps."""
-        doubtful, self._errors = _implausible(coarse), None
-        self.notes: Notes = (*coarse.notes, *(((NOT_ESTIMATED, doubtful),) if doubtful else ()))
-        found = coarse.model_error if not doubtful else {}
-        self._model: Mapping[str, Outputs] = {name: x for name, x in found.items() if len(x)}
+        self._errors, (self._model_bound, doubt) = None, bounded(coarse)
+        self.notes: Notes = (*coarse.notes, *doubt)
+        self._model: Mapping[str, Outputs] = {name: x for name, x in coarse.model_error.items() if len(x)}
         self._model_every = coarse.every
         self._model_of = coarse.cells, coarse.every, coarse.catenary
 
@@ -286,11 +282,17 @@ class Estimate:
     def _model_error(self, quantity: str, a: int, b: int) -> np.ndarray | None:
         """Errors of neglecting bending: what a corrected run says of itself, else those of a coarser run."""
         if quantity in self.run.model_error:
-            return np.asarray(self.run.model_error[quantity][a:b])
+            factors = self._bound[a:b] if self._bound is not None else None
+            return scaled(np.asarray(self.run.model_error[quantity][a:b]), factors)
         if quantity not in self._model:
             return None
         known, own = around(every_of(self._count, self._model_every), a, b)
-        return at_all_outputs(np.asarray(self._model[quantity][own]), known, a, b)
+        return at_all_outputs(self._model_at(quantity, own), known, a, b)
+
+    def _model_at(self, quantity: str, own: slice) -> np.ndarray:
+        """Errors of neglecting bending of the coarser run, at its own outputs."""
+        factors = self._model_bound[own] if self._model_bound is not None else None
+        return scaled(np.asarray(self._model[quantity][own]), factors)
 
     @property
     def _count(self) -> int:
@@ -350,8 +352,8 @@ class Estimate:
     def checkpoint(self) -> Tree:
         """All of it, as named arrays and plain values."""
         by_step, by_mesh = self._keep()
-        model = {name: at_all_outputs(np.asarray(x), every_of(self._count, self._model_every), 0, self._count)
-                 for name, x in self._model.items()}  # fmt: skip
+        known = every_of(self._count, self._model_every)
+        model = {name: at_all_outputs(self._model_at(name, slice(None)), known, 0, self._count) for name in self._model}
         changes = {name: np.array(x) for name, x in self.changes.items()}
         found: Tree = {
             "order": self.order,
@@ -380,6 +382,7 @@ class Estimate:
         self.changes = {name: (float(x[0]), float(x[1])) for name, x in changes.items()}
         late, cells, model = (restored_outputs(tree[name], shape) for name in ("late", "cells", "model"))
         self.by_step, self.by_mesh, self._model, self._model_every = late, cells, model, 1
+        (self._bound, _), self._model_bound = bounded(self.run), None  # what is kept of a coarser run is bounded
         older = dict(zip(MODEL_OF, (1, 1, np.zeros(0)), strict=True))  # checkpoints of 0.6 do not say
         count, every, catenary = matched(tree.get("model_of", older), older, "model error").values()
         if min(count, every) < 1 or catenary.shape not in ((0,), every_of(shape[0], every).shape):
@@ -400,15 +403,3 @@ def summary(errors: Errors) -> dict[str, float]:
         out[f"error_{cause}_position"] = errors.largest(cause, "position")
         out[f"error_{cause}_end_force"] = max(errors.largest(cause, name) for name in END_FORCES.values())
     return out
-
-
-def _implausible(coarse: RunSample) -> str:
-    """What to say where the model error of a line whose zones move is too large to be true; else empty."""
-    found = coarse.model_error.get("position")
-    error = np.asarray(found) if found is not None else None
-    if error is None or not coarse.bound or float(np.max(error, initial=0.0)) <= BELIEVED * coarse.bound:
-        return ""
-    return (
-        f"the error of leaving bending out comes to {float(np.max(error)):.3g} m, beyond what its criteria let pass "
-        f"({coarse.bound:.3g} m): it is not believed, and not part of the error; compare with model: rod"
-    )

@@ -11,6 +11,7 @@ import numpy as np
 from hybrid.errors import ZONE_EVENTS
 from hybrid.model.plan import output_times
 from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.simulation.bounded_model_errors import bounded
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.error_estimate import Errors, summary
 from hybrid.simulation.refinement import END_FORCE
@@ -91,14 +92,15 @@ def known(
 
 
 def error_fields(result: RunSample, errors: Errors) -> list[Field]:
-    """Errors by cause and quantity; those by neglected bending only where the run has not written them itself."""
+    """Errors by cause and quantity; those by neglected bending only where the run's own do not count as written."""
+    written = bool(result.model_error) and bounded(result)[0] is None
     return [
         Field(
             f"errors/{cause}/{name}", UNITS[name], f"{CAUSES[cause]} of {_words(name)}, estimated",
             shape[1:], ("right/s" if name.startswith("right_") else "s",) if len(shape) == 2 else (),
         )
         for cause, quantities in errors.fields.items()
-        if not (cause == "model" and result.model_error)
+        if not (cause == "model" and written)
         for name, shape in quantities.items()
     ]  # fmt: skip
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from hybrid.model.resolution import RequestedAccuracy
 from hybrid.scene.schema import Scene
+from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.error_order import MOST_ORDER
 from hybrid.simulation.run_sample import END_FORCES, RunSample
@@ -202,12 +203,12 @@ def _begins(t: np.ndarray, windows: int) -> np.ndarray:
 
 def _model_errors(run: RunSample, values: Mapping[str, np.ndarray], every: int, windows: int) -> dict[str, np.ndarray]:
     """What errors of neglected bending (nt, ...) make of STATISTICS, to first order: (4, 1, ...)."""
-    out = {}
+    out, (factors, _) = {}, bounded(run)
     named = {END_FORCES.get(name, name): x for name, x in values.items()}
     for name, field in run.model_error.items():
         if not len(field):
             continue
-        error, value = _thinned(np.asarray(field), every // run.every), named.get(name)
+        error, value = _thinned(scaled(np.asarray(field), factors), every // run.every), named.get(name)
         level = np.sqrt(np.mean(error * error, axis=0))
         if value is None or value.shape != error.shape:  # of vectors: no extreme of a component
             out[name] = np.stack([np.max(error, axis=0), level, level, level])[:, None]
