@@ -16,6 +16,7 @@ import numpy as np
 from hybrid.kernels import books as b
 from hybrid.kernels.axial_law import strain_and_energy
 from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.paid_length import amount_between, cell, length_at, node
 from hybrid.kernels.payout import slope_at, velocity_at
@@ -36,7 +37,7 @@ from hybrid.kernels.reel import (
     blank_reel,
 )
 from hybrid.kernels.references import reader
-from hybrid.kernels.rotations import add, dot, scale, sub
+from hybrid.kernels.rotations import add, cross, dot, scale, sub
 from hybrid.kernels.state import Floats, Line, State, blank_line, blank_state
 from hybrid.kernels.winch import ALGORITHMIC_NOW, RATE_NOW, TENSION, TRUE_NOW
 
@@ -252,6 +253,32 @@ def carried(a, e, to):
 
 
 @inner
+def twist_rate(line, state, reel, i):
+    """Rate, rad/m along s, at which the frames of the two cells at a node turn about the line; 0: nothing bears torque there."""
+    k = node(line, reel, i)
+    if not 0 < k < line.h.shape[0] or not line.element[k] or not line.kb[k, 2] > 0.0 or line.bits & PLANAR:
+        return 0.0
+    e = get3(state.e, k)
+    a, b = carried(get3(state.a1, k - 1), get3(state.e, k - 1), e), get3(state.a1, k)
+    angle = math.atan2(dot(cross(a, b), e) / math.sqrt(dot(e, e)), dot(a, b))
+    return 2.0 * angle / (line.h[k - 1] + line.h[k])
+
+
+@inner
+def put_director(job, c, a, e, turn):
+    """The first director of a new cell: `a`, of a cell with the chord e, carried there and turned by `turn`, rad.
+
+    Cells of a twisted line differ by what the twist is between their middles.  Without this the torque at a new node is
+    zero, and that beside it half as much again, until twist waves have levelled it.
+    """
+    to = chord_at(job.target, job.out, job.new, c)
+    a, side = carried(a, e, to), job.new.numbers[SIDE] / math.sqrt(dot(to, to))
+    if turn != 0.0:
+        a = add(scale(math.cos(turn), a), scale(math.sin(turn) * side, cross(to, a)))
+    put(job.out.a1, cell(job.target, job.new, c), a)
+
+
+@inner
 def let_lack(job, flow, c, true, grows, rises, kept, span):
     """Cell c of the new line lacks what its law of length misses, and gets it in `span`, s.
 
@@ -309,6 +336,12 @@ def enter(job, flow, g):
     cut, last = cell(line, reel, g), cell(line, reel, g - 1)
     slope = (state.T[cut] - state.T[last]) / (0.5 * (line.h[last] + h))
     kept, rises = mismatch(job, flow, g, g), tension_rate(state, job.clock, job.tension, cut)
+    twist, side = twist_rate(line, state, reel, g), reel.numbers[SIDE]
+    ahead = twist_rate(line, state, reel, i)
+    if ahead == 0.0:
+        ahead = twist
+    elif twist == 0.0:
+        twist = ahead
     for c in range(g):
         new.lack[c], new.rate[c], new.since[c], new.span[c] = reel.lack[c], reel.rate[c], reel.since[c], reel.span[c]
     for c in range(g, g + 2):
@@ -316,7 +349,9 @@ def enter(job, flow, g):
         middle = 0.5 * (length - h) if c == g else 0.5 * (h - length)
         k = cell(target, new, c)
         out.T[k] = state.T[cut] + slope * middle
-        put(out.a1, k, carried(get3(state.a1, cut), e_old, chord_at(target, out, new, c)))
+        # the twist is linear between the nodes: that between the two middles
+        rate = 0.5 * (twist + ahead) + 0.5 * (ahead - twist) * middle / h
+        put_director(job, c, get3(state.a1, cut), e_old, side * rate * middle)
         if state.slow.shape[0] > 0:
             out.slow[k] = state.slow[cut] + slope * middle
         grows = flow.rate if c == i else 0.0
@@ -339,7 +374,7 @@ def leave(job, flow, g):
     out.wd[k] = a * state.wd[last] + z * state.wd[cut]
     if state.slow.shape[0] > 0:
         out.slow[k] = a * state.slow[last] + z * state.slow[cut]
-    put(out.a1, k, carried(get3(state.a1, last), e, both))
+    put_director(job, c, get3(state.a1, last), e, 0.5 * reel.numbers[SIDE] * twist_rate(line, state, reel, g) * hb)
     kept = mismatch(job, flow, g, c) + mismatch(job, flow, g, g)
     rises = a * tension_rate(state, job.clock, job.tension, last) + z * tension_rate(state, job.clock, job.tension, cut)
     for j in range(c):

@@ -51,3 +51,36 @@ def test_nodes_enter_and_leave_as_by_python(
     assert len(one_by_one) >= 3
     for name in (x for x in found.names if x != "steps/cpu" and found[x].dtype.kind == "f"):
         assert np.array_equal(found[name], other[name], equal_nan=True), name
+
+
+@pytest.mark.parametrize(
+    ("winch", "rate", "more"),
+    [("end", 0.8, {}), ("start", 0.8, {}), ("start", -0.8, {}), ("end", 0.4, {"contact": {"self": True}})],
+)
+def test_torque_stays_even_where_nodes_enter_and_leave(winch: str, rate: float, more: dict[str, Any]) -> None:
+    """A straight line whose ends hold one turn: torque is 2 pi GJ/L at every node and step, in envelope and outputs.
+
+    2 %: what the growing cell adds beside the winch, and the twist waves of the ramp.
+    """
+    far, out = "start" if winch == "end" else "end", 4.0
+    up = {"tangent": [0, 0, 1 if winch == "end" else -1], "normal": [1, 0, 0]}
+    section = {"length": out, "mass": 0.4, "diameter": 0.02, "axial_stiffness": 1e5, "bending_stiffness": 0.2}
+    pulled = {"kind": "guided", **up, "force": [0, 0, -40.0]}
+    held = {"kind": "clamped", "position": [0, 0, 0], **up, "payout": {"rate": rate, "ramp": 0.2}}
+    turned = {winch: held, far: pulled}
+    turned["end"] |= {"turns": 1}
+    result = hybrid.run({
+        "cable": {"sections": [section | {"torsional_stiffness": 0.16}]}, "model": "rod", "mesh": {"cells": 40},
+        "ends": turned, "initial": "equilibrium", "time": {"duration": 1.5, "step": 0.01}, "output": {"every": 0.02},
+        "dimension": 3, **more,
+    })  # fmt: skip
+    length = result["payout/length"]
+    assert abs(length[-1] - length[0]) > 5 * out / 40  # nodes have entered, or left
+    expected = 2.0 * np.pi * 0.16 / length
+    low, high = 0.98 * expected.min(), 1.02 * expected.max()
+    torque = np.abs(result["torque"])
+    assert low < torque.min() and torque.max() < high
+    for bound in ("min", "max"):
+        kept = np.abs(result[f"envelope/torque_{bound}"])
+        kept = kept[np.isfinite(kept)]
+        assert low < kept.min() and kept.max() < high
