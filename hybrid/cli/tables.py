@@ -49,10 +49,11 @@ def lowest_node(s: np.ndarray, r: np.ndarray) -> int:
 def extremes_facts(result: Result) -> dict[str, Any]:
     """Largest and smallest tension (N), smallest bend radius (m) with s (m) and t (s), and the limits of sections.
 
-    Of every accepted step where the file has its envelope, else of the outputs.
+    Of every accepted step where the file has its envelope, and of the outputs.
     """
+    from hybrid.store.envelope import limits_of
     from hybrid.store.limits import held_of
-    from hybrid.view.worst import limits_of, worst
+    from hybrid.view.worst import worst
 
     found: dict[str, Any] = {}
     moves = len(result.times) > 1
@@ -64,7 +65,7 @@ def extremes_facts(result: Result) -> dict[str, Any]:
         straight = not x.value * float(result.s[-1] - result.s[0]) > 1e-6
         found["bend_radius_min"] = None if straight else {"value": 1.0 / x.value, "s": x.s, "t": x.t}
     found["quantities"] = [x._asdict() | {"text": x.text, "when": x.when * moves} for x in held_of(result)]
-    return found | {"limits": [x._asdict() for x in limits_of(result)]}
+    return found | {"limits": [x._asdict() for x in limits_of(result, result)]}
 
 
 def extremes_rows(facts: dict[str, Any], moves: bool) -> Iterator[tuple[str, str]]:

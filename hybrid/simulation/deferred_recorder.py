@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.store.envelope import Recorded
 from hybrid.store.writer import Recorder
 
 # So much is held back at most where nothing was saved to come back to.
@@ -49,6 +50,11 @@ class DeferredRecorder:
     def replace(self, values: Mapping[str, np.ndarray]) -> None:
         """Values as of `Recorder.replace`, of which the last count."""
         self._recorder.replace(values)
+
+    def recorded(self) -> Recorded | None:
+        """As of `Recorder.recorded`, after a last step: what waits is handed on."""
+        self.commit()
+        return self._recorder.recorded()
 
     @property
     def due(self) -> bool:

@@ -30,7 +30,7 @@ from hybrid.simulation.self_watch import SelfWatch
 from hybrid.solve.run import CompiledRun, no_extremes
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import Stepper
-from hybrid.store.envelope import BEGIN, END, GROUP, SCALE, Judged, judged
+from hybrid.store.envelope import BEGIN, END, GROUP, SCALE, Recorded, limits_of
 from hybrid.store.format import Field
 from hybrid.store.named_arrays import matched
 
@@ -213,13 +213,11 @@ class Envelope:
         out += [(field, np.full(field.shape, np.nan)) for field in self.quantities.fields()]
         return out + [(field, unknown[0]) for field in self.itself.fields()]
 
-    def judged(self, values: Mapping[str, np.ndarray]) -> list[Judged]:
-        """The limits of the sections against those values."""
-        return judged({field.name: x for field, x in self.fixed()} | dict(values))
-
-    def note_broken(self, values: Mapping[str, np.ndarray], note: Callable[..., None]) -> None:
-        """An event for every limit that those values break; note: as Recorder.event."""
-        for x in self.judged(values):
+    def note_broken(
+        self, values: Mapping[str, np.ndarray], outputs: Recorded | None, note: Callable[..., None]
+    ) -> None:
+        """An event for every limit that those values, or the outputs, break; note: as Recorder.event."""
+        for x in limits_of(outputs, {field.name: x for field, x in self.fixed()} | dict(values)):
             if x.broken:
                 note(x.t, x.s, x.s, LIMIT_EVENTS[x.limit], x.text, value=x.value, threshold=x.allowed)
 

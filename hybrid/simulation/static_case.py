@@ -76,7 +76,7 @@ class StaticCase:
             recorder.save(0.0, values, observer.zone_rows)
             reached = of_equilibrium(envelope, self.scene, model, found, recorder.event)
             recorder.replace(reached)
-            envelope.note_broken(reached, recorder.event)
+            envelope.note_broken(reached, recorder.recorded(), recorder.event)
             recorder.close("complete", f"equilibrium: {found.summary}; residual force {found.residual:.2g} N")
         return _sample(resolution, model, values, at_edges, clock.process_time() - begin)
 

@@ -245,7 +245,7 @@ class LineResult:
         """Record the envelope up to t (s) and the status; events as of `take_events`."""
         values = self.envelope.values(self.model.line.s, self.books.extremes, t)
         self.recorder.replace(values)
-        self.envelope.note_broken(values, self.events.event)
+        self.envelope.note_broken(values, self.recorder.recorded(), self.events.event)
         if self.contact is not None and (tries := self.contact.given_up):
             self.events.event(t, 0.0, self.model.length, "steps cut", energy_gains_text(tries), value=float(tries))
         noted = self.take_events()

@@ -142,7 +142,7 @@ class TimeLoop:
         self.write_envelope()
         self.diagnostics.finish(run.run)
         if run.envelope is not None:
-            run.envelope.note_broken(run.envelope_values(), run.events.event)
+            run.envelope.note_broken(run.envelope_values(), self.recorder.recorded(), run.events.event)
         count_iterations(run)
         count_energy_gains(run)
         run.events.write_to(self.recorder)

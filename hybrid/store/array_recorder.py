@@ -132,6 +132,12 @@ class ArrayRecorder(BaseRecorder):
         """Whether a run should hand over what it has."""
         return monotonic() - self._flushed > _PAUSE
 
+    def _has_fixed(self, name: str) -> bool:
+        return name in self._fixed
+
+    def _fixed_values(self, name: str) -> np.ndarray:
+        return self._fixed[name].values
+
     def checkpoint(self, content: Callable[[], Mapping[str, Any]]) -> None:
         """Nobody goes on with a result in memory."""
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.store.envelope import Recorded
 
 
 class ComparisonRecorder:
@@ -48,6 +49,10 @@ class ComparisonRecorder:
         self._catenary += [share] * len(times)
         self.rods |= {(a, b) for kind, a, b in zones if kind == "rod"}
         self._keep(values)
+
+    def recorded(self) -> Recorded | None:
+        """Outputs to compare with are held against no limits."""
+        return None
 
     def _keep(self, values: Mapping[str, np.ndarray]) -> None:
         for name, value in values.items():

@@ -1,7 +1,12 @@
-"""Extremes and limits of a result: over every accepted step where the file has its envelope, else over its outputs."""
+"""Extremes and limits of a result: over every accepted step where the file has its envelope, and over its outputs.
+
+An envelope is of nodes, where a tension is the mean of two cells: an output between nodes, or on one side of a point
+load, may lie beyond it.  Limits are held against both.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -14,8 +19,12 @@ GROUP = "envelope"
 SCALE, BEGIN, END = f"{GROUP}/s", f"{GROUP}/begin", f"{GROUP}/end"
 # What limits are held against.
 _HELD = {"min_bend_radius": ("curvature", "max"), "max_tension": ("tension", "max"), "min_tension": ("tension", "min")}
+# Which limits there are of quantities that outputs may have beyond their envelope.
+LIMITED = {"curvature": ("min_bend_radius",), "tension": ("max_tension", "min_tension"), "von_mises": ("max_stress",)}
 # Of the largest tension: what is below is what the solver's tolerance leaves of a force of zero, as at a free end.
 NOTHING = 1e-6
+# Part of a value by which an output at a node may differ from that of its step: sums in another order.
+SAME = 1e-12
 
 
 class Arrays(Protocol):
@@ -24,6 +33,14 @@ class Arrays(Protocol):
     def __contains__(self, name: object, /) -> bool: ...
 
     def __getitem__(self, name: str, /) -> np.ndarray: ...
+
+
+class Recorded(Arrays, Protocol):
+    """What is known of a line: a result, or one that is being written; quantities that grow come as rows."""
+
+    def rows_of(self, *names: str) -> Iterator[tuple[np.ndarray, ...]]:
+        """Rows (n, ...) of quantities over the outputs, so many at a time."""
+        ...
 
 
 class Extreme(NamedTuple):
@@ -81,6 +98,56 @@ def extreme(values: Arrays, name: str, bound: str) -> Extreme | None:
     s = values[SCALE]
     side = int(k > 0 and s[k - 1] == s[k]) - int(k + 1 < len(s) and s[k + 1] == s[k])
     return Extreme(float(x[k]), float(s[k]), float(values[f"{GROUP}/{name}_t_{bound}"][k]), side)
+
+
+def extremes_of_outputs(values: Recorded, name: str) -> dict[str, np.ndarray]:
+    """Extremes of a field (t, s) over the outputs, and its limits, by the names and in the form of an envelope."""
+    s, right = values["s"], f"right/{name}"
+    jumps = values["right/s"] if right in values else np.zeros(0)
+    behind = np.searchsorted(s, jumps) + 1
+    places = np.insert(s, behind, jumps)
+    low, high, first, last = (np.full(places.size, x) for x in (np.inf, -np.inf, np.nan, np.nan))
+    for t, x, *more in values.rows_of("t", name, *[right] * bool(jumps.size)):
+        if not len(t):
+            continue
+        x = np.insert(x, behind, more[0], axis=1) if more else x
+        for bound, when, sign in ((low, first, 1.0), (high, last, -1.0)):
+            row = np.where(np.isfinite(x), sign * x, np.inf).argmin(axis=0)
+            found = x[row, np.arange(places.size)]
+            better = sign * found < sign * bound
+            bound[better], when[better] = found[better], t[row][better]
+    out = {SCALE: places}
+    for word, bound, when in (("min", low, first), ("max", high, last)):
+        out[f"{GROUP}/{name}_{word}"] = np.where(np.isfinite(bound), bound, np.nan)
+        out[f"{GROUP}/{name}_t_{word}"] = when
+    for limit in LIMITED.get(name, ()):
+        if limit in values:
+            other = f"right/{limit}"
+            beside = values[other] if other in values else values[limit][np.searchsorted(s, jumps)]
+            out[f"{GROUP}/{limit}"] = np.insert(values[limit], behind, beside) if jumps.size else values[limit]
+    return out
+
+
+def limits_of(values: Recorded | None, envelope: Arrays) -> list[Judged]:
+    """Every limit of bend radius and tension that sections have, where it was broken most, or nearly: of an envelope
+    and of the outputs; of an output that is no more than a node of it, the node."""
+    found = {x.limit: x for x in judged(envelope)}
+    for name in ("curvature", "tension"):
+        if values is not None and name in values and any(limit in values for limit in LIMITED[name]):
+            for x in judged(extremes_of_outputs(values, name)):
+                known, near = found.get(x.limit), SAME * max(1.0, abs(x.value), abs(x.allowed))
+                if known is None or x.margin < known.margin - near:
+                    found[x.limit] = x
+    return [found[limit] for limit in _HELD if limit in found]
+
+
+def farthest(result: Recorded, name: str, bound: str) -> Extreme | None:
+    """As `extreme`, of the envelope and of the outputs."""
+    known, shown = extreme(result, name, bound), extreme(extremes_of_outputs(result, name), name, bound)
+    if known is None or shown is None:
+        return known or shown
+    more = shown.value - known.value if bound == "max" else known.value - shown.value
+    return shown if more > SAME * abs(known.value) else known
 
 
 def judged(values: Arrays) -> list[Judged]:

@@ -13,7 +13,7 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.statistics import extremes, fatigue, moments, spectrum
 from hybrid.store.bends import bends_of
-from hybrid.store.envelope import Judged, judged
+from hybrid.store.envelope import Judged, limits_of
 from hybrid.store.names import ALIASES
 
 if TYPE_CHECKING:
@@ -171,8 +171,8 @@ class Histories:
         return moments.exceedance(history.t, history.values, above)
 
     def utilisation(self: Any) -> dict[str, Judged]:
-        """How near the line came to each limit of its sections over all steps, by the key of the limit: `used` is the
-        part of max_tension or min_bend_radius that was used, None of min_tension; at s (m) and t (s).
+        """How near the line came to each limit of its sections over all steps and outputs, by the key of the limit:
+        `used` is the part of max_tension or min_bend_radius that was used, None of min_tension; at s (m) and t (s).
 
         ResultError of a result of several lines: each has its own."""
         if self.lines:
@@ -181,7 +181,7 @@ class Histories:
                 f"utilisation of a result with the lines {', '.join(self.lines)}\n"
                 f"    expected: that of one line\n    try:      result.lines[{first!r}].utilisation()"
             )
-        return {found.limit: found for found in judged(self)}
+        return {found.limit: found for found in limits_of(self, self)}
 
     def spectrum(
         self: Any, name: str, *, at: Any = None, times: Window | None = None, segment: float | None = None

@@ -1,4 +1,5 @@
-"""How near the quantities that a scene asks for came to their limits: over every step where a file knows them."""
+"""How near the quantities that a scene asks for came to their limits: over every step where a file knows them, and
+over the outputs."""
 
 from __future__ import annotations
 
@@ -7,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybrid.store.envelope import GROUP as GROUP_OF_NODES
-from hybrid.store.envelope import has_envelope
+from hybrid.store.envelope import SAME, Arrays, extremes_of_outputs, has_envelope
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
@@ -66,22 +67,34 @@ def at_every_step(result: Result, name: str, bound: str) -> tuple[float, float, 
     return float(result[full][k]), float(result[f"{EXTREMES}/t/{name}"][k]), s
 
 
-def stress_at_every_step(result: Result) -> Held | None:
-    """The largest stress over every accepted step and node, as a part of what is allowed; None: it is not known."""
-    if f"{GROUP_OF_NODES}/max_stress" not in result or not has_envelope(result):
+def stress_of(result: Result) -> Held | None:
+    """The largest stress as a part of what is allowed, over every accepted step and node and over the outputs, which
+    may lie between nodes; None: there is no limit, or no stress."""
+    known = _most_stressed(result, False) if has_envelope(result) else None
+    if "von_mises" not in result or "max_stress" not in result:
+        return known
+    by_outputs = known is None and len(result.times) > 1
+    shown = _most_stressed(extremes_of_outputs(result, "von_mises"), by_outputs)
+    if known is None or shown is None:
+        return known or shown
+    return shown if shown.value / shown.allowed > (1.0 + SAME) * known.value / known.allowed else known
+
+
+def _most_stressed(values: Arrays, by_outputs: bool) -> Held | None:
+    names = [f"{GROUP_OF_NODES}/{x}" for x in ("von_mises_max", "max_stress", "von_mises_t_max", "s")]
+    if any(name not in values for name in names):
         return None
-    stress, allowed = result[f"{GROUP_OF_NODES}/von_mises_max"], result[f"{GROUP_OF_NODES}/max_stress"]
+    stress, allowed, t, s = (values[name] for name in names)
     used = stress / allowed
     if np.isnan(used).all():
         return None
     k = int(np.nanargmax(used))
     value, most = float(stress[k]), float(allowed[k])
-    t, s = (float(result[f"{GROUP_OF_NODES}/{x}"][k]) for x in ("von_mises_t_max", "s"))
-    return Held("von_mises", "max_stress", "Pa", value, most, value > most, t, s, False)
+    return Held("von_mises", "max_stress", "Pa", value, most, value > most, float(t[k]), float(s[k]), by_outputs)
 
 
 def held_of(result: Result) -> list[Held]:
-    """Every limit of a quantity, at the step, or output, where it is nearest to be broken, or most broken."""
+    """Every limit of a quantity, at the step or output where it is nearest to be broken, or most broken."""
     found, moves = [], len(result.times) > 1
     for full in (name for name in result.names if name.startswith(f"{GROUP}/")):
         name = full.removeprefix(f"{GROUP}/")
@@ -90,28 +103,19 @@ def held_of(result: Result) -> list[Held]:
             if np.isnan(allowed):
                 continue
             known = at_every_step(result, name, limit)
-            if known is None and np.isnan(values).all():
-                found.append(Held(name, limit, unit, np.nan, allowed, False, np.nan, None, moves))
-                continue
-            if known is not None:
-                value, t, where = known
-            else:
+            if np.isfinite(values).any():
                 k = int(np.nanargmin(values) if limit == "smallest" else np.nanargmax(values))
                 value, t, where = float(values[k]), float(result.times[k]), None
+                sign = 1.0 if limit == "smallest" else -1.0
+                if known is not None and not sign * value < sign * known[0] - SAME * abs(known[0]):
+                    value, t, where = known
+            elif known is not None:
+                value, t, where = known
+            else:
+                found.append(Held(name, limit, unit, np.nan, allowed, False, np.nan, None, moves))
+                continue
             broken = value < allowed if limit == "smallest" else value > allowed
             found.append(Held(name, limit, unit, value, allowed, broken, t, where, moves and known is None))
-    if (stressed := stress_at_every_step(result)) is not None:
+    if (stressed := stress_of(result)) is not None:
         found.append(stressed)
-    elif "max_stress" in result and "von_mises" in result:
-        s, stress = result.both_sides("von_mises")
-        right = result["right/max_stress"] if "right/max_stress" in result else np.zeros(0)
-        jumps = result["right/s"] if right.size else right
-        allowed = np.insert(result["max_stress"], np.searchsorted(result["s"], jumps) + 1, right)
-        used = stress / allowed
-        if not np.isnan(used).all():
-            n, k = divmod(int(np.nanargmax(used)), used.shape[1])
-            value, most = float(stress[n, k]), float(allowed[k])
-            where, value, most = float(s[k]), float(stress[n, k]), float(allowed[k])
-            t, broken = float(result.times[n]), value > most
-            found.append(Held("von_mises", "max_stress", "Pa", value, most, broken, t, where, moves))
     return found

@@ -32,7 +32,7 @@ from __future__ import annotations
 import difflib
 import html
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -254,6 +254,10 @@ class Result(Histories):
         jumps = self["right/s"]
         places = np.searchsorted(s, jumps) + 1
         return np.insert(s, places, jumps), np.insert(values, places, self[right], self.dims(name).index("s"))
+
+    def rows_of(self, *names: str) -> Iterator[tuple[np.ndarray, ...]]:
+        """Arrays over the outputs, as those of a result that is being written come: all rows at once."""
+        yield tuple(self[name] for name in names)
 
     def to_xarray(
         self,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from math import isfinite, nan
 from types import TracebackType
@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 
 from hybrid.errors import OMITTED, ResultError
+from hybrid.store.envelope import Recorded
 from hybrid.store.format import Field, unsound
 from hybrid.store.table import Table
 
@@ -143,6 +144,29 @@ class BaseRecorder:
     def replace(self, values: Mapping[str, np.ndarray]) -> None:
         """Other values for quantities of `fixed`, by name; written with the next flush."""
         self._replaced.update(values)
+
+    # --- what is recorded so far ----------------------------------------------------------------------
+
+    def recorded(self) -> Recorded | None:
+        """What is recorded so far; None: nobody keeps it."""
+        return self
+
+    def __contains__(self, name: object, /) -> bool:
+        return name in self._names or self._has_fixed(str(name))
+
+    def __getitem__(self, name: str, /) -> np.ndarray:
+        """A quantity of `fixed`, or the arc lengths of the grid."""
+        return self._fixed_values(name)
+
+    def rows_of(self, *names: str) -> Iterator[tuple[np.ndarray, ...]]:
+        """Rows (n, ...) of fields over the outputs, so many at a time; "t": their times."""
+        return self._outputs.rows_of(names)
+
+    def _has_fixed(self, name: str) -> bool:
+        raise NotImplementedError
+
+    def _fixed_values(self, name: str) -> np.ndarray:
+        raise NotImplementedError
 
     def __enter__(self) -> Self:
         return self

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import h5py
@@ -12,6 +12,8 @@ from h5py import h5d, h5s, h5t
 from hybrid.store.format import Field, cut
 
 NUMBERS = {"float64": h5t.NATIVE_DOUBLE, "int64": h5t.NATIVE_INT64}
+
+_PIECE = 1_000_000  # numbers of a dataset that are read at a time
 
 
 class Table:
@@ -49,6 +51,18 @@ class Table:
             one = parts[0] if len(parts) == 1 else None
             found[name] = np.concatenate([np.zeros((0, *field.shape), field.dtype), *parts]) if one is None else one
         return found
+
+    def rows_of(self, names: Sequence[str]) -> Iterator[tuple[np.ndarray, ...]]:
+        """All rows (n, ...) of some datasets, written ones and those that wait, some 8 MB at a time."""
+        columns = [self._names.index(name) for name in names]
+        if self.count:
+            assert self._file is not None
+            wide = max(int(np.prod(self.fields[k].shape)) for k in columns)
+            some = max(1, _PIECE // max(wide, 1))
+            for a in range(0, self.count, some):
+                yield tuple(self._file[name][a : min(a + some, self.count)] for name in names)
+        for block in self._blocks:
+            yield tuple(block[k] for k in columns)
 
     def drop(self) -> None:
         """Forget the rows that wait."""

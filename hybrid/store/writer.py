@@ -227,6 +227,12 @@ class Recorder(BaseRecorder):
         late = monotonic() - self._flushed > max(_PAUSE, _PART * self._took)
         return late or sum(x._outputs.bytes_waiting for x in (self, *self._parts.values())) > _MOST_WAITING
 
+    def _has_fixed(self, name: str) -> bool:
+        return name in self._file
+
+    def _fixed_values(self, name: str) -> np.ndarray:
+        return np.asarray(self._file[name][()])
+
     def checkpoint(self, content: Callable[[], Mapping[str, Any]]) -> None:
         """Keep a checkpoint at the last output, written with the next flush; content: makes `program`, `asks`,
         `resolution` and `state` of it."""

@@ -11,7 +11,7 @@ import numpy as np
 from hybrid.errors import HybridError, ResultError
 from hybrid.scene.study import LIMIT_OF, Kept
 from hybrid.statistics import extremes, moments
-from hybrid.store.envelope import judged
+from hybrid.store.envelope import farthest, limits_of
 from hybrid.store.histories import history_of, lies_along
 from hybrid.store.limits import at_every_step
 from hybrid.store.reader import Result
@@ -114,9 +114,8 @@ def _taken(
     """
     name, at = kept.quantity, None if kept.at is None else np.atleast_1d(np.asarray(kept.at, float))
     if take in ("max", "min") and at is None and kept.times is None and f"envelope/{name}_{take}" in result:
-        values = result[f"envelope/{name}_{take}"]  # of every step
-        finite = values[np.isfinite(values)]
-        worst = (finite.max() if take == "max" else finite.min()) if finite.size else np.nan
+        farther = farthest(result, name, take)
+        worst = np.nan if farther is None else farther.value
         return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(worst)
     if take in ("max", "min") and at is None and kept.times is None:
         known = at_every_step(result, name, "largest" if take == "max" else "smallest")
@@ -124,7 +123,7 @@ def _taken(
             return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(known[0])
     if take == "utilisation":
         limit = LIMIT_OF[name]
-        used = [x.used for x in judged(result) if x.limit == limit and x.used is not None]
+        used = [x.used for x in limits_of(result, result) if x.limit == limit and x.used is not None]
         if not used:
             raise ResultError(f"no section has a {limit}, which {name} would be held against")
         return Variable("", f"{WORDS[take]} {limit}, every step", (), {}), np.asarray(used[0])

@@ -43,19 +43,48 @@ class Along(NamedTuple):
 def extent(result: Result, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, str]:
     """Arc lengths (n,), lowest and highest value there with a gap at jumps, and of what: every step, or every output.
 
-    Every accepted step where the file has its envelope, except where zones are corrected for bending: an envelope is of
-    the line that was computed.
+    Every accepted step, and outputs between nodes that go beyond it, where the file has its envelope, except where
+    zones are corrected for bending: an envelope is of the line that was computed.
     """
     found = along(result, name)
+    low, high = found.values.min(axis=0), found.values.max(axis=0)
     corrected = any(zone.kind == "corrected" for zone in result.zones[-1])
     if has_envelope(result) and not corrected and f"{GROUP}/{name}_max" in result:
         bounds = [result[f"{GROUP}/{name}_{x}"] for x in ("min", "max")]
         if all(np.isfinite(x).all() for x in bounds):
             steps = found._replace(s=result[SCALE])
-            (s, low), (_, high) = (steps.curve(x) for x in bounds)
+            steps, low, high = _widened(steps, bounds[0], bounds[1], found, low, high)
+            (s, low), (_, high) = (steps.curve(x) for x in (low, high))
             return s, low, high, "every step"
-    (s, low), (_, high) = (found.curve(x) for x in (found.values.min(axis=0), found.values.max(axis=0)))
+    (s, low), (_, high) = (found.curve(x) for x in (low, high))
     return s, low, high, "every output"
+
+
+def _widened(
+    steps: Along, low: np.ndarray, high: np.ndarray, outputs: Along, lowest: np.ndarray, highest: np.ndarray
+) -> tuple[Along, np.ndarray, np.ndarray]:
+    """Places of an envelope and its bounds there, with those of outputs between nodes that lie beyond them."""
+    near = 1e-9 * float(np.ptp(steps.s))
+
+    def apart(s: np.ndarray) -> np.ndarray:
+        """Places that come twice, on their sides."""
+        twice, out = np.flatnonzero(np.diff(s) == 0.0), s.copy()
+        out[twice] -= near
+        out[twice + 1] += near
+        return out
+
+    a, b = apart(steps.s), apart(outputs.s)
+    low, high = low.copy(), high.copy()
+    nearest = np.abs(a - b[:, None]).argmin(axis=1)
+    same = np.abs(a[nearest] - b) < 1.5 * near  # at a node there is no other place
+    np.minimum.at(low, nearest[same], lowest[same])
+    np.maximum.at(high, nearest[same], highest[same])
+    more = ~same & ((lowest < np.interp(b, a, low)) | (highest > np.interp(b, a, high)))
+    order = np.argsort(np.concatenate([a, b[more]]), kind="stable")
+    s, low, high = (
+        np.concatenate([x, y[more]])[order] for x, y in ((steps.s, outputs.s), (low, lowest), (high, highest))
+    )
+    return steps._replace(s=s), low, high
 
 
 def along(result: Result, name: str) -> Along:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.store.envelope import limits_of
 from hybrid.store.reader import Result
 from hybrid.view import report_parts as parts
 from hybrid.view.along import along
@@ -23,7 +24,7 @@ from hybrid.view.projections import views_of
 from hybrid.view.save import PAGES, REPORT_MARK, check_target, write_file
 from hybrid.view.style import ZERO, prefix, short, title_of
 from hybrid.view.summary import amount, length_of, warnings_of
-from hybrid.view.worst import limits_of, worst
+from hybrid.view.worst import worst
 
 Curve = tuple[np.ndarray, np.ndarray]
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -93,7 +94,7 @@ def _verdict(results: Mapping[str, Result]) -> str:
     lines, bad = [], False
     for name, result in results.items():
         kinds = [event.kind for event, _ in warnings_of(result)]
-        broken = [x.limit for x in limits_of(result) if x.broken]
+        broken = [x.limit for x in limits_of(result, result) if x.broken]
         bad |= bool(kinds or broken) or result.status != "complete"
         told = [result.status_text.splitlines()[0], ", ".join(kinds) or "no warnings"]
         told += [f"broken: {', '.join(broken)}"] if broken else []

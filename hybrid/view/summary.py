@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, LIMIT_EVENTS, weight_of_event
-from hybrid.store.envelope import GROUP, NOTHING, SCALE, has_envelope
+from hybrid.store.envelope import GROUP, NOTHING, SCALE, has_envelope, limits_of
 from hybrid.store.hockling import formation_ratio, formation_tension
 from hybrid.store.limits import held_of
 from hybrid.store.reader import Result
@@ -23,7 +23,7 @@ from hybrid.view.along import along
 from hybrid.view.loops import held_loop, trapped_loop
 from hybrid.view.projections import STILL, free_edges
 from hybrid.view.style import NEWS, ZERO, prefix, short
-from hybrid.view.worst import Worst, limits_of, worst
+from hybrid.view.worst import Worst, worst
 
 HOCKLING = (
     "Criterion: a long rod under tension T and torque M is straight and stable where T > M²/(4 EI) (A. G. Greenhill, "
@@ -157,7 +157,7 @@ def _tension(result: Result) -> Fact:
 
 def _with_limit(result: Result, limit: str, fact: Fact) -> Fact:
     """A fact on tension with the limit that it is held against."""
-    for x in limits_of(result):
+    for x in limits_of(result, result):
         if x.limit == limit:
             values = fact.values | {"allowed": x.allowed, "broken": x.broken}
             if not x.broken:
@@ -207,7 +207,7 @@ def _bend(result: Result) -> Fact:
         place_of = (found.t, found.s)
     unknown = _bends_left_out(result)
     text += unknown
-    limits = [x for x in limits_of(result) if x.limit == "min_bend_radius"]
+    limits = [x for x in limits_of(result, result) if x.limit == "min_bend_radius"]
     if not limits:
         weight = "note" if unknown else "plain"
         return Fact("bend", title, f"{text} No allowed radius given.", weight, values, *place_of)
@@ -284,14 +284,14 @@ def _limits(result: Result) -> Fact:
     """All limits of the sections in one table."""
     title, keys = "Limits of the sections", ("limit", "value", "allowed", "broken", "s", "t")
     stresses = [x for x in held_of(result) if x.limit == "max_stress"]
-    rows = [x._asdict() for x in limits_of(result)]
+    rows = [x._asdict() for x in limits_of(result, result)]
     rows += [{key: getattr(x, key) for key in keys} | {"used": x.value / x.allowed} for x in stresses]
     if not rows:
         none = "None given: min_bend_radius, max_tension, min_tension, or max_stress of the pipe, of a section."
         return Fact("limits", title, none, "absent")
     broken = sum(x["broken"] for x in rows)
     text = f"{broken} of {len(rows)} broken" if broken else "All are kept"
-    text += ", over every accepted step." if has_envelope(result) else ", at the outputs that were saved."
+    text += ", over every accepted step and output." if has_envelope(result) else ", at the outputs that were saved."
     return Fact("limits", title, text, "plain", {"limits": rows})
 
 
