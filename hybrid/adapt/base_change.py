@@ -7,7 +7,7 @@ import numpy as np
 from hybrid.adapt.manager import OF_BASE, DomainManager
 from hybrid.kernels import zone_step as z
 from hybrid.kernels.zone_step import blank_zones
-from hybrid.model.layout import Layout
+from hybrid.model.layout import Layout, on_other_parts
 from hybrid.model.line_on_base import LineOnBase
 
 # Arrays of `Zones` that have no base cells; of base cells; of cells.
@@ -17,21 +17,21 @@ OF_CELLS = ("past", "recent", "lack", "rate", "since", "keeps")
 
 
 def change_base(
-    manager: DomainManager, layout: Layout, source: np.ndarray, given: np.ndarray, on_base: LineOnBase
-) -> None:
-    """Let a manager go on with base cells of one cell each, of which some have come or gone.
+    manager: DomainManager, layout: Layout, source: np.ndarray, of_cell: np.ndarray, given: np.ndarray,
+    on_base: LineOnBase, anew: bool = False,
+) -> None:  # fmt: skip
+    """Let a manager go on with base cells of which some have come or gone, where they are one cell each.
 
-    source: (n,) which of the old base cells a new one is, or has come from; given: (n,) 1 rod, -1 catenary, 0 adaptive.
+    source, of_cell: which of the old base cells (n,), and cells (N,), a new one is, or has come from; given: (n,) 1
+    rod, -1 catenary, 0 adaptive; anew: how long nodes have been calm is not known.
     """
     old, n, places = manager.zones, layout.rod.size, layout.starts[-1] + 1
-    assert (layout.parts == 1).all()
-    blank = blank_zones(1, n)._replace(
-        here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=np.zeros(places, np.int64)
-    )
+    calm = np.zeros(places, np.int64) if anew else on_other_parts(manager.layout, old.calm, source, layout.parts)
+    blank = blank_zones(1, n)._replace(here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=calm)
     kept = {name: getattr(old, name) for name in OF_LINE} | {"ratios": old.ratios[:, source].copy()}
     kept |= {name: getattr(old, name)[source] for name in CARRIED}
     assert set(kept) <= set(OF_BASE)
-    cells = {name: getattr(old, name)[source] for name in OF_CELLS}
+    cells = {name: getattr(old, name)[of_cell] for name in OF_CELLS}
     known, relaxing = old.counts[z.KNOWN], old.counts[z.RELAXING]
     age, recent_age = manager.age, manager.recent_age
     manager.zones = blank._replace(**kept)

@@ -176,16 +176,17 @@ def foresee_edge(line, sea, state, zones, i, time):
 
     rods takes so long to come, and the edge would be there before them.
     """
-    kinds, length = zones.kinds, line.s[line.h.shape[0]] - line.s[0]
+    kinds, s, n = zones.kinds, line.s, line.h.shape[0]
     low = max(state.T[i], kinds.floor[i], 1e-300)
     x = min(over_shares(lack_at_edge(kinds.EI[i], kinds.w[i], low), zones.shares), FORESEEN)
     at, speed = edge_at(line, sea, state, i)
-    way = min(max(time * speed, -FARTHEST_KIND * length), FARTHEST_KIND * length)
-    a, b, begin = at + min(way, 0.0), at + max(way, 0.0), line.s[0]
-    for j in range(zones.H.shape[0]):
-        if begin <= b and begin + zones.H[j] >= a:
+    farthest = FARTHEST_KIND * (s[n] - s[0])
+    way = min(max(time * speed, -farthest), farthest)
+    a, b = at + min(way, 0.0), at + max(way, 0.0)
+    for c in range(n):  # base cells by their cells: their lengths may be of before, where line is paid out
+        if s[c] <= b and s[c + 1] >= a:
+            j = kinds.base_of_cell[c]
             raise_ratio(zones.ratios, EDGE, j, j, x)
-        begin += zones.H[j]
 
 
 @inner

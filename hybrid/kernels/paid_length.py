@@ -29,7 +29,6 @@ from hybrid.kernels.reel import (
     DRAG_N,
     DRAG_T,
     EASING,
-    FADING,
     FAR,
     KAPPA_1,
     LENGTH,
@@ -216,11 +215,9 @@ def take_balance_off(line, reel):
 @inner
 def prepare(line, reel, t):
     """The line with the length of now at t."""
-    numbers = reel.numbers
     take_riding_off(line, reel)
     take_balance_off(line, reel)
     fill_cells(line, reel)
     for k in range(growing(line, reel), line.h.shape[0]):
         line.h[cell(line, reel, k)] = reel.true[k]
-    if numbers[FADING] > -np.inf:
-        set_lengths(line, reel, t)
+    set_lengths(line, reel, t)

@@ -41,7 +41,6 @@ from hybrid.kernels.payout_balance import find_balance
 from hybrid.kernels.reel import (
     ACCELERATION,
     DUE,
-    FADING,
     FLUX,
     FLUX_BEFORE,
     LENGTH,
@@ -320,8 +319,6 @@ def pay_out(table):
     job.work[0, b.ZONES] += work_of_balance(before, state, reel, clock[b.NOW], clock[b.LAST_DT])
     remember(line, reel)
     last = reel.true[growing(line, reel)]
-    if clock[b.NOW] >= numbers[FADING]:
-        numbers[FADING] = -np.inf
     numbers[DUE] = 1.0 if last > numbers[LONGEST] or last < numbers[SHORTEST] else 0.0
     return 1 if numbers[DUE] > 0.0 or at_its_end(winch) else 0
 

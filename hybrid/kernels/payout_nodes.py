@@ -24,7 +24,6 @@ from hybrid.kernels.reel import (
     CHANGED,
     EASING,
     ENTERS,
-    FADING,
     FAR,
     LEAVES,
     LONGEST,
@@ -87,7 +86,7 @@ class Flow(NamedTuple):
 def place_reel(reel, nodes, count):
     """What a reel knows of a line of so many material nodes; none of its cells lacks anything."""
     numbers, before, place, next_ = reel.numbers, nodes[count - 2], nodes[count - 1], nodes[count]
-    numbers[PLACE], numbers[FADING] = place, -np.inf
+    numbers[PLACE] = place
     numbers[LONGEST] = next_ - place + ENTERS * (nodes[count + 1] - next_)
     numbers[SHORTEST] = LEAVES * (next_ - place)
     amount_between(reel.pieces, before, place, reel.rest)
@@ -394,10 +393,6 @@ def carry(job):
         enter(job, flow, g)
     else:
         leave(job, flow, g)
-    until = -np.inf
-    for c in range(m):
-        until = max(until, new.since[c] + new.span[c])
-    new.numbers[FADING] = until
     plain = (
         line.torsion.shape[0] == 0 and line.tension_twist.shape[0] == 0
     )  # no force that payout_balance does not know

@@ -34,7 +34,7 @@ ENTERS, LEAVES = 0.85, 0.35
     LENGTH, RATE, ACCELERATION,  # L, c and the rate of c at the end of the try
     PLACE,  # p
     LONGEST, SHORTEST,  # m, the last cell: beyond the first a node enters, below the second one leaves
-    FADING,  # s, until when lengths of cells are on their way to true ones
+    SPARE,  # in checkpoints of earlier versions
     DUE,  # 1 when a node is to enter or to leave
     FLUX,  # W, into the line by what the corrected force of the fairlead does not do
     FLUX_BEFORE,  # and before the last step

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import Literal
 
@@ -86,7 +87,7 @@ class Model:
         """What `build` makes a model of the same mesh from."""
         if self.layout is None:
             return (self.line.s, self.zones) if self.payout is None else (self.payout.begun, self.payout.zones)
-        return self.layout.finest if self.payout is None else of_rods(self.payout.begun)
+        return self.layout.finest if self.payout is None else self.payout.first_layout
 
     @property
     def cells(self) -> int:
@@ -95,14 +96,27 @@ class Model:
     @property
     def nodes(self) -> Floats:
         """(N+1,) m, nodes by which extremes are kept: the fairlead of a line that is paid out is the next one."""
+        if self.payout is not None and self.layout is not None:
+            return self.payout.kept_nodes(self.layout)
         return self.line.s if self.payout is None else self.payout.along(self.payout.nodes[: self.cells + 1])
+
+    @property
+    def finest_nodes(self) -> Floats:
+        """(K,) m, all nodes that there may be."""
+        if self.payout is not None:
+            s = self.payout.finest
+            return s[(s if self.payout.side else self.payout.far - s) < self.payout.longest]
+        return self.line.s if self.layout is None else self.layout.finest.nodes
 
     @property
     def always(self) -> np.ndarray:
         """Numbers of nodes that there always are: those of base cells, or that cannot be taken in."""
         if self.payout is not None:
             stays = np.flatnonzero(self.payout.nodes <= self.payout.shortest - self.payout.layer[0])
-            return stays if self.payout.side else self.cells - stays[::-1]
+            if self.layout is None:
+                return stays if self.payout.side else self.cells - stays[::-1]
+            first = self.layout.first
+            return first[stays] if self.payout.side else first[first.size - 1 - stays[::-1]]
         return np.arange(self.line.s.size) if self.layout is None else self.layout.first
 
     @property
@@ -161,6 +175,13 @@ def build(
     cable = material(scene)
     resolution = resolution or first_resolution(scene)
     layout, s, zones = _nodes(scene, cable, resolution, mesh)
+    paid = None
+    if layout is not None and payout_of(scene) is not None and follows_curvature(scene):
+        whole = line_on(cable, layout.base, layout.finest.rod)
+        paid = payout_plan(scene, whole, zones, partial(_following_parts, scene, resolution=resolution))
+        assert paid is not None
+        layout = paid.first_layout
+        s = layout.nodes
     n = s.size - 1
     middle = 0.5 * (s[:-1] + s[1:])
     zone_of = np.clip(np.searchsorted([z.s_b for z in zones], middle), 0, len(zones) - 1)
@@ -201,7 +222,7 @@ def build(
         attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
         on_base=LineOnBase(cable, layout.base) if layout is not None else None,
         plane=plane, corrected=corrected, follows_error=follows,
-        payout=payout_plan(scene, line, zones),
+        payout=paid or payout_plan(scene, line, zones),
     )  # fmt: skip
 
 
@@ -325,21 +346,29 @@ def _layout(scene: Scene, cable: Material, cuts: Sequence[float], resolution: Re
         base, _ = place_nodes((ZonePlan("rod", scene.length),), cuts, None, None, FOLLOWING_BASE)
     if not (follows and mesh_is_free(scene)):
         base, _ = _placed(scene, cable, (ZonePlan("rod", scene.length),), cuts, resolution, BASE_CELLS)
-    middle = 0.5 * (base[:-1] + base[1:])
-    cell = rod_cells(scene, cable, middle, resolution.grading)
-    cell = (
-        np.minimum(cell, TWIST / np.maximum(twist_rate(scene, cable, middle), TWIST / scene.length))
-        / resolution.fineness
-    )
     if follows:
-        halvings = np.ceil(np.log2(np.maximum(np.diff(base) / cell, 1.0)) - 1e-9)
-        parts = np.minimum(2 ** halvings.astype(int), MOST_FOLLOWING)
-        return Layout(base, parts, np.ones(base.size - 1, bool))
+        return Layout(base, _following_parts(scene, cable, base, resolution), np.ones(base.size - 1, bool))
+    cell = _rod_cells(scene, cable, base, resolution)
     nearly = NEARLY if resolution.grading is not None else 1e-9
     parts = np.clip(np.ceil(np.diff(base) / cell - nearly), 1, MOST_PARTS).astype(int)
     layout = Layout(base, parts, np.ones(base.size - 1, bool))
     # of a line that is paid out catenaries have the cells of rods, so that whatever enters and leaves is of one kind
     return layout if payout_of(scene) is None else of_rods(layout.nodes)
+
+
+def _rod_cells(scene: Scene, cable: Material, base: Floats, resolution: Resolution) -> Floats:
+    """Longest cells (n,) m of rods in base cells between nodes (n+1,) m."""
+    middle = 0.5 * (base[:-1] + base[1:])
+    twisted = TWIST / np.maximum(twist_rate(scene, cable, middle), TWIST / scene.length)
+    cell = np.minimum(rod_cells(scene, cable, middle, resolution.grading), twisted)
+    return np.asarray(cell / resolution.fineness)
+
+
+def _following_parts(scene: Scene, cable: Material, base: Floats, resolution: Resolution) -> np.ndarray:
+    """Finest cells (n,) of base cells between nodes (n+1,) m, where they follow the curvature."""
+    cell = _rod_cells(scene, cable, base, resolution)
+    halvings = np.ceil(np.log2(np.maximum(np.diff(base) / cell, 1.0)) - 1e-9)
+    return np.asarray(np.minimum(2 ** halvings.astype(int), MOST_FOLLOWING))
 
 
 def rod_cells(scene: Scene, cable: Material, s: Floats, grading: Grading | None = None) -> Floats:

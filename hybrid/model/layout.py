@@ -39,6 +39,13 @@ class Layout(_Fields):
         there[self.starts] = True
         return np.flatnonzero(there)
 
+    @property
+    def there(self) -> np.ndarray:
+        """(K+1,) bool, which nodes of the finest mesh there are."""
+        out = np.zeros(self.starts[-1] + 1, bool)
+        out[self.places] = True
+        return out
+
     @cached_property
     def first(self) -> np.ndarray:
         """(n+1,) number of the first cell (and node) of each base cell; the last is the number of all."""
@@ -75,6 +82,22 @@ class Layout(_Fields):
             Zone("rod" if self.rod[a] else "catenary", float(self.base[a]), float(self.base[b]))
             for a, b in pairwise(edges(self.rod))
         )
+
+
+def on_other_parts(old: Layout, x: np.ndarray, source: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """Values of the nodes of a finest mesh (K+1,) on that of base cells with twice, or half, as many parts.
+
+    source: (n,) which base cell of the old layout each comes from; parts: (n,).  New nodes have 0; a node that is no
+    longer one must have had 0.
+    """
+    out, begin = np.zeros(parts.sum() + 1, x.dtype), 0
+    for j, size in zip(source.tolist(), parts.tolist(), strict=True):
+        now = x[old.starts[j] : old.starts[j + 1]]
+        more, fewer = max(size // now.size, 1), max(now.size // size, 1)
+        out[begin : begin + size : more] = now[::fewer]
+        begin += size
+    out[-1] = x[-1]
+    return out
 
 
 def of_rods(s: Floats) -> Layout:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -22,6 +23,7 @@ from hybrid.scene.schema import AdaptiveModel, Modules, Scene, Section
 
 # The fewest cells that may be left.
 FEWEST_CELLS = 4
+MOST_LEVELS = 30  # of halvings, far beyond what cells have
 # Nodes that ride with the fairlead behind a clamp, where the line bends most, and of other rods.
 RIDE_BEHIND_CLAMP, RIDE = 8, 4
 # More of them behind a clamp, where cells are short: so many times sqrt(EI/T), with the weight of the line for T.  In
@@ -70,6 +72,7 @@ class PayoutPlan:
 
     law: Floats  # (K, 8) as of kernels.payout.Reel
     nodes: Floats  # (M,) m, nodes that there may be; that of the fairlead is none of them
+    parts: np.ndarray  # (M-1,) cells between two of them, where cells follow the curvature and are shortest; else 1
     first: float  # m, length at t = 0
     longest: float  # m, that may be out
     shortest: float  # m, below which nothing can be taken in
@@ -141,16 +144,61 @@ class PayoutPlan:
         line = line_on(cable, s, rods)
         return line._replace(bits=like.bits, plane=like.plane, footing=self._footing(like, s.size))
 
-    def layout(self, count: int, length: float, rod: np.ndarray) -> Layout:
-        """The cells of `count` material nodes and a length, m, where zones move; rod: (N,) bool."""
+    def layout(self, count: int, length: float, rod: np.ndarray, here: np.ndarray | None = None) -> Layout:
+        """The cells of `count` material nodes and a length, m, where zones move; rod, here: as of a Layout."""
         s = self.along(np.concatenate([self.nodes[:count], length - self.layer]))
-        return Layout(s, np.ones(s.size - 1, int), rod)
+        return Layout(s, self.parts_of(count), rod, here)
+
+    @property
+    def first_layout(self) -> Layout:
+        """The cells at t = 0, where zones move: all rod, as short as they may be."""
+        parts = self.parts_of(self.count(self.first))
+        return Layout(self.begun, parts, np.ones(parts.size, bool))
+
+    @property
+    def follows(self) -> bool:
+        """Whether cells follow the curvature."""
+        return bool((self.parts > 1).any())
+
+    def parts_of(self, count: int) -> np.ndarray:
+        """(n,) finest cells of base cells, in the order of the line, with `count` material base nodes out.
+
+        The cells that ride with the winch, the one that grows and FEWEST_CELLS before it are whole; every one before
+        these may be halved once more than the next, so that none is merged by more than a level when it is taken in.
+        """
+        beyond = count - 1 - FEWEST_CELLS - np.arange(count - 1)
+        allowed = 2 ** np.clip(beyond, 0, MOST_LEVELS)
+        out = np.concatenate([np.minimum(self.parts[: count - 1], allowed), np.ones(self.layer.size, int)])
+        return out if self.side else out[::-1]
+
+    @property
+    def finest(self) -> Floats:
+        """(K,) m, arc lengths of all nodes that there may be in any cells."""
+        parts = self.parts if self.side else self.parts[::-1]
+        return Layout(self.along(self.nodes), parts, np.ones(parts.size, bool)).nodes
+
+    def nodes_of(self, layout: Layout) -> Floats:
+        """(K,) m, `nodes` with those of a layout in place of the base nodes that are out."""
+        count, rides = layout.base.size - self.layer.size, self.layer.size - 1
+        first, s = layout.first, layout.nodes
+        if not self.side:
+            first, s = s.size - 1 - first[::-1], self.far - s[::-1]
+        out = np.concatenate([s[: s.size - 1 - rides], self.nodes[count:]])
+        out[first[:count]] = self.nodes[:count]  # to the last bit
+        return out
+
+    def kept_nodes(self, layout: Layout) -> Floats:
+        """(N+1,) m, arc lengths by which extremes are kept: those that do not move, and for others the next ones."""
+        count, out = layout.base.size - self.layer.size, layout.nodes
+        coming = self.along(self.nodes[count : count + self.layer.size])
+        if self.side:
+            return np.concatenate([out[: -self.layer.size], coming])
+        return np.concatenate([coming, out[self.layer.size :]])
 
     def line_on(self, layout: Layout, like: Line, cable: Material) -> tuple[LineOnBase, Line]:
         """The line on the cells of a layout, and what makes it; like, cable: as of `line`."""
         on_base = LineOnBase(cable, layout.base)
-        line = on_base.line(layout, like.bits, like.plane)
-        return on_base, line._replace(footing=self._footing(like, layout.base.size))
+        return on_base, on_base.line(layout, like.bits, like.plane)
 
     def at_winch(self, count: int, reach: float) -> np.ndarray:
         """(N,) bool, cells that are rod where zones move: those that change, and as many before them as may be taken in
@@ -179,8 +227,13 @@ class PayoutPlan:
         return out
 
 
-def payout_plan(scene: Scene, line: Line, zones: tuple[Zone, ...]) -> PayoutPlan | None:
-    """What a scene's line consists of that is paid out; None: its length stays.  SceneError: it cannot be done."""
+def payout_plan(
+    scene: Scene, line: Line, zones: tuple[Zone, ...], parts: Callable[[Material, Floats], np.ndarray] | None = None
+) -> PayoutPlan | None:
+    """What a scene's line consists of that is paid out; None: its length stays.  SceneError: it cannot be done.
+
+    line: of base cells, where cells follow the curvature; parts: (n,) finest cells of those between nodes (n+1,) m.
+    """
     payout = payout_of(scene)
     if payout is None:
         return None
@@ -226,9 +279,12 @@ def payout_plan(scene: Scene, line: Line, zones: tuple[Zone, ...]) -> PayoutPlan
         refuse(where, "intrinsic_curvature", "straight sections, because a rod is paid out", "take a catenary there")
     winch = winch_of(payout, length)
     winch[w.LEAST], winch[w.MOST] = shortest, longest
-    cable, far = _whole_material(scene), 0.0 if side else length
+    cable, far, places = _whole_material(scene), 0.0 if side else length, np.array(nodes)
+    finest = np.ones(places.size - 1, int)
+    if parts is not None:
+        finest = parts(cable, places) if side else parts(cable, far - places[::-1])[::-1]
     return PayoutPlan(
-        side, far, law, np.array(nodes), length, longest, shortest, zones, cable, _pieces(cable, side, far),
+        side, far, law, places, finest, length, longest, shortest, zones, cable, _pieces(cable, side, far),
         payout.from_outside, winch, layer, line.s.copy(),
     )  # fmt: skip
 

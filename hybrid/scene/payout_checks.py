@@ -68,8 +68,6 @@ def payout_stands_alone(
         expected = f"adaptive, catenary, rod, or zones of catenary and rod, {because}"
         yield Finding(("model",), expected, "write `model: adaptive`, or `model: catenary`", f"kind: {model.kind}")
     if isinstance(model, AdaptiveModel):
-        if model.curvature_error is not None:
-            yield Finding(("model", "curvature_error"), f"nothing, {because}, and its cells stay", "leave it out")
         if model.joint == "curvature":
             yield Finding(("model", "joint"), f"spherical, {because}", "leave it out")
         if model.correct:

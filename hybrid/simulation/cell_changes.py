@@ -136,6 +136,8 @@ class CellChanges:
         switching, model, run = owner.switching, owner.model, owner.run
         if switching is None or not (switching.compiled and switching.zones.clock[z.SHARE] > 0.0):
             return False
+        if owner.payout is not None:
+            return False
         plain = (
             owner.correction is None
             and run.contact is None

@@ -95,7 +95,7 @@ class Envelope:
         layout = model.layout if moves else None
         nodes = model.line.s.copy() if layout is None else layout.finest.nodes
         if moves and model.payout is not None:
-            nodes = model.payout.along(model.payout.nodes)
+            nodes = model.payout.finest
         marked = model.line.s[np.flatnonzero(marks_of(scene, model))]
         self._nodes, self._marked = nodes, marked
         self.s = _doubled(nodes, marked)
@@ -153,7 +153,12 @@ class Envelope:
             fold_extremes(places, self.s, columns, extremes, out)
             return out
         now = extremes[:, :, columns]
-        first = int(np.searchsorted(self.s, places[0]))
+        first, last = np.searchsorted(self.s, places[0]), np.searchsorted(self.s, places[-1], "right")
+        if last - first > places.size:  # cells that follow the curvature, of a line that is paid out
+            there = np.ascontiguousarray(out[:, :, first:last])
+            fold_extremes(places, self.s[first:last], columns, extremes, there)
+            out[:, :, first:last] = there
+            return out
         some = out[:, :, first : first + places.size]  # of a line that is paid out there may be more
         for row in self._rows:
             if np.isfinite(now[:, row]).all():  # else no state was computed yet

@@ -21,9 +21,10 @@ from hybrid.kernels.reel import MovingZones, Reel, blank_reel, blank_reel_job
 from hybrid.kernels.report import LENGTH_OUT, PAYOUT_RATE
 from hybrid.kernels.state import ALONG_LINE, Batch, Ends, Floats, Line, State, state_for
 from hybrid.model.build import Model
+from hybrid.model.layout import Layout, on_other_parts
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.mesh import Zone
-from hybrid.model.payout import PayoutPlan, payout_of, winch_at
+from hybrid.model.payout import FEWEST_CELLS, PayoutPlan, payout_of, winch_at
 from hybrid.model.payout_law import fastest, length_at, lengths_at
 from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.observation import Observation
@@ -38,6 +39,7 @@ ROUND_OFF = 1e-9  # of a length
 # Arrays of a line that its length changes, and that outputs ask for.
 VARIES = ("s", "h", "ck", "mass", "force", "kb", "k0", "hn", "rotary", "polar")
 # What a checkpoint keeps of a reel.
+OF_CELLS = ("lack", "rate", "since", "span")
 KEPT = ("numbers", "lack", "rate", "since", "span", "winch", "balance")
 
 
@@ -48,33 +50,34 @@ class PayingOut:
         assert model.payout is not None
         self.plan: PayoutPlan = model.payout
         self.law, self.winch = self.plan.law.copy(), self.plan.winch.copy()
-        self.count = self.plan.count(self.plan.first)  # material nodes that are out
-        self.reel = self._blank(self.count)
+        self.count = self.plan.count(self.plan.first)  # material nodes that are out; of base cells, where these are cut
+        self._nodes = self.plan.nodes if model.layout is None else self.plan.nodes_of(model.layout)
+        self.reel = self._blank(model.cells - self.rides)
         # Rate, m/s, by which the rods of zones that move have been given at the winch: at the start, or by the last
         # node that has entered or left.
         self.foreseen = fastest(self.law)
-        self._rod: np.ndarray | None = None  # (N,) of a line whose zones move
+        self._layout: Layout | None = None  # of a line whose zones move
         self.table, self._fitting, self._clock = Table(blank_reel_job()), Table(blank_reel_job()), np.zeros(CLOCK_SIZE)
         self._carrying = Table(blank_carry_job())
 
-    def _blank(self, count: int) -> Reel:
+    def _blank(self, material: int) -> Reel:
         """Arrays of a line of so many material nodes, none of whose cells lacks anything."""
         plan = self.plan
-        reel = blank_reel(count + self.rides, self.law, plan.pieces, self.winch, plan.layer, self.solves_twice)
+        reel = blank_reel(material + self.rides, self.law, plan.pieces, self.winch, plan.layer, self.solves_twice)
         numbers = reel.numbers
         numbers[p.SIDE], numbers[p.FAR] = (1.0 if plan.side else -1.0), plan.far
         numbers[p.SPRING] = plan.cable.springs[plan.side]
-        put_places(reel, plan.nodes, count)
+        put_places(reel, self._nodes, material)
         return reel
 
-    def on(self, model: Model, length: float, rod: np.ndarray | None = None) -> Model:
-        """A model with the nodes of now and a length, m; rod: (N,) bool, of a line whose zones move."""
+    def on(self, model: Model, length: float) -> Model:
+        """A model with the nodes of now and a length, m; of a line whose zones move as its layout has them."""
         plan, layout, on_base = self.plan, None, None
         cable = plan.held_as(model.cable)
         if model.layout is None:
             line, zones = plan.line(self.count, length, model.line, cable), plan.zones_of(length)
         else:
-            layout = plan.layout(self.count, length, model.layout.rod if rod is None else rod)
+            layout = plan.layout(self.count, length, model.layout.rod, model.layout.here)
             (on_base, line), zones = plan.line_on(layout, model.line, cable), layout.zones
         cells = line.h.size
         sea = model.sea if cells == model.cells else model.sea.on(cells)
@@ -82,7 +85,7 @@ class PayingOut:
 
     def attach(self, run: CompiledRun, model: Model, stepper: Stepper, moving: MovingZones) -> None:
         """Let a run pay out its line from now on; moving: of its zones."""
-        self._rod = model.layout.rod if model.layout is not None else None
+        self._layout = model.layout
         self.table.bind(
             line=model.line, sea=model.sea.values, ends=model.ends.values, old=run.states[0], new=run.states[1],
             clock=run.clock, counts=run.count, work=run.books.work, velocity=run.books.velocity,
@@ -92,6 +95,11 @@ class PayingOut:
         numbers = self.table.numbers
         asks = self.holds_tension or self.rides
         run.pay_out(self.table, pay_out.address(numbers), iterate.address(numbers) if asks else 0)
+
+    @property
+    def material(self) -> int:
+        """Nodes that are out, but for the fairlead and those that ride with it."""
+        return int(self.reel.true.size) - self.rides
 
     @property
     def rides(self) -> int:
@@ -123,8 +131,8 @@ class PayingOut:
     @property
     def lengthening(self) -> Floats:
         """(N,) m/s2, second rates of the lengths of cells."""
-        out = np.zeros(self.count + self.rides)
-        out[self.count - 1] = self.reel.numbers[p.ACCELERATION]
+        out = np.zeros(self.reel.true.size)
+        out[self.material - 1] = self.reel.numbers[p.ACCELERATION]
         return self._ordered(out)
 
     def _ordered(self, x: Floats) -> Floats:
@@ -147,48 +155,62 @@ class PayingOut:
         return self.holds_tension and not winch[w.LEAST] <= winch[w.LENGTH_NOW] <= winch[w.MOST]
 
     def change(
-        self, run: CompiledRun, model: Model, carry: Callable[[Model, np.ndarray], None] | None = None
+        self, run: CompiledRun, model: Model, carry: Callable[[Model, np.ndarray, np.ndarray], None] | None = None
     ) -> tuple[Model, State, float]:
         """The model and the state with one node more, or less, at the fairlead, and the energy, J, that it puts in.
 
-        carry: lets zones that move go on, with the model and (N,) which old cell each of its cells comes from.
+        carry: lets zones that move go on, with the model and which old cell (N,) each of its cells comes from, and
+        base cell (n,).
         """
         state, old, plan = run.state, self.reel, self.plan
-        enters = old.true[self.count - 1] > old.numbers[p.LONGEST]
-        source = self._came_from(enters, old.true.size)
-        self.count += 1 if enters else -1
+        more_nodes = 1 if self.enters else -1
+        source = self._came_from(self.enters, old.true.size)
+        of_base = source
+        if model.layout is not None:
+            of_base = self._came_from(self.enters, model.layout.rod.size)
+            parts = plan.parts_of(self.count + more_nodes)
+            here = on_other_parts(model.layout, model.layout.there, of_base, parts) if plan.follows else None
+            model = replace(model, layout=model.layout._replace(rod=model.layout.rod[of_base], parts=parts, here=here))
+        self.count, material = self.count + more_nodes, self.material + more_nodes
         length = float(old.numbers[p.LENGTH])
-        changed = self.on(model, length, model.layout.rod[source] if model.layout is not None else None)
+        changed = self.on(model, length)
+        if changed.layout is not None:
+            self._nodes = plan.nodes_of(changed.layout)
         if model.line.law.size:  # laws as the last step has linearised them
             changed.line.ck[:], changed.line.law[:, SHIFT:] = model.line.ck[source], model.line.law[source, SHIFT:]
-        reel, out = self._blank(self.count), state_for(changed.line)
+        reel, out = self._blank(material), state_for(changed.line)
         self._carrying.bind(
             line=model.line, target=changed.line, state=state, out=out, reel=old, new=reel, clock=run.clock,
-            tension=run.books.tension, nodes=plan.nodes,
+            tension=run.books.tension, nodes=self._nodes,
         )  # fmt: skip
         carry_node(self._carrying.numbers)
-        reel.true[self.count - 1] = length - plan.layer[0] - plan.nodes[self.count - 1]
+        reel.true[material - 1] = length - plan.layer[0] - plan.nodes[self.count - 1]
         self.reel = reel
         self._fit(changed.line, reel, length, run.t)
         if carry is not None:
-            carry(changed, source)
+            carry(changed, source, of_base)
         ends = model.ends.at(run.t)
         more = energy(changed.line, ends, out) - energy(model.line, ends, state)
         if model.line.law.size:
             more += stretch_energy(changed.line, out) - stretch_energy(model.line, state)
         return changed, out, more
 
+    @property
+    def enters(self) -> bool:
+        """Whether the node that is due enters; else one leaves."""
+        return bool(self.reel.true[self.material - 1] > self.reel.numbers[p.LONGEST])
+
     def _came_from(self, enters: bool, cells: int) -> np.ndarray:
-        """Which of so many old cells those of a line come from in which a node enters, or leaves."""
-        grows, all_ = self.count - 1, np.arange(cells)
-        source = np.insert(all_, grows, grows) if enters else np.delete(all_, grows)
+        """Which of so many old cells, or base cells, those come from of a line that a node enters, or leaves."""
+        grows, all_ = cells - self.plan.layer.size, np.arange(cells)
+        source = np.insert(all_, grows, grows) if enters else np.delete(all_, grows - 1)
         return source if self.plan.side else cells - 1 - source[::-1]
 
     @property
     def changing(self) -> np.ndarray:
         """(N,) bool, cells whose length changes because line is paid out."""
         reel = self.reel
-        found = (np.arange(reel.true.size) >= self.count - 1) | (reel.since > -np.inf)
+        found = (np.arange(reel.true.size) >= self.material - 1) | (reel.since > -np.inf)
         return found if self.plan.side else found[::-1]
 
     def as_now(self, model: Model) -> Model:
@@ -196,13 +218,41 @@ class PayingOut:
         assert model.layout is not None
         self.lengthen()
         length = float(self.reel.numbers[p.LENGTH])
-        layout = self.plan.layout(self.count, length, model.layout.rod)
+        layout = self.plan.layout(self.count, length, model.layout.rod, model.layout.here)
         on_base = LineOnBase(self.plan.held_as(model.cable), layout.base)
         return replace(model, layout=layout, on_base=on_base, zones=layout.zones, length=length)
 
-    def fit(self, line: Line, t: float) -> None:
-        """Let a line of the same nodes have the length of now, at t (s)."""
-        self._fit(line, self.reel, float(self.reel.numbers[p.LENGTH]), t)
+    def release(self, cells: np.ndarray) -> None:
+        """The reel no longer says how long these cells (k,), counted from the far end, are."""
+        reel = self.reel
+        reel.since[cells], reel.span[cells] = -np.inf, 1.0
+        reel.lack[cells] = reel.rate[cells] = 0.0
+
+    def lengths_now(self, cells: np.ndarray, t: float) -> tuple[Floats, Floats]:
+        """What cells (k,), counted from the far end, lack of their length at t (s), and its rate, m/s."""
+        reel = self.reel
+        x = np.clip((t - reel.since[cells]) / reel.span[cells], 0.0, 1.0)
+        lack, rate, span = reel.lack[cells], reel.rate[cells], reel.span[cells]
+        value, y = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x), x * (1.0 - x) ** 3 * (1.0 + 3.0 * x)
+        grows = (1.0 - x) ** 2 * (1.0 + 2.0 * x - 15.0 * x * x)
+        return lack * value + span * rate * y, rate * grows - 30.0 * lack / span * x * x * (1.0 - x) ** 2
+
+    def fit(self, model: Model, t: float) -> None:
+        """Let the line of a model whose zones have changed have the length of now, at t (s)."""
+        assert model.layout is not None
+        if self.plan.follows:
+            self._take_cells(model.layout)
+        self._fit(model.line, self.reel, float(self.reel.numbers[p.LENGTH]), t)
+
+    def _take_cells(self, layout: Layout) -> None:
+        """Go on with other cells far from the winch: what the reel knows of those near it stays."""
+        old, self._nodes = self.reel, self.plan.nodes_of(layout)
+        self.reel = reel = self._blank(layout.base_of_cell.size - self.rides)
+        reel.numbers[:], reel.stage[:], near = old.numbers, old.stage, FEWEST_CELLS + self.plan.layer.size
+        for name in OF_CELLS:
+            getattr(reel, name)[-near:] = getattr(old, name)[-near:]
+        at = slice(-near, None) if self.plan.side else slice(near)  # in the order of the line
+        reel.balance[at] = old.balance[at]
 
     def _fit(self, line: Line, reel: Reel, length: float, t: float) -> None:
         """Let a line have a length, m, at t (s): cells that grow hold the sections that come off the reel."""
@@ -224,7 +274,8 @@ class PayingOut:
                 x[k] = getattr(line, name)
         if model.layout is not None:  # lengths and stiffness of zones that move
             kept, at = ~self.changing, np.arange(line.s.size)
-            nodes = at < self.count - 1 if self.plan.side else at > line.h.size - self.count + 1
+            own = self.material - 1
+            nodes = at < own if self.plan.side else at > line.h.size - own
             varied["h"][:, kept], varied["kb"][:, nodes] = batch.h[:, kept], batch.kb[:, nodes]
         there = observer.on_varied(line, model.sea.values, zones[0], varied["s"])
         there.first_energy = observer.first_energy
@@ -239,7 +290,6 @@ class PayingOut:
         """
         line.force[:, :2] = 0.0  # but for what rounding leaves of the forces on nodes that ride
         reel = reel._replace(numbers=reel.numbers.copy(), true=reel.true.copy(), stage=np.zeros_like(reel.stage))
-        reel.numbers[p.FADING] = 0.0
         self._fitting.bind(line=line, reel=reel, clock=self._clock)
         if not self.holds_tension:  # exactly, where samples interpolate
             known = np.flatnonzero(batch.t >= self.law[0, 0])
@@ -270,14 +320,19 @@ class PayingOut:
     def checkpoint(self) -> dict[str, Any]:
         """What the next steps depend on."""
         kept = {name: getattr(self.reel, name).copy() for name in KEPT}
-        rods = {} if self._rod is None else {"rod": self._rod.copy()}
-        return {"count": self.count, "law": self.law.copy(), "foreseen": self.foreseen, **kept, **rods}
+        cells = {}
+        if self._layout is not None:
+            cells["rod"] = self._layout.rod.copy()
+            if self.plan.follows:
+                cells["here"] = self._layout.there
+        return {"count": self.count, "law": self.law.copy(), "foreseen": self.foreseen, **kept, **cells}
 
     def restore(self, tree: Any, model: Model) -> Model:
         """Go on as `checkpoint` has written: the model as it was then.  ValueError: it is that of another line."""
         template = {"count": 0, "law": np.zeros((0, 8))}
         given = dict(tree)
-        rod, foreseen = given.pop("rod", None), given.pop("foreseen", None)
+        cells = {name: given.pop(name) for name in ("rod", "here") if name in given}
+        foreseen = given.pop("foreseen", None)
         saved = matched({name: given.pop(name) for name in template}, template, "payout")
         count, law = saved["count"], saved["law"]
         if not (law.ndim == 2 and law.shape[1] == 8 and len(law) and (np.diff(law[:, 0]) >= 0.0).all()):
@@ -291,7 +346,17 @@ class PayingOut:
         self.count, self.law = count, law
         # A file of an earlier version has none.
         self.foreseen = matched(foreseen, 0.0, "payout/foreseen") if foreseen is not None else self.fastest
-        self.reel = self._blank(count)
+        if model.layout is not None:
+            parts = self.plan.parts_of(count)
+            known: dict[str, Any] = {"rod": parts > 0}
+            known |= {"here": np.zeros(parts.sum() + 1, bool)} if self.plan.follows else {}
+            found = matched(cells, known, "payout")
+            provisional = float(self.plan.nodes[count] + self.plan.layer[0])
+            layout = self.plan.layout(count, provisional, found["rod"], found.get("here"))
+            model, self._nodes = replace(model, layout=layout), self.plan.nodes_of(layout)
+            self.reel = self._blank(layout.base_of_cell.size - self.rides)
+        else:
+            self.reel = self._blank(count)
         numbers = np.asarray(given.get("numbers", np.zeros(0)))
         if numbers.shape in ((p.SIDE,), (p.SPRING,), (p.CHANGED,)):  # of a file of an earlier version
             given["numbers"] = np.concatenate([numbers, self.reel.numbers[numbers.size :]])
@@ -301,11 +366,7 @@ class PayingOut:
             raise ValueError("a length that no line has")
         for name, x in kept.items():
             getattr(self.reel, name)[:] = x
-        cells = count + self.rides
-        known = isinstance(rod, np.ndarray) and rod.shape == (cells,) and rod.dtype == bool
-        if model.layout is not None and not known:
-            raise ValueError(f"rods of another line than one of {cells} cells")
-        return self.on(model, float(self.reel.numbers[p.LENGTH]), rod)
+        return self.on(model, float(self.reel.numbers[p.LENGTH]))
 
     def go_on(self, begin: float, end: float, asked: tuple[float | None, float] | None) -> None:
         """From `begin` to `end`, s, a length that is set from Python goes where it was asked to, or on at its rate.

@@ -6,17 +6,19 @@ import numpy as np
 
 from hybrid.adapt.base_change import change_base
 from hybrid.adapt.manager import Change, DomainManager, Reason
+from hybrid.kernels import zone_step as z
 from hybrid.kernels.reel import MovingZones, zones_that_stay
 from hybrid.kernels.stiffness_ramp import soften
 from hybrid.model.build import Model, given_zones
-from hybrid.model.payout import PayoutPlan
+from hybrid.model.layout import Layout
+from hybrid.model.payout import FEWEST_CELLS, PayoutPlan
 from hybrid.scene.schema import Scene
 from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.zone_switching import ZoneSwitching
+from hybrid.solve.run import CompiledRun
 
 # Ramp times of bending stiffness within which a cell that is taken in must have become rod.
 AHEAD = 2.0
-BEFORE_LEAVING = 3  # cells before a node that leaves
 
 
 def rods_at_winch(scene: Scene, plan: PayoutPlan, model: Model, count: int, pace: float, rate: float) -> np.ndarray:
@@ -41,19 +43,62 @@ class PaidZones:
     def manager(self) -> DomainManager:
         return self.switching.manager
 
-    def rods_before_leaving(self) -> Change | None:
-        """Rods where a node leaves, which must be there; None: they are."""
-        paying, manager = self.paying, self.manager
-        near = paying.plan.at_winch(paying.count, 0.0)
-        if manager.layout.rod[near].all():
-            return None
-        rod = manager.layout.rod | near
-        a, b = np.flatnonzero(near)[[0, -1]]
-        none = np.zeros_like(rod)
-        return Change(rod, (Reason(int(a), int(b) + 1, "grow", "it is about to be taken in"),), near, none)
+    def before_change(self) -> tuple[Change, np.ndarray | None] | None:
+        """What must change before a node enters or leaves: rods, and places of nodes on the finest mesh (K+1,) bool.
 
-    def as_now(self, model: Model) -> Model:
+        Rods where a node leaves, and no cells there that are shorter than those near a winch may be; None: so it is.
+        """
+        paying, layout = self.paying, self.manager.layout
+        near, none = paying.plan.at_winch(paying.count, 0.0), np.zeros_like(layout.rod)
+        change, here = self.manager.same_zones(), None
+        if not layout.rod[near].all():
+            a, b = np.flatnonzero(near)[[0, -1]]
+            why = Reason(int(a), int(b) + 1, "grow", "it is about to be taken in")
+            change = Change(layout.rod | near, (why,), near, none)
+        if paying.plan.follows:
+            here = layout.there
+            if not paying.enters:
+                here &= self._may_stay(layout)
+        stays = here is None or bool((here == layout.there).all())
+        return None if change.same and stays else (change, here)
+
+    def _may_stay(self, layout: Layout) -> np.ndarray:
+        """(K+1,) bool, places on the finest mesh of nodes that there may be when one less is out."""
+        plan, count = self.paying.plan, self.paying.count
+        fewer = plan.parts_of(count - 1)
+        fewer = np.append(fewer, 1) if plan.side else np.append(1, fewer)
+        step = np.repeat(layout.parts // np.minimum(fewer, layout.parts), layout.parts)
+        return np.append((np.arange(step.size) - np.repeat(layout.starts[:-1], layout.parts)) % step == 0, True)
+
+    def hand_over(self, run: CompiledRun) -> None:
+        """Cells whose lengths the reel has brought to their true ones are those of zones from now on.
+
+        Where cells follow the curvature these are as long as makes chords of arcs, and go there within a ramp time.
+        """
+        paying, switching, zones = self.paying, self.switching, self.switching.zones
+        reel, line = paying.reel, switching.model.line
+        at = np.arange(reel.since.size)
+        let = (reel.since > -np.inf) & (at < paying.material - 1)
+        if paying.plan.follows:
+            let &= at < paying.material - 1 - FEWEST_CELLS
+        else:
+            let &= reel.since + reel.span <= run.t
+        if not let.any():
+            return
+        own = np.flatnonzero(let)
+        lack, rate = paying.lengths_now(own, run.t)
+        cells = own if paying.plan.side else reel.since.size - 1 - own
+        true = np.diff(line.s)[cells]
+        if paying.plan.follows:
+            less = switching.arcs_less_chords(run.state)[cells]
+            true, lack = true - less, lack - less
+        zones.true[cells], zones.lack[cells], zones.rate[cells], zones.since[cells] = true, lack, rate, run.t
+        zones.lengths[cells], zones.keeps[cells], zones.counts[z.RELAXING] = line.h[cells], False, 1
+        paying.release(own)
+
+    def as_now(self, model: Model, run: CompiledRun) -> Model:
         """Before zones change: the model with its nodes where they are now."""
+        self.hand_over(run)
         model, switching, zones = self.paying.as_now(model), self.switching, self.switching.zones
         assert model.layout is not None and model.on_base is not None
         switching.model = model
@@ -65,30 +110,37 @@ class PaidZones:
         zones.true[changing] = model.line.h[changing]
         return model
 
-    def carry(self, model: Model, source: np.ndarray) -> None:
-        """A node has entered or left: `model` has the cells of now; source: (N,) which old cells they were."""
+    def carry(self, model: Model, source: np.ndarray, of_base: np.ndarray) -> None:
+        """A node has entered or left: `model` has the cells of now.
+
+        source, of_base: which old cells (N,), and base cells (n,), they were.
+        """
         switching, zones = self.switching, self.switching.zones
-        lengths, line = zones.lengths[source], model.line
+        lengths, true, line = zones.lengths[source], zones.true[source], model.line
         self.paying.foreseen = self.paying.fastest
-        self._change_base(model, source)
+        self._change_base(model, of_base, source)
         kept = ~self.paying.changing
         line.h[kept] = lengths[kept]
-        switching.zones.lengths[:] = line.h
+        switching.zones.lengths[:], switching.zones.true[kept] = line.h, true[kept]
         near = self.paying.plan.at_winch(self.paying.count, 0.0)
         self.manager.grown[near], self.manager.leaving[near] = 1.0, False
         soften(self.manager.stiffness_shares(), switching.zones.stiff, line.kb)
 
     def resume(self, model: Model) -> None:
         """Go on with the cells of a checkpoint, from which all else follows (ZoneSwitching.restore)."""
-        cells = np.arange(model.cells)
-        self._change_base(model, np.minimum(cells, self.manager.layout.rod.size - 1))
+        old = self.manager.layout
+        assert model.layout is not None
+        base, cells = np.arange(model.layout.rod.size), np.arange(model.cells)
+        self._change_base(
+            model, np.minimum(base, old.rod.size - 1), np.minimum(cells, old.base_of_cell.size - 1), anew=True
+        )
 
-    def _change_base(self, model: Model, source: np.ndarray) -> None:
+    def _change_base(self, model: Model, source: np.ndarray, cells: np.ndarray, anew: bool = False) -> None:
         assert model.layout is not None and model.on_base is not None
         paying, manager = self.paying, self.manager
         given = rods_at_winch(self.scene, paying.plan, model, paying.count, manager.pace, paying.foreseen)
         manager.cable = paying.plan.held_as(model.cable)
-        change_base(manager, model.layout, source, given, model.on_base)
+        change_base(manager, model.layout, source, cells, given, model.on_base, anew)
         self.switching.take_cells(model)
 
     def moving(self) -> MovingZones:

@@ -21,13 +21,13 @@ from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ResultError
 from hybrid.kernels.cache import kernel_hash
 from hybrid.model.build import MOST_FOLLOWING, MOST_PARTS, Model, build
-from hybrid.model.layout import Layout, of_rods
+from hybrid.model.layout import Layout
 from hybrid.model.mesh import MOST_CELLS, Zone
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.output_points import OutputPoints
 from hybrid.model.plane import in_space, planar
 from hybrid.model.release import released_as
-from hybrid.model.resolution import Resolution, first_resolution
+from hybrid.model.resolution import Resolution, first_resolution, follows_curvature
 from hybrid.model.self_reach import touching
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
@@ -129,7 +129,7 @@ def restored_points(result: Result, length: float, far: float | None = None) -> 
 def mesh_tree(model: Model) -> Tree:
     """Where the nodes of a model are, and its zones, for a checkpoint."""
     if model.layout is not None:
-        return (model.layout if model.payout is None else of_rods(model.payout.begun))._asdict()
+        return (model.layout if model.payout is None else model.payout.first_layout)._asdict()
     assert not isinstance(model.mesh, Layout)
     s, zones = model.mesh
     return {"s": s, "zones": [[x.kind, x.s_a, x.s_b] for x in zones]}
@@ -143,7 +143,7 @@ def restored_model(scene: Scene, resolution: Resolution, saved: Mapping[str, Any
         layout = Layout(**matched({"here": None} | dict(mesh), template, "mesh"))
         _check_nodes(layout.base, scene)
         fits = layout.parts.shape == layout.rod.shape == (layout.base.size - 1,)
-        most = MOST_FOLLOWING if layout.here is not None else MOST_PARTS
+        most = MOST_FOLLOWING if follows_curvature(scene) else MOST_PARTS
         fits &= layout.here is None or (layout.here.dtype == bool and layout.here.shape == (layout.parts.sum() + 1,))
         if not (fits and 1 <= layout.parts.min() <= layout.parts.max() <= most):
             raise ValueError("base cells that no mesh has")

@@ -186,14 +186,12 @@ def _limits_of_quantities(observer: Observer) -> list[tuple[Field, np.ndarray]]:
 
 def mesh_fields(model: Model) -> list[tuple[Field, np.ndarray]]:
     """All nodes that the mesh may have, and which are there in rods alone: with the zones, the mesh of any time."""
-    nodes, always = model.line.s, np.ones(model.line.s.size, np.int64)
+    nodes, always = model.finest_nodes, np.ones(model.finest_nodes.size, np.int64)
     if model.layout is not None:
-        nodes = model.layout.finest.nodes
         always = np.isin(nodes, model.layout.base).astype(np.int64)
     if model.payout is not None:
-        places = model.payout.nodes[model.payout.nodes < model.payout.longest]
-        nodes = model.payout.along(places)
-        always = (places <= model.payout.shortest).astype(np.int64)[:: 1 if model.payout.side else -1]
+        stays = model.payout.nodes <= model.payout.shortest
+        always = np.isin(nodes, model.payout.along(model.payout.nodes[stays])).astype(np.int64)
     text = "1 where the node is always there, 0 where only while it lies in a rod zone"
     return [
         (Field("mesh/s", "m", "arc lengths of all nodes that there may be", nodes.shape, ("mesh/s",)), nodes),

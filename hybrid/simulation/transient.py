@@ -492,9 +492,11 @@ class Transient:
             nodes.change()
             return
         zones = self.paid_zones
-        rods = zones.rods_before_leaving() if zones is not None else None
-        if rods is not None:
-            self._switch(rods)
+        before = zones.before_change() if zones is not None else None
+        if before is not None:
+            self._switch(*before)
+        if zones is not None:
+            zones.hand_over(self.run)
         carry = (zones.carry,) if zones is not None else ()
         model, state, booked = self.payout.change(self.run, self.model, *carry)
         if self.run.contact is not None:  # whose forces kernels.payout_balance does not know
@@ -525,8 +527,8 @@ class Transient:
 
     # --- another model --------------------------------------------------------------------------
 
-    def _switch(self, change: Change) -> None:
-        """Zones change: nothing moves, and what changes energy is booked."""
+    def _switch(self, change: Change, here: np.ndarray | None = None) -> None:
+        """Zones change: nothing moves, and what changes energy is booked; here: as of `ZoneSwitching.switch`."""
         assert self.switching is not None
         run, trying, cells = self.run, self.run.count[b.PHASE] == b.JUDGE, self._changes_of_cells()
         if cells is not None and change.same:
@@ -538,11 +540,11 @@ class Transient:
             booked = cells.change_zones(change)
         else:
             if self.paid_zones is not None:
-                self.model = self.paid_zones.as_now(self.model)
+                self.model = self.paid_zones.as_now(self.model, self.run)
             ends, sea = self.model.ends.at(self.t), self.model.sea.at(self.t)
-            model, state, booked = self.switching.switch(change, self.t, ends, self.state, sea)
+            model, state, booked = self.switching.switch(change, self.t, ends, self.state, sea, here)
             if self.payout is not None:
-                self.payout.fit(model.line, self.t)
+                self.payout.fit(model, self.t)
             run.books.work[0, b.ZONES] += booked
         note_change(self.events, self.switching.manager.layout.base, self.t, change, booked)
         if cells is None:

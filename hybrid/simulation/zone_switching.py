@@ -244,10 +244,16 @@ class ZoneSwitching:
             change = manager.same_zones()
         return booked, change
 
-    def switch(self, change: Change, t: float, ends: Ends, state: State, sea: Sea) -> tuple[Model, State, float]:
-        """The model and the state with other zones, and the energy (J) that the switch puts in."""
+    def switch(
+        self, change: Change, t: float, ends: Ends, state: State, sea: Sea, here: np.ndarray | None = None
+    ) -> tuple[Model, State, float]:
+        """The model and the state with other zones, and the energy (J) that the switch puts in.
+
+        here: (K+1,) bool, places of the finest mesh where nodes should be; None: as is planned.
+        """
         old, manager, model = self.manager.layout, self.manager, self.model
-        here = self.zones.plan.copy() if change.same else self.plan(change.rod, sea, ends, state)
+        if here is None:
+            here = self.zones.plan.copy() if change.same else self.plan(change.rod, sea, ends, state)
         new = old._replace(rod=change.rod, here=here)
         line = model.line
         if self.joints is not None:
@@ -272,6 +278,15 @@ class ZoneSwitching:
         if self.joints is not None:
             self.joints = self.joints.on(target)
         return changed, transfer.out, float(numbers[AFTER] - numbers[BEFORE])
+
+    def arcs_less_chords(self, state: State) -> Floats:
+        """(N,) m, by how much the chords of cells are shorter than their arcs."""
+        true = self.zones.true.copy()
+        self._plan_table.bind(line=self.model.line, new=state, zones=self.zones)
+        take_arcs(self._plan_table.numbers)
+        less: Floats = np.diff(self.model.line.s) - self.zones.true
+        self.zones.true[:] = true
+        return less
 
     def release(self, k: int, model: Model) -> None:
         """End k (0 or 1) has been let go."""

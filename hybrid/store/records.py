@@ -41,9 +41,12 @@ THERE = "mesh/there"  # the field of a line whose cells follow the curvature
 
 
 def there(s: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Bits in words of 64 for places s (K,) m, rising: those that are nodes (N+1,) m, which are among them."""
+    """Bits in words of 64 for places s (K,) m, rising: those that are nodes (N+1,) m.
+
+    All nodes are among them, but for those that move with the winch of a line that is paid out.
+    """
     bits = np.zeros(-(-s.size // 64) * 64, np.uint8)
-    bits[np.searchsorted(s, nodes)] = 1
+    bits[: s.size] = np.isin(s, nodes)
     return np.packbits(bits, bitorder="little").view("<i8").astype(np.int64)
 
 

@@ -1,0 +1,149 @@
+"""Cells that follow the curvature on a line that is paid out or taken in: exact solutions, rods, kicks, resume."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.simulation.transient import Transient
+from tests.simulation.test_payout import G, check_kicks, clamped, hanging, sagging
+from tests.simulation.test_payout_zones import touching
+
+FOLLOWING = {"kind": "adaptive", "tolerance": 1e-5, "hold_time": 1.0, "curvature_error": 0.05}
+NAMES = ("position", "tension", "curvature", "reaction_end", "work/end", "work/zones", "envelope/curvature_max")
+
+
+def pinned(rate: float, side: str = "end", model: Any = FOLLOWING, **more: Any) -> dict[str, Any]:
+    """The line of `touching` from a winch at which it turns freely."""
+    scene = touching(rate, model, side, **more)
+    scene["ends"][side]["kind"] = "pinned"
+    del scene["ends"][side]["tangent"]
+    return scene
+
+
+def change_cells(run: Transient, random: np.random.Generator, part: float) -> None:
+    """Other cells far from the winch: a part of the nodes that there might be."""
+    layout = run.model.layout
+    assert layout is not None and run.switching is not None
+    here = np.zeros(layout.starts[-1] + 1, bool)
+    for begin, size in zip(layout.starts, layout.parts, strict=False):
+        cells = [(begin, begin + size)]
+        while cells:
+            a, b = cells.pop()
+            here[[a, b]] = True
+            if b - a > 1 and random.random() < part:
+                cells += [(a, (a + b) // 2), ((a + b) // 2, b)]
+    run._switch(run.switching.manager.same_zones(), here)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("side", ["end", "start"])
+def test_a_hanging_line_weighs_what_is_out_while_its_cells_change(sign: float, side: str) -> None:
+    """T = w L - m L dc/dt at the winch, to round-off, with other cells every half a second."""
+    scene = hanging({"rates": [[0, 0], [20, sign]]}, 18.0)
+    section = {"length": 40.0, "mass": 2.0, "bending_stiffness": 20.0}
+    scene |= {"cable": {"sections": [section]}, "model": FOLLOWING | {"rod_cell": 0.4, "force_rod": [[0, 40]]}}
+    if side == "start":
+        scene["ends"] = {"start": scene["ends"]["end"], "end": "free"}
+    random, cells, off = np.random.default_rng(1), set(), []
+    with hybrid.Simulation(scene) as sim:
+        run = sim._loop.run
+        for k in range(350):
+            sim.step()
+            if k % 10 == 0:
+                change_cells(run, random, 0.5)
+            cells.add(run.model.cells)
+            force = getattr(sim.forces(), side)[2]
+            off.append(force / (-2.0 * sim.length * (G - sign * 0.05)) - 1.0)
+        assert abs(sim.length - 40.0) > 7.0
+    assert len(cells) > 10
+    assert np.abs(off).max() < 1e-9
+
+
+@pytest.mark.parametrize(("rate", "part"), [(0.8, 0.7), (-0.8, 0.4)])
+def test_as_rods_whose_cells_are_short_everywhere(rate: float, part: float) -> None:
+    """Nearer to 320 rods than rods as long as its base cells, and its energy is balanced as theirs is."""
+    fine, coarse = (hybrid.run(pinned(rate, model="rod", mesh={"cells": n})) for n in (320, 40))
+    found = hybrid.run(pinned(rate))
+    off = [np.abs(x["position"] - fine["position"]).max() for x in (found, coarse)]
+    pulls = [np.linalg.norm(x["reaction_end"], axis=1) for x in (found, coarse, fine)]
+    assert off[0] < part * off[1]
+    assert np.abs(pulls[0] - pulls[2]).max() < 0.9 * np.abs(pulls[1] - pulls[2]).max()
+    left = [np.abs(x["work/scheme"]).max() for x in (found, fine)]
+    assert left[0] < 1.1 * left[1]
+    assert found.mesh[-1].s.size < 0.75 * fine.mesh[-1].s.size
+
+
+@pytest.mark.parametrize("rate", [0.8, -0.8])
+def test_a_winch_at_the_start_is_the_mirror_image(rate: float) -> None:
+    found, mirror = hybrid.run(pinned(rate)), hybrid.run(pinned(rate, side="start"))
+    np.testing.assert_allclose(mirror["position"][:, ::-1], found["position"], atol=1e-9)
+    np.testing.assert_allclose(mirror["reaction_start"], found["reaction_end"], atol=1e-9 * 4000.0)
+    for name in ("curvature", "tension"):
+        for bound in ("min", "max"):
+            x, y = (r[f"envelope/{name}_{bound}"] for r in (found, mirror))
+            np.testing.assert_allclose(y[::-1][: x.size // 2], x[: x.size // 2], rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("clamp", [False, True])
+@pytest.mark.parametrize(
+    ("EI", "rate", "most"), [(2e4, 0.8, 6e-4), (500.0, 0.8, 6e-4), (500.0, -0.8, 6e-4), (2e4, -0.8, 2e-3)]
+)
+def test_a_cell_that_enters_or_leaves_does_not_kick(EI: float, rate: float, most: float, clamp: bool) -> None:
+    """The force at the winch, within five steps; of a line taken in with what merges the cells that come near it."""
+    scene = sagging("rod", 2e6, EI, rate, duration=12.0) | {"model": FOLLOWING | {"force_rod": [[0, 100]]}}
+    check_kicks(clamped(scene) if clamp else scene, most)
+
+
+def test_energy_is_balanced_to_second_order() -> None:
+    left = []
+    for step in (0.1, 0.05):
+        model = FOLLOWING | {"force_rod": [[0, 100]], "rod_cell": 0.6}
+        result = hybrid.run(clamped(sagging("rod", 2e6, 2e4, step=step) | {"model": model}))
+        left.append(np.abs(result["work/scheme"]).max() / np.abs(result["work/end"]).max())
+    assert left[1] < 5e-5
+    assert left[0] > 3.0 * left[1]
+
+
+def test_a_winch_that_holds_a_tension() -> None:
+    """Its length as with rods as long as the shortest cells."""
+    lengths = []
+    for model, cells in ((FOLLOWING, 40), ("rod", 320)):
+        scene = pinned(0.0, model=model, mesh={"cells": cells})
+        winch = {"tension": 800.0, "inertia": 300.0, "damping": 50.0, "max_rate": 2.0, "ramp": 4.0}
+        scene["ends"]["end"]["payout"] = {"longest": 130.0, "winch": winch}
+        lengths.append(hybrid.run(scene)["payout/length"])
+    assert np.ptp(lengths[1]) > 3.0
+    assert np.abs(lengths[0] - lengths[1]).max() < 0.02
+
+
+@pytest.mark.parametrize("rate", [0.8, -0.8])
+@pytest.mark.parametrize("clamp", [False, True])
+def test_resumed_to_the_last_bit(tmp_path: Path, rate: float, clamp: bool) -> None:
+    """Stopped while cells have just been handed over by the winch, or are merged on their way to it."""
+    make = touching if clamp else pinned
+    whole = hybrid.run(make(rate, model=FOLLOWING))
+    assert len({str(x) for x in whole.mesh}) > 5
+    for until in (2.0, 4.5):
+        path = tmp_path / f"{until}.h5"
+        hybrid.run(make(rate, model=FOLLOWING, time={"duration": until, "step": 0.05}), output=path)
+        resumed = hybrid.resume(path, until=8.0)
+        for name in (*NAMES, "mesh/there"):
+            assert np.array_equal(whole[name], resumed[name], equal_nan=True), name
+        assert whole.zones[-1] == resumed.zones[-1]
+
+
+def test_a_step_is_taken_back() -> None:
+    """`save` and `restore` over cells that change, and nodes that enter."""
+    with hybrid.Simulation(pinned(0.8)) as sim:
+        sim.advance(4.0)
+        saved, places = sim.save(), []
+        for _ in range(2):
+            sim.advance(6.0)
+            places.append(sim.forces().end.copy())
+            sim.restore(saved)
+    assert np.array_equal(*places)
