@@ -165,7 +165,7 @@ _CAUSE = {
     Outcome.NOT_FINITE: "a number stopped being finite (NaN or infinity)",
     Outcome.SINGULAR: "the equations have no unique solution: something can move without resistance",
     Outcome.SLACK: "the line goes into compression; a catenary cannot carry it",
-    Outcome.TURNED_TOO_FAR: "a cell turned by more than a radian within one time step, however small",
+    Outcome.TURNED_TOO_FAR: "a cell turned, or spun against the next, by more than a radian in a step, however small",
     Outcome.GAINS_ENERGY: "the computation creates energy: as much as all the work done on the cable so far",
     Outcome.ILL_CONDITIONED: "the line is too long for literal shooting: the system is ill-conditioned",
     Outcome.TWISTED_TOO_FAR: "the twist from one cell to the next nears half a turn, and could be its opposite",

@@ -34,7 +34,8 @@ from hybrid.kernels.rotations import dot, spin_about
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.water import wave_kinematics
 
-# A step in which a chord turns (or is predicted to turn) by more than this, in rad, is repeated in parts.
+# A step in which a chord turns (or is predicted to turn) by more than this, in rad, is repeated in parts; so is one in
+# which a cell spins by more against the next one.
 LARGEST_STEP_TURN = 1.0
 
 
@@ -195,8 +196,40 @@ def begin_step(plane, space, line, sea, old, new, u, s, safe):
 
 
 @inner
+def spin_of_step(old, new, s, c):
+    """Spin of cell c about its chord in a step, rad, however many turns; rates are known."""
+    return s.dt * (old.w[c] + s.dt * ((0.5 - s.be) * old.wa[c] + s.be * new.wa[c]))
+
+
+@inner
+def largest_spin(line, ends, old, new, s):
+    """Largest spin of a cell against the next one, or against what holds its twist, in a step, rad, and the cell."""
+    most, where, before, n = 0.0, -1, 0.0, old.w.shape[0]
+    for i in range(n + 1):
+        now = 0.0
+        if i < n and line.spin[i]:
+            now = spin_of_step(old, new, s, i)
+        if line.element[i] and line.kb[i, 2] > 0.0:
+            if i == 0 or i == n:
+                c = min(i, n - 1)
+                d, _, _ = chord(get3(new.e, c))
+                turned = s.dt * dot(get3(ends.spin, 0 if i == 0 else 1), d)
+                x = abs(now - turned) if i == 0 else abs(turned - before)
+            else:
+                x = abs(now - before)
+            if not x <= most:
+                most, where = x, min(i, n - 1)
+        before = now
+    return most, where
+
+
+@inner
 def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, strains):
-    """Report of a step that Newton has solved, and strains of its elements.  Returns its largest turn of a chord, rad, and its cell."""
+    """Report of a step that Newton has solved, and strains of its elements.
+
+    Returns its largest turn of a chord, rad, and the cell; or the spin of a cell against the next one, where that is
+    more than LARGEST_STEP_TURN: half a turn more or less would not show in the twist of the element between them.
+    """
     u, report, dt = work.u, work.report, s.dt
     sharp = (0.0, -1, 0.0, -1)
     if space is not None:
@@ -221,4 +254,8 @@ def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, s
             report[PUSH_ENERGY], report[WRONG_PIVOTS] = step_out_of_plane(
                 line, sea, ends, new, dt, task.before, task.rho, was, now, A
             )
+    if space is not None:
+        spun, cell = largest_spin(line, ends, old, new, s)
+        if not spun < LARGEST_STEP_TURN:
+            return spun, cell
     return largest_turn(old.e, u)

@@ -166,6 +166,26 @@ def test_a_line_that_breaks_passes_no_torque_any_more(tmp_path: Path) -> None:
             assert np.array_equal(one.lines["line"][name], more.lines["line"][name])
 
 
+def test_a_rod_that_breaks_spins_with_the_energy_that_it_has() -> None:
+    """Of 45 degrees in 20 m, in steps in which its last cell would spin by five radians against the next one.
+
+    A step after one of half its length gives stiff modes up to a fifth of their energy, and takes it out again.
+    """
+    down = {"tangent": [0, 0, -1]}
+    clamps = {"start": down | {"normal": [1, 0, 0]}, "end": down | {"normal": [1, 1, 0]}}
+    hanging = line("top", "low", [("rod", 20)], clamps)
+    result = hybrid.run({
+        "environment": {"fluid": {"density": 1025}}, "time": {"duration": 1.0, "step": 0.02},
+        "points": {"top": {"position": [0, 0, 0]}, "low": {"position": [0, 0, -20.0026]}}, "output": {"every": 0.02},
+        "lines": {"line": hanging | {"break_at": {"time": 0.02}}},
+    })  # fmt: skip
+    hung = result.lines["line"]
+    alive = hung["energy/kinetic"] + hung["energy/torsion"]
+    assert alive[0] == pytest.approx(0.5 * GJ * (0.25 * np.pi) ** 2 / 20.0, rel=1e-3)
+    assert alive.max() <= 1.2 * alive[0] and hung["work/scheme"].max() < 0.2 * alive[0]
+    assert hung["work/scheme"][-1] < 0.0
+
+
 @pytest.mark.parametrize("free", [True, False])
 def test_stiffness_with_a_torque_through_catenaries(free: bool) -> None:
     """A turn about two taut lines: 2 GJ/L; across them: tension over length, with the levers of the body and EI."""
