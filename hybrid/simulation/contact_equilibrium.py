@@ -6,7 +6,7 @@ import math
 
 from hybrid.kernels.forces import SELF_CONTACT
 from hybrid.kernels.link import holds_twist, link_of
-from hybrid.kernels.state import State
+from hybrid.kernels.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.simulation.self_watch import deepest_text, diameters, least_bending
 from hybrid.solve.contact_statics import contact_energy, settled
@@ -19,19 +19,32 @@ LINK, KEPT = 2, 1e-3  # place in what link_of gives; turns by which the link of 
 def with_contact(model: Model, t: float, found: Equilibrium | None) -> Equilibrium | None:
     """The equilibrium with the loads of time t of a line that contact is asked for; None: there is none to be had.
 
-    found: without contact, which is taken where nothing touches; None: none was found.  None comes back for zones, and
-    where the starting shape, from which a damped motion leads to rest, is within itself.  ComputationError: that
-    motion does not come to rest, or has lost turns.
+    found: without contact, which is taken where nothing touches; None: none was found.  None comes back where the
+    starting shape, from which a damped motion leads to rest, is within itself.  ComputationError: as of `settled_from`.
     """
-    if not model.line.bits & SELF_CONTACT or model.layout is not None or not model.line.spin.all():
+    if not model.line.bits & SELF_CONTACT:
         return None
-    contact = SelfContact(model.line, diameters(model), least_bending(model), model.tension_scale)
+    contact = contact_of(model)
     sea, ends = model.sea.at(t), model.ends.at(t)
     if found is not None and contact_energy(model.line, sea, ends, found.state, contact) == 0.0:
         return found
     if not math.isfinite(contact_energy(model.line, sea, ends, model.start, contact)):
         return None
-    asked = link(model, model.start)
+    return settled_from(model, t, model.start)
+
+
+def contact_of(model: Model) -> SelfContact:
+    """Contact without friction of the line of a model with itself."""
+    return SelfContact(model.line, diameters(model), least_bending(model), model.tension_scale)
+
+
+def settled_from(model: Model, t: float, start: State, near: bool = False) -> Equilibrium:
+    """The equilibrium with contact, with the loads of time t, that a damped motion reaches from a start that is apart.
+
+    near: that start is next to an equilibrium, which Newton's method with contact is asked for before anything moves.
+    ComputationError: the motion does not come to rest, has lost turns, or ends with a catenary that is not taut.
+    """
+    asked = link(model, start)
 
     def keeps_turns(state: State) -> str:
         has = link(model, state)
@@ -40,15 +53,22 @@ def with_contact(model: Model, t: float, found: Equilibrium | None) -> Equilibri
         why = "it has gone around a clamp, or its cells are too long for its loops"
         return f"the starting shape has a link of {asked:.6g} turns, the line in contact {has:.6g}: {why}"
 
-    return settled(model.line, sea, ends, model.start, model.length, model.tension_scale, contact, keeps_turns)
+    scales = model.length, model.tension_scale, model.slack_floor
+    sea, ends = model.sea.at(t), model.ends.at(t)
+    return settled(model.line, sea, ends, start, scales, contact_of(model), keeps_turns, near)
+
+
+def nearness(model: Model, t: float, state: State) -> Floats:
+    """How near nodes (N+1,) of a line at rest are to other parts of it: above 1, nearer than two diameters."""
+    contact = contact_of(model)
+    near = contact.look_ahead(1.0)
+    contact_energy(model.line, model.sea.at(t), model.ends.at(t), state, contact)
+    return near
 
 
 def why_not(model: Model, t: float) -> tuple[str, str]:
     """Why `with_contact` has nothing to give of a line that contact is asked for: what it takes, and what to do."""
-    if model.layout is not None or not model.line.spin.all():
-        takes = "a line of rods: statics make no damped motion with contact of a line with catenary zones"
-        return takes, "`model: rod`, or `hybrid run` from a start that is apart"
-    contact = SelfContact(model.line, diameters(model), least_bending(model), model.tension_scale)
+    contact = contact_of(model)
     contact_energy(model.line, model.sea.at(t), model.ends.at(t), model.start, contact)
     where = deepest_text(contact, model)
     takes = f"a starting shape that is apart, for a damped motion with contact to lead to rest; in this one {where}"

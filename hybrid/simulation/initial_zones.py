@@ -10,7 +10,7 @@ from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.cell_errors import CURVATURE, MOMENT, TENSION
-from hybrid.kernels.forces import PLANAR
+from hybrid.kernels.forces import PLANAR, SELF_CONTACT
 from hybrid.kernels.state import Ends, Line, State
 from hybrid.kernels.torque_transfer import carry_torque
 from hybrid.model.bending_reference import LEFT
@@ -21,6 +21,7 @@ from hybrid.model.payout_law import fastest
 from hybrid.model.resolution import Resolution, follows_curvature, requested_accuracy
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
+from hybrid.simulation.contact_equilibrium import nearness, settled_from
 from hybrid.simulation.equilibrium import equilibrium_of, solve_model
 from hybrid.simulation.payout_zones import rods_at_winch
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
@@ -101,9 +102,7 @@ def equilibrium_zones(model: Model, manager: DomainManager, t: float, found: Equ
     free = manager.given >= 0
     if not free.all():  # the most rod that the scene lets it have
         most = on_layout(model, model.layout._replace(rod=free))
-        equilibrium = _equilibrium(
-            most, t, _on_fewer(found.state, model.line, most.line, model.ends.at(t)), found.with_friction
-        )
+        equilibrium = _equilibrium(most, t, _on_fewer(found.state, model.line, most.line, model.ends.at(t)), found)
     assert most.layout is not None
     allowed = manager.tolerance
     try:
@@ -142,21 +141,26 @@ def _zones_within(
     """Zones that satisfy the criteria in their own equilibrium; None: all rod.  ComputationError: there is none."""
     assert model.layout is not None
     full = found.state
-    manager.evaluate_criteria(model.line, model.sea.at(t), model.ends.at(t), full, 0.0)
-    rod = manager.initial_rods(full)
+    rod = _rods(model, manager, full, t)
     for _ in range(MOST_ROUNDS):
         if rod[manager.given >= 0].all():
             return None
         layout = model.layout._replace(rod=rod)
         new = on_layout(model, layout)
-        answer = _equilibrium(new, t, _on_fewer(full, model.line, new.line, model.ends.at(t)), found.with_friction)
+        answer = _equilibrium(new, t, _on_fewer(full, model.line, new.line, model.ends.at(t)), found)
         manager.set_layout(layout)
-        manager.evaluate_criteria(new.line, new.sea.at(t), new.ends.at(t), answer.state, 0.0)
-        more = rod | manager.initial_rods(answer.state)
+        more = rod | _rods(new, manager, answer.state, t)
         if (more == rod).all():
             return new, answer
         rod = more
     return None
+
+
+def _rods(model: Model, manager: DomainManager, state: State, t: float) -> np.ndarray:
+    """Base cells (n,) that ask to be rod in a state at rest; what is near itself does where contact is asked for."""
+    manager.near = nearness(model, t, state) if model.line.bits & SELF_CONTACT else np.zeros(0)
+    manager.evaluate_criteria(model.line, model.sea.at(t), model.ends.at(t), state, 0.0)
+    return manager.initial_rods(state)
 
 
 def _difference(full: State, layout: Layout, answer: tuple[Model, Equilibrium], t: float) -> float:
@@ -171,9 +175,11 @@ def _difference(full: State, layout: Layout, answer: tuple[Model, Equilibrium], 
     return float(np.linalg.norm(full.r[layout.first] - r[model.layout.first], axis=1).max())
 
 
-def _equilibrium(model: Model, t: float, start: State, with_friction: bool) -> Equilibrium:
-    """with_friction: whether friction took part in what it is compared with."""
-    return solve_model(model, t, start, settle="start" if with_friction else "")
+def _equilibrium(model: Model, t: float, start: State, like: Equilibrium) -> Equilibrium:
+    """like: what it is compared with, and is found as: with friction on the bed, or in contact with itself."""
+    if like.touch.size:
+        return settled_from(model, t, start, near=True)
+    return solve_model(model, t, start, settle="start" if like.with_friction else "")
 
 
 def _on_fewer(state: State, full: Line, line: Line, ends: Ends) -> State:

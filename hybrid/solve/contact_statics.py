@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance, wo
 from hybrid.kernels.forces import FRICTION, MASS_DAMPING, ROTARY, SELF_FRICTION, WAVES
 from hybrid.kernels.newton import EQUILIBRIUM, NEAR, STEP, Task
 from hybrid.kernels.report import FORCE_A, SELF_CONTACT_ENERGY, TWIST
+from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.run import blank_books, blank_job, in_space
 from hybrid.kernels.self_contact_pairs import KEEPS, SPEED
 from hybrid.kernels.state import Ends, Line, Sea, State
@@ -101,6 +103,10 @@ class _Job:
         self.state.vd[:], self.state.wd[:] = 0.0, 0.0
         return Outcome(outcome), iterations
 
+    def lowest(self) -> float:
+        """Lowest tension of a catenary cell, N."""
+        return float(lowest(self.line, self.state.T)[0])
+
     def residual(self, anchor: float) -> float:
         """Largest force, N, that is left over at a node of the state, contact included; work.report is its report."""
         work, state = self.work, self.state
@@ -159,21 +165,23 @@ def _calming(job: _Job, time_scale: float, length: float, limits: Limits) -> Ite
 
 
 def settled(
-    line: Line, sea: Sea, ends: Ends, start: State, length: float, scale: float, contact: SelfContact,
-    keeps_turns: Callable[[State], str],
+    line: Line, sea: Sea, ends: Ends, start: State, scales: tuple[float, float, float], contact: SelfContact,
+    keeps_turns: Callable[[State], str], near: bool = False,
 ) -> Equilibrium:  # fmt: skip
-    """Equilibrium of a line of rods with contact, from a start that is at rest and apart.
+    """Equilibrium of a line with contact, from a start that is at rest and apart.
 
-    length: m; scale: the tension scale, N; contact: of this line, without friction; keeps_turns: what turns a state has
-    lost, empty: none.  ComputationError: it does not come to rest, or has lost turns.
+    scales: length, m, tension scale, N, and tension at or below which a catenary is slack, N; contact: of this line,
+    without friction; keeps_turns: what turns a state has lost, empty: none; near: Newton's method is tried from the
+    start itself first.  ComputationError: it does not come to rest, has lost turns, or has a slack catenary.
     """
+    length, scale, floor = scales
     smooth = line._replace(bits=line.bits & ~(WAVES | FRICTION | SELF_FRICTION))
     time_scale = float(np.sqrt(line.mass.sum() * length / scale))
-    first = nudged(smooth, start, length, time_scale)
+    first = start.copy() if near else nudged(smooth, start, length, time_scale)
     moving = _Job(damped(smooth, length, time_scale), sea, ends, contact, (first, first.copy()))
     anchor = Stability(smooth, sea, length, scale).anchor
     limits, total, path = Limits(REACH * length, scale, MOST_OF_STEP), 0, []
-    for iterations in _calming(moving, time_scale, length, limits):
+    for iterations in chain([0] if near else [], _calming(moving, time_scale, length, limits)):
         rest = moving.state.copy()
         found, kept = _Job(smooth, sea, ends, contact, (rest, rest.copy())), contact.contact.numbers.copy()
         found.rest()
@@ -188,8 +196,9 @@ def settled(
             residual = found.residual(anchor)
             if residual <= BALANCED * (float(np.abs(rest.T).max()) + scale):
                 lost = keeps_turns(rest)
-                if lost:
-                    outcome = Outcome.TURNS_LOST
+                slack = not found.lowest() > floor
+                if lost or slack:
+                    outcome = Outcome.TURNS_LOST if lost else Outcome.SLACK
                     break
                 path.append(f"{ROAD}: found ({total + iterations} iterations in all)")
                 touch = found.books.touch[0].copy()

@@ -358,11 +358,11 @@ def test_an_equilibrium_that_touches_itself_from_a_start_within_itself_is_refuse
         "start": {"kind": "pinned", "position": [0, 0, 0]},
         "end": {"kind": "pinned", "position": [0, 0.95 * WIDTH, 0]},
     }
-    for model, cause in (("rod", "in this one the centrelines of s = "), (LEGS, "catenary zones")):
+    for model in ("rod", LEGS):
         weighted = closing(model, ends=ends)
         weighted["cable"]["sections"][0]["bending_stiffness"] = 1e-4
         weighted["cable"]["attachments"] = [{"kind": "clump", "at": 4.0, "mass": 10.0}]
-        pattern = rf"touches itself at s = .* m and s = .* m[\s\S]*{cause}[\s\S]*hybrid run"
+        pattern = r"touches itself at s = .* m and s = .* m[\s\S]*in this one the centrelines of s = [\s\S]*hybrid run"
         with pytest.raises(hybrid.SceneError, match=pattern):
             hybrid.static(hybrid.validate_scene(weighted))
     apart = hybrid.static(hybrid.validate_scene(closing("rod")))

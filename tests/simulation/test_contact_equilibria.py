@@ -1,0 +1,105 @@
+"""Equilibria of lines that touch themselves, with catenary zones: against rods, zones by their criteria, runs from there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+
+WIDTH, LENGTH = 0.02, 8.0
+LEGS = {"zones": [{"catenary": 3.0}, {"rod": 2.0}, {"catenary": 3.0}]}
+MESH = {"mesh": {"cells": 160}}
+
+
+def hanging(model: Any, **more: Any) -> dict[str, Any]:
+    """A U with a weight, whose legs lie against each other below ends that are 0.9 diameters apart; it starts open."""
+    section = {
+        "length": LENGTH, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e5, "bending_stiffness": 0.02,
+        "torsional_stiffness": 0.016, "damping": {"mass": 0.5},
+    }  # fmt: skip
+    y = 0.9 * WIDTH
+    open_ = [[0, 0, 0], [-1, 0, -2], [0, 0.5 * y, -3.7], [1, y, -2], [0, y, 0]]
+    return {
+        "cable": {"sections": [section], "attachments": [{"kind": "clump", "at": 4.0, "mass": 1.0}]}, "model": model,
+        "contact": {"self": True, "friction": 0.3}, "initial": {"kind": "equilibrium", "points": open_},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [0, y, 0]}},
+        "time": {"duration": 0.3, "step": 0.01}, "output": {"every": 0.1, "points": 81},
+    } | more  # fmt: skip
+
+
+def twisted(model: Any) -> dict[str, Any]:
+    """Three turns between clamps half the length apart."""
+    section = {
+        "length": 4.0, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e5, "bending_stiffness": 0.5,
+        "torsional_stiffness": 0.4,
+    }  # fmt: skip
+    clamp = {"kind": "clamped", "tangent": [1, 0, 0], "normal": [0, 0, 1]}
+    return {
+        "environment": {"gravity": 0.5}, "cable": {"sections": [section]}, "model": model, "contact": {"self": True},
+        "initial": "equilibrium",
+        "ends": {"start": clamp | {"position": [0, 0, 0]}, "end": clamp | {"position": [2.0, 0, 0], "turns": 3}},
+    }  # fmt: skip
+
+
+def apart(result: hybrid.Result) -> float:
+    """Least distance of the line from itself, in diameters."""
+    return float(result["self_distance/distance"]) / WIDTH
+
+
+def stays(tables: dict[str, Any], static: hybrid.Result, within: float) -> None:
+    """A run with friction begins in the equilibrium without, and stays."""
+    result = hybrid.run(hybrid.validate_scene(tables))
+    assert np.abs(result["position"] - static["position"]).max() < within
+    assert result["energy/self_contact"] == pytest.approx(float(static["energy/self_contact"][0]), rel=1e-5)
+    assert any(e.kind == "static friction neglected" and "touches itself" in e.text for e in result.events)
+
+
+@pytest.mark.slow
+def test_zones_of_an_equilibrium_in_contact() -> None:
+    """What touches is rod, what hangs free between is catenary, and it lies where rods on the same nodes lie."""
+    tables = hanging("adaptive")
+    result = hybrid.static(hybrid.validate_scene(tables))
+    rods = hybrid.static(hybrid.validate_scene(hanging({"kind": "adaptive", "force_rod": [[0.0, LENGTH]]})))
+    assert {z.kind for z in rods.zones[0]} == {"rod"} and {z.kind for z in result.zones[0]} == {"rod", "catenary"}
+    assert {"line touches itself", "stability not judged"} <= {e.kind for e in result.events}
+    touching = result.s[result["self_contact"][0] > 0.0]
+    assert touching.size and result["energy/self_contact"][0] > 0.0
+    assert all(any(z.kind == "rod" and z.s_a <= s <= z.s_b for z in result.zones[0]) for s in touching)
+    assert 0.94 < apart(result) < 1.0
+    assert np.linalg.norm(result["position"] - rods["position"], axis=2).max() < 1e-4 * LENGTH
+    assert result["energy/self_contact"][0] == pytest.approx(float(rods["energy/self_contact"][0]), rel=0.05)
+    stays(tables, result, 1e-9)
+
+
+@pytest.mark.slow
+def test_fixed_zones_in_contact() -> None:
+    """The legs of the U are catenaries, which touch below the ends; the same as rods on the same nodes."""
+    tables = hanging(LEGS, **MESH)
+    result = hybrid.static(hybrid.validate_scene(tables))
+    rods = hybrid.static(hybrid.validate_scene(hanging("rod", **MESH)))
+    assert 0.94 < apart(result) < 1.0 and result["energy/self_contact"][0] > 0.0
+    assert np.linalg.norm(result["position"] - rods["position"], axis=2).max() < 1e-5 * LENGTH
+    stays(tables, result, 1e-9)
+
+
+def test_stretches_that_stay_catenary_touch() -> None:
+    model = {"kind": "adaptive", "force_catenary": [[0.0, 1.5], [6.5, 8.0]]}
+    result = hybrid.static(hybrid.validate_scene(hanging(model)))
+    assert result.zones[0][0].kind == result.zones[0][-1].kind == "catenary"
+    assert result.zones[0][0].s_b >= 1.5 and 0.94 < apart(result) < 1.05
+
+
+def test_a_loop_in_zones_that_move_is_rod() -> None:
+    """A torque that throws a loop asks for rods from end to end."""
+    result = hybrid.static(hybrid.validate_scene(twisted("adaptive")))
+    assert {z.kind for z in result.zones[0]} == {"rod"} and 0.94 < apart(result) < 1.05
+    assert result["turns/link"][0] == pytest.approx(3.0, abs=1e-9) and result["turns/writhe"][0] > 1.5
+
+
+def test_a_catenary_that_a_loop_presses_is_refused() -> None:
+    """Between catenaries at both clamps the loop pushes; they cannot carry that, and the message says where."""
+    with pytest.raises(hybrid.ComputationError, match=r"compression; a catenary cannot carry it \(s = "):
+        hybrid.static(hybrid.validate_scene(twisted({"zones": [{"catenary": 0.4}, {"rod": 3.2}, {"catenary": 0.4}]})))
