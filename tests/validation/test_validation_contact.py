@@ -126,6 +126,7 @@ def test_the_ply_of_two_strands() -> None:
 
     M = 2 EI cos a sin^3 a/(r cos 2a) and T = EI sin^4 a (1/2 + 1/cos 2a)/r^2, less the energy of contact per length of
     strand, 2 % here, which hard strands would not have; r is half of their distance, sin^2 a = r times the curvature.
+    They press on each other with p = EI sin^4 a/(r^3 cos 2a) per length.
     """
     result = driven(10.0, {"travel": {"by": [-0.47, 0, 0], "over": 30.0}}, 35.0, damping=40.0)
     x, torque, tension = result.position[-1], result.torque[-1].mean(), result.reaction_end[-1, 0]
@@ -142,3 +143,6 @@ def test_the_ply_of_two_strands() -> None:
     assert result["turns/writhe"][-1] > 3.0  # two helical turns or more
     assert torque == pytest.approx(M, rel=0.01)
     assert tension == pytest.approx(T, rel=0.01)
+    pressure = math.sin(a) ** 4 / (r**3 * math.cos(2.0 * a))
+    pressed = result["self_contact"][-1][ply]
+    assert pressed.mean() == pytest.approx(pressure, rel=0.01) and np.ptp(pressed) < 0.03 * pressure
