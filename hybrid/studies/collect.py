@@ -73,6 +73,13 @@ def names_of(wanted: Mapping[str, Kept]) -> dict[str, tuple[str, str]]:
     return found
 
 
+def one_value_of(quantity: str) -> str:
+    """What to keep instead of a quantity that has several values at a time."""
+    if quantity in ("touchdown", "touchdown_position"):
+        return "output.quantities of the scene: {td: {kind: touchdown, end: end}}, and collect td"
+    return "end_force_end, or one of output.quantities of the scene"
+
+
 class NotAlwaysThere(ResultError):
     """A quantity of this run has times without a value, such as a touchdown point while nothing touches."""
 
@@ -141,12 +148,8 @@ def _taken(
     history = memory.get((own, "history")) or history_of(result, name, kept.times, at)
     memory[own, "history"] = history
     if history.s is None and history.values.ndim > 1:
-        fix = "end_force_end"
-        if name in ("touchdown", "touchdown_position"):
-            fix = "output.quantities of the scene: {td: {kind: touchdown, end: end}}, and collect td"
-        raise ResultError(
-            f"'{name}' has {history.values[0].size} values at a time, and one is kept\n    try:      {fix}"
-        )
+        count, fix = history.values[0].size, one_value_of(name)
+        raise ResultError(f"'{name}' has {count} values at a time, and one is kept\n    try:      {fix}")
     dims, places = ((), {}) if at is None or history.s is None else _places(own, history.s)
     unit, about = history.unit, f"{name}, {history.basis}"
     values = history.values

@@ -25,12 +25,14 @@ import numpy as np
 
 from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.model.plan import plan
+from hybrid.outputs.probes import PROBES
 from hybrid.scene.study import LIMIT_OF, Kept, Study, read_study, study_from
 from hybrid.simulation.api import run, static
 from hybrid.store.lock import locked
+from hybrid.store.names import ALIASES
 from hybrid.store.study_file import OPEN, OWN, Column, StudyFile, open_study
 from hybrid.studies.cases import Cases, cases_of, digest_of, scene_of
-from hybrid.studies.collect import names_of, usual
+from hybrid.studies.collect import names_of, one_value_of, usual
 from hybrid.studies.dispatch import AHEAD, StudyRunning, compute_open_batches
 
 if TYPE_CHECKING:
@@ -69,6 +71,7 @@ def study(
     wanted = asked.collect or usual(asked.static, cases.lines)
     _refuse_collisions(cases, wanted)
     _refuse_unknown_lines(cases, wanted)
+    _refuse_several_values(wanted)
     _refuse_limits_not_there(cases, wanted)
     identity = _identity(cases, wanted, asked.derive, asked.files)
     whole = target.with_suffix(".files") if asked.files else None
@@ -165,6 +168,17 @@ def _refuse_unknown_lines(cases: Cases, wanted: Mapping[str, Kept]) -> None:
         if kept.line is None and cases.lines and (kept.curve or {"profile"} & set(kept.take)):
             expected = f"one of {', '.join(cases.lines)}: what lies along a line is of one of them"
             raise SceneError([Complaint(f"collect.{name}.line", "nothing", expected, f"line: {cases.lines[0]}")])
+
+
+def _refuse_several_values(wanted: Mapping[str, Kept]) -> None:
+    """SceneError where a quantity is to be kept that has several values at a time, such as a force."""
+    for name, kept in wanted.items():
+        probe = PROBES.get(ALIASES.get(kept.quantity, kept.quantity))
+        if probe is None or not probe.dims or "s" in probe.dims:
+            continue
+        fix = one_value_of(kept.quantity)
+        expected = f"a quantity with one value at a time, or along the line: it has {', '.join(probe.dims)}"
+        raise SceneError([Complaint(f"collect.{name}.quantity", kept.quantity, expected, fix)])
 
 
 def _refuse_limits_not_there(cases: Cases, wanted: Mapping[str, Kept]) -> None:

@@ -273,16 +273,25 @@ def test_equilibria(folder: Path, tmp_path: Path, scheduler: str) -> None:
 
 
 def test_what_can_never_be_kept_ends_the_study(folder: Path, tmp_path: Path, scheduler: str) -> None:
-    """A quantity that no result has, or one with several values: said after the first batch; a corrected study takes the place."""
-    vary = {"cable.sections[0].mass": [6, 8]}
-    for wrong, text in (
-        ({"quantity": "tensoin"}, "did you mean"),
-        ({"quantity": "reaction_end"}, "3 values at a time"),
-    ):
-        with pytest.raises(ResultError, match=text):
-            hybrid.study(
-                folder / "scene.yaml", tmp_path / "x.zarr", vary=vary, collect={"x": wrong}, static=True, scheduler=scheduler
-            )  # fmt: skip
+    """A quantity that no result has: said after the first batch; a corrected study takes the place."""
+    vary, wrong = {"cable.sections[0].mass": [6, 8]}, {"quantity": "tensoin"}
+    with pytest.raises(ResultError, match="did you mean"):
+        hybrid.study(
+            folder / "scene.yaml", tmp_path / "x.zarr", vary=vary, collect={"x": wrong}, static=True, scheduler=scheduler
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize(("quantity", "fix"), [("touchdown", "kind: touchdown"), ("reaction_end", "end_force_end")])
+def test_several_values_at_a_time_are_refused_before_a_run(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quantity: str, fix: str
+) -> None:
+    monkeypatch.setattr("hybrid.studies.study.compute_open_batches", lambda *_: pytest.fail("a case was computed"))
+    with pytest.raises(SceneError, match=fix) as refused:
+        hybrid.study(
+            folder / "scene.yaml", tmp_path / "x.zarr", vary={"cable.sections[0].mass": [6, 8]},
+            collect={"x": {"quantity": quantity}}, static=True,
+        )  # fmt: skip
+    assert "collect.x.quantity" in str(refused.value) and not (tmp_path / "x.zarr").exists()
 
 
 def test_what_is_not_always_there_costs_nothing_else(folder: Path) -> None:
