@@ -27,10 +27,10 @@ _FONT = "system-ui, sans-serif"
 
 
 def figure_of(panel: Panel, store: Store) -> Spec:
-    """What the page's script draws: data and layout, colour bars, and which curve moves with time."""
+    """What the page's script draws: data and layout, and which curve moves with time."""
     (left, right), (low, high) = panel.limits()
     figure: Spec = {"data": [], "layout": _layout(panel, (left, right), (low, high))}
-    bars, readable = [], not any(isinstance(item, Map) for item in panel.items)
+    readable = not any(isinstance(item, Map) for item in panel.items)
     for item in panel.items:
         if isinstance(item, Line) and item.frames is not None:
             figure["now"] = {"trace": len(figure["data"]), "frames": store.add(item.frames)}
@@ -38,17 +38,12 @@ def figure_of(panel: Panel, store: Store) -> Spec:
             figure["layout"].setdefault("shapes", []).extend(_shapes(item))
         else:
             figure["data"] += _traces(item, store, panel.y.unit if readable else None)
-        if isinstance(item, Map):
-            bars.append(
-                {"label": f"{item.name}: {item.quantity}", "shades": item.shades, "low": item.low, "high": item.high}
-                | {"unit": item.unit, "log": item.log}
-            )
     seen: set[str] = set()
     for trace in (trace for trace in (*figure["data"], *figure["layout"].get("shapes", ())) if "name" in trace):
         trace["showlegend"] = bool(trace["name"]) and trace["name"] not in seen
         trace["legendgroup"] = trace["name"]
         seen.add(trace["name"])
-    return figure | ({"bars": bars} if bars else {}) | ({"cursor": True} if panel.cursor else {})
+    return figure | ({"cursor": True} if panel.cursor else {})
 
 
 def colour_scale(colours: Sequence[str]) -> list[list[Any]]:

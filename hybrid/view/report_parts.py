@@ -16,6 +16,7 @@ from hybrid.view.decimate import Store
 from hybrid.view.figure import Map, Panel
 from hybrid.view.style import prefix, short
 from hybrid.view.summary import CAUSES, Fact, amount, attention
+from hybrid.view.svg_graph import draw_graph
 from hybrid.view.zones import event_rows
 
 _SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
@@ -190,10 +191,19 @@ def caption_html(k: int, panel: Panel) -> str:
 
 
 def plot_html(k: int, panel: Panel) -> str:
-    """The place of a graph; a map is taller, with its colour bars above."""
-    maps = any(isinstance(item, Map) for item in panel.items)
-    bars = f'<div class="legend" data-bars="{k}"></div>' if maps else ""
-    return f'{bars}<div class="plot{" tall" * maps}" id="plot-{panel.key}" data-figure="{k}"></div>'
+    """The place of a graph, with its still drawing; a map is taller, with its colour bars above."""
+    maps = [item for item in panel.items if isinstance(item, Map)]
+    bars = f'<div class="legend">{"".join(map(_bar, maps))}</div>' if maps else ""
+    place = f'class="plot{" tall" * bool(maps)}" id="plot-{panel.key}" data-figure="{k}"'
+    return f"{bars}<div {place}>{draw_graph(panel)}</div>"
+
+
+def _bar(item: Map) -> str:
+    """The colours of a map, from its lowest value to its highest."""
+    shades = f'<span class="ramp" style="background:linear-gradient(to right,{",".join(item.shades)})"></span>'
+    low, high = "≤ " * item.log + short(item.low, 3), f"{short(item.high, 3)} {item.unit}" + " (log.)" * item.log
+    name = f"{item.name}: {item.quantity}"
+    return f'<span class="bar">{escape(name)}<span>{escape(low)}</span>{shades}{escape(high)}</span>'
 
 
 def events_html(result: Result, several: bool) -> str:

@@ -1,5 +1,6 @@
 "use strict";
-// The page's own script: unpacks the numbers and plotly, draws figures as they come into view, moves the cable.
+// The page's own script: draws figures as they come into view, with plotly, which starts with the first of them, and
+// moves the cable.  Until then, on paper, and where plotly cannot start, still drawings stand there.
 (async () => {
   const byId = (id) => document.getElementById(id);
   const index = JSON.parse(byId("index").textContent);
@@ -18,30 +19,34 @@
   };
 
   const problem = (text) => {
-    for (const box of document.querySelectorAll(".plot")) {
+    for (const figure of document.querySelectorAll("figure:has(.plot)")) {
       const line = document.createElement("p");
       line.className = "problem";
       line.textContent = text;
-      box.append(line);
+      figure.append(line);
     }
   };
 
-  let numbers;
-  try {
-    performance.mark("text");
-    numbers = await unpacked("data");
-    const script = document.createElement("script");
-    script.textContent = new TextDecoder().decode(await unpacked("plotly"));
-    performance.mark("unpacked");
-    document.head.append(script);
-    performance.mark("plotly");
-    for (const id of ["data", "plotly"]) byId(id).textContent = "";  // their memory is wanted elsewhere
-    if (!window.Plotly) throw new Error("plotly did not start");
-  } catch (error) {
-    problem("Pictures need a browser of 2023 or later (DecompressionStream): " + error.message);
-    return;
-  }
-  const { Plotly } = window;
+  let numbers, Plotly, starting = null;
+  const start = async () => {  // more than a second, in which nothing else moves: whether it could
+    try {
+      numbers = await unpacked("data");
+      const script = document.createElement("script");
+      script.textContent = new TextDecoder().decode(await unpacked("plotly"));
+      performance.mark("unpacked");
+      document.head.append(script);
+      performance.mark("plotly");
+      for (const id of ["data", "plotly"]) byId(id).textContent = "";  // their memory is wanted elsewhere
+      Plotly = window.Plotly;
+      if (!Plotly) throw new Error("plotly did not start");
+      return true;
+    } catch (error) {
+      problem("Pictures that move need a browser of 2023 or later (DecompressionStream): " + error.message);
+      return false;
+    }
+  };
+  const started = () => (starting ??= start());
+  performance.mark("text");
 
   const TYPES = { f4: Float32Array, u1: Uint8Array };
   const flat = (ref) => {
@@ -60,15 +65,15 @@
     return Object.fromEntries(Object.entries(x).map(([key, value]) => [key, revived(value)]));
   };
 
-  // ---- light, dark and paper -------------------------------------------------------------------
+  // ---- light and dark --------------------------------------------------------------------------
 
   const night = matchMedia("(prefers-color-scheme: dark)");
-  let paper = false;  // while it is printed: light, and as wide as a page
+  let printing = false;
   const DARK = { "#ffffff": "#15181c", "#222222": "#e6e6e6", "#000000": "#f4f4f4", "#ededed": "#2c3238", "#e4e4e4": "#2c3238",
     "#bdbdbd": "#59616a", "#6e6e6e": "#a9adb3", "#5f5f5f": "#a9adb3", "#555555": "#c8ccd1", "#b5b5b5": "#6b727a", "#9e9e9e": "#59616a",
     "#eee5d0": "#4a4231", "#8c6d31": "#c9a55a", "#eff6fa": "#1b3140", "#0072b2": "#56b4e9", "#d55e00": "#ff8b3d",
     "#009e73": "#2ecf9f", "#8e63b5": "#b594d8", "#c00000": "#ff8a80", "#b84f04": "#ff9a52", "#2c72b6": "#6fb3ee" };
-  const shade = (colour) => (night.matches && !paper && DARK[String(colour).toLowerCase()]) || colour;
+  const shade = (colour) => (night.matches && !printing && DARK[String(colour).toLowerCase()]) || colour;
   const faded = /^rgba\((\d+),(\d+),(\d+),([\d.]+)\)$/;
   const themed = (x, key) => {  // numbers and scales of colours stay
     if (key === "colorscale" || key === "x" || key === "y" || key === "z" || key === "text") return x;
@@ -211,6 +216,7 @@
       byId("cable-said").textContent = "This browser has no WebGL: the cable is shown still.";
       return;
     }
+    if (!(await started())) return;
     const traces = [{ type: "scatter3d", mode: "lines", ...shape(0), line: { color: shade("#b5b5b5"), width: 2 }, hoverinfo: "skip" }];
     traces.push({ type: "scatter3d", mode: "lines", ...shape(state.frame), line: line(), customdata: flat(scene.s),
       hovertemplate: "s = %{customdata:.4g} m<br>x = %{x:.4g}, y = %{y:.4g}, z = %{z:.4g} m<extra></extra>" });
@@ -257,29 +263,29 @@
 
   const graphs = new Map();  // element -> its figure, once drawn
   const seen = new Set();
+  let turn = Promise.resolve();
+  const inTurn = (draw) => {  // one at a time, and the page answers in between
+    turn = turn.then(draw).catch((error) => console.error(error)).then(() => new Promise((done) => setTimeout(done)));
+  };
   const cursor = () => ({ type: "line", xref: "x", yref: "paper", x0: state.t, x1: state.t, y0: 0, y1: 1,
     line: { color: shade("#555555"), width: 1, dash: "dot" } });
 
-  const HALF = 318, FULL = 660, HIGH = 235;  // px of a graph on paper, beside another and alone
   const drawGraph = async (element, figure, again = false) => {
-    if (graphs.has(element) && !again) return;
+    if (!(await started())) return;
+    if (again ? !graphs.has(element) : graphs.has(element)) return;
     const first = !graphs.has(element);
     graphs.set(element, figure);
     const layout = themed(figure.layout);
     layout.dragmode = touch ? false : "zoom";  // a finger scrolls the page
-    if (paper) {
-      const beside = element.closest(".grid") && !element.closest("figure").matches(":last-child:nth-child(odd)");
-      Object.assign(layout, { autosize: false, width: beside ? HALF : FULL, height: beside ? HIGH : HIGH * 1.25 });
-      layout.font = { ...layout.font, size: 10.5 };
-    }
-    if (element.clientWidth < 500 || paper) layout.legend.font.size = 11;
-    if (figure.cursor && times.length > 1 && !paper) layout.shapes = [cursor(), ...(layout.shapes || [])];
+    if (element.clientWidth < 500) layout.legend.font.size = 11;
+    if (figure.cursor && times.length > 1) layout.shapes = [cursor(), ...(layout.shapes || [])];
     const data = revived(themed(figure.data));
     for (const trace of data) if (trace.type === "heatmap") trace.zsmooth = false;
     if (figure.now) data[figure.now.trace].y = row(figure.now.frames, state.frame);
-    const done = Plotly.newPlot(element, data, layout, paper ? { staticPlot: true } : config);
+    const done = Plotly.newPlot(element, data, layout, config);
     if (figure.cursor && (first || again)) done.then(() => element.on("plotly_click", (event) => go(event.points[0].x)));
     await done;
+    element.classList.add("drawn");
   };
   const follow = (element, figure) => {
     if (figure.now) Plotly.restyle(element, { y: [row(figure.now.frames, state.frame)] }, [figure.now.trace]);
@@ -314,7 +320,8 @@
   let last = 0;
   const tick = (now) => {
     if (!state.playing) return;
-    const t = state.clock + (Math.min(now - last, 1000) / 1000) * Number(pace.value);
+    const waits = starting && !space && hasWebGL();  // the cable is about to be drawn
+    const t = state.clock + (waits ? 0 : (Math.min(now - last, 1000) / 1000) * Number(pace.value));
     last = now;
     if (t >= times.at(-1)) { show(times.length - 1); stop(); return; }
     state.clock = t;
@@ -363,11 +370,6 @@
     target.addEventListener("click", act);
     if (target.tagName === "TR") target.addEventListener("keydown", (event) => { if (event.key === "Enter") act(); });
   }
-  for (const place of document.querySelectorAll("[data-bars]")) {
-    for (const bar of index.figures[Number(place.dataset.bars)].bars) {
-      place.append(ramp(bar.label, bar.shades, bar.low, bar.high, bar.unit, bar.log));
-    }
-  }
   sayTime();
   if (box3d && scene) {  // its still drawing is there; plotly's takes a second or more, and is made when it is looked at
     say3d();
@@ -377,35 +379,39 @@
       new IntersectionObserver((entries, watcher) => {
         if (!entries.some((entry) => entry.isIntersecting)) return;
         watcher.disconnect();
-        drawCable();
+        inTurn(drawCable);
       }, { rootMargin: "-100px 0px" }).observe(box3d);
     }
   }
   const places2d = [...document.querySelectorAll(".plot[data-figure]")];
   const figureOf = (element) => index.figures[Number(element.dataset.figure)];
+  const drawNearest = async () => {  // of the graphs that wait, that in the middle of the window
+    await started();
+    const far = (x) => { const box = x.getBoundingClientRect(); return Math.abs(box.top + box.bottom - innerHeight); };
+    const [first] = [...seen].filter((x) => !graphs.has(x)).sort((a, b) => far(a) - far(b));
+    if (first) await drawGraph(first, figureOf(first));
+  };
   const watcher = new IntersectionObserver((entries) => {
     for (const entry of entries) {
       if (!entry.isIntersecting) { seen.delete(entry.target); continue; }
       seen.add(entry.target);
       if (graphs.has(entry.target)) follow(entry.target, figureOf(entry.target));
-      else drawGraph(entry.target, figureOf(entry.target));
+      else inTurn(drawNearest);
     }
-  }, { rootMargin: "300px" });
+  }, { rootMargin: "150px" });
   for (const element of places2d) watcher.observe(element);
   const redraw = (elements) => elements.forEach((element) => drawGraph(element, figureOf(element), true));
   const folds = [...document.querySelectorAll("details")].map((fold) => [fold, fold.open]);
-  addEventListener("beforeprint", () => {  // all graphs, light, as wide as a page; what is folded opens
-    paper = true;
-    document.documentElement.classList.add("paper");
-    folds.forEach((each) => { each[1] = each[0].open; each[0].open = true; });
-    redraw(places2d);
-  });
-  addEventListener("afterprint", () => {
-    paper = false;
-    document.documentElement.classList.remove("paper");
-    folds.forEach(([fold, open]) => { fold.open = open; });
-    redraw([...graphs.keys()]);
-  });
+  const print = (on) => {  // light, and what is folded opens
+    printing = on;
+    if (box3d && scene) say3d();
+    for (const each of folds) {
+      if (on) each[1] = each[0].open;
+      each[0].open = on || each[1];
+    }
+  };
+  addEventListener("beforeprint", () => print(true));
+  addEventListener("afterprint", () => print(false));
   night.addEventListener("change", () => {
     redraw([...graphs.keys()]);
     if (box3d && scene && space) { say3d(); drawCable(); }
