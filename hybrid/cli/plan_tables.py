@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -170,7 +171,8 @@ def _hockling(plan: Plan) -> str:
     if found.of_tension:
         text += f", of which tension makes {abs(found.of_tension):.3g}"
     if found.diameter > 0.0 and found.min_bend_radius > 0.0:
-        text += f", kinks from {kink_torque(found.stiffness, found.diameter, found.min_bend_radius):.3g}"
+        kink = kink_torque(found.stiffness, found.diameter, found.min_bend_radius)
+        text += f"; a loop kinks from {kink:.3g} N m on" if isfinite(kink) else "; no torque makes a loop kink"
     return text
 
 

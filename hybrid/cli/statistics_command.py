@@ -125,7 +125,7 @@ def _limit_lines(result: Result, rows: list[dict[str, Any]], above: float | None
         found.append(f"{row['quantity']}{place} is above {above:g} {row['unit']} for {part}")
     for x in () if result.lines else result.utilisation().values():
         part = "" if x.used is None else f"{100.0 * x.used:.4g} % of {x.limit} used: "
-        found.append(f"{part}{x.text}, s = {x.s:.5g} m, t = {x.t:.5g} s, of every step")
+        found.append(f"{part}{x.text}, s = {x.s:.5g} m, t = {x.t:.5g} s, of every step and output")
     return found + [f"{x.text}{x.when}" + "; BROKEN" * x.broken for x in held_of(result)]
 
 

@@ -121,6 +121,8 @@ def _seen(f: np.ndarray, density: np.ndarray) -> np.ndarray:
 
 def _enveloped(result: Result, name: str) -> Panel:
     if not _has_profile(result, name):
+        if f"steps/{name}" not in result:
+            result.dims(name)  # says what a name that is not there may mean
         raise ResultError(f"'{name}' has no value along the line\n    try:      tension, curvature, bending_moment")
     s, low, high, basis = extent(result, name)
     factor, unit = prefix(result.units[name], float(np.abs([low, high]).max()))

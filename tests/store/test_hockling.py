@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.cli.plan_tables import plan_lines
 from hybrid.store.hockling import formation_tension, kink_torque, pop_out, strand_distance
 
 
@@ -105,6 +106,13 @@ def test_the_plan_names_the_torque_from_which_a_hanging_line_can_throw_a_loop() 
     assert critical is not None
     assert critical.torque == pytest.approx(2.0 * np.sqrt(EI * c * weight), rel=1e-3)
     assert critical.s == pytest.approx(0.5 * length, abs=length / 200)
+    for radius, text in ((0.3, "a loop kinks from"), (1e-6, "no torque makes a loop kink")):
+        section["min_bend_radius"] = radius
+        checked = hybrid.validate_scene(scene)
+        told = " ".join(" ".join(plan_lines(checked, hybrid.plan(checked))).split())
+        assert text in told
+        kink = kink_torque(EI, 0.02, radius)
+        assert f"kinks from {kink:.3g} N m on" in told or not np.isfinite(kink)
     scene["cable"]["attachments"] = [{"kind": "swivel", "at": 10.0}]  # there is no torque
     assert hybrid.plan(hybrid.validate_scene(scene)).critical_torque is None
 

@@ -68,6 +68,9 @@ def test_they_compose_on_axes_of_the_user() -> None:
         hybrid.plot_energy(reported(energy=False))
     with pytest.raises(ResultError, match="all times and places"):
         hybrid.plot_quantity(result, "tension", at=1.0, envelope=True)
+    for name, text in (("tensoin", "did you mean tension"), ("end_force_end", "no value along the line")):
+        with pytest.raises(ResultError, match=text):
+            hybrid.plot_quantity(result, name, envelope=True)
 
 
 def test_numbers_have_no_exponents() -> None:
