@@ -162,8 +162,8 @@ def equilibrium_table(facts: dict[str, Any]) -> Any:
 
 def zones_over_time(result: Result) -> dict[str, Any]:
     """What zones that move have done: shares of the line that were rod, and changes."""
-    length = float(result.s[-1])
-    shares = [sum(z.s_b - z.s_a for z in zones if z.kind == "rod") / length for zones in result.zones]
+    rods = [sum(z.s_b - z.s_a for z in zones if z.kind == "rod") for zones in result.zones]
+    shares = [rod / (zones[-1].s_b - zones[0].s_a) for rod, zones in zip(rods, result.zones, strict=True)]
     events = result.events
     changes = sum(e.kind in ZONE_EVENTS for e in events)
     changes += sum(int(e.value or 0) for e in events if e.kind == OMITTED and e.criterion in ZONE_EVENTS)

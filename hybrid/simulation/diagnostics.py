@@ -216,7 +216,10 @@ class Diagnostics:
         else:
             finer = 0.3 * first / bend
             how = f"the bend at the end s = {s:g} m is sharper than the mesh"
-        ask = "`ratio` grades them" if self._model.layout is None else "`model.rod_cell`"
+        layout, paid = self._model.layout, self._model.payout
+        ask = "`ratio` grades them" if layout is None else "`model.rod_cell`"
+        if layout is not None and paid is not None and paid.follows and layout.parts[layout.base_of_cell[cell]] == 1:
+            ask = "`mesh.cells`: those at the winch stay whole"
         return f"{how}: curvature and moment are wrong there; cells of {finer:.2g} m would do ({ask})"
 
     def scheme(self, rho: float) -> None:

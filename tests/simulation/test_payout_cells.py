@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.cli.tables import zones_over_time
 from hybrid.simulation.transient import Transient
 from tests.simulation.test_payout import G, check_kicks, clamped, hanging, sagging
 from tests.simulation.test_payout_zones import touching
@@ -147,3 +148,14 @@ def test_a_step_is_taken_back() -> None:
             places.append(sim.forces().end.copy())
             sim.restore(saved)
     assert np.array_equal(*places)
+
+
+@pytest.mark.parametrize("side", ["end", "start"])
+def test_cells_that_are_too_long_at_the_winch_are_told_of(side: str) -> None:
+    """They stay whole, whatever `rod_cell` says; and the part that is rod is one of the line that is out."""
+    result = hybrid.run(touching(0.8, FOLLOWING, side))
+    (said,) = [x.text for x in result.events if x.kind == "unresolved bend" and x.t == 0.0]
+    assert said.endswith("would do (`mesh.cells`: those at the winch stay whole)")
+    shares = zones_over_time(result)["rod"]
+    assert 0.0 < shares["least"] <= shares["mean"] <= shares["most"] <= 1.0
+    assert max(sum(z.s_b - z.s_a for z in zones if z.kind == "rod") for zones in result.zones) > 100.0
