@@ -16,14 +16,18 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.error_order import (
     COARSER,
+    CONFIRMED,
     MOST,
     MOST_ORDER,
+    ORDER,
     ORDERS,
+    Falls,
     around,
     as_halved,
     at_all_outputs,
     blended,
     falls,
+    force_orders,
     magnitude,
     order,
     refinement,
@@ -112,7 +116,6 @@ class Estimate:
     An error of order p is k^p times as large on cells k times as long.
     """
 
-    orders = ORDERS  # bounds of the order of convergence
     cancels = True  # whether errors by mesh and time step add with their signs; else their sizes add
     _errors: Errors | None = None  # of the result and the model error as they are; None: not asked for yet
 
@@ -137,7 +140,7 @@ class Estimate:
             for name, found in fall.items():
                 fall[name] = as_halved(found, finer, step_share(name, coarse, rough, coarsest))
         self.falls = {name: found.mean for name, found in fall.items()}
-        self.order = {name: order(max(found.mean, found.largest), self.orders) for name, found in fall.items()}
+        self.order = {name: order(max(x.mean, x.largest), self._bounds(name, x)) for name, x in fall.items()}
         # Root mean square of the last change of each output, and of that before.
         self.changes = {name: (found.change, found.before) for name, found in fall.items()}
         self.start = start_change(result, coarse), start_change(coarse, coarsest)
@@ -151,6 +154,10 @@ class Estimate:
         self.by_mesh: dict[str, np.ndarray] | None = None  # the same by the mesh
         self.has_step = self._rough is not None and any(name in self._rough.values for name in self.order)
         self.has_mesh = bool(self.order) and result.cells >= LEAST_RATIO * coarse.cells
+
+    def _bounds(self, name: str, found: Falls) -> tuple[float, float]:
+        """Bounds of the order of convergence of an output."""
+        return force_orders(found) if name in END_FORCES else ORDERS
 
     def _signed(self, name: str, a: int, b: int) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Errors by time step and mesh of the outputs from number a to b, with their sign; None: not known."""
@@ -232,7 +239,7 @@ class Estimate:
         self.start = start_change(result, before), self.start[0]
         finer, shorter = result.cells / before.cells, result.steps / before.steps
         other_zones = result.resolution.zones != before.resolution.zones
-        for name, p in self.order.items():
+        for name, p in list(self.order.items()):
             self.changes[name] = np.nan, self.changes[name][0]
             if other_zones:  # what has changed is not by cells and steps alone
                 for found, ratio in ((by_step, shorter), (by_mesh, finer)):
@@ -240,6 +247,8 @@ class Estimate:
                         found[name] = found[name] / ratio**p
                 continue
             change = np.asarray(result.values[name]) - np.asarray(before.values[name])
+            if p < ORDER and self._is_unconfirmed(name, change, finer, shorter):
+                p = self._with_usual_order(name)
             self.changes[name] = float(np.sqrt(squares(change) / max(1, change.size))), self.changes[name][1]
             if finer > LEAST_RATIO and name in by_mesh:
                 if name in by_step:
@@ -249,6 +258,29 @@ class Estimate:
             elif shorter > LEAST_RATIO:
                 shown = change / (shorter**p - 1.0)
                 by_step[name] = blended(shown, by_step[name] / shorter**p, shorter, p) if name in by_step else shown
+
+    def _is_unconfirmed(self, name: str, change: np.ndarray, finer: float, shorter: float) -> bool:
+        """Whether a finer run has changed an output by less than the order of its errors has foretold."""
+        by_step, by_mesh = self._keep()
+        parts = [
+            found[name] * (1.0 - ratio ** -self.order[name])
+            for found, ratio in ((by_step, shorter), (by_mesh, finer)) if name in found
+        ]  # fmt: skip
+        if not parts:
+            return False
+        foretold = np.asarray(sum(parts))
+        most, largest = (float(np.max(magnitude(x, name), initial=0.0)) for x in (change, foretold))
+        return most < CONFIRMED * largest and squares(change) < CONFIRMED**2 * squares(foretold)
+
+    def _with_usual_order(self, name: str) -> float:
+        """Take errors of an output to fall with ORDER from here on, and make of those until now what it would have."""
+        by_step, by_mesh = self._keep()
+        p, self.order[name] = self.order[name], ORDER
+        less = (COARSER**p - 1.0) / (COARSER**ORDER - 1.0)  # of runs twice as fine as those before
+        for found in (by_mesh, by_step):
+            if name in found:
+                found[name] = less * found[name]
+        return ORDER
 
     @property
     def not_converged(self) -> dict[str, float]:

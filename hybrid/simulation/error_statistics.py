@@ -17,7 +17,7 @@ from hybrid.model.resolution import RequestedAccuracy
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.error_estimate import Estimate
-from hybrid.simulation.error_order import MOST_ORDER
+from hybrid.simulation.error_order import MOST_ORDER, ORDER, Falls
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.store.named_arrays import Tree, matched
 
@@ -41,7 +41,6 @@ class StatisticEstimate(Estimate):
     One number has no field in which mesh and time step could be told apart: their sizes add.
     """
 
-    orders = 1.5, MOST_ORDER  # runs of long steps overshoot snaps, and come back with order 3
     cancels = False
 
     def __init__(
@@ -49,6 +48,9 @@ class StatisticEstimate(Estimate):
     ) -> None:
         super().__init__(result, coarse, rough, coarsest)
         self.chance = _chance(result, coarse)  # N, of a mean over windows at start and end: zeros of what is no mean
+
+    def _bounds(self, name: str, found: Falls) -> tuple[float, float]:
+        return ORDER, MOST_ORDER  # runs of long steps overshoot snaps, and come back with order 3
 
     def update(self, result: RunSample) -> None:
         self.chance = _chance(result, self.run)
