@@ -105,6 +105,7 @@ EVENTS_BY_WEIGHT = (
     "windows uncertain",
     "irregular motion",
     "costly accuracy",
+    "finer run not kept",
     "end force between outputs",
     "line meets itself",
     "loop can form",

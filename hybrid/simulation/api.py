@@ -8,9 +8,8 @@ resume   continue a run
 from __future__ import annotations
 
 import io
-import os
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -39,6 +38,7 @@ from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.simulation.case import Case
 from hybrid.simulation.error_control import ErrorController, comparison_resolutions
 from hybrid.simulation.error_report import write_errors
+from hybrid.simulation.finer_result import FinerResult, beside
 from hybrid.simulation.first_use import OF_LINES, compile_beside, kernels_of
 from hybrid.simulation.interrupts import interrupts
 from hybrid.simulation.mesh_survey import survey_resolution
@@ -66,8 +66,6 @@ from hybrid.store.stored_rows import remove_rows
 
 if TYPE_CHECKING:
     from hybrid.scene.system import System
-
-Record = Callable[[Resolution, Path | io.BytesIO], RunSample]
 
 
 def run(
@@ -110,7 +108,7 @@ def run(
     case, target = Case(scene, criterion), _target(output, overwrite, wants_errors(scene))
     with locked(_path(output)), _supervised(case, progress):
         if isinstance(target, Path):
-            _beside(target).unlink(missing_ok=True)  # of a run that was cut off
+            beside(target).unlink(missing_ok=True)  # of a run that was cut off
         _compute(case, target)
     return written_result(target)
 
@@ -139,9 +137,11 @@ def static(scene: SceneLike | System, output: str | Path | None = None, *, overw
             case.record(resolution, target)
             return written_result(target)
         assert not isinstance(target, MemoryTarget)
-        compute = _replacing(target, case.record, case.record)
+        compute = FinerResult(target, case.record, case.record)
         free = _free(scene)._replace(steps=False)
-        control = ErrorController(requested_accuracy(scene), free, False, case.sample, compute, choice=choice)
+        control = ErrorController(
+            requested_accuracy(scene), free, False, case.sample, compute, choice=choice, settle=compute.settle
+        )
         result, errors = control.start(resolution)
         write_errors(target, scene, control, result, errors, clock.process_time() - begin)
     return written_result(target)
@@ -266,13 +266,13 @@ def _compute(case: Case, target: Target, source: Path | None = None, remaining: 
     case.beside_result = target if isinstance(target, Path) else None
     try:
         if remaining is not None and remaining.before:
-            control = _controller(case, _replacing(target, first, refinement))
+            control = _controller(case, FinerResult(target, first, refinement))
             with refused(source or Path()):
                 control.restore(remaining.before, case.scene, case.points, source)
             go_on = control.proceed
         else:
             choice, resolution = _surveyed(case, resolution) if remaining is None else (NAMED, resolution)
-            control = _controller(case, _replacing(target, first, refinement), choice)
+            control = _controller(case, FinerResult(target, first, refinement), choice)
             moves = isinstance(case.scene.model, AdaptiveModel) and not follows_curvature(case.scene)
             go_on = partial(control.start, replace(resolution, follow=moves))
         try:
@@ -285,7 +285,7 @@ def _compute(case: Case, target: Target, source: Path | None = None, remaining: 
         if control.choice.kind == "catenary" and failed:
             _emptied(target)
             choice, resolution = rods_instead(case, first_resolution(case.scene), failed)
-            control = _controller(case, _replacing(target, anew, refinement), choice)
+            control = _controller(case, FinerResult(target, anew, refinement), choice)
             result, errors = control.start(resolution)
     except KeyboardInterrupt:
         if control is not None and control.estimate is not None:  # the result before the finer run stands
@@ -311,11 +311,13 @@ def _emptied(target: Path | io.BytesIO) -> None:
         left.unlink(missing_ok=True)
 
 
-def _controller(case: Case, compute: Callable[[Resolution], RunSample], choice: ModelChoice = NAMED) -> ErrorController:
+def _controller(case: Case, compute: FinerResult, choice: ModelChoice = NAMED) -> ErrorController:
     """What chooses how finely a case is computed."""
     asked = requested_accuracy(case.scene)
     irregular = is_irregular(case.scene)
-    return ErrorController(asked, _free(case.scene), True, case.sample, compute, case.beside, irregular, choice)
+    return ErrorController(
+        asked, _free(case.scene), True, case.sample, compute, case.beside, irregular, choice, compute.settle
+    )
 
 
 def _surveyed(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
@@ -351,39 +353,6 @@ def _expect(case: Case, resolution: Resolution, surveys: bool) -> None:
     passes = [(PRE_RUN, survey_resolution(resolution))] if surveys else []
     passes += [(ESTIMATION, x) for x in comparison_resolutions(resolution, moves=True)]
     case.progress.expect([*passes, (RESULT, resolution)], resolution)
-
-
-def _replacing(target: Path | io.BytesIO, first: Record, refinement: Record) -> Callable[[Resolution], RunSample]:
-    """Record results one after the other: a finer one takes the place of that before it when it is complete."""
-    done = False
-
-    def compute(resolution: Resolution) -> RunSample:
-        nonlocal done
-        if not done:
-            found, done = first(resolution, target), True
-            return found
-        if isinstance(target, io.BytesIO):
-            new = io.BytesIO()
-            found = refinement(resolution, new)
-            target.seek(0)
-            target.truncate()
-            target.write(new.getvalue())
-            return found
-        beside = _beside(target)
-        try:
-            found = refinement(resolution, beside)
-            os.replace(beside, target)
-        finally:
-            for left in (beside, beside.with_suffix(".snapshot.npz")):
-                left.unlink(missing_ok=True)
-        return found
-
-    return compute
-
-
-def _beside(target: Path) -> Path:
-    """Where a finer result is computed, until it is complete."""
-    return target.with_name(f".{target.name}.finer")
 
 
 def _path(output: str | Path | None) -> Path | None:

@@ -36,18 +36,21 @@ from hybrid.simulation.error_statistics import (
     STATISTICS,
     StatisticEstimate,
     estimates,
+    irregular_notes,
     is_chance,
     snaps,
     statistics_of,
-    windows_uncertain,
 )
+from hybrid.simulation.finer_result import NOT_KEPT, Before
 from hybrid.simulation.refinement import (
     COSTLY_ACCURACY,
     MOST_OF_MODEL,
+    RAW,
     Free,
     Verdict,
     costly,
     judge,
+    missed,
     not_converged,
     refined,
 )
@@ -107,6 +110,7 @@ class ErrorController:
     beside: Beside | None = None
     irregular: bool = False
     choice: ModelChoice = NAMED  # of a scene that names no model
+    settle: Callable[[bool], None] = lambda kept: None  # whether a finer result takes the place of that before it
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
     first: Resolution | None = None  # that the runs to compare with are for; the result may be finer
     next: Resolution | None = None  # of the result that is to be computed
@@ -133,25 +137,7 @@ class ErrorController:
         """What is judged of an irregular motion, and how far the result may be off in what is not."""
         if self.asked is None or not self.irregular or not self.statistics or self.estimate is None:
             return []
-        errors = self.estimate.errors
-        force = max(errors.largest("total", name) for name in END_FORCES.values())
-        position = errors.largest("total", "position")
-        text = (
-            "the motion is irregular: accuracy is that of largest values, mean extremes of windows and standard "
-            f"deviations; at an instant positions may be off by {position:.2g} m, end forces by {force:.2g} N; "
-            "accuracy: {instant: 1%} asks for every instant"
-        )
-        notes = [("irregular motion", text)]
-        if self.scattered:
-            found = self.statistics[LARGEST].errors
-            each = [f"{x.removeprefix('end_force_')} {found.largest('total', x):.2g} N" for x in self.scattered]
-            text = (
-                f"the largest force is that of one snap, and differs from run to run however fine they are (at the "
-                f"{', at the '.join(each)}): it is not judged; the spread over seeds, or a longer run, says more"
-            )
-            notes.append(("largest force uncertain", text))
-        notes += windows_uncertain(self.statistics, self.asked)
-        return notes
+        return irregular_notes(self.statistics, self.estimate.errors, self.scattered, self.asked)
 
     def start(self, resolution: Resolution) -> tuple[RunSample, Errors | None]:
         """From a first resolution to the result and its errors, None where they cannot be estimated."""
@@ -188,16 +174,16 @@ class ErrorController:
             except ComputationError as error:
                 if self.estimate is None:
                     raise
-                return self.without_refinement(f"a finer run failed: {str(error).splitlines()[0]}")
+                why = f"a finer run failed: {str(error).splitlines()[0]}"
+                self._notes.append((NOT_KEPT, f"{why}; the result is the one before"))
+                return self.without_refinement(why)
             if self.estimate is None:
                 if not self.first_estimate(result):
                     return result, None
+                self._judge(resolution)
             else:
-                self.next_estimate(self.estimate, resolution, result)
+                self._judge_finer(self.estimate, resolution, result)
             assert self.estimate is not None
-            if self.estimate.lacks_model_errors():
-                self._renew_model_errors(self.estimate, resolution)
-            self.next = self.next_resolution()
             if self.next is not None and not any(kind == COSTLY_ACCURACY for kind, _ in self._notes):
                 self._notes += costly(self.runs, self.estimate.run, self.next)
         assert self.estimate is not None
@@ -207,6 +193,33 @@ class ErrorController:
             if verdict.ratio > 1.0:
                 self.note_missed(verdict)
         return self.estimate.run, errors
+
+    def _judge(self, resolution: Resolution) -> Estimate:
+        """Whether the result is as accurate as asked, and what follows; its estimate."""
+        assert self.estimate is not None
+        if self.estimate.lacks_model_errors():
+            self._renew_model_errors(self.estimate, resolution)
+        self.next = self.next_resolution()
+        return self.estimate
+
+    def _judge_finer(self, estimate: Estimate, resolution: Resolution, result: RunSample) -> None:
+        """The same of a finer result; where it is the last and no better than that before it, that one stays."""
+        asked, irregular = self.asked, self.irregular
+        before = Before.of(estimate, self.verdict(asked)) if asked is not None and not irregular else None
+        kept = True
+        try:
+            self.next_estimate(estimate, resolution, result)
+            finer = self._judge(resolution)
+            if asked is None or before is None or self.next is not None or self.irregular:
+                return
+            found = self.verdict(asked)
+            if before.is_better(asked, finer, found):
+                kept, self.estimate = False, before.estimate
+                before.estimate.set_apart(finer.run)
+                text = f"{finer.run.cells} cells and {finer.run.steps} steps are no better: {found.text}"
+                self._notes.append((NOT_KEPT, f"{text}; the result is the one before"))
+        finally:
+            self.settle(kept)
 
     def verdict(self, asked: RequestedAccuracy) -> Verdict:
         """How the errors compare with what is asked: at every instant, or of extremes and standard deviations."""
@@ -375,7 +388,7 @@ class ErrorController:
             return False
         estimate = self.statistics[LARGEST] if self.irregular else self.estimate
         assert estimate is not None
-        name = {of: raw for raw, of in END_FORCES.items()}.get(verdict.name, verdict.name)
+        name = RAW.get(verdict.name, verdict.name)
         of_largest = self.irregular and verdict.statistic == LARGEST
         diverges = falls > STALLED or estimate.falls.get(name, np.nan) > DIVERGES
         if not (diverges or (of_largest and is_chance(self.statistics, LARGEST, name))):
@@ -393,7 +406,7 @@ class ErrorController:
 
     def _by_chance(self, verdict: Verdict) -> bool:
         """Whether what misses is an end force that another run would differ in as much, however fine."""
-        name = {of: raw for raw, of in END_FORCES.items()}.get(verdict.name, "")
+        name = RAW.get(verdict.name, "")
         if not self.irregular or not name or verdict.statistic not in self.statistics:
             return False
         diverges = self.statistics[verdict.statistic].falls.get(name, np.nan) > DIVERGES
@@ -401,20 +414,7 @@ class ErrorController:
 
     def note_missed(self, verdict: Verdict) -> None:
         """Say that what was asked is not met, whose doing it is, and what to try."""
-        main = max((verdict.mesh, "mesh"), (verdict.time, "time step"), (verdict.model, "model"))[1]
-        free = {"mesh": self.free.mesh, "time step": self.free.steps, "model": self.free.zones}[main]
-        fixed = {"mesh": "mesh (or cells of zones)", "time step": "time.step", "model": "model, or its tolerance"}[main]
-        try_ = f"leave {fixed} out"
-        if free:
-            try_ = f"accuracy: {{{verdict.reached}}}, which this run meets"
-            try_ += ", or compare with model: rod" * (verdict.model > 0.0)
-        if main == "model" and not free:
-            try_ = "model: adaptive, or rod"
-        whose = f"most of it is of the {main}"
-        if self._by_chance(verdict):
-            whose = "the line snaps at other instants in every run, and finer ones differ as much"
-            try_ = f"a longer run, several seeds, or accuracy: {{{verdict.reached}}}, which this run meets"
-        text = f"{verdict.text}; {whose}, {len(self.runs)} runs; try: {try_}"
+        text = missed(verdict, self.free, len(self.runs), self._by_chance(verdict))
         self._notes.append(("accuracy missed", text))
 
     def checkpoint(self) -> Tree:

@@ -117,6 +117,7 @@ class Estimate:
     """
 
     cancels = True  # whether errors by mesh and time step add with their signs; else their sizes add
+    _apart: RunSample | None = None  # a finer run that is no better, from which the result is not less far than it is
     _errors: Errors | None = None  # of the result and the model error as they are; None: not asked for yet
 
     def __init__(
@@ -211,6 +212,14 @@ class Estimate:
         self._model: Mapping[str, Outputs] = {name: x for name, x in coarse.model_error.items() if len(x)}
         self._model_every = coarse.every
         self._model_of = coarse.cells, coarse.every, coarse.catenary
+
+    def set_apart(self, finer: RunSample) -> None:
+        """A finer run is no better, and either may be wrong: the error is nowhere less than what they differ by."""
+        self._apart, self._errors = finer, None
+
+    def forget_errors(self) -> None:
+        """Let errors be computed anew from what is known now."""
+        self._errors = None
 
     def differs_in_zones(self, result: RunSample) -> bool:
         """Whether a finer result has other zones than this one by more than OTHER_ZONES of its catenaries or rods."""
@@ -379,6 +388,9 @@ class Estimate:
             for cause, error in (found | {"total": total}).items():
                 out[cause] = with_neighbours(error, a - before, b - before, starts=a == 0)
             out["total"] = out["total"] + (model if model is not None else 0.0)
+            if self._apart is not None and name in self._apart.values:
+                far = np.asarray(self.run.values[name][a:b]) - np.asarray(self._apart.values[name][a:b])
+                out["total"] = np.maximum(out["total"], magnitude(far, name))
         return out
 
     def checkpoint(self) -> Tree:

@@ -7,7 +7,7 @@ docs/accuracy.md
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Self
 
@@ -16,7 +16,7 @@ import numpy as np
 from hybrid.model.resolution import RequestedAccuracy
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bounded_model_errors import bounded, scaled
-from hybrid.simulation.error_estimate import Estimate
+from hybrid.simulation.error_estimate import Errors, Estimate
 from hybrid.simulation.error_order import MOST_ORDER, ORDER, Falls
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.store.named_arrays import Tree, matched
@@ -154,6 +154,32 @@ def windows_uncertain(found: Mapping[str, StatisticEstimate], asked: RequestedAc
         f"instants in every run; {allowed:.2g} N are asked: a longer run, or several seeds, say more"
     )
     return [("windows uncertain", text)]
+
+
+def irregular_notes(
+    found: Mapping[str, StatisticEstimate], errors: Errors, scattered: Sequence[str], asked: RequestedAccuracy
+) -> list[tuple[str, str]]:
+    """What is judged of an irregular motion, and how far the result may be off in what is not.
+
+    errors: at every output; scattered: end forces whose largest values are by chance.
+    """
+    force = max(errors.largest("total", name) for name in END_FORCES.values())
+    position = errors.largest("total", "position")
+    text = (
+        "the motion is irregular: accuracy is that of largest values, mean extremes of windows and standard "
+        f"deviations; at an instant positions may be off by {position:.2g} m, end forces by {force:.2g} N; "
+        "accuracy: {instant: 1%} asks for every instant"
+    )
+    notes = [("irregular motion", text)]
+    if scattered:
+        largest = found[LARGEST].errors
+        each = [f"{x.removeprefix('end_force_')} {largest.largest('total', x):.2g} N" for x in scattered]
+        text = (
+            f"the largest force is that of one snap, and differs from run to run however fine they are (at the "
+            f"{', at the '.join(each)}): it is not judged; the spread over seeds, or a longer run, says more"
+        )
+        notes.append(("largest force uncertain", text))
+    return notes + windows_uncertain(found, asked)
 
 
 def snaps(run: RunSample) -> bool:

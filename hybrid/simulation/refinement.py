@@ -27,6 +27,7 @@ A_LITTLE = 0.8
 # than the last, in s, is not worth a word.
 COSTLY, COSTLY_ACCURACY, LITTLE = 4.0, "costly accuracy", 0.5
 END_FORCE = next(iter(END_FORCES.values()))
+RAW = {of: raw for raw, of in END_FORCES.items()}  # what runs call the forces at the ends
 
 
 class Free(NamedTuple):
@@ -142,6 +143,27 @@ def costly(runs: Sequence[float], before: RunSample, resolution: Resolution) -> 
         f"{total / one:.2g} times that run alone"
     )
     return [(COSTLY_ACCURACY, text)]
+
+
+def missed(verdict: Verdict, free: Free, runs: int, chance: bool) -> str:
+    """That what was asked is not met, whose doing it is, and what to try.
+
+    runs: how many there were; chance: whether another run would differ in what is missed as much, however fine.
+    """
+    main = max((verdict.mesh, "mesh"), (verdict.time, "time step"), (verdict.model, "model"))[1]
+    is_free = {"mesh": free.mesh, "time step": free.steps, "model": free.zones}[main]
+    fixed = {"mesh": "mesh (or cells of zones)", "time step": "time.step", "model": "model, or its tolerance"}[main]
+    try_ = f"leave {fixed} out"
+    if is_free:
+        try_ = f"accuracy: {{{verdict.reached}}}, which this run meets"
+        try_ += ", or compare with model: rod" * (verdict.model > 0.0)
+    if main == "model" and not is_free:
+        try_ = "model: adaptive, or rod"
+    whose = f"most of it is of the {main}"
+    if chance:
+        whose = "the line snaps at other instants in every run, and finer ones differ as much"
+        try_ = f"a longer run, several seeds, or accuracy: {{{verdict.reached}}}, which this run meets"
+    return f"{verdict.text}; {whose}, {runs} runs; try: {try_}"
 
 
 def _largest(errors: Errors, cause: str, name: str) -> float:
