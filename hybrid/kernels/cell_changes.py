@@ -74,6 +74,9 @@ class RenewJob(NamedTuple):
     bounds: Floats  # (4, EXTREMES, E)
     places: Floats  # room for all nodes and all marked ones once more
     columns: NDArray[np.int64]  # likewise
+    width: Floats  # (M,) m, diameters of the new cells; empty: nobody watches whether the line meets itself
+    nearest: NDArray[np.int64]  # (2,) the pair of its cells that was nearest
+    widths: Floats  # (n,) m, diameters of base cells
     scale: float  # N, tension scale
 
 
@@ -83,7 +86,7 @@ def blank_renew_job() -> RenewJob:
     return RenewJob(
         z(2), blank_line(1), z(2, np.int64), z(1, np.int64), z(2, np.int64), z((2, 3)), z(2, np.int8), z(1), state,
         state, no_sea(1), no_work(), blank_zones(1, 1), books, books, z((0, 4)), z((0, 4)), z((0, 4)), z(2),
-        z((4, b.EXTREMES, 2)), z(2), z(2, np.int64), 1.0,
+        z((4, b.EXTREMES, 2)), z(2), z(2, np.int64), z(0), z(2, np.int64), z(1), 1.0,
     )  # fmt: skip
 
 
@@ -218,6 +221,9 @@ def renew(table):
     if job.push.shape[0] > 0:
         carry_push(job.push, job.s, job.line.s, job.new_push)
         clear(job.next_push)
+    for c in range(job.width.shape[0]):
+        job.width[c] = job.widths[job.of[c]]
+    job.nearest[0], job.nearest[1] = -1, -1
     zones.clock[AGE], zones.clock[RECENT_AGE] = 0.0, 0.0
     zones.counts[KNOWN], zones.counts[STRAINED], zones.counts[RELAXING] = 0, 0, 1
     clock[b.WAVE_STEP], clock[b.PREVIOUS], books.counts[b.PARITY] = wave_step(job.line, job.scale), clock[b.NOW], 0

@@ -18,6 +18,7 @@ from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.newton import ASSEMBLY, RUN
 from hybrid.kernels.references import caller, reader
 from hybrid.kernels.sampling import SAME_TIME
+from hybrid.kernels.self_distance import boxes_of
 from hybrid.kernels.state import Floats
 from hybrid.kernels.zone_step import CELLS_DUE, CLOCK_SIZE, FLAG_COUNT, LOUDEST, NEXT_REVIEW, RELAXING
 from hybrid.kernels.zone_switch import AFTER, BEFORE, NUMBERS, RELAXES, TIME
@@ -38,8 +39,9 @@ CALLS = 12
     ALONE,  # 1 where cells may change without Python
     MAY_WAIT,  # 1 where outputs may wait although the cells that they are of change
     WAITING, PLACED, USED,  # lines whose outputs wait; places of their nodes; numbers of their samples
-) = range(14)  # fmt: skip
-AT_SIZE = 14
+    BOXES_AT,  # where the table of kernels.self_distance has the rows of its tree
+) = range(15)  # fmt: skip
+AT_SIZE = 15
 # Columns of `waiting`.
 OFFSET, COUNT, OF_CELLS = range(3)
 
@@ -62,6 +64,9 @@ class FollowingJob(NamedTuple):
     zones: Numbers  # likewise of the table of zones
     zone_places: Numbers
     in_zones: NDArray[np.int64]
+    itself: Numbers  # of kernels.self_distance.watch_itself
+    itself_places: Numbers  # empty: nobody watches
+    in_itself: NDArray[np.int64]
     layouts: NDArray[np.int64]  # (2 sides, size), tables of kernels.cell_changes.lay_out
     line: Numbers  # table of fill_line
     lines: NDArray[np.int64]  # (2 new sides, 3, size)
@@ -82,14 +87,14 @@ def blank_following_job() -> FollowingJob:
     z, few, pairs, sides = np.zeros, np.zeros(1, np.int64), np.zeros((1, 3), np.int64), np.zeros((2, 3, 1), np.int64)
     return FollowingJob(
         z(CALLS, np.int64), z(AT_SIZE, np.int64), z(b.CLOCK_SIZE), z(b.COUNT_SIZE, np.int64), z(0), z((2, b.WORKS)),
-        z(CLOCK_SIZE), z(FLAG_COUNT, np.int64), z(NUMBERS), few, few, sides, few, few, sides, z((2, 1), np.int64), few,
-        sides, few, sides, few, sides, few, sides, few, z(1, bool), pairs, few,
+        z(CLOCK_SIZE), z(FLAG_COUNT, np.int64), z(NUMBERS), few, few, sides, few, few, sides, few, few, sides,
+        z((2, 1), np.int64), few, sides, few, sides, few, sides, few, sides, few, z(1, bool), pairs, few,
     )  # fmt: skip
 
 
 read = reader(blank_following_job())
 call, call_count, call_solver = caller(None), caller(0), caller((0, 0, 0.0, 0))
-numbers_of_sample = inner(sample_size)
+numbers_of_sample, boxes = inner(sample_size), inner(boxes_of)
 
 
 @inner
@@ -136,6 +141,9 @@ def put_all(job):
     k, m = job.at[SIDE], job.at[CELLS]
     put_at(job.in_run[k], job.run_places, m, job.run)
     put_at(job.in_zones[k], job.zone_places, m, job.zones)
+    if job.itself_places.shape[0] > 0:
+        put_at(job.in_itself[k], job.itself_places, m, job.itself)
+        job.itself[job.at[BOXES_AT]] = boxes(m)
     put_samples(job, m)
 
 

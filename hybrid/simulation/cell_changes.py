@@ -35,6 +35,7 @@ from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.newton import RUN, Task
 from hybrid.kernels.run import blank_job
 from hybrid.kernels.run import run as steps
+from hybrid.kernels.self_distance import blank_itself, blank_itself_job, boxes_of
 from hybrid.kernels.state import NO_TENSION_TORQUE, NO_TORSION, TENSION_TORQUE, Batch, Floats, Line, Sea, State, Work
 from hybrid.kernels.zone_line import blank_kinds_job, blank_line_job, fill_kinds, fill_line
 from hybrid.kernels.zone_step import Zones, blank_zone_job
@@ -64,6 +65,7 @@ if TYPE_CHECKING:
 # Of the tables of a run, what depends on the cells.
 IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
 IN_ZONES = ("line", "sea", "old", "new", "zones")
+IN_ITSELF = ("line", "old", "new", "itself")
 # Lines whose outputs may wait, and their nodes in all.
 MOST_WAITING, MOST_PLACES = 256, 20_000
 
@@ -92,6 +94,8 @@ class CellChanges:
         self._rows = max(1, min(ROWS, MOST_SAMPLED // size))
         self._samples = np.zeros(self._rows * size)
         self._numbers, self._turn = np.zeros(NUMBERS), np.zeros((0, 3))
+        self._watch = owner.itself if owner.itself is not None and owner.itself.on else None
+        self._itself = blank_itself(np.zeros(self.most))
         self._twist, self._clamps, self._held = np.zeros(self.base), np.zeros((2, 2, 3)), np.zeros(2, bool)
         self._room_for_places = np.zeros(self.most + 1 + extra), np.zeros(self.most + 1 + extra, np.int64)
         self._match = Room(Packed(blank_joined), self.most), Room(Packed(blank_single), self.most)
@@ -143,8 +147,7 @@ class CellChanges:
             and run.contact is None
             and not (model.line.torsion.size or model.line.tension_twist.size)
         )
-        watches = owner.itself is not None and owner.itself.watching
-        return plain and not watches and bool(model.line.bits & PLANAR or not switching.manager.twisted)
+        return plain and bool(model.line.bits & PLANAR or not switching.manager.twisted)
 
     def still_fits(self) -> bool:
         """Whether the line is of the kind that the arrays were made for."""
@@ -185,6 +188,10 @@ class CellChanges:
         found: Cells = self._view(self._sides[k].cells, cells)
         return found
 
+    def _width(self, cells: int) -> Floats:
+        """Diameters of cells; none where nobody watches whether the line meets itself."""
+        return self._itself.width[: cells if self._watch is not None else 0]
+
     def _push(self, k: int, which: int, cells: int) -> Floats:
         """Of a run that carries one, else none."""
         if not self._run.push.size:
@@ -223,6 +230,7 @@ class CellChanges:
         floor_part, least = self._tension_floor
         envelope, bounds = owner.envelope, np.zeros((4, b.EXTREMES, 1))
         places, borne = np.zeros(1), 1.0 + model.cable.max_strain[self._piece]
+        widths = np.ascontiguousarray(model.cable.outer_diameter[self._piece])
         start = np.zeros((self._finest.size, 3))
         if envelope is not None:
             bounds, places, start = envelope.bounds, envelope.s, envelope.start
@@ -259,7 +267,8 @@ class CellChanges:
                 "zones": self._zones(to, m), "before": self._books(n), "books": self._books(m),
                 "push": self._push(k, parity, n), "new_push": self._push(to, 0, m), "next_push": self._push(to, 1, m),
                 "envelope_s": places, "bounds": bounds, "places": self._room_for_places[0],
-                "columns": self._room_for_places[1], "scale": model.tension_scale,
+                "columns": self._room_for_places[1], "width": self._width(m), "nearest": self._itself.cells,
+                "widths": widths, "scale": model.tension_scale,
             }  # fmt: skip
 
         def in_run(k: int, m: int) -> dict[str, Any]:
@@ -272,6 +281,11 @@ class CellChanges:
         def in_zones(k: int, m: int) -> dict[str, Any]:
             found = in_run(k, m)
             return {name: found[name] for name in IN_ZONES if name in found} | {"zones": self._zones(k, m)}
+
+        def in_itself(k: int, m: int) -> dict[str, Any]:
+            states = self._state(k, 0, m), self._state(k, 1, m)
+            itself = self._itself._replace(width=self._itself.width[:m])
+            return {"line": self._line(k, m), "old": states[0], "new": states[1], "itself": itself}
 
         both, pairs = (0, 1), ((0, 0), (0, 1), (1, 0), (1, 1))
         layouts = []
@@ -294,9 +308,10 @@ class CellChanges:
         of_run, of_zones = for_sides(blank_job, in_run), for_sides(blank_zone_job, in_zones)
         switches = [Shaped(Table(blank_switch_job), partial(switch_job, *pair)) for pair in pairs]
         renews = [Shaped(Table(blank_renew_job), partial(renew_job, *pair)) for pair in pairs]
+        of_itself = for_sides(blank_itself_job, in_itself) if self._watch is not None else []
         self._lines = lines
-        self._tables = layouts, kinds, of_run, of_zones, switches, renews  # what is bound there stays alive
-        self._bind_following(layouts, lines, kinds, of_run, of_zones, switches, renews)
+        self._tables = layouts, kinds, of_run, of_zones, of_itself, switches, renews  # what is bound there stays alive
+        self._bind_following(layouts, lines, kinds, of_run, of_zones, of_itself, switches, renews)
 
     def _bind_review(self) -> None:
         """The table of reviews that change nothing."""
@@ -311,7 +326,7 @@ class CellChanges:
 
     def _bind_following(
         self, layouts: list[Table], lines: list[Shaped], kinds: list[Shaped], of_run: list[Shaped],
-        of_zones: list[Shaped], switches: list[Shaped], renews: list[Shaped],
+        of_zones: list[Shaped], of_itself: list[Shaped], switches: list[Shaped], renews: list[Shaped],
     ) -> None:  # fmt: skip
         """The table of runs whose cells change in compiled code."""
         run, zones = self._run, self._switching.zones
@@ -320,11 +335,19 @@ class CellChanges:
             return np.array([x.numbers[:, places] for x in shaped])
 
         in_run, in_zones = of_run[0].places(IN_RUN), of_zones[0].places(IN_ZONES)
+        itself, itself_places = np.zeros(0, np.int64), np.zeros(0, np.int64)
+        in_itself = np.zeros((2, 3, 0), np.int64)
+        if self._watch is not None:
+            itself, itself_places = self._watch.table.numbers, of_itself[0].places(IN_ITSELF)
+            in_itself = stacked(of_itself, itself_places)
+            tree = self._itself.tree.__array_interface__["data"][0]
+            self._at[f.BOXES_AT] = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
         numbers: dict[str, Any] = {
             "calls": self._calls, "at": self._at, "clock": run.clock, "counts": run.count, "outputs": run.books.outputs,
             "work": run.books.work, "zone_clock": zones.clock, "zone_counts": zones.counts, "numbers": self._numbers,
             "run": run.table.numbers, "run_places": in_run, "in_run": stacked(of_run, in_run),
             "zones": self._switching.table.numbers, "zone_places": in_zones, "in_zones": stacked(of_zones, in_zones),
+            "itself": itself, "itself_places": itself_places, "in_itself": in_itself,
             "layouts": np.array([x.numbers for x in layouts]), "line": lines[0].table.numbers, "lines": stacked(lines),
             "kind": kinds[0].table.numbers, "kinds": stacked(kinds), "switch": switches[0].table.numbers,
             "switches": stacked(switches), "renewed": renews[0].table.numbers, "renews": stacked(renews),
@@ -371,6 +394,8 @@ class CellChanges:
         _copy(model.line, self._line(k, n), ("bits", "plane", "torsion"))
         _copy(model.sea.values, self._sea_on(n), REST_OF_SEA)
         _copy(owner.stepper.work, self._work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
+        if self._watch is not None:
+            _copy(self._watch.itself, self._itself._replace(width=self._width(n)), ("tree", "stack"))
         _copy(run.books, self._books(n), tuple(x for x in Books._fields if x not in Kept._fields))
         at.place[:], at.s[:], at.of[:], at.rods[:] = layout.places, model.line.s, layout.base_of_cell, layout.rod_cells
         self._sides[k].first[:] = self._base[:] = layout.first
@@ -503,6 +528,10 @@ class CellChanges:
         )  # fmt: skip
         switching.take(model, zones)
         switching.table.hold(line=line, sea=sea, old=run.states[0], new=run.states[1], zones=zones)
+        if self._watch is not None:
+            itself = self._itself._replace(width=self._width(n), tree=self._itself.tree[: boxes_of(n)])
+            self._watch.itself = itself
+            self._watch.table.hold(line=line, old=run.states[0], new=run.states[1], itself=itself)
         owner.take(model, work)
 
 

@@ -69,15 +69,13 @@ def note_unknown_error(moving: Transient) -> None:
         moving.beyond = moving.t + moving.model.time_scale  # that it takes the whole line to move
 
 
-def look_at_itself(moving: Transient, flags: int, cells_change: bool) -> None:
+def look_at_itself(moving: Transient, flags: int) -> None:
     """The line has become so bent that it could come near itself, is near, or meets itself: an event.
 
-    flags: of kernels.books; cells_change: whether the line may have other cells than when it was attached.
+    flags: of kernels.books.
     """
     watch = moving.itself
     assert watch is not None
-    if cells_change and not watch.watching:
-        watch.attach(moving.model, moving.run)
     found = (MEETS if flags & b.MEETS_ITSELF else 0) | (NEARS if flags & b.NEARS_ITSELF else 0)
     found = found or watch.look(moving.run)
     if found & NEARS:

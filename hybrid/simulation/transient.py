@@ -438,7 +438,7 @@ class Transient:
         if flags & b.ITERATIONS_CUT:
             note_iterations(self)
         if flags & (b.IS_BENT | b.MEETS_ITSELF | b.NEARS_ITSELF):
-            look_at_itself(self, flags, self._cells is not None)
+            look_at_itself(self, flags)
         if flags & b.PUSH_DIED:
             self.plane_monitor.renew(run)
         if flags & b.LEAVES_PLANE:

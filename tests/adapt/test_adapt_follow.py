@@ -11,7 +11,7 @@ from adapt_cases import along, bight, cable, hanging, helix, layout, on, state_o
 from problems import order
 
 import hybrid
-from hybrid.adapt.manager import DomainManager
+from hybrid.adapt.manager import Change, DomainManager
 from hybrid.kernels import binding
 from hybrid.kernels import books as b
 from hybrid.kernels import zone_step as z
@@ -22,6 +22,7 @@ from hybrid.kernels.zone_step import blank_zone_job, plan_nodes, take_arcs
 from hybrid.outputs.probes import Observer
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.initial_zones import shares_asked
+from hybrid.simulation.transient import Transient
 from hybrid.simulation.transient_checkpoint import zoning_of_today
 from hybrid.solve.run import CompiledRun
 
@@ -189,6 +190,44 @@ def test_changes_in_arrays_made_once_are_those_of_new_arrays(friction: str, monk
     assert [(e.t, e.kind, e.text) for e in once.events] == [(e.t, e.kind, e.text) for e in anew.events]
     for name in ("position", "velocity", "tension", "curvature", "work/zones", "energy/bending", "envelope/tension_max",
                  "envelope/curvature_t_max", "envelope/displacement_max", "steps/iterations"):  # fmt: skip
+        assert np.array_equal(once[name], anew[name], equal_nan=True), name
+
+
+def test_a_line_that_is_watched_changes_its_cells_in_arrays_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slack line could come near itself: every step looks how near it is, and its cells change in compiled code."""
+    section = {
+        "length": 2000, "diameter": 0.05, "mass": 20, "axial_stiffness": 2e8, "bending_stiffness": 2e4,
+        "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0},
+    }  # fmt: skip
+    moves = {"surge": {"amplitude": 8.0, "period": 40}, "heave": {"amplitude": 2.0, "period": 10}, "ramp": 10}
+    scene = hybrid.validate_scene({
+        "environment": {"fluid": {"density": 1025}, "seabed": {"z": -500, "stiffness": 5e3, "damping": 500}},
+        "cable": {"sections": [section]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, -500]},
+                 "end": {"kind": "pinned", "position": [1650, 0, 0], "motion": moves}},
+        "initial": "equilibrium", "time": {"duration": 40.0, "step": 0.2}, "mesh": {"cells": 32},
+        "model": {"kind": "adaptive", "curvature_error": 0.03},
+        "output": {"every": 2, "points": 501, "errors": False},
+    })  # fmt: skip
+    changed, change = [], Transient._switch
+
+    def switch(self: Transient, how: Change) -> None:
+        changed.append(how.same and self.itself.watching)
+        change(self, how)
+
+    monkeypatch.setattr(Transient, "_switch", switch)
+    once = hybrid.run(scene)
+    by_python = sum(changed)
+    monkeypatch.setattr(CellChanges, "applies", lambda owner: False)
+    anew = hybrid.run(scene)
+    assert sum(changed) - by_python > 20 > 5 >= by_python
+    assert [(e.t, e.kind, e.text) for e in once.events] == [(e.t, e.kind, e.text) for e in anew.events]
+    for name in (
+        "position",
+        "tension",
+        "curvature",
+        *(f"self_distance/{x}" for x in ("clearance", "s_a", "s_b", "time")),
+    ):
         assert np.array_equal(once[name], anew[name], equal_nan=True), name
 
 
