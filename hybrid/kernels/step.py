@@ -203,13 +203,17 @@ def spin_of_step(old, new, s, c):
 
 @inner
 def largest_spin(line, ends, old, new, s):
-    """Largest spin of a cell against the next one, or against what holds its twist, in a step, rad, and the cell."""
+    """Largest spin of a cell against the next one, or against what holds its twist, in a step, rad, and the cell.
+
+    Of cells with polar inertia: others are where the balance of torques has them, and create no energy.
+    """
     most, where, before, n = 0.0, -1, 0.0, old.w.shape[0]
     for i in range(n + 1):
         now = 0.0
         if i < n and line.spin[i]:
             now = spin_of_step(old, new, s, i)
-        if line.element[i] and line.kb[i, 2] > 0.0:
+        inert = line.polar[max(i - 1, 0)] > 0.0 or line.polar[min(i, n - 1)] > 0.0
+        if inert and line.element[i] and line.kb[i, 2] > 0.0:
             if i == 0 or i == n:
                 c = min(i, n - 1)
                 d, _, _ = chord(get3(new.e, c))

@@ -251,7 +251,8 @@ def test_in_files_statistics_tables_and_after_a_resume(tmp_path: Path) -> None:
     held = {x.name: x for x in held_of(result)}
     least, most = result["extremes/gap"][0], result["extremes/hang_off"][1]  # of every step, half of which are outputs
     assert held["gap"].value == least < result.gap.min() and held["gap"].broken == (least < 4.0)
-    assert held["hang_off"].value == most >= result.hang_off.max() and not held["hang_off"].broken
+    assert held["hang_off"].value == most and not held["hang_off"].broken
+    assert most >= result.hang_off.max() * (1.0 - 1e-14)  # in the last step: kernel and output differ by round-off
     half = hybrid.parse_scene(SWINGING.replace("duration: 4", "duration: 2"))
     hybrid.run(half, tmp_path / "half.h5").close()
     gone_on = hybrid.resume(tmp_path / "half.h5", tmp_path / "rest.h5", until=4.0)
