@@ -39,10 +39,6 @@ LOST_TENSION, WEIGHTLESS = (
 )  # remaining part of a lost tension; tension floor over scale, no weight
 LONGEST_WAIT = 8.0  # hold times that a rod is kept below threshold, where earlier ones were released too soon
 SHORTEST = 2.0  # base cells that make a zone
-# Cells times steps in which a catenary instead of a rod saves what two changes of zones cost: 2 to 3 ms each, 0.28 us a
-# cell and iteration, 2.7 iterations a step.  A rod that is let go then costs at most twice what the best choice would.
-PAYS = 6000.0
-FOLLOWING_PARTS = 2  # cells of a base cell that is calm, where cells follow the curvature
 
 
 # What a checkpoint holds of the manager; the rest follows from the scene, the layout and the next step.
@@ -145,7 +141,6 @@ class DomainManager:
         self.calm_since, self.buffer = np.full(n, np.inf), np.zeros(n)
         self.calmed = np.zeros((2, n))  # of rods on their way out: which criterion was the loudest, and its ratio
         self.patience, self.released = np.ones(n), np.full(n, -np.inf)
-        self.pays = 0.0  # hold times times cells in which a change pays; 0: that is not asked
         self._table, self.on_base = Table(blank_zone_job), on_base or LineOnBase(cable, layout.base)
         self.measure(layout)
         weight = np.abs(cable.submerged_weight)
@@ -313,16 +308,6 @@ class DomainManager:
 
     # --- proposing -----------------------------------------------------------------------------
 
-    @property
-    def waits(self) -> Floats:
-        """(n,) hold times that rods must have been calm: also until letting them go pays."""
-        if self.pays == 0.0:
-            return self.patience
-        most = FOLLOWING_PARTS if self.zones.clock[z.SHARE] > 0.0 else np.inf
-        rod, parts = self.layout.rod, np.minimum(self.zones.parts, most)
-        run = np.cumsum(np.append(True, rod[1:] != rod[:-1])) - 1  # rods beside each other go together
-        return np.asarray(np.maximum(self.patience, np.where(rod, self.pays / np.bincount(run, parts)[run], 0.0)))
-
     def review_due(self, t: float) -> bool:
         """Whether a review is due: a catenary asks, a rod has been blended out, or some time has passed."""
         return self.loudest > 1.0 or t >= self.next_review
@@ -338,7 +323,7 @@ class DomainManager:
         self._add_global_ratios()
         rules = self.rules(state)
         next_, self.calm_since = planned(
-            self.ratios, rod, self.calm_since, t, self.layout.base, rules, self.leaving, self.waits
+            self.ratios, rod, self.calm_since, t, self.layout.base, rules, self.leaving, self.patience
         )
         next_ = (next_ | (rod & self.held)) & (self.given >= 0)
         back, before = self.going, self.leaving.copy()
@@ -423,7 +408,7 @@ class DomainManager:
         """Runs of base cells that change, and for each what asks for it, or had held it until now."""
         out = []
         base = self.layout.base
-        loud, waits = self.ratios.max(axis=0), self.waits
+        loud = self.ratios.max(axis=0)
         for a, b in pairwise(edges(np.where(rod == new, 0, np.where(new, 1, -1)))):
             if rod[a] == new[a]:
                 continue
@@ -446,7 +431,7 @@ class DomainManager:
                 j = a + int(np.argmax(ratios / OFF[which]))
                 c, value = int(self.calmed[0, j]), float(self.calmed[1, j])
                 name, off = CRITERIA[c].name, float(OFF[c])
-                calm = f"calm for {self.dwell * waits[j]:.3g} s and blended out"
+                calm = f"calm for {self.dwell * self.patience[j]:.3g} s and blended out"
                 text = f"{calm}; {name} {value:.3g}, threshold {off:g}"
                 out.append(Reason(a, b, "shrink" if beside else "merge", text, name, value, off))
         return out

@@ -47,8 +47,6 @@ from hybrid.kernels.tension_torque import rest_strain
 MOST = 1e6
 # Torque^2/(4 EI T) from which a straight cable is near to a loop: the Maxwell torque is 0.4 of the buckling one.
 TWISTED = 0.5
-# Times sqrt(EI/T): a rod cell longer than that does not show how bending fades at its end.
-UNRESOLVED = 3.0
 # The most that a tension counts for that is only foreseen.
 FORESEEN = 2.0
 # What may sit at a node: nothing, a jump of bending stiffness, a point load.
@@ -142,43 +140,6 @@ def kink_at(line, turn, i):
     return max(turn[i] - smooth * line.hn[i], 0.0)
 
 
-@inner
-def beside_joint(line, turn, joint, side):
-    """Of the line on the side (-1, 1) of a joint, as it is continued from the next two nodes there: its curvature at
-
-    the joint, 1/m, and its turn, rad, over the half cell beside it.
-    """
-    n = line.h.shape[0]
-    i, k = joint + side, joint + 2 * side
-    if i < 1 or i > n - 1:
-        return 0.0, 0.0
-    cell = joint if side > 0 else joint - 1
-    h, kappa, slope = line.h[cell], turn[i] / line.hn[i], 0.0
-    other = k if side > 0 else k - 1
-    if 1 <= k <= n - 1 and line.spin[other] == line.spin[cell]:
-        slope = (kappa - turn[k] / line.hn[k]) / line.h[i if side > 0 else k]
-    most = 2.0 * kappa
-    return min(max(kappa + h * slope, 0.0), most), 0.5 * h * min(max(kappa + 0.75 * h * slope, 0.0), most)
-
-
-@inner
-def lack_at_joint(line, turn, i, EI, w, T):
-    """What a catenary lacks at a joint: its kink, which is not what long cells turn by beside it.
-
-    Where cells of the rod are too long to show how its bend fades, results have the curvature of the catenary there:
-    the kink is in it as a turn over the length of the node, and both sides should say the same.
-    """
-    before, turn_before = beside_joint(line, turn, i, -1)
-    after, turn_after = beside_joint(line, turn, i, 1)
-    kink = min(abs(turn[i] - turn_before - turn_after), kink_at(line, turn, i))
-    lack = lack_at_kink(EI, w, T, kink)
-    h = line.h[i] if line.spin[i] else line.h[i - 1]
-    if h > UNRESOLVED * math.sqrt(EI / T):
-        kappa = max(kink / line.hn[i], abs(after - before))
-        lack = CellError(lack.position, lack.tension, kappa, EI * kappa)
-    return lack
-
-
 class NodeKinds(NamedTuple):
     """What the criteria know of the nodes of a line."""
 
@@ -227,10 +188,8 @@ def lack_of_node(line, kinds, shares, i, T):
         if along and line.element[i]:
             lack = CellError(lack.position, lack.tension, kappa, EI * kappa)
         return lack, CLAMP
-    joint = line.spin[i] != line.spin[i - 1]  # which has a kink too
-    if kinds.node[i] == LOAD or joint:
-        load = kinds.node[i] == LOAD
-        lack = lack_at_kink(EI, w, T, kink_at(line, turn, i)) if load else lack_at_joint(line, turn, i, EI, w, T)
+    if kinds.node[i] == LOAD or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
+        lack = lack_at_kink(EI, w, T, kink_at(line, turn, i))
         if along and line.element[i]:
             lack = CellError(lack.position, lack.tension, kappa, EI * kappa)
         return lack, POINT

@@ -414,7 +414,7 @@ class CellChanges:
         self._at[f.ALONE], self._at[f.MAY_WAIT] = self.alone, self._owner.outputs_may_wait
         manager = self._switching.manager
         self._review.bind(
-            calm_since=manager.calm_since, patience=manager.waits, seen=manager.seen, buffer=manager.buffer,
+            calm_since=manager.calm_since, patience=manager.patience, seen=manager.seen, buffer=manager.buffer,
             held=int(manager.held),
         )  # fmt: skip
         code = self._run.go(lambda: int(f.go_on(self._following.numbers, reviewed)))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybrid.adapt.manager import PAYS, DomainManager
+from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.cell_errors import CURVATURE, MOMENT, TENSION
@@ -67,8 +67,6 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
         LEFT if model.corrected else 1.0, model.on_base,
         curvature_error, shares_asked(scene, curvature_error), resolution.fineness,
     )  # fmt: skip
-    if wanted.hold_time is None:
-        manager.pays = PAYS * step / hold
     manager.load(model.ends.moments)
     return manager
 
