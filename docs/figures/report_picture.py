@@ -1,4 +1,4 @@
-"""The picture of docs/report.md: the upper part of a report, as Chromium shows it.
+"""The pictures of docs/report.md: the upper part of a report, as Chromium shows it on wide screens and on a phone.
 
     python docs/figures/report_picture.py [chromium]
 
@@ -12,15 +12,37 @@ import shutil
 import sys
 import tempfile
 from pathlib import Path
+from typing import Literal
 
 from PIL import Image
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Browser, sync_playwright
 
 import hybrid
 
 ROOT = Path(__file__).parents[2]
 SETTINGS = ["accuracy=1%", "cable.sections[0].min_bend_radius=30"]
+SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+
+
+def saved(picture: Image.Image, name: str) -> None:
+    """Save a picture in docs/pictures, with 256 colours."""
+    few = picture.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=8, dither=Image.Dither.NONE)
+    few.save(ROOT / "docs" / "pictures" / f"{name}.png", optimize=True)
+
+
+def shown(browser: Browser, file: Path, size: tuple[int, int], scheme: Literal["light", "dark"]) -> Image.Image:
+    """The upper part of a report of so many pixels, at the time of the smallest bend radius."""
+    view = {"width": size[0], "height": size[1]}
+    page = browser.new_page(viewport=view, reduced_motion="reduce", color_scheme=scheme)
+    page.goto(file.as_uri())
+    page.click("#fact-bend button.show")
+    page.wait_for_function("window.report && window.report.cable")  # it is gone to
+    page.evaluate("scrollTo(0, 0)")
+    page.wait_for_timeout(2000)
+    picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    page.close()
+    return picture
 
 
 def main() -> None:
@@ -29,18 +51,11 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as play:
         file = hybrid.report(hybrid.run(scene, progress=False), Path(folder) / "touchdown.html")
         browser = play.chromium.launch(executable_path=program, args=FLAGS)
-        page = browser.new_page(viewport={"width": 1120, "height": 2140}, reduced_motion="reduce")
-        page.goto(file.as_uri())
-        page.wait_for_function("window.report && window.report.cable")  # it is in view
-        page.click("#fact-bend button.show")
-        page.evaluate("scrollTo(0, 0)")
-        page.wait_for_timeout(2000)
-        picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+        saved(shown(browser, file, (1120, 2140), "light").resize((840, 1605), Image.Resampling.LANCZOS), "report")
+        for width, height in ((1400, 1200), (400, 900)):
+            for scheme in SCHEMES:
+                saved(shown(browser, file, (width, height), scheme), f"report_{width}_{scheme}")
         browser.close()
-    small = picture.resize((840, 1605), Image.Resampling.LANCZOS)
-    small.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=8, dither=Image.Dither.NONE).save(
-        ROOT / "docs" / "pictures" / "report.png", optimize=True
-    )
 
 
 if __name__ == "__main__":
