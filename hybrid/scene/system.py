@@ -112,9 +112,6 @@ class JoinedLine(Table):
             refuse([Finding(("model",), expected, "write `model: rod`", f"kind: {self.model.kind}")])
         if isinstance(self.model, AdaptiveModel):
             refuse(self._of_moving_zones(self.model))
-        if self.contact.self and isinstance(self.model, AdaptiveModel):
-            expected = "false, because zones of this line move, which know no contact in a line of several"
-            refuse([Finding(("contact", "self"), expected, "write `model: rod`, or leave contact out", "true")])
         for i, section in enumerate(self.sections):
             if section.tension_torque:
                 expected = "nothing or 0, because several lines are computed together, which know no torque of tension"

@@ -89,6 +89,7 @@ class LineResult:
         self.carried = [k for k, end in enumerate(("start", "end")) if end in bodies and loaded[k]]
         self.books = self._own_books(state)
         self.contact: SelfContact | None = None
+        self._touching = model  # for whose cells that is
         self._waiting: list[Batch] = []
         self._log: list[tuple[float, ...]] = []
         if found is not None:
@@ -123,12 +124,13 @@ class LineResult:
         """Contact of the line as it is from t (s) on, which goes on with what there was; None: there is none."""
         if not self.touches:
             return None
-        before, model = self.contact, self.model
+        before, model, other = self.contact, self.model, self._touching.layout is not self.model.layout
         self.contact = SelfContact(
             model.line, diameters(model), least_bending(model), model.tension_scale, self.scene.contact.friction
         )
         if before is not None:
-            self.contact.restore(before.checkpoint(t), t)
+            self.contact.restore(before.checkpoint(t), t, remeshed=other)
+        self._touching = model
         return self.contact
 
     def note_equilibrium(self, x: JoinedLine, state: State, t: float | None) -> None:

@@ -202,10 +202,10 @@ class SystemRun:
             self.recorder.flush()
 
     def gather_events(self) -> None:
-        """Record the events of the lines, in the result of the system with their names."""
-        for line in self.lines:
-            for t, s_a, s_b, kind, text in line.take_events():
-                self.recorder.event(t, s_a, s_b, kind, f"line {line.name}: {text}")
+        """Record the events of the lines, in the result of the system with their names, as they happened."""
+        noted = [(x, f"line {line.name}: {x[-1]}") for line in self.lines for x in line.take_events()]
+        for (t, s_a, s_b, kind, _), text in sorted(noted, key=lambda event: event[0][0]):
+            self.recorder.event(t, s_a, s_b, kind, text)
 
     def _output(self, solver: SystemSolver) -> None:
         """Record points, bodies and lines as they are."""
@@ -299,6 +299,8 @@ class SystemRun:
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts)
         self.solver.keep_books([line.books for line in self.lines])
         self.solver.books_steps = self.zones is None
+        if self.zones is not None:
+            self.zones.look_ahead()
         if self.control is not None:
             self.solver.allowed[:] = self.resolution.allowed
 

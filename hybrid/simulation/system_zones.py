@@ -18,12 +18,15 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels import zone_step as z
 from hybrid.kernels.books import COUNT_SIZE
-from hybrid.kernels.state import Ends, Floats, State, state_for
-from hybrid.kernels.zone_step import follow_zones
+from hybrid.kernels.forces import SELF_CONTACT
+from hybrid.kernels.report import SELF_CONTACT_ENERGY
+from hybrid.kernels.state import Ends, State, state_for
+from hybrid.kernels.zone_step import LOOKAHEAD, follow_zones
 from hybrid.model.build import Model
 from hybrid.model.coarsen import picked
 from hybrid.model.system import SystemModel
 from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.simulation.contact_equilibrium import nearness
 from hybrid.simulation.initial_zones import MOST_ROUNDS, STRICTER, manager_for
 from hybrid.simulation.system_start import joined_lines
 from hybrid.simulation.zone_switching import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, note_change, on_layout
@@ -118,6 +121,7 @@ def _within(
 
 def _asked(manager: DomainManager, model: Model, state: State, t: float) -> np.ndarray:
     """Base cells that the criteria want to be rod in a state."""
+    manager.near = nearness(model, t, state) if model.line.bits & SELF_CONTACT else np.zeros(0)
     manager.evaluate_criteria(model.line, model.sea.at(t), model.ends.at(t), state, 0.0)
     return manager.initial_rods(state)
 
@@ -150,7 +154,7 @@ class _LineZones:
         longest, clock = LONGEST_IN_PACE * manager.pace * every, manager.zones.clock
         clock[z.RAMP_STEP], clock[z.CALM_STEP] = longest, longest * READY
         clock[z.LETTING_GO] = LETTING_GO * manager.pace
-        self.near: Floats = np.zeros(0)
+        self.contact_energy = 0.0  # J, of the line with itself, after the last accepted step
         self.pending: Change | None = None
 
     def follow(self, run: SystemRun, phase: int, t: float, end: float, old: State, new: State) -> None:
@@ -159,7 +163,8 @@ class _LineZones:
         model = self.switching.model
         self.switching.table.bind(
             line=model.line, sea=model.sea.values, ends=model.ends.values, old=old, new=new, clock=self.clock,
-            counts=self.counts, work=run.lines[self.number].books.work, zones=self.switching.zones, near=self.near,
+            counts=self.counts, work=run.lines[self.number].books.work, zones=self.switching.zones,
+            near=self.switching.manager.near,
         )  # fmt: skip
         follow_zones(self.switching.table.numbers)
 
@@ -173,8 +178,20 @@ class SystemZones:
         self.lines = [_LineZones(k, run.model.models[k], x, every) for k, x in managers.items()]
         self._rescues = 0  # of the step that is tried
 
+    def look_ahead(self) -> None:
+        """Criteria know how near lines come to themselves, by the contact that the solver has now."""
+        for x in self.lines:
+            manager, contact = x.switching.manager, self._run.lines[x.number].contact
+            manager.near = np.zeros(0) if contact is None else contact.look_ahead(LOOKAHEAD * manager.pace)
+
+    def _note_contact(self) -> None:
+        """Energy of contact of the state as it is, from which that of other cells is told."""
+        for x in self.lines:
+            x.contact_energy = float(self._run.solver.work[x.number].report[SELF_CONTACT_ENERGY])
+
     def begin(self) -> None:
         """Weigh the criteria of the first state."""
+        self._note_contact()
         for x in self.lines:
             x.switching.begin(self._ends(x), self._run.state.lines[x.number])
             if x.switching.manager.held:
@@ -223,6 +240,7 @@ class SystemZones:
         """Go on as `checkpoint` has written, of lines that have those zones.  ValueError: that cannot be."""
         for x in self.lines:
             x.switching.restore(saved[self._run.lines[x.number].name]["switching"])
+        self._note_contact()
 
     # --- steps ------------------------------------------------------------------------------------
 
@@ -260,6 +278,7 @@ class SystemZones:
     def accepted(self, dt: float) -> None:
         """After an accepted step of dt (s), with the states exchanged: energy, and what should change."""
         run, self._rescues = self._run, 0
+        self._note_contact()
         for x in self.lines:
             k = x.number
             state, before = run.state.lines[k], run.other.lines[k]
@@ -304,3 +323,7 @@ class SystemZones:
         taken = run.solver.evaluate_forces(run.state, 0.0, run.t)
         if taken.outcome != Outcome.OK:
             raise LineFailed(taken.line, taken.outcome, run.t, None, "after a change of zones")
+        before = [x.contact_energy for x in self.lines]
+        self._note_contact()
+        for x, energy in zip(self.lines, before, strict=True):
+            run.lines[x.number].books.work[0, b.ZONES] += x.contact_energy - energy

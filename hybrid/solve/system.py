@@ -20,7 +20,7 @@ from hybrid.kernels.assembly import JOINED
 from hybrid.kernels.binding import Table
 from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
 from hybrid.kernels.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, STATE, VD, WA, WD, WORK, A, U, V, W, X
-from hybrid.kernels.books import NOW, Books
+from hybrid.kernels.books import CARRIED, NOW, Books
 from hybrid.kernels.carried_frames import ANSWER, SEAT, TURNS
 from hybrid.kernels.entry import NO_PUSH, workspace_of
 from hybrid.kernels.forces import FRICTION, WAVES
@@ -28,7 +28,7 @@ from hybrid.kernels.joined_lines import COLUMNS, FUNCTIONAL
 from hybrid.kernels.junctions import HANDED
 from hybrid.kernels.named_quantities import note_quantities
 from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, Limits, Task
-from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL
+from hybrid.kernels.report import FORCE_A, LOCAL_ERROR, RESIDUAL
 from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.run import blank_books, blank_job, in_space
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work, blank_state
@@ -321,7 +321,20 @@ class SystemSolver:
         for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
             work.u[:] = 0.0
             self._around(x, state, work)
-        return self._solve(Task(ASSEMBLY, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states, t)
+        taken = self._solve(Task(ASSEMBLY, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states, t)
+        if taken.outcome == Outcome.OK:
+            self._settle_contact(states)
+        return taken
+
+    def _settle_contact(self, states: SystemState) -> None:
+        """Put what contact does to held ends into the reports and powers of states that have just been evaluated."""
+        for k, contact in self._contacts.items():
+            x, books, report = self.lines[k], self.books[k], self.work[k].report
+            bears = np.where(books.loaded == CARRIED, 0, x.ends.held)  # what a line carries gets its force alone
+            before = report[FORCE_A : FORCE_A + 6].copy()
+            contact.settle(states.lines[k], x.ends._replace(held=bears), report)
+            added = (report[FORCE_A : FORCE_A + 6] - before).reshape(2, 3)
+            books.power[0, :2] -= np.einsum("ij,ij->i", added, books.velocity)
 
     def _around(self, x: JoinedLine, state: State, work: Work) -> None:
         if x.line.bits & WAVES:

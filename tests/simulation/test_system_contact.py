@@ -82,7 +82,6 @@ def test_it_resumes_bit_for_bit(whole: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("more", "says"),
     [
-        ({"model": "adaptive"}, r"contact\.self[\s\S]*zones of this line move"),
         ({"contact": {"friction": 0.2}}, r"contact\.friction[\s\S]*without contact\.self"),
         ({"sections": [{k: x for k, x in HOSE.items() if k != "diameter"}]}, r"diameter"),
     ],
