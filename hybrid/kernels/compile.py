@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import gc
+import hashlib
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -13,8 +14,7 @@ from typing import Any
 import numba
 import numpy as np
 from filelock import FileLock, Timeout
-from numba import config
-from numba.core.caching import FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
@@ -29,7 +29,6 @@ _OPTIONS: dict[str, Any] = {
     "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False, "no_cfunc_wrapper": True, "nogil": True,
 }  # fmt: skip
 _njit: Any = numba.njit  # its type knows of fewer options than it takes
-_folder: Path | None = None
 
 
 class _Kernel(CPUDispatcher):
@@ -102,7 +101,57 @@ class _Entry(_Kernel):
         return self.part.get_overload(sig)
 
 
+class _Place:
+    """Where numba keeps an entry, and what must not have changed: nothing of where the package lies, so that copies of a
+    version, in other environments or on other machines of a network, are compiled once.
+
+    The folder stands for the sources of all kernels (`kernel_hash`); the stamp is for kernels of tests and of users.
+    """
+
+    def __init__(self, function: Callable[..., Any], source: str) -> None:
+        self._line, self._py_file = function.__code__.co_firstlineno, source  # numba names the latter in a warning
+        self._folder = _made_folder() / (function.__module__.rpartition(".")[0] or "scripts")
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], source: str) -> _Place:
+        return cls(function, source)
+
+    def ensure_cache_path(self) -> None:
+        self._folder.mkdir(parents=True, exist_ok=True)
+
+    def get_cache_path(self) -> str:
+        return str(self._folder)
+
+    def get_source_stamp(self) -> bytes:
+        return _content(self._py_file)
+
+    def get_disambiguator(self) -> str:
+        return str(self._line)
+
+
+@cache
+def _made_folder() -> Path:
+    folder = cache_folder()
+    folder.mkdir(parents=True, exist_ok=True)
+    prune(folder)
+    return folder
+
+
+@cache
+def _content(source: str) -> bytes:
+    return hashlib.sha256(Path(source).read_bytes()).digest()
+
+
+class _Saved(CompileResultCacheImpl):
+    pass
+
+
+_Saved._locator_classes = [_Place]
+
+
 class _Cache(FunctionCache):
+    _impl_class = _Saved
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Load from disk without the registries of numba, which bring scipy.linalg and a compilation of their own.
 
@@ -254,19 +303,9 @@ def named(function: Any, name: str) -> FunctionType:
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile an entry point: called from Python, kept on disk under `cache_folder`."""
-    global _folder
-    if _folder is None:
-        _folder = cache_folder()
-        _folder.mkdir(parents=True, exist_ok=True)
-        prune(_folder)
-    before = config.CACHE_DIR  # type: ignore[attr-defined]
-    config.CACHE_DIR = str(_folder)  # type: ignore[attr-defined]
-    try:
-        made = _njit(cache=True, pipeline_class=_EntryCompiler, **_OPTIONS)(function)
-    finally:
-        config.CACHE_DIR = before  # type: ignore[attr-defined]  # the user's own numba functions keep their own cache
+    made = _njit(pipeline_class=_EntryCompiler, **_OPTIONS)(function)
     made.__class__ = _Entry
-    made._cache.__class__ = _Cache
+    made._cache = _Cache(function)
     return made
 
 

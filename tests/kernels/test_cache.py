@@ -102,6 +102,18 @@ def test_an_edit_in_another_file_compiles_anew(copy: Path) -> None:
     assert compiled(copy) > kept
 
 
+def test_a_copy_elsewhere_compiles_nothing(copy: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Another environment or checkout of the same version, files with another date: the machine code is the same."""
+    answer(copy, SPIN)
+    kept = {x: x.stat().st_mtime_ns for x in compiled(copy)}
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    shutil.copytree(copy / "hybrid", elsewhere / "hybrid", copy_function=shutil.copyfile)
+    shutil.move(copy / "cache", elsewhere / "cache")
+    assert answer(elsewhere, SPIN) == pytest.approx(2.0)
+    moved = {copy / x.relative_to(elsewhere): x.stat().st_mtime_ns for x in compiled(elsewhere)}
+    assert moved == kept
+
+
 def test_an_edit_of_any_file_with_a_kernel_means_another_folder(copy: Path) -> None:
     """Scenes load what lies in the folder of their hash: an edit of a file that it does not know would go unnoticed."""
     package = copy / "hybrid"

@@ -1,0 +1,73 @@
+"""Compile the kernels that most tests call, one half of them: `python tests/compile_kernels.py plane`, or `space`.
+
+The first half is for lines in a plane, zones, cells and payout, the second for space, contact and several lines.
+Started together (conftest.py) they keep two cores busy, and each function that both need is read by numba twice, not by
+every process of the tests.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib import import_module
+
+import numpy as np
+
+import hybrid
+from hybrid.simulation.first_use import payout_kernels
+
+CABLE = {"length": 20, "mass": 2, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 20}
+CABLE |= {"drag": {"normal": 1.2}, "added_mass": {"normal": 1}}
+SCENE = {
+    "environment": {"fluid": {"density": 1025}, "seabed": {"z": -9, "stiffness": 1e3}},
+    "cable": {"sections": [CABLE]},
+    "ends": {
+        "start": {"kind": "pinned", "position": [0, 0, -9]},
+        "end": {
+            "kind": "pinned", "position": [14, 0, 0], "motion": {"heave": {"amplitude": 0.1, "period": 4}, "ramp": 4},
+        },
+    },
+    "initial": "equilibrium", "mesh": {"cells": 12}, "time": {"duration": 0.2, "step": 0.1},
+}  # fmt: skip
+LINE = {"start": "low", "end": "free", "model": "rod", "mesh": {"cells": 12}, "sections": [CABLE]}
+LINES = {
+    "environment": {"fluid": {"density": 1025}},
+    "points": {
+        "low": {"position": [0, 0, 0]}, "high": {"position": [12, 0, 0]},
+        "free": {"kind": "free", "initial_guess": [11, 0, 0]},
+    },
+    "lines": {
+        "a": LINE | {"contact": {"self": True, "friction": 0.3}},
+        "b": LINE | {"start": "free", "end": "high", "model": "catenary", "sections": [CABLE | {"length": 5}]},
+    },
+    "time": {"duration": 0.2, "step": 0.1},
+}  # fmt: skip
+
+# Those of the plane first where both halves need one: who comes second loads it, or waits.
+BY_TABLE = {
+    "plane": """run.in_plane run.run zone_step.follow_zones zone_switch.begin_switch zone_switch.end_switch
+        zone_step.plan_nodes zone_step.take_arcs zone_transfer.transfer cell_changes.lay_out cell_changes.clear_state
+        cell_changes.renew following_run.put_cells following_run.begin_cells following_run.end_cells
+        following_run.cells_may_change""",
+    "space": """run.in_space bending_error.advance_error self_contact.contact_task self_distance.watch_itself
+        system_contact.touch_system named_quantities.note_quantities""",
+}
+
+
+def main(half: str) -> None:
+    os.cpu_count = lambda: 1  # or each run below would start a process that compiles beside it
+    table = np.zeros(0, np.int64)
+    for name in BY_TABLE[half].split():
+        file, function = name.split(".")
+        getattr(import_module(f"hybrid.kernels.{file}"), function).compile_unless_busy(table)
+    if half == "plane":
+        hybrid.run({**SCENE, "dimension": 2}, progress=False)
+        for kernel in payout_kernels():
+            kernel.compile_unless_busy(table)
+    else:
+        hybrid.run({**SCENE, "dimension": 3}, progress=False)
+        hybrid.run(LINES, progress=False)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
