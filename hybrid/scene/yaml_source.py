@@ -20,6 +20,7 @@ from hybrid.errors import Complaint
 from hybrid.scene.base import Place, Table, dotted
 from hybrid.scene.schema_walk import keys_at, shorthand_keys, tables_at
 from hybrid.scene.suggestions import decimal_comma, did_you_mean
+from hybrid.scene.yaml_faults import anchor_twice, not_yaml, odd_character
 
 Spot = tuple[int, int]
 
@@ -36,6 +37,8 @@ MANY = 100
 
 # Names of points, bodies and lines are keys too: they may begin with a digit, and have hyphens and blanks in them.
 _PATH = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.\w[\w -]*(\[\d+\])*)*")
+# A key and its value that YAML takes for a key: any value behind a colon without a space, a number without a colon.
+_KEY_AND_VALUE = re.compile(r"([A-Za-z_]\w*)(?::| +(?=[-+.]?\d))([^\s:]+)")
 _WRITE_OUT = "begin anew from an example; every scene is a few tables within tables"
 _QUOTE = "write one word before the colon; close brackets and braces"
 _EXAMPLE = "key=value, such as time.step=0.005 or cable.sections[0].mass=2"
@@ -92,11 +95,11 @@ def from_text(text: str) -> tuple[Node, list[Complaint]]:
             warnings.simplefilter("error", ReusedAnchorWarning)
             top = _composed(text)
     except MarkedYAMLError as error:
-        raise Unreadable(_not_yaml(text, error)) from None
+        raise Unreadable(not_yaml(text, error)) from None
     except ReusedAnchorWarning as warning:
-        raise Unreadable(_anchor_twice(str(warning))) from None
+        raise Unreadable(anchor_twice(str(warning))) from None
     except ReaderError as error:
-        raise Unreadable(_odd_character(text, error)) from None
+        raise Unreadable(odd_character(text, error)) from None
     except (YAMLError, RecursionError, ValueError) as error:
         why = "nested too deeply" if isinstance(error, RecursionError) else str(error).splitlines()[0]
         raise Unreadable(Complaint("YAML", why, "a text that YAML can read", _WRITE_OUT, 1, 1)) from None
@@ -125,42 +128,6 @@ def _composed(text: str) -> Any:
         if found is not None:
             return found
     return YAML(typ="safe", pure=True).compose(text)
-
-
-def _not_yaml(text: str, error: MarkedYAMLError) -> Complaint:
-    mark = error.problem_mark or error.context_mark
-    line, column = (mark.line, mark.column) if mark is not None else (0, 0)
-    lines = text.splitlines()
-    given = lines[line].strip() if line < len(lines) else "the end of the text"
-    problem = (error.problem or "").strip()
-    fix = "indent with spaces, not tabs" if "\\t" in problem or "\t" in given else ""
-    if "mapping values are not allowed" in problem:
-        fix = "check the indentation, and put text that contains a colon in quotes"
-    elif "could not find expected ':'" in problem:
-        fix = "a key needs a colon and a space behind it"
-    elif "expected ',' or" in problem:
-        fix = "close the bracket, or put a comma between the entries"
-    elif "undefined alias" in problem:
-        fix = "give the anchor (&name) before the alias (*name)"
-    if not fix:
-        fix = "check indentation, brackets and quotes here and in the line before"
-    problem = problem.replace("<stream end>", "the end of the text").replace("\\t", "tab")
-    return Complaint("YAML", given or "nothing", f"a text that YAML can read; {problem}", fix, line + 1, column + 1)
-
-
-def _anchor_twice(warning: str) -> Complaint:
-    """`warning` names both places, the later one last."""
-    line, column = map(int, re.findall(r"line (\d+), column (\d+)", warning)[-1])
-    name = re.findall(r"duplicate anchor '(.*)'", warning)[0]
-    return Complaint("YAML", f"the anchor &{name} twice", "every anchor once", "give it another name", line, column)
-
-
-def _odd_character(text: str, error: ReaderError) -> Complaint:
-    """A character that no YAML text may have."""
-    before = text[: error.position]
-    line, column = before.count("\n") + 1, error.position - before.rfind("\n")
-    given = f"the character U+{ord(text[error.position]):04X}"
-    return Complaint("YAML", given, "a text that YAML can read; it has no such characters", "take it out", line, column)
 
 
 def _place(node: Any) -> Spot:
@@ -219,6 +186,13 @@ def _build_table(
             fix, there = decimal_comma(written), number.place or spot
             complaints.append(Complaint(dotted((*path, before)), written, "a number", fix, *there))
             table.value[before] = number
+            continue
+        parts = _KEY_AND_VALUE.fullmatch(key)
+        if parts and key_node.style is None and value_node.value == "":  # {z:-20} and {z -20} are a key without a value
+            complaints.append(Complaint(dotted((*path, parts[1])), key, "a key, a colon, a space, a value",
+                                        f"write `{parts[1]}: {parts[2]}`", *spot))  # fmt: skip
+            table.value[parts[1]] = from_text(parts[2])[0]
+            table.value[parts[1]].place = table.key_places[parts[1]] = spot
             continue
         if key_node.tag == "tag:yaml.org,2002:merge":
             built = _build(value_node, path, complaints)

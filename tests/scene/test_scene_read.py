@@ -151,7 +151,7 @@ def test_json_schema_describes_every_field() -> None:
 
 NOT_YAML = {
     "tab": ("cable:\n§\tsections: 1\n", "tabs"),
-    "bracket": ("cable: [1, 2\n§", "bracket"),
+    "bracket": ("cable: [1, 2§\n", "close it with ]"),
     "colon": ("title: a§: b\n", "quotes"),
     "alias": ("cable: §*nowhere\n", "anchor"),
     "nothing": ("§", "cable"),
