@@ -16,6 +16,7 @@ from hybrid.live.workers import own_process
 
 CALL = "from hybrid.cli.commands import main; main(sys.argv[1:])"
 LONGEST_LINE = 16_000_000
+INSIST = 2.0  # s after which a run that has computed nothing yet is asked again to stop: it may be compiling
 
 
 class Run:
@@ -37,43 +38,54 @@ class Run:
             start_new_session=True, creationflags=new_group,
         )  # fmt: skip
         assert child.stdout is not None
+        if self._stopped:
+            self._ask_to_stop()  # it was asked for while the process was being made
         with suppress(ValueError):
             while line := await child.stdout.readline():
                 with suppress(json.JSONDecodeError):
                     self._hear(json.loads(line))
         await child.wait()
         self.state["running"] = False
-        if "ended" not in self.state:
+        if "ended" not in self.state and self._stopped:
+            text = f"ended at once, after t = {self.state['t']:.4g} s" if "t" in self.state else "stopped before it began"
+            self.state |= {"ended": "interrupted", "text": text}
+        elif "ended" not in self.state:
             self.state |= {"ended": "failed", "text": f"the run ended with exit code {child.returncode}"}
         self._changed()
 
     def stop(self) -> None:
         """Ask it to stop: its file is complete until then.  A second time ends it at once."""
+        if self._stopped and self._child is not None:
+            with suppress(ProcessLookupError):
+                self._child.kill()
+        elif not self._stopped:
+            self._stopped = True
+            self._ask_to_stop()
+        self.state["text"] = "stopping"
+        self._changed()
+
+    def _ask_to_stop(self) -> None:
+        """By SIGTERM: SIGINT is ignored by what `hybrid view &` starts, until a run hears it by itself."""
         child = self._child
         if child is None or child.returncode is not None:
             return
         with suppress(ProcessLookupError):
-            if self._stopped:
-                child.kill()
-            elif sys.platform == "win32":
-                child.send_signal(signal.CTRL_BREAK_EVENT)
-            else:
-                child.send_signal(signal.SIGINT)
-        self._stopped = True
-        self.state["text"] = "stopping"
-        self._changed()
+            child.send_signal(signal.CTRL_BREAK_EVENT if sys.platform == "win32" else signal.SIGTERM)
+        if "t" not in self.state:
+            asyncio.get_running_loop().call_later(INSIST, self._ask_to_stop)
 
     def _hear(self, event: dict[str, Any]) -> None:
         """Take a line of the run."""
         kind = event.get("event")
-        if kind == "compiling":
+        if kind == "compiling" and not self._stopped:
             self.state["text"] = "compiling the kernels for this machine (first use only)"
         elif kind == "progress":
             self.state |= {"fraction": event["fraction"], "t": event["t"], "duration": event["duration"]}
             several = f"run {event['run']} of {event['runs']}, {event['name']}: " if event["runs"] > 1 else ""
             left = event["seconds_left"]
             rest = f", {left:.2g} s left" if left is not None else ""
-            self.state["text"] = f"{several}t = {event['t']:.4g} of {event['duration']:g} s{rest}"
+            if not self._stopped:
+                self.state["text"] = f"{several}t = {event['t']:.4g} of {event['duration']:g} s{rest}"
         elif kind == "error":
             self.state |= {"ended": "failed", "text": event["message"]}
         elif kind == "done":

@@ -141,6 +141,24 @@ def test_a_new_scene_by_five_questions_and_its_completion(
         row = next(k for k, line in enumerate(lines) if "axial_stiffness" in line)
         about = visit.page.evaluate("([l, c]) => view.editor.aboutAt(l, c)", [row, lines[row].index("axial") + 3])
         assert "(N)" in about
+        # help under the mouse goes when one writes, and comes back when the mouse is moved, not when the text moves
+        tip, at = "#editor > .tip", {"line": row, "ch": lines[row].index("axial") + 3}
+        place = visit.page.evaluate(
+            "at => { const e = view.editor.editor; e.setCursor({line: 0, ch: 0}); e.scrollIntoView(at, 60);"
+            " const p = e.charCoords(at, 'window'); return [p.left, (p.top + p.bottom) / 2]; }", at
+        )  # fmt: skip
+        visit.page.mouse.move(*place)
+        visit.wait(f"!document.querySelector('{tip}').hidden")
+        assert "(N)" in visit.page.inner_text(tip)
+        visit.page.focus("#editor textarea")
+        for key in ("ArrowDown", "a"):
+            visit.page.keyboard.press(key)
+            for _ in range(20):
+                assert visit.page.is_hidden(tip)
+                visit.page.wait_for_timeout(20)
+        visit.page.keyboard.press("Escape")
+        visit.page.mouse.move(place[0] + 1, place[1])
+        visit.wait(f"!document.querySelector('{tip}').hidden")
         assert not visit.complaints
         visit.context.close()
 

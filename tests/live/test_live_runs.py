@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -55,6 +57,27 @@ def test_a_run_is_followed_stopped_and_played(tmp_path: Path) -> None:
         assert "cannot be changed" in page.hear("refused")["text"]
         page.close()
     assert sorted(x.name for x in tmp_path.iterdir()) == ["scene.h5", "scene.yaml"]
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.05, 0.3, 0.8])
+def test_a_run_is_stopped_while_it_starts(tmp_path: Path, delay: float) -> None:
+    """Also by what a background shell starts, whose SIGINT is ignored: before the process is made, while it imports."""
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(SCENE.replace("duration: 4.0", "duration: 40000.0"))
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with served(scene) as (address, _):
+            page = Page(address)
+            page.ask(do="run")
+            time.sleep(delay)
+            page.ask(do="stop")
+            ended = page.hear(lambda m: m["is"] == "state" and m["run"] is not None and not m["run"]["running"], 120.0)
+            assert ended["run"]["ended"] == "interrupted" and "stopped" in ended["run"]["text"]
+            page.ask(do="stop")
+            assert "no run" in page.hear("refused")["text"]
+            page.close()
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_frames_of_a_long_run_are_every_second_or_fourth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -168,22 +168,33 @@ window.makeEditor = (element, help, tip, onChange, onSave, onRun) => {
   const problemsAt = (line) => marked.filter((x) => x.line === line + 1).map((x) => `${x.where}\n${x.given ? "given: " + x.given + "\n" : ""}${x.text}`).join("\n");
   editor.on("cursorActivity", () => { const { line, ch } = editor.getCursor(); help.textContent = aboutAt(line, ch); });
   const wrapper = editor.getWrapperElement();
-  let waiting = 0;
-  wrapper.addEventListener("mousemove", (e) => {
+  // Only a hand that moves the mouse asks for help: browsers send a move also when the text moves under a mouse at rest,
+  // and taps, behind which one writes, send some too.
+  let waiting = 0, rest = "";
+  const hideTip = () => { clearTimeout(waiting); tip.hidden = true; };
+  const showTip = (e) => {
+    if (editor.state.completionActive) return;
+    const at = editor.coordsChar({ left: e.clientX, top: e.clientY }, "window"), there = editor.charCoords(at, "window");
+    const near = Math.abs(there.left - e.clientX) < 14 && e.clientY >= there.top && e.clientY <= there.bottom;
+    const text = [problemsAt(at.line), near ? aboutAt(at.line, at.ch) : ""].filter(Boolean).join("\n\n");
+    tip.hidden = !text;
+    tip.textContent = text;
+    const box = wrapper.getBoundingClientRect(), below = e.clientY - box.top + 18, above = e.clientY - box.top - 12 - tip.offsetHeight;
+    tip.style.left = `${Math.min(e.clientX - box.left + 12, Math.max(box.width - 350, 4))}px`;
+    tip.style.top = `${below + tip.offsetHeight > box.height && above > 0 ? above : below}px`;
+  };
+  wrapper.addEventListener("pointermove", (e) => {
+    const place = `${e.screenX} ${e.screenY}`;
+    if (e.pointerType !== "mouse" || place === rest) return;
+    rest = place;
     clearTimeout(waiting);
-    waiting = setTimeout(() => {
-      const at = editor.coordsChar({ left: e.clientX, top: e.clientY }, "window"), there = editor.charCoords(at, "window");
-      const near = Math.abs(there.left - e.clientX) < 14 && e.clientY >= there.top && e.clientY <= there.bottom;
-      const text = [problemsAt(at.line), near ? aboutAt(at.line, at.ch) : ""].filter(Boolean).join("\n\n");
-      tip.hidden = !text;
-      tip.textContent = text;
-      const box = wrapper.getBoundingClientRect();
-      tip.style.left = `${Math.min(e.clientX - box.left + 12, Math.max(box.width - 350, 4))}px`;
-      tip.style.top = `${e.clientY - box.top + 18}px`;
-    }, 150);
+    waiting = setTimeout(() => showTip(e), 150);
   });
-  wrapper.addEventListener("mouseleave", () => { clearTimeout(waiting); tip.hidden = true; });
-  editor.on("change", () => { tip.hidden = true; if (!quiet) onChange(); });
+  wrapper.addEventListener("pointerleave", hideTip);
+  wrapper.addEventListener("pointerdown", hideTip);
+  editor.on("scroll", hideTip);
+  editor.on("keydown", hideTip);
+  editor.on("change", () => { hideTip(); if (!quiet) onChange(); });
 
   // ---- the text and its marks ------------------------------------------------------------------
 
