@@ -1,6 +1,6 @@
 """Pictures of the live view for docs/view.md, in headless Chromium: wide and on a phone, light and dark.
 
-python docs/figures/view_pictures.py [--new] [FOLDER]      # --new: those of a new scene alone
+python docs/figures/view_pictures.py [--scene] [--result] [--new] [FOLDER]      # all, or those of one kind
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from typing import Any
 
 from PIL import Image
 from playwright.sync_api import sync_playwright
+
+import hybrid
 
 ROOT = Path(__file__).parents[2]
 PICTURES = ROOT / "docs" / "pictures"
@@ -45,41 +47,77 @@ def small(picture: Path) -> None:
     Image.open(picture).convert("RGB").quantize(256).save(picture, optimize=True)
 
 
-def main(to: Path, all_of_them: bool = True) -> None:
+def opened(browser: Any, address: str, width: int, scheme: str) -> Any:
+    """A page of the view; playwright waits by a way that the policy of the page forbids."""
+    page = browser.new_context(bypass_csp=True, color_scheme=scheme, **SCREENS[width]).new_page()
+    page.goto(address)
+    return page
+
+
+def kept(page: Any, file: Path) -> None:
+    """Save what a page shows."""
+    page.wait_for_timeout(800)
+    page.screenshot(path=file)
+    small(file)
+    page.context.close()
+
+
+def of_a_scene(browser: Any, folder: Path, to: Path, width: int, scheme: str) -> None:
+    """A scene while it is written; on a wide screen with something wrong, and the last good picture."""
+    with viewed(folder, "touchdown.yaml") as address:
+        page = opened(browser, address, width, scheme)
+        page.wait_for_function("view.drawn >= 0", timeout=120_000)
+        if width == 1400:
+            page.evaluate("view.editor.editor.setValue(view.editor.text().replace('mass: 20', 'mass: -20'))")
+            page.wait_for_function("document.querySelector('#list .problem')")
+            page.evaluate("view.editor.skipHead()")
+        kept(page, to / f"view_{width}_{scheme}.png")
+
+
+def of_a_result(browser: Any, folder: Path, to: Path, width: int, scheme: str) -> None:
+    """A result that is played, coloured by tension."""
+    with viewed(folder / "results", "touchdown.h5") as address:
+        page = opened(browser, address, width, scheme)
+        page.wait_for_function("view.frames > 1", timeout=120_000)
+        page.select_option("#colour", "tension")
+        page.fill("#time", "218")
+        page.evaluate("document.activeElement.blur()")
+        kept(page, to / f"view_play_{width}_{scheme}.png")
+
+
+def of_a_new_scene(browser: Any, folder: Path, to: Path, width: int, scheme: str) -> None:
+    """Five questions, and what they make."""
+    with viewed(folder) as address:
+        page = opened(browser, address, width, scheme)
+        page.click("#new >> text=lay")
+        page.wait_for_timeout(300)
+        page.screenshot(path=to / f"view_new_{width}_{scheme}.png")
+        small(to / f"view_new_{width}_{scheme}.png")
+        page.click("text=Make the scene")
+        page.wait_for_function("document.getElementById('verdict').className === 'good'", timeout=120_000)
+        kept(page, to / f"view_made_{width}_{scheme}.png")
+
+
+PARTS = {"scene": of_a_scene, "result": of_a_result, "new": of_a_new_scene}
+
+
+def main(to: Path, parts: list[str]) -> None:
     with tempfile.TemporaryDirectory() as name, sync_playwright() as play:
         folder = Path(name)
         shutil.copy(ROOT / "examples" / "touchdown.yaml", folder)
+        if "result" in parts:
+            (folder / "results").mkdir()
+            hybrid.run(folder / "touchdown.yaml", output=folder / "results" / "touchdown.h5", progress=False)
         program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
         browser = play.chromium.launch(executable_path=program, args=list(QUIET))
-        for scheme in ("light", "dark") if all_of_them else ():
-            for width, screen in SCREENS.items():
-                with viewed(folder, "touchdown.yaml") as address:
-                    # playwright waits by a way that the policy of the page forbids
-                    page = browser.new_context(bypass_csp=True, color_scheme=scheme, **screen).new_page()
-                    page.goto(address)
-                    page.wait_for_function("view.drawn >= 0", timeout=120_000)
-                    if width == 1400:  # with something wrong, and the last good picture
-                        page.evaluate(
-                            "view.editor.editor.setValue(view.editor.text().replace('mass: 20', 'mass: -20'))"
-                        )
-                        page.wait_for_function("document.querySelector('#list .problem')")
-                        page.evaluate("view.editor.skipHead()")
-                    page.wait_for_timeout(800)
-                    file = to / f"view_{width}_{scheme}.png"
-                    page.screenshot(path=file)
-                    small(file)
-        for width, scheme in ((1400, "light"), (400, "light"), (400, "dark")):
-            with viewed(folder) as address:
-                page = browser.new_context(bypass_csp=True, color_scheme=scheme, **SCREENS[width]).new_page()
-                page.goto(address)
-                page.click("text=mooring")
-                page.wait_for_timeout(300)
-                file = to / f"view_new_{width}_{scheme}.png"
-                page.screenshot(path=file)
-                small(file)
+        for part in parts:
+            for width in SCREENS:
+                for scheme in ("light", "dark"):
+                    PARTS[part](browser, folder, to, width, scheme)
         browser.close()
 
 
 if __name__ == "__main__":
-    folders = [argument for argument in sys.argv[1:] if argument != "--new"]
-    main(Path(folders[0]) if folders else PICTURES, "--new" not in sys.argv)
+    asked = [argument.removeprefix("--") for argument in sys.argv[1:] if argument.startswith("--")]
+    folders = [argument for argument in sys.argv[1:] if not argument.startswith("--")]
+    main(Path(folders[0]) if folders else PICTURES, asked or list(PARTS))

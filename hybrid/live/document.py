@@ -72,13 +72,14 @@ class Document:
     def save(self, name: str | None = None, force: bool = False) -> None:
         """Write the text to its file; name: of a new one in the folder.
 
-        Refused if the file was changed by somebody else since it was read or written last, unless `force`.
+        Refused if somebody else changed the file (not deleted it) since it was read or written last, unless `force`.
         """
         target = self._target(name) if name is not None or self.path is None else self.path
         assert target is not None
         if target != self.path and target.exists() and not force:
             raise Refused(f"{target.name} exists: take another name")
-        if target == self.path and not force and _content(target) not in (self.saved, self.text):
+        there = stamp_of(target) is not None  # one that was deleted is written anew
+        if target == self.path and there and not force and _content(target) not in (self.saved, self.text):
             raise Refused(f"{target.name} was changed on disk by another program")
         _write(target, self.text.replace("\n", self.newline))
         self.path, self.saved, self._stamp = target, self.text, stamp_of(target)

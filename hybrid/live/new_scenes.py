@@ -69,28 +69,34 @@ def _mooring(depth: float, length: float, mass: float, heave: float) -> str:
     far = 0.93 * math.sqrt(length**2 - depth**2)
     bar = math.sqrt(mass / 20000.0)  # diameter of the bar of a chain, whose mass is 20 t/m3 of its square
     return f"""\
-# A mooring line of chain from an anchor on the seabed to a fairlead that heaves.
+# A mooring line of chain, from an anchor on the seabed
+# to a fairlead that heaves.
 title: Mooring line in {depth:g} m of water
 environment:
-  fluid: {{density: 1025, current: [0.3, 0, 0]}}               # kg/m^3; m/s, to the side of the fairlead
-  seabed: {{z: {-depth:g}, stiffness: 5.0e+3, damping: 5.0e+2}}    # m; N/m and N s/m per metre of line
+  # kg/m^3; m/s, to the side of the fairlead
+  fluid: {{density: 1025, current: [0.3, 0, 0]}}
+  # m; N/m and N s/m per metre of line
+  seabed: {{z: {-depth:g}, stiffness: 5.0e+3, damping: 5.0e+2}}
 cable:
   sections:
-    - length: {length:g}                                       # m, unstretched
-      mass: {mass:g}                                           # kg/m, in air
-      diameter: {1.8 * bar:.3g}                                # m, that displaces as much water as the chain
-      axial_stiffness: {8.5e10 * bar**2:.3g}                   # N
+    - length: {length:g}  # m, unstretched
+      mass: {mass:g}  # kg/m, in air
+      diameter: {1.8 * bar:.3g}  # m, displaces as much water
+      axial_stiffness: {8.5e10 * bar**2:.3g}  # N
       drag: {{normal: 1.3, tangential: 0.4}}
       added_mass: {{normal: 1.0}}
 ends:
-  start: {{kind: pinned, position: [0, 0, {-depth:g}]}}        # the anchor
-  end:                                                         # the fairlead
+  start:  # the anchor
+    kind: pinned
+    position: [0, 0, {-depth:g}]
+  end:  # the fairlead
     kind: pinned
     position: [{far:.4g}, 0, 0]
-    motion: {{heave: {{amplitude: {heave:g}, period: 10}}, ramp: 20}}   # m, s; it grows from rest over two periods
+    # m, s; it grows from rest over two periods
+    motion: {{heave: {{amplitude: {heave:g}, period: 10}}, ramp: 20}}
 initial: equilibrium
 model: catenary
-time: {{duration: 60}}                                         # s
+time: {{duration: 60}}  # s
 output: {{every: 0.25}}
 """
 
@@ -102,25 +108,33 @@ def _tether(depth: float, length: float, diameter: float, heave: float) -> str:
     d = diameter / 1000.0
     mass = 1.3 * 1025.0 * math.pi / 4.0 * d**2
     return f"""\
-# A tether from a ship that heaves down to a vehicle that keeps its place.
+# A tether, from a ship that heaves down to a vehicle
+# that keeps its place.
 title: Tether to a vehicle {depth:g} m below
 environment:
-  fluid: {{density: 1025, surface: 0, current: [0.25, 0, 0]}}  # kg/m^3; m/s
+  # kg/m^3; m; m/s
+  fluid: {{density: 1025, surface: 0, current: [0.25, 0, 0]}}
 cable:
   sections:
-    - length: {length:g}                                       # m
-      mass: {mass:.3g}                                         # kg/m: 1.3 times as heavy as water
-      diameter: {d:g}                                          # m
-      axial_stiffness: {1.5e9 * d**2:.3g}                      # N
-      bending_stiffness: {3e7 * d**4:.3g}                      # N m^2
+    - length: {length:g}  # m
+      mass: {mass:.3g}  # kg/m: 1.3 times that of water
+      diameter: {d:g}  # m
+      axial_stiffness: {1.5e9 * d**2:.3g}  # N
+      bending_stiffness: {3e7 * d**4:.3g}  # N m^2
       drag: {{normal: 1.2, tangential: 0.02}}
       added_mass: {{normal: 1.0}}
 ends:
-  start: {{kind: pinned, position: [0, 0, 0], motion: {{heave: {{amplitude: {heave:g}, period: 8}}, ramp: 16}}}}   # the ship
-  end: {{kind: pinned, position: [{far:.4g}, 0, {-depth:g}]}}    # the vehicle
+  start:  # the ship
+    kind: pinned
+    position: [0, 0, 0]
+    # m, s; it grows from rest over two periods
+    motion: {{heave: {{amplitude: {heave:g}, period: 8}}, ramp: 16}}
+  end:  # the vehicle
+    kind: pinned
+    position: [{far:.4g}, 0, {-depth:g}]
 initial: equilibrium
-model: adaptive                                                # a rod where it bends, a catenary elsewhere
-time: {{duration: 60}}                                         # s
+model: adaptive  # rod where it bends, else catenary
+time: {{duration: 60}}  # s
 output: {{every: 0.25}}
 """
 
@@ -132,27 +146,36 @@ def _hose(distance: float, length: float, diameter: float, surge: float) -> str:
     mass = 1.4 * 1025.0 * math.pi / 4.0 * d**2
     radius = max(0.5 * d, 1e-3)
     return f"""\
-# A hose that hangs under water between two ships, of which one moves; its bend radius is limited.
+# A hose that hangs under water between two ships, of which
+# one moves; its bend radius is limited.
 title: Hose between two ships
 environment:
-  fluid: {{density: 1025, current: [0, 0.3, 0]}}               # kg/m^3; m/s, across
+  # kg/m^3; m/s, across
+  fluid: {{density: 1025, current: [0, 0.3, 0]}}
 cable:
   sections:
-    - length: {length:g}                                       # m
-      mass: {mass:.4g}                                         # kg/m with what is in it: 1.4 times as heavy as water
-      diameter: {d:g}                                          # m
-      axial_stiffness: {2e8 * d**2:.3g}                        # N
-      bending_stiffness: {6e6 * d**4:.3g}                      # N m^2
-      min_bend_radius: {16 * radius:.3g}                       # m, the limit that is watched
+    - length: {length:g}  # m
+      mass: {mass:.4g}  # kg/m, filled: 1.4 times that of water
+      diameter: {d:g}  # m
+      axial_stiffness: {2e8 * d**2:.3g}  # N
+      bending_stiffness: {6e6 * d**4:.3g}  # N m^2
+      min_bend_radius: {16 * radius:.3g}  # m, the limit that is watched
       drag: {{normal: 1.2, tangential: 0.02}}
       added_mass: {{normal: 1.0}}
 ends:
-  start: {{kind: clamped, position: [0, 0, -5], tangent: [0.2, 0, -1]}}
-  end: {{kind: clamped, position: [{distance:g}, 0, -5], tangent: [0.2, 0, 1],
-        motion: {{surge: {{amplitude: {surge:g}, period: 12}}, ramp: 24}}}}   # m, s
+  start:
+    kind: clamped
+    position: [0, 0, -5]
+    tangent: [0.2, 0, -1]
+  end:
+    kind: clamped
+    position: [{distance:g}, 0, -5]
+    tangent: [0.2, 0, 1]
+    # m, s; it grows from rest over two periods
+    motion: {{surge: {{amplitude: {surge:g}, period: 12}}, ramp: 24}}
 initial: equilibrium
 model: rod
-time: {{duration: 60}}                                         # s
+time: {{duration: 60}}  # s
 output: {{every: 0.25}}
 """
 
@@ -165,28 +188,37 @@ def _lay(depth: float, mass: float, diameter: float, speed: float) -> str:
     ratio = (mass - water) * 9.80665 / (0.5 * 1025.0 * 1.2 * d * speed**2)  # sin2 a / cos a
     cosine = -0.5 * ratio + math.sqrt(0.25 * ratio**2 + 1.0)
     length = 1.5 * depth / math.sqrt(1.0 - cosine**2)
+    # Without a tension at the bottom the heave presses the cable on the bed together, which bows it sideways.
+    bottom = 0.2 * (mass - water) * 9.80665 * depth
     return f"""\
-# A ship lays a cable.  Seen from the ship the cable stands still, and the water comes towards it as a current.
+# A ship lays a cable.  Seen from the ship the cable stands
+# still, and the water comes towards it as a current.
 title: Cable laid in {depth:g} m of water at {speed:g} m/s
 environment:
-  fluid: {{density: 1025, surface: 0, current: [{-speed:g}, 0, 0]}}   # kg/m^3; m/s: the speed of the ship
-  seabed: {{z: {-depth:g}, stiffness: 2.0e+3, damping: 5.0e+2}}       # m; N/m and N s/m per metre of cable
+  # kg/m^3; m; m/s
+  fluid: {{density: 1025, surface: 0, current: [{-speed:g}, 0, 0]}}
+  # m; N/m and N s/m per metre of cable
+  seabed: {{z: {-depth:g}, stiffness: 2.0e+3, damping: 5.0e+2}}
 cable:
   sections:
-    - length: {length:.4g}                                     # m: the part that hangs, and half as much on the seabed
-      mass: {mass:g}                                           # kg/m
-      diameter: {d:g}                                          # m
-      axial_stiffness: {2e10 * d**2:.3g}                       # N
-      bending_stiffness: {1.2e8 * d**4:.3g}                    # N m^2
+    - length: {length:.4g}  # m: about a third lies on the seabed
+      mass: {mass:g}  # kg/m
+      diameter: {d:g}  # m
+      axial_stiffness: {2e10 * d**2:.3g}  # N
+      bending_stiffness: {1.2e8 * d**4:.3g}  # N m^2
       drag: {{normal: 1.2}}
       added_mass: {{normal: 1.0}}
 ends:
-  start: free                                                  # on the seabed
-  end: {{kind: pinned, position: [0, 0, 0], motion: {{heave: {{amplitude: 1, period: 8}}, ramp: 16}}}}   # the ship
+  # N: what the brakes hold back
+  start: {{kind: free, force: [{-bottom:.3g}, 0, 0]}}
+  end:  # the ship
+    kind: pinned
+    position: [0, 0, 0]
+    # m, s; it grows from rest over two periods
+    motion: {{heave: {{amplitude: 1, period: 8}}, ramp: 16}}
 initial: equilibrium
-model: adaptive                                                # a rod where it bends, a catenary elsewhere
-dimension: 2
-time: {{duration: 60}}                                         # s
+model: adaptive  # rod where it bends, else catenary
+time: {{duration: 60}}  # s
 output: {{every: 0.25}}
 """
 
@@ -200,21 +232,25 @@ def _span(distance: float, sag: float, mass: float, wind: float) -> str:
 # A cable hangs between two towers in the wind.
 title: Span of {distance:g} m in the wind
 environment:
-  fluid: {{density: 1.225, current: [0, {wind:g}, 0]}}         # air, kg/m^3; wind across the span, m/s
+  # air, kg/m^3; wind across the span, m/s
+  fluid: {{density: 1.225, current: [0, {wind:g}, 0]}}
 cable:
   sections:
-    - length: {length:.6g}                                     # m: a sag of {sag:g} m, and what wind and stretch add
-      mass: {mass:g}                                           # kg/m
-      diameter: {d:.3g}                                        # m
-      axial_stiffness: {4.5e10 * d**2:.3g}                     # N
+    - length: {length:.6g}  # m: sag {sag:g} m, more by stretch
+      mass: {mass:g}  # kg/m
+      diameter: {d:.3g}  # m
+      axial_stiffness: {4.5e10 * d**2:.3g}  # N
       drag: {{normal: 1.0, tangential: 0.01}}
 ends:
   start: {{kind: pinned, position: [0, 0, 0]}}
-  end: {{kind: pinned, position: [{distance:g}, 0, 0],
-        motion: {{sway: {{amplitude: 0.05, period: 5}}, ramp: 10}}}}    # m, s; the top of a tower
+  end:  # the top of a tower
+    kind: pinned
+    position: [{distance:g}, 0, 0]
+    # m, s; it grows from rest over two periods
+    motion: {{sway: {{amplitude: 0.05, period: 5}}, ramp: 10}}
 initial: equilibrium
 model: catenary
-time: {{duration: 30}}                                         # s
+time: {{duration: 30}}  # s
 output: {{every: 0.1}}
 """
 

@@ -47,7 +47,8 @@ class Run:
         await child.wait()
         self.state["running"] = False
         if "ended" not in self.state and self._stopped:
-            text = f"ended at once, after t = {self.state['t']:.4g} s" if "t" in self.state else "stopped before it began"
+            t = self.state.get("t")
+            text = "stopped before it began" if t is None else f"ended at once, after t = {t:.4g} s"
             self.state |= {"ended": "interrupted", "text": text}
         elif "ended" not in self.state:
             self.state |= {"ended": "failed", "text": f"the run ended with exit code {child.returncode}"}
@@ -70,7 +71,10 @@ class Run:
         if child is None or child.returncode is not None:
             return
         with suppress(ProcessLookupError):
-            child.send_signal(signal.CTRL_BREAK_EVENT if sys.platform == "win32" else signal.SIGTERM)
+            if sys.platform == "win32":
+                child.send_signal(signal.CTRL_BREAK_EVENT)
+            else:
+                child.send_signal(signal.SIGTERM)
         if "t" not in self.state:
             asyncio.get_running_loop().call_later(INSIST, self._ask_to_stop)
 

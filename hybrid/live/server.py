@@ -178,6 +178,7 @@ def listen(port: int = 0) -> socket.socket:
     """A socket at a port of this machine alone, a random one with 0."""
     found = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     found.bind(("127.0.0.1", port))
+    found.listen(100)  # a browser that is opened before the server runs waits, and is not refused
     return found
 
 

@@ -91,6 +91,17 @@ def test_a_file_changed_by_another_program_is_not_replaced_unasked(tmp_path: Pat
     assert file.read_text() == "mine\n"
 
 
+def test_a_file_that_was_deleted_is_written_anew(tmp_path: Path) -> None:
+    file = tmp_path / "scene.yaml"
+    file.write_text("a: 1\n")
+    document = Document("a: 1\n", file)
+    document.edit("a: 2\n", document.revision)
+    file.unlink()
+    assert document.look() == "gone"
+    document.save()
+    assert file.read_text() == "a: 2\n" and document.look() == "" and not document.changed
+
+
 def test_a_change_on_disk_is_taken_where_nothing_is_unsaved(tmp_path: Path) -> None:
     file = tmp_path / "scene.yaml"
     file.write_text(BASE)

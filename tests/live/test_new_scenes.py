@@ -16,6 +16,7 @@ from hybrid.live.pictures import picture_of
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_usual_answers_make_a_scene_with_an_equilibrium_and_a_motion(kind: str) -> None:
+    assert max(map(len, new_scene(kind, {}).splitlines())) <= 60, "lines that fit in the editor"
     text = new_scene(kind, {})
     picture, _ = picture_of(text, "", lambda: None)
     assert picture["problems"] == []

@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import json
 import random
+import socket
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -18,7 +20,7 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from hybrid.live.document import Document
 from hybrid.live.named_files import MOST_FILES, named_files
 from hybrid.live.pictures import picture_of
-from hybrid.live.server import LARGEST_MESSAGE
+from hybrid.live.server import LARGEST_MESSAGE, listen
 from hybrid.live.session import Session
 
 
@@ -142,6 +144,11 @@ def test_it_listens_at_this_machine_alone(viewed: tuple[str, Session, Path]) -> 
     assert len(viewed[0].split("/")[3]) >= 30
 
 
+def test_a_browser_that_comes_before_the_server_runs_waits() -> None:
+    with closing(listen()) as at, socket.create_connection(at.getsockname(), timeout=10) as early:
+        assert early.getpeername() == at.getsockname()
+
+
 def test_messages_that_are_too_large_end_the_connection_and_nothing_else(
     viewed: tuple[str, Session, Path], page: Page
 ) -> None:
@@ -209,7 +216,7 @@ def test_a_picture_has_everything_and_an_error_keeps_the_last_one(
     ("old", "new", "line", "words"),
     [
         ("mass: 2.0", "mass: two", 6, "number"),
-        ("initial: equilibrium", "initial: [", 12, ""),
+        ("initial: equilibrium", "initial: [", 10, "close it with ]"),
         ("kind: pinned, position: [14, 0, 0]", "kind: pined, position: [14, 0, 0]", 9, "pinned"),
         ("time: {duration: 4.0, step: 0.05}", "time: {duration: 4.0, steps: 0.05}", 13, "step"),
         ("length: 30", "length: 20", None, ""),

@@ -2,6 +2,8 @@
 // The editor: CodeMirror, with completion and help from the JSON schema of a scene, and marks at the lines of messages.
 window.makeEditor = (element, help, tip, onChange, onSave, onRun) => {
   const { CodeMirror } = window;
+  const KEYS = matchMedia("(pointer: coarse)").matches ? "" : "Ctrl+Space completes, Ctrl+S saves, Ctrl+Enter runs; Esc leaves the editor.";
+  const keys = () => (editor.getOption("readOnly") ? "" : KEYS);
   let schemas = null, quiet = false, marked = [], gutters = new Map();
   const editor = CodeMirror(element, {
     mode: "yaml", lineNumbers: true, lineWrapping: true, indentUnit: 2, tabSize: 2, gutters: ["marks", "CodeMirror-linenumbers"],
@@ -11,7 +13,14 @@ window.makeEditor = (element, help, tip, onChange, onSave, onRun) => {
       Esc: () => editor.getInputField().blur(),  // so that Tab leaves the editor
     },
   });
-  editor.getInputField().setAttribute("aria-label", "The scene as YAML");
+  editor.getInputField().setAttribute("aria-label", "The scene as YAML; Escape, then Tab leaves it");
+  new ResizeObserver(() => { editor.refresh(); if (editor.hasFocus()) editor.scrollIntoView(null, 20); }).observe(element);
+  // What does not fit on a line goes on below its beginning.
+  editor.on("renderLine", (cm, line, element) => {
+    const wide = (CodeMirror.countColumn(line.text, null, 2) + 2) * cm.defaultCharWidth();
+    element.style.textIndent = `-${wide}px`;
+    element.style.paddingLeft = `${wide + 4}px`;
+  });
 
   // ---- where the cursor is in the scene --------------------------------------------------------
 
@@ -166,7 +175,8 @@ window.makeEditor = (element, help, tip, onChange, onSave, onRun) => {
     return context.position === "value" && context.key && context.key !== "[]" ? describe(root, nodes, context.key) : "";
   };
   const problemsAt = (line) => marked.filter((x) => x.line === line + 1).map((x) => `${x.where}\n${x.given ? "given: " + x.given + "\n" : ""}${x.text}`).join("\n");
-  editor.on("cursorActivity", () => { const { line, ch } = editor.getCursor(); help.textContent = aboutAt(line, ch); });
+  editor.on("cursorActivity", () => { const { line, ch } = editor.getCursor(); help.textContent = aboutAt(line, ch) || keys(); });
+  help.textContent = keys();
   const wrapper = editor.getWrapperElement();
   // Only a hand that moves the mouse asks for help: browsers send a move also when the text moves under a mouse at rest,
   // and taps, behind which one writes, send some too.
@@ -232,7 +242,7 @@ window.makeEditor = (element, help, tip, onChange, onSave, onRun) => {
   return {
     put, mark, editor, text: () => editor.getValue(), contextAt, aboutAt, hints,
     schema: (found) => { schemas = found; },
-    readOnly: (on) => editor.setOption("readOnly", on),
+    readOnly: (on) => { if (editor.getOption("readOnly") !== on) { editor.setOption("readOnly", on); help.textContent = keys(); } },
     go: (line, column) => { editor.focus(); editor.setCursor(line - 1, (column || 1) - 1); editor.scrollIntoView(null, 80); },
     skipHead: () => {  // to the first line that is no comment
       let k = 0;
@@ -242,4 +252,19 @@ window.makeEditor = (element, help, tip, onChange, onSave, onRun) => {
     refresh: () => editor.refresh(),
     forget: () => editor.clearHistory(),
   };
+};
+// What a text `mine` has on top of `from`, put on `to`; null where both changed the same place.
+window.rebased = (from, to, mine) => {
+  if (mine === from) return to;
+  const part = (text) => {
+    let a = 0, b = 0;
+    const most = Math.min(from.length, text.length);
+    while (a < most && from[a] === text[a]) a++;
+    while (b < most - a && from[from.length - 1 - b] === text[text.length - 1 - b]) b++;
+    return { a, b: from.length - b, put: text.slice(a, text.length - b) };
+  };
+  const [x, y] = [part(to), part(mine)];
+  if (x.b < y.a) return from.slice(0, x.a) + x.put + from.slice(x.b, y.a) + y.put + from.slice(y.b);
+  if (y.b < x.a) return from.slice(0, y.a) + y.put + from.slice(y.b, x.a) + x.put + from.slice(x.b);
+  return null;
 };

@@ -141,7 +141,7 @@ window.makeGraphs = (box, onPick) => {
         pen.fillStyle = shade(colour);
         pen.fillRect(X(a), y + 0.5, X(b) - X(a), each - 1);
         if (count < 3 && X(b) - X(a) > 70) {
-          pen.fillStyle = "#ffffff";
+          pen.fillStyle = shade(colour) === colour ? "#ffffff" : back;  // in the dark colours are light
           pen.font = "11px system-ui, sans-serif";
           pen.textAlign = "center";
           pen.fillText(kind, 0.5 * (Math.max(X(a), LEFT) + Math.min(X(b), w - RIGHT)), y + 0.36 * each);

@@ -41,23 +41,8 @@
     view.stamps.push(performance.now());
     if (ask({ do: "edit", text, base: revision })) sent = text;
   };
-  // What the editor has on top of `from`, put on `to`; null where both changed the same place.
-  const rebased = (from, to, mine) => {
-    if (mine === from) return to;
-    const part = (text) => {
-      let a = 0, b = 0;
-      const most = Math.min(from.length, text.length);
-      while (a < most && from[a] === text[a]) a++;
-      while (b < most - a && from[from.length - 1 - b] === text[text.length - 1 - b]) b++;
-      return { a, b: from.length - b, put: text.slice(a, text.length - b) };
-    };
-    const [x, y] = [part(to), part(mine)];
-    if (x.b < y.a) return from.slice(0, x.a) + x.put + from.slice(x.b, y.a) + y.put + from.slice(y.b);
-    if (y.b < x.a) return from.slice(0, y.a) + y.put + from.slice(y.b, x.a) + x.put + from.slice(x.b);
-    return null;
-  };
   const take = (text, number, from) => {
-    const mine = editor.text(), next = rebased(from, text, mine);
+    const mine = editor.text(), next = window.rebased(from, text, mine);
     if (next === null) { timer = setTimeout(send, 0); return; }  // both changed one place: the server merges, from `revision`
     base = text;
     revision = view.revision = number;
@@ -97,8 +82,11 @@
     frames: (m) => takeFrames(m),
     state: (m) => { state = m; showState(); },
     saved: (m) => { say(`${m.file} is saved`); follow(); },
-    refused: (m) => { sent = null; after = null; refused(m.text); },
-    ask: (m) => choose(`${m.file} is there already, a result of an earlier run.`, [["Cancel"], ["Replace it", () => ask({ do: "run", replace: true }), true]]),
+    refused: (m) => { sent = after = asked = null; refused(m.text); },
+    ask: (m) => {
+      asked = null;
+      choose(`${m.file} is there already, a result of an earlier run.`, [["Cancel"], ["Replace it", () => { asked = "run"; ask({ do: "run", replace: true }); }, true]]);
+    },
   };
   let queued = null, scheduled = false;
   const later = () => {  // of pictures that come faster than they can be drawn, the last
@@ -196,8 +184,10 @@
     };
     const scale = space.bounds();
     if (scale) {
-      const text = (v) => Number(v.toPrecision(3)).toString();
-      item(`${text(scale[1])} to ${text(scale[2])} ${{ tension: "N", bending_moment: "N m", curvature: "1/m" }[scale[0]]}`, `linear-gradient(to right, ${scale[3].join(",")})`, true);
+      const kilo = scale[0] !== "curvature" && Math.max(Math.abs(scale[1]), Math.abs(scale[2])) >= 1e3;
+      const text = (v) => Number((kilo ? v / 1e3 : v).toPrecision(3)).toString();
+      const unit = (kilo ? "k" : "") + { tension: "N", bending_moment: "N m", curvature: "1/m" }[scale[0]];
+      item(`${text(scale[1])} to ${text(scale[2])} ${unit}`, `linear-gradient(to right, ${scale[3].join(",")})`, true);
     } else if (now.lines.length > 1) picture.heads.slice(0, 10).forEach((head) => item(head.name, space.shade(head.colour)));
     else for (const [kind, colour] of new Map(now.lines[0].zones.map((zone) => [zone[0], zone[3]]))) item(kind, space.shade(colour));
     for (const plane of picture.planes) item(plane.text, plane.line);
@@ -209,7 +199,7 @@
   const current = () => (mode === "motion" && motion ? motion.frames[frame] : still && still.frame);
   const takeFrames = (m) => {
     const atEnd = !motion || frame >= motion.frames.length - 1 || (m.running && !playing && mode === "motion" && frame >= motion.frames.length - 2);
-    const fresh = m.begin === 0;
+    const fresh = m.begin === 0, followed = m.running || Boolean(motion && motion.running) || asked === "run";
     motion = { ...m.head, frames: fresh ? m.frames : [...(motion ? motion.frames.slice(0, m.begin) : []), ...m.frames], running: m.running, status: m.status };
     view.frames = motion.frames.length;
     motion.ranges = {};
@@ -217,11 +207,11 @@
       const range = motion.ranges[name] ||= [0, 0];
       for (const v of line.along[name][1]) if (v !== null) { if (v > range[1]) range[1] = v; else if (v < range[0]) range[0] = v; }
     }
-    if (fresh && (m.running || !state.editable || asked === "play")) { mode = "motion"; frame = 0; asked = null; }
+    if (fresh && (followed || !state.editable || asked === "play")) { mode = "motion"; frame = 0; asked = null; }
     byId("time-row").hidden = !motion.frames.length;
     byId("time").max = String(Math.max(motion.frames.length - 1, 0));
     if (mode === "motion") {
-      if (atEnd && m.running && !playing) frame = motion.frames.length - 1;
+      if (atEnd && followed && !playing) frame = motion.frames.length - 1;
       showMotion();
       if (!m.running) rows(byId("facts-list"), motion.facts || []);
     }
@@ -290,8 +280,9 @@
     else choose(`Name of the new file, in ${state.folder}`, [["Cancel"], ["Save", (name) => settled(() => { if (ask({ do: "save", name })) after = done; }), true]], "scene.yaml");
   };
   const run = () => {
-    if (!state.editable || byId("run").disabled) return;
-    const begin = () => ask({ do: "run" });
+    if (!state.editable) return;
+    if (byId("run").disabled) { say(`Not run: ${whyNot()}.`); return; }
+    const begin = () => { asked = "run"; ask({ do: "run" }); };
     if (!state.file || state.changed || editor.text() !== base) save(() => setTimeout(begin, 0)); else begin();
   };
   byId("save").addEventListener("click", () => save());
@@ -306,7 +297,12 @@
     space.stretch(on);
   });
   byId("fit").addEventListener("click", () => space.fit());
-  addEventListener("keydown", (event) => { if ((event.ctrlKey || event.metaKey) && event.key === "s") { event.preventDefault(); save(); } });
+  addEventListener("keydown", (event) => {  // outside the editor, which has its own
+    const command = { s: () => save(), Enter: run }[event.key];
+    if (!command || !(event.ctrlKey || event.metaKey) || event.defaultPrevented || byId("dialog").open) return;
+    event.preventDefault();
+    command();
+  });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (mode === "motion") showMotion(); else showStill(true); });
 
   const choose = (question, choices, name) => {
@@ -334,12 +330,17 @@
 
   // ---- what stands above ---------------------------------------------------------------------------
 
+  const whyNot = () => {
+    if (state.run && state.run.running) return "a run is under way";
+    if (problems.some((x) => !x.note)) return "the scene has problems";
+    return still ? "the scene has no motion; it needs a table `time`" : "the scene has not been read yet";
+  };
   const buttons = () => {
     const running = Boolean(state.run && state.run.running), unsaved = state.editable && (state.changed || editor.text() !== base);
     for (const id of ["save", "run"]) byId(id).hidden = !state.editable;
-    byId("save").disabled = Boolean(state.file) && !unsaved;
+    byId("save").disabled = state.file ? !unsaved : !editor.text().trim();
     byId("run").disabled = running || problems.some((x) => !x.note) || !still || !still.moves;
-    byId("run").title = byId("run").disabled && still && !still.moves ? "The scene has no motion: it needs a table `time`" : "Compute the motion (Ctrl+Enter)";
+    byId("run").title = byId("run").disabled ? `Not now: ${whyNot()}` : "Compute the motion (Ctrl+Enter)";
     byId("stop").hidden = !running;
     byId("report").disabled = !(mode === "motion" ? motion : still);
     byId("play-result").hidden = !(state.editable && state.result && !state.playing && !running);

@@ -2,7 +2,10 @@
 // The line in space, on a canvas: an orthographic view that is turned, moved and zoomed.  It needs no WebGL, which takes
 // 70 ms a frame where a machine has no graphics processor, and this takes 3.
 window.makeSpace = (canvas, tip) => {
-  const SCALES = { tension: ["#b5cfe1", "#0072b2", "#00304d"], bending_moment: ["#f2c9a8", "#d55e00", "#5c2600"], curvature: ["#f2c9a8", "#d55e00", "#5c2600"] };
+  // From low to high, on white and in the dark: what is high stands out from the ground.
+  const BLUE = [["#b5cfe1", "#0072b2", "#00304d"], ["#1f5f8f", "#3a9bd6", "#d6ecfb"]];
+  const ORANGE = [["#f2c9a8", "#d55e00", "#5c2600"], ["#8a4a14", "#ee8033", "#ffe3cd"]];
+  const scaleOf = (name) => (name === "tension" ? BLUE : ORANGE)[Number(dark())];
   const FIRST = { turn: -0.3, tilt: 0.26, zoom: 1, x: 0, y: 0 };
   let picture = null, frame = null, eye = { ...FIRST }, colour = "zone", stretched = false, shown = [], drawn = 0, old = false, pending = false, picked = null;
 
@@ -180,11 +183,11 @@ window.makeSpace = (canvas, tip) => {
       }
       return;
     }
-    const [low, high] = bounds(name), along = line.along[name];
+    const [low, high] = bounds(name), along = line.along[name], scale = scaleOf(name);
     for (let i = 1; i < points.length; i++) {
       if (!points[i] || !points[i - 1]) continue;
       const v = along ? valueAt(along, 0.5 * (line.s[i] + line.s[i - 1])) : null;
-      curve(pen, [points[i - 1], points[i]], v === null ? style("--grey") : mixed(SCALES[name], (v - low) / (high - low)), 3.6);
+      curve(pen, [points[i - 1], points[i]], v === null ? style("--grey") : mixed(scale, (v - low) / (high - low)), 3.6);
     }
   };
 
@@ -287,7 +290,7 @@ window.makeSpace = (canvas, tip) => {
     colour: (name) => { colour = name; again(); },
     stretch: (on) => { stretched = on; again(); },
     fit, again, factors: () => (picture ? factors() : [1, 1, 1]),
-    bounds: () => (frame && quantity() ? [quantity(), ...bounds(quantity()), SCALES[quantity()]] : null),
+    bounds: () => (frame && quantity() ? [quantity(), ...bounds(quantity()), scaleOf(quantity())] : null),
     get drawn() { return drawn; },
     shade,
   };
