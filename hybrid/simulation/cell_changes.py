@@ -30,33 +30,27 @@ from hybrid.kernels.cell_changes import (
     lay_out,
     renew,
 )
-from hybrid.kernels.entry import NO_PUSH
 from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.newton import RUN, Task
 from hybrid.kernels.run import blank_job
 from hybrid.kernels.run import run as steps
-from hybrid.kernels.self_distance import blank_itself, blank_itself_job, boxes_of
-from hybrid.kernels.state import NO_TENSION_TORQUE, NO_TORSION, TENSION_TORQUE, Batch, Floats, Line, Sea, State, Work
+from hybrid.kernels.self_distance import blank_itself_job, boxes_of
+from hybrid.kernels.state import Batch, Line
 from hybrid.kernels.zone_line import blank_kinds_job, blank_line_job, fill_kinds, fill_line
-from hybrid.kernels.zone_step import Zones, blank_zone_job
+from hybrid.kernels.zone_step import blank_zone_job
 from hybrid.kernels.zone_switch import AFTER, BEFORE, NUMBERS, begin_switch, blank_switch_job, end_switch
 from hybrid.kernels.zone_transfer import Match, Transfer
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
 from hybrid.model.sea import Surroundings
 from hybrid.simulation.cell_arrays import (
     REST_OF_SEA,
-    Cells,
     Kept,
     Shaped,
-    Side,
     blank_joined,
-    blank_kept,
     blank_single,
-    seas,
-    works,
 )
+from hybrid.simulation.cell_views import CellViews
 from hybrid.simulation.envelope import marks_on
-from hybrid.solve.run import MOST_SAMPLED, ROWS
 from hybrid.solve.stepper import HEAVY
 
 if TYPE_CHECKING:
@@ -84,29 +78,21 @@ class CellChanges:
         self.most, self.base = int(layout.starts[-1]), int(layout.rod.size)
         self._starts = layout.starts
         self._finest, self._piece = layout.finest.nodes, model.cable.piece(0.5 * (layout.base[1:] + layout.base[:-1]))
-        self._base = np.zeros(self.base + 1, np.int64)
-        self._sides = Side(self.most, self.base), Side(self.most, self.base)
         self._marked = marks_on(layout.base, owner.marked)
-        extra, some = int((self._marked != 0).sum()), owner.envelope is not None
-        self._kept = Room(Packed(lambda n: blank_kept(n, extra, some)), self.most)
-        self._sea, self._work = Room(seas, self.most), Room(works, self.most)
-        size = sample_size(self.most, True)
-        self._rows = max(1, min(ROWS, MOST_SAMPLED // size))
-        self._samples = np.zeros(self._rows * size)
-        self._numbers, self._turn = np.zeros(NUMBERS), np.zeros((0, 3))
+        extra = int((self._marked != 0).sum())
+        self._calls, self._at = np.zeros(f.CALLS, np.int64), np.zeros(f.AT_SIZE, np.int64)
+        self._on = CellViews(owner, self.most, extra, self._at)
+        self._numbers = np.zeros(NUMBERS)
         self._watch = owner.itself if owner.itself is not None and owner.itself.on else None
-        self._itself = blank_itself(np.zeros(self.most))
         self._twist, self._clamps, self._held = np.zeros(self.base), np.zeros((2, 2, 3)), np.zeros(2, bool)
         self._room_for_places = np.zeros(self.most + 1 + extra), np.zeros(self.most + 1 + extra, np.int64)
         self._match = Room(Packed(blank_joined), self.most), Room(Packed(blank_single), self.most)
-        self._calls, self._at = np.zeros(f.CALLS, np.int64), np.zeros(f.AT_SIZE, np.int64)
         self._following, self._review = Table(f.blank_following_job), Table(blank_review_job)
         self._waiting, self._places = np.zeros((MOST_WAITING, 3), np.int64), np.zeros(MOST_PLACES, np.int64)
         self.adopted, self._synced = False, -1  # number of changes that Python knows of
-        self._views: dict[Any, Any] = {}  # while tables are bound
         self._shifts = np.zeros(1, bool)
         self._follows = bool(owner.switching.zones.clock[z.SHARE] > 0.0)
-        self._binding = self._bound = False
+        self._bound = False
         self._tension_floor = TENSION_FLOOR, LEAST_TENSION * manager.scale
 
     @property
@@ -153,78 +139,11 @@ class CellChanges:
         """Whether the line is of the kind that the arrays were made for."""
         return self._fixed_to == self._key(self._owner)
 
-    # --- arrays -------------------------------------------------------------------------------------
-
-    def _view(self, room: Room, cells: int, given: Callable[[], dict[str, Any]] = dict) -> Any:
-        """Of a room, for so many cells; while tables are bound, the same for the same."""
-        if not self._binding:
-            return room.view(cells, **given())
-        if (room, cells) not in self._views:
-            self._views[room, cells] = room.view(cells, **given())
-        return self._views[room, cells]
-
-    def _line(self, k: int, cells: int) -> Line:
-        line = self._owner.model.line
-        given = {"bits": line.bits, "plane": line.plane, "torsion": NO_TORSION}
-        given |= dict.fromkeys(TENSION_TORQUE, NO_TENSION_TORQUE)
-        found: Line = self._view(self._sides[k].line, cells, lambda: given)
-        return found
-
-    def _zones(self, k: int, cells: int) -> Zones:
-        zones = self._switching.zones
-
-        def given() -> dict[str, Any]:
-            kinds = self._view(self._sides[k].kinds, cells, lambda: {"free": zones.kinds.free})
-            return {"kinds": kinds, **{name: getattr(zones, name) for name in OF_BASE}}
-
-        found: Zones = self._view(self._sides[k].zones, cells, given)
-        return found
-
-    def _state(self, k: int, which: int, cells: int) -> State:
-        found: State = self._view(self._sides[k].states[which], cells, lambda: {"turn": self._turn})
-        return found
-
-    def _layout(self, k: int, cells: int) -> Cells:
-        found: Cells = self._view(self._sides[k].cells, cells)
-        return found
-
-    def _width(self, cells: int) -> Floats:
-        """Diameters of cells; none where nobody watches whether the line meets itself."""
-        return self._itself.width[: cells if self._watch is not None else 0]
-
-    def _push(self, k: int, which: int, cells: int) -> Floats:
-        """Of a run that carries one, else none."""
-        if not self._run.push.size:
-            return NO_PUSH
-        layout = self._layout(k, cells)
-        return layout.next_push if which else layout.push
-
-    def _sea_on(self, cells: int) -> Sea:
-        values = self._owner.model.sea.values
-        found: Sea = self._view(self._sea, cells, lambda: {x: getattr(values, x) for x in REST_OF_SEA})
-        return found
-
-    def _work_on(self, cells: int) -> Work:
-        found: Work = self._view(self._work, cells, lambda: {"torsion": self._owner.stepper.work.torsion})
-        return found
-
-    def _books(self, cells: int) -> Books:
-        size, used = sample_size(cells, True), int(self._at[f.USED])
-        rows = min(self._rows, (self._samples.size - used) // size)
-        samples = self._samples[used : used + rows * size].reshape(rows, size)
-        kept = self._view(self._kept, cells)
-        if not self._binding:
-            return self._run.books._replace(samples=samples, base=self._base, **kept._asdict())
-        if (size, cells) not in self._views:
-            found = self._run.books._replace(samples=samples, base=self._base, **kept._asdict())
-            self._views[size, cells] = found
-        return self._views[size, cells]
-
     # --- tables -------------------------------------------------------------------------------------
 
     def _bind_all(self) -> None:
         """Tables of changes from either side to the other, and of runs on either."""
-        owner, sides, model = self._owner, self._sides, self._owner.model
+        owner, on, model = self._owner, self._on, self._owner.model
         assert model.on_base is not None and model.layout is not None
         cable, zones, ends = model.on_base.cable, self._switching.zones, model.ends.values
         floor_part, least = self._tension_floor
@@ -236,64 +155,64 @@ class CellChanges:
             bounds, places, start = envelope.bounds, envelope.s, envelope.start
 
         def line_job(k: int, m: int) -> dict[str, Any]:
-            at = self._layout(k, m)
-            return {"cable": cable, "nodes": at.s, "base_of_cell": at.of, "rod": at.rods, "line": self._line(k, m)}
+            at = on.layout(k, m)
+            return {"cable": cable, "nodes": at.s, "base_of_cell": at.of, "rod": at.rods, "line": on.line(k, m)}
 
         def kinds_job(k: int, m: int) -> dict[str, Any]:
-            of, kinds = self._layout(k, m).of, self._zones(k, m).kinds
+            of, kinds = on.layout(k, m).of, on.zones(k, m).kinds
             return {"cable": cable, "base_of_cell": of, "kinds": kinds, "floor_part": floor_part, "least": least}
 
         def switch_job(k: int, parity: int, n: int, m: int) -> dict[str, Any]:
-            to, at = 1 - k, self._layout(1 - k, m)
+            to, at = 1 - k, on.layout(1 - k, m)
             match = Match(**self._match[0].view(m)._asdict(), **self._match[1].view(n)._asdict())
             transfer = Transfer(
-                self._line(k, n), self._line(to, m), self._state(k, parity, n), self._state(to, 0, m),
-                self._layout(k, n).place, at.place, at.of, sides[k].first, self._switching.kinks, self._twist,
+                on.line(k, n), on.line(to, m), on.state(k, parity, n), on.state(to, 0, m),
+                on.layout(k, n).place, at.place, at.of, on.sides[k].first, self._switching.kinks, self._twist,
                 self._clamps, self._held, self._shifts, match,
             )  # fmt: skip
             return {
-                "transfer": transfer, "ends": ends, "sea": self._sea_on(n), "target_sea": self._sea_on(m),
-                "zones": self._zones(k, n), "target_zones": self._zones(to, m), "numbers": self._numbers,
+                "transfer": transfer, "ends": ends, "sea": on.sea_on(n), "target_sea": on.sea_on(m),
+                "zones": on.zones(k, n), "target_zones": on.zones(to, m), "numbers": self._numbers,
                 "guided": self._switching.guided,
             }  # fmt: skip
 
         def renew_job(k: int, parity: int, n: int, m: int) -> dict[str, Any]:
-            to, at = 1 - k, self._layout(1 - k, m)
+            to, at = 1 - k, on.layout(1 - k, m)
             return {
-                "s": self._layout(k, n).s, "line": self._line(to, m), "place": at.place, "of": at.of,
-                "first": sides[to].first, "start": start, "marked": self._marked,
-                "borne": borne, "state": self._state(to, 0, m),
-                "twin": self._state(to, 1, m), "sea": self._sea_on(m), "work": self._work_on(m),
-                "zones": self._zones(to, m), "before": self._books(n), "books": self._books(m),
-                "push": self._push(k, parity, n), "new_push": self._push(to, 0, m), "next_push": self._push(to, 1, m),
+                "s": on.layout(k, n).s, "line": on.line(to, m), "place": at.place, "of": at.of,
+                "first": on.sides[to].first, "start": start, "marked": self._marked,
+                "borne": borne, "state": on.state(to, 0, m),
+                "twin": on.state(to, 1, m), "sea": on.sea_on(m), "work": on.work_on(m),
+                "zones": on.zones(to, m), "before": on.books(n), "books": on.books(m),
+                "push": on.push(k, parity, n), "new_push": on.push(to, 0, m), "next_push": on.push(to, 1, m),
                 "envelope_s": places, "bounds": bounds, "places": self._room_for_places[0],
-                "columns": self._room_for_places[1], "width": self._width(m), "nearest": self._itself.cells,
+                "columns": self._room_for_places[1], "width": on.width(m), "nearest": on.itself.cells,
                 "widths": widths, "scale": model.tension_scale,
             }  # fmt: skip
 
         def in_run(k: int, m: int) -> dict[str, Any]:
             return {
-                "line": self._line(k, m), "sea": self._sea_on(m), "old": self._state(k, 0, m),
-                "new": self._state(k, 1, m), "was": self._push(k, 0, m), "now": self._push(k, 1, m),
-                "work": self._work_on(m), "books": self._books(m),
+                "line": on.line(k, m), "sea": on.sea_on(m), "old": on.state(k, 0, m),
+                "new": on.state(k, 1, m), "was": on.push(k, 0, m), "now": on.push(k, 1, m),
+                "work": on.work_on(m), "books": on.books(m),
             }  # fmt: skip
 
         def in_zones(k: int, m: int) -> dict[str, Any]:
             found = in_run(k, m)
-            return {name: found[name] for name in IN_ZONES if name in found} | {"zones": self._zones(k, m)}
+            return {name: found[name] for name in IN_ZONES if name in found} | {"zones": on.zones(k, m)}
 
         def in_itself(k: int, m: int) -> dict[str, Any]:
-            states = self._state(k, 0, m), self._state(k, 1, m)
-            itself = self._itself._replace(width=self._itself.width[:m])
-            return {"line": self._line(k, m), "old": states[0], "new": states[1], "itself": itself}
+            states = on.state(k, 0, m), on.state(k, 1, m)
+            itself = on.itself._replace(width=on.itself.width[:m])
+            return {"line": on.line(k, m), "old": states[0], "new": states[1], "itself": itself}
 
         both, pairs = (0, 1), ((0, 0), (0, 1), (1, 0), (1, 1))
         layouts = []
         for k in both:
-            at, table = self._layout(k, self.most), Table(blank_layout_job)
+            at, table = on.layout(k, self.most), Table(blank_layout_job)
             table.bind(
                 plan=zones.plan, rod=zones.next_rod, parts=zones.parts, finest=self._finest, place=at.place, s=at.s,
-                of=at.of, rods=at.rods, first=sides[k].first,
+                of=at.of, rods=at.rods, first=on.sides[k].first,
             )  # fmt: skip
             layouts.append(table)
 
@@ -340,7 +259,7 @@ class CellChanges:
         if self._watch is not None:
             itself, itself_places = self._watch.table.numbers, of_itself[0].places(IN_ITSELF)
             in_itself = stacked(of_itself, itself_places)
-            tree = self._itself.tree.__array_interface__["data"][0]
+            tree = self._on.itself.tree.__array_interface__["data"][0]
             self._at[f.BOXES_AT] = 1 + int(np.flatnonzero(of_itself[0].numbers[0] == tree)[0])
         numbers: dict[str, Any] = {
             "calls": self._calls, "at": self._at, "clock": run.clock, "counts": run.count, "outputs": run.books.outputs,
@@ -355,8 +274,8 @@ class CellChanges:
         }  # fmt: skip
         self._following.bind(**numbers)
         self._bind_review()
-        at, samples = self._at, self._samples.__array_interface__["data"][0]
-        at[f.ROOM], at[f.ROOM_SIZE], at[f.MOST_ROWS] = samples, self._samples.size, self._rows
+        at, samples = self._at, self._on.samples.__array_interface__["data"][0]
+        at[f.ROOM], at[f.ROOM_SIZE], at[f.MOST_ROWS] = samples, self._on.samples.size, self._on.rows
         at[f.TASK] = run.table.part("task").start
         (at[f.SAMPLES_AT],) = np.flatnonzero(of_run[0].numbers[0] == samples)
         calls = {
@@ -378,27 +297,26 @@ class CellChanges:
         layout, n, k = model.layout, model.cells, 0
         assert layout is not None
         if not self._bound:
-            self._binding = True
-            self._bind_all()
-            self._binding, self._bound = False, True
-            self._views.clear()
+            with self._on.bound():
+                self._bind_all()
+            self._bound = True
         self._at[f.SIDE], self._at[f.CELLS] = k, n
-        parity, at = int(run.count[b.PARITY]), self._layout(k, n)
+        parity, at = int(run.count[b.PARITY]), self._on.layout(k, n)
         for which in (0, 1):
-            _copy(run.states[which], self._state(k, which, n))
+            _copy(run.states[which], self._on.state(k, which, n))
             if run.push.size:
-                self._push(k, which, n)[:] = run.pushes[which]
-        zones = self._zones(k, n)
+                self._on.push(k, which, n)[:] = run.pushes[which]
+        zones = self._on.zones(k, n)
         _copy(switching.zones, zones, (*OF_BASE, "kinds"))
         _copy(switching.zones.kinds, zones.kinds, ("free",))
-        _copy(model.line, self._line(k, n), ("bits", "plane", "torsion"))
-        _copy(model.sea.values, self._sea_on(n), REST_OF_SEA)
-        _copy(owner.stepper.work, self._work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
+        _copy(model.line, self._on.line(k, n), ("bits", "plane", "torsion"))
+        _copy(model.sea.values, self._on.sea_on(n), REST_OF_SEA)
+        _copy(owner.stepper.work, self._on.work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
         if self._watch is not None:
-            _copy(self._watch.itself, self._itself._replace(width=self._width(n)), ("tree", "stack"))
-        _copy(run.books, self._books(n), tuple(x for x in Books._fields if x not in Kept._fields))
+            _copy(self._watch.itself, self._on.itself._replace(width=self._on.width(n)), ("tree", "stack"))
+        _copy(run.books, self._on.books(n), tuple(x for x in Books._fields if x not in Kept._fields))
         at.place[:], at.s[:], at.of[:], at.rods[:] = layout.places, model.line.s, layout.base_of_cell, layout.rod_cells
-        self._sides[k].first[:] = self._base[:] = layout.first
+        self._on.sides[k].first[:] = self._on.base[:] = layout.first
         run.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
         self._calls[f.SOLVER] = run.solver_address()
         f.put_cells(self._following.numbers)
@@ -441,8 +359,8 @@ class CellChanges:
         """The change of zones that follows from the criteria now; None: they stay."""
         manager, k, n = self._switching.manager, self.side, self.cells
         if self._stale:
-            manager.take(manager.layout, self._zones(k, n))
-        return manager.review(float(self._run.clock[b.NOW]), self._state(k, int(self._run.count[b.PARITY]), n))
+            manager.take(manager.layout, self._on.zones(k, n))
+        return manager.review(float(self._run.clock[b.NOW]), self._on.state(k, int(self._run.count[b.PARITY]), n))
 
     def change_zones(self, change: Change) -> float:
         """Other zones, with the cells that go with them; the energy, J, that is booked for it."""
@@ -481,20 +399,20 @@ class CellChanges:
         for offset, count, cells in self._waiting[: self._at[f.WAITING]].tolist():
             line = self._line_of(self._places[begin : begin + cells + 1])
             size = sample_size(cells, True)
-            rows = self._samples[offset : offset + count * size].reshape(count, size)
+            rows = self._on.samples[offset : offset + count * size].reshape(count, size)
             begin += cells + 1
             yield line, self._run.batch_of(rows, cells, self._owner.model.ends.values)
 
     def _line_of(self, places: np.ndarray) -> Line:
         """The line with nodes at these places of the finest mesh, in the arrays that are not in use."""
         k, m, starts = 1 - self.side, places.size - 1, self._starts
-        at, table = self._layout(k, m), self._lines[k].table.numbers
+        at, table = self._on.layout(k, m), self._lines[k].table.numbers
         at.place[:], at.s[:] = places, self._finest[places]
         at.of[:] = np.searchsorted(starts, places[:-1], "right") - 1
         at.rods[:] = self._switching.zones.rod[at.of]
         table[:] = np.array([1, 0, m]) @ self._lines[k].numbers
         fill_line(table)
-        return self._line(k, m)
+        return self._on.line(k, m)
 
     def empty(self) -> None:
         """No output waits any longer."""
@@ -511,16 +429,16 @@ class CellChanges:
             return
         self._synced = int(self._at[f.CHANGES])
         owner, run, k, n = self._owner, self._run, self.side, self.cells
-        model, switching, line = owner.model, self._switching, self._line(k, n)
+        model, switching, line = owner.model, self._switching, self._on.line(k, n)
         assert model.layout is not None
-        zones, sea, work, books = self._zones(k, n), self._sea_on(n), self._work_on(n), self._books(n)
+        zones, sea, work, books = self._on.zones(k, n), self._on.sea_on(n), self._on.work_on(n), self._on.books(n)
         now = sea.now.copy()
         layout = model.layout._replace(rod=zones.rod.copy(), here=zones.here.copy() if self._follows else None)
         model = replace(model, line=line, layout=layout, zones=layout.zones, sea=Surroundings(sea))
         sea.now[:] = now
-        run.books, run.states = books, (self._state(k, 0, n), self._state(k, 1, n))
+        run.books, run.states = books, (self._on.state(k, 0, n), self._on.state(k, 1, n))
         if run.push.size:
-            at = self._layout(k, n)
+            at = self._on.layout(k, n)
             run.pushes = at.push, at.next_push
         run.table.hold(
             line=line, sea=sea, old=run.states[0], new=run.states[1], was=run.pushes[0], now=run.pushes[1], work=work,
@@ -529,7 +447,7 @@ class CellChanges:
         switching.take(model, zones)
         switching.table.hold(line=line, sea=sea, old=run.states[0], new=run.states[1], zones=zones)
         if self._watch is not None:
-            itself = self._itself._replace(width=self._width(n), tree=self._itself.tree[: boxes_of(n)])
+            itself = self._on.itself._replace(width=self._on.width(n), tree=self._on.itself.tree[: boxes_of(n)])
             self._watch.itself = itself
             self._watch.table.hold(line=line, old=run.states[0], new=run.states[1], itself=itself)
         owner.take(model, work)

@@ -381,10 +381,10 @@ def test_a_change_of_cells_keeps_momentum_to_second_order(monkeypatch: pytest.Mo
 
     def measured(self: CellChanges, *given) -> float:
         k, n, parity = self.side, self.cells, int(self._run.count[b.PARITY])
-        line, state = self._line(k, n), self._state(k, parity, n)
+        line, state = self._on.line(k, n), self._on.state(k, parity, n)
         size, before = line.mass.sum() * np.linalg.norm(state.v, axis=1).max(), line.mass @ state.v
         booked = change(self, *given)
-        line, state = self._line(self.side, self.cells), self._state(self.side, 0, self.cells)
+        line, state = self._on.line(self.side, self.cells), self._on.state(self.side, 0, self.cells)
         left.append(np.linalg.norm(line.mass @ state.v - before) / size)
         return booked
 
