@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from itertools import accumulate, pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
@@ -87,6 +88,11 @@ class JoinedLine(Table):
     accuracy: AskedAccuracy | None = Field(
         default=None, description="how wrong the result of this line may be; absent: as `accuracy` of the system"
     )
+    initial: Equilibrium = Field(
+        default=Equilibrium(),
+        description="shape of the line that the search of the equilibrium starts from: guess, or points, a polyline "
+        "that is shifted to the first places of its ends; absent: hung between these",
+    )
     break_at: LineFailure | None = Field(
         default=None,
         description="when the line breaks from the point at one of its ends, at a time or after the first step with so "
@@ -112,6 +118,9 @@ class JoinedLine(Table):
             refuse([Finding(("model",), expected, "write `model: rod`", f"kind: {self.model.kind}")])
         if isinstance(self.model, AdaptiveModel):
             refuse(self._of_moving_zones(self.model))
+        if self.initial.friction != "neglected":
+            expected = "neglected, as in every equilibrium of several lines"
+            refuse([Finding(("initial", "friction"), expected, "leave it out", self.initial.friction)])
         for i, section in enumerate(self.sections):
             if section.tension_torque:
                 expected = "nothing or 0, because several lines are computed together, which know no torque of tension"
@@ -134,6 +143,26 @@ class JoinedLine(Table):
             if isinstance(getattr(self.connections, end), ClampedConnection):
                 expected = "pinned, because zones of this line move"
                 yield Finding(("connections", end), expected, "write `model: rod`, or leave the clamp out", "clamped")
+
+
+def _between(initial: Equilibrium, ends: Mapping[str, End]) -> Equilibrium:
+    """A first shape whose ends are where the points are first, the rest in between shifted along."""
+    if initial.points is None:
+        return initial
+    points = initial.points
+    way = [0.0, *accumulate(math.dist(a, b) for a, b in pairwise(points))]
+    gaps = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
+    for k, key in enumerate(("start", "end")):
+        place = ends[key].first_position
+        if place is not None:
+            x, y, z = points[-k]
+            gaps[k] = place[0] - x, place[1] - y, place[2] - z
+    moved = []
+    for point, s in zip(points, way, strict=True):
+        part = s / way[-1]
+        x, y, z = (p + (1.0 - part) * a + part * b for p, a, b in zip(point, *gaps, strict=True))
+        moved.append((x, y, z))
+    return initial.model_copy(update={"points": tuple(moved)})
 
 
 class SystemOutput(Table):
@@ -349,11 +378,12 @@ class System(Table):
                     position=place, tangent=held[0], normal=held[1], swivel=clamp.swivel,
                     bend_stiffness=clamp.bend_stiffness, motion=motion,
                 )  # fmt: skip
+        initial = _between(line.initial, ends)
         if places is not None:
-            return (scene or self.scene_of(name)).model_copy(update={"ends": Ends(**ends)})
+            return (scene or self.scene_of(name)).model_copy(update={"ends": Ends(**ends), "initial": initial})
         tables: dict[str, Any] = {
             "title": f"{self.title}, line {name}" if self.title else f"line {name}", "environment": self.environment,
-            "cable": line.cable, "ends": Ends(**ends), "initial": Equilibrium(), "model": line.chosen_model,
+            "cable": line.cable, "ends": Ends(**ends), "initial": initial, "model": line.chosen_model,
             "mesh": line.mesh, "contact": line.contact.asked, "accuracy": line.accuracy or self.accuracy,
         }  # fmt: skip
         if self.time is not None:

@@ -19,18 +19,20 @@ LINK, KEPT = 2, 1e-3  # place in what link_of gives; turns by which the link of 
 def with_contact(model: Model, t: float, found: Equilibrium | None) -> Equilibrium | None:
     """The equilibrium with the loads of time t of a line that contact is asked for; None: there is none to be had.
 
-    found: without contact, which is taken where nothing touches; None: none was found.  None comes back where the
-    starting shape, from which a damped motion leads to rest, is within itself.  ComputationError: as of `settled_from`.
+    found: without contact, which is taken where nothing touches; None: none was found.  A damped motion leads to rest
+    from the starting shape, or, where that is within itself, from `found`; None comes back where both are.
+    ComputationError: as of `settled_from`.
     """
     if not model.line.bits & SELF_CONTACT:
         return None
     contact = contact_of(model)
     sea, ends = model.sea.at(t), model.ends.at(t)
-    if found is not None and contact_energy(model.line, sea, ends, found.state, contact) == 0.0:
+    energy = math.inf
+    if found is not None and (energy := contact_energy(model.line, sea, ends, found.state, contact)) == 0.0:
         return found
-    if not math.isfinite(contact_energy(model.line, sea, ends, model.start, contact)):
-        return None
-    return settled_from(model, t, model.start)
+    if math.isfinite(contact_energy(model.line, sea, ends, model.start, contact)):
+        return settled_from(model, t, model.start)
+    return settled_from(model, t, found.state) if found is not None and math.isfinite(energy) else None
 
 
 def contact_of(model: Model) -> SelfContact:
@@ -64,6 +66,11 @@ def nearness(model: Model, t: float, state: State) -> Floats:
     near = contact.look_ahead(1.0)
     contact_energy(model.line, model.sea.at(t), model.ends.at(t), state, contact)
     return near
+
+
+def is_within_itself(model: Model, t: float, state: State) -> bool:
+    """Whether parts of a line at rest are in each other."""
+    return math.isinf(contact_energy(model.line, model.sea.at(t), model.ends.at(t), state, contact_of(model)))
 
 
 def why_not(model: Model, t: float) -> tuple[str, str]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from hybrid.kernels.books import CARRIED, LOG, STORED, Books
 from hybrid.kernels.entry import sharpest
-from hybrid.kernels.forces import FRICTION, SELF_CONTACT
+from hybrid.kernels.forces import FRICTION, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.report import FORCE_A, LOCAL_ERROR
 from hybrid.kernels.run import blank_books
 from hybrid.kernels.state import Batch, Ends, Floats, State, Work, batch_of_one
@@ -118,7 +118,7 @@ class LineResult:
     @property
     def touches(self) -> bool:
         """Whether contact of the line with itself is computed."""
-        return self._moves and bool(self.model.line.bits & SELF_CONTACT)
+        return bool(self.model.line.bits & SELF_CONTACT)
 
     def touch_itself(self, t: float) -> SelfContact | None:
         """Contact of the line as it is from t (s) on, which goes on with what there was; None: there is none."""
@@ -133,14 +133,25 @@ class LineResult:
         self._touching = model
         return self.contact
 
-    def note_equilibrium(self, x: JoinedLine, state: State, t: float | None) -> None:
-        """What an equilibrium leaves open; t: s, where a motion starts from it, None: it is the result."""
+    def note_equilibrium(self, x: JoinedLine, state: State, t: float | None, settled: bool) -> None:
+        """What an equilibrium leaves open; t: s, where a motion starts from it, None: it is the result.
+
+        settled: whether a damped motion with contact led to it.
+        """
         line = self.model.line
         if line.bits & FRICTION:
             text = "this equilibrium of several lines is the one without friction on the seabed"
             self.events.event(0.0, 0.0, self.model.length, "static friction neglected", text)
-        if line.element.any():
+        touches = settled and bool(self.books.touch[:1].any())
+        if line.bits & SELF_FRICTION and touches:
+            text = "this equilibrium is the one without friction where the line touches itself"
+            where = f"{text}: a run with damping that comes to rest in contact has it"
+            self.events.event(0.0, 0.0, self.model.length, "static friction neglected", where)
+        if line.element.any() or touches:
             text = "whether rods would buckle out of an equilibrium of several lines is not judged"
+            if settled:
+                there = "the line touches itself; " if touches else ""
+                text = f"{there}a damped motion with contact, without friction, led to this equilibrium; {text}"
             self.events.event(0.0, 0.0, self.model.length, "stability not judged", text)
         self.judge(t, sharpest(x.line, x.ends, state), state)
         self._itself.look(t or 0.0, 0.0, state, state.r, self.events.event)

@@ -252,11 +252,11 @@ class SystemRun:
         assert self.found is not None
         try:
             solver = self.found.solver
-            refuse_within_itself(zip(self.lines, solver.lines, self.state.lines, strict=True), False)
+            refuse_within_itself(self.model, self.found, moves=False)
             solver.keep_books([line.books for line in self.lines])
             solver.evaluate_forces(self.state, 0.0)
             for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
-                line.note_equilibrium(x, state, None)
+                line.note_equilibrium(x, state, None, self.found.settled)
             self._output(solver)
             text = f"equilibrium: {self.found.summary}; residual force {self.found.residual:.2g} N"
             self._close("complete", text)
@@ -312,7 +312,8 @@ class SystemRun:
         """Make the start ready for steps, and record it."""
         time = self.system.require_time()
         self.make_solver()
-        refuse_within_itself(zip(self.lines, self.solver.lines, self.state.lines, strict=True), True)
+        assert self.found is not None
+        refuse_within_itself(self.model, self.found, moves=True)
         self._settle(self.solver)
         if self.zones is not None:
             self.zones.begin()
@@ -321,7 +322,7 @@ class SystemRun:
             for body in (x for x in self.model.bodies if x.members is None):
                 self.recorder.event(0.0, 0.0, 0.0, "waves on body neglected", f"body {body.name}: {text}")
         for line, x, state in zip(self.lines, self.solver.lines, self.state.lines, strict=True):
-            line.note_equilibrium(x, state, 0.0)
+            line.note_equilibrium(x, state, 0.0, self.found.settled)
             line.diagnostics.scheme(time.rho_inf)
         self._output(self.solver)
         self.gather_events()

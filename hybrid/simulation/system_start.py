@@ -12,6 +12,7 @@ from hybrid.kernels.members import PIECE, PUSH, WATER, WET
 from hybrid.kernels.state import Floats
 from hybrid.model.system import SystemModel, balanced_places, starts_between
 from hybrid.scene.system import System
+from hybrid.simulation.system_contact_equilibrium import settle, solve_with_contact
 from hybrid.solve.system import JoinedLine, SystemState, joined_ends
 from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
 
@@ -24,7 +25,7 @@ def equilibrium_of_system(system: System, model: SystemModel, t: float) -> Syste
     """Equilibrium with the loads of time t (s; infinity: of full size).  ComputationError: none is found."""
     try:
         numbers = model.body_numbers(t)
-        found = solve_system_statics(joined_lines(model, t), len(model.free), numbers, _starts(system, model))
+        found = solve_with_contact(model, joined_lines(model, t), numbers, lambda: _starts(system, model))
         if not any(body.members for body in model.bodies):
             return found
         part, before = 1.0, None
@@ -39,12 +40,21 @@ def equilibrium_of_system(system: System, model: SystemModel, t: float) -> Syste
                 part = float(np.clip(-part * (before * more).sum() / max((more * more).sum(), 1e-300), 0.05, 1.0))
             numbers += part * change
             before = change
-            start = [("members where they came to rest", found.state)]
-            found = solve_system_statics(joined_lines(model, t), len(model.free), numbers, iter(start))
+            found = solve_from(found, model, t, numbers, found.state, "members where they came to rest")
         told = f"the place of a body and the water around its members do not agree after {MOST_ROUNDS} equilibria; "
         raise LineFailed(-1, Outcome.NOT_CONVERGED, None, None, told + "take a nearer initial_guess, or more pieces")
     except LineFailed as failed:
         raise named(failed, model) from None
+
+
+def solve_from(
+    found: SystemEquilibrium, model: SystemModel, t: float, bodies: Floats, start: SystemState, name: str
+) -> SystemEquilibrium:
+    """The equilibrium with the loads of time t from a start next to another one, with contact if that has it."""
+    lines = joined_lines(model, t)
+    if found.settled:
+        return settle(model, lines, bodies, start, near=True)
+    return solve_system_statics(lines, len(model.free), bodies, iter([(name, start)]))
 
 
 def _same_water(there: Floats, taken: Floats) -> bool:

@@ -21,8 +21,11 @@ from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene
 from hybrid.scene.suggestions import nearest
 from hybrid.scene.system import JoinedLine, System
 from hybrid.simulation.envelope import marks_of
+from hybrid.simulation.system_contact import refuse_within_itself
+from hybrid.simulation.system_contact_equilibrium import contacts_of
 from hybrid.simulation.system_start import equilibrium_of_system
 from hybrid.solve.system import SystemSolver, SystemState
+from hybrid.solve.system_contact_statics import touching_solver
 from hybrid.solve.system_statics import SystemEquilibrium
 
 VERTICAL = np.array([0.0, 0.0, 1.0])
@@ -73,7 +76,7 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     system = _system(scene)
     kind, name = _target(system, at)
     model = build_system(system)
-    found = equilibrium_of_system(system, model, np.inf)
+    found = _equilibrium(system, model)
     solver, state, first = found.solver, found.state, 0
     size = 6 if kind == "body" else 3
     free = [*model.free], [*(body.name for body in model.bodies), *model.rigid]
@@ -105,6 +108,13 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     return Stiffness(at, np.asarray(matrix, float), np.asarray(matrix - own, float), position, rotation)
 
 
+def _equilibrium(system: System, model: SystemModel) -> SystemEquilibrium:
+    """Under full loads.  SceneError: a line that contact is asked for is within itself in it."""
+    found = equilibrium_of_system(system, model, np.inf)
+    refuse_within_itself(model, found, moves=False)
+    return found
+
+
 def _compliance(solver: SystemSolver, state: SystemState, first: int, size: int, points: int) -> Floats | None:
     """(size, size) m/N, rad/N, .. of the point or body that begins at `first` of `SystemSolver.compliance`; points: how
     many there are.  None: the system is singular.
@@ -112,6 +122,7 @@ def _compliance(solver: SystemSolver, state: SystemState, first: int, size: int,
     From the factors; where a torque passes through catenaries, which these know roughly, from equilibria under small
     forces and moments both ways.
     """
+    solver.evaluate_forces(state, 0.0)
     found = solver.compliance(state, solver.anchor)
     if found is None:
         return None
@@ -139,8 +150,8 @@ def _compliance(solver: SystemSolver, state: SystemState, first: int, size: int,
 
 
 def _needs_equilibria(solver: SystemSolver) -> bool:
-    """Whether the factors know the answer of some line only roughly."""
-    return any(x.line.torsion.size for x in solver.lines)
+    """Whether the factors know the answer of some line only roughly, or not that it touches itself."""
+    return any(x.line.torsion.size for x in solver.lines) or bool(solver.in_contact())
 
 
 def _load_on(solver: SystemSolver, points: int, first: int, state: SystemState) -> Floats:
@@ -192,7 +203,7 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
         fix = "give finite numbers, such as --reach 20 --heading 90"
         raise SceneError([Complaint("offsets", given, "distances (m) and a heading (deg)", fix)])
     model = build_system(system)
-    found = equilibrium_of_system(system, model, np.inf)
+    found = _equilibrium(system, model)
     place = _place(system, model, found, name) if kind == "point" else None
     rigid = kind == "point" and name in system.rigid
     if rigid:
@@ -214,7 +225,7 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
         try:
             moved = _held(system, kind, name, place + distance * along, rotation)
             there = build_system(moved)
-            here = equilibrium_of_system(moved, there, np.inf)
+            here = _equilibrium(moved, there)
         except SceneError as error:
             given = f"an offset of {distance:g} m"
             raise SceneError([replace(x, value=f"{given}: {x.value}") for x in error.complaints]) from None
@@ -356,7 +367,12 @@ def _let_go(
                         seats[k] = seat_of(x.ends.frame[k], rows[-1, FRAME:V].reshape(3, 3))
         ends_now = x.ends._replace(held=held, position=x.ends.position.copy())
         lines.append(x._replace(joints=(joints[0], joints[1]), ends=ends_now, fairleads=fairleads, seats=seats))
-    return SystemSolver(lines, points + (kind == "point"), numbers), SystemState(found.state.lines, rows)
+    points += kind == "point"
+    if found.settled:
+        solver = touching_solver(lines, points, numbers, lambda: contacts_of(model))
+    else:
+        solver = SystemSolver(lines, points, numbers)
+    return solver, SystemState(found.state.lines, rows)
 
 
 def _own_stiffness(numbers: Floats, row: Floats) -> Floats:

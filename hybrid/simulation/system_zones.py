@@ -28,11 +28,11 @@ from hybrid.model.system import SystemModel
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.contact_equilibrium import nearness
 from hybrid.simulation.initial_zones import MOST_ROUNDS, STRICTER, manager_for
-from hybrid.simulation.system_start import joined_lines
+from hybrid.simulation.system_start import solve_from
 from hybrid.simulation.zone_switching import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, note_change, on_layout
 from hybrid.solve.run import Tried
 from hybrid.solve.system import SystemState, SystemTaken
-from hybrid.solve.system_statics import LineFailed, SystemEquilibrium, solve_system_statics
+from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
 from hybrid.store.named_arrays import matched
 
 if TYPE_CHECKING:
@@ -108,8 +108,8 @@ def _within(
             states[k] = _on_fewer(states[k], full, models[k])
             manager.set_layout(full.layout._replace(rod=rods[k]))
         other = replace(model, models=tuple(models))
-        start = [("the equilibrium of rods", SystemState(states, found.state.bodies))]
-        answer = solve_system_statics(joined_lines(other, t), len(model.free), found.solver.bodies.copy(), iter(start))
+        start = SystemState(states, found.state.bodies)
+        answer = solve_from(found, other, t, found.solver.bodies.copy(), start, "the equilibrium of rods")
         more = {
             k: rods[k] | _asked(manager, models[k], answer.state.lines[k], t) for k, manager in managers.items()
         }  # fmt: skip

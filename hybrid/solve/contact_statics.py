@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import chain
+from typing import Protocol
 
 import numpy as np
 
@@ -20,12 +21,11 @@ from hybrid.kernels.binding import Table
 from hybrid.kernels.books import NOW, PARITY, STEP_BEFORE, TRY_END
 from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance, workspace_of
 from hybrid.kernels.forces import FRICTION, MASS_DAMPING, ROTARY, SELF_FRICTION, WAVES
-from hybrid.kernels.newton import EQUILIBRIUM, NEAR, STEP, Task
+from hybrid.kernels.newton import EQUILIBRIUM, STEP, Task
 from hybrid.kernels.report import FORCE_A, SELF_CONTACT_ENERGY, TWIST
 from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.run import blank_books, blank_job, in_space
-from hybrid.kernels.self_contact_pairs import KEEPS, SPEED
-from hybrid.kernels.state import Ends, Line, Sea, State
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.stability import Stability
 from hybrid.solve.statics import BALANCED, BALANCING, CALM, GYRATION, MOST_ITERATIONS, REACH, Equilibrium, nudged
@@ -50,6 +50,7 @@ class _Job:
     ends: Ends
     contact: SelfContact
     states: tuple[State, State]
+    limits: Limits  # of a step
 
     def __post_init__(self) -> None:
         self.work = workspace_of(self.line, keep=True)
@@ -71,15 +72,14 @@ class _Job:
         """The state now."""
         return self.states[self.count[PARITY]]
 
-    def step(self, dt: float, before: float, limits: Limits) -> tuple[int, int, float]:
-        """One step with rho_inf 0: outcome, iterations, largest way of a node, m.  The state is that after it if OK."""
+    def step(self, dt: float, before: float) -> tuple[int, int, float]:
+        """As of `Moving`."""
         clock, count = self.clock, self.count
         old, new = self.states[count[PARITY]], self.states[1 - count[PARITY]]
         clock[TRY_END], clock[STEP_BEFORE] = clock[NOW] + dt, before
-        self.table.bind(task=Task(STEP, dt, before, 0.0, limits=limits), old=old, new=new)
+        self.table.bind(task=Task(STEP, dt, before, 0.0, limits=self.limits), old=old, new=new)
         outcome, iterations, _, _ = in_space(self.table.numbers)
-        twisted = self.work.report[TWIST] > LARGEST_TWIST or dt * float(np.abs(new.w).max()) > MOST_SPIN
-        if outcome == Outcome.OK and twisted:
+        if outcome == Outcome.OK and (self.twisted or dt * float(np.abs(new.w).max()) > MOST_SPIN):
             outcome = Outcome.TWISTED_TOO_FAR
         if outcome != Outcome.OK:
             return outcome, iterations, 0.0
@@ -87,15 +87,22 @@ class _Job:
         return outcome, iterations, float(np.abs(new.r - old.r).max())
 
     def rest(self) -> None:
-        """Stop all motion."""
-        for still in (self.state.v, self.state.a, self.state.vd, self.state.w, self.state.wa, self.state.wd):
-            still[:] = 0.0
+        """As of `Moving`."""
+        stop(self.state)
+
+    @property
+    def twisted(self) -> bool:
+        """As of `Moving`."""
+        return bool(self.work.report[TWIST] > LARGEST_TWIST)
+
+    @property
+    def speed(self) -> float:
+        """As of `Moving`."""
+        return float(np.abs(self.state.v).max())
 
     def equilibrium(self, anchor: float, limits: Limits) -> tuple[Outcome, int]:
         """Newton from the state, which becomes what was found; anchor: 1/s2, of springs of that times the mass."""
-        numbers = self.contact.contact.numbers
-        numbers[SPEED], self.contact.call[NEAR] = 0.0, 0
-        numbers[KEEPS] = -1.0  # no pairs are kept of a step
+        self.contact.forget()
         self.work.u[:] = 0.0
         self.table.bind(task=Task(EQUILIBRIUM, ca=anchor, limits=limits), old=self.state, new=self.state)
         outcome, iterations, _, _ = in_space(self.table.numbers)
@@ -109,19 +116,53 @@ class _Job:
 
     def residual(self, anchor: float) -> float:
         """Largest force, N, that is left over at a node of the state, contact included; work.report is its report."""
-        work, state = self.work, self.state
+        work = self.work
         work.u[:] = 0.0
-        rows = block_rows(self.line)
-        bad = entry.assembly(self.line, self.sea, self.ends, state, 0.0, anchor, work._replace(rows=rows))
-        if bad >= 0:
-            return float("inf")
-        force = self.contact.force(state)
-        left = out_of_balance(self.line, rows) + force
+        residual, force = left_over(self.line, self.sea, self.ends, self.state, self.contact, anchor, work)
         for k in np.flatnonzero(self.ends.held):
-            left[-k] = 0.0  # k is 0 or 1: the first or the last node
-            work.report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3] += force[-k]
+            work.report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3] += force[k]
         work.report[SELF_CONTACT_ENERGY] = self.contact.energy()
-        return float(np.abs(left).max())
+        return residual
+
+
+class Moving(Protocol):
+    """What moves, damped and with contact, until it rests."""
+
+    def step(self, dt: float, before: float) -> tuple[int, int, float]:
+        """One step with rho_inf 0: outcome, iterations, largest way of a node, m.  The state is that after it if OK."""
+
+    def rest(self) -> None:
+        """Stop all motion."""
+
+    @property
+    def twisted(self) -> bool:
+        """Whether the last step has twisted an element too far."""
+
+    @property
+    def speed(self) -> float:
+        """Largest speed along an axis, m/s."""
+
+
+def left_over(
+    line: Line, sea: Sea, ends: Ends, state: State, contact: SelfContact, anchor: float, work: Work
+) -> tuple[float, Floats]:
+    """Largest force, N, that is left over at a node which nothing holds, contact included; forces (2, 3) N of contact
+
+    on the end nodes.  work: of the line, with u = 0, whose report becomes that of the state without contact.
+    """
+    rows = block_rows(line)
+    if entry.assembly(line, sea, ends, state, 0.0, anchor, work._replace(rows=rows)) >= 0:
+        return float("inf"), np.zeros((2, 3))
+    force = contact.force(state)
+    left = out_of_balance(line, rows) + force
+    left[[-k for k in (0, 1) if ends.held[k]]] = 0.0
+    return float(np.abs(left).max()), force[[0, -1]]
+
+
+def stop(state: State) -> None:
+    """Stop all motion of a state."""
+    for still in (state.v, state.a, state.vd, state.w, state.wa, state.wd):
+        still[:] = 0.0
 
 
 def damped(line: Line, length: float, time_scale: float) -> Line:
@@ -135,21 +176,21 @@ def damped(line: Line, length: float, time_scale: float) -> Line:
     )
 
 
-def _calming(job: _Job, time_scale: float, length: float, limits: Limits) -> Iterator[int]:
+def calming(job: Moving, time_scale: float, length: float) -> Iterator[int]:
     """The damped motion: iterations so far, each time that it has calmed by another order, and at its end."""
     dt, before, calm, total, orders = 1e-3 * time_scale, 0.0, 0, 0, list(CALMER)
     for _ in range(STEPS):
-        outcome, iterations, moved = job.step(dt, before, limits)
+        outcome, iterations, moved = job.step(dt, before)
         total += iterations
         if outcome != Outcome.OK:
             dt *= 0.5
-            if outcome == Outcome.TWISTED_TOO_FAR and job.work.report[TWIST] > LARGEST_TWIST:
+            if outcome == Outcome.TWISTED_TOO_FAR and job.twisted:
                 job.rest()
             if dt < 1e-9 * time_scale:
                 break
             continue
         before = dt
-        if float(np.abs(job.state.v).max()) > FASTEST * length / time_scale:
+        if job.speed > FASTEST * length / time_scale:
             job.rest()
             calm = 0
         if iterations <= 5:
@@ -178,12 +219,12 @@ def settled(
     smooth = line._replace(bits=line.bits & ~(WAVES | FRICTION | SELF_FRICTION))
     time_scale = float(np.sqrt(line.mass.sum() * length / scale))
     first = start.copy() if near else nudged(smooth, start, length, time_scale)
-    moving = _Job(damped(smooth, length, time_scale), sea, ends, contact, (first, first.copy()))
-    anchor = Stability(smooth, sea, length, scale).anchor
     limits, total, path = Limits(REACH * length, scale, MOST_OF_STEP), 0, []
-    for iterations in chain([0] if near else [], _calming(moving, time_scale, length, limits)):
+    moving = _Job(damped(smooth, length, time_scale), sea, ends, contact, (first, first.copy()), limits)
+    anchor = Stability(smooth, sea, length, scale).anchor
+    for iterations in chain([0] if near else [], calming(moving, time_scale, length)):
         rest = moving.state.copy()
-        found, kept = _Job(smooth, sea, ends, contact, (rest, rest.copy())), contact.contact.numbers.copy()
+        found, kept = _Job(smooth, sea, ends, contact, (rest, rest.copy()), limits), contact.contact.numbers.copy()
         found.rest()
         outcome, residual, lost = Outcome.NOT_CONVERGED, np.inf, keeps_turns(rest)
         if lost:  # and will not come back
@@ -222,4 +263,4 @@ def _place(job: _Job) -> float:
 
 def contact_energy(line: Line, sea: Sea, ends: Ends, state: State, contact: SelfContact) -> float:
     """Energy, J, of contact of a state at rest; 0: nothing touches; infinite: parts are in each other."""
-    return _Job(line, sea, ends, contact, (state, state.copy())).contact.energy()
+    return _Job(line, sea, ends, contact, (state, state.copy()), Limits(1.0, 1.0, 1)).contact.energy()

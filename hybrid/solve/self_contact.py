@@ -10,7 +10,7 @@ import numpy as np
 from hybrid.kernels.binding import Table
 from hybrid.kernels.books import Books
 from hybrid.kernels.forces import ROTARY
-from hybrid.kernels.newton import ADDRESS, ASKED, REST
+from hybrid.kernels.newton import ADDRESS, ASKED, NEAR, REST
 from hybrid.kernels.report import FORCE_A, SELF_CONTACT_ENERGY
 from hybrid.kernels.self_contact import blank_contact_job, contact_task
 from hybrid.kernels.self_contact_friction import AT, GRIP, HELD, PIECE
@@ -26,6 +26,7 @@ from hybrid.kernels.self_contact_pairs import (
     HAD,
     HAS,
     HORIZON,
+    KEEPS,
     LARGEST,
     LED,
     NARROWEST,
@@ -89,6 +90,10 @@ class SelfContact:
         self.call, self._touch = np.zeros(3, np.int64), np.zeros((3, 0))
         self._job = Table(blank_contact_job())
 
+    def forget(self) -> None:
+        """What is computed next is no step: no speed with which strands meet, and no pairs kept of a step."""
+        self.contact.numbers[SPEED], self.contact.numbers[KEEPS], self.call[NEAR] = 0.0, -1.0, 0
+
     def energy(self) -> float:
         """Energy, J, of contact where work.u has led the state of a run; infinite where strands are in each other."""
         self.call[ASKED] = REST
@@ -107,6 +112,11 @@ class SelfContact:
         for k in np.flatnonzero(ends.held):  # 0 or 1: the first or the last node
             report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3] += force[-k]
         return energy
+
+    @property
+    def touches(self) -> bool:
+        """Whether anything touches in the state that was looked at last."""
+        return bool(self.contact.counts[POINTS])
 
     @property
     def deepest(self) -> tuple[int, int]:

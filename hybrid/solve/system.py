@@ -36,6 +36,7 @@ from hybrid.kernels.step import friction_axes
 from hybrid.kernels.system import JUNCTIONS, book_system_step, solve_system
 from hybrid.kernels.system_contact import blank_touching_job, room_for_products, touch_system
 from hybrid.kernels.water import wave_kinematics
+from hybrid.solve.contact_statics import left_over
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.stability import ANCHOR
 from hybrid.solve.statics import (
@@ -225,12 +226,37 @@ class SystemSolver:
         return SystemTaken(Outcome(outcome), iterations, left, line, where, self.residual())
 
     def residual(self) -> float:
-        """Largest residual force (N) of the last march, at a node or a point."""
-        inside = max(float(work.report[RESIDUAL]) for work in self.work)
+        """Largest residual force (N) of the last march, at a node or a point; without contact."""
         left = self.body_work[:, OWN : OWN + 6] + self.body_work[:, LINES : LINES + 6]
+        return self._largest([float(work.report[RESIDUAL]) for work in self.work], self.net, left)
+
+    def _largest(self, inside: Sequence[float], net: Floats, left: Floats) -> float:
+        """The largest of what is left over inside lines, at points (P, 3) N, and at bodies (B, 6) N, N m."""
         arm = max(1.0, float(np.abs(self._fairleads).max()))  # m, by which moments are compared with forces
         turning = float(np.abs(left[:, 3:]).max(initial=0.0)) / arm
-        return max(inside, turning, *(float(np.abs(x).max(initial=0.0)) for x in (self.net, left[:, :3])))
+        return max(*inside, turning, *(float(np.abs(x).max(initial=0.0)) for x in (net, left[:, :3])))
+
+    def in_contact(self) -> list[int]:
+        """Lines that touch themselves in the states that were looked at last."""
+        return [k for k, contact in self._contacts.items() if contact.touches]
+
+    def _proof(self, states: SystemState) -> float:
+        """Largest force (N) that is left over at a node, a point or a body, with that of contact; reports follow."""
+        residual = self.evaluate_forces(states, self.anchor).residual
+        touching, points = self.in_contact(), len(self.net)
+        if not touching:
+            return residual
+        inside, net = [float(work.report[RESIDUAL]) for work in self.work], self.net.copy()
+        left = self.body_work[:, OWN : OWN + 6] + self.body_work[:, LINES : LINES + 6]
+        for k in touching:
+            x, work = self.lines[k], workspace_of(self.lines[k].line, keep=True)
+            inside[k], forces = left_over(x.line, x.sea, x.ends, states.lines[k], self._contacts[k], self.anchor, work)
+            for joint, force, arm in zip(x.joints, forces, self._arms[k], strict=True):
+                if 0 <= joint < points:
+                    net[joint] += force
+                elif joint >= points:
+                    left[joint - points] += np.concatenate([force, np.cross(arm, force)])
+        return self._largest(inside, net, left)
 
     # --- motion -------------------------------------------------------------------------------------
 
@@ -389,7 +415,8 @@ class SystemSolver:
     def newton(self, start: SystemState) -> tuple[SystemTaken, SystemState]:
         """Static Newton from `start`; a new state is returned, the old one is left as it was.
 
-        SLACK: a catenary cell of what was found is not under tension.  UNSTABLE: a point or body would leave it.
+        SLACK: a catenary cell of what was found is not under tension.  UNSTABLE: a point or body would leave it; not
+        asked where a line touches itself.
         """
         new = start.copy()
         for state in new.lines:
@@ -402,6 +429,8 @@ class SystemSolver:
             for x, work, state in zip(self.lines, self.work, new.lines, strict=True):
                 work.u[:] = 0.0
                 self._around(x, state, work)
+            for contact in self._contacts.values():
+                contact.forget()
             task = Task(EQUILIBRIUM, ca=self.anchor, limits=Limits(REACH * self.length, 1.0, MOST_ITERATIONS))
             taken = self._solve(task, new, new)
             iterations += taken.iterations
@@ -412,19 +441,17 @@ class SystemSolver:
                 state.vd[:], state.wd[:] = 0.0, 0.0  # of the anchor's springs
             if taken.outcome != Outcome.OK:
                 break
-            proof = self.evaluate_forces(new, self.anchor)
+            proof = self._proof(new)
             greatest = max(float(np.abs(state.T).max()) for state in new.lines)
-            taken = SystemTaken(taken.outcome, iterations, taken.correction, taken.line, taken.where, proof.residual)
-            if proof.residual <= BALANCED * (greatest + self.scale):
+            taken = SystemTaken(taken.outcome, iterations, taken.correction, taken.line, taken.where, proof)
+            if proof <= BALANCED * (greatest + self.scale):
                 break
-            taken = SystemTaken(
-                Outcome.NOT_CONVERGED, iterations, taken.correction, taken.line, taken.where, proof.residual
-            )
+            taken = SystemTaken(Outcome.NOT_CONVERGED, iterations, taken.correction, taken.line, taken.where, proof)
         if taken.outcome == Outcome.OK:
             for k, (x, state) in enumerate(zip(self.lines, new.lines, strict=True)):
                 tension, cell = lowest(x.line, state.T)
                 if np.isfinite(x.floor) and not tension > LEAST_TENSION * abs(x.floor):
                     taken = SystemTaken(Outcome.SLACK, iterations, taken.correction, k, cell, taken.residual)
-        if taken.outcome == Outcome.OK and not self.is_stable(new):
+        if taken.outcome == Outcome.OK and not self.in_contact() and not self.is_stable(new):
             taken = SystemTaken(Outcome.UNSTABLE, iterations, taken.correction, -1, -1, taken.residual)
         return taken, new

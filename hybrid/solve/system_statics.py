@@ -9,9 +9,10 @@ import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.bodies import DAMPING, MASS, V
-from hybrid.kernels.forces import FLOW, FRICTION, MASS_DAMPING, ROTARY, SEABED, WAVES
+from hybrid.kernels.forces import FLOW, FRICTION, SEABED, WAVES
 from hybrid.kernels.state import Floats
-from hybrid.solve.statics import CALM, GYRATION, LIMP, RELAXING_STEPS, SOFT_BED
+from hybrid.solve.contact_statics import damped, stop
+from hybrid.solve.statics import CALM, LIMP, RELAXING_STEPS, SOFT_BED
 from hybrid.solve.system import JoinedLine, SystemSolver, SystemState, SystemTaken
 
 
@@ -25,6 +26,7 @@ class SystemEquilibrium:
     iterations: int
     residual: float
     solver: SystemSolver  # whose reports are those of the solution
+    settled: bool = False  # True where a damped motion with contact led there
 
     @property
     def summary(self) -> str:
@@ -118,21 +120,10 @@ def _eased(solver: SystemSolver, points: int, start: SystemState) -> tuple[str, 
 
 def _relax(solver: SystemSolver, points: int, start: SystemState) -> SystemState:
     """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until the lines hardly move."""
-    lines = []
     mass = sum(float(x.line.mass.sum()) for x in solver.lines) + float(solver.bodies[:, MASS].sum())
     time_scale = float(np.sqrt(mass * solver.length / solver.scale))
-    for x in solver.lines:
-        line = x.line
-        gyration = line.spin * 0.5 * (line.mass[:-1] + line.mass[1:]) * (GYRATION * x.length) ** 2
-        damped = line._replace(
-            damp=np.nan_to_num(line.damp) + 2.0 * line.mass / time_scale,
-            polar=np.nan_to_num(line.polar) + gyration, rotary=np.nan_to_num(line.rotary),
-            bits=line.bits | MASS_DAMPING | ROTARY,
-        )  # fmt: skip
-        lines.append(x._replace(line=damped, floor=-np.inf))
-    bodies = solver.bodies.copy()
-    bodies[:, DAMPING : DAMPING + 36] += 2.0 / time_scale * bodies[:, MASS : MASS + 36]
-    here = SystemSolver(lines, points, bodies)
+    lines = [x._replace(line=damped(x.line, x.length, time_scale), floor=-np.inf) for x in solver.lines]
+    here = SystemSolver(lines, points, damped_bodies(solver.bodies, time_scale))
     old, new = start.copy(), start.copy()
     dt, calm = 1e-3 * time_scale, 0
     for _ in range(RELAXING_STEPS):
@@ -143,8 +134,7 @@ def _relax(solver: SystemSolver, points: int, start: SystemState) -> SystemState
                 break
             old.bodies[:, V:] = 0.0
             for state in old.lines:
-                for rate in (state.v, state.a, state.vd, state.w, state.wa, state.wd):
-                    rate[:] = 0.0
+                stop(state)
             continue
         moved = max(float(np.abs(a.r - b.r).max()) for a, b in zip(new.lines, old.lines, strict=True))
         old, new = new, old
@@ -154,3 +144,10 @@ def _relax(solver: SystemSolver, points: int, start: SystemState) -> SystemState
         if calm >= 3:
             break
     return old
+
+
+def damped_bodies(bodies: Floats, time_scale: float) -> Floats:
+    """Bodies with damping by mass that lets them settle in a time scale, s."""
+    slow = bodies.copy()
+    slow[:, DAMPING : DAMPING + 36] += 2.0 / time_scale * bodies[:, MASS : MASS + 36]
+    return slow

@@ -103,3 +103,14 @@ def test_a_catenary_that_a_loop_presses_is_refused() -> None:
     """Between catenaries at both clamps the loop pushes; they cannot carry that, and the message says where."""
     with pytest.raises(hybrid.ComputationError, match=r"compression; a catenary cannot carry it \(s = "):
         hybrid.static(hybrid.validate_scene(twisted({"zones": [{"catenary": 0.4}, {"rod": 3.2}, {"catenary": 0.4}]})))
+
+
+def test_strands_that_are_too_close_along_the_line_for_contact() -> None:
+    """Ends 0.9 diameters apart, legs that spread from there: what is nearer is beside both ends, which is no contact."""
+    tables = hanging("rod", mesh={"cells": 80})
+    tables["cable"]["sections"][0] |= {"length": 4.0}
+    tables["cable"]["attachments"][0] |= {"at": 2.0, "mass": 2.0}
+    tables["initial"]["points"] = [[0, 0, 0], [-0.5, 0, -1.0], [0, 0.009, -1.85], [0.5, 0.018, -1.0], [0, 0.018, 0]]
+    result = hybrid.static(hybrid.validate_scene(tables))
+    assert result["energy/self_contact"][0] == 0.0 and apart(result) < 1.0
+    assert "line touches itself" in {e.kind for e in result.events}

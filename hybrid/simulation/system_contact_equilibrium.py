@@ -1,0 +1,117 @@
+"""Equilibria of systems with lines that touch themselves: whether one does, and the damped motion to them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
+
+from hybrid.kernels.carried_frames import TURNS
+from hybrid.kernels.forces import SELF_CONTACT
+from hybrid.kernels.link import LINK, holds_twist, link_of
+from hybrid.kernels.state import Floats, State
+from hybrid.model.build import Model
+from hybrid.model.system import SystemModel
+from hybrid.simulation.contact_equilibrium import KEPT, contact_of
+from hybrid.solve.contact_statics import contact_energy
+from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.system import JoinedLine, SystemState
+from hybrid.solve.system_contact_statics import settled_system
+from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
+
+# Turns by which an equilibrium without contact may differ from its start, whose shape may have a writhe of its own.
+OF_SHAPE = 0.5
+
+
+def solve_with_contact(
+    model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, starts: Callable[[], Iterator[Start]]
+) -> SystemEquilibrium:
+    """As `solve_system_statics`; of lines that contact is asked for, and that would touch themselves or have lost turns
+    of their ends, that to which a damped motion with contact leads from the first start that is apart; the last start
+    is the equilibrium without contact.
+
+    starts: begins anew at every call.  An equilibrium within itself comes back where no start is apart.
+    """
+    try:
+        found = solve_system_statics(lines, len(model.free), bodies, starts())
+    except LineFailed as failed:
+        if not any(_touch(lines)) or (first := _first_apart(model, lines, starts())) is None:
+            raise
+        try:
+            return settle(model, lines, bodies, first)
+        except LineFailed as too:
+            tried = "\n              ".join(x for x in (failed.detail, too.detail) if x)
+            raise LineFailed(failed.line, failed.outcome, None, failed.s, tried) from None
+    if not any(_touch(lines)):
+        return found
+    lost = _has_lost(model, lines, found)
+    if not (lost or _largest_energy(model, lines, found.state)):
+        return found
+    last: list[Start] = [] if lost else [("the equilibrium without contact", found.state)]
+    first = _first_apart(model, lines, chain(starts(), last))
+    return found if first is None else settle(model, lines, bodies, first)
+
+
+def settle(
+    model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, start: SystemState, near: bool = False
+) -> SystemEquilibrium:
+    """The equilibrium with contact that a damped motion reaches from a start that is apart; near: as of that."""
+    keeps = _keeps_turns(lines, start, KEPT)
+    return settled_system(lines, len(model.free), bodies.copy(), start, lambda: contacts_of(model), keeps, near)
+
+
+def contacts_of(model: SystemModel) -> list[SelfContact | None]:
+    """Contact without friction of each line that it is asked for."""
+    return [contact_of(x) if x.line.bits & SELF_CONTACT else None for x in model.models]
+
+
+def energy_of(x: JoinedLine, model: Model, state: State) -> float:
+    """Energy, J, of contact of a line at rest; infinite: parts are in each other."""
+    return contact_energy(x.line, x.sea, x.ends, state, contact_of(model))
+
+
+def _touch(lines: Iterable[JoinedLine]) -> list[bool]:
+    return [bool(x.line.bits & SELF_CONTACT) for x in lines]
+
+
+def _largest_energy(model: SystemModel, lines: Sequence[JoinedLine], state: SystemState) -> float:
+    """Of all lines that contact is asked for, J."""
+    each = zip(lines, model.models, state.lines, strict=True)
+    return max(energy_of(*x) for x in each if x[0].line.bits & SELF_CONTACT)
+
+
+def _first_apart(model: SystemModel, lines: Sequence[JoinedLine], starts: Iterable[Start]) -> SystemState | None:
+    """The first start in which no line is within itself."""
+    return next((state for _, state in starts if math.isfinite(_largest_energy(model, lines, state))), None)
+
+
+def _has_lost(model: SystemModel, lines: Sequence[JoinedLine], found: SystemEquilibrium) -> bool:
+    """Whether an equilibrium that knows no contact has lost turns, against its lines hung between first places."""
+    hung = SystemState([x.start for x in model.models])
+    return bool(_keeps_turns(lines, hung, OF_SHAPE)(found.state)[1])
+
+
+def _keeps_turns(
+    lines: Sequence[JoinedLine], start: SystemState, within: float
+) -> Callable[[SystemState], tuple[int, str]]:
+    """What tells of the first line whose link in a state is not that of the start."""
+    asked = {k: _link(x, start.lines[k]) for k, x in enumerate(lines) if _holds_turns(x)}
+
+    def lost(states: SystemState) -> tuple[int, str]:
+        for k, link in asked.items():
+            has = _link(lines[k], states.lines[k])
+            if abs(has - link) > within:
+                why = "it has gone around a clamp, or its cells are too long for its loops"
+                return k, f"the start has a link of {link:.6g} turns, the line in contact {has:.6g}: {why}"
+        return -1, ""
+
+    return lost
+
+
+def _holds_turns(x: JoinedLine) -> bool:
+    """Whether the turns of a line cannot change: contact is asked for, and what holds its twist does not turn."""
+    return bool(x.line.bits & SELF_CONTACT) and holds_twist(x.line) and not x.seats[:, TURNS].any()
+
+
+def _link(x: JoinedLine, state: State) -> float:
+    return float(link_of(x.line, x.ends, state.r, state.e, state.a1, state.turn)[LINK])

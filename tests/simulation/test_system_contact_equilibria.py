@@ -1,0 +1,104 @@
+"""Equilibria of systems with lines that touch themselves: against one cable, at a body, and runs that begin there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+
+WIDTH = 0.02
+HOSE = {
+    "length": 4.0, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e5, "bending_stiffness": 0.02,
+    "torsional_stiffness": 0.016, "damping": {"mass": 0.5},
+}  # fmt: skip
+LINE = {
+    "sections": [HOSE], "attachments": [{"kind": "clump", "at": 2.0, "mass": 2.0}], "mesh": {"cells": 80},
+    "contact": {"self": True, "friction": 0.3},
+}  # fmt: skip
+Y = 0.9 * WIDTH  # m, between the ends of a U
+OPEN = [[0, 0, 0], [-0.5, 0, -1.0], [0, 0.5 * Y, -1.85], [0.5, Y, -1.0], [0, Y, 0]]
+COMMON = {"time": {"duration": 0.3, "step": 0.01}, "output": {"every": 0.1, "points": 81}}
+
+
+def cable() -> dict[str, Any]:
+    """A U whose ends are 0.9 diameters apart, with a weight."""
+    ends = {"start": {"kind": "pinned", "position": OPEN[0]}, "end": {"kind": "pinned", "position": OPEN[-1]}}
+    return COMMON | {
+        "cable": {key: LINE[key] for key in ("sections", "attachments")}, "model": "adaptive", "mesh": LINE["mesh"],
+        "contact": LINE["contact"], "initial": {"kind": "equilibrium", "points": OPEN}, "ends": ends, "dimension": 3,
+    }  # fmt: skip
+
+
+def beside_each_other(*shifts: float) -> dict[str, Any]:
+    """The same lines in a system, y (m) apart; the first shape is that of the first, shifted."""
+    points, lines = {}, {}
+    for k, y in enumerate(shifts):
+        points |= {f"a{k}": {"position": [0, y, 0]}, f"b{k}": {"position": [0, y + Y, 0]}}
+        lines[f"line {k}"] = LINE | {"start": f"a{k}", "end": f"b{k}", "model": "adaptive", "initial": {"points": OPEN}}
+    return COMMON | {"points": points, "lines": lines}
+
+
+def at_a_body() -> dict[str, Any]:
+    """One leg hangs on a body that two ropes pull against the other leg."""
+    rope = {"sections": [{"length": 1.1, "mass": 0.1, "axial_stiffness": 1e5}], "model": "catenary", "start": "free"}
+    first = [[0, 0, 0], [-0.3, -0.3, -1.0], [0, 0, -1.8], [0.3, 0.3, -1], [0, 0.3, 0.1]]
+    return COMMON | {
+        "points": {
+            "a": {"position": [0, 0, 0]}, "left": {"position": [-0.6, -0.01, 0.75]},
+            "right": {"position": [0.6, -0.01, 0.75]}, "free": {"kind": "fairlead", "body": "pod", "place": [0, 0, -0.05]},
+        },
+        "bodies": {"pod": {"kind": "free", "mass": 1.0, "inertia": [0.1] * 3, "initial_guess": [0, 0.3, 0.15]}},
+        "lines": {
+            "hose": LINE | {"start": "a", "end": "free", "model": "rod", "initial": {"points": first}},
+            "left": rope | {"end": "left", "mesh": {"cells": 5}}, "right": rope | {"end": "right", "mesh": {"cells": 5}},
+        },
+    }  # fmt: skip
+
+
+def stays(scene: dict[str, Any], static: hybrid.Result, name: str) -> None:
+    """A run with friction begins in the equilibrium without, and stays."""
+    run = hybrid.run(scene, progress=False).lines[name]
+    assert np.abs(run.position - static.lines[name].position).max() < 1e-9
+    energy = float(static.lines[name]["energy/self_contact"][0])
+    assert run["energy/self_contact"] == pytest.approx(energy, rel=1e-5)
+
+
+def test_lines_rest_as_the_cable_does() -> None:
+    """Each with its zones, contact and forces; the other beside it changes nothing."""
+    alone, scene = hybrid.static(hybrid.validate_scene(cable())), beside_each_other(0.0, 3.0)
+    system = hybrid.static(scene)
+    assert alone["energy/self_contact"][0] > 0.0 and {z.kind for z in alone.zones[0]} == {"rod", "catenary"}
+    for k, line in enumerate(system.lines.values()):
+        assert np.abs(line.position - np.array([0, 3.0 * k, 0]) - alone.position).max() < 1e-9
+        assert line.zones[0] == alone.zones[0]
+        for name in ("energy/self_contact", "self_contact", "tension", "reaction_start"):
+            here, there = line[name], alone[name]
+            assert np.abs(here - there).max() <= 1e-6 * np.abs(there).max() > 0.0, name
+        told = {e.kind: e.text for e in line.events}
+        assert "damped motion with contact" in told["stability not judged"]
+        assert "touches itself" in told["static friction neglected"] and "line touches itself" in told
+    assert system.attributes["static_residual"] < 1e-9
+    stays(scene, system, "line 1")
+
+
+def test_a_line_that_a_body_presses_against_itself() -> None:
+    scene = at_a_body()
+    result = hybrid.static(scene)
+    hose = result.lines["hose"]
+    assert hose["energy/self_contact"][0] > 0.0 and 0.94 < float(hose["self_distance/distance"]) / WIDTH < 1.05
+    assert result.attributes["static_residual"] < 1e-9
+    without = at_a_body()
+    without["lines"]["hose"]["contact"] = {"self": False}
+    there = hybrid.static(without)["bodies/pod/position"][0]
+    assert np.linalg.norm(result["bodies/pod/position"][0] - there) > 1e-4  # the contact holds it off
+    stays(scene, result, "hose")
+
+
+def test_a_first_shape_knows_no_friction() -> None:
+    scene = beside_each_other(0.0)
+    scene["lines"]["line 0"] |= {"initial": {"points": OPEN, "friction": "settled"}}
+    with pytest.raises(hybrid.SceneError, match=r"initial\.friction[\s\S]*neglected"):
+        hybrid.static(scene)
