@@ -35,3 +35,9 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         commands = [[sys.executable, str(script), half] for half in ("plane", "space")]
         for process in [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands]:
             process.wait()  # what fails here fails again, with words, in a test
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files beside the folders first: they run pages and examples, and what takes a minute is not left to the end."""
+    tests = Path(__file__).parent / "tests"
+    items.sort(key=lambda item: item.path.parent != tests)
