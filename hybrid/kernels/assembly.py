@@ -1,4 +1,4 @@
-"""The march along s: geometry, laws and balance of one node after the other, each block row eliminated as it is born.
+"""Block rows of nodes in space: geometry, laws and balance of one node after the other, for the march (kernels.march).
 
 The layout of a block row and its elimination are in kernels.block_elimination; symbols as in
 kernels.cell, kernels.element and kernels.loads.
@@ -9,18 +9,15 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from hybrid.kernels.axial_law import LOSS, SHIFT
-from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH, eliminate_narrow, eliminate_wide
+from hybrid.kernels.block_elimination import SIZE, WIDTH, eliminate_narrow, eliminate_wide
 from hybrid.kernels.cell import Chord, chord, damped_stretch, moment_force, pull, rotary_force, stretch, turning
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import after, angular_velocity, before, bending, damped_bending
 from hybrid.kernels.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.node_forces import Z3, Z9, get3, node_loads
 from hybrid.kernels.report import (
-    ASSEMBLED,
     FORCE_A,
     FORCE_B,
-    MOMENT_A,
-    MOMENT_B,
     RESIDUAL,
     RESIDUAL_NODE,
     STIFFNESS_DAMPING_POWER,
@@ -395,61 +392,3 @@ def eliminate(W, X, i, kept, node, cell_before, cell, force_before, wide, couple
         return eliminate_narrow(sized, hck, gap, Z3, Z9, UNIT, Z3, Z9, node.gap, X, i, kept, size)
     back, L = scale(-1.0, cell_before.chord.d), mscale(-1.0, node.G1)
     return eliminate_narrow(sized, hck, gap, back, L, node.D, cell.chord.d, node.G2, node.rhs, X, i, kept, size)
-
-
-@kernel
-def march(line, sea, ends, r, state, cv, ca, work):
-    """Assemble and eliminate all block rows for the configuration given.
-
-    Everything belongs to the end of the step.  work.u is the displacement since its start, r (N+1, 3) the position
-    then; state.r is not read.  Returns -1, or the node whose block was singular.  work.rows with N+1 entries receives
-    every block row before elimination (for tests and independent solvers); with one that of a held start, which is then
-    its balance.  An X with room for more keeps the factors for another right-hand side, and one with room for the
-    factors of one block those of the last (kernels.block_elimination).
-    """
-    n = line.h.shape[0]
-    u, W, X, report, rows = work.u, work.W, work.X, work.report, work.rows
-    keeps_start, keeps_rows = rows.shape[0] == 1, rows.shape[0] > 1
-    kept, next_kept, last_kept, room = 0, 0, 0, X.shape[0] - (n + 1) * ROW
-    known = work.torsion.known
-    if room == KEPT:
-        last_kept = (n + 1) * ROW
-    elif room > 0 and (known.shape[0] == 0 or known[2] + known[3] > 0.0):
-        kept, next_kept = (n + 1) * ROW, KEPT
-    for j in range(ASSEMBLED):
-        report[j] = 0.0
-    report[RESIDUAL_NODE] = -1.0
-
-    cell_before = Cell(Chord(Z3, 0.0, 0.0), Z3, Z3, Z9, Z9)
-    force_before = Force(Z3, Z9, Z3, Z9, Z3, Z9, Z3, Z3, -1.0, 0.0)  # there is no cell before the start: dT = 0
-    bent_before = False
-    cell = cell_at(line, ends, state, 0, cv)
-    couple = work.couple
-    here = element_at_start(line, ends, state, cell, cv, couple, report)
-    report[MOMENT_A], report[MOMENT_A + 1], report[MOMENT_A + 2] = here.M
-    for i in range(n + 1):
-        following = cell_at(line, ends, state, i + 1, cv)
-        there = element_after(line, ends, state, i, cell, following, cv, couple, report)
-        bent = i < n and (line.element[i] != 0 or line.element[i + 1] != 0 or line.spin[i] != 0)
-        force = cell_force(line, state, i, cell, here, there, bent, work.gaps, cv, ca, couple, report)
-        node = balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, force, cv, ca, report)
-        wide = bent or bent_before
-        if wide or keeps_rows or (keeps_start and i == 0):
-            passed = work.torsion.passed
-            fill(W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca, passed, couple)
-            if keeps_start and i == 0:
-                keep_row(rows, 0, W)
-            if node.held:
-                hold(W, size_of_spin(line, i, cell, here, there, ca), node.gap[0], node.gap[1], node.gap[2])
-            if keeps_rows:
-                keep_row(rows, i, W)
-        if i == n:
-            kept += last_kept
-        if not eliminate(W, X, i, kept, node, cell_before, cell, force_before, wide, couple.shape[0] > 0):
-            return i
-        if i == n - 1:
-            report[MOMENT_B], report[MOMENT_B + 1], report[MOMENT_B + 2] = there.M
-        kept += next_kept
-        cell_before, force_before, bent_before = cell, force, bent
-        cell, here = following, there
-    return -1

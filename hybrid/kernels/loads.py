@@ -36,28 +36,26 @@ def half_cell_drag(u, d, il, cn, ct):
     i = 1.0 / s if s.real > 0.0 else 0.0 * s
     f, p, q = half_cell(ut, un, a, s, d, cn, ct)
 
-    # df/du = -cn (|un| P + un un^T/|un|) - 2 ct |ut| d d^T
+    # df/du = -cn (|un| P + un un^T/|un|) - 2 ct |ut| d d^T; products that appear twice are written once
     c1, c2, c3 = -p, -cn * i, p - 2.0 * ct * a
+    x, y, z = c2 * un[0], c2 * un[1], c2 * un[2]
+    dx, dy, dz = c3 * d[0], c3 * d[1], c3 * d[2]
+    xy, xz, yz = x * un[1] + dx * d[1], x * un[2] + dx * d[2], y * un[2] + dy * d[2]
     B = (
-        c1 + c2 * un[0] * un[0] + c3 * d[0] * d[0], c2 * un[0] * un[1] + c3 * d[0] * d[1], c2 * un[0] * un[2] + c3 * d[0] * d[2],
-        c2 * un[1] * un[0] + c3 * d[1] * d[0], c1 + c2 * un[1] * un[1] + c3 * d[1] * d[1], c2 * un[1] * un[2] + c3 * d[1] * d[2],
-        c2 * un[2] * un[0] + c3 * d[2] * d[0], c2 * un[2] * un[1] + c3 * d[2] * d[1], c1 + c2 * un[2] * un[2] + c3 * d[2] * d[2],
+        c1 + x * un[0] + dx * d[0], xy, xz,
+        xy, c1 + y * un[1] + dy * d[1], yz,
+        xz, yz, c1 + z * un[2] + dz * d[2],
     )  # fmt: skip
 
     # df/de = (1/l) { cn [|un| (d un^T + ut P) + (ut/|un|) un un^T] - ct [2 |ut| d un^T + |ut| ut P] }
     b1, b2, b3 = il * (p * ut - q), il * (p - 2.0 * ct * a), il * cn * ut * i
-    b4 = -b1
+    x, y, z = b2 * un[0] - b1 * d[0], b2 * un[1] - b1 * d[1], b2 * un[2] - b1 * d[2]  # beside d
+    ux, uy, uz = b3 * un[0], b3 * un[1], b3 * un[2]
     L = (
-        b1 + b4 * d[0] * d[0] + b2 * d[0] * un[0] + b3 * un[0] * un[0],
-        b4 * d[0] * d[1] + b2 * d[0] * un[1] + b3 * un[0] * un[1],
-        b4 * d[0] * d[2] + b2 * d[0] * un[2] + b3 * un[0] * un[2],
-        b4 * d[1] * d[0] + b2 * d[1] * un[0] + b3 * un[1] * un[0],
-        b1 + b4 * d[1] * d[1] + b2 * d[1] * un[1] + b3 * un[1] * un[1],
-        b4 * d[1] * d[2] + b2 * d[1] * un[2] + b3 * un[1] * un[2],
-        b4 * d[2] * d[0] + b2 * d[2] * un[0] + b3 * un[2] * un[0],
-        b4 * d[2] * d[1] + b2 * d[2] * un[1] + b3 * un[2] * un[1],
-        b1 + b4 * d[2] * d[2] + b2 * d[2] * un[2] + b3 * un[2] * un[2],
-    )
+        b1 + d[0] * x + ux * un[0], d[0] * y + ux * un[1], d[0] * z + ux * un[2],
+        d[1] * x + uy * un[0], b1 + d[1] * y + uy * un[1], d[1] * z + uy * un[2],
+        d[2] * x + uz * un[0], d[2] * y + uz * un[1], b1 + d[2] * z + uz * un[2],
+    )  # fmt: skip
     return f, B, L
 
 
@@ -68,17 +66,16 @@ def half_cell_added_mass(vd, d, il, an, at, ca):
     n = (vd[0] - t * d[0], vd[1] - t * d[1], vd[2] - t * d[2])
     f = (-an * n[0] - at * t * d[0], -an * n[1] - at * t * d[1], -an * n[2] - at * t * d[2])
     c1, c2 = -ca * an, ca * (an - at)
-    D = (
-        c1 + c2 * d[0] * d[0], c2 * d[0] * d[1], c2 * d[0] * d[2],
-        c2 * d[1] * d[0], c1 + c2 * d[1] * d[1], c2 * d[1] * d[2],
-        c2 * d[2] * d[0], c2 * d[2] * d[1], c1 + c2 * d[2] * d[2],
-    )  # fmt: skip
+    x, y, z = c2 * d[0], c2 * d[1], c2 * d[2]
+    xy, xz, yz = x * d[1], x * d[2], y * d[2]
+    D = (c1 + x * d[0], xy, xz, xy, c1 + y * d[1], yz, xz, yz, c1 + z * d[2])
     b = il * (an - at)
     bt = b * t
+    x, y, z = b * n[0] - bt * d[0], b * n[1] - bt * d[1], b * n[2] - bt * d[2]
     L = (
-        bt - bt * d[0] * d[0] + b * d[0] * n[0], -bt * d[0] * d[1] + b * d[0] * n[1], -bt * d[0] * d[2] + b * d[0] * n[2],
-        -bt * d[1] * d[0] + b * d[1] * n[0], bt - bt * d[1] * d[1] + b * d[1] * n[1], -bt * d[1] * d[2] + b * d[1] * n[2],
-        -bt * d[2] * d[0] + b * d[2] * n[0], -bt * d[2] * d[1] + b * d[2] * n[1], bt - bt * d[2] * d[2] + b * d[2] * n[2],
+        bt + d[0] * x, d[0] * y, d[0] * z,
+        d[1] * x, bt + d[1] * y, d[1] * z,
+        d[2] * x, d[2] * y, bt + d[2] * z,
     )  # fmt: skip
     return f, D, L
 

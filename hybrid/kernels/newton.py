@@ -1,6 +1,6 @@
 """Newton's method for one step (in time, or one static solve): the only nonlinear loop of the package.
 
-Each iteration is one march along s and one substitution back (kernels.assembly), then an update of positions,
+Each iteration is one march along s and one substitution back (kernels.march), then an update of positions,
 tensions, frames and rates.  `plane` and `space`: for which kind of line (kernels.configuration).
 
 `solve` is inlined in the one entry to all that needs the march (kernels.run): a second one would compile it once more.
@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from hybrid.kernels.assembly import march
 from hybrid.kernels.assembly_plane import march_planar
 from hybrid.kernels.block_elimination import substitute
 from hybrid.kernels.block_elimination_plane import substitute_planar
@@ -19,6 +18,7 @@ from hybrid.kernels.compile import inner
 from hybrid.kernels.configuration import first_bad, measure, update
 from hybrid.kernels.forces import FRICTION
 from hybrid.kernels.generalized_alpha import Scheme, scheme
+from hybrid.kernels.march import march
 from hybrid.kernels.references import caller, caller_of_six
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE, SELF_CONTACT_ENERGY
 from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates

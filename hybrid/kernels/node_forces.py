@@ -7,7 +7,7 @@ and kernels.seabed.
 from __future__ import annotations
 
 from hybrid.kernels.bed import bed_before, bed_beside, bed_under
-from hybrid.kernels.compile import inner
+from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
 from hybrid.kernels.loads import body_drag, half_cell_added_mass, half_cell_drag
 from hybrid.kernels.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_POWER, MASS_DAMPING_POWER, WAVE_POWER
@@ -105,7 +105,7 @@ def body_water(line, i, z, eta, u, U1, vi, b, af, cv, ca, report):
 
 @inner
 def seabed_forces(line, sea, i, x, u, v, e, cv, report):
-    """Contact and friction at node i: F, D, GL, GR."""
+    """Contact and friction at node i: whether there are any, F, D, GL, GR."""
     n, p = bed_under(sea, x)
     left = right = n  # normals of the bed under the nodes beside this one
     pd = -dot(n, get3(v, i))
@@ -127,7 +127,11 @@ def seabed_forces(line, sea, i, x, u, v, e, cv, report):
     if line.footing[i] > 0.0 and p > 0.0:
         f, f0, g0 = pressure(0.0, p, p, pd, pd, sea.stiffness, sea.damping, sea.onset)
         N, DN = N + line.footing[i] * f, DN + line.footing[i] * (f0 + cv * g0)
-    F, slope, q = scale(N, n), n, (0.0, 0.0, 0.0)
+    if N == 0.0 and DN == 0.0 and NL == 0.0 and NR == 0.0:
+        for k in range(3):
+            sea.slid[i, k], sea.bed[i, k] = 0.0, 0.0
+        return False, Z3, Z9, Z9, Z9
+    F, slope, q = scale(N, n), n, Z3
     D = Z9
     report[CONTACT_FORCE] += N
     if line.bits & FRICTION and N > 0.0:
@@ -145,7 +149,7 @@ def seabed_forces(line, sea, i, x, u, v, e, cv, report):
     # n turns with x is left out: p times the curvature of the bed
     L, R = mscale(NL, outer(slope, left)), mscale(NR, outer(slope, right))
     D = madd(D, mscale(-DN, outer(slope, n)))
-    return F, madd(D, mscale(-1.0, madd(L, R))), L, mscale(-1.0, R)
+    return True, F, madd(D, mscale(-1.0, madd(L, R))), L, mscale(-1.0, R)
 
 
 @inner
@@ -189,7 +193,7 @@ def inertia_and_water(line, sea, i, z, vi, vdi, before, after, cv, ca, report):
     return F, D, GL, GR
 
 
-@inner
+@kernel  # called for every node, not inlined in each of the loops that do
 def node_loads(line, sea, i, r, u, state, before, after, cv, ca, report):
     """Force on node i but for the cells' own: F, and its derivatives D (dr_i), GL, GR (chord before, after)."""
     v = state.v
@@ -198,6 +202,7 @@ def node_loads(line, sea, i, r, u, state, before, after, cv, ca, report):
     )
     if line.bits & SEABED:
         x = (r[i, 0] + u[i, 0], r[i, 1] + u[i, 1], r[i, 2] + u[i, 2])
-        f, Df, L, R = seabed_forces(line, sea, i, x, u, v, state.e, cv, report)
-        F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
+        touches, f, Df, L, R = seabed_forces(line, sea, i, x, u, v, state.e, cv, report)
+        if touches:
+            F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
     return F, D, GL, GR

@@ -78,6 +78,11 @@ def cut(p0, p1, v0, v1, k, c, o):
 @kernel
 def contact(p0, p1, v0, v1, h, k, c, o):
     """Force N on the node at p0, and its derivatives by p0, p1, v0, v1.  Called where one of p0, p1 is positive."""
+    if p0 >= o and p1 >= o:
+        q0, q1 = k * (p0 - 0.5 * o) + c * v0, k * (p1 - 0.5 * o) + c * v1
+        if q0 > 0.0 and q1 > 0.0:  # all of the half cell presses, and q is linear: most of what lies on the bed
+            w = h / 6.0
+            return w * (2.0 * q0 + q1), 2.0 * w * k, w * k, 2.0 * w * c, w * c
     N = N0 = N1 = V0 = V1 = 0.0
     for a, b in cut(p0, p1, v0, v1, k, c, o):
         w = 0.5 * h * (b - a)

@@ -5,6 +5,8 @@ The laws are those of kernels.end_motion.driven_position and driven_frame, which
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from hybrid.kernels.state import Floats
@@ -12,6 +14,7 @@ from hybrid.kernels.state import Floats
 # Columns of a path: begin and end (s), position and velocity at both (m, m/s), frame at the begin, rotation vector.
 FROM, TO, AT, SPEED, THERE, SPEED_THERE, FRAME, TURN = 0, 1, 2, 5, 8, 11, 14, 23
 PATH = 26
+Vector = tuple[float, float, float] | Floats
 
 
 class DrivenEnd:
@@ -20,21 +23,23 @@ class DrivenEnd:
     def __init__(self, path: Floats, position: Floats, frame: Floats, held: bool, turns: bool) -> None:
         """path: (PATH,) filled here; position: (3,) m; frame: (3, 3); held, turns: what is set of it."""
         self.path, self.held, self.turns = path, held, turns
+        self._numbers: Any = path.data  # the same, of which one number costs a third of what numpy takes
         self.stand(position, frame)
 
-    def set(self, begin: float, end: float, position: Floats, velocity: Floats, turn: Floats) -> None:
+    def set(self, begin: float, end: float, position: Vector, velocity: Vector, turn: Vector) -> None:
         """From where it is at `begin` (s) to a place at `end`; turn: rotation vector in the axes of its frame, rad."""
-        path = self.path
-        if begin < path[TO]:  # on its way
+        path, numbers = self.path, self._numbers
+        if begin < numbers[TO]:  # on its way
             path[AT:SPEED], path[SPEED:THERE], frame, _ = self.at(begin)
             path[FRAME:TURN] = np.ravel(frame)
         else:
-            path[AT:THERE] = path[THERE:FRAME]
-            if any(path[TURN:PATH].tolist()):
+            numbers[AT:THERE] = numbers[THERE:FRAME]
+            if numbers[TURN] or numbers[TURN + 1] or numbers[TURN + 2]:
                 path[FRAME:TURN] = np.ravel(path[FRAME:TURN].reshape(3, 3) @ rotation(path[TURN:PATH]))
-        path[FROM], path[TO] = begin, end
-        path[THERE:SPEED_THERE], path[SPEED_THERE:FRAME] = position, velocity
-        path[TURN:PATH] = turn
+        numbers[FROM], numbers[TO] = begin, end
+        numbers[THERE], numbers[THERE + 1], numbers[THERE + 2] = position
+        numbers[SPEED_THERE], numbers[SPEED_THERE + 1], numbers[SPEED_THERE + 2] = velocity
+        numbers[TURN], numbers[TURN + 1], numbers[TURN + 2] = turn
 
     def at(self, t: float) -> tuple[Floats, Floats, Floats, Floats]:
         """Position (3,) m, velocity (3,) m/s, frame (3, 3), angular velocity (3,) 1/s at t (s); inertial."""

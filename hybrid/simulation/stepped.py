@@ -42,6 +42,7 @@ class Locked(Protocol):
     lock: Any
 
 
+Triple = tuple[float, float, float]
 P = ParamSpec("P")
 R = TypeVar("R")
 L = TypeVar("L", bound=Locked)
@@ -83,6 +84,16 @@ def vector(x: Sequence[float] | Floats, name: str) -> Floats:
     if value.shape != (3,) or not all(map(isfinite, value.tolist())):
         raise ValueError(f"{name}: expected three finite numbers, found {x!r:.60}")
     return value
+
+
+def triple(x: Sequence[float] | Floats, name: str) -> Triple:
+    """As `vector`, for what is set at every step: a tuple or list of floats is not made an array first."""
+    if type(x) in (tuple, list) and len(x) == 3:
+        a, b, c = x
+        if type(a) is type(b) is type(c) is float and isfinite(a) and isfinite(b) and isfinite(c):
+            return a, b, c
+    a, b, c = vector(x, name).tolist()
+    return a, b, c
 
 
 def numbers(x: Any, name: str) -> Floats:

@@ -16,16 +16,17 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.interface_stiffness import interface_stiffness
 from hybrid.simulation.payout import length_asked
-from hybrid.simulation.stepped import EndForces, numbers, one_thread, vector
+from hybrid.simulation.stepped import EndForces, Triple, numbers, one_thread, triple, vector
 from hybrid.simulation.time_loop import TimeLoop
 from hybrid.simulation.transient import StepFailed
 
 ENDS = ("start", "end")
 # Of the largest component: what is out of a plane by no more is in it.
 IN_PLANE = 1e-9
-STILL: Floats = np.zeros(3)
-# Where the report of a step has the forces and the moments at both ends.
-OF_ENDS = np.concatenate([np.arange(k, k + 3) for k in (FORCE_A, FORCE_B, MOMENT_A, MOMENT_B)])
+STILL = (0.0, 0.0, 0.0)
+# Rows of three numbers that the report of a step begins with: the forces and the moments at both ends.
+OF_ENDS = 4
+assert (FORCE_A, FORCE_B, MOMENT_A, MOMENT_B) == (0, 3, 6, 9)
 
 
 class SteppedEnds:
@@ -37,11 +38,13 @@ class SteppedEnds:
     _recorder: DeferredRecorder
     _closed: bool
     _driven: dict[int, DrivenEnd]
-    _next: dict[int, tuple[Floats, Floats, Floats | None]]  # what ends are set to, for the next step
+    _next: dict[int, tuple[Triple, Triple, Triple]]  # what ends are set to, for the next step
     _wound: tuple[float | None, float] | None  # length and rate that are set for the next step
     _driven_of: Model | None = None  # whose ends those that are set were last looked for among
     _signed: Model | None = None  # of which the next are
-    _signs: Floats  # (12,) what of the report of a step is a force or a moment on what holds an end, with its sign
+    _signs: Floats  # (4, 3) what of the report of a step is a force or a moment on what holds an end, with its sign
+    _report: Floats | None = None  # of the last step, of which the next are
+    _reported: Floats  # (4, 3) forces and moments at both ends in it
 
     @property
     def t(self) -> float:
@@ -76,17 +79,17 @@ class SteppedEnds:
                 raise ValueError(f"ends.{end} has a motion in the scene: leave it out to set the end from outside")
             self._driven[k] = conditions.drive(k)
             self._loop.run.run.move(conditions.moves())
-        there = self._driven[k].at(self.t)[0] if position is None else vector(position, "position")
-        speed, turn = vector(STILL if velocity is None else velocity, "velocity"), None
+        there = triple(self._driven[k].at(self.t)[0] if position is None else position, "position")
+        speed, turn = STILL if velocity is None else triple(velocity, "velocity"), STILL
         if self.scene.dimension == 2:
-            self._check_plane(end, "position", there - self._driven[k].at(self.t)[0])
+            self._check_plane(end, "position", np.array(there) - self._driven[k].at(self.t)[0])
         if frame is not None:
             now = self._driven[k].at(self.t)[2]
             wanted = numbers(frame, "frame")
             proper = wanted.shape == (3, 3) and np.allclose(wanted.T @ wanted, np.eye(3), atol=1e-6)
             if not (proper and np.linalg.det(wanted) > 0.0):
                 raise ValueError("frame: expected a rotation matrix (3, 3), right-handed")
-            turn = rotation_vector(now.T @ wanted)
+            turn = triple(rotation_vector(now.T @ wanted), "frame")
         self._next[k] = there, speed, turn
 
     @property
@@ -189,10 +192,11 @@ class SteppedEnds:
         if moving.model is not self._signed:
             self._signed, held = moving.model, moving.model.ends.values.held
             parts = held[0], held[1], self._turns(0), -1.0 * self._turns(1)
-            self._signs = np.repeat(np.array(parts, float), 3)
-        found = moving.run.books.report[0][OF_ENDS]
-        found *= self._signs
-        return EndForces(found[:3], found[3:6], found[6:9], found[9:])
+            self._signs = np.repeat(np.array(parts, float), 3).reshape(OF_ENDS, 3)
+        report = moving.run.books.report
+        if report is not self._report:
+            self._report, self._reported = report, report[0, : 3 * OF_ENDS].reshape(OF_ENDS, 3)
+        return EndForces(*(self._reported * self._signs))
 
     @one_thread
     def stiffness(self, end: str) -> Floats:

@@ -30,7 +30,7 @@ from hybrid.simulation.case import Case
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.direct_steps import DirectSteps
 from hybrid.simulation.first_use import compile_beside
-from hybrid.simulation.stepped import CableState, Saved, in_space, iterations_allowed, one_thread, tension_now
+from hybrid.simulation.stepped import CableState, Saved, Triple, in_space, iterations_allowed, one_thread, tension_now
 from hybrid.simulation.stepped_ends import STILL, SteppedEnds
 from hybrid.simulation.transient import StepFailed
 from hybrid.store.hdf5_file import check_target
@@ -98,7 +98,7 @@ class Simulation(SteppedEnds):
         self._loop.recorder = self._recorder = DeferredRecorder(recorder)
         self._driven: dict[int, DrivenEnd] = {}
         self._wound: tuple[float | None, float] | None = None  # length and rate that are set for the next step
-        self._next: dict[int, tuple[Floats, Floats, Floats | None]] = {}  # what ends are set to, for the next step
+        self._next: dict[int, tuple[Triple, Triple, Triple]] = {}  # what ends are set to, for the next step
         self._loop.patient = self._plain
         self._loop.run.run.count[b.MOST_ITERATIONS] = self._most
         self._loop.run.run.wait_longer()
@@ -142,18 +142,18 @@ class Simulation(SteppedEnds):
             raise ValueError(f"a step has failed ({reason}): restore() what save() returned, or close()")
         if isinstance(until, bool) or not isinstance(until, NUMBER):
             raise ValueError(f"until: expected a number, in s, found {until!r:.60}")
-        now, duration, sliver = self.t, self._duration, self._sliver
+        moving, duration, sliver = self._loop.run, self._duration, self._sliver
+        now = moving.t
         if not now + sliver < until <= duration + sliver:
             raise ValueError(
                 f"until = {until:.9g} s, expected a time after {now:.9g} s, up to time.duration, {duration:g} s"
             )
-        if self._loop.run.payout is not None:
-            self._loop.run.payout.go_on(now, until, self._wound)
+        if moving.payout is not None:
+            moving.payout.go_on(now, until, self._wound)
             self._wound = None
         for k, end in self._driven.items():
-            wanted = self._next.pop(k, None)
-            position, velocity, turn = wanted or (end.at(now)[0], STILL, None)
-            end.set(now, until, position, velocity, STILL if turn is None else turn)
+            position, velocity, turn = self._next.pop(k, None) or (end.at(now)[0].tolist(), STILL, STILL)
+            end.set(now, until, position, velocity, turn)
         self._recorder.commit_old()
         try:
             self._step_to(min(until, duration))
@@ -164,7 +164,7 @@ class Simulation(SteppedEnds):
         if monotonic() - self._written > WRITE_EVERY:
             self._loop.write_down(everything=True)
             self._written = monotonic()
-        return self.t
+        return moving.t
 
     def _step_to(self, until: float) -> None:
         try:
