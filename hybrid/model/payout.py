@@ -16,7 +16,7 @@ from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
-from hybrid.model.mesh import Zone
+from hybrid.model.mesh import MOST_CELLS, Zone
 from hybrid.model.payout_law import extremes, law_of, least_length, lengths_at, refuse
 from hybrid.scene.payout import Payout
 from hybrid.scene.schema import AdaptiveModel, Modules, Scene, Section
@@ -269,6 +269,9 @@ def payout_plan(
         expected = f"at least {shortest:.6g} m: {left}"
         refuse(where, given, expected, fix)
     h = float(s[-1 - ride] - s[-2 - ride])
+    if not (longest - length) / h < MOST_CELLS:
+        given, expected = f"{longest:.6g} m of line in cells of {h:.6g} m", f"at most {MOST_CELLS} cells"
+        refuse(where, given, expected, "pay less out (the rate is in m/s, the length in m), or take longer cells")
     nodes: list[float] = s[: s.size - ride].tolist()
     for end in np.cumsum([x.length for x in sections[:-1]]).tolist():
         if nodes[-1] * (1 + 1e-9) < end:

@@ -11,6 +11,9 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state import Floats
 from hybrid.scene.payout import Payout
 
+# Of the length of the cable: as much may the first one given differ from it, by round-off.
+SAME_LENGTH = 1e-9
+
 
 def refuse(where: str, given: str, expected: str, fix: str) -> NoReturn:
     raise SceneError([Complaint(where, given, expected, fix)])
@@ -33,7 +36,7 @@ def law_of(payout: Payout, length: float, duration: float, where: str = "payout"
     if payout.rate is not None:
         return _law_of_rate(payout, length)
     if payout.file is not None:
-        payout = payout.model_copy(update=_rows_of(payout.file, where))
+        payout = payout.model_copy(update=_rows_of(payout.file, length, where))
     if payout.rates is not None:
         return _law_of_rates(np.array(payout.rates, float), length, duration)
     if payout.lengths is not None:
@@ -41,8 +44,8 @@ def law_of(payout: Payout, length: float, duration: float, where: str = "payout"
     return _rows([(0.0, [length])])
 
 
-def _rows_of(path: str, where: str) -> dict[str, Floats]:
-    """Rates or lengths over time of a file, by their key in the scene."""
+def _rows_of(path: str, length: float, where: str) -> dict[str, Floats]:
+    """Rates or lengths over time of a file, by their key in the scene; length: m, at t = 0."""
     from hybrid.scene.motion_file import RecordRefused, check_file, read_table
 
     name = Path(path).name
@@ -69,6 +72,12 @@ def _rows_of(path: str, where: str) -> dict[str, Floats]:
     if t[0] != 0.0 or (key == "rates" and x[0] != 0.0):
         expected = "a first row at t = 0" + (" with rate 0, because the line is at rest" if key == "rates" else "")
         refuse(f"{where}.file", f"{name}, line {lines[0]}: t = {t[0]:.9g}, {x[0]:.9g}", expected, "add that row")
+    if key == "lengths":
+        for k in np.flatnonzero(x <= 0.0)[:1]:
+            refuse(f"{where}.file", f"{name}, line {lines[k]}: length = {x[k]:.9g}", "lengths > 0, in m", "correct it")
+        if abs(x[0] - length) > SAME_LENGTH * length:
+            given, expected = f"{name}, line {lines[0]}: length = {x[0]:.9g}", f"{length:.9g} m, that of the cable"
+            refuse(f"{where}.file", given, expected, "the same length at t = 0, in m")
     return {key: np.column_stack([t, x])}
 
 
@@ -101,7 +110,7 @@ def _law_of_lengths(table: Floats, length: float, where: str) -> Floats:
     from scipy.interpolate import PPoly, make_interp_spline
 
     t, out = table.T
-    if abs(out[0] - length) > 1e-9 * length:
+    if abs(out[0] - length) > SAME_LENGTH * length:
         given, expected = f"{out[0]:.9g} m at t = 0", f"{length:.9g} m, the length of the cable"
         refuse(f"{where}.lengths", given, expected, "the same length")
     rest = [(1, 0.0), (2, 0.0)]

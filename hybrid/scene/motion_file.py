@@ -234,6 +234,10 @@ def _table(
             precision.add(cell)
         numbers.append(i)
     if not header:
+        try:
+            checked(name, [])
+        except RecordRefused as error:
+            raise RecordRefused(error.finding.expected, error.finding.fix, f"{name}, which is empty") from None
         raise RecordRefused("a table", "name the columns in the first line, such as t,x,y,z", f"{name}, which is empty")
     return header, values, precisions, numbers
 
@@ -250,7 +254,7 @@ def _checked_header(name: str, header: list[str]) -> list[str]:
 
 def _number(name: str, line: int, column: str, text: str) -> float:
     try:
-        value = float(text)
+        value = float(text) if "_" not in text else math.nan  # 1_0 is 10 to Python, and a slip to everybody else
     except ValueError:
         value = math.nan
     if not abs(value) <= LARGEST:

@@ -512,15 +512,22 @@ def test_rates_and_lengths_from_a_file(tmp_path: Path) -> None:
     found = hybrid.run(hanging({"file": str(table)}, 10.0))
     assert np.array_equal(given["payout/length"], found["payout/length"])
     assert np.array_equal(given["reaction_end"], found["reaction_end"])
-    for text in (
-        "t,rates\n0,0\n",
-        "t,rate\n0,0\n0,1\n",
-        "t,rate\n0,1\n2,1\n",
-        "t,length\n0,40\n2,41\n",
-        "t,rate\n0,x\n",
+    for text, told in (
+        ("", "columns t,rate or t,length"),
+        ("t,rates\n0,0\n", "with columns t, rates"),
+        ("t,rate\n0,0\n0,1\n", "line 3"),
+        ("t,rate\n0,0\n1_0,1\n", "line 3"),  # 10 to Python
+        ("t,rate\n0,1\n2,1\n", "line 2"),
+        ("t,length\n0,40\n2,41\n", "2 rows"),
+        ("t,length\n0,41\n2,41\n4,42\n", "line 2: length = 41"),
+        ("t,length\n0,40\n2,30\n# reeled in\n4,-5\n", "line 5: length = -5"),
+        ("t,rate\n0,x\n", "line 2"),
     ):
         table.write_text(text)
-        assert "payout.file" in refused(hanging({"file": str(table)}, 10.0))
+        message = refused(hanging({"file": str(table)}, 10.0))
+        assert "payout.file" in message and "rates.csv" in message and told in message, message
+    table.write_text("t,rate\n0,0\n1,1e8\n")  # 20 million cells: nothing of that size is allocated
+    assert "at most 1000000 cells" in refused(hanging({"file": str(table)}, 10.0))
 
 
 # --- the plan ---------------------------------------------------------------------------------------
