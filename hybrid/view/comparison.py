@@ -69,7 +69,7 @@ def _html(results: Mapping[str, Result]) -> str:
     text, figures = "", list[dict[str, Any]]()
     for key, (title, note, panels) in groups.items():
         if panels:
-            drawn = "".join(parts.figure_html(len(figures) - 1 + k, panel) for k, panel in enumerate(panels))
+            drawn = "".join(parts.figure_html(k, panel, 0) for k, panel in enumerate(panels, len(figures)))
             figures += [figure_of(panel, store) for panel in panels]
             text += f'<section id="{key}"><h2>{title}</h2><p class="quiet">{note}</p>'
             text += f'<div class="grid">{drawn}</div></section>'
@@ -108,7 +108,7 @@ def _table(results: Mapping[str, Result]) -> str:
     """Extremes and sizes of each, and how far they are from those of the first."""
     first = next(iter(results.values()))
     rows = [["length", *(f"{short(length_of(r), 6)} m" for r in results.values())]]
-    rows.append(["t to", *(f"{short(r.times[-1], 6)} s" for r in results.values())])
+    rows.append(["last output at t =", *(f"{short(r.times[-1], 6)} s" for r in results.values())])
     rows.append(["steps", *(str(len(r["steps/t"])) if "steps/t" in r else "–" for r in results.values())])
     for name, lowest, head in EXTREMES:
         if not all(name in r for r in results.values()):

@@ -178,16 +178,17 @@ def space_html(scene: dict[str, Any], poster: str, moves: bool, notice: str, cap
     return filled("cable.html", parts)
 
 
-def figure_html(k: int, panel: Panel) -> str:
-    """A graph with its title and caption; k: its number in the index; the cable in space is figure 1."""
+def figure_html(k: int, panel: Panel, before: int = 1) -> str:
+    """A graph with its title and caption; k: its place in the index; before: figures before that of place 0, such as
+    the cable in space."""
     title = panel.title[:1].upper() + panel.title[1:]
-    return f"<figure><h3>{escape(title)}</h3>{plot_html(k, panel)}{caption_html(k, panel)}</figure>"
+    return f"<figure><h3>{escape(title)}</h3>{plot_html(k, panel)}{caption_html(k, panel, before)}</figure>"
 
 
-def caption_html(k: int, panel: Panel) -> str:
+def caption_html(k: int, panel: Panel, before: int = 1) -> str:
     """A caption that can be quoted."""
     text = panel.caption or f"{panel.title[:1].upper()}{panel.title[1:]}."
-    return f"<figcaption><b>Figure {k + 2}.</b> {escape(text)}</figcaption>"
+    return f"<figcaption><b>Figure {k + 1 + before}.</b> {escape(text)}</figcaption>"
 
 
 def plot_html(k: int, panel: Panel) -> str:

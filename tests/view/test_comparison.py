@@ -48,6 +48,25 @@ def test_differences_are_those_at_the_same_instant_and_place() -> None:
     assert [line.label for line in ranges.items if line.label] == ["a", "b", "c"]
 
 
+def test_every_graph_stands_under_its_own_title(tmp_path: Path) -> None:
+    """What plotly draws at a place is the graph of the title, caption and still drawing there."""
+    page = hybrid.compare({"a": reported(), "b": reported(dip=500.0)}, tmp_path / "x.html").read_text()
+    figures = json.loads(re.search(r'id="index">(.*?)</script>', page, re.S)[1])["figures"]  # type: ignore[index]
+    places = re.findall(r'id="plot-([\w-]+)" data-figure="(-?\d+)"', page)
+    assert [int(k) for _, k in places] == list(range(len(figures)))
+    drawn = {
+        key: [figures[int(k)]["layout"][axis]["title"]["text"] for axis in ("xaxis", "yaxis")] for key, k in places
+    }
+    for key, axes in (
+        ("shape", ["x (m)", "z (m)"]), ("grounded_length", ["t (s)", "length on the seabed (m)"]),
+        ("range-tension", ["s (m)", "tension (kN)"]), ("range-curvature", ["s (m)", "curvature (1/m)"]),
+        ("tension-over", ["t (s)", "difference (N)"]), ("tension-along", ["s (m)", "difference (N)"]),
+    ):  # fmt: skip
+        assert drawn[key] == axes
+    captions = [int(k) for k in re.findall(r"<b>Figure (\d+)\.</b>", page)]
+    assert captions == list(range(1, len(figures) + 1))
+
+
 def test_the_table_has_differences_in_percent() -> None:
     table = _table({"a": reported(), "b": reported(dip=12000.0)})
     row = re.search(r"<tr><td>lowest tension</td>(.*?)</tr>", table)
