@@ -61,7 +61,9 @@ def page() -> str:
         title = (ROOT / "examples" / f"{name}.yaml").read_text(encoding="utf-8")
         title = next(line.removeprefix("title: ") for line in title.splitlines() if line.startswith("title: "))
         text += f"## {title}\n\n{words}\n\n"
-        text += f'<video controls loop muted playsinline preload="metadata" src="films/{name}.mp4"></video>\n\n'
+        # the poster is what phones show before a film is played
+        text += f'<video controls loop muted playsinline preload="metadata" poster="pictures/{name}.png" '
+        text += f'src="films/{name}.mp4"></video>\n\n'
         text += f"[{name}.yaml](../examples/{name}.yaml)\n\n"
     return text.rstrip("\n") + "\n"
 

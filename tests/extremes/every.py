@@ -86,9 +86,11 @@ def page(judged: Sequence[tuple[Case, Verdict]]) -> str:
         text += f"| {family} | " + " | ".join(cells) + f" | {worst:.2g} |\n"
         sources = list(dict.fromkeys(case.source for case, _ in cases))
         tables += f"\n## {family.capitalize()}\n\n" + "".join(f"{k}. {x}\n" for k, x in enumerate(sources, 1))
+        tables += f'\n<details markdown="1">\n<summary>{len(cases)} cases</summary>\n'
         tables += "\n| case | model | outcome | error | tolerance | truth | warnings or refusal |\n|---|---|---|---|---|---|---|\n"
         for case, v in cases:
             tables += line(case, v, sources.index(case.source) + 1) + "\n"
+        tables += "\n</details>\n"
     return text + tables
 
 
