@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from hybrid.errors import SceneError
 from hybrid.kernels.drag_law import body, half_cell, split
 from hybrid.kernels.forces import BODIES, DRAG, FLOW, SURFACE
 from hybrid.kernels.state import Floats, Line, Sea, State
@@ -322,7 +324,11 @@ def _end_conditions(
         motion = end.prescribed_motion
         if motion is not None:
             waves = around.values.waves, float(around.values.ramps[1]), end.held_tangent is not None
-            motions[k] = EndMotion(motion, end.held_position, base, around.elevation, waves)
+            try:
+                motions[k] = EndMotion(motion, end.held_position, base, around.elevation, waves)
+            except SceneError as error:  # of a table of the motion, which does not know whose it is
+                where = f"ends.{('start', 'end')[k]}"
+                raise SceneError([replace(x, where=f"{where}.{x.where}") for x in error.complaints]) from None
     held = [end.held_position is not None for end in scene.ends.both]
     when = [end.release for end in scene.ends.both]
     times = [x.time if x is not None and x.time is not None else np.inf for x in when]

@@ -181,7 +181,13 @@ def _kinks(times: Array, x: Array, unit: Array, negligible: float, from_rest: bo
         kink = (excess > ISOLATED * typical) & (excess > negligible) & (excess > unsure)
         worst = first + each.argmax(axis=1)
         jump = (np.abs(accel[inside]) * spacing[inside]).max(axis=1)
-        found += zip(worst[kink].tolist(), jump[kink].tolist(), strict=True)
+        sizes = np.abs(accel) * spacing
+        for i, size in zip(worst[kink].tolist(), jump[kink].tolist(), strict=True):
+            if size <= negligible:  # smooth itself, beside kinks so near each other that they hide each other
+                begin = max(i - 2, 0)
+                i = begin + int(np.argmax(sizes[begin : i + 3]))
+                size = float(sizes[i])
+            found.append((i, size))
     # A kink casts its shadow on the samples that are interpolated from it: of neighbours, the largest is meant.
     largest = [k for k in found if all(k[1] >= other[1] for other in found if abs(k[0] - other[0]) <= NEIGHBOURS)]
     return [(float(times[i + 1]), size) for i, size in largest]

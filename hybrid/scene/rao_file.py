@@ -46,6 +46,8 @@ def _read(
         return read_dataset(path)
     name = Path(path).name
     header, table, lines = read_table(path, _checked_header)
+    if not lines:
+        raise RecordRefused("a row for every frequency and heading", "add them", f"{name}, 0 rows")
     columns = {column: table[:, header.index(column)] for column in header}
     w, headings = columns["frequency"], columns["heading"]
     for bad in np.flatnonzero(w <= 0.0)[:1]:
@@ -53,8 +55,14 @@ def _read(
         raise RecordRefused("frequencies > 0, in rad/s", "2 pi over the period", given)
     frequency, row = np.unique(w, return_inverse=True)
     heading, column = np.unique(headings, return_inverse=True)
-    if len(set(zip(row.tolist(), column.tolist(), strict=True))) != len(w) or frequency.size * heading.size != len(w):
-        given = f"{name}: {len(w)} rows for {frequency.size} frequencies and {heading.size} headings"
+    first = np.full((frequency.size, heading.size), -1)
+    for k, (i, j) in enumerate(zip(row.tolist(), column.tolist(), strict=True)):
+        if first[i, j] >= 0:
+            given = f"{name}, line {lines[k]}: frequency and heading of line {lines[first[i, j]]} again"
+            raise RecordRefused("one row for every frequency and heading", "drop one of them", given)
+        first[i, j] = k
+    for i, j in np.argwhere(first < 0)[:1]:
+        given = f"{name}: no row for {frequency[i]:g} rad/s at {heading[j]:g} deg, {(first < 0).sum()} missing in all"
         raise RecordRefused("one row for every frequency and heading", "complete the table", given)
     response = np.zeros((frequency.size, heading.size, 6), complex)
     for k, freedom in enumerate(FREEDOMS):

@@ -117,6 +117,13 @@ def test_size_of_the_jump() -> None:
     assert jump is not None and jump == pytest.approx((20.0, 0.3))
 
 
+def test_a_leap_has_its_size_where_its_kinks_hide_each_other() -> None:
+    """Near the begin of a record that is blended in: what the test finds is a smooth sample beside them."""
+    t, values = np.arange(12.0), np.zeros((12, 3))
+    values[:, 0] = np.where(t > 1.0, 100.0, 0.0)
+    assert first_jump(t, values, np.zeros((12, 3)), from_rest=False) == pytest.approx((1.0, 100.0))
+
+
 def test_jumps_outside_the_computation_do_not_matter() -> None:
     t = np.arange(-20.0, 80.0, 0.5)
     values = np.zeros((len(t), 3))
