@@ -41,7 +41,7 @@ from hybrid.simulation.error_statistics import (
     snaps,
     statistics_of,
 )
-from hybrid.simulation.finer_result import NOT_KEPT, Before
+from hybrid.simulation.finer_result import NOT_KEPT, Judged, is_no_better, not_kept_text
 from hybrid.simulation.refinement import (
     COSTLY_ACCURACY,
     MOST_OF_MODEL,
@@ -49,7 +49,6 @@ from hybrid.simulation.refinement import (
     Free,
     Verdict,
     costly,
-    judge,
     missed,
     not_converged,
     refined,
@@ -194,45 +193,43 @@ class ErrorController:
                 self.note_missed(verdict)
         return self.estimate.run, errors
 
-    def _judge(self, resolution: Resolution) -> Estimate:
-        """Whether the result is as accurate as asked, and what follows; its estimate."""
+    def _judge(self, resolution: Resolution) -> None:
+        """Whether the result is as accurate as asked, and what follows."""
         assert self.estimate is not None
         if self.estimate.lacks_model_errors():
             self._renew_model_errors(self.estimate, resolution)
         self.next = self.next_resolution()
-        return self.estimate
 
     def _judge_finer(self, estimate: Estimate, resolution: Resolution, result: RunSample) -> None:
         """The same of a finer result; where it is the last and no better than that before it, that one stays."""
-        asked, irregular = self.asked, self.irregular
-        before = Before.of(estimate, self.verdict(asked)) if asked is not None and not irregular else None
-        kept = True
+        before, kept = self.judged(True).copied(), True
         try:
             self.next_estimate(estimate, resolution, result)
-            finer = self._judge(resolution)
-            if asked is None or before is None or self.next is not None or self.irregular:
+            self._judge(resolution)
+            if self.asked is None or self.next is not None:
                 return
-            found = self.verdict(asked)
-            if before.is_better(asked, finer, found):
-                kept, self.estimate = False, before.estimate
-                before.estimate.set_apart(finer.run)
-                text = f"{finer.run.cells} cells and {finer.run.steps} steps are no better: {found.text}"
-                self._notes.append((NOT_KEPT, f"{text}; the result is the one before"))
+            finer = self.judged(self.irregular)
+            found = is_no_better({"": self.asked}, {"": before}, {"": finer})
+            if found is not None:
+                kept = False
+                self.keep(before, finer)
+                self._notes.append((NOT_KEPT, not_kept_text(result, found)))
         finally:
             self.settle(kept)
 
+    def judged(self, of_statistics: bool) -> Judged:
+        """The errors of the result; of_statistics: with those of extremes and standard deviations."""
+        assert self.estimate is not None
+        return Judged(self.estimate, self.statistics if of_statistics else {}, tuple(self.scattered))
+
+    def keep(self, before: Judged, finer: Judged) -> None:
+        """Go back to the result before a finer one that is no better."""
+        before.set_apart(finer)
+        self.estimate, self.statistics = before.estimate, dict(before.statistics)
+
     def verdict(self, asked: RequestedAccuracy) -> Verdict:
         """How the errors compare with what is asked: at every instant, or of extremes and standard deviations."""
-        assert self.estimate is not None
-        if not self.irregular or not self.statistics:
-            return judge(asked, self.estimate.errors, self.estimate.run)
-        verdicts = []
-        for statistic, estimate in self.statistics.items():
-            skip = self.scattered if statistic == LARGEST else ()
-            found = judge(asked, estimate.errors, self.statistics[LARGEST].run, skip)
-            text = found.text.replace(": error", f", {STATISTICS[statistic]}: error")
-            verdicts.append(replace(found, text=text, statistic=statistic))
-        return max(verdicts, key=lambda found: found.ratio)
+        return self.judged(self.irregular).verdict(asked)
 
     @property
     def allowed_force(self) -> float | None:

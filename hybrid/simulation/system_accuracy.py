@@ -10,17 +10,16 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import time as clock
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hybrid.errors import ComputationError, SceneError
-from hybrid.model.build import Model
 from hybrid.model.output_points import output_points
 from hybrid.model.plan import output_interval
 from hybrid.model.resolution import (
@@ -34,28 +33,24 @@ from hybrid.model.resolution import (
 )
 from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.read import scene_text
-from hybrid.scene.schema import AdaptiveModel
 from hybrid.scene.system import System
 from hybrid.simulation.error_control import ErrorController, comparison_resolutions
 from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.error_report import effort, error_fields, known
 from hybrid.simulation.error_statistics import statistics_of
+from hybrid.simulation.finer_result import NOT_KEPT, Replacement, is_no_better, not_kept_text
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution, with_survey
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.refinement import COSTLY_ACCURACY, Free, costly, verdicts
 from hybrid.simulation.restore import refused, resolution_from, resolution_tree
 from hybrid.simulation.run_sample import (
-    COMPARED,
     NOT_ESTIMATED,
     RunSample,
-    catenary_share,
-    compared_cells,
-    split_outputs,
 )
 from hybrid.simulation.system_checkpoint import kept_resolution
-from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.system_model_errors import Stretches, as_rods, leaves_bending_out, rods_of, with_model_errors
-from hybrid.simulation.system_run import SystemRun, run_system, static_system
+from hybrid.simulation.system_run import run_system, static_system
+from hybrid.simulation.system_samples import compared, sample_of
 from hybrid.store.amend import amend_lines
 from hybrid.store.checkpoint import read_before
 from hybrid.store.comparison_recorder import ComparisonRecorder
@@ -114,6 +109,7 @@ class SystemPasses:
     ) -> None:  # fmt: skip
         """moves: whether its motion is computed, else its equilibrium; others as of `run_system`."""
         self.system, self.target, self.moves = system, target, moves
+        self._replacement = Replacement(target)
         self.reporter, self.interrupted = reporter, interrupted
         self.scenes = {name: system.scene_of(name) for name in system.lines}
         time = system.time
@@ -282,25 +278,50 @@ class SystemPasses:
     def _refine(self, resolution: SystemResolution, result: Samples) -> None:
         """Finer results until what is asked is met, or more would not help; then errors are written."""
         stopped: BaseException | None = None
-        while True:
-            wanted = self._judged(resolution, result)
-            if not wanted:
-                self._note_missed("")
-                break
+        why, wanted = "", self._judged(resolution, result)
+        while wanted:
             finer = self._finer(resolution, wanted)
             self._warn_of_costs(result, finer)
             try:
-                result, resolution = self._replaced(finer), finer
+                found = self._replacement.finer(partial(self._record, finer, name=REFINEMENT, found=_tree(finer)))
             except ComputationError as error:
-                self._note_missed(f"a finer run failed: {str(error).splitlines()[0]}")
+                why = f"a finer run failed: {str(error).splitlines()[0]}"
+                self._notes.append((NOT_KEPT, f"{why}; the result is the one before"))
                 break
             except KeyboardInterrupt as error:
-                self._note_missed("a finer run was stopped from outside")
-                stopped = error
+                why, stopped = "a finer run was stopped from outside", error
                 break
+            wanted, kept = self._judged_finer(finer, found)
+            if kept:
+                result, resolution = found, finer
+        self._note_missed(why)
         self._write(resolution, result)
         if stopped is not None:
             raise stopped
+
+    def _judged_finer(self, resolution: SystemResolution, result: Samples) -> tuple[dict[str, Resolution], bool]:
+        """As `_judged` of a finer result, and whether it takes the place of that before it.
+
+        The last stays beside where the lines together are no better: they are one result.
+        """
+        before = {n: x.judged(True).copied() for n, x in self.controls.items() if x.estimate is not None}
+        kept = True
+        try:
+            wanted = self._judged(resolution, result)
+            if wanted:
+                return wanted, True
+            finer = {n: x.judged(x.irregular) for n, x in self.controls.items() if x.estimate is not None}
+            asked = {n: x.asked for n, x in self.controls.items() if x.asked is not None}
+            found = is_no_better(asked, before, finer)
+            if found is not None:
+                kept = False
+                for name, control in self.controls.items():
+                    if name in before and name in finer:
+                        control.keep(before[name], finer[name])
+                self._notes.append((NOT_KEPT, not_kept_text(next(iter(result.values())), found)))
+            return {}, kept
+        finally:
+            self._replacement.settle(kept)
 
     def _judged(self, resolution: SystemResolution, result: Samples) -> dict[str, Resolution]:
         """Take over a result; how finely lines that miss what is asked of them want the next one."""
@@ -340,23 +361,6 @@ class SystemPasses:
     def _warn_of_costs(self, result: Samples, finer: SystemResolution) -> None:
         if not any(kind == COSTLY_ACCURACY for kind, _ in self._notes):
             self._notes += costly(self._costs, next(iter(result.values())), finer.one)
-
-    def _replaced(self, resolution: SystemResolution) -> Samples:
-        """A finer result in place of that before it, when it is complete."""
-        if isinstance(self.target, io.BytesIO):
-            new = io.BytesIO()
-            found = self._record(resolution, new, REFINEMENT)
-            self.target.seek(0)
-            self.target.truncate()
-            self.target.write(new.getvalue())
-            return found
-        beside = self.target.with_name(f".{self.target.name}.finer")
-        try:
-            found = self._record(resolution, beside, REFINEMENT, found=_tree(resolution))
-            os.replace(beside, self.target)
-        finally:
-            beside.unlink(missing_ok=True)
-        return found
 
     def _note_missed(self, why: str) -> None:
         """Say of each line that misses what is asked; why: more was tried in vain."""
@@ -408,33 +412,6 @@ def _elsewhere(resolution: Resolution) -> RunSample:
 
 def _tree(resolution: SystemResolution) -> Tree:
     return {name: resolution_tree(x) for name, x in resolution.lines.items()}
-
-
-def compared(line: LineResult, run: SystemRun, cpu: float) -> RunSample:
-    """What is compared of a line in a run that is only to be compared with; cpu: s, of all lines."""
-    found, resolution = line.recorder, run.resolution.lines[line.name]
-    assert isinstance(found, ComparisonRecorder)
-    values, _ = split_outputs({name: found[name] for name in found.names})
-    catenary = found.catenary if isinstance(line.scene.model, AdaptiveModel) else np.zeros(0)
-    return RunSample(
-        resolution, values, compared_cells(line.model), max(run.steps, 1), cpu, resolution.every, forces=found.steps,
-        catenary=catenary,
-    )  # fmt: skip
-
-
-def sample_of(line: Result, resolution: Resolution, model: Model, cpu: float) -> RunSample:
-    """What is compared of a line in a complete result; model: as it began; cpu: s, of all lines."""
-    values = {name: np.asarray(line[name]) for name in COMPARED if name in line}
-    columns = [f"steps/{name}" for name in ("t", "end_force_start", "end_force_end")]
-    forces = np.zeros((0, 3))
-    if len(line.times) > 1 and columns[0] in line:
-        forces = np.column_stack([line[name] for name in columns])
-    unresolved = any(event.kind == "unresolved bend" for event in line.events)
-    catenary = np.array([catenary_share(zones) for zones in line.zones]) if model.layout is not None else np.zeros(0)
-    return RunSample(
-        resolution, values, compared_cells(model), max(len(forces), 1), cpu, resolution.every, unresolved,
-        forces=forces, catenary=catenary,
-    )  # fmt: skip
 
 
 def refine_system(

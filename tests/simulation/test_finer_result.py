@@ -10,10 +10,12 @@ import pytest
 import hybrid
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.resolution import RequestedAccuracy, Resolution
+from hybrid.simulation import error_control
 from hybrid.simulation.case import Case
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.error_estimate import Estimate
-from hybrid.simulation.finer_result import NOT_KEPT, Before
+from hybrid.simulation.error_statistics import STATISTICS, estimates
+from hybrid.simulation.finer_result import NOT_KEPT, Judged, is_no_better
 from hybrid.simulation.refinement import Free, Verdict
 from hybrid.simulation.run_sample import RunSample
 
@@ -84,16 +86,73 @@ def test_a_finer_run_that_fails_leaves_the_one_before() -> None:
         (0.5, 3.0, True),  # more than the change before
     ],
 )
-def test_which_of_two_results_is_better(off: float, ratio: float, better: bool) -> None:
+def test_which_of_two_results_is_better(off: float, ratio: float, better: bool, monkeypatch) -> None:
     estimate = Estimate(made_up(), *comparisons())
-    verdict = Verdict(2.0, 1.0, 1.0, 0.0, "", name="position")
-    before = Before.of(estimate, verdict)
+    before = Judged(estimate).copied()
     finer = made_up(1.2, 120)
     everywhere = {"position": np.asarray(finer.values["position"]) - off}
     estimate.update(replace(finer, values=everywhere))
-    assert before.is_better(ASKED, estimate, replace(verdict, ratio=ratio)) is better
+    now, verdict = Judged(estimate), Verdict(2.0, 1.0, 1.0, 0.0, "", name="position")
+    ratios = {id(before.estimate): 2.0, id(estimate): ratio}
+    monkeypatch.setattr(Judged, "verdict", lambda self, asked: replace(verdict, ratio=ratios[id(self.estimate)]))
+    assert (is_no_better({"": ASKED}, {"": before}, {"": now}) is not None) is better
     assert before.estimate.run.cells == 100  # the copy stays what it was
     assert before.estimate.errors.largest("total", "position") == pytest.approx(0.012 * np.sqrt(3.0), rel=1e-3)
+
+
+def storm(fineness: float, steps: int, most: float = 0.0) -> RunSample:
+    """A force at the end that snaps, at other instants in every run: off by 3/fineness^2 N, its largest by `most` too."""
+    t = np.linspace(0.0, 400.0, 2001)
+    force = 500.0 * (1.0 + np.sin(np.pi * (t - 0.2 * round(2.0 / fineness)))) + 3.0 / fineness**2
+    force[700] = 1200.0 + 3.0 / fineness**2 + most
+    forces = np.column_stack([t[1:], force[1:], force[1:]])
+    reaction = np.stack([force, 0.0 * force, 0.0 * force], axis=-1)
+    resolution = Resolution(fineness, 10.0 / steps, 1e-6, 1e-3)
+    return RunSample(resolution, {"reaction_end": reaction}, round(100 * fineness), steps, 0.0, forces=forces)
+
+
+@pytest.mark.parametrize("most", [0.0, 60.0])
+def test_of_an_irregular_motion_statistics_decide(most: float) -> None:
+    """Runs snap at other instants, and statistics agree: the finer one counts, unless its largest force is far off."""
+    every = RequestedAccuracy(None, None, 1e-3)
+    runs = [storm(0.5, 50), storm(0.5, 25), storm(0.25, 25)]
+    first, finer = storm(1.0, 100), storm(1.5, 150, most)
+    estimate, found = Estimate(first, *runs), estimates(first, *runs, 1)
+    before = Judged(estimate, found).copied()
+    ratio = before.verdict(every).ratio
+    estimate.update(finer)
+    for name, statistic in error_control.statistics_of(finer, 1).items():
+        found[name].update(statistic)
+    now = Judged(estimate, found)
+    decides = is_no_better({"": every}, {"": before}, {"": now})
+    assert ratio > 1.0 and set(found) == set(STATISTICS)
+    if not most:
+        assert decides is None and now.verdict(every).ratio < ratio
+        return
+    assert decides is not None and decides.statistic == "largest" and decides.ratio > ratio
+    before.set_apart(now)
+    assert before.statistics["largest"].errors.largest("total", "end_force_end") > 58.0  # of 60, 1.7 by cells
+    assert before.statistics["deviation"].errors.largest("total", "end_force_end") < 0.1 * most
+    # a largest force that is by chance is not judged
+    scattered = Judged(estimate, found, ("end_force_end",))
+    assert is_no_better({"": every}, {"": Judged(Estimate(first, *runs), found)}, {"": scattered}) is None
+
+
+def test_of_several_lines_the_worst_decides() -> None:
+    """A line whose figure has grown does not bring back a result in which another line was worse still."""
+
+    def pair(off: float, finer_off: float) -> tuple[Judged, Judged]:
+        estimate = Estimate(made_up(off=off), *comparisons())
+        before = Judged(estimate).copied()
+        estimate.update(made_up(1.2, 120, off=finer_off))
+        return before, Judged(estimate)
+
+    asked = {"a": ASKED, "b": ASKED}
+    far, near = pair(0.0, 2.0), pair(0.0, 0.0)
+    assert is_no_better(asked, {"a": far[0], "b": near[0]}, {"a": far[1], "b": near[1]}) is not None
+    worse = pair(9.0, 0.5)
+    assert is_no_better(asked, {"a": far[0], "b": worse[0]}, {"a": far[1], "b": worse[1]}) is None
+    assert is_no_better({}, {"a": far[0]}, {"a": far[1]}) is None  # nothing is asked
 
 
 def swinging(accuracy: str) -> hybrid.Scene:
@@ -129,7 +188,7 @@ def test_the_file_is_that_of_the_run_before(file, how, tmp_path, monkeypatch) ->
 
         monkeypatch.setattr(Case, "record", fails)
     else:
-        monkeypatch.setattr(Before, "is_better", lambda *_: True)
+        monkeypatch.setattr(error_control, "is_no_better", lambda *_: Verdict(2.0, 1.0, 1.0, 0.0, "no use"))
     with hybrid.run(swinging("0.3%"), path) as result:
         assert result.attributes["cells"] < cells and result.status == "complete"
         assert len(result.steps["t"]) > 0 and result.attributes["error_total_position"] > 0.0

@@ -17,6 +17,8 @@ from hybrid.scene.analysis import RodModel
 from hybrid.scene.system import System
 from hybrid.simulation import progress as reports
 from hybrid.simulation import system_accuracy, system_errors
+from hybrid.simulation.finer_result import NOT_KEPT, Replacement
+from hybrid.simulation.refinement import Verdict
 
 LEG = {"length": 70, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
 
@@ -183,6 +185,27 @@ def test_an_equilibrium_has_an_accuracy_too() -> None:
             1,
             len(line.s),
         )
+
+
+@pytest.mark.parametrize("how", ["no better", "failed"])
+def test_a_finer_run_that_is_no_better_is_not_kept(how: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The lines are one result: that before the finer one stays, in its file, with errors that know of the finer one."""
+    scene, path = bridle(accuracy={"position": "0.01 mm"}), tmp_path / "run.h5"
+    del scene["time"]
+    with hybrid.static(scene) as both:
+        assert both.attributes["effort_runs"] > 4  # a finer result follows the first
+        cells = {name: int(line.attributes["cells"]) for name, line in both.lines.items()}
+    if how == "failed":
+        monkeypatch.setattr(Replacement, "finer", fails)
+    else:
+        monkeypatch.setattr(system_accuracy, "is_no_better", lambda *_: Verdict(2.0, 1.0, 0.0, 0.0, "no use"))
+    with hybrid.static(scene, path) as found:
+        for name, line in found.lines.items():
+            assert int(line.attributes["cells"]) < cells[name]
+            assert line["errors/total/position"].max() > 0.0
+        (text,) = [e.text for e in found.events if e.kind == NOT_KEPT]
+        assert how in text and text.endswith("the result is the one before")
+    assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
 
 
 def test_what_a_line_does_not_have_is_refused_with_its_name() -> None:

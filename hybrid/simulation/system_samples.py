@@ -1,0 +1,41 @@
+"""What is compared of the lines of a system: of a run that is only to be compared with, and of a complete result."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.model.build import Model
+from hybrid.model.resolution import Resolution
+from hybrid.scene.schema import AdaptiveModel
+from hybrid.simulation.run_sample import COMPARED, RunSample, catenary_share, compared_cells, split_outputs
+from hybrid.simulation.system_lines import LineResult
+from hybrid.simulation.system_run import SystemRun
+from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.reader import Result
+
+
+def compared(line: LineResult, run: SystemRun, cpu: float) -> RunSample:
+    """What is compared of a line in a run that is only to be compared with; cpu: s, of all lines."""
+    found, resolution = line.recorder, run.resolution.lines[line.name]
+    assert isinstance(found, ComparisonRecorder)
+    values, _ = split_outputs({name: found[name] for name in found.names})
+    catenary = found.catenary if isinstance(line.scene.model, AdaptiveModel) else np.zeros(0)
+    return RunSample(
+        resolution, values, compared_cells(line.model), max(run.steps, 1), cpu, resolution.every, forces=found.steps,
+        catenary=catenary,
+    )  # fmt: skip
+
+
+def sample_of(line: Result, resolution: Resolution, model: Model, cpu: float) -> RunSample:
+    """What is compared of a line in a complete result; model: as it began; cpu: s, of all lines."""
+    values = {name: np.asarray(line[name]) for name in COMPARED if name in line}
+    columns = [f"steps/{name}" for name in ("t", "end_force_start", "end_force_end")]
+    forces = np.zeros((0, 3))
+    if len(line.times) > 1 and columns[0] in line:
+        forces = np.column_stack([line[name] for name in columns])
+    unresolved = any(event.kind == "unresolved bend" for event in line.events)
+    catenary = np.array([catenary_share(zones) for zones in line.zones]) if model.layout is not None else np.zeros(0)
+    return RunSample(
+        resolution, values, compared_cells(model), max(len(forces), 1), cpu, resolution.every, unresolved,
+        forces=forces, catenary=catenary,
+    )  # fmt: skip
