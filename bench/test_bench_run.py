@@ -250,8 +250,13 @@ def test_switches_of_zones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
     for method in ("_review_try", "_after_step", "_switch"):
         monkeypatch.setattr(Transient, method, timed(method, getattr(Transient, method)))
-    for name in ("touchdown", "s_tether", "laying"):
-        scene = hybrid.load_scene(EXAMPLES / f"{name}.yaml", ["output.errors=false"])
+    from test_bench_cells import CASES, DRIFT, scene_of
+
+    names = ("touchdown", "s_tether", "laying")
+    scenes = {name: hybrid.load_scene(EXAMPLES / f"{name}.yaml", ["output.errors=false"]) for name in names}
+    follows = {"kind": "adaptive", "curvature_error": 0.05}
+    scenes["drift, cells that follow"] = scene_of(DRIFT, follows, {"cells": CASES["drift"].base})
+    for name, scene in scenes.items():
         hybrid.run(scene, tmp_path / "r.h5").close()
         spent.clear()
         begin = time.perf_counter()
