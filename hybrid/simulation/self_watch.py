@@ -13,6 +13,7 @@ from hybrid.kernels.binding import Table
 from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, NOW
 from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT
 from hybrid.kernels.self_contact_law import INNER, OUTER
+from hybrid.kernels.self_contact_pairs import WINDOW
 from hybrid.kernels.self_distance import (
     AHEAD,
     CLEARANCE,
@@ -26,6 +27,7 @@ from hybrid.kernels.self_distance import (
     MEETING,
     MEETS,
     NEARS,
+    NEIGHBOURS,
     OTHER_S,
     TOLD,
     TURNED,
@@ -65,6 +67,8 @@ def least_bending(model: Model) -> Floats:
     return np.asarray(model.cable.B[model.cable.piece(0.5 * (s[:-1] + s[1:])), :2].min(axis=1))
 
 
+# Diameters and cells, of both ends together, within which held ends are neighbours (kernels.self_contact_pairs).
+BESIDE, BESIDE_CELLS = WINDOW, NEIGHBOURS + 1
 REMEDY = "contact: {self: true} does, of catenaries that are not corrected for bending too"
 
 
@@ -180,6 +184,22 @@ class SelfWatch:
         else:
             text = meeting_text(s, other, distance, width, dt, self.why, self.remedy)
             event(t, s, other, "line meets itself", text, value=distance, threshold=width)
+
+    def tell_unkept(self, model: Model, event: Callable[..., None]) -> None:
+        """At the end of a run: an event where a line whose contact is computed has come nearer than contact lets it."""
+        found, s = self.itself.found, model.line.s
+        distance = float(found[LEAST_DISTANCE])
+        width = distance - float(found[LEAST])
+        if not (self.on and self._touches and distance < INNER * width):
+            return
+        first, last = sorted((float(found[LEAST_S]), float(found[LEAST_OTHER])))
+        why, remedy = "its cells are too long for contact there", "shorter cells"
+        beside = BESIDE * width + BESIDE_CELLS * float(np.diff(s).max())
+        if model.ends.values.held.all() and first + float(s[-1]) - last < beside:
+            why = "beside ends that are held no contact is computed of one with the other"
+            remedy = "ends that stay a diameter apart"
+        text = meeting_text(first, last, distance, width, 0.0, why, remedy)
+        event(float(found[LEAST_TIME]), first, last, "line meets itself", text, value=distance, threshold=width)
 
     def fields(self) -> list[Field]:
         """Fields of the file; NaN where the line never came near itself."""

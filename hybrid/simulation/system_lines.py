@@ -261,6 +261,7 @@ class LineResult:
         self.envelope.note_broken(values, self.recorder.recorded(), self.events.event)
         if self.contact is not None and (tries := self.contact.given_up):
             self.events.event(t, 0.0, self.model.length, "steps cut", energy_gains_text(tries), value=float(tries))
+        self.envelope.itself.tell_unkept(self.model, self.events.event)
         noted = self.take_events()
         self.recorder.close(status, message)
         return noted

@@ -145,6 +145,8 @@ class TimeLoop:
             run.envelope.note_broken(run.envelope_values(), self.recorder.recorded(), run.events.event)
         count_iterations(run)
         count_energy_gains(run)
+        if run.itself is not None and self.target is not None:
+            run.itself.tell_unkept(run.model, run.events.event)
         run.events.write_to(self.recorder)
 
     def write_envelope(self) -> None:

@@ -69,6 +69,22 @@ def test_lines_have_the_zones_and_the_contact_of_the_cable(whole: hybrid.Result)
             assert np.abs(here - there).max() <= 1e-6 * np.abs(there).max() > 0.0, name
 
 
+@pytest.mark.parametrize("alone_or_not", [alone, lambda: system(0.0)], ids=["cable", "system"])
+def test_ends_that_are_led_through_each_other_are_told(alone_or_not: Any) -> None:
+    """No contact is computed beside ends that are held: what passes through the line there is said at the end."""
+    through = {"travel": {"by": [-2.4, 0.3 * WIDTH, 0], "over": 3.0}}
+    scene = alone_or_not() | {"time": {"duration": 2.4, "step": 0.02}, "output": {"every": 0.2, "points": 41}}
+    if "ends" in scene:
+        scene["ends"]["end"]["motion"] = through
+    else:
+        scene["points"]["b0"]["motion"] = through
+    result = hybrid.run(scene, progress=False)
+    line = result if "ends" in scene else result.lines["line 0"]
+    (told,) = (event for event in line.events if event.kind == "line meets itself")
+    assert "ends that are held" in told.text and told.value == float(line["self_distance/distance"]) < 0.85 * WIDTH
+    assert told.s_a < 0.3 and told.s_b > 7.7 and told.t == float(line["self_distance/time"])
+
+
 @pytest.mark.slow
 def test_a_stopped_run_goes_on_bit_for_bit(
     whole: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
