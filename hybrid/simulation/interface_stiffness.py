@@ -18,6 +18,7 @@ from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.generalized_alpha import weights
 from hybrid.kernels.state import Floats
 from hybrid.simulation.transient import Transient
+from hybrid.solve.workspaces import workspace_of
 
 
 def interface_stiffness(run: Transient, k: int, step: float) -> Floats:
@@ -36,7 +37,7 @@ def interface_stiffness(run: Transient, k: int, step: float) -> Floats:
     ends = model.ends.values
     held = ends.held.copy()
     held[k] = 0
-    work = entry.workspace_of(line, keep=True)
+    work = workspace_of(line, keep=True)
     old, new = run.before, run.state
     work.u[:] = new.r - old.r if clock[b.LAST_DT] > 0.0 else 0.0
     bad = entry.assembly_of_step(line, model.sea.values, ends._replace(held=held), old, new, cv, ca, work)

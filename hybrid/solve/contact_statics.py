@@ -19,7 +19,7 @@ from hybrid.kernels import entry
 from hybrid.kernels.accept import LARGEST_TWIST
 from hybrid.kernels.binding import Table
 from hybrid.kernels.books import NOW, PARITY, STEP_BEFORE, TRY_END
-from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance, workspace_of
+from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance
 from hybrid.kernels.forces import FRICTION, MASS_DAMPING, ROTARY, SELF_FRICTION, WAVES
 from hybrid.kernels.newton import EQUILIBRIUM, STEP, Task
 from hybrid.kernels.report import FORCE_A, SELF_CONTACT_ENERGY, TWIST
@@ -30,6 +30,7 @@ from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.stability import Stability
 from hybrid.solve.statics import BALANCED, BALANCING, CALM, GYRATION, MOST_ITERATIONS, REACH, Equilibrium, nudged
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
+from hybrid.solve.workspaces import workspace_of
 
 # Steps of the damped motion, at most; the largest, in time scales: what moves by more meets itself at full speed.
 STEPS, LARGEST = 20_000, 0.25

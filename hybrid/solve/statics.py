@@ -11,7 +11,7 @@ import numpy as np
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels import entry
 from hybrid.kernels.bed import planes_under
-from hybrid.kernels.entry import Limits, workspace_of
+from hybrid.kernels.entry import Limits
 from hybrid.kernels.forces import AXIAL_LAW, FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.resolution_checks import lowest, lowest_not_held
@@ -20,6 +20,7 @@ from hybrid.kernels.step import friction_axes
 from hybrid.solve.laid import laid_on_bed
 from hybrid.solve.stability import Stability, is_judged
 from hybrid.solve.stepper import Stepper
+from hybrid.solve.workspaces import workspace_of
 
 MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
 REACH = 0.1  # of the length: largest shift of a node in one iteration

@@ -13,13 +13,14 @@ from hybrid.errors import Outcome
 from hybrid.kernels import entry
 from hybrid.kernels.bed import planes_under
 from hybrid.kernels.block_elimination import solve_again
-from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance, workspace_of
+from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, WAVES
 from hybrid.kernels.report import FORCE_A, LOCAL_ERROR, RESIDUAL, SEABED_ENERGY, SLACKEST, SLACKEST_CELL
 from hybrid.kernels.seabed import normal_forces, stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.step import friction_axes
 from hybrid.kernels.water import wave_kinematics
+from hybrid.solve.workspaces import workspace_of
 
 MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper
 # Share of the line's length that a node may move in one Newton iteration of a step.

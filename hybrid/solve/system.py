@@ -22,7 +22,7 @@ from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
 from hybrid.kernels.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, STATE, VD, WA, WD, WORK, A, U, V, W, X
 from hybrid.kernels.books import CARRIED, NOW, Books
 from hybrid.kernels.carried_frames import ANSWER, SEAT, TURNS
-from hybrid.kernels.entry import NO_PUSH, workspace_of
+from hybrid.kernels.entry import NO_PUSH
 from hybrid.kernels.forces import FRICTION, WAVES
 from hybrid.kernels.joined_lines import COLUMNS, FUNCTIONAL
 from hybrid.kernels.junctions import HANDED
@@ -47,6 +47,7 @@ from hybrid.solve.statics import (
 )
 from hybrid.solve.stepper import HEAVY, REACH
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
+from hybrid.solve.workspaces import workspace_of
 
 # Springs of points and bodies that nothing holds, in the test of stability, as a part of tension scale over length.
 NEUTRAL = 1e-6
