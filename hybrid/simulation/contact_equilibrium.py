@@ -68,9 +68,11 @@ def nearness(model: Model, t: float, state: State) -> Floats:
     return near
 
 
-def is_within_itself(model: Model, t: float, state: State) -> bool:
-    """Whether parts of a line at rest are in each other."""
-    return math.isinf(contact_energy(model.line, model.sea.at(t), model.ends.at(t), state, contact_of(model)))
+def within_itself(model: Model, t: float, state: State) -> str:
+    """Where parts of a line at rest are in each other; empty: nowhere."""
+    contact = contact_of(model)
+    energy = contact_energy(model.line, model.sea.at(t), model.ends.at(t), state, contact)
+    return deepest_text(contact, model) if math.isinf(energy) else ""
 
 
 def why_not(model: Model, t: float) -> tuple[str, str]:

@@ -22,7 +22,7 @@ from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
-from hybrid.simulation.contact_equilibrium import is_within_itself, why_not
+from hybrid.simulation.contact_equilibrium import why_not, within_itself
 from hybrid.simulation.diagnostics import Diagnostics, stretch_text
 from hybrid.simulation.envelope import Envelope, of_equilibrium
 from hybrid.simulation.equilibrium import equilibrium_of
@@ -49,8 +49,8 @@ class StaticCase:
         model, found, switching = self._equilibrium(resolution)
         observer = self.observer(model)
         texts = {"scene": scene_text(self.scene)}
-        if model.line.bits & SELF_CONTACT and is_within_itself(model, np.inf, found.state):
-            refuse_contact(model)
+        if model.line.bits & SELF_CONTACT and (where := within_itself(model, np.inf, found.state)):
+            refuse_contact(model, where)
         envelope = Envelope(self.scene, model, moves=False)
         with result_recorder(self.scene, model, observer, target, texts, found, envelope) as recorder:
             ends, events = model.ends.at(np.inf), EventLog()
@@ -125,10 +125,10 @@ class StaticCase:
         )  # fmt: skip
 
 
-def refuse_contact(model: Model) -> None:
-    """SceneError: the equilibrium, and the shape to start from, have parts of the line in each other."""
+def refuse_contact(model: Model, where: str) -> None:
+    """SceneError: the equilibrium, and the shape to start from, have parts of the line in each other; where: of it."""
     expected, fix = why_not(model, np.inf)
-    given = "true, where the line is within itself in the equilibrium without contact"
+    given = f"true, where in the equilibrium without contact {where}"
     raise SceneError([Complaint("contact.self", given, expected, f"{fix}; or leave it out")])
 
 
