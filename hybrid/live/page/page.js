@@ -130,7 +130,7 @@
   };
   const showStill = (fresh) => {
     byId("back").hidden = true;
-    byId("time-row").hidden = !motion;
+    timed(Boolean(motion));
     graphs.fade(!fresh);
     if (!still) return;
     if (!fresh) { space.fade(); return; }
@@ -197,6 +197,7 @@
   // ---- motion --------------------------------------------------------------------------------------
 
   const current = () => (mode === "motion" && motion ? motion.frames[frame] : still && still.frame);
+  const timed = (on) => { byId("time-row").hidden = !on; byId("view").classList.toggle("timed", on); };
   const takeFrames = (m) => {
     const atEnd = !motion || frame >= motion.frames.length - 1 || (m.running && !playing && mode === "motion" && frame >= motion.frames.length - 2);
     const fresh = m.begin === 0, followed = m.running || Boolean(motion && motion.running) || asked === "run";
@@ -208,7 +209,7 @@
       for (const v of line.along[name][1]) if (v !== null) { if (v > range[1]) range[1] = v; else if (v < range[0]) range[0] = v; }
     }
     if (fresh && (followed || !state.editable || asked === "play")) { mode = "motion"; frame = 0; asked = null; }
-    byId("time-row").hidden = !motion.frames.length;
+    timed(motion.frames.length > 0);
     byId("time").max = String(Math.max(motion.frames.length - 1, 0));
     if (mode === "motion") {
       if (atEnd && followed && !playing) frame = motion.frames.length - 1;
@@ -260,7 +261,7 @@
     requestAnimationFrame(tick);
   });
   byId("time").addEventListener("input", () => { stop(); mode = "motion"; frame = Number(byId("time").value); showMotion(); });
-  byId("back").addEventListener("click", () => { stop(); mode = "still"; showStill(true); byId("now").textContent = ""; byId("time-row").hidden = !motion; });
+  byId("back").addEventListener("click", () => { stop(); mode = "still"; showStill(true); byId("now").textContent = ""; timed(Boolean(motion)); });
 
   // ---- commands ------------------------------------------------------------------------------------
 
