@@ -1,6 +1,6 @@
 """Scenes in which release 0.5.0 was wrong, and what must happen instead (tests/data/defects).
 
-The storm of three hours among them is a bench: bench/test_bench_irregular.py.  The hose that crosses itself is in
+The storm of three hours among them is a bench: bench/test_bench_storm.py.  The hose that crosses itself is in
 tests/simulation/test_self_contact_default.py.
 """
 
