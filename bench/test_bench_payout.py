@@ -12,6 +12,8 @@ import pytest
 import hybrid
 from hybrid.simulation.transient import Transient
 from hybrid.solve.run import CompiledRun
+from tests.simulation.test_payout import clamped, kicks
+from tests.simulation.test_payout import sagging as swung
 
 pytestmark = pytest.mark.bench
 
@@ -126,3 +128,15 @@ def test_ripple_of_the_pull() -> None:
         mesh = np.abs(pull(swinging(*line, cells, False)) - still[line])[40:].max() / still[line].mean()
         print(f"{name}: {100.0 * found:.3f} % (before: {before} %); of a fixed length {100.0 * mesh:.3f} %")
         assert found < 2e-3
+
+
+@pytest.mark.parametrize("clamp", [False, True])
+@pytest.mark.parametrize("EI", [2e4, 500.0])
+@pytest.mark.parametrize("rate", [0.8, -0.8])
+def test_kicks_where_cells_follow(rate: float, EI: float, clamp: bool) -> None:
+    """Of the pull within five steps, by a node that enters or leaves and what merges with it; docs/payout.md."""
+    model = {"kind": "adaptive", "tolerance": 1e-5, "hold_time": 1.0, "curvature_error": 0.05, "force_rod": [[0, 100]]}
+    scene = swung("rod", 2e6, EI, rate, duration=12.0) | {"model": model}
+    found = kicks(clamped(scene) if clamp else scene)
+    print(f"EI {EI:g} N m2, {rate:g} m/s, {'clamped' if clamp else 'pinned'}: {100.0 * max(found):.3f} % of the mean")
+    assert max(found) < 1e-3

@@ -276,7 +276,8 @@ class PayingOut:
             kept, at = ~self.changing, np.arange(line.s.size)
             own = self.material - 1
             nodes = at < own if self.plan.side else at > line.h.size - own
-            varied["h"][:, kept], varied["kb"][:, nodes] = batch.h[:, kept], batch.kb[:, nodes]
+            h, kb = (batch.h, batch.kb) if batch.h.ndim == 2 else (model.line.h[None], model.line.kb[None])  # of now
+            varied["h"][:, kept], varied["kb"][:, nodes] = h[:, kept], kb[:, nodes]
         there = observer.on_varied(line, model.sea.values, zones[0], varied["s"])
         there.first_energy = observer.first_energy
         return there, there.look(batch._replace(h=varied["h"], kb=varied["kb"]), varied), zones[1:]

@@ -19,6 +19,9 @@ from hybrid.solve.run import CompiledRun
 
 # Ramp times of bending stiffness within which a cell that is taken in must have become rod.
 AHEAD = 2.0
+# Nodes by which cells are merged before the one leaves at which they must be whole: merged then, where the reel still
+# brings lengths to their true ones, they kicked the pull by 0.14 % of its mean, a node before by 0.09 %.
+MERGED_AHEAD = 2
 
 
 def rods_at_winch(scene: Scene, plan: PayoutPlan, model: Model, count: int, pace: float, rate: float) -> np.ndarray:
@@ -63,10 +66,10 @@ class PaidZones:
         return None if change.same and stays else (change, here)
 
     def _may_stay(self, layout: Layout) -> np.ndarray:
-        """(K+1,) bool, places on the finest mesh of nodes that there may be when one less is out."""
+        """(K+1,) bool, places on the finest mesh of nodes that there may be when MERGED_AHEAD less are out."""
         plan, count = self.paying.plan, self.paying.count
-        fewer = plan.parts_of(count - 1)
-        fewer = np.append(fewer, 1) if plan.side else np.append(1, fewer)
+        fewer, whole = plan.parts_of(count - MERGED_AHEAD), np.ones(MERGED_AHEAD, int)
+        fewer = np.concatenate([fewer, whole] if plan.side else [whole, fewer])
         step = np.repeat(layout.parts // np.minimum(fewer, layout.parts), layout.parts)
         return np.append((np.arange(step.size) - np.repeat(layout.starts[:-1], layout.parts)) % step == 0, True)
 
