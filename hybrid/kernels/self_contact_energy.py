@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from hybrid.kernels.assembly import get9
 from hybrid.kernels.books import NOW, RATES, STORED, TRY_END
 from hybrid.kernels.cell import chord, turning
@@ -23,12 +25,14 @@ from hybrid.kernels.rotations import dot, frame, sub
 from hybrid.kernels.self_contact_pairs import (
     BALANCE,
     BEGUN,
+    ENERGY,
     GAINED,
     HAD,
     HAS,
     LARGEST,
     LED,
     NARROWEST,
+    QUIET,
     STALE,
     TRIED_BALANCE,
     farthest_from_mean,
@@ -91,23 +95,30 @@ def energy_without_weight(line, ends, contact, state, report):
 
 @inner
 def work_of_try(line, ends, contact, velocity, before, state, work, clock):
-    """Work, J, of a try as kernels.powers books it, with that of weight; before: W, powers at its beginning."""
-    report, done = work.report, work.report[SELF_FRICTION_WORK]
+    """Work, J, of a try as kernels.powers books it, with that of weight; and how much of it powers have done, either way.
+
+    before: W, powers at its beginning.  What powers do is known to second order in the step.
+    """
+    report, done, moved = work.report, work.report[SELF_FRICTION_WORK], 0.0
+    half = 0.5 * (clock[TRY_END] - clock[NOW])
     find_powers(line, ends, velocity, state, report, contact.power)
     for k in range(RATES):
-        done += 0.5 * (clock[TRY_END] - clock[NOW]) * (before[k] + contact.power[k])
+        done += half * (before[k] + contact.power[k])
+        moved += half * (abs(before[k]) + abs(contact.power[k]))
     if line.bits & SEABED:
         done += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock[STORED] + report[FRICTION_WORK]
     for i in range(work.u.shape[0]):
         for k in range(3):
             done += line.force[i, k] * work.u[i, k]
-    return done
+    return done, moved
 
 
 @inner
 def puts_energy_in(line, ends, contact, books, clock, old, new, work):
     """Whether the try has put in so much energy that it has to be repeated in halves.
 
+    A line that has not come to contact yet is not judged where powers move more in the step than it may put in: contact
+    has excited nothing, and what the work misses in a long step of a smooth motion would count.
     books: velocity (2, 3) m/s of the ends, powers (2, RATES) W and reports of the state now, as kernels.books has them.
     """
     numbers = contact.numbers
@@ -120,10 +131,10 @@ def puts_energy_in(line, ends, contact, books, clock, old, new, work):
         numbers[LARGEST] = max(numbers[LARGEST], numbers[HAD])
     numbers[HAS] = energy_without_weight(line, ends, contact, new, work.report)
     numbers[LED] = clock[TRY_END]
-    gain = numbers[HAS] - numbers[HAD]
-    gain -= work_of_try(line, ends, contact, books.velocity, books.power[0], new, work, clock)
+    done, moved = work_of_try(line, ends, contact, books.velocity, books.power[0], new, work, clock)
+    most, touched = MOST_GAIN * numbers[LARGEST], numbers[QUIET] < math.inf or numbers[ENERGY] > 0.0
+    gain = numbers[HAS] - numbers[HAD] - done if touched or moved <= most else 0.0
     numbers[TRIED_BALANCE] = numbers[BALANCE] + gain
-    most = MOST_GAIN * numbers[LARGEST]
     if gain <= most and (gain <= 0.0 or numbers[TRIED_BALANCE] <= most):
         return False
     if not farthest_from_mean(work.u) > LEAST_TRAVEL * numbers[NARROWEST]:
