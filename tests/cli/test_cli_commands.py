@@ -207,6 +207,14 @@ def test_plan_says_what_is_on_and_computes_nothing(call: Call) -> None:
     assert {"what", "on", "why", "event"} == set(plan["contents"][0])
 
 
+def test_plan_of_a_line_with_20_000_attachments(call: Call) -> None:
+    """Seconds; it did not end within 40 s when each asked for all the others."""
+    clumps = "".join(f"    - {{kind: clump, at: {i * 1e-4:.4f}, mass: 0.001}}\n" for i in range(1, 20_000))
+    Path("many.yaml").write_text(WIRE.replace("ends:\n", f"  attachments:\n{clumps}ends:\n", 1))
+    (plan,) = call("plan", "many.yaml", "--json").lines
+    assert plan["cells"] >= 20_000
+
+
 def test_plan_of_a_scene_without_time(call: Call) -> None:
     Path("wire.yaml").write_text(WIRE.replace("time: {duration: 0.05, step: 0.005}\n", ""))
     said = call("plan", "wire.yaml")
