@@ -38,7 +38,7 @@ STEPS, LARGEST = 20_000, 0.25
 # most that a cell spins in a step, rad: what is faster could twist from cell to cell by half a turn unseen.
 FASTEST, MOST_SPIN = 10.0, 1.0
 # Of the motion by mass, over mass and time scale.  With 2, legs of catenaries that came together at speed folded in
-# half of 12 scenes that differ by a thousandth of the mass, and the others took ten times as long.
+# half of 12 scenes whose mass differs by at most 1 %, and the others took five times as long or more.
 DAMPING = 8.0
 # Newton with contact is tried where the motion has calmed to these parts of CALM, one after the other.
 CALMER = (1.0, 1e-1, 1e-2, 1e-3)
