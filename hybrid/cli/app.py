@@ -91,43 +91,62 @@ def hybrid_(
 def session(as_json: bool, quiet: bool) -> Iterator[Console]:
     """The console of one command; errors become words and exit codes."""
     from hybrid.cli.console import Console
-    from hybrid.errors import ComputationError, ResultError, ResultHeld, SceneError
 
     console, code = Console(as_json, quiet), 0
-    in_main = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler) if in_main else None
-    try:
-        yield console
-    except SceneError as error:
-        from hybrid.scene.read import located
-
-        console.refused(located(error, console.source, console.settings) if console.source else error)
-        code = REFUSED
-    except ComputationError as error:
-        console.failed(error)
-        code = FAILED
-    except ResultHeld as error:
-        console.error("result", str(error))
-        code = REFUSED
-    except ResultError as error:
-        console.error("result", str(error), file=console.written)
-        code = FAILED if console.written else REFUSED
-    except KeyboardInterrupt:
-        console.interrupted()
-        code = INTERRUPTED
-    except Exception as error:
-        if isinstance(error.__cause__, KeyboardInterrupt):  # Python wraps one that comes while a class is made
-            console.interrupted()
-            code = INTERRUPTED
-        else:
-            head = f"this is a bug in hybrid {hybrid.__version__}; please report it with the scene and these lines"
-            console.error("bug", f"{head}\n{traceback.format_exc()}")
-            code = FAILED
-    finally:
-        if in_main:
-            signal.signal(signal.SIGTERM, before)
+    with _stops() as heard:
+        try:
+            yield console
+        except (Exception, KeyboardInterrupt) as error:
+            # Where a stop comes while modules are imported or compiled, it can end as any exception.
+            stopped = bool(heard) or isinstance(error, KeyboardInterrupt)
+            code = INTERRUPTED if stopped else _told(console, error)
+            if stopped:
+                console.interrupted()
     if code:
         raise typer.Exit(code)
+
+
+@contextmanager
+def _stops() -> Iterator[list[int]]:
+    """Raise KeyboardInterrupt by Ctrl-C and SIGTERM; gives the signals that came.  An ignored Ctrl-C stays ignored."""
+    heard: list[int] = []
+
+    def stop(number: int, _frame: object) -> None:
+        heard.append(number)
+        raise KeyboardInterrupt
+
+    numbers = [signal.SIGTERM] if signal.getsignal(signal.SIGINT) is signal.SIG_IGN else [signal.SIGINT, signal.SIGTERM]
+    in_main = threading.current_thread() is threading.main_thread()
+    before = {number: signal.signal(number, stop) for number in numbers} if in_main else {}
+    try:
+        yield heard
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _told(console: Console, error: BaseException) -> int:
+    """Say what went wrong; gives the exit code."""
+    from hybrid.errors import ComputationError, ResultError, ResultHeld, SceneError
+
+    match error:
+        case SceneError():
+            from hybrid.scene.read import located
+
+            console.refused(located(error, console.source, console.settings) if console.source else error)
+            return REFUSED
+        case ComputationError():
+            console.failed(error)
+            return FAILED
+        case ResultHeld():
+            console.error("result", str(error))
+            return REFUSED
+        case ResultError():
+            console.error("result", str(error), file=console.written)
+            return FAILED if console.written else REFUSED
+    head = f"this is a bug in hybrid {hybrid.__version__}; please report it with the scene and these lines"
+    console.error("bug", f"{head}\n{''.join(traceback.format_exception(error))}")
+    return FAILED
 
 
 def load(console: Console, path: Path, settings: list[str] | None) -> Scene:

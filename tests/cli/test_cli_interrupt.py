@@ -13,8 +13,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
 import hybrid
+from hybrid.cli.app import session
 
 LONG = """\
 title: a pendulum that swings for days
@@ -104,3 +106,26 @@ def test_the_live_line_on_a_terminal_and_ctrl_c() -> None:
     assert "/ 100000 s" in lines[-1] and "catenary" in lines[-1] and " x" in lines[-1]
     # The line is taken away before anything else is said.
     assert after.index("\x1b[2K") < after.index("interrupted; long.h5 is complete up to t = ")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_that_ends_as_another_exception(number: signal.Signals, capsys: pytest.CaptureFixture[str]) -> None:
+    """As where it comes while a module is imported: libraries turn it into exceptions of their own."""
+    before = signal.getsignal(number)
+    with pytest.raises(typer.Exit) as ended, session(as_json=True, quiet=False):
+        try:
+            os.kill(os.getpid(), number)
+            signal.sigtimedwait([], 5.0)  # until it is heard
+        except KeyboardInterrupt:
+            raise ImportError("cannot import name 'core'") from None
+    assert ended.value.exit_code == 130
+    heard = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [line["event"] for line in heard] == ["done"] and heard[0]["status"] == "interrupted"
+    assert signal.getsignal(number) is before
+
+
+def test_an_exception_that_nobody_stopped_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(typer.Exit) as ended, session(as_json=True, quiet=False):
+        raise ImportError("cannot import name 'core'")
+    told = json.loads(capsys.readouterr().out)
+    assert ended.value.exit_code == 2 and told["event"] == "error" and "ImportError: cannot import" in told["message"]

@@ -63,7 +63,9 @@ def test_a_run_is_followed_stopped_and_played(tmp_path: Path) -> None:
 def test_a_run_is_stopped_while_it_starts(tmp_path: Path, delay: float) -> None:
     """Also by what a background shell starts, whose SIGINT is ignored: before the process is made, while it imports."""
     scene = tmp_path / "scene.yaml"
-    scene.write_text(SCENE.replace("duration: 4.0", "duration: 40000.0"))
+    # In water: without damping this motion ends with an error after 200 s of it, which take 0.7 s.
+    in_water = SCENE.replace("environment:\n", "environment:\n  fluid: {density: 1025}\n")
+    scene.write_text(in_water.replace("duration: 4.0", "duration: 40000.0"))
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with served(scene) as (address, _):
