@@ -68,14 +68,14 @@ def payouts(scene: Scene) -> list[Payout]:
 
 
 def slack_of(scene: Scene) -> float:
-    """Length, m, by which the line is longer than its ends are apart; infinite where an end moves or may, or it is
+    """Length, m, by which the line is longer than its ends are apart; infinite where an end moves or may, breaks or is
 
-    paid out.
+    let go, or it is paid out.
     """
     a, b = (end.held_position for end in scene.ends.both)
-    if payouts(scene):
+    if a is None or b is None or payouts(scene):
         return math.inf
-    if a is None or b is None or any(x.prescribed_motion or x.release for x in scene.ends.both):
+    if any(x.prescribed_motion or x.release or not x.is_placed for x in scene.ends.both):
         return math.inf
     return scene.length - math.dist(a, b)
 

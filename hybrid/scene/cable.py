@@ -167,11 +167,6 @@ class Contact(Table):
         description="coefficient of friction between parts of the cable that touch each other, with `self` [-]",
     )
 
-    @property
-    def asked(self) -> Contact:
-        """The same, off where it is not asked for."""
-        return self if self.self is not None else self.model_copy(update={"self": False})
-
 
 # Strain that a section bears which says nothing: beyond that of steel, chain and most ropes.
 USUAL_STRAIN = 0.05

@@ -42,7 +42,10 @@ REACHED = 0.95
 
 
 class _JoinedPin(Pinned):
-    """The end of a line at a point that is free, or on a free body, held where that is looked for first."""
+    """The end of a line at a point that is free, or on a free body, or that it may break from, held where that is
+
+    first.
+    """
 
     @property
     def is_placed(self) -> bool:
@@ -81,9 +84,7 @@ class JoinedLine(Table):
     )
     mesh: Mesh | None = Field(default=None, description="how the line is cut into cells; absent: chosen")
     contact: Contact = Field(
-        default=Contact(self=False),
-        description="whether the line touches itself in a run, with friction or without; absent: an event says where "
-        "it meets itself",
+        default=Contact(), description="whether the line touches itself in a run, as of one cable, and its friction"
     )
     accuracy: AskedAccuracy | None = Field(
         default=None, description="how wrong the result of this line may be; absent: as `accuracy` of the system"
@@ -249,6 +250,12 @@ class System(Table):
         """Whether a point moves by what pulls there: it is free, or on a free body."""
         return isinstance(self.points[point], FreePoint) or isinstance(self.body_of(point), FreeBody)
 
+    def may_leave(self, name: str, end: Literal["start", "end"]) -> bool:
+        """Whether an end of a line moves by what pulls there, or may once something has broken."""
+        point = getattr(self.lines[name], end)
+        weak = getattr(self.points[point], "break_at", None) is not None
+        return weak or self.breaks(name, end) or self.is_joined(point)
+
     def lines_at(self, point: str) -> list[tuple[str, Literal["start", "end"]]]:
         """Names of the lines that meet at a point, each with the end that does; those that break there come last."""
         lines, meeting = self._meetings
@@ -370,11 +377,11 @@ class System(Table):
             if key in carrying and isinstance(point, FreePoint):
                 ends[key] = point.end.model_copy(update={"initial_guess": first[key]} if point.is_body else {})
             elif held is None:
-                kind = _JoinedPin if self.is_joined(getattr(line, key)) else Pinned
+                kind = _JoinedPin if self.may_leave(name, key) else Pinned
                 ends[key] = kind(position=place, motion=motion)
             else:
                 clamp = getattr(line.connections, key)
-                ends[key] = (_JoinedClamp if self.is_joined(getattr(line, key)) else Clamped)(
+                ends[key] = (_JoinedClamp if self.may_leave(name, key) else Clamped)(
                     position=place, tangent=held[0], normal=held[1], swivel=clamp.swivel,
                     bend_stiffness=clamp.bend_stiffness, motion=motion,
                 )  # fmt: skip
@@ -384,7 +391,7 @@ class System(Table):
         tables: dict[str, Any] = {
             "title": f"{self.title}, line {name}" if self.title else f"line {name}", "environment": self.environment,
             "cable": line.cable, "ends": Ends(**ends), "initial": initial, "model": line.chosen_model,
-            "mesh": line.mesh, "contact": line.contact.asked, "accuracy": line.accuracy or self.accuracy,
+            "mesh": line.mesh, "contact": line.contact, "accuracy": line.accuracy or self.accuracy,
         }  # fmt: skip
         if self.time is not None:
             tables["time"] = self.time

@@ -16,6 +16,7 @@ from hybrid.errors import LIMIT_EVENTS
 from hybrid.kernels import books as b
 from hybrid.kernels.extremes import fold_extremes
 from hybrid.kernels.forces import MAY_TOUCH, PLANAR, SEABED, SELF_CONTACT
+from hybrid.kernels.self_distance import blank_itself
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
@@ -87,11 +88,8 @@ class Envelope:
     Places are nodes; those where a quantity may have two values come twice, the left value first.
     """
 
-    def __init__(self, scene: Scene, model: Model, moves: bool, itself: SelfWatch | None = None) -> None:
-        """moves: whether there are steps; of an equilibrium the nodes are those of its line.  itself: what watches the
-
-        line, None: as one cable is watched.
-        """
+    def __init__(self, scene: Scene, model: Model, moves: bool) -> None:
+        """moves: whether there are steps; of an equilibrium the nodes are those of its line."""
         layout = model.layout if moves else None
         nodes = model.line.s.copy() if layout is None else layout.finest.nodes
         if moves and model.payout is not None:
@@ -124,7 +122,7 @@ class Envelope:
         self._grows = model.payout is not None
         if moves and model.line.bits & MAY_TOUCH and not model.line.bits & SELF_CONTACT:
             self.bounds[:, b.SELF_PRESSURE] = 0.0  # there is no contact before it is computed
-        self.itself = itself or (SelfWatch(model, no_contact(scene)) if moves else SelfWatch(model))
+        self.itself = SelfWatch(model, no_contact(scene)) if moves else SelfWatch(model)
         asked = scene.output.quantities if moves and not model.corrected else {}
         self.quantities = StepQuantities(scene, asked, pipes)
 
@@ -185,7 +183,8 @@ class Envelope:
     def restore(self, saved: Mapping[str, Any], now: Floats) -> None:
         """Go on as `checkpoint` has written, into `now`.  ValueError: it is that of another line."""
         mine = self.checkpoint(now)
-        older = {"itself": mine["itself"]}  # files of before have none
+        mine["itself"] = blank_itself(np.ones(1)).found  # infinite as long as the line was never near itself
+        older = {"itself": self.itself.itself.found}  # files of before have none
         saved = dict(saved)
         for name in ("bounds", "now"):  # nor wall tension and stress
             saved[name] = with_pipes(saved.get(name))

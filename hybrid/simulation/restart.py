@@ -18,6 +18,7 @@ from hybrid.model.output_points import OutputPoints
 from hybrid.model.payout import longest_out, payout_of, winch_at, winch_side
 from hybrid.model.plan import output_interval
 from hybrid.model.resolution import Resolution
+from hybrid.model.self_reach import self_reach
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import parse_either, parse_scene, scene_text
 from hybrid.scene.schema import Scene
@@ -26,7 +27,7 @@ from hybrid.simulation.restore import refused, resolution_from, restored_points
 from hybrid.store.checkpoint import Checkpoint, read_before, read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
-from hybrid.store.reader import open_result
+from hybrid.store.reader import Result, open_result
 
 # What may be other from some time on: it acts from outside, and nothing of the cable's state hangs on it.
 MAY_CHANGE = (
@@ -110,6 +111,7 @@ def remaining_system(
         found, _ = parse_either(result.scene_text)
         if isinstance(found, Scene):
             return None
+        found = as_begun(found, result)
         status, reached = result.status, float(result.times[-1]) if len(result.times) else 0.0
     with opened(path) as file:
         unjudged = bool(read_before(file))
@@ -128,6 +130,15 @@ def remaining_system(
     data.setdefault("output", {})["every"] = output_interval(found)
     longer, _ = parse_either(scene_text(type(found).model_validate(data)))
     return None if isinstance(longer, Scene) else longer
+
+
+def as_begun(system: System, result: Result) -> System:
+    """The same, without contact that no line asks for, in lines of a result of a version that computed none then."""
+    lines = dict(system.lines)
+    for name, line in system.lines.items():
+        if "self_contact" not in result.lines[name] and self_reach(system.scene_of(name)).may:
+            lines[name] = line.model_copy(update={"contact": line.contact.model_copy(update={"self": False})})
+    return system.model_copy(update={"lines": lines})
 
 
 def changes_text(changes: Sequence[LoadChange]) -> str:

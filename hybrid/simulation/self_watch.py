@@ -120,21 +120,21 @@ class SelfWatch:
         """Go on with a (new) line of a run."""
         if not self.on:
             return
-        self.itself = blank_itself(diameters(model))._replace(found=self.itself.found)
+        self.renew(model)
         old, new = run.states
         self._job.bind(
             line=model.line, ends=model.ends.values, old=old, new=new, clock=run.clock, counts=run.count,
             itself=self.itself,
         )  # fmt: skip
-        self.touch(model)
-        self.asks = bool(model.line.bits & MAY_TOUCH) and not self._touches
-        self.itself.ahead[AHEAD] = 0.0 if self.asks else -1.0
         run.watch_itself(self._job.numbers, self._address)
 
-    def touch(self, model: Model) -> None:
-        """Events tell of contact from now on where it is computed."""
+    def renew(self, model: Model) -> None:
+        """Go on with the cells of a model; events tell of contact from now on where it is computed."""
+        self.itself = blank_itself(diameters(model))._replace(found=self.itself.found)
         self._touches = bool(model.line.bits & SELF_CONTACT)
         self.itself.found[MEETING] = OUTER - 1.0 if self._touches else 0.0
+        self.asks = bool(model.line.bits & MAY_TOUCH) and not self._touches
+        self.itself.ahead[AHEAD] = 0.0 if self.asks else -1.0
 
     @property
     def table(self) -> Table:
@@ -155,9 +155,13 @@ class SelfWatch:
         """Whether a line that may touch itself is near itself in a state from which steps (s) are to be made."""
         if not (self.on and self.asks and is_bent(run.state)):
             return False
-        v = run.state.v
+        return self.foresees(run.state, step, lambda: self.look(run))
+
+    def foresees(self, state: State, step: float, look: Callable[[], int]) -> bool:
+        """Whether a look at a state, from which steps (s) are to be made, finds that the line will be near itself."""
+        v = state.v
         self.itself.ahead[AHEAD] = 2.0 * CLOSING * step * float(np.linalg.norm(v - v.mean(axis=0), axis=1).max())
-        found = self.look(run)
+        found = look()
         self.itself.ahead[AHEAD], self.itself.found[TOLD] = 0.0, 0.0
         return bool(found & NEARS)
 
@@ -225,8 +229,7 @@ class LineWatch:
         self._watch, self._model = watch, model
         self._job: Table | None = None
         if watch.on:
-            watch.itself = blank_itself(diameters(model))._replace(found=watch.itself.found)
-            watch.touch(model)
+            watch.renew(model)
 
     def _bind(self) -> Table:
         """Get ready for the kernel, when the line is so bent for the first time that it could come near itself."""
@@ -239,19 +242,38 @@ class LineWatch:
         )  # fmt: skip
         return job
 
-    def look(self, t: float, dt: float, state: State, before: Floats, event: Callable[..., None]) -> None:
-        """An event if surfaces have met in the step of dt (s) to t (s), from positions (N+1, 3) m to a state."""
+    def look(self, t: float, dt: float, state: State, before: Floats, event: Callable[..., None]) -> bool:
+        """An event if surfaces have met in the step of dt (s) to t (s), from positions (N+1, 3) m to a state; whether
+
+        the line is so near itself, in place of an event, that its contact has to begin.
+        """
         if not self._watch.on:
-            return
+            return False
+        told = self._watch.itself.found
         if not is_bent(state):
-            self._watch.itself.found[TOLD] = 0.0
-            return
+            told[TOLD] = 0.0
+            return False
+        found = self._look(t, state, before)
+        if found & NEARS:
+            told[TOLD] = 0.0 if found & MEETS else told[TOLD]
+        elif found & MEETS:
+            self._watch.tell(t, dt, event)
+        return bool(found & NEARS)
+
+    def is_near(self, t: float, state: State, step: float) -> bool:
+        """As `SelfWatch.is_near`, of a state at t (s)."""
+        watch = self._watch
+        if not (watch.on and watch.asks and is_bent(state)):
+            return False
+        return watch.foresees(state, step, lambda: self._look(t, state, state.r))
+
+    def _look(self, t: float, state: State, before: Floats) -> int:
+        """MEETS and NEARS of kernels.self_distance."""
         if self._job is None:
             self._job = self._bind()
         self._now.r[:], self._now.e[:], self._before.r[:] = state.r, state.e, before
         self._clock[NOW] = t
-        if int(watch_itself(self._job.numbers)) & MEETS:
-            self._watch.tell(t, dt, event)
+        return int(watch_itself(self._job.numbers))
 
 
 def is_bent(state: State) -> bool:

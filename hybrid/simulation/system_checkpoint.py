@@ -14,6 +14,7 @@ from hybrid.model.system import SystemResolution
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.system import System
 from hybrid.simulation.restore import program, refused, resolution_from, resolution_tree
+from hybrid.simulation.system_contact import let_touch
 from hybrid.simulation.transient_checkpoint import FIRST_REPORT
 from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
 from hybrid.store.hdf5_file import opened
@@ -48,8 +49,11 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     # It took members as at the first guess, and rotations were within half a turn of 0.
     older = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "rotations": run.rotations.last}
     saved = older | dict(saved)
+    near = [x.number for x in run.lines if "self_contact" in _of(saved, x.name) and not x.touches]
+    let_touch(run, near)
     if run.zones is not None:
         run.zones.take_rods(saved["zones"])
+    if run.zones is not None or near:
         run.make_solver()
     template = checkpoint(run) | {"dry": None, "broken": None, "control": None}
     saved = {"quantities": run.quantities.unknown(), **saved}  # nor did it keep ranges
@@ -69,6 +73,13 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     run.start_from(found["rest"])
     run.make_solver()
     set_state(run, found)
+
+
+def _of(saved: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """What is saved of a line, whatever it is worth."""
+    lines = saved.get("lines")
+    line = lines.get(name) if isinstance(lines, Mapping) else None
+    return line if isinstance(line, Mapping) else {}
 
 
 def of_today(lines: Any, template: Mapping[str, Any]) -> Any:

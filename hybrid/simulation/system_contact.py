@@ -1,16 +1,25 @@
-"""Lines of a system that touch themselves: what their equilibrium must be like."""
+"""Lines of a system that touch themselves: from when on, and what the equilibrium of those that ask for it is like."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from hybrid.errors import Complaint, SceneError
+from hybrid.errors import Complaint, Outcome, SceneError
+from hybrid.kernels.books import ZONES
 from hybrid.kernels.forces import SELF_CONTACT
+from hybrid.kernels.report import SELF_CONTACT_ENERGY
+from hybrid.model.self_reach import touching
 from hybrid.model.system import SystemModel
 from hybrid.simulation.contact_equilibrium import contact_of
 from hybrid.simulation.self_watch import deepest_text
 from hybrid.solve.contact_statics import contact_energy
-from hybrid.solve.system_statics import SystemEquilibrium
+from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
+
+if TYPE_CHECKING:
+    from hybrid.simulation.system_run import SystemRun
 
 
 def refuse_within_itself(system: SystemModel, found: SystemEquilibrium, moves: bool) -> None:
@@ -32,3 +41,66 @@ def refuse_within_itself(system: SystemModel, found: SystemEquilibrium, moves: b
         expected = "a first shape in which the line is apart, for a damped motion with contact to lead to rest"
         fix = f"lines.{name}.initial: {{points: [...]}}, such as a wide U, a smaller diameter, or leave contact out"
         raise SceneError([Complaint(f"lines.{name}.contact", given, expected, fix)])
+
+
+def begin_where_near(run: SystemRun) -> None:
+    """Contact is computed from now on of lines that are near themselves in the state from which a run begins."""
+    step = run.resolution.one.step
+    for line, state in zip(run.lines, run.state.lines, strict=True):
+        line.nears_itself = line.is_near_itself(run.t, state, step)
+    begin_contact(run)
+
+
+def begin_contact(run: SystemRun) -> None:
+    """Contact is computed from now on of lines that have come near themselves; those within themselves go on without.
+
+    Nothing moves; energy that contact has at once is booked as that of a change of zones.
+    """
+    near = [line for line in run.lines if line.nears_itself]
+    begun = []
+    for line in near:
+        x, line.nears_itself = run.solver.lines[line.number], False
+        model = run.model.models[line.number]
+        energy = contact_energy(x.line, x.sea, x.ends, run.state.lines[line.number], contact_of(model))
+        if math.isfinite(energy):
+            begun.append(line.number)
+        elif run.steps:  # what is so at the start is told with the equilibrium
+            line.meets_itself(run.t, run.last_step)
+    if not begun:
+        return
+    let_touch(run, begun)
+    if run.zones is not None:
+        run.zones.go_on()
+    else:
+        renew_solver(run, "where contact of the line with itself begins")
+    moving = () if run.zones is None else run.zones.numbers
+    for k in (k for k in begun if k not in moving):
+        run.lines[k].books.work[0, ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY])
+
+
+def let_touch(run: SystemRun, numbers: Iterable[int]) -> None:
+    """Give a run models of lines that touch themselves; its solver has still to follow."""
+    models = [*run.model.models]
+    for k in numbers:
+        friction = run.lines[k].scene.contact.friction
+        models[k] = replace(models[k], line=touching(models[k].line, friction))
+        run.lines[k].follow(models[k])
+        if run.zones is not None:
+            run.zones.let_touch(k, friction)
+    run.model = replace(run.model, models=tuple(models))
+
+
+def renew_solver(run: SystemRun, after: str) -> None:
+    """Another solver in mid-motion, for lines that have changed; after: what, for the text of a failure."""
+    run.gather_events()  # in the order in which they happen
+    bodies, work = run.solver.bodies.copy(), run.solver.body_work.copy()
+    run.make_solver()
+    run.solver.bodies[:], run.solver.body_work[:] = bodies, work
+    run.take_other()
+    for model in run.model.models:
+        model.ends.at(run.t)
+        model.sea.at(run.t)
+    run.model.load_bodies(run.t, run.solver.bodies, run.loaded)
+    taken = run.solver.evaluate_forces(run.state, 0.0, run.t)
+    if taken.outcome != Outcome.OK:
+        raise LineFailed(taken.line, taken.outcome, run.t, None, after)

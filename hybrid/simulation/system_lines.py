@@ -11,7 +11,7 @@ import numpy as np
 
 from hybrid.kernels.books import CARRIED, LOG, STORED, Books
 from hybrid.kernels.entry import sharpest
-from hybrid.kernels.forces import FRICTION, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.forces import FRICTION, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.report import FORCE_A, LOCAL_ERROR
 from hybrid.kernels.run import blank_books
 from hybrid.kernels.state import Batch, Ends, Floats, State, Work, batch_of_one
@@ -28,7 +28,7 @@ from hybrid.simulation.envelope import Envelope, marks_of
 from hybrid.simulation.events import EventLog, energy_gains_text
 from hybrid.simulation.result_file import result_recorder
 from hybrid.simulation.run_sample import COMPARED
-from hybrid.simulation.self_watch import LineWatch, SelfWatch, diameters, least_bending
+from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
 from hybrid.simulation.time_loop import FORCE_COLUMNS
 from hybrid.solve.run import no_extremes
 from hybrid.solve.self_contact import SelfContact
@@ -40,7 +40,6 @@ from hybrid.store.writer import Recorder
 
 # Outputs of a line that wait for one another: quantities of all of them are computed together.
 WAITING = 64
-NO_CONTACT = "its contact is off"
 # Of the length: ends that are so near to where they were have not been moved.
 SAME_PLACE = 1e-9
 
@@ -72,10 +71,10 @@ class LineResult:
         self.diagnostics = Diagnostics(model, self.events)
         self._moves = outputs > 0
         self.observer = observer_of(scene, model, self._moves, COMPARED if target is None else None)
-        itself = SelfWatch(model, NO_CONTACT, "contact: {self: true} of the line does")
-        self.envelope = Envelope(scene, model, self._moves, itself)
-        self.envelope.itself.on &= target is not None
+        self.envelope = Envelope(scene, model, self._moves)
+        self.envelope.itself.on &= target is not None or bool(model.line.bits & MAY_TOUCH)
         self._itself = LineWatch(self.envelope.itself, model)
+        self.nears_itself = False  # whether contact with itself has to begin
         self.target = MemoryTarget() if isinstance(target, MemoryTarget) else None  # else it will be a part of a file
         self.recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder
         self.recorder = ComparisonRecorder(FORCE_COLUMNS)
@@ -112,8 +111,11 @@ class LineResult:
         return books._replace(
             strains=np.zeros((nodes, 3)), marks=marks, right=right, start=begin.copy(),
             extremes=no_extremes(nodes + marked.size),
-            touch=np.zeros((3, nodes if self.touches else 0)),
+            touch=self._blank_touch(),
         )  # fmt: skip
+
+    def _blank_touch(self) -> Floats:
+        return np.zeros((3, self.model.line.s.size if self.touches else 0))
 
     @property
     def touches(self) -> bool:
@@ -123,6 +125,7 @@ class LineResult:
     def touch_itself(self, t: float) -> SelfContact | None:
         """Contact of the line as it is from t (s) on, which goes on with what there was; None: there is none."""
         if not self.touches:
+            self.contact = None
             return None
         before, model, other = self.contact, self.model, self._touching.layout is not self.model.layout
         self.contact = SelfContact(
@@ -154,7 +157,16 @@ class LineResult:
                 text = f"{there}a damped motion with contact, without friction, led to this equilibrium; {text}"
             self.events.event(0.0, 0.0, self.model.length, "stability not judged", text)
         self.judge(t, sharpest(x.line, x.ends, state), state)
-        self._itself.look(t or 0.0, 0.0, state, state.r, self.events.event)
+        if self._itself.look(t or 0.0, 0.0, state, state.r, self.events.event):
+            self.meets_itself(t or 0.0, 0.0)
+
+    def is_near_itself(self, t: float, state: State, step: float) -> bool:
+        """Whether contact that may begin has to at the state at t (s), from which steps (s) are to be made."""
+        return self._itself.is_near(t, state, step)
+
+    def meets_itself(self, t: float, dt: float) -> None:
+        """An event, unless there was one, where contact could not begin after the step of dt (s) to t (s)."""
+        self.envelope.itself.tell_again(t, dt, self.events.event)
 
     def follow(self, model: Model) -> None:
         """Go on with another model of the same cells, after what waits has been recorded."""
@@ -166,6 +178,8 @@ class LineResult:
         self.observer.first_energy = first
         self.diagnostics.follow(model)
         self._itself = LineWatch(self.envelope.itself, model)
+        if self.touches != bool(self.books.touch.size):
+            self.books = self.books._replace(touch=self._blank_touch())
 
     def take_zones(self, model: Model, extremes: bool = True) -> None:
         """Go on with other zones, whose cells are others; extremes: whether those of now count."""
@@ -184,7 +198,7 @@ class LineResult:
         self, t: float, dt: float, taken: SystemTaken, repeats: int, state: State, before: State, work: Work, cpu: float
     ) -> None:
         """Log a step of dt (s) that ended at t (s) in a state, after the one `before`."""
-        self._itself.look(t, dt, state, before.r, self.events.event)
+        self.nears_itself = self._itself.look(t, dt, state, before.r, self.events.event)
         forces = work.report[FORCE_A : FORCE_A + 6]
         pulls = float(np.linalg.norm(forces[:3])), float(np.linalg.norm(forces[3:]))
         error = float(work.report[LOCAL_ERROR])

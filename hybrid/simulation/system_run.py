@@ -32,7 +32,7 @@ from hybrid.simulation.system_checkpoint import (
     other_program,
     restore,
 )
-from hybrid.simulation.system_contact import refuse_within_itself
+from hybrid.simulation.system_contact import begin_contact, begin_where_near, refuse_within_itself
 from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.system_points import Rotations, fields_of, values_of
@@ -314,6 +314,7 @@ class SystemRun:
         self.make_solver()
         assert self.found is not None
         refuse_within_itself(self.model, self.found, moves=True)
+        begin_where_near(self)
         self._settle(self.solver)
         if self.zones is not None:
             self.zones.begin()
@@ -465,6 +466,8 @@ class SystemRun:
                 line.log(t, self.last_step, taken, repeats, *states, work, cpu)
             if zones is not None:
                 zones.accepted(self.last_step)
+            if any(line.nears_itself for line in self.lines):
+                begin_contact(self)
             repeats = 0
             if control is not None:
                 return

@@ -82,7 +82,7 @@ def bring_back(run: SystemRun, saved: SavedSystem) -> None:
     run.gather_events()
     for recorder, mark in zip(recorders(run), saved.marks, strict=True):
         recorder.back_to(mark)
-    if run.model is not saved.model:  # something has broken since
+    if run.model is not saved.model:  # something has broken since, or contact has begun
         run.model, run.failures.broken = saved.model, [*saved.run["broken"]]
         for line, model, rows in zip(run.lines, saved.model.models, saved.waiting, strict=True):
             line.wait_again(((), (), rows[2]))

@@ -24,15 +24,17 @@ from hybrid.kernels.state import Ends, State, state_for
 from hybrid.kernels.zone_step import LOOKAHEAD, follow_zones
 from hybrid.model.build import Model
 from hybrid.model.coarsen import picked
+from hybrid.model.self_reach import touching
 from hybrid.model.system import SystemModel
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.contact_equilibrium import nearness
 from hybrid.simulation.initial_zones import MOST_ROUNDS, STRICTER, manager_for
+from hybrid.simulation.system_contact import renew_solver
 from hybrid.simulation.system_start import solve_from
 from hybrid.simulation.zone_switching import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, note_change, on_layout
 from hybrid.solve.run import Tried
 from hybrid.solve.system import SystemState, SystemTaken
-from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
+from hybrid.solve.system_statics import SystemEquilibrium
 from hybrid.store.named_arrays import matched
 
 if TYPE_CHECKING:
@@ -272,7 +274,7 @@ class SystemZones:
                 changed = True
         self._rescues += changed
         if changed:
-            self._go_on()
+            self.go_on()
         return changed
 
     def accepted(self, dt: float) -> None:
@@ -294,7 +296,7 @@ class SystemZones:
                 self._switch(x, x.pending)
                 x.pending, changed = None, True
         if changed:
-            self._go_on()
+            self.go_on()
 
     def _switch(self, x: _LineZones, change: Change) -> None:
         """Give a line other zones: nothing moves, and what changes energy is booked."""
@@ -308,21 +310,22 @@ class SystemZones:
         run.model, run.state = replace(run.model, models=tuple(models)), run.state._replace(lines=states)
         line.take_zones(model)
 
-    def _go_on(self) -> None:
-        """Another solver, for lines that have other cells."""
+    def let_touch(self, number: int, friction: float) -> None:
+        """The line of this number touches itself from now on, if its zones move."""
+        for x in (x for x in self.lines if x.number == number):
+            x.full = replace(x.full, line=touching(x.full.line, friction))
+            model = x.switching.model
+            x.switching.model = replace(model, line=touching(model.line, friction))
+
+    @property
+    def numbers(self) -> list[int]:
+        """Of the lines whose zones move."""
+        return [x.number for x in self.lines]
+
+    def go_on(self) -> None:
+        """Another solver, for lines that have other cells, or touch themselves."""
         run = self._run
-        run.gather_events()  # in the order in which they happen
-        bodies, work = run.solver.bodies.copy(), run.solver.body_work.copy()
-        run.make_solver()
-        run.solver.bodies[:], run.solver.body_work[:] = bodies, work
-        run.take_other()
-        for model in run.model.models:
-            model.ends.at(run.t)
-            model.sea.at(run.t)
-        run.model.load_bodies(run.t, run.solver.bodies, run.loaded)
-        taken = run.solver.evaluate_forces(run.state, 0.0, run.t)
-        if taken.outcome != Outcome.OK:
-            raise LineFailed(taken.line, taken.outcome, run.t, None, "after a change of zones")
+        renew_solver(run, "after a change of zones")
         before = [x.contact_energy for x in self.lines]
         self._note_contact()
         for x, energy in zip(self.lines, before, strict=True):

@@ -82,7 +82,7 @@ def test_it_resumes_bit_for_bit(whole: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("more", "says"),
     [
-        ({"contact": {"friction": 0.2}}, r"contact\.friction[\s\S]*without contact\.self"),
+        ({"contact": {"self": False, "friction": 0.2}}, r"contact\.friction[\s\S]*without contact\.self"),
         ({"sections": [{k: x for k, x in HOSE.items() if k != "diameter"}]}, r"diameter"),
     ],
 )

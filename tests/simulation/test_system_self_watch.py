@@ -29,7 +29,8 @@ def hanging(duration: float = TIME["duration"]) -> dict[str, Any]:
             "deck": {"position": [9, 0, 0]}, "ground": {"position": [9, 0, -49.9]},
         },
         "lines": {
-            "hose": {"start": "low", "end": "high", "model": "rod", "mesh": {"cells": 40}, "sections": [HOSE]},
+            "hose": {"start": "low", "end": "high", "model": "rod", "mesh": {"cells": 40}, "sections": [HOSE],
+                     "contact": {"self": False}},
             "rope": rope | {"mesh": {"cells": 10}, "sections": [rope["sections"][0] | {"axial_stiffness": 1e5}]},
         },
         "time": TIME | {"duration": duration}, "output": {"every": 1.0},
