@@ -13,7 +13,7 @@ import numpy as np
 from hybrid.kernels.forces import MAY_TOUCH, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twist
 from hybrid.kernels.state import Batch, Floats, Line, Sea
-from hybrid.model.bending_reference import LEFT
+from hybrid.model.bending_reference import LEFT, left_by_correction
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import NEAR
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
@@ -246,7 +246,7 @@ class Observer:
             for name, (_, text) in zip(self._criteria, criteria, strict=True)
         ]
         if errors:
-            left = f", what correction leaves of it ({LEFT:g})" if corrected else ""
+            left = f", what correction leaves of it ({LEFT:g} or more)" if corrected else ""
             fields += [
                 Field(
                     f"errors/model/{name}",
@@ -357,7 +357,7 @@ class Observer:
             right = view.on(self._after)
             found |= {f"right/{name}": self._probes[name].value(right) for name in self._right}
         if self._errors:
-            part = LEFT if self._corrected else 1.0
+            part = left_by_correction(shift.share) if self._corrected and shift is not None else 1.0
             found |= {f"errors/model/{name}": part * x for name, x in model_errors(plain, corrected).items()}
             if self.jumps.size:
                 after = model_errors(plain.on(self._after), corrected.on(self._after))

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from hybrid.kernels.bending_error import COMPLIANCE, FREE_TURN, GIVEN, TURN
-from hybrid.kernels.state import Ends, Floats, State
-from hybrid.model.bending_reference import full_bending
+from hybrid.kernels.state import Batch, Ends, Floats, State
+from hybrid.model.bending_reference import HALF_WRONG, NO_DOUBT, full_bending
 from hybrid.model.build import Model
-from hybrid.solve.bending_corrector import Corrector
+from hybrid.solve.bending_corrector import Corrector, Shift
 
 
 def corrector_for(model: Model) -> Corrector:
@@ -32,6 +32,7 @@ class Correction:
     def __init__(self, model: Model, torque: Callable[[], float] | None = None) -> None:
         """torque: N m, of the whole line as far as its rods do not carry it; None: it follows from the ends' turn."""
         self.model, self.corrector, self._torque = model, corrector_for(model), torque
+        self.doubt = np.array(NO_DOUBT)  # of the output where most of it may be wrong
         if torque is None:
             _follow_ends(model, self.corrector.torque)
 
@@ -50,17 +51,30 @@ class Correction:
         if self._torque is not None:
             self.corrector.torque[GIVEN] = self._torque()
 
+    def shift(self, sampled: np.ndarray, batch: Batch) -> Shift:
+        """What it makes of the outputs of a batch; keeps where a linear estimate knows least of it."""
+        found = self.corrector.shift(sampled, batch)
+        far = np.sqrt((found.position**2).sum(axis=1)).max(axis=0)
+        wrong = np.where(found.share > HALF_WRONG, np.minimum(found.share, 1.0) * far, 0.0)
+        k = int(wrong.argmax())
+        if wrong[k] > min(self.doubt[2], 1.0) * self.doubt[3]:
+            self.doubt[:] = batch.t[k], found.at[k], found.share[k], far[k]
+        return found
+
     def checkpoint(self) -> dict[str, Any]:
         """The error after the last step."""
         c = self.corrector
-        return {"error": c.error, "slid": c.arrays.slid, "twist": float(c.torque[TURN]), "sampled": c.sampled[0]}
+        return {
+            "error": c.error, "slid": c.arrays.slid, "twist": float(c.torque[TURN]), "sampled": c.sampled[0],
+            "doubt": self.doubt,
+        }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on as `checkpoint` has said."""
         c = self.corrector
         c.sea = self.model.sea.values
         c.error[:], c.arrays.slid[:], c.torque[TURN] = saved["error"], saved["slid"], saved["twist"]
-        c.sampled[0] = saved["sampled"]
+        c.sampled[0], self.doubt[:] = saved["sampled"], saved["doubt"]
 
     def switch(self, model: Model) -> None:
         """The line has changed: the error goes on from where it was."""

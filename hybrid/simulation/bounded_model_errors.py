@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from hybrid.simulation.run_sample import NOT_ESTIMATED, Notes, RunSample
 
+if TYPE_CHECKING:
+    from hybrid.simulation.error_estimate import Errors
+
 # Model errors beyond so many times what the criteria of zones let pass are not believed: a loose line drifts for ever.
 BELIEVED = 30.0
+# Part of an error figure that an estimate of neglected bending may be wrong by, beyond which that is said.
+WORTH_SAYING = 0.5
 
 
 def bounded(run: RunSample) -> tuple[np.ndarray | None, Notes]:
@@ -36,3 +44,41 @@ def bounded(run: RunSample) -> tuple[np.ndarray | None, Notes]:
 def scaled(error: np.ndarray, factors: np.ndarray | None) -> np.ndarray:
     """Errors (n, ...) of n outputs, times factors (n,); None: as they are."""
     return error if factors is None else error * factors.reshape(-1, *[1] * (error.ndim - 1))
+
+
+def doubt_text(doubt: np.ndarray) -> str:
+    """Where a linear estimate of neglected bending knows least, and why; doubt: as of `RunSample`."""
+    t, s, share, far = doubt.tolist()
+    part = 100.0 * min(share, 1.0)
+    return (
+        f"at t = {t:.4g} s, s = {s:.4g} m bending, which a catenary neglects, changes the tension or the direction of "
+        f"the line so much that a linear estimate of its shift ({far:.2g} m) may be wrong by {part:.0f} %"
+    )
+
+
+def possible_error(found: float, doubt: np.ndarray, largest: float) -> float:
+    """By how much a model error may be larger than its figure, which is linear; largest: m, figure of the position."""
+    _, _, share, far = doubt.tolist()
+    return found * min(share, 1.0) * min(far / largest, 1.0) if largest > 0.0 else 0.0
+
+
+def doubtful(errors: Errors, doubt: np.ndarray, bounds: Mapping[str, float] | None) -> Notes:
+    """The event that says so where a model error that is not known may take a figure beyond what is asked.
+
+    bounds: what is asked, by quantity; None: nothing is, and the figure of position is to be right.
+    """
+    if not doubt[2] > 0.0:
+        return ()
+    far, names = errors.largest("model", "position"), []
+    for name, bound in (bounds or {"position": 0.0}).items():
+        total = errors.largest("total", name)
+        more = possible_error(errors.largest("model", name), doubt, far)
+        if more > WORTH_SAYING * total and total + more > bound:
+            names.append(name.replace("_", " "))
+    if not names:
+        return ()
+    text = (
+        f"{doubt_text(doubt)}: the error of {', '.join(names)} may be larger than its figure; compare with model: rod, "
+        "or model: adaptive, which makes such places rod"
+    )
+    return (("error uncertain", text),)

@@ -17,6 +17,7 @@ from hybrid.errors import OTHER_PROGRAM, ComputationError, ResultError
 from hybrid.kernels.books import OUTPUT
 from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.state import Floats
+from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model, build
 from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.payout import longest_out, winch_side
@@ -268,7 +269,7 @@ class Case:
                     catenary = np.array([catenary_share(x) for x in result.zones])
         return RunSample(
             resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, bound, notes, forces=forces,
-            catenary=catenary,
+            catenary=catenary, doubt=doubt_of(run),
         )  # fmt: skip
 
     # --- runs to compare with -------------------------------------------------------------------
@@ -324,6 +325,7 @@ class Case:
             found.reference() if isinstance(found, RowsRecorder) else {},
             found.steps,
             found.catenary if switching is not None else np.zeros(0),
+            doubt_of(loop.run),
         )
 
     def survey(self, resolution: Resolution) -> Survey | None:
@@ -397,3 +399,8 @@ class Case:
     def _report(self, run: Transient, finished: bool) -> None:
         if self.progress.heard:
             self.progress(run.t, run.steps, run.iterations, run.model.zones, finished)
+
+
+def doubt_of(run: Transient) -> Floats:
+    """`RunSample.doubt` of a complete run; of zones that move criteria of zones bound what bending does."""
+    return run.correction.doubt if run.correction is not None and run.switching is None else np.array(NO_DOUBT)

@@ -28,6 +28,7 @@ from hybrid.model.resolution import (
     Resolution,
 )
 from hybrid.scene.schema import Scene
+from hybrid.simulation.bounded_model_errors import doubtful
 from hybrid.simulation.error_estimate import Errors, Estimate
 from hybrid.simulation.error_forecast import forecast
 from hybrid.simulation.error_order import COARSER
@@ -48,6 +49,7 @@ from hybrid.simulation.refinement import (
     RAW,
     Free,
     Verdict,
+    bounds_of,
     costly,
     missed,
     not_converged,
@@ -130,6 +132,11 @@ class ErrorController:
         regular = found is not None and not self.irregular  # the other is judged otherwise
         own = [*self.choice.notes, *self._notes, *self._irregular_note()]
         own += not_converged(found.not_converged, self.asked) if found is not None and regular else []
+        if found is not None:
+            asked = (
+                None if self.asked is None else {name: bound for name, _, bound, _ in bounds_of(self.asked, found.run)}
+            )
+            own += doubtful(found.errors, found.doubt, asked)
         return (*own, *((*found.several_equilibria, *found.run.notes, *found.notes) if found is not None else ()))
 
     def _irregular_note(self) -> list[tuple[str, str]]:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.error_order import (
@@ -210,8 +211,13 @@ class Estimate:
         self._errors, (self._model_bound, doubt) = None, bounded(coarse)
         self.notes: Notes = (*coarse.notes, *doubt)
         self._model: Mapping[str, Outputs] = {name: x for name, x in coarse.model_error.items() if len(x)}
-        self._model_every = coarse.every
+        self._model_every, self._model_doubt = coarse.every, coarse.doubt
         self._model_of = coarse.cells, coarse.every, coarse.catenary
+
+    @property
+    def doubt(self) -> np.ndarray:
+        """Where a linear estimate of the model error knows least (`RunSample.doubt`)."""
+        return self.run.doubt if self.run.model_error else self._model_doubt
 
     def set_apart(self, finer: RunSample) -> None:
         """A finer run is no better, and either may be wrong: the error is nowhere less than what they differ by."""
@@ -409,7 +415,8 @@ class Estimate:
             "model": model,
         }
         of = dict(zip(MODEL_OF, self._model_of, strict=True))
-        return found | {"notes": self.notes, "run": self.run.checkpoint(), "model_of": of}
+        found |= {"notes": self.notes, "run": self.run.checkpoint(), "model_of": of}
+        return found | {"doubt": self._model_doubt}
 
     @classmethod
     def restored(cls, tree: Any, scene: Scene, shape: tuple[int, int, int]) -> Self:
@@ -428,6 +435,8 @@ class Estimate:
         self.by_step, self.by_mesh, self._model, self._model_every = late, cells, model, 1
         (self._bound, _), self._model_bound = bounded(self.run), None  # what is kept of a coarser run is bounded
         older = dict(zip(MODEL_OF, (1, 1, np.zeros(0)), strict=True))  # checkpoints of 0.6 do not say
+        sure = np.array(NO_DOUBT)  # of checkpoints of 0.6
+        self._model_doubt = matched({"doubt": tree.get("doubt", sure)}, {"doubt": sure}, "model error")["doubt"]
         count, every, catenary = matched(tree.get("model_of", older), older, "model error").values()
         if min(count, every) < 1 or catenary.shape not in ((0,), every_of(shape[0], every).shape):
             raise ValueError("a model error of no run")

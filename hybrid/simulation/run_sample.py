@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import Resolution, first_resolution
@@ -55,6 +56,7 @@ class RunSample:
     rows: Tree = field(default_factory=dict)  # what store.stored_rows keeps of the outputs; {}: they are in memory
     forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of all steps: s; N, at start and end
     catenary: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (nt,) part of the line, of zones that move
+    doubt: np.ndarray = field(default_factory=lambda: np.array(NO_DOUBT))  # of the model error
     # of an equilibrium: errors (ns,) by its cells beside edges of contact (outputs.edge_errors); in no checkpoint
     at_edges: Mapping[str, np.ndarray] = field(default_factory=dict)
 
@@ -126,7 +128,7 @@ def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int, int], result
     """
     blank = RunSample(first_resolution(scene), {}, 1, 1, 0.0).checkpoint()
     free = dict.fromkeys(("resolution", "values", "model_error", "notes", "rows"))
-    older = {"rows": {}, "catenary": np.zeros(0)}  # that a checkpoint of 0.6 has not
+    older = {"rows": {}, "catenary": np.zeros(0), "doubt": np.array(NO_DOUBT)}  # that a checkpoint of 0.6 has not
     saved = matched(older | tree, blank | free, "run")
     if saved["forces"].ndim != 2 or saved["forces"].shape[1] != 3 or not np.isfinite(saved["forces"]).all():
         raise ValueError("forces of steps that no run has")

@@ -12,6 +12,7 @@ from hybrid.kernels.forces import SEABED, SELF_CONTACT
 from hybrid.kernels.report import REPORT_SIZE, SEABED_ENERGY
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Floats, batch_of_one
+from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model, build
 from hybrid.model.output_points import output_points
 from hybrid.model.resolution import Resolution, wants_errors
@@ -64,7 +65,7 @@ class StaticCase:
                 diagnostics.torque(0.0, manager.torque * manager.compliance, manager.torque)
             stretched = diagnostics.stretch(found.state)
             stop = stretched or diagnostics.still(ends, found.state)
-            values, at_edges = _values(model, found, observer) if stop is None else ({}, {})
+            values, at_edges, doubt = _values(model, found, observer) if stop is None else ({}, {}, np.array(NO_DOUBT))
             if stop is None:
                 diagnostics.loops(
                     np.zeros(1), {name: np.asarray(x)[None] for name, x in values.items()}, observer.grid.s
@@ -78,14 +79,14 @@ class StaticCase:
             recorder.replace(reached)
             envelope.note_broken(reached, recorder.recorded(), recorder.event)
             recorder.close("complete", f"equilibrium: {found.summary}; residual force {found.residual:.2g} N")
-        return _sample(resolution, model, values, at_edges, clock.process_time() - begin)
+        return _sample(resolution, model, values, at_edges, doubt, clock.process_time() - begin)
 
     def sample(self, resolution: Resolution) -> RunSample:
         """Compute for comparison only."""
         begin = clock.process_time()
         model, found, _ = self._equilibrium(resolution)
-        values, at_edges = _values(model, found, self.observer(model, COMPARED))
-        return _sample(resolution, model, values, at_edges, clock.process_time() - begin)
+        values, at_edges, doubt = _values(model, found, self.observer(model, COMPARED))
+        return _sample(resolution, model, values, at_edges, doubt, clock.process_time() - begin)
 
     def survey(self, resolution: Resolution) -> Survey | None:
         """A coarse equilibrium that shows where cells should be short; None: there is none.
@@ -100,7 +101,7 @@ class StaticCase:
             if self.scene.resolution is not None:
                 raise
             return None
-        values, _ = _values(model, found, self.observer(model, COMPARED, s))
+        values, _, _ = _values(model, found, self.observer(model, COMPARED, s))
         run = {name: np.asarray(values[name])[None] for name in ("curvature", "tension")}
         return Survey.of(self.scene, resolution, model, s, run)
 
@@ -132,8 +133,10 @@ def refuse_contact(model: Model, where: str) -> None:
     raise SceneError([Complaint("contact.self", given, expected, f"{fix}; or leave it out")])
 
 
-def _values(model: Model, found: Equilibrium, observer: Observer) -> tuple[dict[str, object], dict[str, Floats]]:
-    """All fields of an equilibrium; what its cells miss beside edges of contact."""
+def _values(
+    model: Model, found: Equilibrium, observer: Observer
+) -> tuple[dict[str, object], dict[str, Floats], Floats]:
+    """All fields of an equilibrium; what its cells miss beside edges of contact; `RunSample.doubt`."""
     ends, correction, sea = model.ends.at(np.inf), None, model.sea.values
     if model.follows_error:
         model.sea.at(np.inf)
@@ -145,18 +148,21 @@ def _values(model: Model, found: Equilibrium, observer: Observer) -> tuple[dict[
     batch = batch_of_one(0.0, ends, found.state, report, np.zeros(len(POWERS)), sea)
     if found.touch.size:
         batch = batch._replace(touch=found.touch[None])
-    shift = correction.corrector.shift(correction.corrector.sampled[:1], batch) if correction is not None else None
+    shift = correction.shift(correction.corrector.sampled[:1], batch) if correction is not None else None
     seen = observer.look(batch)
     values = {name: x[0] for name, x in observer.values_of(seen, shift=shift).items()}
-    return values, edge_errors(seen) if model.line.bits & SEABED else {}
+    doubt = correction.doubt if correction is not None else np.array(NO_DOUBT)
+    return values, edge_errors(seen) if model.line.bits & SEABED else {}, doubt
 
 
 def _sample(
-    resolution: Resolution, model: Model, values: Mapping[str, object], at_edges: Mapping[str, Floats], cpu: float
-) -> RunSample:
+    resolution: Resolution, model: Model, values: Mapping[str, object], at_edges: Mapping[str, Floats], doubt: Floats,
+    cpu: float,
+) -> RunSample:  # fmt: skip
     kept = {name: np.array(values[name])[None] for name in COMPARED if name in values}
     left = {k.removeprefix(MODEL_ERRORS): np.array(x)[None] for k, x in values.items() if k.startswith(MODEL_ERRORS)}
     catenary = np.array([catenary_share(model.zones)]) if model.layout is not None else np.zeros(0)
     return RunSample(
-        resolution, kept, compared_cells(model), 1, cpu, 1, False, left, catenary=catenary, at_edges=at_edges
-    )
+        resolution, kept, compared_cells(model), 1, cpu, 1, False, left, catenary=catenary, doubt=doubt,
+        at_edges=at_edges,
+    )  # fmt: skip

@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING
 
 from hybrid.kernels import books as b
 from hybrid.kernels.self_distance import MEETS, NEARS, TOLD
+from hybrid.model.resolution import ZONES, wants_errors
+from hybrid.simulation.bounded_model_errors import doubt_text
 from hybrid.simulation.events import energy_gains_text, slack_steps_text, steps_cut_text
+from hybrid.simulation.run_sample import NOT_ESTIMATED
 
 if TYPE_CHECKING:
     from hybrid.simulation.transient import Transient
@@ -65,8 +68,18 @@ def note_unknown_error(moving: Transient) -> None:
     assert moving.correction is not None
     if moving.t > moving.beyond:
         s = float(moving.model.line.s[max(moving.correction.corrector.furthest, 0)])
-        moving.events.event(moving.t, s, s, "model error not estimated", moving.correction.beyond)
+        moving.events.event(moving.t, s, s, NOT_ESTIMATED, moving.correction.beyond)
         moving.beyond = moving.t + moving.model.time_scale  # that it takes the whole line to move
+
+
+def note_unknown_correction(moving: Transient) -> None:
+    """At the end: a result without an error figure is corrected where a linear estimate does not know by how much."""
+    model, found = moving.model, moving.correction
+    if found is None or wants_errors(moving.scene) or not model.corrected:
+        return
+    t, s, share, far = found.doubt
+    if min(share, 1.0) * far > ZONES * model.length:
+        moving.events.event(t, s, s, NOT_ESTIMATED, f"{doubt_text(found.doubt)}: the result may be off by as much")
 
 
 def look_at_itself(moving: Transient, flags: int) -> None:

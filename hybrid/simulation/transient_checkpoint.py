@@ -80,7 +80,8 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     if isinstance(saved["push"], dict):
         saved = {**saved, "push": {"real": False} | saved["push"]}
     if run.correction is not None and isinstance(saved.get("correction"), dict):
-        older |= {"correction": {"sampled": run.correction.corrector.sampled[0]} | saved["correction"]}
+        new = {"sampled": run.correction.corrector.sampled[0], "doubt": run.correction.doubt}
+        older |= {"correction": new | saved["correction"]}
         saved = {name: x for name, x in saved.items() if name != "correction"}
     if isinstance(saved.get("state"), dict) and "turn" not in saved["state"] and not model.line.torsion.size:
         saved = {**saved, "state": {**saved["state"], "turn": state.turn}}

@@ -44,7 +44,8 @@ class Shift(NamedTuple):
 
     position, velocity: (N+1, 3, nb) m, m/s; tension: (N, nb) N; moment: (N+1, 3, nb) N m, inertial; stiffness: (N+1,)
     N m2, by which all of a moment makes a curvature; resultants: (2, 3, nb) N, of the forces on the first and the last
-    node, zero where they are given; clamped: (2,) 1 where an end prescribes a tangent.
+    node, zero where they are given; clamped: (2,) 1 where an end prescribes a tangent.  share: (nb,) part of
+    it that a linear estimate may be wrong by, where that is largest; at: (nb,) m, there.
     """
 
     position: Floats
@@ -54,6 +55,8 @@ class Shift(NamedTuple):
     stiffness: Floats
     resultants: Floats
     clamped: np.ndarray
+    share: Floats
+    at: Floats
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
@@ -160,7 +163,40 @@ class Corrector:
         forces = (more - now) / SMALL * batch.held[:, :, None]
         each = (error[:, 0, :, :3], error[:, 1, :, :3], tension, moment, forces)
         r, v, T, M, F = (np.moveaxis(x, 0, -1) for x in each)
-        return Shift(r, v, T, M, self.ki * self.line.hn, F, self.bending.tangent)
+        return Shift(r, v, T, M, self.ki * self.line.hn, F, self.bending.tangent, *self._shares(batch, tension))
+
+    def _shares(self, batch: Batch, change: Floats) -> tuple[Floats, Floats]:
+        """`share` and `at` of `Shift`; change: (nb, N) N, of tension (docs/theory.md, 14)."""
+        line, floor = self.line, self.bending.floor
+        lower = np.minimum(np.maximum(batch.T, floor), np.maximum(batch.T + change, floor))
+        shares, s = np.where(line.spin == 0, np.abs(change) / lower, 0.0), 0.5 * (line.s[:-1] + line.s[1:])
+        kinks = [i for i in np.flatnonzero(self.bending.kinks) if self._may_kink(int(i))]
+        if kinks:
+            shares = np.hstack([shares, np.stack([self._kink_share(batch, int(i)) for i in kinks], axis=1)])
+            s = np.append(s, line.s[kinks])
+        return shares.max(axis=1), s[shares.argmax(axis=1)]
+
+    def _may_kink(self, i: int) -> bool:
+        """Whether node i, where the cable has bending stiffness, lies between catenaries or at a clamped one."""
+        n, spin = self.line.h.size, self.line.spin
+        inside = 0 < i < n and not (spin[i - 1] or spin[i])
+        return bool(self.ki[i] > 0.0 and (inside or (i in (0, n) and not spin[min(i, n - 1)])))
+
+    def _kink_share(self, batch: Batch, i: int) -> Floats:
+        """Part (nb,) by which the estimate for a kink, or a clamp, is wrong: half a kink counts as a clamp at an angle.
+
+        A taut elastica at an angle a to its chord is exactly 2 lambda sin(a/2) beside it and 4 lambda (1 - cos(a/2))
+        short; the estimate has lambda times half the turn (`neglected_moments.bend`) for the first, nothing for the
+        second.
+        """
+        n = self.line.h.size
+        chord = batch.e[:, min(i, n - 1)]
+        other = batch.e[:, i - 1] if 0 < i < n else batch.frame[:, int(i == n), [2, 5, 8]]
+        cosine = _dot(chord, other)[:, 0] / np.sqrt(_dot(chord, chord) * _dot(other, other))[:, 0]
+        turn = np.arccos(np.clip(cosine, -1.0, 1.0))
+        a, estimate = (0.5 * turn, np.tan(0.5 * turn)) if 0 < i < n else (turn, 2.0 * np.tan(0.5 * turn))
+        beside, short = estimate - 2.0 * np.sin(0.5 * a), 4.0 * (1.0 - np.cos(0.5 * a))
+        return np.divide(np.hypot(beside, short), estimate, out=np.zeros(turn.size), where=estimate > 0.0)
 
     def _end_forces(self, batch: Batch, error: Floats, tension: Floats, left: Floats, part: float) -> Floats:
         """Forces (nb, 2, 3) N with which the first and the last cell pull at their nodes, a part of the error added."""

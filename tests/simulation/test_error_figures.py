@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from hybrid.model.material import material
 
 # Estimated over true error, as asked of the project; where it is below, an event must say that it is uncertain.
 SHARP = 0.7, 3.0
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 def effectivity(result, truth, name="position"):
@@ -302,3 +305,33 @@ def test_equilibria_that_depend_on_the_mesh_are_noticed():
     }
     kinds = {e.kind for e in hybrid.static(hanging | {"accuracy": "1%"}).events}
     assert "several equilibria" not in kinds
+
+
+def example(name, model, **more):
+    scene = hybrid.load_scene(EXAMPLES / f"{name}.yaml").model_dump(mode="json", exclude_unset=True)
+    return scene | {"model": {"kind": model}, "time": {"duration": 20.0}, "accuracy": "1%"} | more
+
+
+@pytest.mark.parametrize("name, uncertain", [("s_tether", True), ("rov_tether", False)])
+def test_what_correction_for_bending_leaves_where_tension_or_direction_change_by_much(name, uncertain):
+    """An arch that loses its tension, and a kink of 100 degrees at a float: 0.4 of the truth were estimated, once.
+
+    The arch is where a linear estimate cannot know; nothing is known there, and the event says so.
+    """
+    result, truth = (hybrid.run(example(name, model)) for model in ("corrected", "rod"))
+    assert SHARP[0] <= effectivity(result, truth) <= SHARP[1]
+    told = [event for event in result.events if event.kind == "error uncertain"]
+    assert bool(told) == uncertain
+    if told:
+        assert "s = 38" in told[0].text and "model: rod" in told[0].text
+
+
+def test_a_correction_beyond_what_a_linear_estimate_knows_is_told_without_an_error_figure():
+    """And so it is of a catenary with a figure; a mooring line under tension has no such event."""
+    fixed = {"time": {"duration": 10.0, "step": 0.1}, "output": {"every": 1.0}}
+    kinds = {x.kind for x in hybrid.run(example("s_tether", "corrected", accuracy=None, **fixed)).events}
+    assert "model error not estimated" in kinds
+    fixed["output"]["errors"] = True
+    for name, told in (("s_tether", True), ("touchdown", False)):
+        found = hybrid.run(example(name, "catenary", accuracy=None, **fixed))
+        assert ("linear estimate" in " ".join(x.text for x in found.events if x.kind == "error uncertain")) == told
