@@ -44,7 +44,7 @@ from hybrid.cli.app import (
 from hybrid.cli.pipe import guard_output
 from hybrid.cli.plan_tables import contents_table, outputs_table, plan_lines
 from hybrid.cli.system_commands import plan_of_lines, resume_lines, run_lines, static_lines
-from hybrid.cli.system_stiffness import refuse_for_a_cable, show_holding
+from hybrid.cli.system_stiffness import check_holding, show_holding
 from hybrid.cli.tables import (
     equilibrium_facts,
     equilibrium_table,
@@ -136,11 +136,11 @@ def static(
     """Find the equilibrium of a cable at t = 0 and write it to a file."""
     with session(as_json, quiet) as console:
         asked = load_either(console, scene, settings)
+        check_holding(asked, stiffness, offsets, reach, heading)
         if not isinstance(asked, hybrid.Scene):
             static_lines(console, asked, output or Path(f"{scene.stem}.static.h5"), plot, keep)
             show_holding(console, asked, stiffness, offsets, reach, heading)
             return
-        refuse_for_a_cable(stiffness, offsets)
         target = console.will_write(output or Path(f"{scene.stem}.static.h5"))
         picture = picture_beside(target, plot)
         console.compiling(asked, static=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import stat
 import sys
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
@@ -259,8 +260,9 @@ def _listed(names: list[str]) -> str:
 
 
 def _stamp(file: Path) -> tuple[int, int] | None:
+    """What changes when a file is written; None of a folder, which others change, and of no file."""
     try:
         found = file.stat()
     except OSError:
         return None
-    return found.st_ino, found.st_mtime_ns
+    return None if stat.S_ISDIR(found.st_mode) else (found.st_ino, found.st_mtime_ns)

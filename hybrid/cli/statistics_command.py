@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from hybrid.cli.app import Json, LineName, Quiet, app, numbers, opened_line, session, window, words
+from hybrid.cli.app import Json, LineName, Quiet, UsageError, app, numbers, opened_line, session, window, words
 from hybrid.errors import ResultError
 
 if TYPE_CHECKING:
@@ -41,6 +41,11 @@ def stats(
     line: LineName = None, quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
     """Statistics of a result: means, deviations, extremes, periods, what three hours bring; fatigue damage."""
+    if not 0.0 < hours < np.inf:
+        raise UsageError(f"--hours: {hours:g} is no time; give a number above 0, such as 3")
+    if curve is None and (strength is not None or section is not None):
+        name = "--strength" if strength is not None else "--section"
+        raise UsageError(f"{name}: of fatigue damage, which needs a curve; add --curve NAME, such as --curve 'D sea'")
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
         if opened.lines and (names is None or not all(name in opened for name in names)):
             from hybrid.store.histories import usual_names

@@ -19,18 +19,38 @@ COUNT = 11  # offsets from one side to the other
 NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
-def refuse_for_a_cable(stiffness: str | None, offsets: str | None) -> None:
-    """SceneError where something is asked of a scene of one cable that only several lines have."""
-    asked = stiffness or offsets
-    if asked is not None:
-        expected = "a scene of several lines, with points and lines"
-        where, fix = "--stiffness" if stiffness else "--offsets", "write the cable as one line between two points"
-        raise SceneError([Complaint(where, asked, expected, fix)])
+def check_holding(
+    asked: Scene | System, stiffness: str | None, offsets: str | None, reach: float | None, heading: float
+) -> None:
+    """SceneError where what is asked cannot be had, before anything is computed."""
+    if reach is not None and offsets is None:
+        raise SceneError([Complaint("--reach", f"{reach:g}", "a point or body to shift", "--offsets point:NAME")])
+    given = {name: at for name, at in (("--stiffness", stiffness), ("--offsets", offsets)) if at is not None}
+    if isinstance(asked, hybrid.Scene):
+        for name, at in given.items():
+            expected, fix = (
+                "a scene of several lines, with points and lines",
+                "write the cable as one line between two points",
+            )
+            raise SceneError([Complaint(name, at, expected, fix)])
+        return
+    if given:
+        from hybrid.simulation.system_stiffness import target_of
+
+        for at in given.values():
+            target_of(asked, at)
+    if offsets is not None:
+        if reach is None:
+            fix = "add --reach 20 (m), the largest offset to either side"
+            raise SceneError([Complaint("--offsets", offsets, "how far", fix)])
+        if not 0.0 < reach < np.inf:
+            raise SceneError([Complaint("--reach", f"{reach:g}", "a length > 0, in m", "--reach 20")])
+        if not np.isfinite(heading):
+            raise SceneError([Complaint("--heading", f"{heading:g}", "an angle in deg", "--heading 90")])
 
 
 def show_holding(
-    console: Console, asked: Scene | System, stiffness: str | None, offsets: str | None, reach: float | None,
-    heading: float,
+    console: Console, asked: System, stiffness: str | None, offsets: str | None, reach: float | None, heading: float,
 ) -> None:  # fmt: skip
     """Print the stiffness at a point or body, and the forces on one that is held beside its equilibrium."""
     if stiffness is not None:
@@ -39,15 +59,11 @@ def show_holding(
             key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in asdict(found).items()
         }
         console.json("stiffness", **facts)
-        console.show(lambda: _matrix(f"stiffness at {found.at} (N/m, N/rad, N m/m, N m/rad)", found.matrix))
+        units = "N/m" if len(found.matrix) == 3 else "N/m, N/rad, N m/m, N m/rad"
+        console.show(lambda: _matrix(f"stiffness at {found.at} ({units})", found.matrix))
         if not np.array_equal(found.matrix, found.lines):
             console.show(lambda: _matrix("of it, by the lines", found.lines))
-    if offsets is not None:
-        if reach is None:
-            fix = "add --reach 20 (m), the largest offset to either side"
-            raise SceneError([Complaint("--offsets", offsets, "how far", fix)])
-        if not reach > 0.0:
-            raise SceneError([Complaint("--reach", f"{reach:g}", "a length > 0, in m", "--reach 20")])
+    if offsets is not None and reach is not None:
         curve = hybrid.offsets(asked, offsets, np.linspace(-reach, reach, COUNT).tolist(), heading)
         console.json(
             "offsets", at=curve.at, heading=curve.heading, distance=curve.distance.tolist(),
@@ -60,7 +76,7 @@ def show_holding(
 def _matrix(title: str, matrix: Any) -> Any:
     from rich.table import Table
 
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 2))
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 2), min_width=len(title))
     size, big = len(matrix), np.abs(matrix).max(initial=0.0)
     for name in ("", *NAMES[:size]):
         table.add_column(name, justify="right")

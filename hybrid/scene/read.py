@@ -200,10 +200,10 @@ def located_in(error: SceneError, text: str, file: str = "", overrides: Sequence
     if isinstance(root.value, dict):
         for each in overrides:
             override(root, each, _system() if names_lines(root.plain()) else Scene)
-    complaints = []
+    complaints, keys = [], {*Scene.model_fields, *_system().model_fields}
     for complaint in error.complaints:
         at = tuple(int(x) if x.isdigit() else x for x in re.findall(r"\w+", complaint.where))
-        place = _find(root, at, False)[2]
+        place = _find(root, at, False)[2] if at and at[0] in keys else None  # an option has no place in the file
         if complaint.line is None and place is not None:
             complaint = replace(complaint, line=place[0], column=place[1])
         complaints.append(complaint)

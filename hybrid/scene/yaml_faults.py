@@ -93,6 +93,8 @@ def _remedy(problem: str, here: str) -> str:
         return "give the anchor (&name) before the alias (*name)"
     if re.search(r"found '[}\]]'", problem):
         return "take the bracket out: none is open here"
+    if "another document" in problem:
+        return "one scene to a file: take out --- and what follows it, or put that into a file of its own"
     if "cannot start any token" in problem:
         return "put the text in quotes"
     return "check indentation, brackets and quotes here and in the line before"

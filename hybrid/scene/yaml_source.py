@@ -292,6 +292,10 @@ def override(root: Node, text: str, schema: type[Table]) -> Complaint | None:
         _open(here, schema, path[:depth])
         if isinstance(part, int):
             refusal = _no_entry(here, path[:depth], part)
+        elif isinstance(here.value, list) and here.value:
+            entry: Place = (int(part),) if part.isdecimal() else (0, part)
+            fix = f"{dotted((*path[:depth], *entry, *path[depth + 1 :]))}=value"
+            refusal = f"the number of an entry of {dotted(path[:depth])} in brackets, counted from 0", fix
         else:
             known = keys_at(schema, path[:depth])
             if not known and isinstance(here.value, dict):  # a table whose keys are names

@@ -74,7 +74,7 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     SceneError where the scene has no such point or body, ComputationError where no equilibrium is found.
     """
     system = _system(scene)
-    kind, name = _target(system, at)
+    kind, name = target_of(system, at)
     model = build_system(system)
     found = _equilibrium(system, model)
     solver, state, first = found.solver, found.state, 0
@@ -193,7 +193,7 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
     Errors: as of `stiffness`; the distance at which no equilibrium is found is in the message.
     """
     system = _system(scene)
-    kind, name = _target(system, at)
+    kind, name = target_of(system, at)
     try:
         known = bool(len(distances)) and bool(np.isfinite([*distances, heading]).all())
     except (TypeError, ValueError):
@@ -281,8 +281,8 @@ def _system(scene: SceneLike | System) -> System:
     return found
 
 
-def _target(system: System, at: str) -> tuple[str, str]:
-    """Kind and name of what is asked for."""
+def target_of(system: System, at: str) -> tuple[str, str]:
+    """Kind and name of what is asked for, `point:NAME` or `body:NAME`; SceneError where the scene has no such one."""
     kind, _, name = at.partition(":")
     if name not in (system.points if kind == "point" else system.bodies if kind == "body" else ()):
         names = [f"point:{x}" for x, p in system.points.items() if not isinstance(p, Fairlead)]

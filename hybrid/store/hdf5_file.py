@@ -82,7 +82,12 @@ def check_format(file: h5py.File, source: Path | io.BytesIO) -> None:
     name = str(source) if isinstance(source, Path) else "the file in memory"
     kind, version = plain_text(file.attrs.get("format", "")), file.attrs.get("format_version")
     if kind != FORMAT:
-        raise ResultError(f"{name} is an HDF5 file, but not a result of hybrid\n    given:    format '{kind}'")
+        exported = kind.startswith(FORMAT)
+        given = f"an export, which other programs read (format '{kind}')" if exported else f"format '{kind or 'none'}'"
+        advice = "name the result that it was made of" if exported else "name a file that `hybrid run` has written"
+        raise ResultError(
+            f"{name} is an HDF5 file, but not a result of hybrid\n    given:    {given}\n    try:      {advice}"
+        )
     if version != FORMAT_VERSION:
         wrote = plain_text(file.attrs.get("version_hybrid-cable", "?"))
         said = f"{name} has result format {version}; this program reads format {FORMAT_VERSION}"

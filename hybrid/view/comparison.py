@@ -106,20 +106,22 @@ def _verdict(results: Mapping[str, Result]) -> str:
 
 def _table(results: Mapping[str, Result]) -> str:
     """Extremes and sizes of each, and how far they are from those of the first."""
-    first = next(iter(results.values()))
     rows = [["length", *(f"{short(length_of(r), 6)} m" for r in results.values())]]
     rows.append(["last output at t =", *(f"{short(r.times[-1], 6)} s" for r in results.values())])
     rows.append(["steps", *(str(len(r["steps/t"])) if "steps/t" in r else "–" for r in results.values())])
     for name, lowest, head in EXTREMES:
-        if not all(name in r for r in results.values()):
+        found = {key: worst(r, name, lowest=lowest).value for key, r in results.items() if name in r}
+        if max(map(abs, found.values()), default=0.0) <= ZERO:
             continue
-        found = [worst(r, name, lowest=lowest).value for r in results.values()]
-        if max(map(abs, found)) <= ZERO:
-            continue
-        cells = [amount(found[0], first.units[name])]
-        for x in found[1:]:
-            part = f" ({short(100.0 * (x / found[0] - 1.0), 3)} %)" if abs(found[0]) > ZERO else ""
-            cells.append(amount(x, first.units[name]) + part.replace("(", "(+" if x > found[0] else "("))
+        cells, known = [], found.get(next(iter(results)))
+        for k, (key, r) in enumerate(results.items()):
+            if key not in found:  # a cable without bending stiffness has no bending moment
+                cells.append("–")
+                continue
+            x, part = found[key], ""
+            if k and known is not None and abs(known) > ZERO:
+                part = f" ({'+' if x > known else ''}{short(100.0 * (x / known - 1.0), 3)} %)"
+            cells.append(amount(x, r.units[name]) + part)
         rows.append([head, *cells])
     return parts.table_html(rows, ["", *results], numbers=len(results))
 
@@ -192,9 +194,10 @@ def _ranges(results: Mapping[str, Result]) -> list[Panel]:
         peak = max((float(np.abs(x.values).max()) for x in found.values()), default=0.0)
         if peak <= ZERO:
             continue
-        factor, unit = prefix(next(iter(results.values())).units[name], peak)
+        factor, unit = prefix(next(r.units[name] for r in results.values() if name in r), peak)
         items: list[Item] = []
-        for (key, x), colour in zip(found.items(), COLOURS, strict=False):
+        for key, x in found.items():
+            colour = COLOURS[list(results).index(key)]
             items.append(Line(*x.curve(x.values.max(axis=0) * factor), key, colour, 1.4))
             if len(x.values) > 1:
                 items.append(Line(*x.curve(x.values.min(axis=0) * factor), "", colour, 0.9, dash="dash"))

@@ -58,7 +58,9 @@ def artists_of(ax: Axes, item: Item, label: str) -> list[Artist]:
             return [_map(ax, item)]
         case Text():
             look = {"ha": item.across, "va": item.up, "fontsize": item.size, "color": item.colour}
-            look["xycoords"] = tuple("axes fraction" if axis in item.parts else "data" for axis in "xy")
+            # Only text at "data" outside the axes is left out; a pair of "data" is drawn there, and shrinks the axes.
+            pair = tuple("axes fraction" if axis in item.parts else "data" for axis in "xy")
+            look["xycoords"] = pair if item.parts else "data"
             place = (item.x, item.y)
             return [ax.annotate(item.text, place, xytext=item.offset, textcoords="offset points", **look)]
 
@@ -106,6 +108,8 @@ def draw_panel(panel: Panel, ax: Axes, *, legend: bool | None = None) -> dict[st
         seen.add(label)
         behind = isinstance(item, Area | Box | Map)  # the grid is at 0.5
         for n, artist in enumerate(artists):
+            if free and isinstance(item, Marks):
+                artist.set_clip_on(False)  # a mark on the rim is drawn whole
             artist.set_zorder((0.1 if behind else 1.0) + 0.001 * k + 0.0001 * n)
         if isinstance(item, Map):
             images[item.name] = artists[0]

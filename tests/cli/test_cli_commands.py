@@ -16,6 +16,7 @@ import pytest
 
 import hybrid
 from hybrid.cli.commands import main
+from hybrid.cli.console import Console
 from hybrid.cli.tables import lowest_node
 
 WIRE = """\
@@ -305,6 +306,10 @@ def test_a_scene_without_time_cannot_be_run(call: Call) -> None:
         (("plot", "wire.yaml", "--zones"), "is a scene, not a result"),
         (("plot", "wire.h5", "--zones", "--times", "0"), "without --zones"),
         (("plot", "wire.h5", "--zones", "--history", "1"), "without --zones"),
+        (("stats", "wire.h5", "--hours", "0"), "0 is no time"),
+        (("stats", "wire.h5", "--hours", "nan"), "nan is no time"),
+        (("stats", "wire.h5", "--strength", "1e6"), "add --curve"),
+        (("stats", "wire.h5", "--section", "1,2,3"), "add --curve"),
     ],
 )
 def test_input_that_is_refused(call: Call, arguments: tuple[str, ...], words: str) -> None:
@@ -315,11 +320,40 @@ def test_input_that_is_refused(call: Call, arguments: tuple[str, ...], words: st
     assert error["event"] == "error" and words in error["message"]
 
 
+@pytest.mark.parametrize(
+    ("arguments", "where"),
+    [
+        (("--stiffness", "point:rng"), "stiffness"),
+        (("--stiffness", "ring"), "stiffness"),
+        (("--offsets", "point:ring"), "--offsets"),
+        (("--offsets", "point:ring", "--reach", "0"), "--reach"),
+        (("--offsets", "point:ring", "--reach", "inf"), "--reach"),
+        (("--offsets", "point:ring", "--reach", "1", "--heading", "nan"), "--heading"),
+        (("--reach", "1"), "--reach"),
+        (("--set", "time.step"), "override"),
+    ],
+)
+def test_options_are_refused_before_anything_is_computed(call: Call, arguments: tuple[str, ...], where: str) -> None:
+    """An equilibrium was found and written first; and an option was said to stand in line 1 of the scene."""
+    Path("bridle.yaml").write_text(BRIDLE)
+    said = call("static", "bridle.yaml", *arguments)
+    assert said.code == 1 and said.out == "" and said.err.startswith(f"bridle.yaml: {where}\n")
+    assert not Path("bridle.static.h5").exists()
+
+
 def test_plot_refuses_what_it_cannot_draw(call: Call) -> None:
     call("run", "wire.yaml", "-q")
     assert "outside the result" in call("plot", "wire.h5", "--times", "9").err
     said = call("plot", "wire.h5", "-o", "wire.docx")
     assert said.code == 1 and "docx" in said.err
+
+
+def test_a_folder_that_others_write_to_is_not_what_was_written(tmp_path: Path) -> None:
+    """The exit code of `-o FOLDER` was 2, failed, where another program wrote to the folder meanwhile."""
+    console = Console(as_json=False, quiet=True)
+    console.will_write(tmp_path)
+    os.utime(tmp_path, ns=(1, 1))
+    assert console.written is None
 
 
 def test_an_older_result_is_replaced_unless_told_otherwise(call: Call) -> None:

@@ -73,6 +73,8 @@ FAULTS = [
     ("A line", "@A", 1, "in quotes"),
     ("  seabed", "\tseabed", 3, "not tabs"),
     ("  end:", "   end:", 11, "indentation"),
+    # a second document
+    ("model: cat", "---\nmodel: cat", 14, "one scene to a file"),
     ("model: cat", "  model: cat", 14, "indentation"),
 ]
 

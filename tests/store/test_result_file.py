@@ -20,6 +20,7 @@ from hybrid.store.format import Field
 from hybrid.store.hdf5_file import SLOTS, created, hold_metadata, in_memory
 from hybrid.store.reader import Result, open_result
 from hybrid.store.records import Event, Zone
+from hybrid.store.selection import MARK
 from hybrid.store.writer import Recorder
 
 S = np.linspace(0.0, 2.0, 5)
@@ -380,6 +381,8 @@ def test_places_where_nothing_can_be_written(tmp_path: Path) -> None:
 def test_files_that_are_no_results(tmp_path: Path) -> None:
     (tmp_path / "text.h5").write_text("hello")
     h5py.File(tmp_path / "foreign.h5", "w").close()
+    with h5py.File(tmp_path / "export.nc", "w") as file:
+        file.attrs["format"] = MARK
     written(tmp_path / "future.h5")
     with h5py.File(tmp_path / "future.h5", "r+") as file:
         file.attrs["format_version"] = 2
@@ -387,7 +390,8 @@ def test_files_that_are_no_results(tmp_path: Path) -> None:
         (tmp_path / "none.h5", "there is no file"),
         (tmp_path, "is a folder"),
         (tmp_path / "text.h5", "cannot be read as a result"),
-        (tmp_path / "foreign.h5", "not a result of hybrid"),
+        (tmp_path / "foreign.h5", "not a result of hybrid\n.*format 'none'\n.*name a file that `hybrid run`"),
+        (tmp_path / "export.nc", "not a result of hybrid\n.*an export.*\n.*name the result that it was made of"),
         (tmp_path / "future.h5", "result format 2; this program reads format 1"),
         (b"hello", "no HDF5 file"),
     )

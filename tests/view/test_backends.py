@@ -16,7 +16,7 @@ from hybrid.store.reader import Result
 from hybrid.view import panels, zones
 from hybrid.view.decimate import Store, kept
 from hybrid.view.figure import Axis, Band, Line, Panel, Text
-from hybrid.view.matplotlib_backend import draw_panel
+from hybrid.view.matplotlib_backend import draw_panel, new_axes
 from hybrid.view.plotly_backend import figure_of
 from hybrid.view.svg_backend import draw
 
@@ -88,6 +88,17 @@ def test_limits_hold_what_is_drawn_and_no_round_off() -> None:
     assert (left, right, low, high) == pytest.approx((-0.1, 2.1, -2.25, 3.25))
     still = Panel("p", "p", Axis("x", "m"), Axis("y", "m", peak=500.0), [Line(x, 7.0 + 1e-12 * x)])
     assert still.limits()[1] == pytest.approx((6.75, 7.25))
+
+
+def test_a_name_far_outside_leaves_the_axes_their_room() -> None:
+    """The still water of a cable 200 m below it: the axes of the page collapsed, and their numbers lay on each other."""
+    x = np.linspace(0.0, 50.0, 3)
+    items: list[Any] = [Line(x, x - 230.0), Text(50.0, 0.0, "still water")]
+    ax = new_axes()
+    draw_panel(Panel("p", "shape", Axis("x", "m"), Axis("z", "m"), items, aspect=1.0), ax)
+    ax.set_autoscale_on(False)
+    ax.figure.canvas.draw()
+    assert ax.get_ylim()[1] < -100.0 and ax.get_position().height > 0.6
 
 
 def test_a_back_end_says_what_it_cannot_draw() -> None:

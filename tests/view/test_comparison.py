@@ -13,7 +13,7 @@ from reported import reported
 import hybrid
 from hybrid.cli.commands import main
 from hybrid.errors import ResultError
-from hybrid.view.comparison import _differences, _ranges, _table
+from hybrid.view.comparison import COLOURS, _differences, _ranges, _table
 
 SCENE = """
 title: {title}
@@ -65,6 +65,18 @@ def test_every_graph_stands_under_its_own_title(tmp_path: Path) -> None:
         assert drawn[key] == axes
     captions = [int(k) for k in re.findall(r"<b>Figure (\d+)\.</b>", page)]
     assert captions == list(range(1, len(figures) + 1))
+
+
+def test_a_result_without_bending_moments_before_one_that_has_them() -> None:
+    """A cable without bending stiffness has none: it ended with a traceback, and curves had each other's colours."""
+    runs = {"a": reported(rod=False), "b": reported(dip=12000.0)}
+    (line,) = [x for x in {p.key: p for p in _ranges(runs)}["range-bending_moment"].items if x.label]
+    assert (line.label, line.colour) == ("b", COLOURS[1])
+    rows = dict(re.findall(r"<tr><td>([^<]*)</td>(.*?)</tr>", _table(runs)))
+    cells = re.findall(r"<td[^>]*>(.*?)</td>", rows["largest bending moment"])
+    assert cells[0] == "–" and cells[1].endswith(" N m")
+    cells = re.findall(r"<td[^>]*>(.*?)</td>", rows["lowest tension"])
+    assert cells == ["9 kN", "3 kN (-66.7 %)"]
 
 
 def test_the_table_has_differences_in_percent() -> None:
