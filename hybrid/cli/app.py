@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import signal
 import threading
 import traceback
@@ -21,6 +23,17 @@ if TYPE_CHECKING:
     from hybrid.store.reader import Result
 
 REFUSED, FAILED, INTERRUPTED = 1, 2, 130
+_ELSEWHERE = "a folder you may write to, with free space"
+# What a disk says of a file, and what to try: no bug, wherever it is raised.
+DISK_ERRORS = {
+    errno.ENAMETOOLONG: "a shorter name",
+    errno.EACCES: "a file that you may read, or a folder you may write to",
+    errno.EPERM: _ELSEWHERE,
+    errno.EROFS: _ELSEWHERE,
+    errno.ENOSPC: _ELSEWHERE,
+    errno.EDQUOT: _ELSEWHERE,
+    errno.ELOOP: "a file that is no link to itself",
+}
 
 app = typer.Typer(
     help="Dynamics of long cables: flexible catenaries where they are taut, rods where they bend.",
@@ -143,6 +156,11 @@ def _told(console: Console, error: BaseException) -> int:
             return REFUSED
         case ResultError():
             console.error("result", str(error), file=console.written)
+            return FAILED if console.written else REFUSED
+        case OSError() if error.errno in DISK_ERRORS and error.filename:
+            name = os.fspath(error.filename)
+            name = name if len(name) <= 200 else f"{name[:100]} ... {name[-40:]}"
+            console.error("result", f"{name}: {error.strerror}\n    try:      {DISK_ERRORS[error.errno]}")
             return FAILED if console.written else REFUSED
     head = f"this is a bug in hybrid {hybrid.__version__}; please report it with the scene and these lines"
     console.error("bug", f"{head}\n{''.join(traceback.format_exception(error))}")

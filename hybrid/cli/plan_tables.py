@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import isfinite
-from textwrap import wrap
+from textwrap import shorten, wrap
 from typing import TYPE_CHECKING, Any
 
 from hybrid.cli.progress_line import span
@@ -56,7 +56,11 @@ def plan_lines(scene: Scene, plan: Plan) -> list[str]:
         "accuracy": _accuracy(on),
         "assumed": "; ".join(what for what, why in on.items() if why.startswith("assumed")),
     }
-    return [scene.title or "untitled scene", *_table(rows), "all that is on and off, and why: --verbose"]
+    return [
+        shorten(scene.title, 160, placeholder=" …") or "untitled scene",
+        *_table(rows),
+        "all that is on and off, and why: --verbose",
+    ]
 
 
 def system_plan_lines(system: System, plan: SystemPlan) -> list[str]:
@@ -83,7 +87,11 @@ def system_plan_lines(system: System, plan: SystemPlan) -> list[str]:
         "accuracy": _accuracy(on),
         "assumed": "; ".join(what for what, why in on.items() if why.startswith("assumed")),
     }
-    return [system.title or "untitled scene", *_table(rows), "of each line, what is on and off, and why: --verbose"]
+    return [
+        shorten(system.title, 160, placeholder=" …") or "untitled scene",
+        *_table(rows),
+        "of each line, what is on and off, and why: --verbose",
+    ]
 
 
 def _table(rows: Mapping[str, str]) -> list[str]:

@@ -47,6 +47,10 @@ def study(
             f"{source} is a folder; a study file is expected, or --case N, --sensitivity RESULT for what it holds"
         )
     with session(as_json, quiet) as console:
+        if netcdf is not None:
+            from hybrid.store.selection import check_target
+
+            check_target(netcdf, overwrite=True)  # before the work
         if case is not None:
             target = console.will_write(output or Path(f"{source.stem}.case{case}.h5"))
             result = hybrid.study_case(source, case, target)
@@ -102,7 +106,9 @@ def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path 
     if empty:
         console.note(f"note: {', '.join(empty)}: in no case (too few peaks or up-crossings in the record)")
     if netcdf is not None:
-        found.to_netcdf(netcdf, engine="h5netcdf")
+        from hybrid.store.selection import write_atomically
+
+        write_atomically({netcdf: found.to_netcdf(engine="h5netcdf")}, overwrite=True)
     text = f"{counts['done']} cases done, {counts['failed']} failed, in {span(wall)} of wall time"
     console.done(text, folder, netcdf, **counts, wall=wall)
 

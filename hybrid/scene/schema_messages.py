@@ -78,6 +78,10 @@ def explain(root: type[Table], error: Mapping[str, Any]) -> list[tuple[Finding, 
     kind, loc, value = error["type"], tuple(error["loc"]), error.get("input")
     path = tuple(part for part in loc if not is_tag(part))
     context = error.get("ctx") or {}
+    if path and path[-1] == "[key]":  # pydantic's word for a name that its table does not take
+        *at, name = path[:-1]
+        words, fix = "a name of one line, without / and .: it is a key of the result file", _plain_name(str(name))
+        return [(Finding((*at, name), words, f"call it {fix}"), True)]
     if kind == "findings":
         return [(Finding((*path, *f.at), f.expected, f.fix, f.given), False) for f in context["findings"]]
     if kind == "default_factory_not_called":
@@ -99,6 +103,11 @@ def explain(root: type[Table], error: Mapping[str, Any]) -> list[tuple[Finding, 
         zero = "" if " > 0" in words else ", or write 0"
         return [(Finding(path, f"{words}, and no less than {context['least']:g}", f"check the unit{zero}"), False)]
     return [(Finding(path, words, _fix(kind, key, value, spot) or _usual_fix(key, words, spot)), False)]
+
+
+def _plain_name(name: str) -> str:
+    """A name that the result file takes, as much like another as can be."""
+    return "_".join(re.findall(r"\w+", name)) or "line1"
 
 
 def _unknown_key(root: type[Table], path: Place, spot: Spot) -> Finding:

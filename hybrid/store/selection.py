@@ -285,5 +285,5 @@ def is_export(path: Path) -> bool:
         return "resources/interface.json" in unit.namelist()
     with suppress(OSError), h5py.File(path, "r", locking="best-effort") as file:
         mark = file.attrs.get("format", "")
-        return (mark.decode() if isinstance(mark, bytes) else str(mark)) == MARK
+        return (mark.decode() if isinstance(mark, bytes) else str(mark)).startswith((MARK, "hybrid-cable study"))
     return False

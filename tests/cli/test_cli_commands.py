@@ -34,6 +34,8 @@ time: {duration: 0.05, step: 0.005}
 output: {every: 0.01, points: 5}
 """
 
+LONG = "x" * 300  # characters, more than the name of a file may have
+
 # The moving end catches up with the wave it sends: no flexible cable stays taut.
 PUSHED = """\
 title: a taut wire whose end moves in
@@ -306,6 +308,12 @@ def test_a_scene_without_time_cannot_be_run(call: Call) -> None:
         (("plot", "wire.yaml", "--zones"), "is a scene, not a result"),
         (("plot", "wire.h5", "--zones", "--times", "0"), "without --zones"),
         (("plot", "wire.h5", "--zones", "--history", "1"), "without --zones"),
+        (("plot", f"{LONG}.h5"), "a shorter name"),
+        (("run", f"{LONG}.yaml"), "given:    xxx"),
+        (("run", "wire.yaml", "-o", f"{LONG}.h5"), "a shorter name"),
+        (("static", "wire.yaml", "-o", f"{LONG}.h5"), "a shorter name"),
+        (("import", "wire.yaml", "-o", f"{LONG}.yaml"), "wire.yaml"),
+        (("export", "wire.yaml", "-o", f"{LONG}.fmu"), "a shorter name"),
         (("stats", "wire.h5", "--hours", "0"), "0 is no time"),
         (("stats", "wire.h5", "--hours", "nan"), "nan is no time"),
         (("stats", "wire.h5", "--strength", "1e6"), "add --curve"),

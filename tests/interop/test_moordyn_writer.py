@@ -169,6 +169,18 @@ def test_a_deck_that_is_there_is_kept(tmp_path: Path) -> None:
     export_moordyn(Straight(made.scene), path, overwrite=True)
 
 
+def test_a_deck_replaces_only_decks_that_were_written_here(tmp_path: Path) -> None:
+    """`hybrid export deck.h5 --moordyn` wrote over deck.txt, from which the scene had been imported, and over scenes."""
+    deck = tmp_path / "deck.txt"
+    deck.write_bytes((FOLDER / "chain.txt").read_bytes())
+    (made,) = import_moordyn(deck).scenes.values()
+    with pytest.raises(hybrid.SceneError, match="a deck that hybrid has written"):
+        export_moordyn(Straight(made.scene), deck, overwrite=True)
+    assert deck.read_bytes() == (FOLDER / "chain.txt").read_bytes()
+    deck.write_text("")
+    assert export_moordyn(Straight(made.scene), deck, overwrite=True).text == deck.read_text()
+
+
 def test_clamps_of_several_lines_are_rods_and_come_back(tmp_path: Path) -> None:
     """At a fixed point and at a body that is turned, in axes of the body; a spring has no counterpart."""
     pipe = {"length": 30.0, "mass": 9.0, "diameter": 0.08, "axial_stiffness": 1e7, "bending_stiffness": 5e3}

@@ -134,3 +134,14 @@ def test_keys_of_one_cable_say_what_several_lines_have_instead() -> None:
         with pytest.raises(SceneError) as refused:
             parse_either(f"{TEXT}{key}: 1\n")
         assert [x.fix for x in refused.value.complaints if x.where == key] == [fix]
+
+
+@pytest.mark.parametrize(("name", "better"), [("a/b", "a_b"), ("../../x", "x"), ("/", "line1")])
+def test_a_name_that_the_result_file_does_not_take(name: str, better: str) -> None:
+    """It was called `lines.a/b.[key]`, of which "something else" was expected."""
+    before, _, after = TEXT.partition("lines:\n  west:")
+    with pytest.raises(SceneError) as refused:
+        parse_either(f"{before}lines:\n  {name}:{after}")
+    (found,) = [x for x in refused.value.complaints if x.value.startswith(f"{name}: ")]
+    assert (found.line, found.fix) == (before.count("\n") + 2, f"call it {better}")
+    assert "without / and ." in found.expected

@@ -375,9 +375,18 @@ def test_lengths_that_differ_lose_profiles_alone(folder: Path, tmp_path: Path, s
 def test_the_command_says_ranges_and_reasons(
     folder: Path, found: object, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
+    command = ["study", str(folder / "heave.yaml"), "--json", "--netcdf", str(tmp_path / "x.nc")]
+    (tmp_path / "x.nc").write_text("measured for months\n")  # it was written over
     with pytest.raises(SystemExit) as ended:
-        main(["study", str(folder / "heave.yaml"), "--json", "--netcdf", str(tmp_path / "x.nc")])
-    assert not ended.value.code
+        main(command)
+    assert ended.value.code == 1 and "was not exported by hybrid" in capsys.readouterr().out
+    assert (tmp_path / "x.nc").read_text() == "measured for months\n"
+    (tmp_path / "x.nc").unlink()
+    for _ in range(2):  # one of an earlier call is replaced
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main(command)
+        assert not ended.value.code
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     largest = next(x for x in lines if x.get("name") == "force_max")
     assert largest["largest"] == np.nanmax(found["force_max"].values) and largest["case"] == 4

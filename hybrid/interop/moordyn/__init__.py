@@ -26,7 +26,7 @@ from hybrid.interop.moordyn.notes import LEFT_OUT, NOT_NEEDED, TAKEN, Note, in_o
 from hybrid.interop.moordyn.rows import Source, read_source
 from hybrid.interop.moordyn.scenes import ImportedScene, scene_of
 from hybrid.interop.moordyn.systems import system_of
-from hybrid.interop.moordyn.writer import Computed, WrittenDeck, deck_of
+from hybrid.interop.moordyn.writer import WRITTEN, Computed, WrittenDeck, deck_of
 
 __all__ = ["ImportedDeck", "ImportedScene", "Note", "WrittenDeck", "export_moordyn", "import_moordyn"]
 
@@ -108,16 +108,25 @@ def import_moordyn(path: str | Path, line: int | None = None, separate: bool = F
     return ImportedDeck(deck.file, {made.name: made for made in scenes}, in_order(notes))
 
 
+def _is_written(path: Path) -> bool:
+    """Whether a file is empty or a deck of `export_moordyn`, which may be replaced."""
+    with path.open("rb") as file:
+        return not file.readline(10_000) or file.readline(10_000).startswith(WRITTEN.encode())
+
+
 def export_moordyn(result: Computed, path: str | Path, overwrite: bool = False) -> WrittenDeck:
     """Write a deck of MoorDyn 2 of the scene of a result (`hybrid.static` or `run`), with the cells of the result.
 
     Free points begin where the result has them at its first output.  `.notes` says what the deck does not have.
-    SceneError if the scene has what MoorDyn has not, or if the file is there and `overwrite` is not given.
+    SceneError if the scene has what MoorDyn has not, or if the file is there and `overwrite` is not given, or is no
+    deck that was written here.
     """
     made, path = deck_of(result), Path(path)
-    if path.exists() and not overwrite:
-        raise SceneError([Complaint("output", str(path), "a file that is not there yet", "another name (-o)")])
     try:
+        if path.exists() and not (overwrite and _is_written(path)):
+            expected = "a deck that hybrid has written, or no file" if overwrite else "a file that is not there yet"
+            fix = "another name (-o), or delete the file yourself" if overwrite else "another name (-o)"
+            raise SceneError([Complaint("output", str(path), expected, fix)])
         path.write_text(made.text, encoding="utf-8")
     except OSError as error:
         expected = f"a place that can be written to ({error.strerror})"

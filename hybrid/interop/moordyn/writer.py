@@ -17,6 +17,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
+from textwrap import shorten
 from typing import Any, Protocol
 
 from hybrid.errors import Complaint, SceneError
@@ -33,6 +34,7 @@ NO_DIAMETER = 0.01  # m, where a section has none and is in no fluid
 # Of the stability limits of RK4: 2.8 over the highest frequency of stretch, 2 c/l, and of bending, 4/l^2 sqrt(EI/m);
 # 2.8 over the highest rate of its damper, 4 BA/(m l^2).
 STRETCH, BEND, DAMPED = 1.2, 0.6, 0.6
+WRITTEN = "written by hybrid-cable"  # begins the second line, a comment: such a deck may be replaced
 _TOP = (
     "--- LINE TYPES ---\nTypeName Diam Mass/m EA BA EI Cd Ca CdAx CaAx\n"
     "(-) (m) (kg/m) (N) (N-s) (N-m^2) (-) (-) (-) (-)\n"
@@ -106,7 +108,7 @@ def deck_of(result: Computed) -> WrittenDeck:
             writer.add_body(name, place, turned)
     text = writer.text()
     if writer.complaints:
-        raise SceneError(list(dict.fromkeys(writer.complaints)), scene.title)
+        raise SceneError(list(dict.fromkeys(writer.complaints)), shorten(scene.title, 60, placeholder=" …"))
     return WrittenDeck(text, tuple(dict.fromkeys(writer.notes)))
 
 
@@ -172,7 +174,7 @@ class _Writer:
         options = "--- OPTIONS ---\n" + "".join(f"{_number(v)} {k}\n" for k, v in self._options()) + "RK4 tScheme\n"
         title = f"{' '.join(self.scene.title.split()) or 'a scene of hybrid'}\n".replace("---", "-")
         tables = f"{_TOP}{types}{bodies}{rods}{points}{lines}{options}"
-        return f"{title}{'; '.join(self.names)}\n{tables}--- need this line ---\n"
+        return f"{title}{WRITTEN}: {'; '.join(self.names)}\n{tables}--- need this line ---\n"
 
     # --- what surrounds ------------------------------------------------------------------------
 
