@@ -57,6 +57,7 @@ from hybrid.simulation.refinement import (
 )
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.simulation.run_sample import END_FORCES, RunSample, restored_notes, restored_sample
+from hybrid.simulation.snap_scatter import snap_excess
 from hybrid.store.named_arrays import Tree, matched
 from hybrid.store.stored_rows import MissingRows
 
@@ -119,6 +120,7 @@ class ErrorController:
     estimate: Estimate | None = None  # of the result as it is
     statistics: dict[str, StatisticEstimate] = field(default_factory=dict)  # of extremes and deviations, if it moves
     scattered: list[str] = field(default_factory=list)  # end forces whose largest values are by chance: not judged
+    excess: np.ndarray = field(default_factory=lambda: np.zeros(2))  # N, by which snaps may exceed the largest forces
     _ratio: float = np.inf  # of the error of the result to what is asked
     _judged: int = 0  # results
     _lost: bool = False  # whether the runs to compare with are to be computed again
@@ -143,7 +145,7 @@ class ErrorController:
         """What is judged of an irregular motion, and how far the result may be off in what is not."""
         if self.asked is None or not self.irregular or not self.statistics or self.estimate is None:
             return []
-        return irregular_notes(self.statistics, self.estimate.errors, self.scattered, self.asked)
+        return irregular_notes(self.statistics, self.estimate.errors, self._left_out, self.excess, self.asked)
 
     def start(self, resolution: Resolution) -> tuple[RunSample, Errors | None]:
         """From a first resolution to the result and its errors, None where they cannot be estimated."""
@@ -227,7 +229,15 @@ class ErrorController:
     def judged(self, of_statistics: bool) -> Judged:
         """The errors of the result; of_statistics: with those of extremes and standard deviations."""
         assert self.estimate is not None
-        return Judged(self.estimate, self.statistics if of_statistics else {}, tuple(self.scattered))
+        return Judged(self.estimate, self.statistics if of_statistics else {}, tuple(self._left_out))
+
+    @property
+    def _left_out(self) -> list[str]:
+        """End forces whose largest values are not judged: they are by chance, or a snap may exceed them."""
+        allowed, found = self.allowed_force, self.statistics.get(LARGEST)
+        if self.scattered or not self.irregular or found is None or allowed is None or not self.excess.max() > allowed:
+            return self.scattered
+        return [name for raw, name in END_FORCES.items() if raw in found.order]  # a snap pulls at both
 
     def keep(self, before: Judged, finer: Judged) -> None:
         """Go back to the result before a finer one that is no better."""
@@ -297,6 +307,7 @@ class ErrorController:
             self._notes += result.notes
             return False
         estimate = Estimate(result, *self.comparisons)
+        self.excess = snap_excess(result.forces, self.comparisons[0].forces)
         self._set_statistics(result, *self.comparisons)
         if not estimate.has_mesh:
             few = f"{result.cells} cells are so few that there is nothing coarser to compare with"
@@ -324,6 +335,7 @@ class ErrorController:
             self.comparisons = self._compute_comparisons(resolution)
             if self.comparisons is not None and self.first_estimate(result):
                 return
+        self.excess = snap_excess(result.forces, estimate.run.forces)
         estimate.update(result)
         if self.statistics:
             found = statistics_of(result, self._every)
@@ -403,7 +415,7 @@ class ErrorController:
             return self.irregular
         if verdict.statistic != LARGEST or verdict.name not in END_FORCES.values():
             return False
-        if self.scattered:
+        if self._left_out:
             return False
         self.scattered = [name for raw, name in END_FORCES.items() if raw in estimate.order]  # a snap pulls at both
         return True
@@ -429,7 +441,7 @@ class ErrorController:
             "coarse": self.comparisons and [x and x.checkpoint() for x in self.comparisons],
             "estimate": self.estimate and self.estimate.checkpoint(),
             "statistics": {name: x.checkpoint() for name, x in self.statistics.items()}, "every": self._every,
-            "scattered": self.scattered, "choice": list(self.choice),
+            "scattered": self.scattered, "excess": self.excess, "choice": list(self.choice),
             "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": self._notes,
         }  # fmt: skip
 
@@ -440,11 +452,13 @@ class ErrorController:
         ResultError or ValueError: it is none of this scene.
         """
         template = {"runs": np.zeros(0), "ratio": np.inf, "finer": 0, "every": 1, "irregular": False}
+        template["excess"] = np.zeros(2)
         names = ("next", "first", "coarse", "estimate", "statistics", "scattered", "notes", "choice")
-        saved = matched({"choice": ["", ""], "first": None, **tree}, template | dict.fromkeys(names), "error control")
+        older = {"choice": ["", ""], "first": None, "excess": np.zeros(2)}  # not in every checkpoint of 0.6
+        saved = matched(older | dict(tree), template | dict.fromkeys(names), "error control")
         shape = len(output_times(scene)) + 1, points.s.size, points.jumps.size
         self.runs, self._ratio, self._judged = saved["runs"].tolist(), saved["ratio"], saved["finer"]
-        self._every, self.irregular = saved["every"], saved["irregular"]
+        self._every, self.irregular, self.excess = saved["every"], saved["irregular"], saved["excess"]
         if self._every < 1:
             raise ValueError("statistics of no outputs")
         self._notes = list(restored_notes(saved["notes"]))

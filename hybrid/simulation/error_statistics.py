@@ -19,6 +19,7 @@ from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.error_estimate import Errors, Estimate
 from hybrid.simulation.error_order import MOST_ORDER, ORDER, Falls
 from hybrid.simulation.run_sample import END_FORCES, RunSample
+from hybrid.simulation.snap_scatter import SLACKENS
 from hybrid.store.named_arrays import Tree, matched
 
 # Windows of a run, and the outputs of the result that one has at least.
@@ -31,8 +32,6 @@ STATISTICS = {
 }  # fmt: skip
 # Windows from which on their scatter is known.
 MANY = 10
-# Part of its largest force to which an end comes back where a line snaps.
-SLACKENS = 0.1
 
 
 class StatisticEstimate(Estimate):
@@ -157,11 +156,13 @@ def windows_uncertain(found: Mapping[str, StatisticEstimate], asked: RequestedAc
 
 
 def irregular_notes(
-    found: Mapping[str, StatisticEstimate], errors: Errors, scattered: Sequence[str], asked: RequestedAccuracy
-) -> list[tuple[str, str]]:
+    found: Mapping[str, StatisticEstimate], errors: Errors, scattered: Sequence[str], excess: np.ndarray,
+    asked: RequestedAccuracy,
+) -> list[tuple[str, str]]:  # fmt: skip
     """What is judged of an irregular motion, and how far the result may be off in what is not.
 
-    errors: at every output; scattered: end forces whose largest values are by chance.
+    errors: at every output; scattered: end forces whose largest values are by chance; excess: (2,) N, by which snaps
+    may exceed those at start and end.
     """
     force = max(errors.largest("total", name) for name in END_FORCES.values())
     position = errors.largest("total", "position")
@@ -172,11 +173,12 @@ def irregular_notes(
     )
     notes = [("irregular motion", text)]
     if scattered:
-        largest = found[LARGEST].errors
-        each = [f"{x.removeprefix('end_force_')} {largest.largest('total', x):.2g} N" for x in scattered]
+        largest, snaps_by = found[LARGEST].errors, dict(zip(END_FORCES.values(), excess, strict=True))
+        by = {x.removeprefix("end_force_"): max(largest.largest("total", x), snaps_by[x]) for x in scattered}
         text = (
-            f"the largest force is that of one snap, and differs from run to run however fine they are (at the "
-            f"{', at the '.join(each)}): it is not judged; the spread over seeds, or a longer run, says more"
+            "the largest force is, or may be exceeded by, that of one snap, and these differ from run to run however "
+            f"fine they are (at the {', at the '.join(f'{x} {n:.2g} N' for x, n in by.items())}): it is not judged; "
+            "the spread over seeds, or a longer run, says more"
         )
         notes.append(("largest force uncertain", text))
     return notes + windows_uncertain(found, asked)
