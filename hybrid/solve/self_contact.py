@@ -44,8 +44,9 @@ from hybrid.kernels.self_contact_pairs import (
 )
 from hybrid.kernels.state import Ends, Floats, Line, State, Work
 
-# Sample points of a piece lie at most this part of a diameter apart.
-SPACING = 0.25
+# Sample points of a piece lie at most this part of a diameter apart, but for round-off, which must not decide how many
+# there are: pieces of the same length, in whatever unit, have as many.
+SPACING = 0.25 * (1.0 + 1e-9)
 # Room for points of contact: LEAST_POINTS, or two for each sample point; at most MOST_POINTS.
 LEAST_POINTS, MOST_POINTS = 1000, 100_000
 # Least size of the law of contact, N: of EI/D^2; without EI of the tension scale.

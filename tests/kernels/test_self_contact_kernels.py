@@ -205,3 +205,19 @@ def test_no_correction_leads_through_the_line(seed: int, far: float) -> None:
         assert part < 1.0
     gaps = (tangle.r + part * x)[43, 2] - (tangle.r + part * x)[10, 2]
     assert gaps > 0.5 * INNER * WIDTH
+
+
+@pytest.mark.parametrize("cells", [20, 40, 60, 100])
+def test_as_many_sample_points_in_every_unit(cells: int) -> None:
+    """Pieces of a whole number of quarters of a diameter, lengths in m, mm, km and feet, and one unit in the last place
+
+    longer or shorter: round-off decides nothing.
+    """
+    counts = set()
+    for unit in (1.0, 1e3, 1e-3, 1.0 / 0.3048):
+        for length in np.nextafter(2.0 * unit, [0.0, 2.0 * unit, np.inf]):
+            line = blank_line(cells)._replace(s=np.linspace(0.0, length, cells + 1), mass=np.ones(cells + 1))
+            width = np.full(cells, 0.8 / cells * unit)
+            contact = SelfContact(line, width, np.ones(cells), 1.0).contact
+            counts |= {int(x) for x in contact.samples[2:-2]}
+    assert counts == {10}
