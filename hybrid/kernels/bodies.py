@@ -39,8 +39,25 @@ PLACE, FRAME, V, A, VD, W, WA, WD, STATE = 0, 3, 12, 15, 18, 21, 24, 27, 30
 MASS, DAMPING, LIFT, ARM, LEVEL, STIFFNESS, FORCE, MOMENT, PIECES, NUMBERS = 0, 36, 72, 73, 76, 77, 80, 83, 86, 87
 # Worked in: displacement, rotation vector, frame at the start of the step, correction, force and moment of all but the
 # lines, and of the lines; kinetic and potential energy (J), powers of the lines, of damping and of what is given (W),
-# the same before the step, and their work (J).
-U, N, START, X, OWN, LINES, KINETIC, POTENTIAL, POWER, BEFORE, DONE, WORK = 0, 3, 6, 15, 21, 27, 33, 34, 35, 38, 41, 44
+# the same before the step, and their work (J); a spring against turns in the equations alone (N m/rad).
+U, N, START, X, OWN, LINES, KINETIC, POTENTIAL, POWER, BEFORE, DONE, SPRING = (
+    0,
+    3,
+    6,
+    15,
+    21,
+    27,
+    33,
+    34,
+    35,
+    38,
+    41,
+    44,
+)
+WORK = 45
+# The spring of a body at first, as a part of its stiffest turn.  A turn that nothing holds would else follow the
+# round-off of moments; one that is held as softly as 1e-4 of the stiffest converges by four digits an iteration still.
+SOFTEST = 1e-8
 VERTICAL = (0.0, 0.0, 1.0)
 
 
@@ -203,6 +220,8 @@ def add_own(bodies, old, new, work, A, at, m, cv, ca):
             for k in range(3):
                 A[first + k, first + c] += F[k]
                 A[first + 3 + k, first + c] += M[k]
+        for k in range(3):
+            A[first + 3 + k, first + 3 + k] -= work[b, SPRING]
         for k in range(6):
             A[first + k, m] -= work[b, OWN + k]
 
@@ -214,6 +233,39 @@ def start_here(old, work):
         put(work[b], U, (0.0, 0.0, 0.0))
         put(work[b], N, (0.0, 0.0, 0.0))
         put_matrix(work[b], START, matrix(old[b], FRAME))
+        work[b, SPRING] = 0.0
+
+
+@inner
+def hold_turns(work, A, at):
+    """Springs as weak as SOFTEST against turns of bodies, into the equations A of their places, from row `at` on.
+
+    In the equations alone, not in what is out of balance: they change the way to an equilibrium, and nothing in it.
+    """
+    for b in range(work.shape[0]):
+        first, stiffest = at + 6 * b + 3, 0.0
+        for k in range(3):
+            stiffest = max(stiffest, abs(A[first + k, first + k]))
+        work[b, SPRING] = SOFTEST * stiffest
+        for k in range(3):
+            A[first + k, first + k] -= work[b, SPRING]
+
+
+@inner
+def adapt_springs(work, strength, turn, most):
+    """Springs after a correction: stronger where a body was to turn by more than ten times `most`, rad, which is as far
+
+    as it may, so that what hardly resists does not keep all else from moving; where it turns by little, weaker, down to
+    strength 1.  Returns the strength.
+    """
+    new = strength
+    if turn > 10.0 * most:
+        new = 10.0 * strength * min(turn / most, 1e12)
+    elif turn < 0.1 * most:
+        new = max(0.01 * strength, 1.0)
+    for b in range(work.shape[0]):
+        work[b, SPRING] *= new / strength
+    return new
 
 
 @inner

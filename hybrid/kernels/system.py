@@ -13,8 +13,10 @@ import math
 from hybrid.kernels.assembly import JOINED
 from hybrid.kernels.bodies import (
     LINES,
+    adapt_springs,
     book_bodies,
     end_bodies,
+    hold_turns,
     move_bodies,
     own_force,
     predict_bodies,
@@ -29,7 +31,16 @@ from hybrid.kernels.extremes import first_strains, force_of_line, note_extremes
 from hybrid.kernels.forces import FRICTION, SEABED
 from hybrid.kernels.generalized_alpha import Scheme, scheme
 from hybrid.kernels.joined_lines import solve_dense
-from hybrid.kernels.junctions import END, START, add_pull, assemble_junctions, correct_all, place_ends
+from hybrid.kernels.junctions import (
+    END,
+    START,
+    add_pull,
+    assemble_junctions,
+    correct_all,
+    count_tensions,
+    first_unknown,
+    place_ends,
+)
 from hybrid.kernels.newton import (
     ADDRESS,
     ASSEMBLY,
@@ -401,7 +412,7 @@ def solve_system(
         rubs |= job.line.bits & FRICTION
         if touch != 0 and job.contact[ADDRESS] != 0:
             rubs |= job.contact[NEAR]
-    before, left = math.inf, math.inf
+    before, left, strength = math.inf, math.inf, 1.0
     outcome, it, line, where = NOT_CONVERGED, 0, -1, -1
     while it < most and outcome == NOT_CONVERGED:
         it += 1
@@ -424,6 +435,8 @@ def solve_system(
         if task.what == JUNCTIONS:
             outcome = OK
             break
+        if task.what == EQUILIBRIUM and it == 1:
+            hold_turns(work, A, first_unknown(points, count_tensions(joints), points))
         if m > 0 and not solve_dense(A, m):
             outcome = SINGULAR
             break
@@ -456,6 +469,9 @@ def solve_system(
         move_bodies(new, work, s.cv, s.ca, part)
         outcome, left = has_converged(size, before, it, part)
         before = size if part == 1.0 else math.inf
+        if task.what == EQUILIBRIUM:
+            outcome = NOT_CONVERGED if strength > 1.0 else outcome
+            strength = adapt_springs(work, strength, turned, LARGEST_TURN)
     if task.what == STEP or task.what == EQUILIBRIUM:
         follow_laws(tables, s)
     if task.what == STEP:

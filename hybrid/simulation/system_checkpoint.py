@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.kernels.bodies import SPRING
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.model.system import SystemResolution
 from hybrid.scene.bodies import FixedBody, FreeBody
@@ -30,9 +31,10 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
         line.name: line.checkpoint(work, run.t) | {"state": state._asdict()}
         for line, work, state in zip(run.lines, run.solver.work, run.state.lines, strict=True)
     }
+    body_work = run.solver.body_work[:, :SPRING]
     return {
         "t": run.t, "steps": run.steps, "last": run.last_step, "loaded": run.loaded, "leg": [*run.leg],
-        "cpu": run.cpu, "dry": sorted(run.dry), "bodies": run.state.bodies, "body_work": run.solver.body_work,
+        "cpu": run.cpu, "dry": sorted(run.dry), "bodies": run.state.bodies, "body_work": body_work,
         "lines": lines, "broken": [*run.failures.broken], "rest": run.rest,
         "control": run.control.checkpoint() if run.control is not None else [],
         "quantities": run.quantities.checkpoint(), "rotations": run.rotations.last.copy(),
@@ -103,7 +105,7 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
     run.leg, run.dry, run.cpu = (found["leg"][0], found["leg"][1]), set(found["dry"]), found["cpu"]
     if run.control is not None:
         run.control.restore(found["control"])
-    run.state.bodies[:], run.solver.body_work[:] = found["bodies"], found["body_work"]
+    run.state.bodies[:], run.solver.body_work[:, :SPRING] = found["bodies"], found["body_work"]
     run.quantities.restore(found["quantities"])
     run.rotations.last[:] = found["rotations"]
     for line, x, work, state in zip(run.lines, run.solver.lines, run.solver.work, run.state.lines, strict=True):

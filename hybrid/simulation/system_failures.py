@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid.kernels.bodies import DONE, WORK
+from hybrid.kernels.bodies import DONE, SPRING
 from hybrid.kernels.report import FORCE_A
 from hybrid.kernels.state import NO_TURN, State
 from hybrid.kernels.zone_torque import TURN, torsion_energy
@@ -92,9 +92,9 @@ class Failures:
             for x, model in zip(run.state.lines, run.model.models, strict=True)
         ]
         run.state = SystemState(states, run.state.bodies)
-        done = run.solver.body_work[:, DONE:WORK].copy()
+        done = run.solver.body_work[:, DONE:SPRING].copy()
         run.make_solver()
-        run.solver.body_work[:, DONE:WORK] = done
+        run.solver.body_work[:, DONE:SPRING] = done
 
 
 def _elastic(model: Model, t: float, state: State) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.assembly import JOINED
-from hybrid.kernels.bodies import ARM, FORCE, FRAME, LINES, OWN, PLACE, STATE, STIFFNESS, V
+from hybrid.kernels.bodies import ARM, FORCE, FRAME, MASS, PLACE, STATE, STIFFNESS, V
 from hybrid.kernels.report import FORCE_A, MOMENT_A
 from hybrid.kernels.state import Floats
 from hybrid.model.bodies import angles_of, frame_of
@@ -29,8 +29,12 @@ from hybrid.solve.system_contact_statics import touching_solver
 from hybrid.solve.system_statics import SystemEquilibrium
 
 VERTICAL = np.array([0.0, 0.0, 1.0])
-# Where the stiffness is that between equilibria: how far these are apart, of the longest line, and rad.
+# Where the stiffness is that between equilibria: how far these are apart, of the longest line, and rad; where lines
+# touch themselves, of the narrowest diameter, over a part of which contact stiffens, but no less than a part of that.
 SMALL_SHIFT, SMALL_TURN = 2e-5, 2e-4
+OF_DIAMETER, LEAST_PART = 1e-3, 0.05
+# Springs that hold a body while a force acts on it resist as it does itself, and at least as this part of the stiffest.
+LEAST_SPRING = 1e-3
 
 
 @dataclass(frozen=True)
@@ -98,14 +102,10 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
         position = np.array(held.position if isinstance(held, FixedBody) else system.first_place(name))
         rotation = np.array(held.rotation) if isinstance(held, FixedBody) else None
         first, own = 3 * len(free[0]) + (6 * len(free[1]) if kind == "body" else 0), np.zeros((size, size))
-    C = _compliance(solver, state, first, size, len(solver.net))
-    try:
-        matrix = None if C is None else np.linalg.inv(C)
-    except np.linalg.LinAlgError:
-        matrix = None
+    matrix = _stiffness(solver, state, first, size, len(solver.net))
     if matrix is None:
         raise ComputationError(Outcome.SINGULAR, None, None, f"nothing gives way at {at}: its lines do not stretch")
-    return Stiffness(at, np.asarray(matrix, float), np.asarray(matrix - own, float), position, rotation)
+    return Stiffness(at, matrix, np.asarray(matrix - own, float), position, rotation)
 
 
 def _equilibrium(system: System, model: SystemModel) -> SystemEquilibrium:
@@ -115,38 +115,56 @@ def _equilibrium(system: System, model: SystemModel) -> SystemEquilibrium:
     return found
 
 
-def _compliance(solver: SystemSolver, state: SystemState, first: int, size: int, points: int) -> Floats | None:
-    """(size, size) m/N, rad/N, .. of the point or body that begins at `first` of `SystemSolver.compliance`; points: how
+def _stiffness(solver: SystemSolver, state: SystemState, first: int, size: int, points: int) -> Floats | None:
+    """(size, size) N/m, N/rad, .. of the point or body that begins at `first` of `SystemSolver.compliance`; points: how
     many there are.  None: the system is singular.
 
-    From the factors; where a torque passes through catenaries, which these know roughly, from equilibria under small
-    forces and moments both ways.
+    From the factors; where a torque passes through catenaries, which they know roughly, or lines touch themselves, from
+    equilibria under small forces and moments both ways.
     """
     solver.evaluate_forces(state, 0.0)
     found = solver.compliance(state, solver.anchor)
     if found is None:
         return None
-    C = found[first : first + size, first : first + size]
-    if not _needs_equilibria(solver):
-        return C
+    K = _inverse(found[first : first + size, first : first + size])
+    if K is None or not _needs_equilibria(solver):
+        return K
     before = _settled(solver, state)
     point, b = first // 3, (first - 3 * points) // 6
-    load, out = _load_on(solver, points, first, before), np.zeros((size, size))
+    load, C, springs = _load_on(solver, points, first, before), np.zeros((size, size)), np.zeros(6)
+    if first >= 3 * points:  # so that it turns by little where nothing holds it
+        R, mass = before.bodies[b, FRAME:V].reshape(3, 3), solver.bodies[b, MASS : MASS + 36].reshape(6, 6)
+        for some in (slice(0, 3), slice(3, size)):
+            held = np.abs(K.diagonal()[some])
+            springs[some] = np.maximum(held, LEAST_SPRING * held.max(initial=0.0))
+        for some in (slice(0, 3), slice(3, 6)):  # in axes of the body
+            mass[some, some] += R.T @ np.diag(springs[some] / solver.anchor) @ R
+    near = max(min(OF_DIAMETER * solver.narrowest / (SMALL_SHIFT * solver.length), 1.0), LEAST_PART)
     for k in range(size):
-        small = SMALL_SHIFT * solver.length if k < 3 else SMALL_TURN
-        part, moved = small / max(abs(float(C[k, k])), 1e-300), []
+        small = near * (SMALL_SHIFT * solver.length if k < 3 else SMALL_TURN)
+        part, moved = small * (abs(float(K[k, k])) + springs[k]), []
         for sign in (1.0, -1.0):
+            there = before.copy()
             load[k] += sign * part
             try:
-                taken, there = solver.newton(before)
+                taken = solver.newton_round(there)
             finally:
                 load[k] -= sign * part
             if taken.outcome != Outcome.OK:
                 detail = f"under a small force both ways, whose answer is the stiffness: {sign * part:.3g} N or N m"
                 raise ComputationError(taken.outcome, None, None, detail)
             moved.append(_place_of(solver, there, before, point if first < 3 * points else -1, b)[:size])
-        out[:, k] = (moved[0] - moved[1]) / (2.0 * part)
-    return out
+        C[:, k] = (moved[0] - moved[1]) / (2.0 * part)
+    found = _inverse(C)
+    return None if found is None else found - np.diag(springs[:size])
+
+
+def _inverse(C: Floats) -> Floats | None:
+    """None: there is none."""
+    try:
+        return np.asarray(np.linalg.inv(C), float)
+    except np.linalg.LinAlgError:
+        return None
 
 
 def _needs_equilibria(solver: SystemSolver) -> bool:
@@ -165,9 +183,10 @@ def _load_on(solver: SystemSolver, points: int, first: int, state: SystemState) 
 def _settled(solver: SystemSolver, state: SystemState) -> SystemState:
     """An equilibrium of these lines, with what was held and is free now loaded as it was held."""
     solver.evaluate_forces(state, 0.0)
-    for point, net in enumerate(solver.net):
-        _load_on(solver, len(solver.net), 3 * point, state)[:] -= net
-    solver.bodies[:, FORCE : FORCE + 6] -= solver.body_work[:, OWN : OWN + 6] + solver.body_work[:, LINES : LINES + 6]
+    _, points, bodies = solver.unbalanced(state, 0.0)
+    for point, net in enumerate(points):
+        _load_on(solver, len(points), 3 * point, state)[:] -= net
+    solver.bodies[:, FORCE : FORCE + 6] -= bodies
     taken, found = solver.newton(state)
     if taken.outcome != Outcome.OK:
         raise ComputationError(taken.outcome, None, None, "as it is, under the forces that hold it")

@@ -120,6 +120,11 @@ class SelfContact:
         return bool(self.contact.counts[POINTS])
 
     @property
+    def narrowest(self) -> float:
+        """The least diameter, m."""
+        return float(self.contact.numbers[NARROWEST])
+
+    @property
     def deepest(self) -> tuple[int, int]:
         """The nodes beside the nearest point of contact of those looked at last."""
         points = self.contact.points[: self.contact.counts[POINTS]]

@@ -241,23 +241,33 @@ class SystemSolver:
         """Lines that touch themselves in the states that were looked at last."""
         return [k for k, contact in self._contacts.items() if contact.touches]
 
+    @property
+    def narrowest(self) -> float:
+        """The least diameter, m, of lines that touch themselves; infinite: none does."""
+        return min((self._contacts[k].narrowest for k in self.in_contact()), default=np.inf)
+
     def _proof(self, states: SystemState) -> float:
         """Largest force (N) that is left over at a node, a point or a body, with that of contact; reports follow."""
         residual = self.evaluate_forces(states, self.anchor).residual
-        touching, points = self.in_contact(), len(self.net)
-        if not touching:
-            return residual
+        return self._largest(*self.unbalanced(states, self.anchor)) if self.in_contact() else residual
+
+    def unbalanced(self, states: SystemState, ca: float) -> tuple[list[float], Floats, Floats]:
+        """What does not balance, with contact, in states that have just been evaluated: the largest force (N) at a node
+
+        of each line, forces (P, 3) N on points, forces and moments (B, 6) N, N m on bodies.  ca: as of them.
+        """
+        points = len(self.net)
         inside, net = [float(work.report[RESIDUAL]) for work in self.work], self.net.copy()
         left = self.body_work[:, OWN : OWN + 6] + self.body_work[:, LINES : LINES + 6]
-        for k in touching:
+        for k in self.in_contact():
             x, work = self.lines[k], workspace_of(self.lines[k].line, keep=True)
-            inside[k], forces = left_over(x.line, x.sea, x.ends, states.lines[k], self._contacts[k], self.anchor, work)
+            inside[k], forces = left_over(x.line, x.sea, x.ends, states.lines[k], self._contacts[k], ca, work)
             for joint, force, arm in zip(x.joints, forces, self._arms[k], strict=True):
                 if 0 <= joint < points:
                     net[joint] += force
                 elif joint >= points:
                     left[joint - points] += np.concatenate([force, np.cross(arm, force)])
-        return self._largest(inside, net, left)
+        return inside, net, left
 
     # --- motion -------------------------------------------------------------------------------------
 
@@ -413,6 +423,25 @@ class SystemSolver:
         give = np.linalg.eigvalsh(0.5 * (C + C.T))
         return bool(give[0] > -1e-6 * NEUTRAL * give[-1])
 
+    def newton_round(self, states: SystemState) -> SystemTaken:
+        """Static Newton from states at rest, which it overwrites; springs of `anchor` times their mass hold nodes and
+
+        bodies where they are, so that what is found balances with these.
+        """
+        for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
+            work.u[:] = 0.0
+            self._around(x, state, work)
+        for contact in self._contacts.values():
+            contact.forget()
+        task = Task(EQUILIBRIUM, ca=self.anchor, limits=Limits(REACH * self.length, 1.0, MOST_ITERATIONS))
+        taken = self._solve(task, states, states)
+        states.bodies[:, PLACE:FRAME] += self.body_work[:, U : U + 3]
+        states.bodies[:, V:] = 0.0
+        for work, state in zip(self.work, states.lines, strict=True):
+            state.r[:] += work.u
+            state.vd[:], state.wd[:] = 0.0, 0.0  # of the springs
+        return taken
+
     def newton(self, start: SystemState) -> tuple[SystemTaken, SystemState]:
         """Static Newton from `start`; a new state is returned, the old one is left as it was.
 
@@ -427,19 +456,8 @@ class SystemSolver:
         taken = SystemTaken(Outcome.NOT_CONVERGED, 0, np.inf, -1, -1, np.inf)
         iterations = 0
         for _ in range(BALANCING):
-            for x, work, state in zip(self.lines, self.work, new.lines, strict=True):
-                work.u[:] = 0.0
-                self._around(x, state, work)
-            for contact in self._contacts.values():
-                contact.forget()
-            task = Task(EQUILIBRIUM, ca=self.anchor, limits=Limits(REACH * self.length, 1.0, MOST_ITERATIONS))
-            taken = self._solve(task, new, new)
+            taken = self.newton_round(new)
             iterations += taken.iterations
-            new.bodies[:, PLACE:FRAME] += self.body_work[:, U : U + 3]
-            new.bodies[:, V:] = 0.0
-            for work, state in zip(self.work, new.lines, strict=True):
-                state.r[:] += work.u
-                state.vd[:], state.wd[:] = 0.0, 0.0  # of the anchor's springs
             if taken.outcome != Outcome.OK:
                 break
             proof = self._proof(new)

@@ -41,14 +41,14 @@ def beside_each_other(*shifts: float) -> dict[str, Any]:
     return COMMON | {"points": points, "lines": lines}
 
 
-def at_a_body() -> dict[str, Any]:
-    """One leg hangs on a body that two ropes pull against the other leg."""
+def at_a_body(y: float = -0.01) -> dict[str, Any]:
+    """One leg hangs on a body that two ropes, which end at y (m), pull against the other leg; nothing holds its yaw."""
     rope = {"sections": [{"length": 1.1, "mass": 0.1, "axial_stiffness": 1e5}], "model": "catenary", "start": "free"}
     first = [[0, 0, 0], [-0.3, -0.3, -1.0], [0, 0, -1.8], [0.3, 0.3, -1], [0, 0.3, 0.1]]
     return COMMON | {
         "points": {
-            "a": {"position": [0, 0, 0]}, "left": {"position": [-0.6, -0.01, 0.75]},
-            "right": {"position": [0.6, -0.01, 0.75]}, "free": {"kind": "fairlead", "body": "pod", "place": [0, 0, -0.05]},
+            "a": {"position": [0, 0, 0]}, "left": {"position": [-0.6, y, 0.75]},
+            "right": {"position": [0.6, y, 0.75]}, "free": {"kind": "fairlead", "body": "pod", "place": [0, 0, -0.05]},
         },
         "bodies": {"pod": {"kind": "free", "mass": 1.0, "inertia": [0.1] * 3, "initial_guess": [0, 0.3, 0.15]}},
         "lines": {
@@ -95,6 +95,19 @@ def test_a_line_that_a_body_presses_against_itself() -> None:
     there = hybrid.static(without)["bodies/pod/position"][0]
     assert np.linalg.norm(result["bodies/pod/position"][0] - there) > 1e-4  # the contact holds it off
     stays(scene, result, "hose")
+
+
+@pytest.mark.parametrize("y", [-0.005, -0.02])
+def test_the_stiffness_of_a_body_in_contact(y: float) -> None:
+    """That of the forces on the body held on both sides, with the contact of the node at its fairlead; yaw is free."""
+    scene = at_a_body(y)
+    K = hybrid.stiffness(scene, "body:pod").matrix
+    assert np.abs(K - K.T).max() < 1e-4 * np.abs(K).max()
+    assert np.abs(K[5]).max() < 1e-5 * np.abs(K[3:5]).max()
+    for k, heading in enumerate((0.0, 90.0)):
+        held = hybrid.offsets(scene, "body:pod", [-2e-5, 2e-5], heading=heading)
+        for found, there in ((K[:3, k], held.force), (K[3:, k], held.moment)):
+            assert found == pytest.approx((there[0] - there[1]) / 4e-5, rel=3e-3, abs=1e-4 * np.abs(found).max())
 
 
 def test_a_first_shape_knows_no_friction() -> None:
