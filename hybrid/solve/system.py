@@ -51,6 +51,8 @@ from hybrid.solve.workspaces import workspace_of
 
 # Springs of points and bodies that nothing holds, in the test of stability, as a part of tension scale over length.
 NEUTRAL = 1e-6
+# Of the longest line: arm by which moments on bodies are compared with forces, at least.
+LEAST_ARM = 0.01
 NO_BODIES: Floats = np.zeros((0, NUMBERS))
 
 
@@ -233,7 +235,7 @@ class SystemSolver:
 
     def _largest(self, inside: Sequence[float], net: Floats, left: Floats) -> float:
         """The largest of what is left over inside lines, at points (P, 3) N, and at bodies (B, 6) N, N m."""
-        arm = max(1.0, float(np.abs(self._fairleads).max()))  # m, by which moments are compared with forces
+        arm = max(LEAST_ARM * self.length, float(np.abs(self._fairleads).max()))  # m, moments against forces
         turning = float(np.abs(left[:, 3:]).max(initial=0.0)) / arm
         return max(*inside, turning, *(float(np.abs(x).max(initial=0.0)) for x in (net, left[:, :3])))
 
