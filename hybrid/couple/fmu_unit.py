@@ -138,13 +138,21 @@ class CableUnit:
             return cable.state.position[-k]
         if name == "node_velocity":
             return cable.state.velocity[-k]
-        forces = cable.forces()
+        try:
+            forces = cable.forces()
+        except ValueError as error:  # an exception here would end the master
+            self.log(str(error), Fmi3Status.warning)  # type: ignore[attr-defined]
+            return np.full(3, np.nan)
         return forces[k] if name == "force" else forces[2 + k]
 
     def _tension(self) -> Floats:
         """Tension along the cable, at the points of the result, as recovered once for a state."""
         if self._recovered is None:
-            self._recovered = self.cable.tension()
+            try:
+                self._recovered = self.cable.tension()
+            except ValueError as error:
+                self.log(str(error), Fmi3Status.warning)  # type: ignore[attr-defined]
+                return np.full(1, np.nan)
         return self._recovered
 
     def _tension_max(self) -> float:
@@ -205,7 +213,11 @@ class CableUnit:
 
     def _get_fmu_state(self) -> dict[str, Any]:
         values = {name: value.copy() for name, value in self._values.items()}
-        return {"cable": self.cable.save(), "values": values}
+        try:
+            return {"cable": self.cable.save(), "values": values}
+        except ValueError as error:  # a step has failed: this is no state to come back to, which the return to it says
+            self.log(str(error), Fmi3Status.error)  # type: ignore[attr-defined]
+            return {"cable": None, "values": values}
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         self._recovered = None

@@ -39,6 +39,7 @@ class SteppedEnds:
     _closed: bool
     _driven: dict[int, DrivenEnd]
     _next: dict[int, tuple[Triple, Triple, Triple]]  # what ends are set to, for the next step
+    _failed: str  # why the last step failed; empty: it did not, or what `save` returned was restored
     _wound: tuple[float | None, float] | None  # length and rate that are set for the next step
     _driven_of: Model | None = None  # whose ends those that are set were last looked for among
     _signed: Model | None = None  # of which the next are
@@ -54,6 +55,12 @@ class SteppedEnds:
     def _check_open(self) -> None:
         if self._closed:
             raise ValueError("the simulation is over: its result has been written")
+
+    def _check_sound(self) -> None:
+        """Of what belongs to the last step: after one that failed there is none until `restore`."""
+        if self._failed:
+            reason = self._failed.splitlines()[0]
+            raise ValueError(f"a step has failed ({reason}): restore() what save() returned, or close()")
 
     @one_thread
     def set_end(
@@ -187,7 +194,9 @@ class SteppedEnds:
 
     @one_thread
     def forces(self) -> EndForces:
-        """Forces and moments of the cable on what holds its ends, now."""
+        """Forces and moments of the cable on what holds its ends, now.  ValueError: a step has failed."""
+        if self._failed:
+            self._check_sound()
         moving = self._loop.run
         if moving.model is not self._signed:
             self._signed, held = moving.model, moving.model.ends.values.held
@@ -205,9 +214,10 @@ class SteppedEnds:
         By minus that, times a shift of the place that was set, `forces` changes where the step is taken again: Newton's
         method of an implicit coupling.  It has the inertia and the damping of the step in it (of its last part, where
         it was cut), and is not the static stiffness; directions that the end holds stay.  Before the first step: as of
-        a step of time.step.  ValueError: the end is not held.
+        a step of time.step.  ValueError: the end is not held, or a step has failed.
         """
         self._check_open()
+        self._check_sound()
         k, run = self._end(end), self._loop.run
         if not run.model.ends.values.held[k]:
             raise ValueError(f"ends.{end} is not held: it has no stiffness that is felt from outside")

@@ -137,9 +137,7 @@ class Simulation(SteppedEnds):
         ValueError: a time that has passed, or beyond the scene's duration; a step has failed and nothing was restored.
         """
         self._check_open()
-        if self._failed:
-            reason = self._failed.splitlines()[0]
-            raise ValueError(f"a step has failed ({reason}): restore() what save() returned, or close()")
+        self._check_sound()
         if isinstance(until, bool) or not isinstance(until, NUMBER):
             raise ValueError(f"until: expected a number, in s, found {until!r:.60}")
         moving, duration, sliver = self._loop.run, self._duration, self._sliver
@@ -186,9 +184,10 @@ class Simulation(SteppedEnds):
     def tension(self) -> Floats:
         """Tension (ns,) N now at the points of the result, recovered between cells and at the ends as written there.
 
-        `state.tension` is that of the cells, and costs less.
+        `state.tension` is that of the cells, and costs less.  ValueError: a step has failed.
         """
         self._check_open()
+        self._check_sound()
         return tension_now(self._loop)
 
     # --- back and forth ---------------------------------------------------------------------------
@@ -198,8 +197,10 @@ class Simulation(SteppedEnds):
         """The state as it is, in memory, to come back to: for the iterations of an implicit coupling.
 
         What has been computed until now is final; what follows is recorded when the next `save` is made.
+        ValueError: a step has failed; what was saved before it stays good.
         """
         self._check_open()
+        self._check_sound()
         if not self._plain or self._loop.run.run.waits_much:
             self._loop.write_down(everything=True)
         self._recorder.commit()

@@ -254,3 +254,22 @@ def test_tensions_are_those_of_the_result_ends_included(tmp_path: Path) -> None:
     assert expected == pytest.approx(written, rel=1e-12)
     assert found[1] == pytest.approx([written.max(), written.min()], rel=1e-9)
     assert found[0] != found[1] and written.max() > cells.max()
+
+
+def test_after_a_step_that_failed_there_are_no_forces_and_no_state_until_the_return(unit: Path, tmp_path: Path) -> None:
+    """They were those of the step that had failed, 1e11 N; and asking for the state lost the last good one."""
+    with running(unit, tmp_path / "open") as (cable, number):
+        force, tension = [number[f"end.force.{x}"] for x in "xyz"], [number["tension_max"], number["tension_min"]]
+        step(cable, 0)
+        good, before = cable.getFMUState(), cable.getFloat64(force)
+        cable.setFloat64([number["end.position.x"]], [1e6])
+        with pytest.raises(Exception, match="fmi3DoStep"):
+            step(cable, 1)
+        assert np.isnan(cable.getFloat64(force)).all() and np.isnan(cable.getFloat64(tension)).all()
+        cable.freeFMUState(cable.getFMUState())
+        cable.setFMUState(good)
+        assert cable.getFloat64(force) == before and np.isfinite(cable.getFloat64(tension)).all()
+        cable.setFloat64([number["end.position.x"]], [10.0])
+        step(cable, 1)
+        assert np.isfinite(cable.getFloat64(force)).all()
+        cable.freeFMUState(good)

@@ -364,8 +364,12 @@ def test_after_a_failed_step_it_asks_for_a_restore() -> None:
         simulation.set_end("end", [150.0, 0.0, 0.0])
         with pytest.raises(hybrid.ComputationError):
             simulation.step()
+        # Forces were those of the step that had failed, and `save` kept its state in place of the last good one.
+        for ask in (simulation.step, simulation.forces, simulation.tension, simulation.save):
+            with pytest.raises(ValueError, match="a step has failed"):
+                ask()
         with pytest.raises(ValueError, match="a step has failed"):
-            simulation.step()
+            simulation.stiffness("end")
         simulation.restore(saved)
         driven(simulation, 2)
         assert simulation.t == pytest.approx(0.1)
