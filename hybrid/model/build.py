@@ -33,7 +33,7 @@ from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
 from hybrid.model.mesh_grading import Grading
-from hybrid.model.payout import PayoutPlan, payout_of, payout_plan
+from hybrid.model.payout import PayoutPlan, payout_of, payout_plan, shorter_behind_clamp
 from hybrid.model.plane import in_plane, planar
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, mesh_is_free
 from hybrid.model.scales import tension_scale
@@ -340,10 +340,12 @@ def _layout(scene: Scene, cable: Material, cuts: Sequence[float], resolution: Re
     """Base cells, all rod."""
     model = scene.model
     assert isinstance(model, AdaptiveModel)
-    follows = follows_curvature(scene)
+    follows, finer = follows_curvature(scene), resolution.fineness
     if follows:  # base cells stay, whatever the fineness: what is asked of rods decides
         resolution = replace(resolution, grading=None, fineness=max(resolution.fineness, 1.0))
         base, _ = place_nodes((ZonePlan("rod", scene.length),), cuts, None, None, FOLLOWING_BASE)
+        assert model.curvature_error is not None
+        base = shorter_behind_clamp(scene, cable, base, model.curvature_error, finer)
     if not (follows and mesh_is_free(scene)):
         base, _ = _placed(scene, cable, (ZonePlan("rod", scene.length),), cuts, resolution, BASE_CELLS)
     if follows:

@@ -315,6 +315,25 @@ def riding_nodes(scene: Scene, line: Line, s: Floats, room: float) -> int:
     return 0 if stretches or not line.spin[-side] or (payout is not None and payout.winch is not None) else RIDE
 
 
+def shorter_behind_clamp(scene: Scene, cable: Material, base: Floats, share: float, fineness: float) -> Floats:
+    """Base nodes (n+1,) m that follow the curvature, with shorter cells behind a clamp from which line is paid out.
+
+    Cells that ride with the winch stay whole.  Behind the clamp the curvature falls by exp(-x/lam) in x,
+    lam = sqrt(EI/W), W the weight of the line: interpolated within `share` of its largest by cells of
+    sqrt(8 share) lam exp(x/(2 lam)).  The first is half as long as that, and each is twice as long as the one before.
+    """
+    if payout_of(scene) is None or scene.ends.both[winch_side(scene)].held_tangent is None:
+        return base
+    weight = float(np.abs(cable.submerged_weight) @ np.diff(cable.bounds))
+    EI = float(cable.weakest_bending[-1 if winch_side(scene) else 0])
+    cell = 0.5 * math.sqrt(8.0 * share * EI / weight) / fineness if weight > 0.0 else math.inf
+    side = base if winch_side(scene) else scene.length - base[::-1]
+    more = cell * (2.0 ** np.arange(RIDE_BEHIND_CLAMP) - 1.0)[1:]
+    more = more[more < 0.6 * (side[-1] - side[-2])]
+    side = np.concatenate([side[:-1], side[-1] - more[::-1], side[-1:]])
+    return side if winch_side(scene) else scene.length - side[::-1]
+
+
 def winch_of(payout: Payout, length: float) -> Floats:
     """Numbers of a winch that holds a tension (kernels.winch), at rest with a length, m, that is out."""
     out, winch = np.zeros(w.WINCH), payout.winch

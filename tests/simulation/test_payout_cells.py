@@ -65,6 +65,34 @@ def test_a_hanging_line_weighs_what_is_out_while_its_cells_change(sign: float, s
     assert np.abs(off).max() < 1e-9
 
 
+@pytest.mark.parametrize("side", ["end", "start"])
+@pytest.mark.parametrize("rate", [0.5, -0.5])
+def test_cells_behind_a_clamped_winch_are_short_where_no_mesh_is_given(rate: float, side: str) -> None:
+    """Bending fades over 0.5 m there, an eighth of a base cell: the moment is that of short rods, and nothing warns."""
+    other = {"end": "start", "start": "end"}[side]
+    tangent = [1.0 if side == "end" else -1.0, 0.0, 0.0]
+    section = {"length": 100.0, "mass": 8.0, "axial_stiffness": 1e7, "bending_stiffness": 1e3}
+    scene: dict[str, Any] = {
+        "cable": {"sections": [section]},
+        "ends": {
+            other: {"kind": "pinned", "position": [0, 0, -45]},
+            side: {
+                "kind": "clamped", "position": [75, 0, 0], "tangent": tangent,
+                "payout": {"rates": [[0, 0], [1, rate]]},
+            },
+        },
+        "initial": "equilibrium",
+        "time": {"duration": 4.0, "step": 0.1},
+        "output": {"every": 1.0, "errors": False},
+    }  # fmt: skip
+    found = hybrid.run(scene | {"model": {"kind": "adaptive", "curvature_error": 0.05}})
+    fine = hybrid.run(scene | {"model": "rod", "mesh": {"cells": 400}})
+    assert "unresolved bend" not in {event.kind for event in found.events}
+    its, true = (np.linalg.norm(x[f"moment_{side}"], axis=1) for x in (found, fine))
+    assert np.abs(its / true - 1.0).max() < 0.05
+    assert found.mesh[-1].s.size < 0.2 * fine.mesh[-1].s.size
+
+
 @pytest.mark.parametrize(("rate", "part"), [(0.8, 0.7), (-0.8, 0.4)])
 def test_as_rods_whose_cells_are_short_everywhere(rate: float, part: float) -> None:
     """Nearer to 320 rods than rods as long as its base cells, and its energy is balanced as theirs is."""
