@@ -204,7 +204,7 @@ def build(
     shape = hung(scene, line, sea.values) if like is None else Hanging(like.start.r, like.start.T)
     start, shape_name, ends = first_state(scene, line, cable, sea, scale, shape)
     others = [
-        (name, other_state(scene, r, line, cable, scale, sea))
+        (name, other_state(scene, r, line, cable, scale))
         for name, r in (spare_shapes(scene, s) if shape is not None else from_joint(scene, s))
         if spare and like is None
     ]

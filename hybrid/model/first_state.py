@@ -8,7 +8,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state import Floats, Line, State, state_for
 from hybrid.model.catenary_guess import Hanging
 from hybrid.model.ends import EndConditions
-from hybrid.model.initial_shape import ends_and_frames, initial_nodes, twist_by_tension
+from hybrid.model.initial_shape import end_conditions, frames, initial_nodes, twist_by_tension
 from hybrid.model.material import Material
 from hybrid.model.sea import Surroundings
 from hybrid.scene.schema import Equilibrium, Points, Scene, Straight
@@ -38,21 +38,29 @@ def first_state(
     if isinstance(scene.initial, Straight):  # exact chords: no round-off of the positions in the strain
         start.e[:] = line.h[:, None] * np.array(scene.initial.direction) / np.linalg.norm(scene.initial.direction)
         start.v[:] = scene.initial.velocity or (0.0, 0.0, 0.0)
-    ends, start.a1[:], start.turn[:, 0] = ends_and_frames(scene, start.e, line, sea)
+    directors, chords = _put_frames(scene, start, line), start.e[[0, -1]]
+    ends = end_conditions(scene, directors, chords / np.linalg.norm(chords, axis=1)[:, None], sea)
     if isinstance(scene.initial, Equilibrium):  # what is not at rest begins without tension
         twist_by_tension(line, cable, start)
     return start, shape_name, ends
 
 
-def other_state(scene: Scene, r: Floats, line: Line, cable: Material, scale: float, sea: Surroundings) -> State:
+def other_state(scene: Scene, r: Floats, line: Line, cable: Material, scale: float) -> State:
     """Another shape to find the equilibrium from: nodes r (N+1, 3) m, tensions of the scale (N)."""
     spare = state_for(line)
     spare.r[:], spare.T[:] = r, scale
     spare.e[:] = np.diff(r, axis=0)
-    _, spare.a1[:], spare.turn[:, 0] = ends_and_frames(scene, spare.e, line, sea)
+    _put_frames(scene, spare, line)
     if isinstance(scene.initial, Equilibrium):
         twist_by_tension(line, cable, spare)
     return spare
+
+
+def _put_frames(scene: Scene, state: State, line: Line) -> tuple[Floats, Floats]:
+    """Give a state the directors and turns that its chords make; the directors at both ends."""
+    directors, state.turn[:, 0] = frames(scene, state.e, line)
+    state.a1[:] = directors[1:-1]
+    return directors[0], directors[-1]
 
 
 def _exact_lengths(start: State, h: Floats, stiff: np.ndarray, scene: Scene) -> None:

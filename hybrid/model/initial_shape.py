@@ -241,9 +241,10 @@ def corners(scene: Scene) -> list[float]:
     return [float(x) for x in knots[:-1] * scene.length / knots[-1]]
 
 
-def ends_and_frames(scene: Scene, e: Floats, line: Line, around: Surroundings) -> tuple[EndConditions, Floats, Floats]:
-    """End conditions, first directors of all cells, carried without twist from the start, and the turns (K,) rad of
-    catenary zones that a torque passes through.
+def frames(scene: Scene, e: Floats, line: Line) -> tuple[Floats, Floats]:
+    """First directors (N+2, 3) of the start, all cells and the end, carried without twist from the start, and the turns
+
+    (K,) rad of catenary zones that a torque passes through.
 
     An end whose `normal` is given fixes the material frame there; a clamp without one holds the twist that the initial
     shape has.  Where both ends fix it, and a torque passes from one to the other, there is a twist to close, less than
@@ -277,7 +278,7 @@ def ends_and_frames(scene: Scene, e: Floats, line: Line, around: Surroundings) -
         turns = 2.0 * np.pi * (turned[zones[:, 1] + 1] - turned[zones[:, 0]])
         angle = 2.0 * np.pi * (turned - np.round(turned))[:, None]  # so that a full turn is none, to the last digit
         carried = carried * np.cos(angle) + np.cross(t, carried) * np.sin(angle)
-    return _end_conditions(scene, (carried[0], carried[-1]), (d[0], d[-1]), around), carried[1:-1], turns
+    return carried, turns
 
 
 def twist_by_tension(line: Line, cable: Material, state: State) -> None:
@@ -306,9 +307,10 @@ def twist_by_tension(line: Line, cable: Material, state: State) -> None:
         state.turn[z, 0] += edges[b + 1] - edges[a]
 
 
-def _end_conditions(
-    scene: Scene, directors: tuple[Floats, Floats], chords: tuple[Floats, Floats], around: Surroundings
+def end_conditions(
+    scene: Scene, directors: tuple[Floats, Floats], chords: Floats, around: Surroundings
 ) -> EndConditions:
+    """The ends of a line; directors, chords: first directors, and directions of the chords (2, 3), at start and end."""
     position, frame = np.zeros((2, 3)), np.zeros((2, 9))
     loads: list[EndLoad] = []
     motions: dict[int, Motion] = {}

@@ -132,12 +132,11 @@ def at_all_outputs(error: np.ndarray, known: np.ndarray, a: int, b: int) -> np.n
     not averaged out."""
     if known.size == b - a and known[0] == a and known[-1] == b - 1:
         return error
-    at = np.arange(a, b)
-    right = np.clip(np.searchsorted(known, at), 1, known.size - 1)
-    before, after = error[right - 1], error[right]
-    between = np.where(np.abs(before) > np.abs(after), before, after)
-    exact = np.isin(at, known)
-    between[exact] = error[np.isin(known, at)]
+    right = np.clip(np.searchsorted(known, np.arange(a, b)), 1, known.size - 1)
+    before, after = error[:-1], error[1:]
+    between = np.where(np.abs(before) > np.abs(after), before, after)[right - 1]
+    inside = (known >= a) & (known < b)
+    between[known[inside] - a] = error[inside]
     return np.asarray(between)
 
 
@@ -172,4 +171,6 @@ def with_neighbours(error: np.ndarray, first: int, last: int, starts: bool) -> n
 
 def magnitude(error: np.ndarray, name: str) -> np.ndarray:
     """Of vectors their length, of numbers their size."""
-    return np.asarray(np.linalg.norm(error, axis=-1) if name == "position" or name in END_FORCES else np.abs(error))
+    if name == "position" or name in END_FORCES:  # einsum takes a third of the time of numpy's norm
+        return np.asarray(np.sqrt(np.einsum("...i,...i->...", error, error)))
+    return np.asarray(np.abs(error))

@@ -109,7 +109,7 @@ class SelfWatch:
     @cached_property
     def _job(self) -> Table:
         """What the kernel gets."""
-        return Table(blank_itself_job())
+        return Table(blank_itself_job)
 
     @property
     def watching(self) -> bool:
@@ -233,7 +233,7 @@ class LineWatch:
 
     def _bind(self) -> Table:
         """Get ready for the kernel, when the line is so bent for the first time that it could come near itself."""
-        model, job = self._model, Table(blank_itself_job())
+        model, job = self._model, Table(blank_itself_job)
         self._now, self._before = state_for(model.line), state_for(model.line)
         self._clock = np.zeros(CLOCK_SIZE)
         job.bind(

@@ -115,7 +115,13 @@ class Transient:
         self.run.books.loaded[:] = model.loaded_ends
         self.run.clock[b.FLOOR] = model.slack_floor if model.slack == "stop" else -np.inf
         self.run.count[b.STIFF] = model.inextensible
-        self.set_model(model, state_for(model.line))  # until `begin` or `restore`
+        if not self._begins_at_once:
+            self.set_model(model, state_for(model.line))  # until `begin` or `restore`
+
+    @property
+    def _begins_at_once(self) -> bool:
+        """Whether no line is attached before `begin` or `restore`, because nothing needs one there."""
+        return self.switching is None and self.payout is None and self.correction is None
 
     def _set_control(self, resolution: Resolution) -> None:
         """How long steps may be."""
@@ -218,6 +224,8 @@ class Transient:
         if self.envelope is not None:
             note_blended(self.scene, self.events)
         if equilibrium is None:
+            if self._begins_at_once:
+                self.set_model(model, state_for(model.line))
             state = model.start.copy()
             rotate_ends_in(self.scene, model, state, self.events)
             if not state.v.any():
@@ -555,7 +563,7 @@ class Transient:
 
     def set_model(self, model: Model, state: State) -> None:
         """Go on with another line: other zones, or out of the plane."""
-        if self.envelope is not None:
+        if self.envelope is not None and self.run.books.extremes.shape[1]:
             self.envelope.fold(self.model.nodes, self.run.books.extremes)
         self.model = model
         if self._cells is not None:
