@@ -62,7 +62,7 @@ class ArrayContents:
         """parts: results of lines by name, of a result of several."""
         self._parts = dict(parts or {})
         self.order = tuple(self._parts)
-        self.data: dict[str, Any] = dict(sorted(data.items(), key=lambda item: item[0].split("/")))
+        self.data: Mapping[str, Any] = dict(sorted(data.items(), key=lambda item: item[0].split("/")))
         self.groups, self._texts = sorted(groups), dict(texts)
         self.attributes, self.is_open = attributes, True
 
@@ -72,8 +72,8 @@ class ArrayContents:
         data = {key: ArrayDataset(x.field, x.dims, x.values) for key, x in found.data.items()}
         return ArrayContents(data, found.groups, found.attributes, found._texts)
 
-    def is_scale(self, data: ArrayDataset) -> bool:
-        return data.dims == (data.field.name,)
+    def scales(self) -> list[str]:
+        return []
 
     def dims_of(self, data: ArrayDataset) -> tuple[str, ...]:
         return data.dims

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from h5py import h5d, h5ds, h5g, h5o
+from h5py import h5ds, h5g, h5o
 
 from hybrid.store.format import plain_text
 from hybrid.store.hdf5_file import check_format, open_file
@@ -23,7 +24,7 @@ HIDDEN = ("checkpoint", GROUP)  # what is for the program alone, and results of 
 class Contents(Protocol):
     """Datasets and attributes of a result."""
 
-    data: dict[str, Any]  # datasets by the names of today, each with `valid`: whether it can be read
+    data: Mapping[str, Any]  # datasets by the names of today, each with `valid`: whether it can be read
     groups: list[str]
     order: tuple[str, ...]  # names of lines, of a result of several
 
@@ -35,8 +36,8 @@ class Contents(Protocol):
     def is_open(self) -> bool:
         """Whether it was not closed."""
 
-    def is_scale(self, data: Any) -> bool:
-        """Whether a dataset is a dimension scale."""
+    def scales(self) -> list[str]:
+        """Names of dimension scales, whose lengths say how many rows are complete; none where all rows are."""
 
     def dims_of(self, data: Any) -> tuple[str, ...]:
         """Names of the dimensions of a dataset."""
@@ -60,6 +61,37 @@ class Contents(Protocol):
         """Let go of it."""
 
 
+class _Closed:
+    """A dataset of a file that was closed before anybody asked for it."""
+
+    valid = False
+
+
+class _Datasets(Mapping[str, Any]):
+    """Datasets of HDF5's own interface by the names of today, each opened when it is asked for."""
+
+    def __init__(self, root: Any, stored: Mapping[str, str]) -> None:
+        """stored: names in the file, by those of today."""
+        self._root, self._stored, self._opened = root, stored, dict[str, Any]()
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._opened:
+            path = self._stored[name]
+            if not self._root:
+                return _Closed()
+            self._opened[name] = h5o.open(self._root.id, path.encode())
+        return self._opened[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._stored
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._stored)
+
+    def __len__(self) -> int:
+        return len(self._stored)
+
+
 class FileContents:
     """The contents of a file, a running one too, or of the bytes of one in memory."""
 
@@ -78,25 +110,16 @@ class FileContents:
             raise
 
     def _scan(self) -> None:
-        self._stored: dict[str, str] = {}  # names in the file, where another version wrote it
-        self.data: dict[str, Any] = {}
-        groups: set[str] = set()
-
-        def visit(path: bytes) -> None:  # HDF5's own interface: objects of h5py take four times as long
-            name = path.decode()
-            if name.split("/")[0] in HIDDEN or name in TEXTS:
-                return
-            found = h5o.open(self._root.id, path)
-            if isinstance(found, h5d.DatasetID):
-                if name in OLD_NAMES:
-                    self._stored[OLD_NAMES[name]] = name
-                    name = OLD_NAMES[name]
-                self.data[name] = found
-            elif isinstance(found, h5g.GroupID):
-                groups.add(name)
-
-        self._root.id.links.visit(visit)
+        names: list[str] = []
+        self._root.id.links.visit(lambda path: names.append(path.decode()))
+        shown = [n for n in names if n.split("/")[0] not in HIDDEN and n not in TEXTS]
+        groups = {n.rpartition("/")[0] for n in shown} - {""}
+        # groups are not empty, but for tables of the result itself without columns
+        empty = [n for n in shown if "/" not in n and n not in groups]
+        groups.update(n for n in empty if isinstance(h5o.open(self._root.id, n.encode()), h5g.GroupID))
         self.groups = sorted(groups)
+        self._stored = {OLD_NAMES.get(n, n): n for n in shown if n not in groups}
+        self.data: Mapping[str, Any] = _Datasets(self._root, self._stored)
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -106,8 +129,10 @@ class FileContents:
     def is_open(self) -> bool:
         return bool(self._file)
 
-    def is_scale(self, data: Any) -> bool:
-        return bool(h5ds.is_scale(data))
+    def scales(self) -> list[str]:
+        if plain_text(self._root.attrs["status"]) != "running":
+            return []
+        return [name for name, data in self.data.items() if h5ds.is_scale(data) and dims_of(data) == (name,)]
 
     def dims_of(self, data: Any) -> tuple[str, ...]:
         return dims_of(data)
@@ -117,7 +142,7 @@ class FileContents:
 
     def label(self, name: str) -> dict[str, str]:
         self._refreshed(name)
-        attrs = self._root[self._stored.get(name, name)].attrs
+        attrs = self._root[self._stored[name]].attrs
         return {key: plain_text(attrs.get(key, "")) for key in ("units", "description", "frame")}
 
     def _refreshed(self, name: str) -> Any:

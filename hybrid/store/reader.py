@@ -97,8 +97,7 @@ class Result(Histories):
         self._dims, self.units = Looked(data, contents.dims_of), Looked(data, contents.units_of, ALIASES)
         # Taken once, so that everything read later shows the same moment of a file that grows.
         # t first: the zones of an output are complete before its time is.
-        scales = [n for n, each in data.items() if contents.is_scale(each) and self._dims[n] == (n,)]
-        self._rows = {n: contents.length(n) for n in sorted(scales, key=lambda n: n != "t")}
+        self._rows = {n: contents.length(n) for n in sorted(contents.scales(), key=lambda n: n != "t")}
         self.attributes: dict[str, Any] = Attributes(
             {OLD_ATTRIBUTES.get(k, k): v for k, v in contents.attributes.items()}
         )
