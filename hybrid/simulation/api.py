@@ -59,6 +59,7 @@ from hybrid.simulation.run_sample import RunSample
 from hybrid.simulation.static_case import StaticCase
 from hybrid.store.array_recorder import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target
+from hybrid.store.late_file import LateFile
 from hybrid.store.lock import locked
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result, written_result
@@ -254,6 +255,12 @@ def _compute(case: Case, target: Target, source: Path | None = None, remaining: 
     def anew(resolution: Resolution, to: Path | io.BytesIO) -> RunSample:
         return case.record(resolution, to, found())
 
+    def complete() -> Path | io.BytesIO | LateFile:
+        """The result, which nothing is to be done to but to add its errors."""
+        assert not isinstance(target, MemoryTarget)
+        late = case.late_file
+        return late if late is not None and not late.placed else target
+
     def found() -> Tree:
         return control.checkpoint() if control is not None else {}
 
@@ -283,6 +290,8 @@ def _compute(case: Case, target: Target, source: Path | None = None, remaining: 
                 raise
             failed = str(error).splitlines()[0]
         if control.choice.kind == "catenary" and failed:
+            if case.late_file is not None:
+                case.late_file.drop()
             _emptied(target)
             choice, resolution = rods_instead(case, first_resolution(case.scene), failed)
             control = _controller(case, FinerResult(target, anew, refinement), choice)
@@ -290,13 +299,15 @@ def _compute(case: Case, target: Target, source: Path | None = None, remaining: 
     except KeyboardInterrupt:
         if control is not None and control.estimate is not None:  # the result before the finer run stands
             result, errors = control.without_refinement("a finer run was stopped from outside")
-            write_errors(target, case.scene, control, result, errors, clock.process_time() - begin, done=False)
+            write_errors(complete(), case.scene, control, result, errors, clock.process_time() - begin, done=False)
         begun = control is not None and (control.comparisons or control.estimate) is not None
         kept = begun and isinstance(target, Path) and target.exists()  # it can be resumed
         raise
     else:
-        write_errors(target, case.scene, control, result, errors, clock.process_time() - begin)
+        write_errors(complete(), case.scene, control, result, errors, clock.process_time() - begin)
     finally:
+        if case.late_file is not None:
+            case.late_file.place()
         if isinstance(target, Path) and not kept:
             remove_rows(target)
 

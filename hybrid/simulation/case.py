@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
@@ -61,6 +61,7 @@ from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.hdf5_file import is_result, open_file, opened
+from hybrid.store.late_file import LateFile
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.reader import open_result, written_result
 from hybrid.store.records import THERE
@@ -100,6 +101,7 @@ class Case:
         self.progress = ProgressReporter(None, 1.0)
         self.interrupted: Callable[[], bool] = lambda: False
         self.beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
+        self.late_file: LateFile | None = None  # of a result that is complete, and may not be in its place yet
         self._results = 0  # that were begun
         self.came_near_itself = False  # whether contact with itself was computed in a run to compare with
         self._unwanted = Event()  # what runs to compare with still compute
@@ -107,28 +109,38 @@ class Case:
     # --- results --------------------------------------------------------------------------------
 
     def record(self, resolution: Resolution, target: Target, before: Tree | None = None) -> RunSample:
-        """Compute the result into a file, or memory; what is to be compared of it.  before: what was found before."""
+        """Compute the result into a file, or memory; what is to be compared of it.  before: what was found before.
+
+        A file that errors will be added to, and that is complete before it had to be there, waits in `late_file`.
+        """
         begin = self._begin_result(resolution)
-        loop, recorder, equilibrium = self.prepare(
-            resolution, target, before or {} if isinstance(target, Path) else None
-        )
+        kept = before or {} if isinstance(target, Path) else None
+        loop, recorder, equilibrium = self.prepare(resolution, target, kept, late=not self.progress.heard)
         loop.recorder = recorder
+        if isinstance(recorder, Recorder):
+            plain = resolution.local is None and loop.run.switching is None
+            recorder.amended = plain and self.beside_result is not None and target == self.beside_result
         with recorder:
             loop.begin(equilibrium)
             loop.to_the_end(self._duration, self._exact, self.changes)
             loop.close()
+        if isinstance(recorder, Recorder):
+            self.late_file = recorder.late_file
         return self._compared(loop.run, target, clock.process_time() - begin)
 
     def prepare(
-        self, resolution: Resolution, target: Target, kept: Tree | None = None
+        self, resolution: Resolution, target: Target, kept: Tree | None = None, late: bool = False
     ) -> tuple[TimeLoop, Recorder | ArrayRecorder, Equilibrium | None]:
-        """The loop of a run, its result, and the equilibrium that it starts from; kept: as `before` of `Recorder`."""
+        """The loop of a run, its result, and the equilibrium that it starts from.
+
+        kept, late: as `before` and `late` of `Recorder`.
+        """
         model, equilibrium, switching = self._start(resolution)
         loop = self._loop(self.scene, model, resolution, switching, target)
         assert loop.run.envelope is not None
         recorder = result_recorder(
             self.scene, model, loop.observer, target, self._texts, equilibrium, loop.run.envelope,
-            len(output_times(self.scene)), kept,
+            len(output_times(self.scene)), kept, late,
         )  # fmt: skip
         recorder.files = self._files
         if switching is not None and switching.manager.held:
@@ -198,7 +210,9 @@ class Case:
         return pack(point.resolution) == pack(resolution_tree(resolution))
 
     def _begin_result(self, resolution: Resolution) -> float:
-        """The pass of a result begins; s of processor time."""
+        """The pass of a result begins, and that before it is where it belongs; s of processor time."""
+        if self.late_file is not None:
+            self.late_file.place()
         self.progress.begin(REFINEMENT if self._results else RESULT, resolution)
         self._results += 1
         return clock.process_time()
@@ -245,7 +259,11 @@ class Case:
         if not wants_errors(self.scene):
             return RunSample(resolution, {}, cells, run.steps, 0.0)
         assert not isinstance(target, MemoryTarget), "errors are written into a file"
-        with open_file(target, summed=False) as file:
+        late = self.late_file
+        if late is not None and sum(late.file[x].size for x in COMPARED if x in late.file) > MOST_IN_MEMORY:
+            late.place()  # they stay in the file
+            late = None
+        with nullcontext(late.file) if late is not None else open_file(target, summed=False) as file:
             model_errors = [f"{MODEL_ERRORS}{x}" for x in file.get(MODEL_ERRORS, ())]
             stored = {name: file[name] for name in (*COMPARED, *model_errors) if name in file}
             # they stay in the file, if they are many, that is one, and no finer result may replace it

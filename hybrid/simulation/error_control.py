@@ -441,8 +441,8 @@ class ErrorController:
             "coarse": self.comparisons and [x and x.checkpoint() for x in self.comparisons],
             "estimate": self.estimate and self.estimate.checkpoint(),
             "statistics": {name: x.checkpoint() for name, x in self.statistics.items()}, "every": self._every,
-            "scattered": self.scattered, "excess": self.excess, "choice": list(self.choice),
-            "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": self._notes,
+            "scattered": list(self.scattered), "excess": self.excess, "choice": list(self.choice),
+            "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": list(self._notes),
         }  # fmt: skip
 
     def restore(self, tree: Mapping[str, Any], scene: Scene, points: OutputPoints, source: Path | None = None) -> None:

@@ -19,6 +19,7 @@ from hybrid.simulation.result_checks import damped_jolts, undersampled_end_force
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.store.amend import Happened, amend
 from hybrid.store.format import Field
+from hybrid.store.late_file import LateFile
 
 UNITS = {
     "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m",
@@ -32,8 +33,8 @@ CAUSES = {
 
 
 def write_errors(
-    target: Path | io.BytesIO, scene: Scene, control: ErrorController, result: RunSample, errors: Errors | None,
-    cpu: float, done: bool = True,
+    target: Path | io.BytesIO | LateFile, scene: Scene, control: ErrorController, result: RunSample,
+    errors: Errors | None, cpu: float, done: bool = True,
 ) -> None:  # fmt: skip
     """Add errors (None: they could not be estimated), attributes and events to a complete result.
 

@@ -391,7 +391,8 @@ class TimeLoop:
         if new:
             recorder.checkpoint(self._content)
             self._kept = here
-        if not last and (new or recorder.due):
+        late = isinstance(recorder, Recorder) and recorder.is_late
+        if not last and (recorder.due or (new and not late)):
             self.write_envelope()
             recorder.flush()
 

@@ -15,7 +15,8 @@ from h5py import h5d, h5p, h5s
 from hybrid.store.checkpoint import BEFORE
 from hybrid.store.format import EVENTS, Field, annotate, attach_scales, checked, plain_text
 from hybrid.store.hdf5_file import beside, in_memory, redrafted, unwritable
-from hybrid.store.integrity import copy_unsigned, sign
+from hybrid.store.integrity import copy_unsigned, sign_new
+from hybrid.store.late_file import LateFile
 from hybrid.store.lines import GROUP
 from hybrid.store.table import NUMBERS, Table, write_rows
 
@@ -26,7 +27,7 @@ Others = tuple[Mapping[str, str | float | int], Sequence[tuple[str, str]]]
 
 
 def amend(
-    target: Path | io.BytesIO,
+    target: Path | io.BytesIO | LateFile,
     fields: Sequence[Field],
     blocks: Iterable[Block],
     others: Callable[[Happened], Others],
@@ -44,6 +45,8 @@ def amend(
             del file[BEFORE]
         _add(file, fields, blocks, others)
 
+    if isinstance(target, LateFile) and done:
+        target.at_last = lambda file: None  # what a refinement would be resumed from
     change_complete(target, add)
 
 
@@ -74,8 +77,12 @@ def amend_lines(
     change_complete(target, add)
 
 
-def change_complete(target: Path | io.BytesIO, change: Callable[[h5py.File], None]) -> None:
+def change_complete(target: Path | io.BytesIO | LateFile, change: Callable[[h5py.File], None]) -> None:
     """Change a complete result, in a copy that takes its place; ResultError where it cannot be written."""
+    if isinstance(target, LateFile):
+        target.change(change)
+        target.place()
+        return
     if isinstance(target, io.BytesIO):
         with in_memory(target.getvalue()) as file:
             change(file)
@@ -91,7 +98,7 @@ def change_complete(target: Path | io.BytesIO, change: Callable[[h5py.File], Non
         copy_unsigned(target, new)
         with redrafted(new) as file:
             change(file)
-        sign(new)
+        sign_new(new)
         os.replace(new, target)
     except (OSError, RuntimeError) as error:
         raise unwritable(target, error, "free some disk space; close programs that hold the file") from error

@@ -221,6 +221,14 @@ def in_memory(content: bytes = b"") -> h5py.File:
     return h5py.File.in_memory(content, libver=_LIBVER, rdcc_nbytes=CACHE, rdcc_nslots=SLOTS)
 
 
+def image_of(file: h5py.File) -> bytes:
+    """The bytes of a file in memory, which is closed."""
+    file.flush()
+    image = bytes(file.id.get_file_image())
+    file.id.close()  # h5py's own way looks at all that is open, in time that grows with the lines of a system squared
+    return image
+
+
 def give_up(file: h5py.File) -> None:
     """Close a file in SWMR mode that could not be written; on the disk it stays as it was when last flushed.
 

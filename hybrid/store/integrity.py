@@ -80,12 +80,17 @@ def unmarked(path: Path) -> bytes:
     return bytes(content)
 
 
+def sign_new(path: Path) -> None:
+    """Put the sum of a closed file, which is not in its place yet, behind its end; OSError: it cannot be written."""
+    with path.open("r+b") as file:
+        size = file.seek(0, 2)
+        file.write(_TAIL.pack(_NAME, size, _sum_of(file, size)))
+
+
 def sign(path: Path) -> None:
-    """Put the sum of a closed file behind its end."""
+    """The same of a file in its place; ResultError."""
     try:
-        with path.open("r+b") as file:
-            size = file.seek(0, 2)
-            file.write(_TAIL.pack(_NAME, size, _sum_of(file, size)))
+        sign_new(path)
     except OSError as error:
         advice = "free some disk space; the result is complete but for this sum"
         raise ResultError(f"{path} cannot be written\n    detail:   {error}\n    try:      {advice}") from error

@@ -19,6 +19,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -42,8 +43,18 @@ from hybrid.store.format import (
     write_fixed,
     write_texts,
 )
-from hybrid.store.hdf5_file import check_target, created, drafted, give_up, hold_metadata, in_memory, unwritable
+from hybrid.store.hdf5_file import (
+    check_target,
+    created,
+    drafted,
+    give_up,
+    hold_metadata,
+    image_of,
+    in_memory,
+    unwritable,
+)
 from hybrid.store.integrity import sign
+from hybrid.store.late_file import LateFile
 from hybrid.store.lines import GROUP, add_parts, in_turn, of_all, of_part
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.recorder import STATUS, BaseRecorder
@@ -71,7 +82,13 @@ class Recorder(BaseRecorder):
     before: what was found before the run, for whoever goes on with it; None: nobody can, it has no checkpoints.
     templates: folder where templates of files are kept (store.template); None: in this process alone.
     parts: results of lines, laid by in memory, that are groups of this file from now on and are written with it.
+    late: whether there is no file before the first flush; without one it is written when this is closed, and if that
+    is "complete" and `amended`, it is left in `late_file` for whoever puts it in its place.
     """
+
+    late_file: LateFile | None = None
+    amended = False
+    _before: Tree | None  # to be written with a file that is late; None: the file is there
 
     def __init__(
         self,
@@ -88,6 +105,7 @@ class Recorder(BaseRecorder):
         before: Tree | None = None,
         templates: Path | None = None,
         parts: Mapping[str, Recorder] | None = None,
+        late: bool = False,
     ) -> None:
         check_names(fields, step_fields, fixed)
         self._memory = target if isinstance(target, io.BytesIO) else None
@@ -100,14 +118,15 @@ class Recorder(BaseRecorder):
         write_attributes(file, attributes)
         write_texts(file, texts)
         write_fixed(file, np.asarray(grid_s, dtype=float), fixed)
+        if late and path is not None:
+            self._write_to(file, path, tables_of(fields, step_fields))
+            self._before, self._flushed = before or {}, monotonic()
+            return
         write_before(file, before)
         if parts:
             add_parts(file, {name: part._take_image for name, part in parts.items()})
         if path is not None:
-            file.flush()
-            image = file.id.get_file_image()
-            file.close()
-            file = created(path, image, many=bool(parts))
+            file = created(path, image_of(file), many=bool(parts))
             if parts:
                 hold_metadata(file)
         self._write_to(file, path, tables_of(fields, step_fields))
@@ -168,13 +187,14 @@ class Recorder(BaseRecorder):
 
     def _write_to(self, file: h5py.File, path: Path | None, tables: Mapping[str, Sequence[Field]]) -> None:
         self._file: Any = file  # a group of the file of `_whole`, where this is a part of that
+        self._before = None
         self._begin(file, tables)
         self.path = path
         self._whole: Recorder | None = None  # never itself: a reference cycle would keep outputs in memory
         self._parts: dict[str, Recorder] = {}
         self._image = b""  # of a file in memory that is closed
         self._number = 0  # of the next checkpoint
-        self._slots = [file[name] for name in SLOTS if name in file]
+        self._slots = _slots_of(file)
         self._fixed: dict[str, h5d.DatasetID] = {}  # their datasets
         self._packed = b""  # a checkpoint that waits
         self._flushed, self._took = -np.inf, 0.0  # when the file was last brought up to date, and how long it took, s
@@ -212,14 +232,41 @@ class Recorder(BaseRecorder):
         that is open.  Events may be noted until it is taken.
         """
         self._leave()
-        self._file.flush()
-        self._image = self._file.id.get_file_image()
-        self._file.id.close()  # h5py's own way looks at all that is open, in time that grows with the lines squared
+        self._image = image_of(self._file)
 
     def _take_image(self) -> bytes:
         """The bytes of a result that was laid by; they are kept no longer."""
         image, self._image = self._image, b""
         return image
+
+    @property
+    def is_late(self) -> bool:
+        """Whether there is no file as yet."""
+        return self._before is not None
+
+    def _appear(self) -> None:
+        """Let readers see a file that is late, with all that it holds now; nothing where it is there."""
+        if self._before is None:
+            return
+        assert self.path is not None
+        before, self._before = self._before, None
+        write_before(self._file, before)
+        image = self._image_so_far()
+        self._broken = True  # until there is a file again
+        self._continue_in(created(self.path, image))
+        self._broken = False
+
+    def _image_so_far(self) -> bytes:
+        self._leave()
+        self._slots = []
+        return image_of(self._file)
+
+    def _continue_in(self, file: h5py.File) -> None:
+        """Write to another file that is the same until now."""
+        self._file = file
+        for table in self._all:
+            table.move(file)
+        self._slots = _slots_of(file)
 
     @property
     def due(self) -> bool:
@@ -236,6 +283,9 @@ class Recorder(BaseRecorder):
     def checkpoint(self, content: Callable[[], Mapping[str, Any]]) -> None:
         """Keep a checkpoint at the last output, written with the next flush; content: makes `program`, `asks`,
         `resolution` and `state` of it."""
+        if self._packed and self._before is not None:  # of a file that is late, which has had no flush since
+            write_slot(self._slots, self._number, self._packed)
+            self._number += 1
         parts = {"": self, **self._parts}
         rows = of_all(
             {name: {x.scale: x.count + x.waiting for x in part._all if x.fields} for name, part in parts.items()}
@@ -250,6 +300,7 @@ class Recorder(BaseRecorder):
         with self._writing():
             parts = [*self._parts.values(), self]
             self._write([x for part in parts for x in reversed(part._all)], self._packed)
+            self._appear()
             if self._packed and self.path is not None:
                 os.fsync(self._file.id.get_vfd_handle())  # a machine that goes down then loses no more than a kill does
         self._number += bool(self._packed)
@@ -314,6 +365,9 @@ class Recorder(BaseRecorder):
                 set_status(self._file, status, message)
             self._whole = None  # a cycle no more: it has this among its parts
             return
+        if self._before is not None:
+            self._write_late(status, message)
+            return
         self.flush()
         with self._writing():
             set_status(self._file, status, message)
@@ -325,3 +379,36 @@ class Recorder(BaseRecorder):
             self._file.close()
         if self.path is not None:
             sign(self.path)
+
+    def _write_late(self, status: str, message: str) -> None:
+        """Write the file in one go, and put it in its place unless it will be amended."""
+        assert self.path is not None
+        before, self._before = self._before, None
+        late = LateFile(self.path, self._image_so_far())
+        late.at_last = partial(write_before, before=before)
+
+        def write(file: h5py.File) -> None:
+            self._continue_in(file)
+            for table in reversed(self._all):
+                table.write()
+                table.commit(at_once=False)
+            for name, values in self._replaced.items():
+                write_all(h5d.open(file.id, name.encode()), values)
+            if self._packed:
+                write_slot(self._slots, self._number, self._packed)
+            set_status(file, status, message)
+            self._leave()
+            self._slots = []
+
+        self._broken = True
+        late.change(write)
+        self._broken = False
+        if self.amended and status == "complete":
+            self.late_file = late
+        else:
+            late.place()
+
+
+def _slots_of(file: h5py.Group) -> list[h5py.Dataset]:
+    """Where checkpoints are written; none in a file without."""
+    return [file[name] for name in SLOTS if name in file]

@@ -62,6 +62,40 @@ def test_what_was_written_stays(limit: int, tmp_path: Path) -> None:
             assert read_checkpoint(file).rows["t"] == len(t)
 
 
+LATE = """
+import os, resource, sys
+sys.path[:0] = [{here!r}]
+from hybrid.errors import ResultError
+from test_result_file import ONE, recorder, values
+def write():
+    with recorder({path!r}, before={{}}, late=True, overwrite=True) as r:
+        for i in range(1000):
+            r.save(float(i), values(float(i)), ONE)
+write()
+size = os.path.getsize({path!r})
+before = open({path!r}, "rb").read()
+for limit in (0, 20_000, size // 2, size - 10):  # while it is made, in its outputs, in the sum behind its end
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, -1))
+    try:
+        write()
+    except ResultError as error:
+        print(error)
+    assert open({path!r}, "rb").read() == before, limit
+    assert os.listdir(os.path.dirname({path!r})) == ["run.h5"], limit
+"""
+
+
+def test_a_late_file_that_cannot_be_written_does_not_appear(tmp_path: Path) -> None:
+    """And what was there before stays."""
+    path, here = tmp_path / "run.h5", Path(__file__).parent
+    env = os.environ | {"PYTHONPATH": str(Path(hybrid.__file__).parents[1]), "PYTHONDONTWRITEBYTECODE": "1"}
+    code = LATE.format(here=str(here), path=str(path))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env)
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr[-2000:]
+    assert done.stdout.count(f"{path} cannot be written") == 4 and "free" in done.stdout
+    assert open_result(path).status == "complete"
+
+
 LINES = """
 import io, resource, sys
 sys.path[:0] = [{here!r}]

@@ -1,0 +1,94 @@
+"""Results of short runs, whose file is written in one go when they have ended: as one that grew, stopped and resumed."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from bits import Stopping, differences
+
+import hybrid
+from hybrid.simulation import api
+from hybrid.simulation.progress import RESULT, Progress
+from hybrid.store import writer
+from hybrid.store.late_file import LateFile
+
+TIMES = ("cpu", "created", "effort_cpu")  # that differ from run to run
+
+
+def described(errors: bool = False) -> dict[str, Any]:
+    section = {"length": 2.0, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e5}
+    motion = {"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0}
+    return {
+        "cable": {"sections": [section]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {"kind": "pinned", "position": [1.5, 0, 0], "motion": motion},
+        },
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 16},
+        "time": {"duration": 2.0, "step": 0.05}, "output": {"every": 0.1, "points": 11, "errors": errors},
+    }  # fmt: skip
+
+
+def contents(path: Path) -> dict[str, Any]:
+    """All that a file has, and how, but for times and checkpoints."""
+    with h5py.File(path) as file:
+        found: dict[str, Any] = {"": {k: str(v) for k, v in file.attrs.items() if k not in TIMES}}
+
+        def visit(name: str, item: Any) -> None:
+            if not isinstance(item, h5py.Dataset) or name.startswith("checkpoint/") or name.split("/")[-1] in TIMES:
+                return
+            said = {k: str(v) for k, v in item.attrs.items() if k in ("units", "description", "frame")}
+            dims = [dim.label for dim in item.dims]
+            found[name] = str(np.asarray(item[()]).tolist()), item.dtype, item.chunks, item.maxshape, said, dims
+
+        file.visititems(visit)
+    return found
+
+
+@pytest.mark.parametrize("errors", [False, True])
+def test_a_file_that_is_late_is_as_one_that_grew(errors: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Path] = []
+    place = LateFile.place
+    monkeypatch.setattr(LateFile, "place", lambda self: made.append(self.path) or place(self))
+    hybrid.run(described(errors), tmp_path / "late.h5").close()
+    assert tmp_path / "late.h5" in made
+    made.clear()
+    monkeypatch.setattr(writer, "_PAUSE", -1.0)  # outputs are due at once
+    hybrid.run(described(errors), tmp_path / "grew.h5").close()
+    assert not made
+    assert contents(tmp_path / "late.h5") == contents(tmp_path / "grew.h5")
+    assert {x.name for x in tmp_path.iterdir()} == {"grew.h5", "late.h5"}
+
+
+def test_it_is_there_when_the_run_is_stopped_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Stopping(monkeypatch, checkpoints=False)  # a step a call
+    hybrid.run(described(True), tmp_path / "whole.h5").close()
+    calls: list[int] = []
+    for stop in (10, 60):  # in the runs to compare with, of which nothing stays, or in the result
+        calls.clear()
+        asked = nullcontext(lambda stop=stop: calls.append(0) or len(calls) >= stop)
+        with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+            patched.setattr(api, "interrupts", lambda asked=asked: asked)
+            hybrid.run(described(True), tmp_path / "run.h5")
+    with hybrid.open(tmp_path / "run.h5") as result:
+        assert result.status == "interrupted" and result.times[-1] < 2.0
+    hybrid.resume(tmp_path / "run.h5").close()
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+    assert {x.name for x in tmp_path.iterdir()} == {"run.h5", "whole.h5"}
+
+
+def test_who_hears_of_the_progress_can_open_it(tmp_path: Path) -> None:
+    seen: list[str] = []
+
+    def look(progress: Progress) -> None:
+        if progress.name == RESULT:
+            with hybrid.open(tmp_path / "run.h5") as result:
+                seen.append(result.status)
+
+    hybrid.run(described(True), tmp_path / "run.h5", progress=look).close()
+    assert seen
