@@ -68,12 +68,12 @@ def payouts(scene: Scene) -> list[Payout]:
 
 
 def slack_of(scene: Scene) -> float:
-    """Length, m, by which the line is longer than its ends are apart; infinite where an end moves or may, breaks or is
+    """Length, m, by which the line is longer than its ends are apart; infinite where an end moves or may, is set from
 
-    let go, or it is paid out.
+    outside, breaks or is let go, or it is paid out.
     """
     a, b = (end.held_position for end in scene.ends.both)
-    if a is None or b is None or payouts(scene):
+    if a is None or b is None or payouts(scene) or scene.contact.ends_are_set:
         return math.inf
     if any(x.prescribed_motion or x.release or not x.is_placed for x in scene.ends.both):
         return math.inf

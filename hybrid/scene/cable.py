@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
 
 from hybrid.scene.attachments import Attachment
 from hybrid.scene.base import (
@@ -166,6 +166,18 @@ class Contact(Table):
         default=0.0,
         description="coefficient of friction between parts of the cable that touch each other, with `self` [-]",
     )
+    _ends_are_set: bool = PrivateAttr(default=False)
+
+    @property
+    def ends_are_set(self) -> bool:
+        """Whether ends may be set from outside, so that no scene says how near they come to each other."""
+        return self._ends_are_set
+
+    def of_ends_that_are_set(self) -> Contact:
+        """The same of a line that is stepped from outside."""
+        found = self.model_copy()
+        found._ends_are_set = True
+        return found
 
 
 # Strain that a section bears which says nothing: beyond that of steel, chain and most ropes.

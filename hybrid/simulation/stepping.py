@@ -65,7 +65,8 @@ class Simulation(SteppedEnds):
         criterion: UserCriterion | None = None, most_iterations: int | None = None,
     ) -> None:  # fmt: skip
         self._most = iterations_allowed(most_iterations)
-        self.scene = in_space(as_scene(scene))
+        found = in_space(as_scene(scene))
+        self.scene = found.model_copy(update={"contact": found.contact.of_ends_that_are_set()})
         if self.scene.time is None:
             raise SceneError([missing_time(self.scene)])
         check_motions(self.scene)

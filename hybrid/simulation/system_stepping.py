@@ -62,6 +62,11 @@ class SystemSimulation:
             where = f"lines.{found.adaptive[0]}.model"
             expected = "rod, catenary or zones that stay, in steps from outside"
             raise SceneError([Complaint(where, "adaptive", expected, "write `model: rod`")])
+        lines = {
+            name: line.model_copy(update={"contact": line.contact.of_ends_that_are_set()})
+            for name, line in found.lines.items()
+        }
+        found = found.model_copy(update={"lines": lines})
         self.scene, self.lock, self._stack = found, threading.RLock(), ExitStack()
         self._target: Path | io.BytesIO = io.BytesIO()
         if output is not None:
