@@ -22,6 +22,7 @@ def reported(
     seabed: bool = True,
     energy: bool = True,
     errors: bool = False,
+    not_converged: str = "",
     steps: bool = True,
     allowed: float | None = None,
     torque: float = 0.0,
@@ -71,6 +72,7 @@ def reported(
     if errors:
         causes = {"mesh": 0.03, "time": 0.01, "model": 0.002, "total": 0.042}
         attributes |= {f"error_{k}_position": x for k, x in causes.items()}
+        attributes |= {"errors_not_converged": not_converged} if not_converged else {}
         attributes |= {f"error_{k}_end_force": 1e3 * x for k, x in causes.items()}
     log = [
         Field("t", "s", "d"),

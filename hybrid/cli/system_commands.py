@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import hybrid
 from hybrid.cli.app import picture_beside
 from hybrid.cli.plan_tables import contents_table, system_plan_lines
-from hybrid.cli.tables import extremes_facts, judged_text, verdict_text, verdicts_of
+from hybrid.cli.tables import extremes_facts, judged_text, unknown_text, verdict_text, verdicts_of
 from hybrid.store.limits import held_of
+from hybrid.store.records import error_words
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
@@ -45,8 +46,7 @@ def _moved(console: Console, asked: System, target: Path, picture: Path | None, 
     steps = len(result.lines[next(iter(result.lines))]["steps/t"])
     text = f"{asked.require_time().duration:.6g} s in {steps} steps, {span(wall)} of wall time"
     if "error_total_position" in result.attributes:
-        position, force = (float(result.attributes[f"error_total_{x}"]) for x in ("position", "end_force"))
-        text += f"; estimated error {position:.2g} m, {force:.2g} N at the ends"
+        text += f"; estimated error {error_words(result.attributes)}"
     else:
         text += "; error not estimated"
     ended(console, result, target, picture, text, steps=steps, wall=wall)
@@ -116,11 +116,11 @@ def _table(
             at(x) + judged_text(limits.get(limit), "N", x)
             for x, limit in ((least, "min_tension"), (most, "max_tension"))
         )
-        table.add_row(f"line {name}", f"tension {low}, to {high}")
+        table.add_row(f"line {name}", f"tension {low}, to {high}{unknown_text(facts, 'N')}")
         bent, bend = facts.get("bend_radius_min"), limits.get("min_bend_radius")
         if bent is not None and bend is not None:
             radius = f"{bent['value']:.5g} m at s = {bent['s']:.5g} m" + f", t = {bent['t']:.5g} s" * (end is not None)
-            table.add_row("", f"smallest bend radius {radius}" + judged_text(bend, "m", bent))
+            table.add_row("", f"smallest bend radius {radius}{judged_text(bend, 'm', bent)}{unknown_text(facts, 'm')}")
         for x in facts["quantities"]:
             table.add_row("", x["text"] + x["when"] + "; BROKEN" * x["broken"])
         for each in facts.get("accuracy", ()):

@@ -53,6 +53,7 @@ def extremes_facts(result: Result) -> dict[str, Any]:
     """
     from hybrid.store.envelope import limits_of
     from hybrid.store.limits import held_of
+    from hybrid.store.records import not_converged_in
     from hybrid.view.worst import worst
 
     found: dict[str, Any] = {}
@@ -64,6 +65,7 @@ def extremes_facts(result: Result) -> dict[str, Any]:
         x = worst(result, "curvature")
         straight = not x.value * float(result.s[-1] - result.s[0]) > 1e-6
         found["bend_radius_min"] = None if straight else {"value": 1.0 / x.value, "s": x.s, "t": x.t}
+    found["not_converged"] = sorted(not_converged_in(result.attributes))
     found["quantities"] = [x._asdict() | {"text": x.text, "when": x.when * moves} for x in held_of(result)]
     return found | {"limits": [x._asdict() for x in limits_of(result, result)]}
 
@@ -80,7 +82,7 @@ def extremes_rows(facts: dict[str, Any], moves: bool) -> Iterator[tuple[str, str
         if x is None:
             continue
         text = f"{x['value']:.5g} {unit} at s = {x['s']:.5g} m" + f", t = {x['t']:.5g} s" * moves
-        yield title, text + judged_text(held, unit, x)
+        yield title, text + judged_text(held, unit, x) + unknown_text(facts, unit)
     for x in facts["quantities"]:
         yield x["name"], x["text"] + x["when"] + "; BROKEN" * x["broken"]
 
@@ -93,6 +95,13 @@ def judged_text(held: dict[str, Any] | None, unit: str, extreme: dict[str, Any])
         return f"; within {held['limit']}"
     there = "" if (held["s"], held["t"]) == (extreme["s"], extreme["t"]) else f" at s = {held['s']:.5g} m"
     return f"; {held['limit']} of {held['allowed']:.5g} {unit} BROKEN{there}"
+
+
+def unknown_text(facts: dict[str, Any], unit: str) -> str:
+    """That the error of an extreme, N of tension or m of a bend radius, does not converge; "" where it does."""
+    from hybrid.store.records import UNKNOWN
+
+    return f"; {UNKNOWN}" * (("curvature" if unit == "m" else "tension") in facts["not_converged"])
 
 
 def extremes_table(facts: dict[str, Any]) -> Any:
@@ -173,13 +182,16 @@ def zones_over_time(result: Result) -> dict[str, Any]:
 
 def errors_facts(result: Result) -> dict[str, Any]:
     """The estimated errors: largest of position (m) and of the end forces (N), by kind; whether they are met."""
+    from hybrid.store.records import not_converged_in
+
     found: dict[str, Any] = {k[6:]: float(x) for k, x in result.attributes.items() if k.startswith("error_")}
     if found and "accuracy_asked" in result.attributes:
         kinds = {event.kind for event in result.events}
         uncertain = "error uncertain", "largest force uncertain", "windows uncertain", "model error not estimated"
         known = not kinds & {*uncertain, "several equilibria", "implausible"}
         found["met"] = "accuracy missed" not in kinds and (known or None)
-    return found
+    unknown = not_converged_in(result.attributes)
+    return found | ({"not_converged": sorted(unknown)} if found and unknown else {})
 
 
 def verdicts_of(line: Result) -> dict[str, Any]:
@@ -201,14 +213,20 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
     """The same for people: by cause, beside what was asked."""
     from rich.table import Table
 
+    from hybrid.store.records import not_converged_in
+
     forces = [result[name] for name in ("reaction_start", "reaction_end") if name in result]
     most = max((float((x**2).sum(axis=1).max()) ** 0.5 for x in forces), default=0.0)
     table = Table.grid(padding=(0, 2))
     kinds = [kind for kind in ("mesh", "time", "model", "total") if f"{kind}_position" in errors]
     extremes = "extremes_total_position" in errors
-    of = "extremes_" if extremes else ""
+    of, unknown = "extremes_" if extremes else "", not_converged_in(result.attributes)
+    not_known = [*[""] * (len(kinds) - 1), "not known", "not converged"]
     table.add_row("error by", *({"time": "step"}.get(kind, kind) for kind in kinds), "", style="bold")
     for what, unit, whole in (("position", "m", float(result.s[-1])), ("end_force", "N", most)):
+        if what in unknown:
+            table.add_row("position" if what == "position" else "end force", *not_known)
+            continue
         total = errors[f"{of}total_{what}"]
         share = (
             f"{100 * total / whole:.2g} % of {'the length' if what == 'position' else f'{_short(whole)} N'}"
@@ -226,7 +244,8 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
         found = {name: float(result[name].max()) for name in names if name in result}
         most = max(found.values())
         sizes = (f"{_short(found[name], most)} N m" if name in found else "" for name in names)
-        table.add_row("moment, at an instant" if extremes else "moment", *sizes, _largest_moment(result))
+        name = "moment, at an instant" if extremes else "moment"
+        table.add_row(name, *(not_known if "bending_moment" in unknown else [*sizes, _largest_moment(result)]))
     asked = result.attributes.get("accuracy_asked")
     if not asked:
         return table

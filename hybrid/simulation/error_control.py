@@ -131,15 +131,19 @@ class ErrorController:
     def notes(self) -> tuple[tuple[str, str], ...]:
         """Events of the result, kind and text: of the control, of the result itself, and of its model error."""
         found = self.estimate
-        regular = found is not None and not self.irregular  # the other is judged otherwise
         own = [*self.choice.notes, *self._notes, *self._irregular_note()]
-        own += not_converged(found.not_converged, self.asked) if found is not None and regular else []
+        own += not_converged(self.diverging, self.asked)
         if found is not None:
             asked = (
                 None if self.asked is None else {name: bound for name, _, bound, _ in bounds_of(self.asked, found.run)}
             )
             own += doubtful(found.errors, found.doubt, asked)
         return (*own, *((*found.several_equilibria, *found.run.notes, *found.notes) if found is not None else ()))
+
+    @property
+    def diverging(self) -> dict[str, float]:
+        """As `Estimate.not_converged`; none of an irregular motion, which is judged otherwise."""
+        return {} if self.estimate is None or self.irregular else self.estimate.not_converged
 
     def _irregular_note(self) -> list[tuple[str, str]]:
         """What is judged of an irregular motion, and how far the result may be off in what is not."""

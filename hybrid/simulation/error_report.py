@@ -20,6 +20,7 @@ from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.store.amend import Happened, amend
 from hybrid.store.format import Field
 from hybrid.store.late_file import LateFile
+from hybrid.store.records import not_converged_attribute
 
 UNITS = {
     "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m",
@@ -74,7 +75,7 @@ def effort(scene: Scene, control: ErrorController, result: RunSample, cpu: float
 
 def known(
     scene: Scene, control: ErrorController, result: RunSample, errors: Errors | None, happened: Happened
-) -> tuple[dict[str, float], list[tuple[str, str]]]:
+) -> tuple[dict[str, float | str], list[tuple[str, str]]]:
     """The largest errors, as attributes, and events of a result; happened: its events until now."""
     undersampled: list[tuple[str, str]] = []
     if errors is not None and control.moves:
@@ -84,7 +85,8 @@ def known(
         if control.asked is None or control.asked.asks(END_FORCE):
             error = max(largest.get(name, 0.0) for name in END_FORCES.values())
             undersampled += damped_jolts(scene, result, error, control.allowed_force)
-    found = summary(errors) if errors is not None else {}
+    found: dict[str, float | str] = {**summary(errors)} if errors is not None else {}
+    found |= not_converged_attribute([control.diverging])
     if control.irregular:
         each = [summary(estimate.errors) for estimate in control.statistics.values()]
         for name in each[0] if each else ():

@@ -58,6 +58,7 @@ from hybrid.store.format import Field
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
+from hybrid.store.records import not_converged_attribute
 
 # Events that make it uncertain whether an accuracy is met.
 DOUBTS = (
@@ -400,8 +401,11 @@ class SystemPasses:
                 each = verdicts(control.asked, [x for x in of if x is not None], run, certain)
                 attributes[name]["accuracy_verdicts"] = json.dumps(each)
         keys = {x for each in attributes.values() for x in each if x.startswith("error_")}
-        of_all = {x: max(float(each[x]) for each in attributes.values() if x in each) for x in keys}
+        of_all: dict[str, float | str] = {
+            x: max(float(each[x]) for each in attributes.values() if x in each) for x in keys
+        }
         of_all |= {"effort_runs": len(self._costs), "effort_cpu": cpu}
+        of_all |= not_converged_attribute(x.diverging for x in self.controls.values())
         events = [(kind, f"line {name}: {text}") for name, each in notes.items() for kind, text in each]
         amend_lines(self.target, fields, values, attributes, of_all, [*self._notes, *events], notes)
 

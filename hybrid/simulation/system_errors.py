@@ -25,6 +25,7 @@ from hybrid.simulation.error_report import CAUSES, UNITS
 from hybrid.store.amend import amend_lines
 from hybrid.store.format import Field
 from hybrid.store.reader import Result, open_result
+from hybrid.store.records import not_converged_attribute
 
 # What is compared, and under which names errors of it are kept; of vectors the size.
 COMPARED = {
@@ -88,20 +89,24 @@ def write_system_errors(system: System, target: Path | io.BytesIO, compute: Comp
                     found[cause + again] = open_result(memory)
     except ComputationError as error:
         failed = f"a coarser run to compare with stopped: {str(error).splitlines()[0]}"
-    errors, doubts = {}, list[str]()
+    errors, doubts = {}, dict[str, list[str]]()
     if not failed:
         with open_result(target) as result:
             for name, line in result.lines.items():
-                errors[name], doubt = _errors_of(line, {cause: x.lines[name] for cause, x in found.items()})
-                doubts += [f"{x} of line {name}" for x in doubt]
+                errors[name], doubts[name] = _errors_of(line, {cause: x.lines[name] for cause, x in found.items()})
     fields = {name: [_field(full, x) for full, x in each.items()] for name, each in errors.items()}
-    attributes = {name: _summary(each) for name, each in errors.items()}
-    largest = {key: max(x[key] for x in attributes.values()) for key in next(iter(attributes.values()), {})}
+    sizes = {name: _summary(each) for name, each in errors.items()}
+    largest = {key: max(x[key] for x in sizes.values()) for key in next(iter(sizes.values()), {})}
+    attributes: dict[str, dict[str, str | float | int]] = {
+        name: {**each, **not_converged_attribute([doubts[name]])} for name, each in sizes.items()
+    }
+    of_all: dict[str, str | float | int] = {**largest, **not_converged_attribute(doubts.values())}
     notes = [(FAILED, failed)] if failed else []
-    if doubts:
+    doubtful = [f"{x.replace('_', ' ')} of line {name}" for name, each in doubts.items() for x in each]
+    if doubtful:
         text = "coarser runs change as much or more from one to the next: the error may be larger than its figure"
-        notes.append(("error uncertain", f"{', '.join(doubts)}: {text}; a finer mesh or a shorter step tells"))
-    amend_lines(target, fields, errors, attributes, largest, notes)
+        notes.append(("error uncertain", f"{', '.join(doubtful)}: {text}; a finer mesh or a shorter step tells"))
+    amend_lines(target, fields, errors, attributes, of_all, notes)
 
 
 def _errors_of(line: Result, others: Mapping[str, Result]) -> tuple[dict[str, Floats], list[str]]:
@@ -124,7 +129,7 @@ def _errors_of(line: Result, others: Mapping[str, Result]) -> tuple[dict[str, Fl
         changed["total"] = sum(changed.values(), np.zeros(values.shape))
         worst = float(np.abs(changed["total"]).max())
         if max(sizes.values(), default=0.0) > 0.5 * worst and worst > NOTHING * float(np.abs(values).max()):
-            doubts.append(called.replace("_", " "))
+            doubts.append(called)
         vector = name == "position" or name.startswith("reaction")
         for cause, change in changed.items():
             out[f"errors/{cause}/{called}"] = np.linalg.norm(change, axis=-1) if vector else np.abs(change)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+# Attribute: names, with commas, of quantities of which finer runs change as much as coarser ones did.
+NOT_CONVERGED = "errors_not_converged"
 ALIASES = {"times": "t", "moment": "bending_moment"}
 OLD_NAMES = {
     f"{table}/pull_{end}": f"{table}/end_force_{end}"

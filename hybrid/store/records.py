@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.names import OLD_ATTRIBUTES
+from hybrid.store.names import NOT_CONVERGED, OLD_ATTRIBUTES
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
+
+
+UNKNOWN = "error not known: not converged"  # in place of the figure of an error that says nothing
 
 
 class Zone(NamedTuple):
@@ -195,3 +198,27 @@ class MeshHistory(Sequence[Mesh]):
 def joined(texts: list[str], by: str = ", ") -> str:
     """The first six texts, and how many more there are."""
     return by.join(texts if len(texts) <= 6 else [*texts[:6], f"and {len(texts) - 6} more"])
+
+
+def not_converged_in(attributes: Mapping[str, Any]) -> frozenset[str]:
+    """Names of quantities whose figure of the error says nothing, from the attributes of a result or of a line."""
+    names = frozenset(filter(None, str(attributes.get(NOT_CONVERGED, "")).split(",")))
+    return names | ({"end_force"} if names & {"tension", "end_force_start", "end_force_end"} else set())
+
+
+def not_converged_attribute(each: Iterable[Iterable[str]]) -> dict[str, str]:
+    """The attribute of a result, or of several lines, of which quantities by name do not converge; {}: all do."""
+    names = dict.fromkeys(name for names in each for name in names)
+    return {NOT_CONVERGED: ",".join(names)} if names else {}
+
+
+def error_words(attributes: Mapping[str, Any]) -> str:
+    """The largest errors of position and of the end forces in words, from the attributes of a result that has them."""
+    unknown = not_converged_in(attributes)
+    figures = (("position", "position", "m", ""), ("end_force", "end forces", "N", " at the ends"))
+    return ", ".join(
+        f"of {called} not known (not converged)"
+        if name in unknown
+        else f"{float(attributes[f'error_total_{name}']):.2g} {unit}{where}"
+        for name, called, unit, where in figures
+    )

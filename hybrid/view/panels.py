@@ -14,6 +14,7 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.store.reader import Result
+from hybrid.store.records import not_converged_in
 from hybrid.view.along import AXES, Along, along, extent
 from hybrid.view.decimate import Kept, even
 from hybrid.view.figure import Area, Axis, Band, Box, Item, Line, Marks, Panel, Rule, Text
@@ -324,7 +325,8 @@ def end_forces(result: Result) -> Panel | None:
     items: list[Item] = []
     for end in found:
         error = f"errors/total/end_force_{end}"
-        if error in result and f"reaction_{end}" in result:
+        known = f"end_force_{end}" not in not_converged_in(result.attributes)
+        if known and error in result and f"reaction_{end}" in result:
             middle = np.linalg.norm(result[f"reaction_{end}"], axis=1)
             items.append(_doubt(result.times, middle * factor, result[error] * factor, size=True))
     items += [Line(t, y * factor, f"at the {end}", END_COLOURS[end]) for end, (t, y) in found.items()]
@@ -389,8 +391,13 @@ def _time(result: Result) -> Axis:
 
 
 def error_of(result: Result, name: str) -> np.ndarray | None:
-    """Estimated error (nt, ns) of a quantity, by all causes; None where the file has none. Of x, y, z: of position."""
+    """Estimated error (nt, ns) of a quantity, by all causes; None where the file has none.
+
+    Or where the figure says nothing, because it does not converge.  Of x, y, z: of position.
+    """
     found = _error_name(name)
+    if found.rpartition("/")[2] in not_converged_in(result.attributes):
+        return None
     return np.asarray(result[found]) if found in result and result.dims(found) == ("t", "s") else None
 
 

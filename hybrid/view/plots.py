@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.store.reader import Result
+from hybrid.store.records import error_words
 from hybrid.view.figure import Map, Page, Panel
 from hybrid.view.headed_page import page_of, refuse_several
 from hybrid.view.panels import history as over_time
@@ -141,8 +142,7 @@ def _facts(result: Result, earlier: np.ndarray) -> list[str]:
     if 0 < len(zones) <= 4:  # more do not fit a line
         facts.append(", ".join(f"{z.kind} {short(z.s_a, 4)} … {short(z.s_b, 4)} m" for z in zones))
     if "error_total_position" in result.attributes:
-        size = {x: float(result.attributes[f"error_total_{x}"]) for x in ("position", "end_force")}
-        facts.insert(0, f"estimated error {short(size['position'], 2)} m, {short(size['end_force'], 2)} N at the ends")
+        facts.insert(0, f"estimated error {error_words(result.attributes)}")
     if len(earlier):
         facts.append("earlier shapes at t = " + ", ".join(f"{short(t, 3)}" for t in earlier) + " s")
     return facts

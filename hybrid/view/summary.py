@@ -18,7 +18,7 @@ from hybrid.store.envelope import GROUP, NOTHING, SCALE, has_envelope, limits_of
 from hybrid.store.hockling import formation_ratio, formation_tension
 from hybrid.store.limits import held_of
 from hybrid.store.reader import Result
-from hybrid.store.records import Event
+from hybrid.store.records import UNKNOWN, Event, not_converged_in
 from hybrid.view.along import along
 from hybrid.view.loops import held_loop, trapped_loop
 from hybrid.view.projections import STILL, free_edges
@@ -179,7 +179,8 @@ def _error(result: Result, name: str, found: Worst) -> float | None:
 
 def _doubt(result: Result, name: str, found: Worst) -> str:
     error = _error(result, name, found)
-    return "" if error is None else f" (± {amount(error, result.units[name], 2)})"
+    unknown = name in not_converged_in(result.attributes)
+    return "" if error is None else f" ({UNKNOWN if unknown else f'± {amount(error, result.units[name], 2)}'})"
 
 
 def _bend(result: Result) -> Fact:
@@ -250,7 +251,8 @@ def _kind_at(result: Result, found: Worst) -> str:
 
 def _doubt_of_radius(result: Result, found: Worst) -> str:
     error = _error(result, "curvature", found)
-    return "" if error is None else f" (± {short(100 * error / found.value, 2)} %)"
+    unknown = "curvature" in not_converged_in(result.attributes)
+    return "" if error is None else f" ({UNKNOWN if unknown else f'± {short(100 * error / found.value, 2)} %'})"
 
 
 def _slack(result: Result) -> Fact:
@@ -419,12 +421,20 @@ def _errors(result: Result) -> Fact:
         text = "Not estimated; `accuracy: 1%` or `output: {errors: true}` in the scene asks for it."
         return Fact("errors", title, text, "absent")
     asked = result.attributes.get("accuracy_asked")
-    text = f"Position {amount(found['total_position'], 'm', 2)}, end forces {amount(found['total_end_force'], 'N', 2)}"
+    unknown = not_converged_in(result.attributes)
+    sizes = {
+        name: f"not known ({amount(found[f'total_{name}'], unit, 2)}, not converged)"
+        if name in unknown
+        else amount(found[f"total_{name}"], unit, 2)
+        for name, unit in (("position", "m"), ("end_force", "N"))
+    }
+    not_known = {f"{cause}_{name}": None for cause in CAUSES for name in unknown}
+    text = f"Position {sizes['position']}, end forces {sizes['end_force']}"
     if "extremes_total_position" in found:
         position, force = (found[f"extremes_total_{x}"] for x in ("position", "end_force"))
         text += f" at an instant; extremes {amount(position, 'm', 2)} and {amount(force, 'N', 2)}"
     text += f"; asked was {asked}." if asked else "."
-    return Fact("errors", title, text + _verdicts(result), "plain", found | {"asked": asked})
+    return Fact("errors", title, text + _verdicts(result), "plain", found | not_known | {"asked": asked})
 
 
 def _verdicts(result: Result) -> str:

@@ -10,6 +10,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import hybrid
+from hybrid.cli.console import Console
+from hybrid.cli.tables import errors_facts, errors_table, extremes_facts, extremes_table
 from hybrid.errors import SceneError
 from hybrid.model.build import build
 from hybrid.model.mesh_grading import GROWTH, SAMPLES, grading, layers
@@ -268,6 +270,20 @@ def test_what_finer_runs_change_as_much_does_not_converge():
     assert [kind for kind, _ in not_converged(estimate.not_converged, asked)] == ["error uncertain", "not converged"]
     estimate.update(sample(Resolution(2.0, 0.05, None, 1e-3), 200, 2.0))
     assert estimate.not_converged == {}
+
+
+def test_what_does_not_converge_is_written_and_printed_as_not_known(capsys):
+    """Curvature on cells that were chosen for positions: no figure beside it, in the tile and in the terminal."""
+    result = hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["accuracy=1%", "time.duration=9.4"]))
+    assert result.attributes["errors_not_converged"] == "curvature,bending_moment"
+    assert [e.kind for e in result.events if "coarser ones did" in e.text] == ["not converged"]
+    console = Console(False, False)
+    console.show(lambda: errors_table(errors_facts(result), result))
+    console.show(lambda: extremes_table(extremes_facts(result)))
+    rows = {line.split("  ")[0]: line for line in capsys.readouterr().out.splitlines()}
+    assert "not known" in rows["moment"] and "N m" not in rows["moment"]
+    assert rows["smallest bend radius"].rstrip().endswith("error not known: not converged")
+    assert "not known" not in rows["largest tension"] + rows["position"] + rows["end force"]
 
 
 @pytest.mark.parametrize("settings", [["model=rod"], [], ["model=corrected"]])

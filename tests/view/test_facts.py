@@ -10,6 +10,7 @@ from reported import reported
 
 from hybrid.errors import EVENTS_BY_WEIGHT
 from hybrid.store.reader import Result
+from hybrid.view.panels import error_of
 from hybrid.view.style import NEWS
 from hybrid.view.summary import Fact, amount, attention, facts_of
 
@@ -26,6 +27,19 @@ def test_the_largest_tension_is_that_of_all_outputs_and_points() -> None:
     assert "Between outputs the force at the end reaches 22.05 kN, at t = 2.5 s." in found.text
     assert "Between" not in fact(reported(steps=False), "tension").text
     assert "(± 100 N)" in fact(reported(errors=True), "tension").text
+
+
+def test_a_figure_of_an_error_that_does_not_converge_stands_beside_no_number() -> None:
+    known, unknown = reported(errors=True), reported(errors=True, not_converged="curvature,position")
+    assert fact(known, "bend").values["headline"] == "50 m (± 5 %)"
+    assert fact(unknown, "bend").values["headline"] == "50 m (error not known: not converged)"
+    assert "± 100 N" in fact(unknown, "tension").values["headline"]
+    assert "Position 0.042 m" in fact(known, "errors").text
+    found = fact(unknown, "errors")
+    assert "Position not known" in found.text and found.values["total_position"] is None
+    assert error_of(known, "curvature") is not None and error_of(unknown, "curvature") is None
+    forces = fact(reported(errors=True, not_converged="tension"), "errors")
+    assert "end forces not known" in forces.text and forces.values["mesh_end_force"] is None
 
 
 def test_the_smallest_bend_radius_is_held_against_the_one_allowed_there() -> None:
