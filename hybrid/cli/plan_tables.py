@@ -40,9 +40,8 @@ def plan_lines(scene: Scene, plan: Plan) -> list[str]:
     line = [f"{length:.6g} m", _count(len(sections), "section")] + ([_count(attached, "attachment")] * bool(attached))
     plane = any(what.startswith("computed in a plane") for what in on)
     rows = {
-        "implausible": "; ".join(
-            f"{entry.what}: {entry.why}" for entry in plan.contents if entry.event == "implausible"
-        ),
+        "implausible": _noted(plan, "implausible"),
+        "ignored": _noted(plan, "ignored"),
         "line": ", ".join(line),
         "ends": "; ".join(what.removeprefix("ends.") for what in on if what.startswith("ends.")),
         "model": _model(plan),
@@ -72,8 +71,7 @@ def system_plan_lines(system: System, plan: SystemPlan) -> list[str]:
         ends = f"{joined.start} to {joined.end}"
         clamps = "".join(f"; {text}" for text in _clamps(system, name))
         rows[f"line {name}"] = f"{length:.6g} m, {ends}, {_model(line)}, {_count(sum(line.cells), 'cell')}{clamps}"
-        implausible = [f"{x.what}: {x.why}" for x in line.contents if x.event == "implausible"]
-        rows[f"  {name}, implausible"] = "; ".join(implausible)
+        rows |= {f"  {name}, {kind}": _noted(line, kind) for kind in ("implausible", "ignored")}
         rows[f"  {name}, hockling"] = _hockling(line)
     every = list(plan.lines.values())
     on = {entry.what: entry.why for line in every for entry in line.contents if entry.on}
@@ -92,6 +90,11 @@ def system_plan_lines(system: System, plan: SystemPlan) -> list[str]:
         *_table(rows),
         "of each line, what is on and off, and why: --verbose",
     ]
+
+
+def _noted(plan: Plan, kind: str) -> str:
+    """Entries of the contents for which a result gets an event of a kind."""
+    return "; ".join(f"{entry.what}: {entry.why}" for entry in plan.contents if entry.event == kind)
 
 
 def _table(rows: Mapping[str, str]) -> list[str]:

@@ -8,7 +8,7 @@ from itertools import pairwise
 from math import inf, pi
 
 from hybrid.kernels.criteria import CRITERIA
-from hybrid.kernels.forces import FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.forces import DRAG, FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state import Line
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import (
@@ -173,6 +173,18 @@ def _force(scene: Scene, line: Line, name: str, bit: int, needs: str) -> Entry:
     return Entry(name, bool(line.bits & bit), needs)
 
 
+IDLE = "the current acts on nothing"
+
+
+def _idle(scene: Scene, line: Line) -> Iterator[Entry]:
+    """That there is a current, but nothing of this line has drag."""
+    fluid, carried = scene.environment.fluid, (*scene.cable.attachments, *scene.ends.bodies().values())
+    flows = fluid is not None and fluid.flows()
+    if flows and not line.bits & DRAG and not any(getattr(x, "drag_area", 0.0) for x in carried):
+        why = "no section, body or member has drag: add `drag: {normal: 1.2}` to a section, or `drag_area`"
+        yield Entry(IDLE, False, f"{why} to what it carries", event="ignored")
+
+
 def contents_of(
     scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry, corrects: bool = False
 ) -> tuple[Entry, ...]:
@@ -221,6 +233,7 @@ def contents_of(
     entries += _accuracy(scene)
     entries.append(Entry("gravity", scene.environment.gravity != 0, "environment.gravity"))
     entries.append(Entry("buoyancy", scene.environment.fluid is not None, "environment.fluid"))
+    entries += _idle(scene, line)
     entries += [_force(scene, line, name, bit, needs) for name, (bit, needs) in FORCES.items()]
     if isinstance(scene.model, AdaptiveModel):
         why = "rods that come and go have none; fixed zones and `model: rod` do"

@@ -23,6 +23,7 @@ from hybrid.model.clamps import (
     untwisted,
     with_clamps,
 )
+from hybrid.model.contents import IDLE
 from hybrid.model.ends import EndLoad
 from hybrid.model.first_state import first_state
 from hybrid.model.initial_shape import dead_loads, hung
@@ -147,6 +148,8 @@ def build_system(system: System, resolution: SystemResolution | None = None) -> 
     maker = _Lines(system, joined, bodies, resolution)
     maker.turn_points()
     models = [maker.model(name) for name in system.lines]
+    if _takes_current(system, models):
+        models = [replace(x, contents=tuple(e for e in x.contents if e.what != IDLE)) for x in models]
     known = maker.known
     for name, body in system.bodies.items():
         if isinstance(body, FixedBody) and name not in known:
@@ -158,6 +161,16 @@ def build_system(system: System, resolution: SystemResolution | None = None) -> 
         np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
         maker.seats, known, maker.scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
     )  # fmt: skip
+
+
+def _takes_current(system: System, models: Sequence[Model]) -> bool:
+    """Whether anything of a system has drag."""
+    members = [member for body in system.free_bodies.values() for member in body.members]
+    return (
+        not all(any(e.what == IDLE for e in x.contents) for x in models)
+        or any(getattr(point, "drag_area", 0.0) for point in system.points.values())
+        or any(x.drag or x.axial_drag for x in members)
+    )
 
 
 class _Joined(NamedTuple):

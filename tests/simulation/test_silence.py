@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.cli.plan_tables import plan_lines
 
 NO_GRAVITY = {"environment": {"gravity": 0.0}}
 TAUT = {"length": 1.0, "mass": 0.1, "bending_stiffness": 0.01, "torsional_stiffness": 0.01, "axial_stiffness": 1e4}
@@ -258,3 +259,46 @@ def test_tiny_steps(step):
     start = {"initial": {"kind": "straight", "direction": [1, 0, 0]}, "time": {"duration": 100 * step, "step": step}}
     result = run(rod, {"ends": {"start": clamped([0, 0, 0], [1, 0, 0]), "end": "free"}, "model": "rod"}, start)
     assert result.position[-1, -1, 2] == pytest.approx(-0.5 * 9.81 * (100 * step) ** 2, rel=1e-6)
+
+
+CURRENT = {"fluid": {"density": 1025.0, "current": [0.5, 0.0, 0.0]}}
+IDLE = "the current acts on nothing: no section, body or member has drag"
+
+
+def idle_notes(result: hybrid.Result) -> list[str]:
+    return [e.text for e in result.events if e.kind == "ignored" and IDLE in e.text]
+
+
+@pytest.mark.parametrize("clump", [{}, {"drag_area": 0.1}])
+@pytest.mark.parametrize("drag", [{}, {"drag": {"normal": 1.2}}])
+def test_a_current_that_acts_on_nothing_says_so(drag, clump):
+    """In the plan and in the result; not where the section or what it carries has drag."""
+    wire = {"length": 10.0, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e6, **drag}
+    data = {
+        "environment": CURRENT,
+        "cable": {"sections": [wire], "attachments": [{"kind": "clump", "at": 5.0, "mass": 1.0, **clump}]},
+        "ends": {end: {"kind": "pinned", "position": [x, 0, 0]} for end, x in (("start", 0), ("end", 8))},
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 10}, "dimension": 3,
+    }  # fmt: skip
+    idle = not (drag or clump)
+    plan = "\n".join(plan_lines(hybrid.validate_scene(data), hybrid.plan(data)))
+    assert ("current acts on nothing" in plan) == idle
+    assert len(idle_notes(hybrid.static(data))) == idle
+
+
+@pytest.mark.parametrize("drags", ["", "west", "buoy"])
+def test_of_several_lines_a_current_acts_where_any_part_has_drag(drags):
+    wire = {"length": 20.0, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e6}
+    lines = {
+        name: {
+            "start": name, "end": "buoy", "mesh": {"cells": 8}, "model": "catenary",
+            "sections": [wire | ({"drag": {"normal": 1.2}} if name == drags else {})],
+        }
+        for name in ("west", "east")
+    }  # fmt: skip
+    buoy = {"kind": "free", "initial_guess": [0, 0, -15], "mass": 10.0, "volume": 0.1} | (
+        {"drag_area": 0.2} if drags == "buoy" else {}
+    )
+    points = {"west": {"position": [-10, 0, -30]}, "east": {"position": [10, 0, -30]}, "buoy": buoy}
+    result = hybrid.static({"environment": CURRENT, "points": points, "lines": lines})
+    assert bool(idle_notes(result)) == (not drags)
