@@ -10,6 +10,7 @@ import sys
 import unicodedata
 import xml.etree.ElementTree as xml
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -23,6 +24,23 @@ from hybrid.scene.checks import CHECKS
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 EQUATIONS: dict[str, Any] = runpy.run_path(str(DOCS / "manual" / "equations.py"))
+
+
+# --- the examples on the site ----------------------------------------------------------------------
+
+
+def test_results_that_lie_among_the_examples_are_no_part_of_the_site(tmp_path: Path) -> None:
+    """`hybrid trade` and `hybrid run` may have been called there: a folder is no file to copy."""
+    hooks = runpy.run_path(str(DOCS / "manual" / "hooks.py"))
+    on_files = hooks["on_files"]
+    on_files.__globals__["ROOT"] = tmp_path
+    (tmp_path / "examples" / "a.trade").mkdir(parents=True)
+    (tmp_path / "examples" / "folder.yaml").mkdir()
+    for name in ("a.yaml", "a.h5", "b.py"):
+        (tmp_path / "examples" / name).touch()
+    plugins = SimpleNamespace(_current_plugin=None)
+    config = SimpleNamespace(site_dir=str(tmp_path), use_directory_urls=True, plugins=plugins)
+    assert [file.src_uri for file in on_files([], config)] == ["examples/a.yaml", "examples/b.py"]
 
 
 # --- every message has an entry --------------------------------------------------------------------

@@ -16,6 +16,7 @@ sys.path.insert(0, str(HERE))
 import equations  # noqa: E402
 
 WITH_EQUATIONS = {"theory.md", "zones.md", "accuracy.md", "extend.md"}
+KINDS = {".yaml", ".py", ".csv", ".txt"}  # of files of examples/; results that a reader has made there are no part
 WIDE = {"validation.md", "extremes.md", "trade.md"}  # tables that need the room of a list of contents
 # In docstrings: a parameter, or several, and what it is, at the beginning of a paragraph or after a sentence.
 PARAMETER = re.compile(r"(<p>|[.;]\s+)((?:[a-z_]+,\s+)*[a-z_]+):\s+(?=\S)")
@@ -25,7 +26,7 @@ NAMED = re.compile(r"\[(?:docs/)?(\w+\.md)\]\(")
 
 def on_files(files: Files, config: Any) -> Files:
     """The scenes of examples/ belong to the site: pages link to them as ../examples/..., as in the repository."""
-    for path in sorted((ROOT / "examples").glob("*.*")):
+    for path in sorted(x for x in (ROOT / "examples").iterdir() if x.is_file() and x.suffix in KINDS):
         files.append(File.generated(config, f"examples/{path.name}", abs_src_path=str(path)))
     return files
 

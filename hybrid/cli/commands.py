@@ -195,7 +195,7 @@ def plan(
 def trade(
     context: typer.Context, scene: SceneFile,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Else SCENE.trade, beside it.")
+        Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Else SCENE.trade, in this folder.")
     ] = None,
     models: Annotated[
         Any, typer.Option(metavar="KIND,..", parser=words, help="Else all that the scene admits.")
@@ -217,7 +217,7 @@ def trade(
     """Compare models and accuracies on a scene: error against CPU time; recommend one."""
     with session(as_json, quiet) as console:
         asked = load(console, scene, settings)
-        folder = output or scene.with_suffix(".trade")
+        folder = output or Path(scene.with_suffix(".trade").name)
         console.left = f"{folder} keeps the runs that are done; the same command makes the others"
         console.note(f"runs and tables go to the folder {folder}")
         console.compiling(asked)

@@ -58,12 +58,12 @@ def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     return run
 
 
-def test_trade_writes_beside_the_scene_and_says_what_to_take(call: Call) -> None:
+def test_trade_writes_into_the_current_folder_and_says_what_to_take(call: Call) -> None:
     Path("there").mkdir()
     Path("sag.yaml").rename("there/sag.yaml")
     said = call("trade", "there/sag.yaml", *SHORT)
     assert said.code == 0, said.err
-    folder = Path("there/sag.trade")
+    folder = Path("sag.trade")
     assert {x.name for x in folder.iterdir()} == {"runs", "trade.csv", "trade.md", "trade.png"}
     assert "rod 3%" in said.out and "reference" in said.out and "catenary 10%" in said.out
     whole = " ".join(said.out.split())
