@@ -38,7 +38,7 @@ def first_state(
     if isinstance(scene.initial, Straight):  # exact chords: no round-off of the positions in the strain
         start.e[:] = line.h[:, None] * np.array(scene.initial.direction) / np.linalg.norm(scene.initial.direction)
         start.v[:] = scene.initial.velocity or (0.0, 0.0, 0.0)
-    directors, chords = _put_frames(scene, start, line), start.e[[0, -1]]
+    directors, chords = _put_frames(scene, start, line, cable), start.e[[0, -1]]
     ends = end_conditions(scene, directors, chords / np.linalg.norm(chords, axis=1)[:, None], sea)
     if isinstance(scene.initial, Equilibrium):  # what is not at rest begins without tension
         twist_by_tension(line, cable, start)
@@ -50,15 +50,15 @@ def other_state(scene: Scene, r: Floats, line: Line, cable: Material, scale: flo
     spare = state_for(line)
     spare.r[:], spare.T[:] = r, scale
     spare.e[:] = np.diff(r, axis=0)
-    _put_frames(scene, spare, line)
+    _put_frames(scene, spare, line, cable)
     if isinstance(scene.initial, Equilibrium):
         twist_by_tension(line, cable, spare)
     return spare
 
 
-def _put_frames(scene: Scene, state: State, line: Line) -> tuple[Floats, Floats]:
+def _put_frames(scene: Scene, state: State, line: Line, cable: Material) -> tuple[Floats, Floats]:
     """Give a state the directors and turns that its chords make; the directors at both ends."""
-    directors, state.turn[:, 0] = frames(scene, state.e, line)
+    directors, state.turn[:, 0] = frames(scene, state.e, line, cable)
     state.a1[:] = directors[1:-1]
     return directors[0], directors[-1]
 

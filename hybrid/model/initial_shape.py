@@ -241,14 +241,26 @@ def corners(scene: Scene) -> list[float]:
     return [float(x) for x in knots[:-1] * scene.length / knots[-1]]
 
 
-def frames(scene: Scene, e: Floats, line: Line) -> tuple[Floats, Floats]:
+def softness(line: Line, cable: Material) -> Floats:
+    """How much cells (N,) with chords of length 1 twist under a torque, against that which resists most.
+
+    Where some resist and some do not, these take all of the twist.
+    """
+    stiff = cable.B[cable.piece(0.5 * (line.s[:-1] + line.s[1:])), 2]
+    if not stiff.all():
+        return np.asarray(stiff == 0.0, float)
+    return np.asarray(stiff.max() / stiff)
+
+
+def frames(scene: Scene, e: Floats, line: Line, cable: Material) -> tuple[Floats, Floats]:
     """First directors (N+2, 3) of the start, all cells and the end, carried without twist from the start, and the turns
 
     (K,) rad of catenary zones that a torque passes through.
 
     An end whose `normal` is given fixes the material frame there; a clamp without one holds the twist that the initial
     shape has.  Where both ends fix it, and a torque passes from one to the other, there is a twist to close, less than
-    half a turn; it is spread over the line, and so are the `turns` by which one end is twisted against the other.
+    half a turn; it is spread over the line as one torque spreads it, and so are the `turns` by which one end is twisted
+    against the other.
     """
     l = np.linalg.norm(e, axis=1)
     d = e / l[:, None]
@@ -263,8 +275,8 @@ def frames(scene: Scene, e: Floats, line: Line) -> tuple[Floats, Floats]:
         closing = float(np.arctan2(np.dot(np.cross(carried[-1], wanted), t[-1]), np.dot(carried[-1], wanted)))
         closing /= 2.0 * np.pi
     if closing or start.held_turns or end.held_turns:
-        n = l.size
-        part = np.concatenate([[0.0], (np.cumsum(l) - 0.5 * l) / l.sum(), [1.0]])
+        n, soft = l.size, l * softness(line, cable)
+        part = np.concatenate([[0.0], (np.cumsum(soft) - 0.5 * soft) / soft.sum(), [1.0]])
         rod = line.spin == 1
         turning = [i for i in np.searchsorted(line.s, np.array(swivels(scene)) - 1e-9 * line.s[-1]) if line.element[i]]
         if turning:  # what lies beyond the last swivel takes it

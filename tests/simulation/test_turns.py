@@ -218,3 +218,19 @@ def test_cells_that_follow_take_the_twist_of_the_ends(turns):
     result = hybrid.run(scene)
     assert "unresolved twist" not in kinds(result)
     assert abs(result["torque"][-1]).max() == pytest.approx(1.5 * 2.0 * math.pi * turns / 10.0, rel=0.02)
+
+
+def test_turns_of_sections_that_resist_torsion_differently() -> None:
+    """Zones take the torque of the rods: turns begin as one torque spreads them, so that none is lost on the way."""
+    stiff = {"mass": 1.0, "axial_stiffness": 1e6, "bending_stiffness": 10.0}
+    sections = [stiff | {"length": l, "torsional_stiffness": gj} for l, gj in ((20, 8.0), (15, 3.0), (25, 12.0))]
+    clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -0.5]}
+    far = clamp | {"position": [50, 3, 0], "tangent": [1, 0, 0.5], "turns": 8}
+    scene = {"cable": {"sections": sections}, "mesh": {"cells": 240}, "ends": {"start": clamp, "end": far}}
+    torque = [
+        hybrid.static(hybrid.validate_scene(scene | {"initial": "equilibrium", "model": model}))["torque"][0]
+        for model in ("rod", {"zones": [{"rod": 12}, {"catenary": 36}, {"rod": 12}]})
+    ]
+    compliance = sum(x["length"] / x["torsional_stiffness"] for x in sections)
+    assert torque[0].mean() == pytest.approx(16.0 * np.pi / compliance, rel=0.01)  # less what the shape takes as writhe
+    assert np.abs(torque[1] - torque[0].mean()).max() < 1e-4 * torque[0].mean()
