@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from hybrid.errors import Complaint, ComputationError, HybridError, SceneError
 from hybrid.kernels.cache import is_warm
 from hybrid.live import drawing
+from hybrid.model.model_costs import with_model
 from hybrid.model.plan import Plan, SystemPlan, plan
 from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.scene.motion_checks import check_motions
@@ -73,6 +74,8 @@ def equilibrium(scene: Scene | System, made: Plan | SystemPlan) -> Result:
     if scene.solver == "shooting":
         return static(scene)
     assert isinstance(made, Plan)
+    if model_is_free(scene, moves=False):
+        scene = with_model(scene, "rod")
     if isinstance(scene.output.points, int):
         points = min(max(sum(made.cells) + 1, LEAST_POINTS), MOST_POINTS)
         output = scene.output.model_copy(update={"points": points, "errors": False})

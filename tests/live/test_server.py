@@ -22,6 +22,8 @@ from hybrid.live.named_files import MOST_FILES, named_files
 from hybrid.live.pictures import picture_of
 from hybrid.live.server import LARGEST_MESSAGE, listen
 from hybrid.live.session import Session
+from hybrid.model.plan import plan
+from hybrid.scene.read import parse_either
 
 
 @pytest.fixture(scope="module")
@@ -238,6 +240,26 @@ def test_an_equilibrium_that_is_not_found_stands_at_initial() -> None:
     picture, _ = picture_of(text, "", lambda: None)
     assert len(picture["problems"]) == 1
     assert picture["problems"][0]["line"] in (8, 9, None)
+
+
+TWO_SECTIONS = """\
+cable:
+  sections:
+    - {length: 20, mass: 7, axial_stiffness: 1.0e+6, bending_stiffness: 1}
+    - {length: 10, mass: 2, axial_stiffness: 1.0e+6, bending_stiffness: 20}
+ends:
+  start: {kind: pinned, position: [0, 0, 0]}
+  end: {kind: pinned, position: [25, 0, 0], motion: {heave: {amplitude: 0.1, period: 4}, ramp: 4}}
+initial: equilibrium
+time: {duration: 4}
+"""
+
+
+@pytest.mark.parametrize("model, kind", [("", "rod"), ("model: catenary\n", "catenary")])
+def test_a_scene_that_names_no_model_is_shown_as_the_plan_has_it(model: str, kind: str) -> None:
+    picture, result = picture_of(TWO_SECTIONS + model, "", lambda: None)
+    assert result is not None and {zone[0] for zone in picture["frame"]["lines"][0]["zones"]} == {kind}
+    assert {zone.kind for zone in plan(parse_either(TWO_SECTIONS + model)[0]).zones} == {kind}
 
 
 def test_several_lines_are_drawn(page: Page) -> None:
