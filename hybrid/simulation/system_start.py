@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,6 +12,7 @@ from hybrid.kernels.bodies import NUMBERS
 from hybrid.kernels.members import PIECE, PUSH, WATER, WET
 from hybrid.kernels.state import Floats
 from hybrid.model.system import SystemModel, balanced_places, starts_between
+from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
 from hybrid.simulation.system_contact_equilibrium import settle, solve_with_contact
 from hybrid.solve.system import JoinedLine, SystemState, joined_ends
@@ -19,6 +21,9 @@ from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, so
 # Equilibria until the water around members is that of the place found, and what of the largest wetted part, velocity
 # and acceleration there counts as the same.
 MOST_ROUNDS, SAME_WATER = 40, 1e-8
+# Lengths of its line from a held point to the first place of another, beyond which that is named where no equilibrium
+# is found; nearer ones are found.
+FAR = 3.0
 
 
 def equilibrium_of_system(system: System, model: SystemModel, t: float) -> SystemEquilibrium:
@@ -44,7 +49,24 @@ def equilibrium_of_system(system: System, model: SystemModel, t: float) -> Syste
         told = f"the place of a body and the water around its members do not agree after {MOST_ROUNDS} equilibria; "
         raise LineFailed(-1, Outcome.NOT_CONVERGED, None, None, told + "take a nearer initial_guess, or more pieces")
     except LineFailed as failed:
-        raise named(failed, model) from None
+        raise named(failed, model, _nearer(system)) from None
+
+
+def _nearer(system: System) -> str:
+    """What to try first where a point is looked for farther away than a line to a held point reaches; else empty."""
+    worst, text = FAR, ""
+    for name, place in system.guesses.items():
+        for line, end in system.lines_at(name):
+            other = system.lines[line].end if end == "start" else system.lines[line].start
+            length = sum(section.length for section in system.lines[line].sections)
+            away = math.dist(place, system.first_place(other))
+            if not system.is_joined(other) and away > worst * length:
+                point, worst = system.points[name], away / length
+                key = f"bodies.{point.body}" if isinstance(point, Fairlead) else f"points.{name}"
+                text = (
+                    f"{key}.initial_guess nearer: {away:.6g} m from points.{other}, line {line} is {length:.6g} m long"
+                )
+    return text
 
 
 def solve_from(
@@ -84,8 +106,8 @@ def joined_lines(model: SystemModel, t: float) -> list[JoinedLine]:
     return lines
 
 
-def named(failed: LineFailed, model: SystemModel) -> ComputationError:
-    """The same with the name of the line in its detail."""
+def named(failed: LineFailed, model: SystemModel, first: str = "") -> ComputationError:
+    """The same with the name of the line in its detail; first: to try before the usual remedy."""
     where = f"line {model.names[failed.line]}" if failed.line >= 0 else "the points"
     detail = f"{where}; {failed.detail}" if failed.detail else where
-    return ComputationError(failed.outcome, failed.t, failed.s, detail)
+    return ComputationError(failed.outcome, failed.t, failed.s, detail, first=first)

@@ -228,3 +228,29 @@ def test_lines_that_go_slack_are_refused_with_their_name() -> None:
         equilibrium(tables)
     assert refused.value.outcome in (Outcome.SLACK, Outcome.SINGULAR, Outcome.NOT_CONVERGED)
     assert "line " in str(refused.value) or "the points" in str(refused.value)
+
+
+@pytest.mark.parametrize("ship", [False, True])
+def test_a_first_place_that_is_forgotten_at_the_origin_is_named(ship: bool) -> None:
+    """Anchors in coordinates of a map, and `initial_guess` left at zero: shapes of `initial` were said to help."""
+    place = {"initial_guess": [0, 0, 0], "mass": 500.0, "volume": 2.0}
+    section = {"length": 70.0, "mass": 3.0, "diameter": 0.03, "axial_stiffness": 1e6}
+    tables: dict[str, Any] = {
+        "environment": {"fluid": {"density": 1025.0}},
+        "points": {
+            "west": {"position": [500_000, 6.7e6, -40]},
+            "east": {"position": [500_100, 6.7e6, -40]},
+            "buoy": {"body": "ship", "place": [0, 0, 0]} if ship else place,
+        },
+        "lines": {
+            name: {"start": name, "end": "buoy", "sections": [section], "mesh": {"cells": 20}}
+            for name in ("west", "east")
+        },
+    }
+    if ship:
+        tables["bodies"] = {"ship": place | {"inertia": [500.0, 500.0, 500.0]}}
+    with pytest.raises(ComputationError) as refused:
+        hybrid.static(tables)
+    key = "bodies.ship" if ship else "points.buoy"
+    assert f"try:      {key}.initial_guess nearer: 6.71864e+06 m from points.east" in str(refused.value)
+    assert "is 70 m long; else " in str(refused.value)
