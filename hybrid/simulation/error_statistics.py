@@ -19,7 +19,7 @@ from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.error_estimate import Errors, Estimate
 from hybrid.simulation.error_order import MOST_ORDER, ORDER, Falls
 from hybrid.simulation.run_sample import END_FORCES, RunSample
-from hybrid.simulation.snap_scatter import SLACKENS
+from hybrid.simulation.snap_scatter import snap_times
 from hybrid.store.named_arrays import Tree, matched
 
 # Windows of a run, and the outputs of the result that one has at least.
@@ -185,9 +185,12 @@ def irregular_notes(
 
 
 def snaps(run: RunSample) -> bool:
-    """Whether the force at an end, of all steps, comes from little to much: a line that slackens and is pulled taut."""
-    forces = run.forces[:, 1:]
-    return bool(forces.size and (forces.min(axis=0) < SLACKENS * forces.max(axis=0)).any())
+    """Whether the force at an end, of all steps, comes from little to much: a line that slackens and is pulled taut.
+
+    One that is let go, whose force grows from nothing, does not: it converges at every instant after that.
+    """
+    t = run.forces[:, 0]
+    return any(snap_times(t, run.forces[:, k]) for k in (1, 2)) if t.size else False
 
 
 def _thinned(x: np.ndarray, step: int) -> np.ndarray:

@@ -1,8 +1,8 @@
 """How far snaps of a line differ from run to run, and whether the largest force may be another one for that.
 
-A snap is a force at the ends that rises after the line was slack.  Its size follows from how the line lay while it was
-slack, which is another in every run, however fine: the largest force of a run can be a smooth one that converges, and
-in the next run a snap exceeds it.
+A snap is a force at the ends that rises after a line that was taut went slack.  Its size follows from how the line lay
+while it was slack, which is another in every run, however fine: the largest force of a run can be a smooth one that
+converges, and in the next run a snap exceeds it.
 
     symbol   meaning                                                                unit
     t, F     times at which steps end, force at the end where it is largest          s, N
@@ -28,7 +28,9 @@ def snap_times(t: Floats, F: Floats) -> list[tuple[float, float]]:
     low, out = SLACKENS * float(F.max(initial=0.0)), []
     for rise in rises.tolist():
         k = int(np.searchsorted(falls, rise))
-        before = int(falls[k - 1]) if k else 0
+        if k == 0:  # the force grows from the start, which no line that was taut before does
+            continue
+        before = int(falls[k - 1])
         lowest = before + int(F[before:rise].argmin())
         if F[lowest] < low:
             out.append((float(t[lowest]), float(t[falls[k]] if k < falls.size else t[-1])))

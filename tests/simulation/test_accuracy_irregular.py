@@ -12,7 +12,7 @@ import hybrid
 from hybrid.model.output_points import output_points
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.simulation.error_control import ErrorController
-from hybrid.simulation.error_statistics import STATISTICS, WINDOWS, StatisticEstimate, statistics_of
+from hybrid.simulation.error_statistics import STATISTICS, WINDOWS, StatisticEstimate, snaps, statistics_of
 from hybrid.simulation.refinement import Free
 from hybrid.simulation.run_sample import RunSample
 from hybrid.simulation.snap_scatter import snap_excess, snap_times
@@ -244,6 +244,7 @@ def test_a_largest_force_that_snaps_may_exceed_is_not_judged(scatter, uncertain)
 def test_a_snap_is_from_slack_to_the_next_fall_and_others_are_none():
     t = np.linspace(0.0, 10.0, 101)
     force = np.full(101, 5.0)
+    force[5:15] = 9.0  # taut
     force[20], force[25:31] = 0.1, 9.0  # slack, then a snap
     force[60], force[65:71] = 2.0, 10.0  # low, and no slack
     assert snap_times(t, force) == [pytest.approx((2.0, 3.1))]
@@ -251,6 +252,16 @@ def test_a_snap_is_from_slack_to_the_next_fall_and_others_are_none():
     deviation = np.sqrt(0.5) * 2.0  # of one run, from two
     assert snap_excess(runs[0], runs[1])[1] == pytest.approx(9.0 + 2.0 * deviation - 10.0)
     assert not snap_excess(runs[0], runs[0]).any()
+
+
+def test_a_line_that_is_let_go_does_not_snap():
+    """Its force grows from nothing and swings: the suspension at 0.1 % was judged as irregular, and met what it missed."""
+    t = np.linspace(0.01, 20.0, 2000)
+    force = 10.0 * (1.0 - np.exp(-4.0 * t) * np.cos(8.0 * t))
+    let_go = run(force, forces=np.column_stack([t, force, np.zeros_like(t)]))
+    assert force.min() < 0.1 * force.max() and not snaps(let_go)
+    force[1000:1010] = 0.1
+    assert snaps(run(force, forces=np.column_stack([t, force, force])))
 
 
 def test_means_over_windows_that_do_not_converge_are_not_refined():
