@@ -75,9 +75,10 @@ def _item(item: Item, at: _Place) -> str:
             return f'<rect x="{left}" y="{top:.1f}" {size} fill="{item.colour}"/>'
         case Text():
             x, y = at.x(item.x) + item.offset[0], at.y(item.y) - item.offset[1]
-            anchor, lift = "end" if item.across == "right" else "start", "-2" if item.up == "bottom" else "10"
+            anchor, lift = "end" if item.across == "right" else "start", -2.0 if item.up == "bottom" else 10.0
+            y = min(max(y + lift, 10.0), 2.0 * at.y0 - 3.0)  # all of the text is in the frame
             look = f'text-anchor="{anchor}" fill="{item.colour}"'
-            return f'<text x="{x:.0f}" y="{y:.0f}" dy="{lift}" {look}>{escape(item.text)}</text>'
+            return f'<text x="{x:.0f}" y="{y:.0f}" {look}>{escape(item.text)}</text>'
     raise TypeError(f"a small drawing does not show {type(item).__name__}")
 
 

@@ -14,7 +14,6 @@ from hybrid.view.decimate import Kept, Store, even, kept, script_json
 from hybrid.view.figure import Panel
 from hybrid.view.panels import ranges
 from hybrid.view.plotly_backend import colour_scale, figure_of
-from hybrid.view.projections import views_of
 from hybrid.view.save import REPORT_MARK
 from hybrid.view.scenery import box_and_planes, speed_of
 from hybrid.view.style import BODY, INK, prefix, short
@@ -28,6 +27,7 @@ from hybrid.view.system_views import (
     facts_line,
     fairleads_of,
     largest_tensions,
+    longest_view,
     motions,
     points_of,
     rotations,
@@ -302,7 +302,7 @@ def _marks(result: Result, frames: np.ndarray, store: Store) -> list[dict[str, A
 
 
 def _space(result: Result, every: AllLines, scene: dict[str, Any], shown: dict[str, Kept]) -> str:
-    poster = draw([shape(result, every, views_of(every.as_result)[0])])
+    poster = draw([shape(result, every, longest_view(every))])
     thinned = next(iter(shown.values()))
     moves = len(thinned.frames) > 1
     when = (

@@ -16,7 +16,7 @@ from hybrid.view.along import along
 from hybrid.view.figure import Axis, Band, Item, Line, Marks, Page, Panel
 from hybrid.view.headed_page import page_of
 from hybrid.view.panels import framed, sea
-from hybrid.view.projections import Numbers, View, aspect_of, telling_times, views_of
+from hybrid.view.projections import Numbers, View, aspect_of, telling_times, view_named, views_of
 from hybrid.view.style import BODY, INK, earlier_grey, prefix, short
 
 LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31", "#000000", "#7F7F7F")
@@ -47,6 +47,16 @@ class AllLines:
     def as_result(self) -> Result:
         """Itself, for functions of a result that ask no more."""
         return cast(Result, self)
+
+
+def longest_view(every: AllLines) -> View:
+    """The upright plane in which the lines, as they are last, are longest: no line is seen from its end."""
+
+    def length(view: View) -> float:
+        shapes = (np.stack(view.project(line.position[-1])) for line in every.lines.values())
+        return sum(float(np.linalg.norm(np.diff(shape), axis=0).sum()) for shape in shapes)
+
+    return max((views_of(every.as_result)[0], view_named("xz"), view_named("yz")), key=length)
 
 
 def colours(result: Result) -> dict[str, str]:

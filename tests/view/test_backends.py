@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,16 @@ def test_a_name_far_outside_leaves_the_axes_their_room() -> None:
     ax.set_autoscale_on(False)
     ax.figure.canvas.draw()
     assert ax.get_ylim()[1] < -100.0 and ax.get_position().height > 0.6
+
+
+@pytest.mark.parametrize(("at", "up"), [(0.0, "top"), (0.0, "bottom"), (10.0, "top"), (10.0, "bottom")])
+def test_a_name_at_the_edge_of_a_small_drawing_is_not_cut(at: float, up: str) -> None:
+    x = np.linspace(0.0, 100.0, 11)
+    items: list[Any] = [Line(x, 0.1 * x), Text(50.0, at, "seabed", up=up)]
+    drawn = draw([Panel("shape", "shape", Axis("x", "m"), Axis("z", "m"), items, aspect=1.0)])
+    height = re.search(r'<svg x="2" y="0" width="\d+" height="(\d+)"', drawn)
+    base = re.search(r'<text x="[^"]*" y="(-?[\d.]+)" text-anchor="start"[^>]*>seabed', drawn)
+    assert height and base and 10.0 <= float(base[1]) <= float(height[1]) - 3.0
 
 
 def test_a_back_end_says_what_it_cannot_draw() -> None:

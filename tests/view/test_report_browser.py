@@ -283,10 +283,13 @@ def test_paper_has_every_picture(browser: Any, page_file: Path) -> None:
     pdfium = pytest.importorskip("pypdfium2", reason="pypdfium2 is not installed")
     opened = Visit(browser, page_file, cable=False, color_scheme="dark")
     sheets = pdfium.PdfDocument(opened.page.pdf(prefer_css_page_size=True, print_background=True))
+    plain = pdfium.PdfDocument(opened.page.pdf(prefer_css_page_size=True))  # as browsers print unless told otherwise
     assert opened.page.evaluate("window.Plotly === undefined"), "paper does not need it"
     graphs = len(opened.page.query_selector_all(".plot[data-figure]"))
     text, ink = "", []
-    for sheet in sheets:
+    for sheet, bare in zip(sheets, plain, strict=True):
+        pair = [np.asarray(x.render(scale=0.7).to_pil(), float) for x in (sheet, bare)]
+        assert np.array_equal(*pair), "swatches of legends, colour scales and bars are printed"
         assert sheet.get_size() == pytest.approx((595.3, 841.9), abs=1.5)
         text += sheet.get_textpage().get_text_range()
         picture = np.asarray(sheet.render(scale=0.7).to_pil().convert("L"), float)

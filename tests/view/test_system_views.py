@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,9 @@ from hybrid.errors import ResultError
 from hybrid.store.records import Zone
 from hybrid.view.animation import animate
 from hybrid.view.figure import Line, Marks
+from hybrid.view.projections import views_of
 from hybrid.view.system_report import _extreme_text, html
-from hybrid.view.system_views import AllLines, arms_of, motions, page, points_of, rotations
+from hybrid.view.system_views import AllLines, arms_of, longest_view, motions, page, points_of, rotations
 
 SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
 PLACES = {"east": (100, 0), "north": (-50, 87), "south": (-50, -87)}
@@ -143,6 +145,18 @@ def test_a_line_that_was_catenary_throughout_has_no_moment() -> None:
     assert "a catenary, which has none" in _extreme_text(Extremes("catenary", 0.0), *ask)  # type: ignore[arg-type]
     assert _extreme_text(Extremes("rod", 0.0), *ask).startswith("0 N m at s")  # type: ignore[arg-type]
     assert _extreme_text(Extremes("catenary", 2.0), *ask).startswith("2 N m at s")  # type: ignore[arg-type]
+
+
+def test_the_still_picture_shows_the_lines_where_they_are_longest() -> None:
+    """Three legs, one along x: its length is seen, though the others reach farther along y."""
+    angles = np.radians([0.0, 120.0, 240.0])
+    legs = [np.array([[0.0, 0.0, 0.0], [np.cos(a), np.sin(a), -1.0]]) for a in angles]
+    every = AllLines.__new__(AllLines)
+    every.lines = {str(k): SimpleNamespace(position=leg[None]) for k, leg in enumerate(legs)}  # type: ignore[misc]
+    every.position = np.concatenate(legs)[None]
+    every._around = {}  # type: ignore[assignment]
+    assert views_of(every.as_result)[0].across_label == "y"
+    assert longest_view(every).across_label == "x"
 
 
 def test_arms_lead_from_a_body_to_its_fairleads(result: hybrid.Result) -> None:
