@@ -302,7 +302,7 @@ def _ended(
     if picture:
         hybrid.plot(result, picture)
     steps = len(result["steps/t"]) if "steps/t" in result else 0
-    pace = "compilation included" if cold else f"{speed(computed / wall)} x real time"
+    pace = "compilation included" if cold else f"computing alone, {speed(computed / wall)} x real time"
     duration = asked.require_time().duration
     text = f"{duration:.6g} s in {steps} steps, {span(wall)} of wall time ({pace})"
     if computed < duration:

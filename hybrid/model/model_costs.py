@@ -147,4 +147,4 @@ def reasons(found: Sequence[Cost]) -> str:
 def _in_words(cost: Cost) -> str:
     if cost.why_not:
         return f"is no choice: {cost.why_not}"
-    return f"{1e6 * cost.seconds:.2g} us a step ({cost.cells} cells)"
+    return f"{float(f'{1e6 * cost.seconds:.2g}'):g} µs of processor time per step ({cost.cells} cells)"
