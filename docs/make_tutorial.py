@@ -97,7 +97,8 @@ The ship heaves by 1 m every 8 s. `--set` changes a value for one run; you may a
     ("hybrid export tow.h5 -o tow.csv",),
     """## Go on
 
-- [Start here](index.md) asks for an accuracy, and gets an estimate of the error: `accuracy: {position: 0.1 m, tension: 1%}`, or `accuracy: 2%`, which is 2 % of the length for positions and 2 % of the largest end force.
+- [Start here](index.md) asks for an accuracy, and gets an estimate of the error:
+  `accuracy: {position: 0.1 m, tension: 1%}`, or `accuracy: 2%`: of the length, and of the largest end force.
 - [Examples](examples.md) and the [Gallery](gallery.md): copy the nearest scene.
 - `hybrid view tow.yaml` shows the equilibrium while you write ([Live view](view.md)).
 """,

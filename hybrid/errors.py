@@ -149,10 +149,22 @@ LIMIT_EVENTS = {
 ZONE_EVENTS = ("split", "grow", "merge", "shrink", "retry")
 # All kinds that are part of a normal run: changes of zones, what `resume`, `release_at` or `ramp` was asked for.
 EXPECTED = (*ZONE_EVENTS, "loads change", "end released", "motion blended in")
+# Kinds that, noted at t = 0, are of the whole run and not of its start.
+OF_THE_RUN = frozenset({
+    "implausible", "accuracy missed", "no error figure", "error uncertain", "several equilibria", "not converged",
+    "largest force uncertain", "windows uncertain", "irregular motion", "costly accuracy", "finer run not kept",
+    "torque neglected", "ignored", "undamped", "model error not estimated", "zones fixed", "static friction neglected",
+    "numerical dissipation", "model chosen",
+})  # fmt: skip
 # Kind of the event of a run that another program had begun.
 OTHER_PROGRAM = "other program"
 # Kind of the event that gives the number (value) of events of another kind (criterion) that were not written.
 OMITTED = EVENTS_BY_WEIGHT[-1]
+
+
+def is_of_the_run(kind: str, t: float) -> bool:
+    """Whether an event holds for the whole run, so that its time, s, says nothing."""
+    return t == 0.0 and kind in OF_THE_RUN
 
 
 def weight_of_event(kind: str) -> int:

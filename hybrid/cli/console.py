@@ -20,7 +20,7 @@ from rich.console import Console as RichConsole
 import hybrid
 from hybrid.cli.pipe import reader_has_gone
 from hybrid.cli.progress_line import ProgressLine, span
-from hybrid.errors import EXPECTED, weight_of_event
+from hybrid.errors import EXPECTED, is_of_the_run, weight_of_event
 
 if TYPE_CHECKING:
     from hybrid.errors import ComputationError, SceneError
@@ -207,7 +207,8 @@ class Console:
         news = [found for kind, found in kinds.items() if kind not in EXPECTED]
         for found in news[:KINDS_SHOWN]:
             more = f" ({len(found) - 1} more like this)" if len(found) > 1 else ""
-            self.note(f"note: t = {found[0].t:.4g} s: {found[0].text}{more}")
+            when = "" if is_of_the_run(found[0].kind, found[0].t) else f"t = {found[0].t:.4g} s: "
+            self.note(f"note: {when}{found[0].text}{more}")
         rest = [found[0].kind for found in news[KINDS_SHOWN:]]
         if rest:
             self.note(f"note: and {len(rest)} more: {', '.join(rest)}; see the events of the result")

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import EVENTS_BY_WEIGHT, LIMIT_EVENTS, weight_of_event
+from hybrid.errors import EVENTS_BY_WEIGHT, LIMIT_EVENTS, is_of_the_run, weight_of_event
 from hybrid.store.envelope import GROUP, NOTHING, SCALE, has_envelope, limits_of
 from hybrid.store.hockling import formation_ratio, formation_tension
 from hybrid.store.limits import held_of
@@ -117,12 +117,15 @@ def _warnings(result: Result) -> list[Fact]:
         if event.kind in LIMIT_EVENTS.values():
             continue  # facts of their own
         more = f" ({count} times; this is the first)" if count > 1 else ""
-        at = f"At t = {short(event.t, 5)} s, " if len(result.times) > 1 else ""
+        of_run = is_of_the_run(event.kind, event.t)
+        at = "" if of_run or len(result.times) < 2 else f"At t = {short(event.t, 5)} s, "
         where = (
             f"s = {short(event.s_a, 4)} m: "
             if event.s_a == event.s_b
             else f"s = {short(event.s_a, 4)} to {short(event.s_b, 4)} m: "
         )
+        if of_run and event.s_a < event.s_b:
+            where = ""  # all of the line
         text = f"{at}{where}{event.text}{more}"
         weight = "note" if event.kind in NEWS else "alarm"
         values = {"kind": event.kind, "count": count}

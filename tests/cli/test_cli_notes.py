@@ -11,7 +11,7 @@ import pytest
 
 import hybrid
 from hybrid.cli.console import KINDS_SHOWN, Console
-from hybrid.errors import EVENTS_BY_WEIGHT, EXPECTED, ZONE_EVENTS, Outcome
+from hybrid.errors import EVENTS_BY_WEIGHT, EXPECTED, OF_THE_RUN, ZONE_EVENTS, Outcome
 from hybrid.store.records import Event
 
 PACKAGE = Path(hybrid.__file__).parent
@@ -54,6 +54,17 @@ def test_changes_of_zones_take_no_line_from_others(capsys: pytest.CaptureFixture
 def test_an_event_that_repeats_is_said_once(capsys: pytest.CaptureFixture[str]) -> None:
     said = lines_of([Event(0.1 * k, 0.0, 1.0, "slack", "no tension") for k in range(10_000)], capsys)
     assert said == ["note: t = 0 s: no tension (9999 more like this)"]
+
+
+def test_what_holds_for_the_whole_run_has_no_time(capsys: pytest.CaptureFixture[str]) -> None:
+    """ "t = 0 s" reads as "at the start": only what happens there has it."""
+    assert lines_of([Event(0.0, 0.0, 1.0, "not converged", "curvature")], capsys) == ["note: curvature"]
+    assert lines_of([Event(0.0, 0.0, 1.0, "slack", "no tension")], capsys) == ["note: t = 0 s: no tension"]
+    assert lines_of([Event(3.0, 0.0, 1.0, "torque neglected", "a")], capsys) == ["note: t = 3 s: a"]
+
+
+def test_of_the_run_are_kinds_that_there_are() -> None:
+    assert set(EVENTS_BY_WEIGHT) >= OF_THE_RUN - {"model chosen"}
 
 
 def test_a_slip_of_units_comes_before_what_follows_from_it() -> None:

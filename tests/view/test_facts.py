@@ -42,6 +42,13 @@ def test_a_figure_of_an_error_that_does_not_converge_stands_beside_no_number() -
     assert "end forces not known" in forces.text and forces.values["mesh_end_force"] is None
 
 
+def test_a_warning_of_the_whole_run_has_neither_time_nor_place() -> None:
+    found = fact(reported(events=[(0.0, 0.0, 100.0, "not converged", "finer cells change as much")]), "warning")
+    assert found.text == "finer cells change as much"
+    found = fact(reported(events=[(0.0, 0.0, 100.0, "slack", "no tension")]), "warning")
+    assert found.text.startswith("At t = 0 s, s = 0 to 100 m: ")
+
+
 def test_the_smallest_bend_radius_is_held_against_the_one_allowed_there() -> None:
     free = fact(reported(), "bend")
     assert free.values["radius"] == pytest.approx(50.0) and (free.t, free.s) == (2.5, 50.0)
