@@ -10,11 +10,14 @@ from typing import Any
 import numpy as np
 
 from hybrid.kernels.books import CARRIED, LOG, STORED, Books
+from hybrid.kernels.carried_frames import TURNS
 from hybrid.kernels.entry import sharpest
 from hybrid.kernels.forces import FRICTION, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.link import holds_twist
 from hybrid.kernels.report import FORCE_A, LOCAL_ERROR
 from hybrid.kernels.run import blank_books
 from hybrid.kernels.state import Batch, Ends, Floats, State, Work, batch_of_one
+from hybrid.kernels.zone_criteria import twist_of_rods
 from hybrid.model.build import Model
 from hybrid.model.output_points import output_points
 from hybrid.model.sections import section_changes
@@ -42,6 +45,19 @@ from hybrid.store.writer import Recorder
 WAITING = 64
 # Of the length: ends that are so near to where they were have not been moved.
 SAME_PLACE = 1e-9
+# Turns of twist at rest that no moment has made: half of what a search may add in passing an upright shape.
+WOUND = 0.25
+
+
+def twist_at_rest(x: JoinedLine, state: State) -> float:
+    """Turns between the cells of a line that holds its twist and is clamped to what may turn; 0 for others."""
+    line = x.line
+    if not (holds_twist(line) and line.element.any() and x.seats[:, TURNS].any()) or line.tension_torque.size:
+        return 0.0
+    within = line.element.copy()
+    within[[0, -1]] = 0  # the frames of its ends are known to the points and bodies alone
+    twist = twist_of_rods(line._replace(element=within), np.zeros((2, 9)), state.e, state.a1)
+    return float(twist) / (2.0 * np.pi)
 
 
 def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | None = None) -> Observer:
@@ -136,10 +152,12 @@ class LineResult:
         self._touching = model
         return self.contact
 
-    def note_equilibrium(self, x: JoinedLine, state: State, t: float | None, settled: bool) -> None:
+    def note_equilibrium(
+        self, x: JoinedLine, state: State, t: float | None, settled: bool, turned: bool = False
+    ) -> None:
         """What an equilibrium leaves open; t: s, where a motion starts from it, None: it is the result.
 
-        settled: whether a damped motion with contact led to it.
+        settled: whether a damped motion with contact led to it.  turned: whether the system has moments at points.
         """
         line = self.model.line
         if line.bits & FRICTION:
@@ -156,6 +174,11 @@ class LineResult:
                 there = "the line touches itself; " if touches else ""
                 text = f"{there}a damped motion with contact, without friction, led to this equilibrium; {text}"
             self.events.event(0.0, 0.0, self.model.length, "stability not judged", text)
+        turns = 0.0 if turned else twist_at_rest(x, state)
+        if abs(turns) > WOUND:
+            text = f"the line rests with a twist of {turns:+.2g} turns, and what it is clamped to may turn back"
+            where = f"{text}: begin nearer to rest (initial_guess, initial_rotation), unless it is meant"
+            self.events.event(0.0, 0.0, self.model.length, "several equilibria", where)
         self.judge(t, sharpest(x.line, x.ends, state), state)
         if self._itself.look(t or 0.0, 0.0, state, state.r, self.events.event):
             self.meets_itself(t or 0.0, 0.0)

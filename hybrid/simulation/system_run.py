@@ -128,6 +128,11 @@ class SystemRun:
     # --- the file -----------------------------------------------------------------------------------
 
     @property
+    def turned(self) -> bool:
+        """Whether moments are given at points."""
+        return any(self.system.moments_on(name) for name in self.system.free)
+
+    @property
     def _parts(self) -> dict[str, Recorder]:
         return {line.name: line.recorder for line in self.lines if isinstance(line.recorder, Recorder)}
 
@@ -256,7 +261,7 @@ class SystemRun:
             solver.keep_books([line.books for line in self.lines])
             solver.evaluate_forces(self.state, 0.0)
             for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
-                line.note_equilibrium(x, state, None, self.found.settled)
+                line.note_equilibrium(x, state, None, self.found.settled, self.turned)
             self._output(solver)
             text = f"equilibrium: {self.found.summary}; residual force {self.found.residual:.2g} N"
             self._close("complete", text)
@@ -323,7 +328,7 @@ class SystemRun:
             for body in (x for x in self.model.bodies if x.members is None):
                 self.recorder.event(0.0, 0.0, 0.0, "waves on body neglected", f"body {body.name}: {text}")
         for line, x, state in zip(self.lines, self.solver.lines, self.state.lines, strict=True):
-            line.note_equilibrium(x, state, 0.0, self.found.settled)
+            line.note_equilibrium(x, state, 0.0, self.found.settled, self.turned)
             line.diagnostics.scheme(time.rho_inf)
         self._output(self.solver)
         self.gather_events()

@@ -111,7 +111,15 @@ def test_the_live_line_on_a_terminal_and_ctrl_c() -> None:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_that_ends_as_another_exception(number: signal.Signals, capsys: pytest.CaptureFixture[str]) -> None:
     """As where it comes while a module is imported: libraries turn it into exceptions of their own."""
-    before = signal.getsignal(number)
+    before, handler = signal.signal(number, signal.default_int_handler), signal.default_int_handler
+    try:
+        _stopped(number, capsys)
+        assert signal.getsignal(number) is handler
+    finally:
+        signal.signal(number, before)  # a background shell has SIGINT ignored
+
+
+def _stopped(number: signal.Signals, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(typer.Exit) as ended, session(as_json=True, quiet=False):
         try:
             os.kill(os.getpid(), number)
@@ -121,7 +129,6 @@ def test_a_stop_that_ends_as_another_exception(number: signal.Signals, capsys: p
     assert ended.value.exit_code == 130
     heard = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [line["event"] for line in heard] == ["done"] and heard[0]["status"] == "interrupted"
-    assert signal.getsignal(number) is before
 
 
 def test_an_exception_that_nobody_stopped_is_told(capsys: pytest.CaptureFixture[str]) -> None:
