@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -174,3 +175,20 @@ def test_importing_all_public_names_works() -> None:
     for name in hybrid.__all__:
         assert getattr(hybrid, name) is not None
     assert set(hybrid.__all__) <= set(dir(hybrid))
+
+
+# Tests that look at a clock: they wait for another process or page, or end what hangs, with limits of many seconds.
+# Anything that compares durations is a bench: a busy machine would fail it.
+WAITING = {
+    "extremes/extreme.py", "harden/harden_verdict.py", "harden/test_harden_files.py", "harden/test_harden_scenes.py",
+    "harden/test_harden_yaml.py", "killed_studies.py", "live/test_live_browser.py", "live/viewed.py",
+    "simulation/test_resume_kill.py", "simulation/test_resume_rows.py", "simulation/test_system_resume.py",
+    "view/test_report_browser.py",
+}  # fmt: skip
+CLOCKS = re.compile(r"\b(process_time|perf_counter|monotonic|thread_time)(_ns)?\(|\btime\.time\(")
+
+
+def test_no_test_of_the_default_run_is_timed() -> None:
+    tests = Path(__file__).parent
+    found = {x.relative_to(tests).as_posix() for x in tests.rglob("*.py") if CLOCKS.search(x.read_text("utf-8"))}
+    assert found - {Path(__file__).name} <= WAITING

@@ -53,13 +53,23 @@ def test_a_point_load_has_a_tension_on_each_side() -> None:
     assert sides == pytest.approx([11.75, 13.4], rel=0.01)
 
 
+def test_tension_along_a_line_with_floats_is_as_right_as_asked() -> None:
+    """0.5.0 said 13.26 N beside a float, met; 11.75 and 13.4 N are right."""
+    asked = hybrid.static(load("float_pack_tension", "accuracy={position: 5 cm, line_tension: 1%}"))
+    truth = hybrid.static(load("float_pack_tension", "accuracy=null", "model=rod", "mesh={cells: 4000}"))
+    far = np.abs(np.ravel(asked.tension) - np.ravel(truth.tension))
+    said = np.ravel(asked["errors/total/tension"])
+    assert far.max() < 0.01 * np.ravel(truth.tension).max() and far.max() < 1.5 * said.max()
+    assert "accuracy missed" not in kinds(asked)
+
+
 # --- friction at rest -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("friction", [0.8, 0.3])
-def test_a_chain_finds_its_settled_friction(friction: float) -> None:
-    settings = ("initial={kind: equilibrium, friction: settled}", f"environment.seabed.friction={friction}")
-    result = hybrid.static(load("chain_friction_settled", *settings))
+@pytest.mark.parametrize(("friction", "bending"), [(0.8, "null"), (0.3, "null"), (0.8, "2.0e+4")])
+def test_a_chain_finds_its_settled_friction(friction: float, bending: str) -> None:
+    settings = ["initial={kind: equilibrium, friction: settled}", f"environment.seabed.friction={friction}"]
+    result = hybrid.static(load("chain_friction_settled", *settings, f"cable.sections[0].bending_stiffness={bending}"))
     lying = np.ravel(result["contact_force"])[1:20]  # N/m, beside the anchor
     assert lying == pytest.approx(1203.0, rel=0.01)
 

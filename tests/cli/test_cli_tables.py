@@ -1,0 +1,33 @@
+"""Rows of the closing tables: what stands beside the error of the bending moment."""
+
+import hybrid
+from hybrid.cli.tables import _largest_moment
+
+CABLE = {"sections": [{"length": 2.2, "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 0.5}]}
+ENDS = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [2, 0, 0]}}
+
+
+def test_a_rod_is_not_told_to_be_a_rod() -> None:
+    scene = {"cable": CABLE, "ends": ENDS, "initial": "equilibrium", "mesh": {"cells": 10}}
+    rod, catenary = (hybrid.static({**scene, "model": model}) for model in ("rod", "catenary"))
+    largest = float(rod.bending_moment.max())
+    assert _largest_moment(rod) == f"of {largest:.2g} N m"
+    assert "`model: rod`" in _largest_moment(catenary)
+
+
+class Lacking:
+    """A result of rods without the moment among its outputs."""
+
+    def __init__(self, result: hybrid.Result) -> None:
+        self.zones = result.zones
+
+    def __contains__(self, name: str) -> bool:
+        return False
+
+
+def test_a_rod_without_that_output_says_so() -> None:
+    result = hybrid.static(
+        {"cable": CABLE, "ends": ENDS, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 10}}
+    )
+    said = _largest_moment(Lacking(result))  # type: ignore[arg-type]
+    assert said == "the moment is not among the outputs"
