@@ -28,6 +28,7 @@ pytestmark = pytest.mark.bench
 EXAMPLES = Path(__file__).parents[1] / "examples"
 ASKED = (10.0, 3.0, 1.0, 0.3, 0.1)  # %
 TRUTH = "0.03%"
+MOVING = {"kind": "adaptive", "always_move": True}
 # Scenes, models they are run as, and settings.  Friction decides where a cable lies in `slack_on_seabed`.
 SCENES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "touchdown": (("rod", "catenary", "adaptive"), ()),
@@ -41,7 +42,8 @@ SCENES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 
 def load(name, accuracy, model, settings=()):
-    own = ("time.step=null", "mesh=null", f"model={model}")
+    kind = "{kind: adaptive, always_move: true}" if model == "adaptive" else model  # not what costs less
+    own = ("time.step=null", "mesh=null", f"model={kind}")
     return hybrid.load_scene(EXAMPLES / f"{name}.yaml", [f"accuracy={accuracy}", *own, *settings])
 
 
@@ -151,7 +153,7 @@ def errors_of(result, exact, name):
     return float(np.max(np.linalg.norm(off, axis=-1) if vector else np.abs(off)))
 
 
-@pytest.mark.parametrize("model", [None, "adaptive"])
+@pytest.mark.parametrize("model", [None, MOVING], ids=["chosen", "zones that move"])
 def test_accuracy_figures_of_random_scenes(model):
     """Estimated over true error of what a scene of bench/random_scenes.py has, asked for 1 %, against rods at 0.1 %.
 
@@ -265,8 +267,11 @@ def test_accuracy_share_of_coarser_runs():
         assert cost[1] < 3.0 * cost[0]
 
 
-def test_accuracy_of_zones_that_move_against_a_rod():
-    """At 1 %: CPU time of rods everywhere, in their plane and in space, over that of zones that move."""
+def test_accuracy_of_adaptive_against_a_rod():
+    """At 1 %: CPU time of rods everywhere over that of `adaptive`, which takes what costs least, and of zones that move.
+
+    Rods in their plane, and in space.
+    """
     from test_bench_adaptive import bight
 
     def at(base, model, dimension):
@@ -280,6 +285,7 @@ def test_accuracy_of_zones_that_move_against_a_rod():
         cost = {}
         for what, model, dimension in (
             ("adaptive", "adaptive", None),
+            ("zones that move", MOVING, None),
             ("rod", "rod", None),
             ("rod in space", "rod", 3),
         ):
@@ -294,9 +300,9 @@ def test_accuracy_of_zones_that_move_against_a_rod():
                 f"{name}, {what}: {cost[what]:.2f} s, {said['cells']} cells, {len(result['steps/t'])} steps, "
                 f"{said['effort_runs']} runs{', missed' if 'accuracy missed' in e else ''}"
             )
+        gain = cost["rod"] / cost["adaptive"]
         print(
-            f"{name}: rod over adaptive {cost['rod'] / cost['adaptive']:.2f}, "
+            f"{name}: rod over adaptive {gain:.2f}, over zones that move {cost['rod'] / cost['zones that move']:.2f}, "
             f"rod in space over adaptive {cost['rod in space'] / cost['adaptive']:.2f}"
         )
-        # the ratios that docs/accuracy.md states are 0.24 to 1.24; a factor of two off and the page is wrong
-        assert 0.1 < cost["rod"] / cost["adaptive"] < 2.5
+        assert 0.9 < gain < 2.5  # 0.95 is asked; medians of three differ by as much

@@ -387,8 +387,9 @@ def rod_cells(scene: Scene, cable: Material, s: Floats, grading: Grading | None 
         return np.asarray(FOLLOWING_CELL * bend)
     if grading is None:
         return np.asarray(ROD_CELL * bend)
-    cell = np.minimum(grading.cell(s), GRADED_ROD_CELL * bend)
-    return np.asarray(cell if grading.rods is None else np.minimum(cell, np.interp(s, grading.s, grading.rods)))
+    if grading.rods is not None:
+        return np.asarray(np.interp(s, grading.s, grading.rods))
+    return np.asarray(np.minimum(grading.cell(s), GRADED_ROD_CELL * bend))
 
 
 def _refuse_single_rod_cells(zones: Sequence[Zone], zone_of: np.ndarray) -> None:

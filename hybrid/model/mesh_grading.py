@@ -79,10 +79,8 @@ def grading(s: Floats, curvature: Floats, beside: Floats, length: float) -> Grad
     """
     x = np.linspace(0.0, length, SAMPLES)
     density = np.interp(x, s, curvature) / TURN + FEWEST / length + beside
-    cell = 1.0 / density
-    step = x[1] - x[0]
-    for i in range(1, SAMPLES):
-        cell[i] = min(cell[i], cell[i - 1] + GROWTH * step)
-    for i in range(SAMPLES - 2, -1, -1):
-        cell[i] = min(cell[i], cell[i + 1] + GROWTH * step)
+    # at most as long as any other cell, and by how much cells may grow on the way from there
+    grown = GROWTH * x
+    cell = np.minimum.accumulate(1.0 / density - grown) + grown
+    cell = np.minimum.accumulate((cell + grown)[::-1])[::-1] - grown
     return Grading(x, 1.0 / cell)

@@ -1,4 +1,4 @@
-"""What the kinds of model would cost for a scene that names none, and where catenaries are no choice."""
+"""What the kinds of model would cost for a scene that leaves the choice, and where catenaries are no choice."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ WORDS = {"rod": "rods everywhere", "catenary": "catenaries everywhere", "adaptiv
 
 
 class ModelChoice(NamedTuple):
-    """A kind of model, and why; both empty where the scene names its model."""
+    """A kind of model, and why; both empty where the scene leaves no choice."""
 
     kind: str = ""
     why: str = ""
@@ -40,10 +40,11 @@ class ModelChoice(NamedTuple):
     @property
     def notes(self) -> list[tuple[str, str]]:
         """The event that says so."""
-        return [(CHOSEN, f"the scene names no model: {WORDS[self.kind]}; {self.why}")] if self.kind else []
+        other = "" if self.kind == "adaptive" else "; model.always_move: true asks for zones that move"
+        return [(CHOSEN, f"{WORDS[self.kind]}; {self.why}{other}")] if self.kind else []
 
 
-NAMED = ModelChoice()  # of a scene that names its model
+NAMED = ModelChoice()  # of a scene that leaves no choice
 
 
 class Cost(NamedTuple):

@@ -185,14 +185,14 @@ def zones_are_free(scene: Scene) -> bool:
 
 
 def model_is_free(scene: Scene, moves: bool = True) -> bool:
-    """Whether the program chooses the model of a cable that bends, whose scene names none.
+    """Whether the program chooses the model of a cable that bends, whose scene names none, or `adaptive` alone.
 
     moves: in motion, by a pre-run; else an equilibrium.
 
-    Where the scene gives steps and asks for no accuracy, places the cells, lets the line touch itself, or wants
-    criteria as fields, zones move.
+    Where the scene gives steps and asks for no accuracy, places the cells, lets the line touch itself, wants criteria
+    as fields, or says anything of its zones, zones move.
     """
-    named = "model" in scene.model_fields_set or not isinstance(scene.model, AdaptiveModel)
+    named = scene.model != AdaptiveModel()
     wants = (scene.time is not None or not moves) and requested_accuracy(scene) is not None and mesh_is_free(scene)
     plain = scene.solver == "elimination" and not scene.contact.self
     return wants and not named and not scene.output.criteria and plain

@@ -272,6 +272,11 @@ class AdaptiveModel(Table):
         description="results corrected for the bending that catenary zones leave out, and criteria that count what "
         "is left after it",
     )
+    always_move: Truth = Field(
+        default=False,
+        description="zones move even where rods or catenaries everywhere are predicted to cost less; any other key of "
+        "this table asks for that too",
+    )
 
 
 def usual_model(cable: Any) -> RodModel | CatenaryModel | AdaptiveModel:

@@ -111,7 +111,7 @@ class ErrorController:
     result: Callable[[Resolution], RunSample]
     beside: Beside | None = None
     irregular: bool = False
-    choice: ModelChoice = NAMED  # of a scene that names no model
+    choice: ModelChoice = NAMED  # of a scene that leaves the choice
     settle: Callable[[bool], None] = lambda kept: None  # whether a finer result takes the place of that before it
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
     first: Resolution | None = None  # that the runs to compare with are for; the result may be finer

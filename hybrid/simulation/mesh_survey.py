@@ -160,27 +160,37 @@ class Survey:
         """Cells for the model of a scene; the pre-run was of that model, or of rods."""
         if not isinstance(scene.model, AdaptiveModel):
             return self.grading()
-        return self.grading_of_moving_zones(rod_cells(scene, self.model.cable, self.demand.s))
+        return self.grading_of_moving_zones(scene.model, rod_cells(scene, self.model.cable, self.demand.s))
 
     def grading(self) -> Grading:
         """Cells of a line whose zones stay what they are, those of the pre-run."""
         model, demand = self.model, self.demand
         middle = 0.5 * (model.line.s[:-1] + model.line.s[1:])
         rod = np.interp(demand.s, middle, model.line.spin.astype(float)) > 0.5
-        beside = self._layers(rod, [z.s_b for z in model.zones[:-1]])
-        return grading(demand.s, demand.curvature, beside, model.length)
+        return self._grading(self._layers(rod, [z.s_b for z in model.zones[:-1]]))
+
+    def _grading(self, beside: Floats) -> Grading:
+        """beside: (SAMPLES,) 1/m, cells beside what disturbs rods."""
+        return grading(self.demand.s, self.demand.curvature, beside, self.model.length)
 
     @cached_property
     def grading_of_catenary(self) -> Grading:
         """Cells of a line that is catenary everywhere."""
-        return grading(self.demand.s, self.demand.curvature, np.zeros(SAMPLES), self.model.length)
+        return self._grading(np.zeros(SAMPLES))
 
-    def grading_of_moving_zones(self, rod_cell: Floats) -> Grading:
-        """Base cells of a line whose zones move; rod_cell: (K,) m, length of the cells of its rods."""
+    def grading_of_moving_zones(self, zones: AdaptiveModel, rod_cell: Floats) -> Grading:
+        """Base cells of a line whose zones move; rod_cell: (K,) m, length of the cells of its rods if curvature counts.
+
+        Where positions and tensions are all that is asked, base cells are those of rods everywhere, and are not cut.
+        """
+        beside = self._layers(np.ones(self.demand.s.size, bool), [])
+        exact = self.given is not None or self.along
+        if not exact and zones.rod_cell is None:
+            found = self._grading(beside)
+            return replace(found, rods=np.full(SAMPLES, self.model.length))
         found = self.grading_of_catenary
         rods = np.interp(found.s, self.demand.s, rod_cell)
-        exact = self.given is not None or self.along
         if exact:
-            rods = 1.0 / (1.0 / rods + self._layers(np.ones(self.demand.s.size, bool), []))
+            rods = 1.0 / (1.0 / rods + beside)
         density = np.maximum(found.density, 1.0 / (MOST_PARTS * rods))
         return replace(found, density=density, rods=rods if exact else None)

@@ -1,4 +1,4 @@
-"""The model of a scene that names none: rods, catenaries or zones that move, whichever costs least.
+"""The model of a scene that leaves the choice: rods, catenaries or zones that move, whichever costs least.
 
 A pre-run of rods shows where the cable bends and how tension goes; what each kind would cost follows from the cells
 that it needs.  docs/zones.md
@@ -27,7 +27,7 @@ from hybrid.model.resolution import Resolution
 from hybrid.scene.schema import AdaptiveModel
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import compile_beside
-from hybrid.simulation.mesh_survey import allowed, asks_along, with_survey
+from hybrid.simulation.mesh_survey import allowed, with_survey
 from hybrid.simulation.static_case import StaticCase
 
 
@@ -41,16 +41,16 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
     resolution = replace(resolution, zones=min(resolution.zones, allowed(scene, survey) / scene.length))
     model, demand = survey.model, survey.demand
     moving = with_model(scene, "adaptive")
-    bend = rod_cells(moving, model.cable, demand.s)
     gradings: dict[str, Grading] = {
         "rod": survey.grading(),
         "catenary": survey.grading_of_catenary,
-        "adaptive": survey.grading_of_moving_zones(bend),
+        "adaptive": survey.grading_for(moving),
     }
     found = ratios(scene, model, demand, resolution.zones * model.length)
     counts = [grading.count(0.0, model.length, resolution.fineness) for grading in gradings.values()]
-    lengths = rod_cells(moving, model.cable, demand.s, gradings["adaptive"])
-    parts = resolution.fineness * float(np.trapezoid(1.0 / lengths, demand.s))
+    zones = gradings["adaptive"]
+    lengths = rod_cells(moving, model.cable, zones.s, zones)
+    parts = resolution.fineness * float(np.trapezoid(1.0 / lengths, zones.s))
     near = "it comes near itself, and contact of catenaries alone is not asked for" if case.came_near_itself else ""
     why_not = structural(scene, model.cable) or near or no_catenary(found, demand.s)
     share = rod_share(model, demand, found)
@@ -66,7 +66,7 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
 def surveyed(case: Case | StaticCase, resolution: Resolution) -> Resolution:
     """With cells, and zones, as a pre-run asks for: of rods, which alone show what zones would leave out of a bend."""
     scene = case.scene
-    if isinstance(scene.model, AdaptiveModel) and asks_along(scene):
+    if isinstance(scene.model, AdaptiveModel):
         case.scene = with_model(scene, "rod")
     try:
         survey = case.survey(resolution)

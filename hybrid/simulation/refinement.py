@@ -186,12 +186,12 @@ def _reached(key: str, unit: str, total: float, most: float | None) -> str:
 def refined(resolution: Resolution, verdict: Verdict, free: Free, most: float = MOST_FINER) -> Resolution | None:
     """What should meet what is asked, by order 2, at least cost; None: nothing that is free would help.
 
-    most: how much finer it may be.  Errors of mesh and step add, and cost grows with fineness over step: half of what
-    is asked is for each.
+    most: how much finer cells and steps may be.  Errors of mesh and step add, and cost grows with fineness over step:
+    half of what is asked is for each.
     """
     zones, model = resolution.zones, verdict.model
     if free.zones and model > MOST_OF_MODEL:
-        zones *= max(OF_MODEL / model, 1.0 / most)
+        zones *= OF_MODEL / model  # at once: zones that are too strict cost what rods do, one run more costs as much
         model = OF_MODEL
     if model >= AIM or (verdict.mesh > 1.0 and not free.mesh) or (verdict.time > 1.0 and not free.steps):
         return None  # what is fixed is wrong by more than is asked

@@ -82,6 +82,8 @@ def scene_data(scene: Scene, kind: str, accuracy: str | Mapping[str, str]) -> di
     for name in ("errors", "criteria"):
         output.pop(name, None)
     given = data["model"] if data["model"]["kind"] == kind else {}
+    if kind == "adaptive":  # zones that move are one of the models that are compared
+        given |= {"always_move": True}
     kept = {name: value for name, value in given.items() if name not in FINENESS}
     if "zones" in kept:
         kept["zones"] = [{k: x for k, x in zone.items() if k not in ("cells", "ratio")} for zone in kept["zones"]]

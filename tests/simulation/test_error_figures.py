@@ -52,7 +52,7 @@ def tether(model, accuracy):
 def test_zones_of_a_coarser_run_do_not_hide_what_those_of_the_result_leave_out():
     """The runs to compare with are all rod, the result is not: 0.26 where their model error was believed."""
     truth = hybrid.run(tether("rod", "0.1%"))
-    result = hybrid.run(tether("adaptive", "2%"))
+    result = hybrid.run(tether({"kind": "adaptive", "always_move": True}, "2%"))
     kinds = {zone.kind for row in result.zones for zone in row}
     assert kinds == {"rod", "catenary"}
     assert SHARP[0] <= effectivity(result, truth) <= SHARP[1]
@@ -102,7 +102,7 @@ def test_the_figure_of_a_swayed_line_with_a_clump_is_not_too_small():
         "initial": "equilibrium", "time": {"duration": 8.0066}, "output": {"every": 0.40033, "points": 201},
     }  # fmt: skip
     truth = hybrid.run(scene | {"model": "rod", "accuracy": "0.1%"})
-    result = hybrid.run(scene | {"accuracy": "1%"})
+    result = hybrid.run(scene | {"model": {"kind": "adaptive", "always_move": True}, "accuracy": "1%"})
     assert SHARP[0] <= effectivity(result, truth) <= SHARP[1]
     for name in ("position", "tension"):
         found = at_outputs(result, truth, name)
@@ -158,7 +158,7 @@ def test_zones_that_change_are_those_of_the_result():
         "initial": "equilibrium", "time": {"duration": 25.7335}, "output": {"every": 0.643336, "points": 51},
     }  # fmt: skip
     truth = hybrid.run(scene | {"model": "rod", "accuracy": "0.1%"})
-    result = hybrid.run(scene | {"model": "adaptive", "accuracy": "1%"})
+    result = hybrid.run(scene | {"model": {"kind": "adaptive", "always_move": True}, "accuracy": "1%"})
     for name in ("position", "tension", "curvature", "bending_moment"):
         assert SHARP[0] <= effectivity(result, truth, name) <= SHARP[1], name
     for end in ("start", "end"):
@@ -203,7 +203,7 @@ TOUCHDOWN = {
 }
 
 
-@pytest.mark.parametrize("model", [None, "adaptive"])
+@pytest.mark.parametrize("model", [None, {"kind": "adaptive", "always_move": True}])
 def test_curvature_asked_alone_is_met(model):
     """At rest on a hard bed curvature begins within sqrt(EI/T) = 0.15 m: catenaries lack all of it (25 %, once)."""
     truth = hybrid.static(TOUCHDOWN | {"model": "rod", "mesh": {"cells": 8000}})
