@@ -380,6 +380,7 @@ class ErrorController:
         verdict = self.verdict(self.asked)
         while verdict.ratio > 1.0 and self._leaves_out(verdict, verdict.ratio / before):
             verdict, before = self.verdict(self.asked), np.inf
+        before *= 1.0 if self.irregular else self.estimate.revised.get(RAW.get(verdict.name, ""), 1.0)
         self._ratio, falls = verdict.ratio, verdict.ratio / before  # 0 for the first
         self._judged += 1
         most = MOST_REFINEMENTS if self.moves else REFINEMENTS_AT_REST

@@ -17,16 +17,15 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.error_order import (
     COARSER,
-    CONFIRMED,
     MOST,
     MOST_ORDER,
-    ORDER,
     ORDERS,
     Falls,
     around,
     as_halved,
     at_all_outputs,
     blended,
+    confirmed_order,
     falls,
     force_orders,
     magnitude,
@@ -203,6 +202,8 @@ class Estimate:
     def _take(self, result: RunSample) -> Notes:
         """Take over a result, the model error that it knows of itself bounded if it is implausible: what to say."""
         self.run, self._errors = result, None
+        # Times as large as they were thought to be, by an order that is known now, are errors of the run before.
+        self.revised: dict[str, float] = {}
         self._bound, doubt = bounded(result)
         return doubt
 
@@ -262,8 +263,8 @@ class Estimate:
                         found[name] = found[name] / ratio**p
                 continue
             change = np.asarray(result.values[name]) - np.asarray(before.values[name])
-            if p < ORDER and self._is_unconfirmed(name, change, finer, shorter):
-                p = self._with_usual_order(name)
+            if name in END_FORCES and self.cancels:
+                p = self._confirmed_order(name, change, finer, shorter)
             self.changes[name] = float(np.sqrt(squares(change) / max(1, change.size))), self.changes[name][1]
             if finer > LEAST_RATIO and name in by_mesh:
                 if name in by_step:
@@ -274,28 +275,18 @@ class Estimate:
                 shown = change / (shorter**p - 1.0)
                 by_step[name] = blended(shown, by_step[name] / shorter**p, shorter, p) if name in by_step else shown
 
-    def _is_unconfirmed(self, name: str, change: np.ndarray, finer: float, shorter: float) -> bool:
-        """Whether a finer run has changed an output by less than the order of its errors has foretold."""
-        by_step, by_mesh = self._keep()
-        parts = [
-            found[name] * (1.0 - ratio ** -self.order[name])
-            for found, ratio in ((by_step, shorter), (by_mesh, finer)) if name in found
-        ]  # fmt: skip
-        if not parts:
-            return False
-        foretold = np.asarray(sum(parts))
-        most, largest = (float(np.max(magnitude(x, name), initial=0.0)) for x in (change, foretold))
-        return most < CONFIRMED * largest and squares(change) < CONFIRMED**2 * squares(foretold)
+    def _confirmed_order(self, name: str, change: np.ndarray, finer: float, shorter: float) -> float:
+        """The order of a force, after a finer run: another, where that changes it by less or more than was foretold.
 
-    def _with_usual_order(self, name: str) -> float:
-        """Take errors of an output to fall with ORDER from here on, and make of those until now what it would have."""
+        Errors until now become what they would have been by that order.
+        """
         by_step, by_mesh = self._keep()
-        p, self.order[name] = self.order[name], ORDER
-        less = (COARSER**p - 1.0) / (COARSER**ORDER - 1.0)  # of runs twice as fine as those before
-        for found in (by_mesh, by_step):
-            if name in found:
-                found[name] = less * found[name]
-        return ORDER
+        known, p = [(x, r) for x, r in ((by_step, shorter), (by_mesh, finer)) if name in x], self.order[name]
+        now = self.order[name] = confirmed_order(name, p, change, [(x[name], r) for x, r in known])
+        self.revised[name] = (COARSER**p - 1.0) / (COARSER**now - 1.0)  # of runs twice as fine as those before
+        for found, _ in known:
+            found[name] = self.revised[name] * found[name]
+        return now
 
     @property
     def not_converged(self) -> dict[str, float]:
@@ -423,6 +414,7 @@ class Estimate:
         """An estimate from a checkpoint; shape, errors: as of `restored_sample`."""
         self = cls.__new__(cls)
         self.run, self.notes = restored_sample(tree["run"], scene, shape), restored_notes(tree["notes"])
+        self.revised = {}
         self.order = matched(tree["order"], dict.fromkeys(tree["order"], 1.0), "order")
         self.falls = matched(tree["falls"], dict.fromkeys(tree["order"], np.nan), "falls")
         unseen = np.full(2, np.nan)  # of checkpoints that do not have it

@@ -20,7 +20,7 @@ from hybrid.scene.accuracy import amount
 from hybrid.simulation import error_estimate
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.error_estimate import OF_SIZES, SAFETY, Errors, Estimate
-from hybrid.simulation.error_order import FORCE_ORDERS, ORDER, ORDERS
+from hybrid.simulation.error_order import FORCE_ORDERS, LEAST_FORCE_ORDER, ORDER, ORDERS, confirmed_order
 from hybrid.simulation.error_report import error_fields
 from hybrid.simulation.error_statistics import statistics_of
 from hybrid.simulation.refinement import OF_MODEL, Free, Verdict, costly, judge, not_converged, refined
@@ -181,13 +181,16 @@ def test_runs_that_are_too_coarse_show_no_high_order():
     assert Estimate(*runs).order == {"position": ORDERS[1], "reaction_end": ORDERS[0]}
 
 
-@pytest.mark.parametrize(("first", "order"), [(1.0, FORCE_ORDERS[0]), (2.0, ORDER)])
-def test_a_low_order_is_taken_back_where_a_finer_run_changes_little(first, order):
-    """Loads that come at once keep it.  Coarse runs before and after a contact seem not to converge, and later do."""
+@pytest.mark.parametrize(("first", "order"), [(1.0, LEAST_FORCE_ORDER), (1.25, FORCE_ORDERS[0]), (2.0, ORDER)])
+def test_a_finer_run_confirms_a_low_order_or_shows_another(first, order):
+    """Loads that come at once keep it, or have a lower one, by which the figure is right.
+
+    Coarse runs before and after a contact seem not to converge, and later do.
+    """
     resolution, noise = Resolution(1.0, 0.1, None, 1e-3), (0.0, 0.5, 0.3) if first == 2.0 else (0.0, 0.0, 0.0)
-    runs = [sample(resolution, 100, first, 1, noise[0]), sample(resolution.coarser(2, 2), 50, first, 2, noise[1])]
-    runs += [sample(resolution.coarser(2, 4), 25, first, 4, noise[1])]
-    runs += [sample(resolution.coarser(4, 4), 25, first, 4, noise[2])]
+    runs = [sample(resolution, 100, first, 1, noise[0]), sample(resolution.coarser(2, 2), 50, first, 1, noise[1])]
+    runs += [sample(resolution.coarser(2, 4), 25, first, 1, noise[1])]
+    runs += [sample(resolution.coarser(4, 4), 25, first, 1, noise[2])]
     finer = sample(replace(resolution, fineness=3.0), 300, first)
     found = []
     for kept in (False, True):  # a checkpoint in between changes nothing
@@ -199,7 +202,36 @@ def test_a_low_order_is_taken_back_where_a_finer_run_changes_little(first, order
         assert estimate.order["reaction_end"] == order
         found.append(estimate.errors.largest("total", "end_force_end"))
     true = 0.03 * 3.0**-first
-    assert found[0] == found[1] and found[0] > (0.7 if first == 1.0 else 1.0) * true
+    assert found[0] == found[1] and found[0] > true
+    if first < ORDER:
+        assert found[0] == pytest.approx(SAFETY * true, rel=0.01)
+
+
+def test_what_hardly_finer_runs_differ_by_shows_no_order():
+    change, error = np.full((9, 3), 0.5), np.full((9, 3), 1.0)
+    far, hardly = (confirmed_order("reaction_end", 1.25, change, [(error, r)]) for r in (1.6, 1.4))
+    assert (far, hardly) == (FORCE_ORDERS[0], FORCE_ORDERS[0])  # what was foretold: 0.44 and 0.34 of the error
+    far, hardly = (confirmed_order("reaction_end", 1.25, 2.0 * change, [(error, r)]) for r in (1.6, 1.4))
+    assert (far, hardly) == (LEAST_FORCE_ORDER, FORCE_ORDERS[0])
+    assert confirmed_order("reaction_end", 1.75, 2.0 * change, [(error, 1.6)]) == 1.75
+
+
+def test_a_run_is_refined_further_where_its_order_has_turned_out_lower():
+    """Errors fall to a third; by the figure of the run before, which was too small, to 0.46, too slowly to arrive."""
+    resolution = Resolution(1.0, 0.1, None, 1e-3)
+    runs = [sample(resolution, 100, 1.0), sample(resolution.coarser(2, 2), 50, 1.0)]
+    runs += [sample(resolution.coarser(2, 4), 25, 1.0), sample(resolution.coarser(4, 4), 25, 1.0)]
+
+    def refused(_: Resolution) -> RunSample:
+        raise AssertionError
+
+    asked = RequestedAccuracy(None, SAFETY * 0.01 / 6.0, None)
+    control = ErrorController(asked, Free(True, True, False), True, refused, refused)
+    control.estimate = Estimate(*runs)
+    assert control.next_resolution() is not None
+    control.estimate.update(sample(replace(resolution, fineness=3.0), 300, 1.0))
+    assert control.verdict(asked).ratio == pytest.approx(6.0, rel=0.01)
+    assert control.next_resolution() is not None
 
 
 def test_without_the_rougher_runs_an_order_in_between_is_taken():
