@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.adapt.user_criterion import FORCED_RATIO, NodeState, UserCriterion, cell_ratios
-from hybrid.adapt.zone_rules import OFF, Rules, planned, reach, spread, tidied, wanted
+from hybrid.adapt.zone_rules import OFF, ROUND_TIME, Rules, planned, reach, spread, tidied, wanted
 from hybrid.kernels import zone_step as z
 from hybrid.kernels.binding import Packed, Table
 from hybrid.kernels.criteria import CRITERIA, GIVEN, SLACK, TORSION
@@ -338,7 +338,7 @@ class DomainManager:
         if self.going:
             wait = max(min(float(self.grown[self.leaving].min()), wait), 0.0)
             new = next_ | (self.leaving & (self.grown > 0.0))
-        self.next_review = t + (wait - 1e-9) * self.pace
+        self.next_review = t + (wait - ROUND_TIME) * self.pace
         change = None
         if (new != rod).any():
             urgent = spread((self.ratios[SLACK] > 1.0) | self._losing_tension(state), self.layout.base, rules.buffer)

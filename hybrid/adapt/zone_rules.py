@@ -32,7 +32,7 @@ class Rules(NamedTuple):
 
 
 OFF = np.array([x.off for x in CRITERIA])
-ROUND = 1e-12  # of a length
+ROUND, ROUND_TIME = 1e-12, 1e-9  # of a length; of the pace of zones
 BACK = 0.5  # ratio above which a rod that is on its way out comes back
 
 
@@ -217,6 +217,7 @@ class ReviewJob(NamedTuple):
     base: Floats  # (n+1,) m
     given: NDArray[np.int64]  # (n,)
     calm_since: Floats  # (n,) s
+    calmed: Floats  # (2, n) of rods on their way out: which criterion was the loudest, and its ratio
     patience: Floats  # (n,)
     seen: Floats  # (criteria, n), largest ratios since the last output
     buffer: Floats  # (n,) m (written)
@@ -229,7 +230,8 @@ class ReviewJob(NamedTuple):
     parts: float  # of the buffer
     light: float  # N/m
     forced: float  # ratio of what is given as rod
-    pause: float  # s until the next review
+    pace: float  # s, ramp time of bending stiffness
+    pause: float  # of that, until the next review
     held: int  # 1 where rods may not go
 
 
@@ -238,39 +240,75 @@ def blank_review_job() -> ReviewJob:
     each, whole, flags = np.zeros(1), np.zeros(1, np.int64), np.zeros((4, 1), bool)
     rows = np.zeros((1, 1))
     return ReviewJob(
-        whole, each, whole, each, each, rows, each, each, each, each, flags, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
-    )
+        whole, each, whole, each, rows, each, rows, each, each, each, each, flags,
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0,
+    )  # fmt: skip
 
 
 read, read_zones = reader(blank_review_job()), reader(z.blank_zone_job())
 
 
+@inner
+def loudest(ratios, off, j):
+    """The criterion of base cell j whose ratio is the largest part of its threshold."""
+    which = 0
+    for c in range(1, off.shape[0]):
+        if ratios[c, j] / off[c] > ratios[which, j] / off[which]:
+            which = c
+    return which
+
+
+@inner
+def stays(job, zones, j):
+    """Whether base cell j remains what it is: no catenary becomes rod, and no rod without stiffness goes."""
+    planned = (job.flags[3, j] or (job.held != 0 and zones.rod[j])) and job.given[j] >= 0
+    return zones.rod[j] if planned else not zones.rod[j] or zones.grown[j] > 0.0
+
+
+@inner
+def let_go(job, zones):
+    """Rods that are not planned are on their way out; the part of the pace until one of them may have gone."""
+    ratios, wait, going, any_before = zones.ratios, job.pause, 0, zones.counts[z.GOING]
+    for j in range(zones.rod.shape[0]):
+        planned = (job.flags[3, j] or job.held != 0) and job.given[j] >= 0
+        goes = zones.rod[j] and not planned
+        if goes:
+            going, wait = 1, min(wait, zones.grown[j])
+            if not zones.leaving[j]:
+                c = loudest(ratios, job.off, j)
+                job.calmed[0, j], job.calmed[1, j] = c, ratios[c, j]
+        zones.leaving[j] = goes
+    zones.counts[z.GOING] = going
+    if going or any_before:
+        zones.counts[z.COMING] = z.is_coming(zones)  # perhaps one that was on its way out
+    return wait
+
+
 @kernel
 def quiet_review(table):
-    """1 where a review now changes nothing, and is done; 0: the domain manager has to do it."""
+    """1 where a review now leaves all zones as they are, and is done; 0: the domain manager has to do it."""
     job = read(table)
     run = read_zones(job.zone_table)
     zones, clock = run.zones, run.zones.clock
-    kinds, ratios, rod, n = zones.kinds, zones.ratios, zones.rod, zones.rod.shape[0]
+    kinds, ratios, n = zones.kinds, zones.ratios, zones.rod.shape[0]
     if clock[z.LOUDEST] > 1.0 or zones.counts[z.HOLDS_TWIST] or zones.counts[z.LOADED]:
         return 0
     for j in range(n):
-        if zones.leaving[j]:
-            return 0
         if job.given[j] > 0:
             ratios[GIVEN, j] = job.forced
-        job.flags[0, j], job.calm[j], job.wait[j] = False, job.calm_since[j], job.dwell * job.patience[j]
+        job.flags[0, j], job.calm[j] = zones.leaving[j], job.calm_since[j]
+        job.wait[j] = job.dwell * job.patience[j]
     state = run.new if run.counts[b.PARITY] else run.old
     reach(state.T, kinds.base_of_cell, kinds.EI, kinds.w, kinds.floor, job.parts, job.light, job.buffer)
     now = run.clock[b.NOW]
-    _plan(ratios, job.off, rod, job.calm, now, job.base, job.buffer, job.shortest, job.wait, job.flags)
+    _plan(ratios, job.off, zones.rod, job.calm, now, job.base, job.buffer, job.shortest, job.wait, job.flags)
     for j in range(n):
-        planned = (job.flags[3, j] or (job.held != 0 and rod[j])) and job.given[j] >= 0
-        if planned != rod[j]:
+        if not stays(job, zones, j):
             return 0
+    wait = let_go(job, zones)
     for j in range(n):
         job.calm_since[j] = job.calm[j]
         for c in range(ratios.shape[0]):
             job.seen[c, j], ratios[c, j] = max(job.seen[c, j], ratios[c, j]), 0.0
-    clock[z.NEXT_REVIEW] = now + job.pause
+    clock[z.NEXT_REVIEW] = now + (max(wait, 0.0) - ROUND_TIME) * job.pace
     return 1

@@ -48,7 +48,9 @@ def over_shares(error, shares):
 def layer_length(EI, w, T):
     """l0; not zero, where there is no bending stiffness either."""
     lam = max(math.sqrt(EI / T), 1e-300)
-    return min(lam, (EI / w) ** (1.0 / 3.0)) if w > 0.0 else lam
+    if w * lam * lam * lam <= EI:  # the other one is longer; taut lines need no root of it
+        return lam
+    return min(lam, (EI / w) ** (1.0 / 3.0))
 
 
 @inner
@@ -125,7 +127,12 @@ def node_curvature(line, turn, i):
 @inner
 def second_difference(line, turn, i):
     """|kappa''| at an inner node i."""
-    a, b = line.s[i] - line.s[i - 1], line.s[i + 1] - line.s[i]
-    k = node_curvature(line, turn, i)
     before, after = node_curvature(line, turn, i - 1), node_curvature(line, turn, i + 1)
+    return second_slope(line.s, i, before, node_curvature(line, turn, i), after)
+
+
+@inner
+def second_slope(s, i, before, k, after):
+    """|kappa''| at an inner node i of arc length s[i], m, from the curvature there and at the nodes beside it."""
+    a, b = s[i] - s[i - 1], s[i + 1] - s[i]
     return abs(2.0 * ((after - k) / b - (k - before) / a) / (a + b))

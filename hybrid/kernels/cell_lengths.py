@@ -24,7 +24,7 @@ from hybrid.kernels.cell_errors import (
     longest_cell,
     node_curvature,
     over_shares,
-    second_difference,
+    second_slope,
 )
 from hybrid.kernels.compile import inner
 from hybrid.kernels.criteria import EDGE
@@ -50,6 +50,7 @@ STEADY = 2.0  # times the curvature error of lengths: by so much may curvature c
 CALM_STEPS = 4  # for which two cells must have been so short and so evenly bent
 FADE = 10.0  # ramp times over which the largest curvature of earlier is forgotten
 SAVED = 0.12  # of all cells: so many must go before any goes
+KAPPA, BENDS = range(2)  # columns of the work array `moment` of zones: curvature, 1/m, and |kappa''|, 1/m^3, of nodes
 SMOOTHED = 0.1  # part by which delta comes nearer to what it is, in a step: at once it is unstable in slack lines
 
 
@@ -78,15 +79,26 @@ def length_by_turn(kinds, i, k, bends, limits, finer):
 
 
 @inner
-def wanted_length(line, kinds, T, i, limits, finer):
-    """W at node i; limits: (4,) errors that interpolation may make, by cells as fine as asked."""
-    n, turn = T.shape[0], kinds.turn
-    bends, largest = 0.0, node_curvature(line, turn, i)
+def find_bends(line, turn, bend):
+    """Curvature and |kappa''| of all nodes into bend (N+1, >= 2); the ends have no |kappa''|."""
+    n = line.h.shape[0]
+    for i in range(n + 1):
+        bend[i, KAPPA] = node_curvature(line, turn, i)
+    bend[0, BENDS] = bend[n, BENDS] = 0.0
+    for i in range(1, n):
+        bend[i, BENDS] = second_slope(line.s, i, bend[i - 1, KAPPA], bend[i, KAPPA], bend[i + 1, KAPPA])
+
+
+@inner
+def wanted_length(kinds, T, bend, i, limits, finer):
+    """W at node i; bend: as of `find_bends`; limits: (4,) errors that interpolation may make, by cells as fine as asked."""
+    n = T.shape[0]
+    bends, largest = 0.0, bend[i, KAPPA]
     for k in range(max(i - 1, 1), min(i + 2, n)):
-        bends = max(bends, second_difference(line, turn, k))
+        bends = max(bends, bend[k, BENDS])
     for k in range(max(i - NEAR, 1), min(i + NEAR + 1, n)):  # flanks of a kink are as sharp as it
-        largest = max(largest, node_curvature(line, turn, k))
-    W = length_by_turn(kinds, i, node_curvature(line, turn, i), bends, limits, finer)
+        largest = max(largest, bend[k, KAPPA])
+    W = length_by_turn(kinds, i, bend[i, KAPPA], bends, limits, finer)
     return max(W, shortest_length(bending_length(kinds, T, i), largest, limits, finer))
 
 
@@ -105,7 +117,7 @@ def raise_beside(line, zones, j, way, reach, finer):
     kinds, s, count = zones.kinds, line.s, 0
     i = j
     while 0 <= i < s.shape[0] and (count <= 2 or abs(s[i] - s[j]) <= reach):
-        k = node_curvature(line, kinds.turn, i)
+        k = zones.moment[i, KAPPA]
         zones.wanted[i] = max(zones.wanted[i], length_by_turn(kinds, i, k, 0.0, zones.limits, finer))
         i, count = i + way, count + 1
 
@@ -225,8 +237,9 @@ def is_too_long(zones, s):
 @inner
 def find_wanted(line, sea, state, zones, dt, finer):
     """Wanted lengths at nodes for the next HORIZON steps of dt into zones.wanted, graded; whether the next needs others."""
+    find_bends(line, zones.kinds.turn, zones.moment)
     for i in range(line.h.shape[0] + 1):
-        zones.wanted[i] = wanted_length(line, zones.kinds, state.T, i, zones.limits, finer)
+        zones.wanted[i] = wanted_length(zones.kinds, state.T, zones.moment, i, zones.limits, finer)
     raise_at_hinges(line, state, zones, finer)
     lower_by_twist(zones, finer)
     lower_at_edges(line, sea, state, zones, dt, finer)
@@ -247,21 +260,21 @@ def least_wanted(zones, p, b):
 
 
 @inner
-def is_steady(line, zones, p, b):
+def is_steady(zones, p, b):
     """Whether curvature changes little from the p-th node to place b on the finest mesh.
 
     The curvature of a node is that half-way between the middles of its cells.  Where two of these become one that
     place moves by an eighth of its length, and a moment that is another one at once shakes the line.
     """
-    q, turn = p + 1, zones.kinds.turn
+    q = p + 1
     while q + 1 < zones.wanted.shape[0] and zones.place[q] < b:
         q += 1
-    change = abs(node_curvature(line, turn, q) - node_curvature(line, turn, p))
+    change = abs(zones.moment[q, KAPPA] - zones.moment[p, KAPPA])
     return change <= STEADY * zones.limits[CURVATURE]
 
 
 @inner
-def halves(line, zones, p, a, size, unit):
+def halves(zones, p, a, size, unit):
     """Whether the part of `size` finest cells of length `unit` from place a on is halved."""
     W, middle, h = least_wanted(zones, p, a + size), a + size // 2, size * unit
     if h > W * AHEAD:
@@ -269,13 +282,13 @@ def halves(line, zones, p, a, size, unit):
         return True
     if not zones.here[middle]:
         return False
-    calm = h <= MERGE * W and is_steady(line, zones, p, a + size)
+    calm = h <= MERGE * W and is_steady(zones, p, a + size)
     zones.calm[middle] = zones.calm[middle] + 1 if calm else 0
     return zones.calm[middle] < CALM_STEPS
 
 
 @inner
-def plan_base_cell(line, zones, p, begin, size, unit):
+def plan_base_cell(zones, p, begin, size, unit):
     """Nodes of a base cell of `size` finest cells, into zones.plan.
 
     p: its first node now.  Parts in their order along the line: the one that begins at an offset is as long as the largest power of two in it.
@@ -284,7 +297,7 @@ def plan_base_cell(line, zones, p, begin, size, unit):
     while offset < size:
         while zones.place[p + 1] <= begin + offset:
             p += 1
-        while part > 1 and halves(line, zones, p, begin + offset, part, unit):
+        while part > 1 and halves(zones, p, begin + offset, part, unit):
             part //= 2
             zones.plan[begin + offset + part] = True
         offset += part
@@ -306,7 +319,7 @@ def plan_cells(line, sea, state, zones, dt, finer):
         while zones.place[p] < begin:
             p += 1
         zones.plan[begin] = True
-        plan_base_cell(line, zones, p, begin, size, zones.H[j] / size)
+        plan_base_cell(zones, p, begin, size, zones.H[j] / size)
         begin += size
     zones.plan[begin] = True
     gone = 0

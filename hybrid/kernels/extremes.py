@@ -342,6 +342,33 @@ def note_extremes(line, sea, ends, state, books, t):
         widen_both(books.extremes, books.right, DISPLACEMENT, i, math.sqrt(dot(x, x)), t)
 
 
+@inner
+def cell_under(places, s, i, k):
+    """Number of the last of `places` that place i of s belongs behind, from that k of the place before on."""
+    last = places.size - 1
+    while k < last and places[k + 1] <= s[i] and not (s[i] == places[k] and places[k + 1] == s[i]):
+        k += 1
+    if i > 0 and s[i] == s[i - 1] and k < last and places[k] == s[i] and places[k + 1] == s[i]:
+        k += 1
+    return k
+
+
+@inner
+def fold_cell(now, row, columns, near, per, s, first, end, out):
+    """Take one row of extremes `now` at both ends of a cell into those at s[first:end], linear between them.
+
+    columns: (2,) of the ends; near: m, where it begins; per: 1/m, of its length, zero where it has none.
+    """
+    a, b = columns
+    for bound in range(2):
+        x, y = now[bound, row, a], now[bound, row, b]
+        for i in range(first, end):
+            part = max((s[i] - near) * per, 0.0)
+            value = (1.0 - part) * x + part * y
+            if (value > out[bound, row, i]) if bound else (value < out[bound, row, i]):
+                out[bound, row, i], out[2 + bound, row, i] = value, now[2 + bound, row, b if part > 0.5 else a]
+
+
 @kernel
 def fold_extremes(places, s, columns, now, out):
     """Take extremes `now` (4, rows, columns) at `places` (m) into those at s, `out` (4, rows, n): lowest, highest, times.
@@ -355,20 +382,13 @@ def fold_extremes(places, s, columns, now, out):
         for c in columns:
             finite &= np.isfinite(now[0, row, c]) and np.isfinite(now[1, row, c])
         known |= finite << row
-    k = 0
-    for i in range(s.size):
-        while k < last and places[k + 1] <= s[i] and not (s[i] == places[k] and places[k + 1] == s[i]):
-            k += 1
-        if i > 0 and s[i] == s[i - 1] and k < last and places[k] == s[i] and places[k + 1] == s[i]:
-            k += 1
-        m = min(k + 1, last)
-        x = (s[i] - places[k]) / (places[m] - places[k]) if places[m] > places[k] and s[i] > places[k] else 0.0
-        a, b = columns[k], columns[m]
-        near = b if x > 0.5 else a
+    i = k = 0
+    while i < s.size:
+        k = cell_under(places, s, i, k)
+        m, first, i = min(k + 1, last), i, i + 1
+        while i < s.size and cell_under(places, s, i, k) == k:
+            i += 1
+        per = 1.0 / (places[m] - places[k]) if places[m] > places[k] else 0.0
         for row in range(rows):
-            if not known >> row & 1:
-                continue
-            for bound in range(2):
-                value = (1.0 - x) * now[bound, row, a] + (x * now[bound, row, b] if x > 0.0 else 0.0)
-                if (value > out[bound, row, i]) if bound else (value < out[bound, row, i]):
-                    out[bound, row, i], out[2 + bound, row, i] = value, now[2 + bound, row, near]
+            if known >> row & 1:
+                fold_cell(now, row, (columns[k], columns[m]), places[k], per, s, first, i, out)

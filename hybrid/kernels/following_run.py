@@ -234,8 +234,8 @@ def set_aside(job):
 
 
 @inner
-def change(job):
-    """To the cells that are planned, after the outputs of those of now."""
+def leave(job):
+    """Outputs of the cells of now, which are to change: those within the last step are sampled, and all wait."""
     counts = job.counts
     if due_within(job) > 0:
         counts[b.INSIDE], counts[b.ASKS] = 1, b.ASK_SAMPLES
@@ -243,8 +243,12 @@ def change(job):
         counts[b.INSIDE], counts[b.ASKS] = 0, 0
     if counts[b.SAMPLES] > 0:
         set_aside(job)
-    begin_change(job)
-    end_change(job)
+
+
+@kernel
+def leave_cells(table):
+    """`leave`."""
+    leave(read(table))
 
 
 @kernel
@@ -270,6 +274,8 @@ def go_on(table, reviewed):
             if timed and call_count(job.calls[REVIEW], job.review) == 0:
                 return code
         if due:
-            change(job)
+            leave(job)
+            begin_change(job)
+            end_change(job)
         reviewed = False
         code = call_count(job.calls[STEPS], job.run)

@@ -6,6 +6,8 @@ import math
 
 from hybrid.kernels.compile import inner, kernel
 
+FEW = 3  # columns of values that are gone through one by one: a loop over so few costs more than the products
+
 
 @kernel
 def add_rows(begin, columns, weights, x, out):
@@ -13,6 +15,14 @@ def add_rows(begin, columns, weights, x, out):
 
     Row i of the matrix has the weights[begin[i] : begin[i + 1]] in the columns of the same places.
     """
+    if out.shape[1] <= FEW:
+        for j in range(out.shape[1]):
+            for i in range(out.shape[0]):
+                total = out[i, j]
+                for k in range(begin[i], begin[i + 1]):
+                    total += weights[k] * x[columns[k], j]
+                out[i, j] = total
+        return
     for i in range(out.shape[0]):
         for k in range(begin[i], begin[i + 1]):
             c, w = columns[k], weights[k]
@@ -43,76 +53,65 @@ def is_definite(band):
 
 
 @inner
-def bracket(x, at, first, last):
-    """The two of x[first] .. x[last] that interpolation at a place uses, and the weight of the second."""
-    low, high = first, last + 1
-    while low < high:
-        middle = (low + high) // 2
-        if x[middle] < at:
-            low = middle + 1
-        else:
-            high = middle
+def bracket(x, at, first, last, near):
+    """The two of x[first] .. x[last] that interpolation at a place uses, and the weight of the second.
+
+    near: the first of the two at a place nearby, where the search begins: places rise along a line.
+    """
+    low = min(max(near, first), last) + 1
+    while low > first and not x[low - 1] < at:
+        low -= 1
+    while low <= last and x[low] < at:
+        low += 1
     left = max(min(low - 1, last - 1), first)
     right = min(left + 1, last)
     return left, right, (at - x[left]) / (x[right] - x[left]) if left < right else 0.0
 
 
-@inner
-def put_row(count, columns, weights, at, out_columns, out_weights):
-    """The first `count` weights of a row behind `at`, by column: those at the same one add up, and zeros go; the end."""
-    for i in range(1, count):
-        c, w, k = columns[i], weights[i], i
-        while k > 0 and columns[k - 1] > c:
-            columns[k], weights[k] = columns[k - 1], weights[k - 1]
-            k -= 1
-        columns[k], weights[k] = c, w
-    for i in range(count):
-        if i + 1 < count and columns[i + 1] == columns[i]:
-            weights[i + 1] += weights[i]
-        elif weights[i] != 0.0:
-            out_columns[at], out_weights[at] = columns[i], weights[i]
-            at += 1
-    return at
-
-
 @kernel
-def linear_rows(x, places, first, last, shift, work_columns, work_weights, begin, columns, weights):
+def linear_rows(x, places, first, last, shift, begin, columns, weights):
     """Rows (outputs.output_grid.Rows) of linear interpolation along x[first] .. x[last], and beyond, at places (ns,).
 
-    shift: (ns,) added to columns; work_columns, work_weights: (10,); begin: (ns+1,) and columns, weights (2 ns,) written.
+    shift: (ns,) added to columns; begin: (ns+1,) and columns, weights (2 ns,) written.
     """
-    at = 0
+    at = left = 0
     for g in range(places.shape[0]):
         begin[g] = at
-        left, right, p = bracket(x, places[g], first[g], last[g])
-        work_columns[0], work_columns[1] = left + shift[g], right + shift[g]
-        work_weights[0], work_weights[1] = 1.0 - p, p
-        at = put_row(2, work_columns, work_weights, at, columns, weights)
+        left, right, p = bracket(x, places[g], first[g], last[g], left)
+        if p != 1.0:
+            columns[at], weights[at] = left + shift[g], 1.0 - p
+            at += 1
+        if p != 0.0:
+            columns[at], weights[at] = right + shift[g], p
+            at += 1
     begin[places.shape[0]] = at
 
 
 @kernel
-def cubic_rows(x, middles, places, first, last, work_columns, work_weights, begin, columns, weights):
+def cubic_rows(x, middles, places, first, last, weight, begin, columns, weights):
     """Rows of the Hermite interpolation along the nodes x[first] .. x[last], with the slopes of parabolas there.
 
-    middles: of the cells; columns, weights: (10 ns,); the rest as of linear_rows.
+    middles: of the cells; weight: (4,) of the two nodes beside a place and of the next ones, work array; columns,
+    weights: (4 ns,); the rest as of linear_rows.
     """
-    at = 0
+    at = left = 0
     for g in range(places.shape[0]):
         begin[g] = at
-        left, right, p = bracket(x, places[g], first[g], last[g])
+        left, right, p = bracket(x, places[g], first[g], last[g], left)
         H, q = x[right] - x[left], 1.0 - p
-        work_columns[0], work_columns[1] = left, right
-        work_weights[0], work_weights[1] = q * q * (3.0 - 2.0 * q), p * p * (3.0 - 2.0 * p)
-        k = 2
+        weight[0] = weight[3] = 0.0
+        weight[1] = q * q * (3.0 - 2.0 * q)
+        weight[2] = p * p * (3.0 - 2.0 * p)
         for side in range(2):
             node, part = (right, -(H * q * p * p)) if side else (left, H * q * p * q)
-            a, b, share = bracket(middles, x[node], first[g], last[g] - 1)
+            a, b, share = bracket(middles, x[node], first[g], last[g] - 1, node - 1)
             for end in range(2):
                 cell, w = (b, share) if end else (a, 1.0 - share)
                 w *= part / (x[cell + 1] - x[cell])
-                work_columns[k], work_weights[k] = cell, -w
-                work_columns[k + 1], work_weights[k + 1] = cell + 1, w
-                k += 2
-        at = put_row(10, work_columns, work_weights, at, columns, weights)
+                weight[cell - left + 1] -= w
+                weight[cell - left + 2] += w
+        for k in range(4):
+            if weight[k] != 0.0:
+                columns[at], weights[at] = left - 1 + k, weight[k]
+                at += 1
     begin[places.shape[0]] = at

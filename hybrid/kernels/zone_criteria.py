@@ -38,7 +38,7 @@ from hybrid.kernels.cell_errors import (
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.criteria import BEND, CLAMP, EDGE, POINT, SLACK, TORSION
 from hybrid.kernels.element import relative_rotation
-from hybrid.kernels.forces import SEABED
+from hybrid.kernels.forces import PLANAR, SEABED
 from hybrid.kernels.rotations import cross, dot, frame, log_rotation, sub, transport
 from hybrid.kernels.state import Floats
 from hybrid.kernels.tension_torque import rest_strain
@@ -102,8 +102,10 @@ def find_turns(line, tangents, e, a1, T, torque, kinds):
         twisting[i] = torque
         twist[i] = abs(torque) / kinds.GJ[i] if kinds.GJ[i] > 0.0 else 0.0
         if line.element[i]:
-            b, carried = get3(a1, i), transport(get3(a1, i - 1), d0, d1)
-            angle = math.atan2(dot(cross(carried, b), d1), dot(carried, b))
+            angle = 0.0
+            if not line.bits & PLANAR:  # in a plane nothing twists
+                b, carried = get3(a1, i), transport(get3(a1, i - 1), d0, d1)
+                angle = math.atan2(dot(cross(carried, b), d1), dot(carried, b))
             twisting[i] = line.kb[i, 2] * (angle - rest_strain(line, T, i)[2])
             twist[i] = abs(angle) / line.hn[i] if kinds.GJ[i] > 0.0 else 0.0
     d0 = get3(tangents, 1)

@@ -388,6 +388,14 @@ def plan_nodes(table):
 
 
 @kernel
+def plan_next(table):
+    """`plan_nodes` between two steps of a run, for the state that it has come to."""
+    job = read(table)
+    clock, state = job.zones.clock, job.new if job.counts[b.PARITY] else job.old
+    plan_cells(job.line, job.sea, state, job.zones, clock[DT], clock[FINENESS])
+
+
+@kernel
 def follow_zones(table):
     """What zones do in the present phase of a run, before a try, after it, after a step; 1: Python must look at it."""
     job = read(table)

@@ -43,8 +43,8 @@ class Rows(NamedTuple):
 
 def _rows(count: int, most: int, make: Callable[..., None], *given: Any) -> Rows:
     """Rows for so many points with at most `most` weights each, from a kernel."""
-    begin, columns, weights = np.zeros(count + 1, np.int64), np.zeros(most * count, np.int64), np.zeros(most * count)
-    make(*given, np.zeros(10, np.int64), np.zeros(10), begin, columns, weights)
+    begin, columns, weights = np.empty(count + 1, np.int64), np.empty(most * count, np.int64), np.empty(most * count)
+    make(*given, begin, columns, weights)
     return Rows(begin, columns[: begin[-1]], weights[: begin[-1]])
 
 
@@ -162,8 +162,8 @@ class Grid:
     @cached_property
     def nodes(self) -> Rows:
         """Hermite, with slopes of parabolas through the three nearest nodes; of one cell alone there is no other."""
-        given = (self._x, self._middles, self.s, self._first, self._last)
-        return _rows(self.s.size, 10, cubic_rows, *given)
+        given = (self._x, self._middles, self.s, self._first, self._last, np.empty(4))
+        return _rows(self.s.size, 4, cubic_rows, *given)
 
     @cached_property
     def cells(self) -> Rows:

@@ -41,6 +41,7 @@ from hybrid.kernels.zone_step import blank_zone_job
 from hybrid.kernels.zone_switch import AFTER, BEFORE, NUMBERS, begin_switch, blank_switch_job, end_switch
 from hybrid.kernels.zone_transfer import Match, Transfer
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
+from hybrid.model.mesh import Zone
 from hybrid.model.sea import Surroundings
 from hybrid.simulation.cell_arrays import (
     REST_OF_SEA,
@@ -88,6 +89,7 @@ class CellChanges:
         self._room_for_places = np.zeros(self.most + 1 + extra), np.zeros(self.most + 1 + extra, np.int64)
         self._match = Room(Packed(blank_joined), self.most), Room(Packed(blank_single), self.most)
         self._following, self._review = Table(f.blank_following_job), Table(blank_review_job)
+        self._rods_then: list[tuple[int, np.ndarray]] = []  # rods (n,) of the outputs that waited, up to so many
         self._waiting, self._places = np.zeros((MOST_WAITING, 3), np.int64), np.zeros(MOST_PLACES, np.int64)
         self.adopted, self._synced = False, -1  # number of changes that Python knows of
         self._shifts = np.zeros(1, bool)
@@ -240,7 +242,7 @@ class CellChanges:
             zone_table=self._switching.table.numbers, base=manager.layout.base, given=manager.given.astype(np.int64),
             off=OFF, calm=np.zeros(n), wait=np.zeros(n), flags=np.zeros((4, n), bool), shortest=manager.shortest,
             dwell=float(manager.dwell), parts=BUFFER, light=1e-9 * manager.scale, forced=FORCED_RATIO,
-            pause=(1.0 / REVIEWS - 1e-9) * manager.pace,
+            pace=float(manager.pace), pause=1.0 / REVIEWS,
         )  # fmt: skip
 
     def _bind_following(
@@ -332,8 +334,8 @@ class CellChanges:
         self._at[f.ALONE], self._at[f.MAY_WAIT] = self.alone, self._owner.outputs_may_wait
         manager = self._switching.manager
         self._review.bind(
-            calm_since=manager.calm_since, patience=manager.patience, seen=manager.seen, buffer=manager.buffer,
-            held=int(manager.held),
+            calm_since=manager.calm_since, calmed=manager.calmed, patience=manager.patience, seen=manager.seen,
+            buffer=manager.buffer, held=int(manager.held),
         )  # fmt: skip
         code = self._run.go(lambda: int(f.go_on(self._following.numbers, reviewed)))
         self._run.set_quota(self.cells)
@@ -364,17 +366,33 @@ class CellChanges:
 
     def change_zones(self, change: Change) -> float:
         """Other zones, with the cells that go with them; the energy, J, that is booked for it."""
-        owner, switching, t = self._owner, self._switching, self._run.t
-        ends, sea = owner.model.ends.at(t), owner.model.sea.at(t)
+        booked = self._to_zones(change)
+        self.sync()
+        return booked
+
+    def change_zones_between(self, change: Change) -> float | None:
+        """The same after a step that asks for nothing else, before `sync`: the outputs of the zones of now wait.
+
+        None: there is no room for these, and nothing has changed.
+        """
+        if not f.cells_may_change(self._following.numbers):
+            return None
+        f.leave_cells(self._following.numbers)
+        if self.waits:
+            self._rods_then.append((int(self._at[f.WAITING]), self._switching.zones.rod.copy()))
+        return self._to_zones(change)
+
+    def _to_zones(self, change: Change) -> float:
+        """Other zones, of which Python's model knows nothing yet, and the energy, J, that is booked for it."""
+        switching, manager, t = self._switching, self._switching.manager, self._run.t
         switching.zones.next_rod[:] = change.rod
-        if switching.plan(change.rod, sea, ends, self._run.state) is None:
-            switching.zones.plan[:] = np.append(np.repeat(change.rod, switching.zones.parts), True)
-        for k, clamp in enumerate(switching.clamps(ends)):
+        z.plan_next(switching.table.numbers)
+        for k, clamp in enumerate(switching.clamps(self._owner.model.ends.at(t))):
             self._held[k] = clamp is not None
             if clamp is not None:
                 self._clamps[k] = clamp
-        booked = self.change(lambda: switching.manager.adopt_rods(change.rod, change, t))
-        self.sync()
+        booked = self.change(lambda: manager.adopt_rods(change.rod, change, t))
+        manager.take(manager.layout._replace(rod=change.rod.copy()), self._on.zones(self.side, self.cells))
         switching.limit_steps(self._run)
         return booked
 
@@ -393,30 +411,36 @@ class CellChanges:
 
     # --- outputs that wait --------------------------------------------------------------------------
 
-    def waiting(self) -> Iterator[tuple[Line, Batch]]:
-        """Outputs of cells of before, with the lines that they are of, in arrays that the next one overwrites."""
-        begin = 0
-        for offset, count, cells in self._waiting[: self._at[f.WAITING]].tolist():
-            line = self._line_of(self._places[begin : begin + cells + 1])
+    def waiting(self) -> Iterator[tuple[Line, Batch, tuple[Zone, ...]]]:
+        """Outputs of cells of before, with the lines and zones that they are of, in arrays that the next overwrites."""
+        layout, begin, zones = self._owner.model.layout, 0, None
+        assert layout is not None
+        then = [*self._rods_then, (MOST_WAITING, self._switching.zones.rod)]
+        for i, (offset, count, cells) in enumerate(self._waiting[: self._at[f.WAITING]].tolist()):
+            if zones is None or i == then[0][0]:
+                while i >= then[0][0]:
+                    del then[0]
+                zones = layout._replace(rod=then[0][1]).zones
+            line = self._line_of(self._places[begin : begin + cells + 1], then[0][1])
             size = sample_size(cells, True)
             rows = self._on.samples[offset : offset + count * size].reshape(count, size)
             begin += cells + 1
-            yield line, self._run.batch_of(rows, cells, self._owner.model.ends.values)
+            yield line, self._run.batch_of(rows, cells, self._owner.model.ends.values), zones
 
-    def _line_of(self, places: np.ndarray) -> Line:
-        """The line with nodes at these places of the finest mesh, in the arrays that are not in use."""
+    def _line_of(self, places: np.ndarray, rod: np.ndarray) -> Line:
+        """The line with nodes at these places of the finest mesh, in the arrays that are not in use; rod: (n,)."""
         k, m, starts = 1 - self.side, places.size - 1, self._starts
         at, table = self._on.layout(k, m), self._lines[k].table.numbers
         at.place[:], at.s[:] = places, self._finest[places]
         at.of[:] = np.searchsorted(starts, places[:-1], "right") - 1
-        at.rods[:] = self._switching.zones.rod[at.of]
+        at.rods[:] = rod[at.of]
         table[:] = np.array([1, 0, m]) @ self._lines[k].numbers
         fill_line(table)
         return self._on.line(k, m)
 
     def empty(self) -> None:
         """No output waits any longer."""
-        waits = self.waits
+        waits, self._rods_then = self.waits, []
         self._at[[f.WAITING, f.PLACED, f.USED]] = 0
         if waits and self.adopted:
             self._synced = -1

@@ -10,25 +10,29 @@ from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.cell_errors import CURVATURE, MOMENT, TENSION
+from hybrid.kernels.cell_lengths import CALM_STEPS
 from hybrid.kernels.forces import PLANAR, SELF_CONTACT
 from hybrid.kernels.state import Ends, Line, State
 from hybrid.kernels.torque_transfer import carry_torque
 from hybrid.model.bending_reference import LEFT
 from hybrid.model.build import Model, given_zones
-from hybrid.model.coarsen import picked
+from hybrid.model.coarsen import FEWER, picked, refined
 from hybrid.model.layout import Layout
 from hybrid.model.payout_law import fastest
 from hybrid.model.resolution import Resolution, follows_curvature, requested_accuracy
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.contact_equilibrium import nearness, settled_from
-from hybrid.simulation.equilibrium import equilibrium_of, solve_model
+from hybrid.simulation.equilibrium import MANY, equilibrium_of, solve_model
 from hybrid.simulation.payout_zones import rods_at_winch
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
 from hybrid.solve.statics import Equilibrium
 
 # Hold time of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps.
 HOLD, LEAST_STEPS_HELD = 0.25, 20
+# Where cells follow the curvature a rod that bends little has cells as long as a catenary: only so many steps without
+# bending save what a change of zones costs.
+STEPS_THAT_PAY = 1000
 # Bending comes and goes no slower than in so many times that, and no faster than in so many steps, whatever is asked.
 SLOWEST, FASTEST = 2.0, 10
 # Parts of the tolerance at which zones for an equilibrium are sought, before all becomes rod.
@@ -45,11 +49,70 @@ def zones_at_start(
     """Zones, equilibrium if one is asked for, and what will move the zones."""
     assert isinstance(scene.model, AdaptiveModel)
     manager, equilibrium = manager_for(scene, model, resolution, criterion), None
-    if at_rest or scene.initial.kind == "equilibrium":
+    follows = follows_curvature(scene) and not at_rest and model.payout is None
+    if follows and scene.initial.kind == "equilibrium":
+        model, equilibrium = _with_followed_cells(scene, model, manager, t)
+    elif at_rest or scene.initial.kind == "equilibrium":
         model, equilibrium = equilibrium_zones(model, manager, t, equilibrium_of(scene, model, t))
     else:
         model = zones_without_equilibrium(model, manager)
     return model, equilibrium, ZoneSwitching(model, manager, loaded=scene.model.joint == "curvature")
+
+
+def _with_followed_cells(scene: Scene, model: Model, manager: DomainManager, t: float) -> tuple[Model, Equilibrium]:
+    """Equilibrium of a line whose cells follow the curvature, on the cells that it asks for; rod wherever it may be.
+
+    A line that touches itself, is turned, or has no equilibrium on these cells, begins on the shortest ones.
+    """
+    assert model.layout is not None
+    free = manager.given >= 0
+    if free.all() and not scene.ends.turns and not model.line.bits & SELF_CONTACT:
+        try:
+            fewer = _with_fewer_cells(model)
+            found = equilibrium_of(scene, fewer, t)
+            if not found.touch.size:
+                return _on_planned_cells(fewer, found, manager, t)
+        except ComputationError:
+            manager.set_layout(model.layout)
+    found = equilibrium_of(scene, model, t)
+    if not free.all():
+        fewer = on_layout(model, model.layout._replace(rod=free))
+        found = _equilibrium(fewer, t, _on_fewer(found.state, model.line, fewer.line, model.ends.at(t)), found)
+        assert fewer.layout is not None
+        manager.set_layout(fewer.layout)
+        return fewer, found
+    return model, found
+
+
+def _with_fewer_cells(model: Model) -> Model:
+    """All rod, with every fourth node of the finest mesh where that has many cells: its equilibrium is found sooner."""
+    assert model.layout is not None
+    here, ends = np.zeros(model.layout.starts[-1] + 1, bool), model.ends.values
+    here[:: FEWER if model.cells > MANY else 1] = True
+    new = on_layout(model, model.layout._replace(here=here))
+    others = tuple((name, _on_fewer(x, model.line, new.line, ends)) for name, x in model.other_starts)
+    return replace(new, start=_on_fewer(model.start, model.line, new.line, ends), other_starts=others)
+
+
+def _on_planned_cells(model: Model, found: Equilibrium, manager: DomainManager, t: float) -> tuple[Model, Equilibrium]:
+    """The equilibrium with cells as its curvature asks for, from one with others; ComputationError: there is none."""
+    sea, ends, before = model.sea.at(t), model.ends.at(t), None
+    for _ in range(MOST_ROUNDS):
+        assert model.layout is not None
+        manager.set_layout(model.layout)
+        manager.evaluate_criteria(model.line, sea, ends, found.state, 0.0)
+        switching = ZoneSwitching(model, manager)
+        for _ in range(CALM_STEPS):  # for which cells must have been too short
+            here = switching.plan(model.layout.rod, sea, ends, found.state)
+        manager.reset()
+        manager.zones.calm[:] = 0
+        if before is not None and not (here & ~before).any():
+            return model, found
+        before = here if before is None else here | before
+        new = on_layout(model, model.layout._replace(here=before))
+        answer = _equilibrium(new, t, refined(found.state, model.line, new.line), found)
+        model, found = new, answer
+    raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "cells become shorter and shorter")
 
 
 def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: UserCriterion | None) -> DomainManager:
@@ -61,6 +124,8 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
     hold = wanted.hold_time if wanted.hold_time is not None else pace
     curvature_error = wanted.curvature_error if follows_curvature(scene) else None
     ramp = min(max(hold, FASTEST * step), SLOWEST * pace)
+    if curvature_error is not None and wanted.hold_time is None:
+        hold = max(hold, STEPS_THAT_PAY * resolution.step)
     manager = DomainManager(
         model.cable, model.layout, resolution.zones * model.length, hold, _given(scene, model, ramp),
         model.tension_scale, criterion, ramp,

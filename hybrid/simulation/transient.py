@@ -185,7 +185,7 @@ class Transient:
     def waiting(self) -> Iterator[list[Output]]:
         """Outputs before those in the buffer of the run, of cells that have changed since; `empty` when done."""
         if self._cells is not None:
-            yield from (outputs_in(batch, line, self.model.zones) for line, batch in self._cells.waiting())
+            yield from (outputs_in(batch, line, zones) for line, batch, zones in self._cells.waiting())
         if self._nodes is not None:
             yield from self._nodes.waiting()
 
@@ -356,16 +356,21 @@ class Transient:
         nodes = self._changes_of_nodes()
         if nodes is not None:
             return nodes.go()
-        cells = self._changes_of_cells()
-        if cells is None:
+        cells, switching = self._changes_of_cells(), self.switching
+        if cells is None or switching is None:
             return self.run.go()
         code = cells.go()
         while code == b.STEPPED and cells.unwatched():
-            if cells.review_due():
-                self._reviewed = cells.review()
-                if self._reviewed is not None:
-                    break
-            code = cells.go(reviewed=True)
+            change = cells.review() if cells.review_due() else None
+            booked = cells.change_zones_between(change) if change is not None else None
+            if change is None:
+                code = cells.go(reviewed=True)
+            elif booked is not None:
+                note_change(self.events, switching.manager.layout.base, self.t, change, booked)
+                code = cells.go()
+            else:
+                self._reviewed = change
+                break
         cells.sync()
         return code
 

@@ -49,7 +49,8 @@ def there(s: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     All nodes are among them, but for those that move with the winch of a line that is paid out.
     """
     bits = np.zeros(-(-s.size // 64) * 64, np.uint8)
-    bits[: s.size] = np.isin(s, nodes)
+    at = np.minimum(np.searchsorted(s, nodes), s.size - 1)
+    bits[at[s[at] == nodes]] = 1
     return np.packbits(bits, bitorder="little").view("<i8").astype(np.int64)
 
 

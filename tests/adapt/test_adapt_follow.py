@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from problems import order
 
 import hybrid
 from hybrid.adapt.manager import Change, DomainManager
+from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels import binding
 from hybrid.kernels import books as b
 from hybrid.kernels import zone_step as z
@@ -20,6 +22,7 @@ from hybrid.kernels.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.state import no_sea
 from hybrid.kernels.zone_step import blank_zone_job, plan_nodes, take_arcs
 from hybrid.outputs.probes import Observer
+from hybrid.simulation import initial_zones
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.initial_zones import shares_asked
 from hybrid.simulation.transient import Transient
@@ -32,6 +35,7 @@ TOUCHDOWN = (
     "output.errors=false", "output.points=501", "output.every=1", "time.duration=20",
     "model={kind: adaptive, force_rod: [[0, 250]], curvature_error: 0.03}", "mesh={cells: 24}",
 )  # fmt: skip
+ZONES = "model={kind: adaptive, curvature_error: 0.05, hold_time: 2.0}"  # by themselves they would not pay so soon
 
 
 def planned(curvature_error, shape, n=8, parts=64, length=10.0, twist=None, rod=True):
@@ -137,7 +141,7 @@ def test_a_mesh_that_moves_with_the_touchdown(following: hybrid.Result) -> None:
     )
     most = rod.curvature.max()
     cells = [mesh.kinds.size for mesh in following.mesh][2:]
-    assert max(cells) < 140
+    assert max(cells) < 150 and np.mean(cells) < 125
     assert np.abs(following.curvature - rod.curvature)[2:].max() < 0.07 * most
     assert np.abs(following.tension - rod.tension)[:, -1].max() < 5e-3 * rod.tension[:, -1].mean()
     assert np.abs(following.position - rod.position).max() < 2e-4 * 250.0
@@ -172,7 +176,7 @@ def test_changes_in_arrays_made_once_are_those_of_new_arrays(friction: str, monk
 
     In arrays made once outputs of other cells are looked at together, and are what each is alone.
     """
-    sets = [*TOUCHDOWN, "time.duration=8", "model={kind: adaptive, curvature_error: 0.05}", "output.every=0.1"]
+    sets = [*TOUCHDOWN, "time.duration=8", ZONES, "output.every=0.1"]
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*sets, friction] if friction else sets)
     together = []
 
@@ -243,7 +247,10 @@ def short():
 
 
 def test_quantities_asked_for_by_name_are_those_of_every_step_where_cells_change() -> None:
-    """With an output at every step, extremes over all steps are those of the outputs."""
+    """With an output at every step, extremes over all steps are those of the outputs.
+
+    A change of cells follows the output of a step, and what it leads to counts as well: forces then are off by 1e-6.
+    """
     asked = "{angle: {kind: declination, end: end}, lay: {kind: layback, end: end, to: touchdown}, "
     asked += "gap: {kind: clearance, point: [150, 0, -50], diameter: 0.1}, up: {kind: vertical_force, end: end}}"
     sets = [*SHORT, "ends.end.motion.ramp=4.0", "time.step=0.1", f"output.quantities={asked}"]
@@ -251,7 +258,8 @@ def test_quantities_asked_for_by_name_are_those_of_every_step_where_cells_change
     assert len({mesh.s.size for mesh in result.mesh}) > 3 and np.allclose(result["steps/t"], result.t[1:])
     for name in ("angle", "lay", "gap", "up"):
         values = result[name]
-        np.testing.assert_allclose(result[f"extremes/{name}"], [values.min(), values.max()], rtol=1e-8, err_msg=name)
+        found, rtol = result[f"extremes/{name}"], 1e-5 if name == "up" else 1e-8
+        np.testing.assert_allclose(found, [values.min(), values.max()], rtol=rtol, err_msg=name)
         at = [values.argmin(), values.argmax()]
         np.testing.assert_allclose(result[f"extremes/t/{name}"], result.t[at], atol=1e-9, err_msg=name)
 
@@ -297,11 +305,17 @@ def test_a_run_seldom_returns_from_compiled_code(short: hybrid.Result, monkeypat
         np.testing.assert_array_equal(found[name], short[name], err_msg=name)
 
 
-def test_cells_that_become_one_in_a_layer_do_not_kick_the_end_force() -> None:
+def test_cells_that_become_one_in_a_layer_do_not_kick_the_end_force(monkeypatch: pytest.MonkeyPatch) -> None:
     """After each step it is near to the cubic through the four beside it: within 0.3 % of its mean.
 
-    Two cells of the clamp's layer that became one where the curvature doubles made it 1.6 %.
+    Two cells of the clamp's layer that became one where the curvature doubles made it 1.6 %.  (The motion begins on the
+    shortest cells, so that there are some to become one.)
     """
+
+    def nowhere(*_: object) -> NoReturn:
+        raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "no equilibrium on longer cells")
+
+    monkeypatch.setattr(initial_zones, "_on_planned_cells", nowhere)
     result = hybrid.run(
         bight()
         | {
@@ -365,7 +379,7 @@ def test_outputs_that_wait_are_not_lost_with_the_arrays_they_wait_in(
 
 def test_kinds_and_cells_keep_the_share() -> None:
     """Where kinds follow as well, the field of curvature is within about what is asked, joints and pins included."""
-    scene = [*TOUCHDOWN[:4], "model={kind: adaptive, curvature_error: 0.05}", "mesh={cells: 24}", "output.every=0.5"]
+    scene = [*TOUCHDOWN[:4], ZONES, "mesh={cells: 24}", "output.every=0.5"]
     found = hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", scene))
     rod = hybrid.run(
         hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*scene[:4], scene[-1], "model=rod", "mesh={cells: 1200}"])

@@ -16,7 +16,7 @@ from hybrid.kernels.self_contact_pairs import GRIPS, POINTS
 from hybrid.kernels.state import Line
 from hybrid.solve.self_contact import SelfContact
 
-FOLLOWING = {"kind": "adaptive", "curvature_error": 0.05}
+FOLLOWING = {"kind": "adaptive", "curvature_error": 0.05, "hold_time": 0.4}  # so that zones change as well
 
 
 def rubbing() -> hybrid.Scene:
