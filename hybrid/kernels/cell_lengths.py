@@ -35,7 +35,7 @@ from hybrid.kernels.zone_criteria import FORESEEN, depth, raise_ratio
 
 TURN = 0.3  # rad that a cell turns through
 TWIST = 0.25  # rad that a cell of a rod is twisted by: cells that stay have as much (model.build)
-SHORTEST_CELL = 0.6  # of l0
+SHORTEST_CELL, SHORTEST_SLACK = 0.6, 0.25  # of l0; where a line is slack, layers in motion are sharper than at rest
 JOINT_LAYER = 3.0  # of l0: over which a rod bends less beside a hinge, which is no bend of the line
 SHARP = 0.5  # rad: a kink that runs along a line may be as short as this over its curvature, which l0 at rest is not
 NEAR = 3  # nodes to either side whose curvature counts
@@ -55,17 +55,25 @@ SMOOTHED = 0.1  # part by which delta comes nearer to what it is, in a step: at 
 
 
 @inner
-def bending_length(kinds, T, i):
-    """l0 at node i."""
+def lowest_beside(kinds, T, i):
+    """The lowest tension beside node i, N, its floor at least."""
     n = T.shape[0]
-    low = min(T[max(i - 1, 0)], T[min(i, n - 1)])
-    return layer_length(kinds.EI[i], kinds.w[i], max(low, kinds.floor[i], 1e-300))
+    return max(min(T[max(i - 1, 0)], T[min(i, n - 1)]), kinds.floor[i], 1e-300)
 
 
 @inner
-def shortest_length(l0, kappa, limits, finer):
-    """Below which cells need not be: what a layer, or a kink on its way, of largest curvature kappa asks for."""
-    least = SHORTEST_CELL * l0 / finer
+def bending_length(kinds, T, i):
+    """l0 at node i."""
+    return layer_length(kinds.EI[i], kinds.w[i], lowest_beside(kinds, T, i))
+
+
+@inner
+def shortest_length(kinds, T, i, kappa, limits, finer):
+    """Below which cells at node i need not be: what a layer, or a kink on its way, of largest curvature kappa asks for."""
+    low = lowest_beside(kinds, T, i)
+    l0 = layer_length(kinds.EI[i], kinds.w[i], low)
+    slack = l0 * l0 * low < 0.99 * kinds.EI[i]  # weight, not tension, says what it is
+    least = (SHORTEST_SLACK if slack else SHORTEST_CELL) * l0 / finer
     if kappa > 0.0:
         least = min(least, 0.9 * math.sqrt(8.0 * limits[CURVATURE] / kappa) * min(l0, SHARP / kappa))
     return least
@@ -99,7 +107,7 @@ def wanted_length(kinds, T, bend, i, limits, finer):
     for k in range(max(i - NEAR, 1), min(i + NEAR + 1, n)):  # flanks of a kink are as sharp as it
         largest = max(largest, bend[k, KAPPA])
     W = length_by_turn(kinds, i, bend[i, KAPPA], bends, limits, finer)
-    return max(W, shortest_length(bending_length(kinds, T, i), largest, limits, finer))
+    return max(W, shortest_length(kinds, T, i, largest, limits, finer))
 
 
 @inner

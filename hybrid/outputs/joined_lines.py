@@ -60,10 +60,11 @@ class JoinedGrid(Grid):
         self.begin = np.cumsum([0, *(grid._x.size for grid in grids)])  # nodes before each line
         sides = np.cumsum([0, *(len(grid.side_nodes) for grid in grids)])
         self.parts = tuple(part for grid in grids for part in grid.parts)
-        self.spans, self.side_nodes = [], []
+        self.spans = []
         for grid, n, o in zip(grids, self.begin.tolist(), sides.tolist(), strict=False):
             self.spans += [(a + n, b + n, c + o) for a, b, c in grid.spans]
-            self.side_nodes += [x + n for x in grid.side_nodes]
+        before = np.repeat(self.begin[:-1], np.diff(sides))
+        self.side_nodes = np.concatenate([grid.side_nodes for grid in grids]) + before
         self.s, self._x = (np.concatenate([getattr(grid, name) for grid in grids]) for name in ("s", "_x"))
         points = [grid.s.size for grid in grids]
         self._before = np.repeat(self.begin[:-1], points)  # (ns,) of each point: nodes before its line
@@ -157,7 +158,7 @@ class JoinedObservation(Observation):
     def by_output(self, x: Floats, dims: Sequence[str]) -> Floats:
         if dims[:1] != ("s",):
             return super().by_output(x, dims)
-        return np.array(x[..., 0].reshape(self.batch.t.size, -1, *x.shape[1:-1]), order="C")
+        return np.ascontiguousarray(x[..., 0]).reshape(self.batch.t.size, -1, *x.shape[1:-1])
 
     def has_element(self, k: int) -> NDArray[np.bool_]:
         return self.line.element[self.begin[1:] - 1 if k else self.begin[:-1]] == 1

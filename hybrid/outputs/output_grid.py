@@ -103,7 +103,7 @@ class Grid:
         cuts = np.abs(nodes_s - bounds[:, None]).argmin(axis=1)  # their nodes
         # first node, last node, offset of the stretch's sides: every joint before it has one side more
         self.spans = [(a, b, a + i) for i, (a, b) in enumerate(pairwise(cuts.tolist()))]
-        self.side_nodes = [node for a, b, _ in self.spans for node in range(a, b + 1)]
+        self.side_nodes = np.concatenate([np.arange(a, b + 1) for a, b, _ in self.spans])
 
         self._cuts, self._kept = cuts, frozenset(kept)
         self._joints = bounds[1:-1] + (-1e-12 if after else 1e-12) * nodes_s[-1]

@@ -42,7 +42,7 @@ def ends_of(spans: Integers) -> SpanEnds:
 
 def strains(view: Observation) -> Floats:
     """Curvature and twist (n sides, 2, outputs), 1/m, of what was computed."""
-    nodes, spans = np.array(view.grid.side_nodes), np.array(view.grid.spans).reshape(-1, 3)
+    nodes, spans = view.grid.side_nodes, np.array(view.grid.spans).reshape(-1, 3)
     rods = np.array([zone.kind == "rod" for zone in view.grid.parts])
     of_rod = np.repeat(rods, spans[:, 1] - spans[:, 0] + 1)
     out = np.zeros((nodes.size, 2, view.columns))

@@ -74,6 +74,10 @@ class Shaped:
         """(3, size) fixed, for each old and each new cell."""
         return np.array([self._fixed, self._by_old, self._by_new])
 
+    def of(self, old: int, new: int) -> np.ndarray:
+        """(size,) for so many old and new cells."""
+        return np.asarray(self._fixed + old * self._by_old + new * self._by_new)
+
     def places(self, names: tuple[str, ...]) -> np.ndarray:
         """Where the numbers of some values are."""
         parts = [self.table.part(name) for name in names]

@@ -434,7 +434,7 @@ class CellChanges:
         at.place[:], at.s[:] = places, self._finest[places]
         at.of[:] = np.searchsorted(starts, places[:-1], "right") - 1
         at.rods[:] = rod[at.of]
-        table[:] = np.array([1, 0, m]) @ self._lines[k].numbers
+        table[:] = self._lines[k].of(0, m)
         fill_line(table)
         return self._on.line(k, m)
 
