@@ -137,7 +137,8 @@ def test_zones_that_move_have_the_cells_of_rods_where_curvature_is_not_asked():
 def test_rods_unless_others_cost_clearly_less():
     rod = Cost("rod", 100, 1.0)
     assert cheapest([rod, Cost("catenary", 100, 0.95)]).kind == "rod"
-    assert cheapest([rod, Cost("catenary", 100, 0.5), Cost("adaptive", 100, 0.4)]).kind == "adaptive"
+    assert cheapest([rod, Cost("catenary", 100, 0.5), Cost("adaptive", 100, 0.35)]).kind == "adaptive"
+    assert cheapest([rod, Cost("catenary", 100, 0.95), Cost("adaptive", 100, 0.5)]).kind == "rod"
     assert cheapest([rod, Cost("catenary", 100, 0.5, "an end is clamped")]).kind == "rod"
 
 
