@@ -87,6 +87,7 @@ class TimeLoop:
         self._cpu = clock.process_time()  # at the start of the run
         self.patient = False  # whether steps and outputs wait in the buffers of the run until these are full
         self._aside: list[tuple[Model, Output]] = []  # outputs that wait, each of a line of its own
+        self._nodes_aside = 0  # of all of these
         self._ratios: list[np.ndarray] = []  # (criteria, points) of outputs that wait, where criteria are written
         run.asks_samples = run.switching is not None and observer.writes_criteria
         self._kept = (-1, 0)  # steps and changes at the last checkpoint
@@ -267,8 +268,9 @@ class TimeLoop:
     def _put_aside(self, outputs: list[Output]) -> None:
         """Outputs of a line of the zones of now, to be recorded with others."""
         self._aside += [(self.run.model, x) for x in outputs]
+        self._nodes_aside += sum(x.line.s.size for x in outputs)
         self._note_torque()
-        if sum(x.line.s.size for _, x in self._aside) > MOST_ASIDE:
+        if self._nodes_aside > MOST_ASIDE:
             self._log()
             self._record_aside()
 
@@ -276,7 +278,7 @@ class TimeLoop:
         """Record what was put aside, and look at it."""
         if not self._aside:
             return
-        aside, self._aside = self._aside, []
+        aside, self._aside, self._nodes_aside = self._aside, [], 0
         outputs = [x for _, x in aside]
         observer, seen = self.observer.look_at(outputs)
         values = observer.values_of(seen)
