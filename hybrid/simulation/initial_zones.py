@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -30,9 +31,6 @@ from hybrid.solve.statics import Equilibrium
 
 # Hold time of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps.
 HOLD, LEAST_STEPS_HELD = 0.25, 20
-# Where cells follow the curvature a rod that bends little has cells as long as a catenary: only so many steps without
-# bending save what a change of zones costs.
-STEPS_THAT_PAY = 1000
 # Bending comes and goes no slower than in so many times that, and no faster than in so many steps, whatever is asked.
 SLOWEST, FASTEST = 2.0, 10
 # Parts of the tolerance at which zones for an equilibrium are sought, before all becomes rod.
@@ -124,8 +122,8 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
     hold = wanted.hold_time if wanted.hold_time is not None else pace
     curvature_error = wanted.curvature_error if follows_curvature(scene) else None
     ramp = min(max(hold, FASTEST * step), SLOWEST * pace)
-    if curvature_error is not None and wanted.hold_time is None:
-        hold = max(hold, STEPS_THAT_PAY * resolution.step)
+    if curvature_error is not None and wanted.hold_time is None and model.payout is None:
+        hold = math.inf  # a rod that bends little has cells as long as a catenary: a change of zones costs more
     manager = DomainManager(
         model.cable, model.layout, resolution.zones * model.length, hold, _given(scene, model, ramp),
         model.tension_scale, criterion, ramp,
