@@ -118,7 +118,6 @@ class ErrorController:
     next: Resolution | None = None  # of the result that is to be computed
     comparisons: tuple[RunSample, RunSample | None, RunSample | None] | None = None  # for the first result
     estimate: Estimate | None = None  # of the result as it is
-    statistics: dict[str, StatisticEstimate] = field(default_factory=dict)  # of extremes and deviations, if it moves
     scattered: list[str] = field(default_factory=list)  # end forces whose largest values are by chance: not judged
     excess: np.ndarray = field(default_factory=lambda: np.zeros(2))  # N, by which snaps may exceed the largest forces
     _ratio: float = np.inf  # of the error of the result to what is asked
@@ -126,6 +125,19 @@ class ErrorController:
     _lost: bool = False  # whether the runs to compare with are to be computed again
     _every: int = 1  # outputs to one of which the statistics are
     _notes: list[tuple[str, str]] = field(default_factory=list)
+    _statistics: dict[str, StatisticEstimate] = field(default_factory=dict)
+    _of_statistics: Callable[[], dict[str, StatisticEstimate]] | None = None  # what they are to be estimated by
+
+    @property
+    def statistics(self) -> dict[str, StatisticEstimate]:
+        """Errors of extremes and deviations, if it moves; estimated when asked for, as regular motions never do."""
+        if self._of_statistics is not None:
+            self._statistics, self._of_statistics = self._of_statistics(), None
+        return self._statistics
+
+    @statistics.setter
+    def statistics(self, found: dict[str, StatisticEstimate]) -> None:
+        self._statistics, self._of_statistics = found, None
 
     @property
     def notes(self) -> tuple[tuple[str, str], ...]:
@@ -238,8 +250,11 @@ class ErrorController:
     @property
     def _left_out(self) -> list[str]:
         """End forces whose largest values are not judged: they are by chance, or a snap may exceed them."""
-        allowed, found = self.allowed_force, self.statistics.get(LARGEST)
-        if self.scattered or not self.irregular or found is None or allowed is None or not self.excess.max() > allowed:
+        allowed = self.allowed_force
+        if self.scattered or not self.irregular or allowed is None or not self.excess.max() > allowed:
+            return self.scattered
+        found = self.statistics.get(LARGEST)
+        if found is None:
             return self.scattered
         return [name for raw, name in END_FORCES.items() if raw in found.order]  # a snap pulls at both
 
@@ -349,13 +364,13 @@ class ErrorController:
             self._renew_model_errors(estimate, resolution)
 
     def _set_statistics(self, result: RunSample, *comparisons: RunSample | None) -> None:
-        """Estimate the errors of extremes and standard deviations, by the outputs that all runs have."""
+        """What errors of extremes and standard deviations are estimated by: the outputs that all runs have."""
         if not self.moves or not (self.irregular or (self.asked is not None and not self.asked.instant)):
             return
         coarse, rough, coarsest = comparisons
         assert coarse is not None
         self._every = max(run.every for run in comparisons if run is not None)
-        self.statistics = estimates(result, coarse, rough, coarsest, self._every)
+        self._of_statistics = partial(estimates, result, coarse, rough, coarsest, self._every)
 
     def _renew_model_errors(self, estimate: Estimate, resolution: Resolution) -> None:
         """Zones are others than those whose model error is known: follow it on the mesh of the result."""

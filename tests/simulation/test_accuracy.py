@@ -17,7 +17,7 @@ from hybrid.model.build import build
 from hybrid.model.mesh_grading import GROWTH, SAMPLES, grading, layers
 from hybrid.model.resolution import RequestedAccuracy, Resolution, first_resolution, wants_errors
 from hybrid.scene.accuracy import amount
-from hybrid.simulation import error_estimate
+from hybrid.simulation import error_control, error_estimate
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.error_estimate import OF_SIZES, SAFETY, Errors, Estimate
 from hybrid.simulation.error_order import FORCE_ORDERS, LEAST_FORCE_ORDER, ORDER, ORDERS, confirmed_order
@@ -214,6 +214,20 @@ def test_what_hardly_finer_runs_differ_by_shows_no_order():
     far, hardly = (confirmed_order("reaction_end", 1.25, 2.0 * change, [(error, r)]) for r in (1.6, 1.4))
     assert (far, hardly) == (LEAST_FORCE_ORDER, FORCE_ORDERS[0])
     assert confirmed_order("reaction_end", 1.75, 2.0 * change, [(error, 1.6)]) == 1.75
+
+
+def test_statistics_are_estimated_where_a_motion_is_judged_by_them(monkeypatch):
+    """They took a twentieth of a run that is judged at every instant."""
+    made = []
+    monkeypatch.setattr(error_control, "estimates", lambda *runs: made.append(runs) or {})
+    hybrid.run(swinging(accuracy="10%", model="rod"))
+    assert not made
+    resolution = Resolution(1.0, 0.1, None, 1e-3)
+    runs = [sample(resolution, 100, 2.0), *(sample(resolution.coarser(2, k), 100 // k, 2.0) for k in (2, 4))]
+    control = ErrorController(RequestedAccuracy(1.0, None, None), Free(True, True, False), True, None, None)
+    control.comparisons = runs[1], runs[2], None
+    assert control.first_estimate(runs[0]) and not made
+    assert control.statistics == {} and len(made) == 1
 
 
 def test_a_run_is_refined_further_where_its_order_has_turned_out_lower():
