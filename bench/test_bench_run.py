@@ -150,7 +150,7 @@ def test_ten_thousand_cells(tmp_path: Path) -> None:
         for k in range(1, steps + 1):
             sea, ends, old, new, was, now = model.sea.at(0.1 * k), model.ends.at(0.1 * k), new, old, now, was
             outcome, iterations, *_ = entry.step(
-                line, sea, ends, old, new, 0.1, 0.1 * (k > 1), 0.5, stepper.limits, was, now, stepper.work
+                line, sea, ends, old, new, 0.1, 0.1 * (k > 1), 0.5, stepper.limits, was, now, stepper.work, 0.5
             )
             assert outcome == hybrid.Outcome.OK
             total += iterations

@@ -91,11 +91,12 @@ def test_catenary_suspension_stays_taut_and_ends_elsewhere() -> None:
     assert "bending_moment" not in result
 
 
-def test_a_blow_makes_the_catenary_slack_and_is_refused() -> None:
-    scene = hybrid.load_scene(EXAMPLES / "04_suspension_catenary.yaml", ["ends.end.force.ramp=0"])
-    with pytest.raises(hybrid.ComputationError) as stopped:
-        hybrid.run(scene)
-    assert stopped.value.outcome == hybrid.Outcome.SLACK
+def test_a_blow_on_the_catenary_is_taken_in_shorter_steps() -> None:
+    """As taut as with steps of 0.2 ms, which need no repeats: there the largest tension is 0.01283 N."""
+    scene = hybrid.load_scene(EXAMPLES / "04_suspension_catenary.yaml", ["ends.end.force.ramp=0", "time.duration=0.2"])
+    result = hybrid.run(scene)
+    assert result["steps/repeats"].sum() > 0 and not result.events
+    assert result.tension.max() == pytest.approx(0.01283, rel=5e-3) and result.tension[1:].min() > 2e-3
 
 
 def test_cantilever_is_bent_as_bisshopp_and_drucker_say_and_swings() -> None:

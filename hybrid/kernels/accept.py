@@ -18,6 +18,7 @@ from hybrid.kernels.books import (
     JUMPED,
     LARGEST_PEAK,
     LAST_DT,
+    LAST_RHO,
     LEAST_PEAK,
     LEAVES_PLANE,
     LETS_GO,
@@ -71,6 +72,7 @@ from hybrid.kernels.report import (
     SLACKEST,
     SLACKEST_CELL,
     TWIST,
+    USED_RHO,
     WRONG_PIVOTS,
 )
 from hybrid.kernels.sampling import end_frame, holds_twist, twist_at_end
@@ -154,7 +156,7 @@ def accept(line, ends, old, new, books, work, end, dt):
     clock, count, report = books.clock, books.counts, work.report
     clock[EARLIER_DT] = clock[LAST_DT] if clock[NOW] > clock[PREVIOUS] else 0.0
     count[PARITY] = 1 - count[PARITY]
-    clock[PREVIOUS], clock[NOW], clock[LAST_DT] = clock[NOW], end, dt
+    clock[PREVIOUS], clock[NOW], clock[LAST_DT], clock[LAST_RHO] = clock[NOW], end, dt, report[USED_RHO]
     count[STEPS] += 1
     count[ITERATIONS] = count[TRIES]
     for j in range(report.shape[0]):

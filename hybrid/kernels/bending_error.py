@@ -23,7 +23,16 @@ from numpy.typing import NDArray
 from hybrid.kernels.bed import bed_before, bed_beside, bed_under
 from hybrid.kernels.block_elimination import solve_again
 from hybrid.kernels.block_elimination_plane import solve_again_planar
-from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, LAST_DT, PARITY, RHO, STEP_BEFORE, UNKNOWN_ERROR
+from hybrid.kernels.books import (
+    CLOCK_SIZE,
+    COUNT_SIZE,
+    LAST_DT,
+    LAST_RHO,
+    PARITY,
+    RHO_BEFORE,
+    STEP_BEFORE,
+    UNKNOWN_ERROR,
+)
 from hybrid.kernels.cell import Chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import FRICTION, PLANAR, ROTARY, SEABED, STIFFNESS_DAMPING
@@ -394,7 +403,7 @@ def advance_error(table):
     moving = dt > 0.0
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if moving:
-        s = scheme(clock[RHO], clock[STEP_BEFORE], dt)
+        s = scheme(clock[LAST_RHO], clock[STEP_BEFORE], clock[RHO_BEFORE], dt)
     work = arrays.work
     history = History(work[0], work[1], work[2], old[0], arrays.slid, work[3], arrays.powers)
     found[FINITE], found[CLIPPED] = 1, 0

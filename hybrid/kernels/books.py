@@ -20,6 +20,7 @@ from hybrid.kernels.state import Floats
     LAST_DT,  # length of the step that led there; 0 after a start
     EARLIER_DT,  # length of the step before the last; 0: it is not known
     STEP_BEFORE,  # length of the step before that, as the weights of the scheme took it
+    LAST_RHO, RHO_BEFORE,  # spectral radii at infinity of these two steps
     STOP,  # where steps must end, and the call with them
     LEG_BEGIN, LEG_STEP,  # where equal steps to `STOP` began, and their length
     BEGIN, UNTIL,  # where the present step was begun, and where it should end
@@ -31,7 +32,7 @@ from hybrid.kernels.state import Floats
     TOLERANCE,  # m, error of position that a step may make
     NEXT_DT,  # chosen by the controller
     ERROR_RATIO,  # error over tolerance of the last accepted step
-    RHO,  # spectral radius at infinity
+    RHO,  # spectral radius at infinity of equal steps
     FLOOR,  # N, a catenary cell not above it refuses the step
     STORED,  # J, in the seabed
     SCALED_JUMP,  # N, jump of tension in a step that is worth a look
@@ -50,8 +51,8 @@ from hybrid.kernels.state import Floats
     CORRECTION,  # of the last try: next correction of Newton's method, as predicted
     RELEASE_START, RELEASE_END,  # N, force at which an end is let go; infinity: never
     NEAR_PLANE,  # m, distance from its plane below which a line in space has come back to it; 0: it never does
-) = range(41)  # fmt: skip
-CLOCK_SIZE = 41
+) = range(43)  # fmt: skip
+CLOCK_SIZE = 43
 
 # What `loaded` says of an end that carries a free point of several lines: forces on it are those of the line alone.
 CARRIED = 2

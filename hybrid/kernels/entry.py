@@ -102,10 +102,10 @@ def out_of_balance(line: Line, rows: Floats) -> Floats:
 
 def step(
     line: Line, sea: Sea, ends: Ends, old: State, new: State, dt: float, before: float, rho: float, limits: Limits,
-    was: Floats, now: Floats, work: Work,
+    was: Floats, now: Floats, work: Work, rho_before: float,
 ) -> tuple[int, int, float, int]:  # fmt: skip
     """One step in time from `old` to `new` (overwritten)."""
-    task = Task(STEP, dt, before, rho, 0.0, 0.0, False, limits)
+    task = Task(STEP, dt, before, rho, 0.0, 0.0, False, limits, False, rho_before)
     return _solve(task, line, sea, ends, old, new, was, now, work)
 
 

@@ -17,7 +17,7 @@ from hybrid.kernels.block_elimination_plane import substitute_planar
 from hybrid.kernels.compile import inner
 from hybrid.kernels.configuration import first_bad, measure, update
 from hybrid.kernels.forces import FRICTION
-from hybrid.kernels.generalized_alpha import Scheme, scheme
+from hybrid.kernels.generalized_alpha import Scheme, before_fixed, radius_of_step, scheme
 from hybrid.kernels.march import march
 from hybrid.kernels.references import caller, caller_of_six
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE, SELF_CONTACT_ENERGY
@@ -59,6 +59,8 @@ class Task(NamedTuple):
     turning: bool = False  # whether chords are turned instead of shifted (kernels.newton.update)
     limits: Limits = Limits(1.0, 1.0, 1)
     cut: bool = False  # whether a step is taken as the last iteration has left it, converged or not
+    rho_before: float = 0.0  # spectral radius of the step that led to its start
+    fixed: bool = False  # whether steps have a fixed length, but for parts of one
 
 
 # Newton stops when the next correction, predicted from the last two by quadratic
@@ -147,6 +149,18 @@ def most_turn(contact):
 
 
 @inner
+def with_radius(task, rho):
+    """The task of a step with its spectral radius where that of equal steps is rho."""
+    before, rho_before = task.before, task.rho_before
+    if task.fixed:
+        before, rho_before = before_fixed(task.dt, before, rho_before, rho)
+    rho = radius_of_step(rho, before, rho_before, task.dt)
+    return Task(
+        task.what, task.dt, before, rho, task.cv, task.ca, task.turning, task.limits, task.cut, rho_before, task.fixed
+    )  # fmt: skip
+
+
+@inner
 def start_step(plane, space, task, line, sea, old, new, work, contact, contact_table):
     """Predict the end of a step; the task with its spectral radius, its scheme, and the largest turn and its cell.
 
@@ -156,8 +170,8 @@ def start_step(plane, space, task, line, sea, old, new, work, contact, contact_t
     if contact[ADDRESS] != 0:
         safe = ask_contact(contact, contact_table, PREPARE)
         rho = ask_contact(contact, contact_table, RADIUS)
-    task = Task(task.what, task.dt, task.before, rho, task.cv, task.ca, task.turning, task.limits, task.cut)
-    s = scheme(rho, task.before, task.dt)
+    task = with_radius(task, rho)
+    s = scheme(task.rho, task.before, task.rho_before, task.dt)
     turn, where = begin_step(plane, space, line, sea, old, new, work.u, s, safe)
     return task, s, turn, where
 

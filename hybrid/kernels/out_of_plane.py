@@ -23,7 +23,6 @@ from typing import NamedTuple
 
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
-from hybrid.kernels.generalized_alpha import scheme
 from hybrid.kernels.loads import body_drag, half_cell_added_mass, half_cell_drag
 from hybrid.kernels.plane import (
     angle_between,
@@ -327,14 +326,13 @@ def substitute_push(line, ends, s, was, now, A):
 
 
 @kernel
-def step_out_of_plane(line, sea, ends, state, dt, before, rho, was, now, A):
-    """Step the push from `was` to `now` (N+1, 4) over a step dt, after one of `before`, that led to `state`.
+def step_out_of_plane(line, sea, ends, state, s, was, now, A):
+    """Step the push from `was` to `now` (N+1, 4) over the step of scheme s that led to `state`.
 
     A: work array with BAND numbers for each of 2 (N+1) equations, and for REACH more.  Returns the kinetic energy
     of the push at the end of the step, J, and how many pivots have the wrong sign: with one, it grows faster than the
     step can follow.
     """
-    s = scheme(rho, before, dt)
     rows = 2 * (state.e.shape[0] + 1)
     for j in range((rows + REACH) * BAND):  # with room for the rows that the last ones reach to
         A[j] = 0.0

@@ -296,7 +296,7 @@ def pay_out(table):
         if winch[TENSION] > 0.0:
             dt = clock[b.TRY_END] - clock[b.NOW]
             numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = predict(
-                winch, clock[b.RHO], clock[b.STEP_BEFORE], dt
+                winch, clock[b.RHO], clock[b.STEP_BEFORE], clock[b.RHO_BEFORE], dt
             )
         prepare(line, reel, clock[b.TRY_END])
         put_balance_on(line, reel, clock[b.TRY_END])

@@ -17,6 +17,7 @@ from hybrid.kernels import books as b
 from hybrid.kernels.axial_law import strain_and_energy
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import PLANAR
+from hybrid.kernels.generalized_alpha import lead
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.paid_length import amount_between, cell, length_at, node
 from hybrid.kernels.payout import slope_at, velocity_at
@@ -179,8 +180,8 @@ def place_of(line, reel, i):
 @inner
 def flow_at(reel, clock):
     """How material flows through the fairlead after an accepted step."""
-    t, dt, rho, winch = clock[b.NOW], clock[b.LAST_DT], clock[b.RHO], reel.winch
-    ahead = ((2.0 * rho - 1.0) / (rho + 1.0) - rho / (rho + 1.0)) * dt
+    t, winch = clock[b.NOW], reel.winch
+    ahead = lead(clock[b.LAST_RHO]) * clock[b.LAST_DT]
     if winch[TENSION] > 0.0:
         rate, acceleration = winch[RATE_NOW], winch[TRUE_NOW]
         return Flow(rate, acceleration, rate + ahead * acceleration, winch[ALGORITHMIC_NOW])

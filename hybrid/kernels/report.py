@@ -26,6 +26,7 @@ The assembly of every iteration clears and writes the first `ASSEMBLED` numbers,
     LENGTH_OUT, PAYOUT_RATE   unstretched length of a line that is paid out, and its rate      m, m/s
     PAYOUT_POWER              power of the winch on the line                                   W
     STRETCH_ENERGY            energy of stretch where an axial law is no straight line         J
+    USED_RHO                  spectral radius at infinity of the step                          -
 """
 
 from __future__ import annotations
@@ -44,4 +45,5 @@ LOCAL_ERROR, LOCAL_ERROR_NODE = 31, 32
 SELF_CONTACT_ENERGY, SELF_FRICTION_WORK = 33, 34
 LENGTH_OUT, PAYOUT_RATE, PAYOUT_POWER = 35, 36, 37
 STRETCH_ENERGY = 38
-REPORT_SIZE = 39
+USED_RHO = 39
+REPORT_SIZE = 40

@@ -37,7 +37,6 @@ from hybrid.kernels.books import (
     IS_CUT,
     ITERATIONS_CUT,
     JUDGE,
-    LAST_DT,
     LOG,
     MEETS_ITSELF,
     MOST_ITERATIONS,
@@ -53,6 +52,7 @@ from hybrid.kernels.books import (
     QUOTA,
     RATES,
     RHO,
+    RHO_BEFORE,
     ROWS,
     SAMPLE,
     SAMPLED,
@@ -98,7 +98,7 @@ from hybrid.kernels.state import (
     no_sea,
     no_work,
 )
-from hybrid.kernels.step_control import begin_step, end_of_try
+from hybrid.kernels.step_control import begin_step, end_of_try, take_past
 
 
 class Job(NamedTuple):
@@ -269,7 +269,8 @@ def solve_job(plane, space, job):
         if cut:
             left = job.books.counts[MOST_ITERATIONS] - job.books.counts[TAKEN]
             limits = Limits(limits.reach, limits.scale, min(left, limits.most))
-        task = Task(STEP, dt, clock[STEP_BEFORE], clock[RHO], 0.0, 0.0, False, limits, cut)
+        fixed = job.books.counts[CONTROLLED] == 0
+        task = Task(STEP, dt, clock[STEP_BEFORE], clock[RHO], 0.0, 0.0, False, limits, cut, clock[RHO_BEFORE], fixed)
     return solve(
         plane, space, task, job.line, job.sea, job.ends, old, new, was, now, job.work, job.books.strains, job.contact,
         job.contact_table, iterated, job.reel_table,
@@ -308,7 +309,7 @@ def run(table):
             sea_at(clock[TRY_END], sea)
             if job.zones != 0:
                 call_zones(job.zones, job.zone_table)
-            clock[STEP_BEFORE] = clock[LAST_DT] if count[CONTROLLED] else clock[TRY_END] - clock[NOW]
+            take_past(clock, count)
             if job.reel != 0:
                 call_reel(job.reel, job.reel_table)
             outcome, it, left, where = call_solver(job.solver, table)

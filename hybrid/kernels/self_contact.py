@@ -13,9 +13,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, NOW, PARITY, RATES, RHO, STEP_BEFORE, TRY_END
+from hybrid.kernels.books import (
+    CLOCK_SIZE,
+    CONTROLLED,
+    COUNT_SIZE,
+    NOW,
+    PARITY,
+    RATES,
+    RHO,
+    RHO_BEFORE,
+    STEP_BEFORE,
+    TRY_END,
+)
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.generalized_alpha import scheme
+from hybrid.kernels.generalized_alpha import before_fixed, radius_of_step, scheme
 from hybrid.kernels.newton import ASKED, FIND, FINISH, GAIN, LIMIT, NEAR, PREPARE, RADIUS, REST, TOUCH
 from hybrid.kernels.references import reader
 from hybrid.kernels.report import FORCE_A, REPORT_SIZE, SELF_FRICTION_WORK
@@ -126,7 +137,8 @@ def radius(contact, clock, near):
 def find_spins(line, contact, clock, near, old, new, u):
     """contact.x = shifts of nodes and spins of cells in the step that is tried."""
     x, dt = contact.x, clock[TRY_END] - clock[NOW]
-    cv = scheme(radius(contact, clock, near), clock[STEP_BEFORE], dt).cv
+    rho = radius_of_step(radius(contact, clock, near), clock[STEP_BEFORE], clock[RHO_BEFORE], dt)
+    cv = scheme(rho, clock[STEP_BEFORE], clock[RHO_BEFORE], dt).cv
     for i in range(u.shape[0]):
         for k in range(3):
             x[i, k] = u[i, k]
@@ -258,7 +270,12 @@ def contact_task(table):
             numbers[QUIET] = 0.0
         return contact.numbers[PART]
     if phase == RADIUS:
-        return radius(contact, job.clock, job.call[NEAR] != 0)
+        clock, rho = job.clock, radius(contact, job.clock, job.call[NEAR] != 0)
+        if not job.counts[CONTROLLED]:
+            clock[STEP_BEFORE], clock[RHO_BEFORE] = before_fixed(
+                clock[TRY_END] - clock[NOW], clock[STEP_BEFORE], clock[RHO_BEFORE], rho
+            )
+        return rho
     if phase == GAIN:
         if not puts_energy_in(line, ends, contact, job, job.clock, old, new, work):
             return 0.0

@@ -27,6 +27,7 @@ from hybrid.kernels.report import (
     SLACKEST_CELL,
     TWIST,
     TWIST_NODE,
+    USED_RHO,
     WRONG_PIVOTS,
 )
 from hybrid.kernels.resolution_checks import lowest, lowest_not_held, sharpest_in_plane, sharpest_in_space
@@ -246,8 +247,9 @@ def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, s
     else:
         report[SLACKEST], report[SLACKEST_CELL] = lowest(line, new.T)
     change, place = acceleration_change(old, new)
-    _, _, _, _, slip = weights(task.rho, task.before / dt)
-    report[LOCAL_ERROR], report[LOCAL_ERROR_NODE] = slip * dt * dt * change, place
+    _, _, _, _, part = weights(task.rho, task.rho_before, task.before / dt)
+    report[LOCAL_ERROR], report[LOCAL_ERROR_NODE] = part * dt * dt * change, place
+    report[USED_RHO] = task.rho
     if line.bits & SEABED:
         seabed_work(line, sea, old, new, u, report)
     if plane is not None:
@@ -255,9 +257,7 @@ def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, s
             n, A = was.shape[0], work.X
             if A.shape[0] > n * ROW:  # behind the factors that are kept
                 A = A[n * (TRIPLE + KEPT) :]
-            report[PUSH_ENERGY], report[WRONG_PIVOTS] = step_out_of_plane(
-                line, sea, ends, new, dt, task.before, task.rho, was, now, A
-            )
+            report[PUSH_ENERGY], report[WRONG_PIVOTS] = step_out_of_plane(line, sea, ends, new, s, was, now, A)
     if space is not None:
         spun, cell = largest_spin(line, ends, old, new, s)
         if not spun < LARGEST_STEP_TURN:

@@ -13,6 +13,8 @@ from hybrid.kernels.books import (
     CUT_STEP,
     ERROR_RATIO,
     LARGEST,
+    LAST_DT,
+    LAST_RHO,
     LEG_BEGIN,
     LEG_PART,
     LEG_PARTS,
@@ -21,16 +23,21 @@ from hybrid.kernels.books import (
     NEXT_DT,
     NOW,
     REPEATS,
+    RHO,
+    RHO_BEFORE,
     SHORTEST,
+    STEP_BEFORE,
     STOP,
     TAKEN,
     TOLERANCE,
     TRIED_DT,
+    TRY_END,
     UNTIL,
     WARY,
 )
 from hybrid.kernels.compile import inner
 from hybrid.kernels.end_motion import turn_between
+from hybrid.kernels.generalized_alpha import SAME, before_fixed
 
 # A fixed step that fails is halved so often: a factor of 1000 separates a hard moment from a hopeless one.
 HALVINGS = 10
@@ -57,14 +64,24 @@ def begin_step(clock, count):
 @inner
 def end_of_try(clock, moves):
     """Time at which the present try ends; earlier where an end of the cable would turn too far in it."""
-    left = clock[UNTIL] - clock[NOW]
-    end = clock[UNTIL] if left <= clock[TRIED_DT] * (1.0 + 1e-9) else clock[NOW] + clock[TRIED_DT]
+    end = clock[NOW] + clock[TRIED_DT]
+    if clock[UNTIL] - end <= SAME * clock[TRIED_DT]:  # what rounding of late times leaves is no step of its own
+        end = clock[UNTIL]
     angle = turn_between(clock[NOW], end, moves)
     while angle > clock[MOST_TURN]:
         clock[CUT_ANGLE], clock[CUT_STEP] = angle, end - clock[NOW]
         end = clock[NOW] + (end - clock[NOW]) / math.ceil(angle / clock[MOST_TURN])
         angle = turn_between(clock[NOW], end, moves)
     return end
+
+
+@inner
+def take_past(clock, count):
+    """Tell the scheme of the step before a try: its length, s, and its radius."""
+    length, radius = clock[LAST_DT], clock[LAST_RHO]
+    if not count[CONTROLLED]:
+        length, radius = before_fixed(clock[TRY_END] - clock[NOW], length, radius, clock[RHO])
+    clock[STEP_BEFORE], clock[RHO_BEFORE] = length, radius
 
 
 @inner

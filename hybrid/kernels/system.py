@@ -23,7 +23,7 @@ from hybrid.kernels.bodies import (
     size_of_moves,
     start_here,
 )
-from hybrid.kernels.books import CARRIED, NOW, RATES, RHO, SHORTEST, STEP_BEFORE, STORED, TRY_END
+from hybrid.kernels.books import CARRIED, NOW, RATES, RHO, RHO_BEFORE, SHORTEST, STEP_BEFORE, STORED, TRY_END
 from hybrid.kernels.carried_frames import turns
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.configuration import first_bad, measure, update
@@ -71,6 +71,7 @@ from hybrid.kernels.newton import (
     most_turn,
     pass_torque,
     round_off_tension,
+    with_radius,
 )
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.powers import book_work, find_powers
@@ -181,14 +182,18 @@ def prepare_contact(tables, task, t):
         if job.contact[ADDRESS] != 0:
             clock = job.books.clock
             clock[NOW], clock[TRY_END], clock[STEP_BEFORE], clock[RHO] = t - task.dt, t, task.before, task.rho
+            clock[RHO_BEFORE] = task.rho_before
             safe = min(safe, ask_contact(job.contact, job.contact_table, PREPARE))
             rho = min(rho, ask_contact(job.contact, job.contact_table, RADIUS))
+    common = with_radius(task, rho)
     for l in range(tables.shape[0]):
         job = read(tables[l])
         if job.contact[ADDRESS] != 0:  # so that each has that of all
             own = ask_contact(job.contact, job.contact_table, RADIUS)
+            clock = job.books.clock
             if own > rho:
-                job.books.clock[RHO] *= rho / own
+                clock[RHO] *= rho / own
+            clock[STEP_BEFORE], clock[RHO_BEFORE] = common.before, common.rho_before
     return safe, rho
 
 
@@ -394,8 +399,8 @@ def solve_system(
         safe, rho = 1.0, task.rho
         if touch != 0:
             safe, rho = prepare_contact(tables, task, t)
-        task = Task(task.what, task.dt, task.before, rho, task.cv, task.ca, task.turning, task.limits, task.cut)
-        s = scheme(rho, task.before, task.dt)
+        task = with_radius(task, rho)
+        s = scheme(task.rho, task.before, task.rho_before, task.dt)
         turn, line = predict_bodies(old, new, work, s)
         if not turn < LARGEST_STEP_TURN:
             return TURNED_TOO_FAR, 0, turn, -1, -1

@@ -25,7 +25,7 @@ from hybrid.kernels.block_elimination_plane import (
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner
 from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.generalized_alpha import scheme
+from hybrid.kernels.generalized_alpha import radius_of_step, scheme
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.plane import row_in_plane
 
@@ -69,9 +69,9 @@ def losses(winch, rate):
 
 
 @inner
-def predict(winch, rho, before, dt):
+def predict(winch, rho, before, rho_before, dt):
     """L, c and dc/dt at the end of a step, with the algorithmic acceleration kept (kernels.step.predict_nodes)."""
-    s = scheme(rho, before, dt)
+    s = scheme(radius_of_step(rho, before, rho_before, dt), before, rho_before, dt)
     winch[CV], winch[CA], winch[BE], winch[DT] = s.cv, s.ca, s.be, dt
     c, vd, a = winch[RATE_NOW], winch[TRUE_NOW], winch[ALGORITHMIC_NOW]
     length = winch[LENGTH_NOW] + dt * c + 0.5 * dt * dt * a

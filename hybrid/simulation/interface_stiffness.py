@@ -29,9 +29,10 @@ def interface_stiffness(run: Transient, k: int, step: float) -> Floats:
     """
     model, clock = run.model, run.run.clock
     dt, before = float(clock[b.LAST_DT]), float(clock[b.STEP_BEFORE])
+    rho, rho_before = float(clock[b.LAST_RHO]), float(clock[b.RHO_BEFORE])
     if not dt > 0.0:
-        dt, before = step, 0.0 if run.controlled else step
-    am, af, ga, be, _ = weights.py_func(run.rho, before / dt)
+        dt, before, rho, rho_before = step, 0.0 if run.controlled else step, run.rho, run.rho
+    am, af, ga, be, _ = weights.py_func(rho, rho_before, before / dt)
     cv, ca = ga / (be * dt), (1.0 - am) / ((1.0 - af) * be * dt * dt)
     line = model.line._replace(bits=model.line.bits & ~PLANAR)
     ends = model.ends.values

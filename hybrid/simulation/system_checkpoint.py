@@ -33,8 +33,8 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
     }
     body_work = run.solver.body_work[:, :SPRING]
     return {
-        "t": run.t, "steps": run.steps, "last": run.last_step, "loaded": run.loaded, "leg": [*run.leg],
-        "cpu": run.cpu, "dry": sorted(run.dry), "bodies": run.state.bodies, "body_work": body_work,
+        "t": run.t, "steps": run.steps, "last": run.last_step, "rho": run.last_rho, "loaded": run.loaded,
+        "leg": [*run.leg], "cpu": run.cpu, "dry": sorted(run.dry), "bodies": run.state.bodies, "body_work": body_work,
         "lines": lines, "broken": [*run.failures.broken], "rest": run.rest,
         "control": run.control.checkpoint() if run.control is not None else [],
         "quantities": run.quantities.checkpoint(), "rotations": run.rotations.last.copy(),
@@ -50,6 +50,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         run.failures.again(saved["broken"])
     # It took members as at the first guess, and rotations were within half a turn of 0.
     older = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "rotations": run.rotations.last}
+    older["rho"] = run.system.require_time().rho_inf
     saved = older | dict(saved)
     near = [x.number for x in run.lines if "self_contact" in _of(saved, x.name) and not x.touches]
     let_touch(run, near)
@@ -102,6 +103,7 @@ def of_today(lines: Any, template: Mapping[str, Any]) -> Any:
 def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
     """Be as when `checkpoint` was called, of a run with the same things broken, without a look at its form."""
     run.t, run.steps, run.last_step, run.loaded = found["t"], found["steps"], found["last"], found["loaded"]
+    run.last_rho = found["rho"]
     run.leg, run.dry, run.cpu = (found["leg"][0], found["leg"][1]), set(found["dry"]), found["cpu"]
     if run.control is not None:
         run.control.restore(found["control"])

@@ -110,7 +110,7 @@ class SystemRun:
         self.quantities = SystemQuantities(system, dict(zip(names, self.scenes, strict=True)))
         if moves and target is not None:
             self.quantities.keep_ranges(self.lines)
-        self.t, self.steps, self.last_step, self.cpu = 0.0, 0, 0.0, 0.0
+        self.t, self.steps, self.last_step, self.last_rho, self.cpu = 0.0, 0, 0.0, 0.0, 0.0
         self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
         self.dry: set[str] = set()  # bodies that have been said to be out of the water
         self.failures = Failures(self)
@@ -446,9 +446,8 @@ class SystemRun:
                 line.books.clock[books.SHORTEST] = shortest
             self.model.load_bodies(t, solver.bodies, self.loaded)
             self.model.stir(t, self.state.bodies, t - self.t, solver.bodies)
-            # a start counts as a step of fixed length does (kernels.run)
-            before = self.last_step or (t - self.t if control is None else 0.0)
-            taken = solver.step(self.state, self.other, t - self.t, rho, before, t)
+            past = (self.last_step, self.last_rho)
+            taken = solver.step(self.state, self.other, t - self.t, rho, *past, t, fixed=control is None)
             if zones is not None and zones.wants_more_rod(taken, t, 0.5 * dt < shortest):
                 repeats += 1
                 continue
@@ -462,7 +461,7 @@ class SystemRun:
                 continue
             if zones is not None:
                 solver.book(t - self.t, t)
-            self.last_step = t - self.t
+            self.last_step, self.last_rho = t - self.t, taken.rho
             self.t, self.state, self.other = t, self.other, self.state
             self.steps += 1
             cpu = clock.process_time() - self._begin

@@ -284,7 +284,7 @@ class SystemZones:
         for x in self.lines:
             k = x.number
             state, before = run.state.lines[k], run.other.lines[k]
-            x.clock[b.LAST_DT] = dt
+            x.clock[b.LAST_DT], x.clock[b.LAST_RHO] = dt, run.last_rho
             x.follow(run, b.END_STEP, run.t, run.t, state, before)
             _, x.pending = x.switching.book_step(run.t, before, state)
 

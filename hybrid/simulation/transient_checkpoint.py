@@ -32,7 +32,8 @@ def checkpoint(run: Transient) -> dict[str, Any]:
         "ends": model.ends, "zoning": run.switching, "correction": run.correction, "payout": run.payout,
     }  # fmt: skip
     return {name: x.checkpoint() if x is not None else None for name, x in parts_.items()} | {
-        "t": run.t, "dt": float(clock[b.LAST_DT]), "steps": run.steps, "iterations": int(count[b.ITERATIONS]),
+        "t": run.t, "dt": float(clock[b.LAST_DT]), "rho": float(clock[b.LAST_RHO]), "steps": run.steps,
+        "iterations": int(count[b.ITERATIONS]),
         "changes": run.changes, "_turned": run.turned, "_slackened": run.slackened, "_beyond": run.beyond,
         "leg": [float(clock[b.LEG_BEGIN]), int(count[b.LEG_PART])],
         "_stored": float(clock[b.STORED]),
@@ -73,7 +74,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         older |= {"twist": np.zeros(2), "last": 0.0}
         saved = {name: x for name, x in saved.items() if name != "last"}
     older |= {"envelope": None, "_slackened": False, "self_contact": None, "payout": None, "home": None}
-    older |= {"torsion": template["torsion"]}  # not in 0.6: found anew
+    older |= {"torsion": template["torsion"], "rho": run.rho}  # not in 0.6: found anew
     report = saved.get("report")
     if isinstance(report, np.ndarray) and report.ndim == 2 and FIRST_REPORT <= report.shape[1] < REPORT_SIZE:
         saved = {**saved, "report": np.pad(report, ((0, 0), (0, REPORT_SIZE - report.shape[1])))}
@@ -95,6 +96,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     saved = matched(older | dict(saved), template, "state")
     clock, count, books = compiled.clock, compiled.count, compiled.books
     clock[b.NOW], clock[b.PREVIOUS] = saved["t"], saved["t"] - saved["last"]
+    clock[b.LAST_RHO] = saved["rho"]
     clock[b.LAST_DT], clock[b.STORED], clock[b.FLOOR] = saved["dt"], saved["_stored"], saved["floor"]
     count[b.STEPS], count[b.ITERATIONS] = saved["steps"], saved["iterations"]
     run.changes, run.beyond = saved["changes"], saved["_beyond"]

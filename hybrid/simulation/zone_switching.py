@@ -16,7 +16,6 @@ from hybrid.kernels import books as b
 from hybrid.kernels import zone_step as z
 from hybrid.kernels.binding import Table
 from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.generalized_alpha import STEEPEST
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.torque_transfer import carry_torque
 from hybrid.kernels.zone_step import LOOKAHEAD, REJECT_RATIO, Zones, blank_zone_job, follow_zones, plan_nodes, take_arcs
@@ -43,7 +42,7 @@ LETTING_GO = 1.0
 TAUT = 2.0
 NONE, NO_STRAIN = np.zeros(0, int), np.zeros((0, 3))
 LONGEST_IN_PACE = 0.1  # of the time in which bending comes and goes: a step may not be longer meanwhile
-READY = STEEPEST  # times as long may it be before: a change must not shorten it by more than the scheme's weights carry
+READY = 2.0  # times as long may it be before: a step that is much shorter than the one before is damped much
 # What a checkpoint holds of cells on their way to true lengths.
 RELAXING = ("lack", "rate", "since", "keeps")
 # Repetitions of one step with more rod.

@@ -15,7 +15,7 @@ from hybrid.kernels.bed import planes_under
 from hybrid.kernels.block_elimination import solve_again
 from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, WAVES
-from hybrid.kernels.report import FORCE_A, LOCAL_ERROR, RESIDUAL, SEABED_ENERGY, SLACKEST, SLACKEST_CELL
+from hybrid.kernels.report import FORCE_A, LOCAL_ERROR, RESIDUAL, SEABED_ENERGY, SLACKEST, SLACKEST_CELL, USED_RHO
 from hybrid.kernels.seabed import normal_forces, stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.step import friction_axes
@@ -40,7 +40,8 @@ POWERS = (
 @dataclass(frozen=True)
 class Taken:
     """How one step went: outcome, Newton iterations, predicted next correction (relative), the cell or node where
-    it was worst, the largest force out of balance before the last correction (N), and the local error (m)."""
+    it was worst, the largest force out of balance before the last correction (N), the local error (m), and the spectral
+    radius at infinity of the step."""
 
     outcome: Outcome
     iterations: int
@@ -48,6 +49,7 @@ class Taken:
     where: int
     residual: float
     error: float = 0.0
+    rho: float = 0.0
 
 
 def static_friction_travel(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:
@@ -82,18 +84,23 @@ class Stepper:
         self.work = workspace_of(line, keep)
         self.told: list[float] = self.work.report.tolist()  # the report of the last step or start, as plain numbers
 
-    def step(self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float, before: float) -> Taken:
+    def step(
+        self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float, before: float,
+        rho_before: float | None = None,
+    ) -> Taken:  # fmt: skip
         """From `old` to `new` (overwritten) over dt with the end conditions and the sea of the new time.
 
         before: s, the length of the step that led to `old`; 0 if it is a start, with consistent accelerations.
+        rho_before: its spectral radius, `Taken.rho` of it; that of equal steps where none is given.
         """
         outcome, iterations, left, where = entry.step(
-            self.line, sea, ends, old, new, dt, before, rho, self.limits, NO_PUSH, NO_PUSH, self.work
-        )
+            self.line, sea, ends, old, new, dt, before, rho, self.limits, NO_PUSH, NO_PUSH, self.work,
+            rho if rho_before is None else rho_before,
+        )  # fmt: skip
         self.told = told = self.work.report.tolist()
         if outcome == OK and not told[SLACKEST] > self.floor:
             outcome, where = Outcome.SLACK, int(told[SLACKEST_CELL])
-        return Taken(OUTCOMES[outcome], iterations, left, where, told[RESIDUAL], told[LOCAL_ERROR])
+        return Taken(OUTCOMES[outcome], iterations, left, where, told[RESIDUAL], told[LOCAL_ERROR], told[USED_RHO])
 
     def static_friction(self, sea: Sea, ends: Ends, state: State) -> None:
         """Give a line that lies still on the seabed the friction that keeps it there, as far as friction can."""

@@ -28,7 +28,7 @@ from hybrid.kernels.joined_lines import COLUMNS, FUNCTIONAL
 from hybrid.kernels.junctions import HANDED
 from hybrid.kernels.named_quantities import note_quantities
 from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, Limits, Task
-from hybrid.kernels.report import FORCE_A, LOCAL_ERROR, RESIDUAL
+from hybrid.kernels.report import FORCE_A, LOCAL_ERROR, RESIDUAL, USED_RHO
 from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.run import blank_books, blank_job, in_space
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work, blank_state
@@ -86,8 +86,9 @@ class SystemState(NamedTuple):
 @dataclass(frozen=True)
 class SystemTaken:
     """How a solution went: outcome, Newton iterations, predicted next correction, line and cell or node where it was
-    worst, the largest residual force at a node or point (N), the local error of a step (m), and the largest of a line
-    over what is allowed of it: a step of more than REFUSED (kernels.step_law) is in no books, and is to be repeated."""
+    worst, the largest residual force at a node or point (N), the local error of a step (m), the largest of a line over
+    what is allowed of it: a step of more than REFUSED (kernels.step_law) is in no books, and is to be repeated; and its
+    spectral radius at infinity."""
 
     outcome: Outcome
     iterations: int
@@ -97,6 +98,7 @@ class SystemTaken:
     residual: float
     error: float = 0.0
     ratio: float = 0.0
+    rho: float = 0.0
 
 
 def joined_ends(ends: Ends, joints: tuple[int, int]) -> Ends:
@@ -274,18 +276,23 @@ class SystemSolver:
     # --- motion -------------------------------------------------------------------------------------
 
     def step(
-        self, old: SystemState, new: SystemState, dt: float, rho: float, before: float, t: float = 0.0,
-        most: int = MOST_OF_STEP,
+        self, old: SystemState, new: SystemState, dt: float, rho: float, before: float, rho_before: float,
+        t: float = 0.0, most: int = MOST_OF_STEP, fixed: bool = False,
     ) -> SystemTaken:  # fmt: skip
         """From `old` to `new` (overwritten) over dt, with the ends and the sea of the new time in the lines' arrays.
 
-        before: s, the length of the step that led to `old`; 0 if it is a start.  t: s, of `new`, for extremes.
+        before, rho_before: the length, s, of the step that led to `old`, 0 if it is a start, and its spectral radius,
+        `SystemTaken.rho` of it.  t: s, of `new`, for extremes.  fixed: whether steps have a fixed length, but for
+        parts of one.
         """
-        taken = self._solve(Task(STEP, dt, before, rho, limits=Limits(REACH * self.length, 1.0, most)), old, new, t)
+        limits = Limits(REACH * self.length, 1.0, most)
+        task = Task(STEP, dt, before, rho, limits=limits, rho_before=rho_before, fixed=fixed)
+        taken = self._solve(task, old, new, t)
         if taken.outcome != Outcome.OK:
             return taken
         errors = np.array([work.report[LOCAL_ERROR] for work in self.work])  # fairleads move as their bodies
-        return replace(taken, error=float(errors.max()), ratio=float((errors / self.allowed).max()))
+        used = float(self.work[0].report[USED_RHO])
+        return replace(taken, error=float(errors.max()), ratio=float((errors / self.allowed).max()), rho=used)
 
     def book(self, dt: float, t: float) -> None:
         """Book the step of dt (s) to t (s) that was computed last, where `books_steps` is off."""

@@ -36,7 +36,7 @@ class _Moving:
 
     def step(self, dt: float, before: float) -> tuple[int, int, float]:
         old, new = self.state, self._other
-        taken = self._solver.step(old, new, dt, 0.0, before, self._t + dt)
+        taken = self._solver.step(old, new, dt, 0.0, before, 0.0, self._t + dt)
         outcome, moved = taken.outcome, 0.0
         if outcome != Outcome.OK:
             return outcome, taken.iterations, 0.0

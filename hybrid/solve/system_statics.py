@@ -127,7 +127,7 @@ def _relax(solver: SystemSolver, points: int, start: SystemState) -> SystemState
     old, new = start.copy(), start.copy()
     dt, calm = 1e-3 * time_scale, 0
     for _ in range(RELAXING_STEPS):
-        taken = here.step(old, new, dt, 0.0, dt)
+        taken = here.step(old, new, dt, 0.0, dt, 0.0)
         if taken.outcome != Outcome.OK:
             dt *= 0.25
             if dt < 1e-9 * time_scale:

@@ -16,6 +16,7 @@ from hybrid.kernels.block_elimination_plane import KEPT, TRIPLE, WIDE, solve_aga
 from hybrid.kernels.configuration import update
 from hybrid.kernels.entry import assembly, block_rows, correction, workspace
 from hybrid.kernels.forces import PLANAR
+from hybrid.kernels.generalized_alpha import Scheme
 from hybrid.kernels.out_of_plane import BAND, REACH, step_out_of_plane, wrong_pivots_at_rest
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state import State
@@ -213,11 +214,11 @@ def test_the_push_obeys_the_jacobian_across_the_plane(zones, seed):
     g = np.random.default_rng(seed)
     was, now, A = np.zeros((N + 1, 4)), np.zeros((N + 1, 4)), np.zeros(45 * (N + 1))
     was[1:, 1] = g.normal(size=N)
-    step_out_of_plane(line, sea, ends, st, dt, dt, rho, was, now, A)
     am, af = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
     ga = 0.5 - am + af
     be = 0.25 * (ga + 0.5) ** 2
     cv, ca = ga / (be * dt), (1 - am) / ((1 - af) * be * dt * dt)
+    step_out_of_plane(line, sea, ends, st, Scheme(dt, am, af, ga, be, cv, ca), was, now, A)
     # the same step in space: J x = b, once as it is and once with the push's prediction in rates and accelerations
     small = 1e-6
     pushed = st._replace(

@@ -32,7 +32,7 @@ def force_after(bodies, old, new, work, cv, ca):
 
 @kernel
 def predict(old, new, work, dt):
-    k.predict_bodies(old, new, work, k_scheme(0.8, dt, dt))
+    k.predict_bodies(old, new, work, k_scheme(0.8, dt, 0.8, dt))
 
 
 def random_body(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

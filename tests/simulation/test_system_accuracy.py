@@ -25,7 +25,7 @@ LEG = {"length": 70, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "dra
 
 def bridle(**tables: Any) -> dict[str, Any]:
     """Two legs to a float that a third line draws aside, up and down."""
-    surge = {"surge": {"amplitude": 0.5, "period": 4}, "ramp": 4}
+    surge = {"surge": {"amplitude": 0.6, "period": 4}, "ramp": 4}
     return {
         "environment": {"fluid": {"density": 1025, "current": [0.4, 0.1, 0]}},
         "points": {

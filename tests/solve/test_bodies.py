@@ -132,7 +132,7 @@ def spun(rho: float, steps: int) -> tuple[SystemSolver, SystemState, list[np.nda
         r = row[k.PLACE : k.FRAME]
         energy = 0.5 * p @ np.concatenate([R.T @ v, w])
         momenta.append(np.concatenate([R @ p[:3], R @ p[3:] + np.cross(r, R @ p[:3]), [energy]]))
-        assert solver.step(state, new, dt, rho, before).outcome == Outcome.OK
+        assert solver.step(state, new, dt, rho, before, rho).outcome == Outcome.OK
         state, new, before = new, state, dt
     return solver, state, momenta
 

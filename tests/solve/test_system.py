@@ -96,7 +96,7 @@ def test_a_line_cut_at_any_node_is_the_same_line(kind: str, cuts: list[int], fli
     for k in range(1, 81):
         cut.move(B + np.array([0.1, 0.0, 0.3]) * (1.0 - np.cos(2.0 * np.pi * k * dt / 3.0)))
         one = stepper.step(cut.sea, cut.ends, old, new, dt, 0.8, before)
-        many = cut.solver.step(found, others, dt, 0.8, before)
+        many = cut.solver.step(found, others, dt, 0.8, before, 0.8)
         assert one.outcome == many.outcome == Outcome.OK
         old, new, found, others, before = new, old, others, found, dt
         iterations = [iterations[0] + one.iterations, iterations[1] + many.iterations]

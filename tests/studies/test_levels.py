@@ -24,7 +24,7 @@ SAG: dict[str, Any] = {
     }]},
     "ends": {
         "start": {"kind": "pinned", "position": [0, 0, -5]},
-        "end": {"kind": "pinned", "position": [10, 0, -5], "motion": {"heave": {"amplitude": 0.3, "period": 2.0}, "ramp": 1}},
+        "end": {"kind": "pinned", "position": [10, 0, -5], "motion": {"heave": {"amplitude": 0.3, "period": 2.0}, "ramp": 2}},
     },
     "initial": "equilibrium", "time": {"duration": 1.0}, "output": {"every": 0.1, "points": 25},
 }  # fmt: skip
