@@ -190,12 +190,13 @@ def _hockling(plan: Plan) -> str:
 def _steps(time: Time | None, plan: Plan | SystemPlan) -> str:
     if time is None:
         return "no motion, statics only"
-    steps = f"{time.duration:.6g} s in {plan.steps} steps"
+    cpu = f"about {span(plan.seconds)} of CPU"
     if time.controlled:
-        return f"{steps} or more, as the motion asks; about {span(plan.seconds)} of CPU"
+        return f"{time.duration:.6g} s in about {plan.steps} steps, as the motion asks; {cpu}"
+    steps = f"{time.duration:.6g} s in {plan.steps} steps"
     asked = time.step or plan.step
     short = f" ({asked:.6g} s asked)" if plan.step < 0.999 * asked else ""
-    return f"{steps} of {plan.step:.6g} s{short}; about {span(plan.seconds)} of CPU"
+    return f"{steps} of {plan.step:.6g} s{short}; {cpu}"
 
 
 def _runs(plan: Plan) -> str:

@@ -19,7 +19,7 @@ from hybrid.model.mesh import Zone
 from hybrid.model.model_costs import structural, with_model
 from hybrid.model.payout import PayoutForecast
 from hybrid.model.resolution import first_resolution, model_is_free, predicted_runs
-from hybrid.model.run_time import processor_time
+from hybrid.model.run_time import foretold_steps, processor_time
 from hybrid.model.sections import limits_along, outer_diameter
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
@@ -178,8 +178,9 @@ def _plan(scene: Scene) -> Plan:
     cells = tuple(int(((middle > z.s_a) & (middle < z.s_b)).sum()) for z in model.zones)
     steps, step = 0, 0.0
     if scene.time:
-        steps = count_steps(scene)
-        step = min(first_resolution(scene).step, scene.time.duration / steps)
+        resolution = first_resolution(scene)
+        steps = foretold_steps(scene, model, resolution, count_steps(scene))
+        step = min(resolution.step, scene.time.duration / steps)
     names = {"catenary": "corrected"} if model.corrected else {}
     zones = tuple(replace(z, kind=names.get(z.kind, z.kind)) for z in model.zones)
     outputs = scene.time.duration / output_interval(scene) if scene.time else 0.0

@@ -7,9 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from hybrid.kernels.forces import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING, SURFACE
+from hybrid.kernels.generalized_alpha import weights
+from hybrid.kernels.step_law import SAFETY
 from hybrid.model.build import Model
-from hybrid.model.resolution import requested_accuracy, wants_errors
+from hybrid.model.resolution import Resolution, requested_accuracy, wants_errors
 from hybrid.scene.schema import JonswapWaves, Scene
 
 # s per cell and Newton iteration, in space and in a plane.
@@ -27,11 +31,38 @@ COST_RUN, COST_STEP, COST_MANAGER, COST_OUTPUT = 0.02, 12e-6, 40e-6, 0.1e-3
 USUAL_ITERATIONS = 2.1
 # Part of a line of moving zones that is rod, on average over scenes, which differ from none to all.
 ROD_SHARE = 0.38
-# Steps that follow the motion, of the least number there may be.
-MORE_STEPS = 1.5
+# Moments at which the motion of the ends is looked at to foretell its steps, spread as multiples of this part of its
+# duration, which no period shares; m/s3, less of which counts as none.
+LOOKS, GOLDEN, TINY_RATE = 48, 0.6180339887498949, 1e-12
+# Steps that follow the motion, of the least number there may be, and of those that the motion of its ends asks for: a
+# line moves more sharply.
+MORE_STEPS, SHARPER = 1.5, 2.2
 # Times a run that a run with its coarser ones costs; with an accuracy, also the mesh pre-run and, perhaps, a finer run.
-COST_ERRORS, COST_ACCURACY = 2.1, 2.6
+COST_ERRORS, COST_ACCURACY = 2.1, 4.0
+COST_SURVEY = 0.06  # s, of the mesh pre-run and of judging errors, whatever the scene
 COST_CORRECTOR = 0.3  # of the line's own, where the error of leaving bending out is followed
+
+
+def foretold_steps(scene: Scene, model: Model, resolution: Resolution, least: int) -> int:
+    """Steps of a run: `least` where they are of fixed length, else as many as the motion is likely to ask for.
+
+    The error of a step grows with the rate at which the acceleration changes (docs/theory.md, (T3c)), of which that of
+    the ends is known beforehand.
+    """
+    time, longest = scene.require_time(), resolution.step
+    if resolution.local is None:
+        return least
+    more = MORE_STEPS * least
+    if not model.ends.motions:
+        return round(more)
+    apart = 0.25 * longest
+    moments = np.maximum((np.arange(LOOKS) * GOLDEN % 1.0) * time.duration, 2.0 * apart)
+    found = [model.ends.acceleration(t + apart, apart) - model.ends.acceleration(t - apart, apart) for t in moments]
+    model.ends.at(0.0)
+    rate = np.linalg.norm(found, axis=2).max(axis=1) / (2.0 * apart)
+    *_, part = weights.py_func(time.rho_inf, time.rho_inf, 1.0)
+    lengths = SAFETY * (resolution.local / np.maximum(part * rate, TINY_RATE)) ** (1.0 / 3.0)
+    return round(max(more, SHARPER * float(np.mean(time.duration / np.minimum(lengths, longest)))))
 
 
 def step_time(
@@ -52,7 +83,7 @@ def step_time(
 
 
 def processor_time(scene: Scene, model: Model, cells: Sequence[int], steps: int, outputs: float) -> float:
-    """Processor time, s, of a run with so many steps at least; cells: of each zone of the model, if all is rod."""
+    """Processor time, s, of a run with so many steps; cells: of each zone of the model, if all is rod."""
     if scene.time is None:
         return 0.0
     counts = {"rod": 0.0, "catenary": 0.0}
@@ -61,7 +92,7 @@ def processor_time(scene: Scene, model: Model, cells: Sequence[int], steps: int,
     if model.layout is not None:
         counts = {"rod": ROD_SHARE * model.cells, "catenary": (1.0 - ROD_SHARE) * model.layout.rod.size}
     step = step_time(scene, model, counts["rod"], counts["catenary"], model.layout is not None, model.follows_error)
-    one = COST_RUN + steps * (MORE_STEPS if scene.time.controlled else 1.0) * step + outputs * COST_OUTPUT
+    one = COST_RUN + steps * step + outputs * COST_OUTPUT
     if not wants_errors(scene):
         return one
-    return one * (COST_ERRORS if requested_accuracy(scene) is None else COST_ACCURACY)
+    return COST_ERRORS * one if requested_accuracy(scene) is None else COST_ACCURACY * one + COST_SURVEY
