@@ -38,8 +38,8 @@ LOOKS, GOLDEN, TINY_RATE = 48, 0.6180339887498949, 1e-12
 # line moves more sharply.
 MORE_STEPS, SHARPER = 1.5, 2.2
 # Times a run that a run with its coarser ones costs; with an accuracy, also the mesh pre-run and, perhaps, a finer run.
-COST_ERRORS, COST_ACCURACY = 2.1, 4.0
-COST_SURVEY = 0.06  # s, of the mesh pre-run and of judging errors, whatever the scene
+COST_ERRORS, COST_ACCURACY = 2.1, 2.6
+COST_SURVEY = 0.1  # s, of the mesh pre-run and of judging errors, whatever the scene
 COST_CORRECTOR = 0.3  # of the line's own, where the error of leaving bending out is followed
 
 

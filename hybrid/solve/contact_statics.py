@@ -18,7 +18,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels import entry
 from hybrid.kernels.accept import LARGEST_TWIST
 from hybrid.kernels.binding import Table
-from hybrid.kernels.books import NOW, PARITY, STEP_BEFORE, TRY_END
+from hybrid.kernels.books import CONTROLLED, NOW, PARITY, STEP_BEFORE, TRY_END
 from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance
 from hybrid.kernels.forces import FRICTION, MASS_DAMPING, ROTARY, SELF_FRICTION, WAVES
 from hybrid.kernels.newton import EQUILIBRIUM, STEP, Task
@@ -60,6 +60,7 @@ class _Job:
         self.work = workspace_of(self.line, keep=True)
         self.books = blank_books(self.line.h.size)._replace(touch=np.zeros((3, self.line.s.size)))
         self.clock, self.count = self.books.clock, self.books.counts
+        self.count[CONTROLLED] = 1  # contact takes the step before as it is told
         self.table = Table(blank_job())
         self.attach()
 
