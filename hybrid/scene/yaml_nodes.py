@@ -1,4 +1,4 @@
-"""The nodes of a long YAML text, by libyaml: twenty times as fast as ruamel.yaml, which reads everything else.
+"""The nodes of a YAML text, by libyaml: twenty times as fast as ruamel.yaml, which says what is wrong with a text.
 
 Tags are those of YAML 1.2, by the rules of ruamel.yaml, so that both make the same tree.
 """
@@ -10,7 +10,11 @@ from typing import Any
 
 import yaml
 from ruamel.yaml.resolver import implicit_resolvers
-from yaml.cyaml import CParser
+
+try:
+    from yaml.cyaml import CParser
+except ImportError:  # PyYAML was built without libyaml
+    CParser = None
 
 # Levels of tables within tables: a scene has eight.
 DEEPEST = 100
@@ -22,7 +26,9 @@ class TooDeep(Exception):
 
 
 def composed(text: str) -> yaml.Node | None:
-    """The tree of a text; None: ruamel.yaml has to say what is wrong with it; TooDeep."""
+    """The tree of a text; None: ruamel.yaml has to read it, or to say what is wrong with it; TooDeep."""
+    if CParser is None:
+        return None
     parser = CParser(text)
     try:
         return _tree(parser)
@@ -47,7 +53,8 @@ def _tree(parser: Any) -> yaml.Node:
         kind = type(event)
         holds = inside[-1] if inside else top
         if kind is yaml.ScalarEvent:
-            node: yaml.Node = yaml.ScalarNode(_tag(event), event.value, event.start_mark, event.end_mark, event.style)
+            style = event.style or None  # of plain text libyaml says ""
+            node: yaml.Node = yaml.ScalarNode(_tag(event), event.value, event.start_mark, event.end_mark, style)
             holds.append(node)
         elif kind is yaml.MappingStartEvent or kind is yaml.SequenceStartEvent:
             new = yaml.MappingNode if kind is yaml.MappingStartEvent else yaml.SequenceNode

@@ -21,6 +21,7 @@ from hybrid.scene.base import Place, Table, dotted
 from hybrid.scene.schema_walk import keys_at, shorthand_keys, tables_at
 from hybrid.scene.suggestions import decimal_comma, did_you_mean
 from hybrid.scene.yaml_faults import anchor_twice, not_yaml, odd_character
+from hybrid.scene.yaml_nodes import TooDeep, composed
 
 Spot = tuple[int, int]
 
@@ -30,10 +31,6 @@ SHOWN = 60
 # Values that a scene may have once its aliases are written out: a list of every node of a fine mesh, or tens of
 # thousands of attachments, are below, and a few lines of aliases of aliases are far above.
 MOST_VALUES = 500_000
-# Characters beyond which ruamel.yaml would take longer than all the rest of reading a scene, a tenth of a second.
-LONG = 10_000
-# Brackets beyond which they may be nested so deeply that ruamel.yaml would take seconds.
-MANY = 100
 
 # Names of points, bodies and lines are keys too: they may begin with a digit, and have hyphens and blanks in them.
 _PATH = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.\w[\w -]*(\[\d+\])*)*")
@@ -118,16 +115,11 @@ def from_text(text: str) -> tuple[Node, list[Complaint]]:
 
 def _composed(text: str) -> Any:
     """The tree of a text as YAML sees it."""
-    if len(text) > LONG or text.count("[") + text.count("{") > MANY:
-        from hybrid.scene.yaml_nodes import TooDeep, composed
-
-        try:
-            found = composed(text)
-        except TooDeep:
-            raise RecursionError from None
-        if found is not None:
-            return found
-    return YAML(typ="safe", pure=True).compose(text)
+    try:
+        found = composed(text)
+    except TooDeep:
+        raise RecursionError from None
+    return found if found is not None else YAML(typ="safe", pure=True).compose(text)
 
 
 def _place(node: Any) -> Spot:

@@ -8,6 +8,7 @@ docs/accuracy.md
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from math import prod
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -84,6 +85,8 @@ class Errors:
         """fields: shapes (nt, ...) of all errors, by cause and output; blocks: computes them."""
         self.fields, self._compute = fields, blocks
         self._largest: dict[tuple[str, str], float] | None = None
+        numbers = sum(prod(shape) for found in fields.values() for shape in found.values())
+        self._kept: list[Block] | None = [] if numbers <= MOST else None  # once they are computed
 
     @classmethod
     def of(cls, values: Mapping[str, Mapping[str, np.ndarray]]) -> Errors:
@@ -93,13 +96,21 @@ class Errors:
         return cls(shapes, lambda: iter(flat))
 
     def blocks(self) -> Iterator[Block]:
-        """All of them, each computed when it is asked for."""
+        """All of them, each computed when it is asked for; few are kept."""
+        if self._kept:
+            yield from self._kept
+            return
         largest: dict[tuple[str, str], float] = {}
+        kept = []
         for block in self._compute():
             key = block.cause, block.name
             largest[key] = float(np.max(block.values, initial=largest.get(key, 0.0)))
+            if self._kept is not None:
+                kept.append(block)
             yield block
         self._largest = largest
+        if self._kept is not None:
+            self._kept = kept
 
     def largest(self, cause: str, name: str) -> float:
         """Largest error of an output; 0 where it is not estimated."""

@@ -210,9 +210,13 @@ class TimeLoop:
         return self.run.unchanging and not (self.patient and self.observer.writes_criteria)
 
     def _settle(self) -> None:
-        """After a start: powers of the new state, and its output where one is due."""
+        """After a start: powers of the new state, and its output where one is due.
+
+        That of a run to compare with waits for those after it, if nothing changes until then.
+        """
         for _ in self.run.advance(self.run.t):
-            self.write_down()
+            if self.target is not None or not self._may_wait:
+                self.write_down()
 
     def _pause(self) -> None:
         """Between two calls of the compiled run: report, and hear of interrupts."""

@@ -2,38 +2,32 @@
 
 A file that readers may open while it grows is flushed before and after every change of its lengths, and what is known
 of a result afterwards goes into a copy.  A run that takes less than the time for which outputs are held back anyhow
-needs neither: its file is made beside its place, is added to until all is known, and then takes its place.
+needs neither: its file is made in memory, is added to until all is known, and is then written to its place.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from pathlib import Path
 
 import h5py
 
-from hybrid.store.hdf5_file import beside, redrafted, unwritable
-from hybrid.store.integrity import sign_new
+from hybrid.store.hdf5_file import beside, image_of, unwritable
+from hybrid.store.integrity import signed
 
 
 class LateFile:
-    """A file beside its place, open to be added to until it takes its place."""
+    """A file in memory, open to be added to until it is written to its place."""
 
-    def __init__(self, path: Path, image: bytes) -> None:
-        """path: its place; image: the bytes that it begins as.  ResultError: it cannot be written."""
-        self.path, self.placed = path, False
+    def __init__(self, path: Path, file: h5py.File) -> None:
+        """path: its place; file: in memory, nothing of which is held open by others when it is placed."""
+        self.path, self.file, self.placed = path, file, False
         self.at_last: Callable[[h5py.File], None] = lambda file: None  # what is added when nothing else is
-        self._new, self._open = beside(path), ExitStack()
-        try:
-            self._new.write_bytes(image)
-            self.file = self._open.enter_context(redrafted(self._new))
-        except OSError as error:
-            raise self._gone(error) from error
 
     def change(self, change: Callable[[h5py.File], None]) -> None:
-        """Add to it; ResultError: it cannot be written, and is dropped."""
+        """Add to it; ResultError: there is no room for it, and it is dropped."""
         try:
             change(self.file)
         except (OSError, RuntimeError) as error:
@@ -43,27 +37,32 @@ class LateFile:
             raise
 
     def place(self) -> None:
-        """Put it in its place, on the disk when this returns; a second call does nothing.  ResultError as `change`."""
+        """Put it in its place, on the disk when this returns; a second call does nothing.
+
+        ResultError: it cannot be written, and is dropped.
+        """
         if self.placed:
             return
         self.change(self.at_last)
+        new = beside(self.path)
         try:
-            self._open.close()
-            sign_new(self._new)
-            with self._new.open("rb") as file:
+            with new.open("wb") as file:
+                file.writelines(signed(image_of(self.file)))
+                file.flush()
                 os.fsync(file.fileno())
-            os.replace(self._new, self.path)
+            os.replace(new, self.path)
         except (OSError, RuntimeError) as error:
             raise self._gone(error) from error
         finally:
             self.drop()
+            new.unlink(missing_ok=True)
 
     def drop(self) -> None:
-        """Leave nothing beside its place; nothing is written there any more."""
+        """Nothing is written of it any more."""
         self.placed = True
         with suppress(OSError, RuntimeError):  # what they say is of a file that nobody wants
-            self._open.close()
-        self._new.unlink(missing_ok=True)
+            if self.file:
+                self.file.id.close()
 
     def _gone(self, error: Exception) -> Exception:
         self.drop()

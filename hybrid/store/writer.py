@@ -384,11 +384,10 @@ class Recorder(BaseRecorder):
         """Write the file in one go, and put it in its place unless it will be amended."""
         assert self.path is not None
         before, self._before = self._before, None
-        late = LateFile(self.path, self._image_so_far())
+        late = LateFile(self.path, self._file)
         late.at_last = partial(write_before, before=before)
 
         def write(file: h5py.File) -> None:
-            self._continue_in(file)
             for table in reversed(self._all):
                 table.write()
                 table.commit(at_once=False)
