@@ -50,7 +50,7 @@ def plan_lines(scene: Scene, plan: Plan) -> list[str]:
         "payout": _payout(plan),
         "forces": _forces(on),
         "hockling": _hockling(plan),
-        "time": _steps(scene.time, plan),
+        "time": _steps(scene.time, plan, bool(scene.contact.self)),
         "runs": _runs(plan),
         "accuracy": _accuracy(on),
         "assumed": "; ".join(what for what, why in on.items() if why.startswith("assumed")),
@@ -187,10 +187,11 @@ def _hockling(plan: Plan) -> str:
     return text
 
 
-def _steps(time: Time | None, plan: Plan | SystemPlan) -> str:
+def _steps(time: Time | None, plan: Plan | SystemPlan, touches: bool = False) -> str:
+    """touches: contact of the line with itself is asked for, and nobody knows for how long it does."""
     if time is None:
         return "no motion, statics only"
-    cpu = f"about {span(plan.seconds)} of CPU"
+    cpu = f"about {span(plan.seconds)} of CPU{', several times as much while it touches itself' if touches else ''}"
     if time.controlled:
         return f"{time.duration:.6g} s in about {plan.steps} steps, as the motion asks; {cpu}"
     steps = f"{time.duration:.6g} s in {plan.steps} steps"

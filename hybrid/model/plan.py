@@ -51,7 +51,7 @@ class Plan:
     unknowns: int
     steps: int
     step: float  # s, of most steps
-    seconds: float  # of processor time, within a factor of two (hybrid.model.run_time)
+    seconds: float  # of processor time, within a factor of two (hybrid.model.run_time), but for contact with itself
     runs: int = (
         1  # until there is a first result with its errors: the mesh pre-run and three to compare with among them
     )

@@ -201,6 +201,10 @@ def test_plan_says_what_is_on_and_computes_nothing(call: Call) -> None:
     verbose = call("plan", "wire.yaml", "--verbose", *long)
     assert "asked for by" in verbose.out and "environment.gravity" in verbose.out
     assert sorted(p.name for p in Path().iterdir()) == ["pushed.yaml", "wire.yaml"]
+    touching = ("--set", "contact={self: true}", "--set", "model=rod", "--set", "cable.sections[0].bending_stiffness=1")
+    for more in ((), touching):  # nobody knows for how long it will
+        said = " ".join(call("plan", "wire.yaml", *more, "--set", "cable.sections[0].diameter=0.01").out.split())
+        assert ("several times as much while it touches itself" in said) == bool(more), said
     (plan,) = call("plan", "wire.yaml", "--json").lines
     assert plan["event"] == "plan" and plan["steps"] == 10 and plan["cells"] == 10
     assert [(z["kind"], z["s_a"], z["s_b"], z["cells"]) for z in plan["zones"]] == [
