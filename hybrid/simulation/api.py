@@ -326,8 +326,9 @@ def _controller(case: Case, compute: FinerResult, choice: ModelChoice = NAMED) -
     """What chooses how finely a case is computed."""
     asked = requested_accuracy(case.scene)
     irregular = is_irregular(case.scene)
+    from_rest = case.scene.initial.kind == "equilibrium" and not any(end.release for end in case.scene.ends.both)
     return ErrorController(
-        asked, _free(case.scene), True, case.sample, compute, case.beside, irregular, choice, compute.settle
+        asked, _free(case.scene), True, case.sample, compute, case.beside, irregular, choice, compute.settle, from_rest
     )
 
 

@@ -29,7 +29,7 @@ from hybrid.model.resolution import (
 )
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bounded_model_errors import doubtful
-from hybrid.simulation.error_estimate import Errors, Estimate
+from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.error_forecast import forecast
 from hybrid.simulation.error_order import COARSER
 from hybrid.simulation.error_statistics import (
@@ -42,6 +42,7 @@ from hybrid.simulation.error_statistics import (
     snaps,
     statistics_of,
 )
+from hybrid.simulation.errors_by_cause import Errors
 from hybrid.simulation.finer_result import NOT_KEPT, Judged, is_no_better, not_kept_text
 from hybrid.simulation.refinement import (
     COSTLY_ACCURACY,
@@ -113,6 +114,7 @@ class ErrorController:
     irregular: bool = False
     choice: ModelChoice = NAMED  # of a scene that leaves the choice
     settle: Callable[[bool], None] = lambda kept: None  # whether a finer result takes the place of that before it
+    from_rest: bool = True  # whether it begins from an equilibrium, or is one
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
     first: Resolution | None = None  # that the runs to compare with are for; the result may be finer
     next: Resolution | None = None  # of the result that is to be computed
@@ -325,7 +327,7 @@ class ErrorController:
         if self.comparisons is None:
             self._notes += result.notes
             return False
-        estimate = Estimate(result, *self.comparisons)
+        estimate = Estimate(result, *self.comparisons, self.from_rest)
         self.excess = snap_excess(result.forces, self.comparisons[0].forces)
         self._set_statistics(result, *self.comparisons)
         if not estimate.has_mesh:

@@ -7,9 +7,8 @@ docs/accuracy.md
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from math import prod
-from typing import Any, NamedTuple, Self
+from collections.abc import Iterator, Mapping
+from typing import Any, Self
 
 import numpy as np
 
@@ -34,9 +33,11 @@ from hybrid.simulation.error_order import (
     refinement,
     squares,
     start_change,
+    start_order,
     step_share,
     with_neighbours,
 )
+from hybrid.simulation.errors_by_cause import Block, Errors
 from hybrid.simulation.run_sample import (
     END_FORCES,
     RIGHT,
@@ -69,58 +70,6 @@ OTHER_ZONES = 0.1
 MODEL_OF = "cells", "every", "catenary"
 
 
-class Block(NamedTuple):
-    """Errors of an output by one cause: magnitudes (n, ...) at n output times, from number `begin` on."""
-
-    cause: str
-    name: str
-    begin: int
-    values: np.ndarray
-
-
-class Errors:
-    """Estimated errors of a run, by cause ("mesh", "time", "model", "total") and output, computed in blocks."""
-
-    def __init__(self, fields: Mapping[str, Mapping[str, tuple[int, ...]]], blocks: Callable[[], Iterator[Block]]):
-        """fields: shapes (nt, ...) of all errors, by cause and output; blocks: computes them."""
-        self.fields, self._compute = fields, blocks
-        self._largest: dict[tuple[str, str], float] | None = None
-        numbers = sum(prod(shape) for found in fields.values() for shape in found.values())
-        self._kept: list[Block] | None = [] if numbers <= MOST else None  # once they are computed
-
-    @classmethod
-    def of(cls, values: Mapping[str, Mapping[str, np.ndarray]]) -> Errors:
-        """From magnitudes, by cause and output."""
-        shapes = {cause: {name: x.shape for name, x in found.items()} for cause, found in values.items()}
-        flat = [Block(cause, name, 0, x) for cause, found in values.items() for name, x in found.items()]
-        return cls(shapes, lambda: iter(flat))
-
-    def blocks(self) -> Iterator[Block]:
-        """All of them, each computed when it is asked for; few are kept."""
-        if self._kept:
-            yield from self._kept
-            return
-        largest: dict[tuple[str, str], float] = {}
-        kept = []
-        for block in self._compute():
-            key = block.cause, block.name
-            largest[key] = float(np.max(block.values, initial=largest.get(key, 0.0)))
-            if self._kept is not None:
-                kept.append(block)
-            yield block
-        self._largest = largest
-        if self._kept is not None:
-            self._kept = kept
-
-    def largest(self, cause: str, name: str) -> float:
-        """Largest error of an output; 0 where it is not estimated."""
-        if self._largest is None:
-            for _ in self.blocks():
-                pass
-        assert self._largest is not None
-        return self._largest.get((cause, name), 0.0)
-
-
 class Estimate:
     """Errors of the last of several runs, by what finer cells and steps have changed.
 
@@ -137,13 +86,16 @@ class Estimate:
         coarse: RunSample,
         rough: RunSample | None,
         coarsest: RunSample | None,
+        from_rest: bool = True,
     ) -> None:
         """coarse: longer cells, and steps if there are any; rough: its cells, steps longer still; coarsest: both.
 
-        None: it failed, or nothing moves.
+        None: it failed, or nothing moves.  from_rest: it begins from an equilibrium, or is one.
         """
         doubt = self._take(result)
         both = [name for name in result.values if name in coarse.values]
+        self._from_rest = from_rest
+        own = [name for name in both if name in END_FORCES and not from_rest]  # with an order at the start
         # What a halving of cells and steps leaves of the difference to the run before; NaN where it is not known.
         fall = {name: falls(name, result, coarse, coarsest) for name in both}
         cells, steps = refinement(result.resolution, coarse.resolution)
@@ -153,6 +105,8 @@ class Estimate:
                 fall[name] = as_halved(found, finer, step_share(name, coarse, rough, coarsest))
         self.falls = {name: found.mean for name, found in fall.items()}
         self.order = {name: order(max(x.mean, x.largest), self._bounds(name, x)) for name, x in fall.items()}
+        # Orders of the error by the mesh at the first output, where it has one of its own.
+        self.at_start = {x: min(start_order(x, result, coarse, coarsest, cells), self.order[x]) for x in own}
         # Root mean square of the last change of each output, and of that before.
         self.changes = {name: (found.change, found.before) for name, found in fall.items()}
         self.start = start_change(result, coarse), start_change(coarse, coarsest)
@@ -169,7 +123,7 @@ class Estimate:
 
     def _bounds(self, name: str, found: Falls) -> tuple[float, float]:
         """Bounds of the order of convergence of an output."""
-        return force_orders(found) if name in END_FORCES else ORDERS
+        return force_orders(found, self._from_rest) if name in END_FORCES else ORDERS
 
     def _signed(self, name: str, a: int, b: int) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Errors by time step and mesh of the outputs from number a to b, with their sign; None: not known."""
@@ -182,7 +136,7 @@ class Estimate:
             return by_step, None
         known, own = around(every_of(count, coarse.every), a, b)
         change = result.some(name, known) - coarse.values[name][own]
-        return by_step, self._mesh_error(name, at_all_outputs(change, known, a, b), by_step, coarse)
+        return by_step, self._mesh_error(name, at_all_outputs(change, known, a, b), by_step, coarse, not a)
 
     def _by_step(self, name: str, a: int, b: int) -> np.ndarray | None:
         """Error by the time step of the outputs from number a to b, with its sign; None: not known."""
@@ -194,12 +148,20 @@ class Estimate:
         late = (later - rough.values[name][own]) / ((coarse.steps / rough.steps) ** p - 1.0)
         return at_all_outputs(late / (result.steps / coarse.steps) ** p, known, a, b)
 
-    def _mesh_error(self, name: str, change: np.ndarray, by_step: np.ndarray | None, before: RunSample) -> np.ndarray:
-        """Error by the mesh, from a change since a run with other cells: less what its steps have changed."""
-        p = self.order[name]
+    def _mesh_error(
+        self, name: str, change: np.ndarray, by_step: np.ndarray | None, before: RunSample, begins: bool = True
+    ) -> np.ndarray:
+        """Error by the mesh, from a change since a run with other cells: less what its steps have changed.
+
+        begins: the first of these outputs is that at the start.
+        """
+        p, finer = self.order[name], self.run.cells / before.cells
         if by_step is not None:
             change = change - by_step * ((self.run.steps / before.steps) ** p - 1.0)
-        return np.asarray(change / ((self.run.cells / before.cells) ** p - 1.0))
+        error = np.asarray(change / (finer**p - 1.0))
+        if begins and name in self.at_start:
+            error[0] = change[0] / (finer ** self.at_start[name] - 1.0)
+        return error
 
     def _keep(self) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
         """Errors by time step and by mesh of all outputs, kept from here on; the runs before are done with."""
@@ -280,8 +242,11 @@ class Estimate:
             if finer > LEAST_RATIO and name in by_mesh:
                 if name in by_step:
                     by_step[name] = by_step[name] / shorter**p
-                shown = self._mesh_error(name, change, by_step.get(name), before)
-                by_mesh[name] = blended(shown, by_mesh[name] / finer**p, finer, p)
+                shown, kept = self._mesh_error(name, change, by_step.get(name), before), by_mesh[name]
+                by_mesh[name] = blended(shown, kept / finer**p, finer, p)
+                if name in self.at_start:
+                    q = self.at_start[name]
+                    by_mesh[name][:1] = blended(shown[:1], kept[:1] / finer**q, finer, q)
             elif shorter > LEAST_RATIO:
                 shown = change / (shorter**p - 1.0)
                 by_step[name] = blended(shown, by_step[name] / shorter**p, shorter, p) if name in by_step else shown
@@ -293,10 +258,11 @@ class Estimate:
         """
         by_step, by_mesh = self._keep()
         known, p = [(x, r) for x, r in ((by_step, shorter), (by_mesh, finer)) if name in x], self.order[name]
-        now = self.order[name] = confirmed_order(name, p, change, [(x[name], r) for x, r in known])
+        later = slice(int(name in self.at_start), None)  # the first output has an order of its own
+        now = self.order[name] = confirmed_order(name, p, change[later], [(x[name][later], r) for x, r in known])
         self.revised[name] = (COARSER**p - 1.0) / (COARSER**now - 1.0)  # of runs twice as fine as those before
-        for found, _ in known:
-            found[name] = self.revised[name] * found[name]
+        for found, _ in known:  # copies: the result before keeps its own
+            found[name] = np.concatenate([found[name][: later.start], self.revised[name] * found[name][later]])
         return now
 
     @property
@@ -409,6 +375,7 @@ class Estimate:
         changes = {name: np.array(x) for name, x in self.changes.items()}
         found: Tree = {
             "order": self.order,
+            "at_start": self.at_start,
             "falls": self.falls,
             "changes": changes,
             "start": np.array(self.start),
@@ -427,6 +394,8 @@ class Estimate:
         self.run, self.notes = restored_sample(tree["run"], scene, shape), restored_notes(tree["notes"])
         self.revised = {}
         self.order = matched(tree["order"], dict.fromkeys(tree["order"], 1.0), "order")
+        at_start = tree.get("at_start", {})  # of checkpoints that have it
+        self.at_start = matched(at_start, dict.fromkeys(at_start, 1.0), "order at the start")
         self.falls = matched(tree["falls"], dict.fromkeys(tree["order"], np.nan), "falls")
         unseen = np.full(2, np.nan)  # of checkpoints that do not have it
         start = matched([tree.get("start", unseen)], [unseen], "start")[0]
@@ -447,15 +416,8 @@ class Estimate:
         self.has_step, self.has_mesh = bool(late), bool(cells)
         if not (set(late) | set(cells) <= set(self.order) <= set(self.run.values) and self.run.every == 1):
             raise ValueError("errors of outputs that are not there")
-        if not all(1.0 <= p <= MOST_ORDER for p in self.order.values()):
+        if not (set(self.at_start) <= set(self.order) and set(self.at_start) <= set(END_FORCES)):
+            raise ValueError("orders at the start of outputs that have none")
+        if not all(1.0 <= p <= MOST_ORDER for p in (*self.order.values(), *self.at_start.values())):
             raise ValueError("orders that no errors have")
         return self
-
-
-def summary(errors: Errors) -> dict[str, float]:
-    """The largest errors of position (m) and of the end forces (N), by cause, as attributes of a result."""
-    out = {}
-    for cause in errors.fields:
-        out[f"error_{cause}_position"] = errors.largest(cause, "position")
-        out[f"error_{cause}_end_force"] = max(errors.largest(cause, name) for name in END_FORCES.values())
-    return out

@@ -13,7 +13,7 @@ from hybrid.model.plan import output_times
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bounded_model_errors import bounded
 from hybrid.simulation.error_control import ErrorController
-from hybrid.simulation.error_estimate import Errors, summary
+from hybrid.simulation.errors_by_cause import Errors, summary
 from hybrid.simulation.refinement import END_FORCE
 from hybrid.simulation.result_checks import damped_jolts, undersampled_end_forces
 from hybrid.simulation.run_sample import END_FORCES, RunSample

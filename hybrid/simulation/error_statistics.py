@@ -16,8 +16,9 @@ import numpy as np
 from hybrid.model.resolution import RequestedAccuracy
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bounded_model_errors import bounded, scaled
-from hybrid.simulation.error_estimate import Errors, Estimate
+from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.error_order import MOST_ORDER, ORDER, Falls
+from hybrid.simulation.errors_by_cause import Errors
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.simulation.snap_scatter import snap_times
 from hybrid.store.named_arrays import Tree, matched

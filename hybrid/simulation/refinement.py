@@ -12,7 +12,7 @@ import numpy as np
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.outputs.probes import SIDED_ERRORS as RIGHT_OF
 from hybrid.scene.accuracy import ALONG, ROUGHEST
-from hybrid.simulation.error_estimate import Errors
+from hybrid.simulation.errors_by_cause import Errors
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 
 # Part of what is asked that the next run aims at.

@@ -143,6 +143,19 @@ def test_the_figure_is_sharp_where_a_run_has_come_to_rest():
     assert SHARP[0] <= found.min() and found.max() <= SHARP[1], found
 
 
+def test_the_force_at_a_held_end_of_a_line_let_go_is_of_order_one():
+    """A level rod falls freely at first, and pulls at nothing; its end cell is held by half: m g h/2.
+
+    At 3 % the force at t = 0 was 1.24 of what is asked, 0.69 of it estimated, and nothing was said.
+    """
+    given = ["accuracy=3%", "time.step=null", "mesh=null", "model=rod", "time.duration=1.5"]
+    result = hybrid.run(hybrid.load_scene(EXAMPLES / "02_suspension.yaml", given))
+    force = np.linalg.norm(result["reaction_start"], axis=1)
+    assert force[0] == pytest.approx(7.853981634e-4 * 9.8 * 0.5 * result.mesh[0].s[1], rel=0.01)
+    assert SHARP[0] <= result.errors["total/end_force_start"][0] / force[0] <= SHARP[1]
+    assert force[0] <= 0.03 * force.max() or "accuracy missed" in {event.kind for event in result.events}
+
+
 def test_zones_that_change_are_those_of_the_result():
     """Zones come and go with the tension; in a coarser run they did so at other times: 0.44 for the force at the start.
 
