@@ -35,7 +35,7 @@ from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.outputs.local_means import means_beside, means_on_line
 from hybrid.outputs.moments import across, node_tangents, node_torques, passed_torques
 from hybrid.outputs.output_grid import Grid
-from hybrid.outputs.strains import strains
+from hybrid.outputs.strains import bend_directions, strains
 from hybrid.outputs.touchdown import Touchdown, carried, contact_pressure, penetration, sinking, touchdown
 from hybrid.outputs.vectors import cross, size
 from hybrid.solve.bending_corrector import Shift
@@ -315,7 +315,14 @@ class Observation:
         strains = self._plain._strains
         if self.shift is not None:
             strains = np.stack([self._curvature_of_moment(self.shift), strains[:, 1]], axis=1)
-        return self.grid.sides @ strains
+        bend = self._plain._bend_directions * strains[:, :1]
+        found = self.grid.sides @ np.concatenate([bend, strains[:, 1:]], axis=1)
+        return np.stack([np.sqrt((found[:, :-1] ** 2).sum(axis=1)), found[:, -1]], axis=1)
+
+    @cached_property
+    def _bend_directions(self) -> Floats:
+        """(n sides, 3 or 1, nb), of the curvature that was computed."""
+        return bend_directions(self)
 
     @cached_property
     def _strains(self) -> Floats:

@@ -1,6 +1,8 @@
 """Curvature and twist on the sides of an observation's stretches: of rods by their elements, of catenaries by bends.
 
 At ends of a stretch without an element they follow from the moment that is given there, or from the nodes inside.
+Between nodes the vector of curvature is interpolated, across the plane of the bend: its size alone would stay large
+where a line bends to one side before a point and to the other side after it.
 """
 
 from __future__ import annotations
@@ -10,14 +12,18 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.forces import PLANAR
+from hybrid.kernels.state import Floats, Line
 from hybrid.kernels.zone_torque import TORQUE
-from hybrid.outputs.vectors import cross, dot
+from hybrid.outputs.moments import across
+from hybrid.outputs.vectors import cross, dot, size
 
 if TYPE_CHECKING:
     from hybrid.outputs.observation import Observation
 
 Integers = NDArray[np.int64]
+# Of a node where the line is straight.
+ANY_DIRECTION = np.array([0.0, 1.0, 0.0])[:, None]
 # Times sqrt(EI/T): a rod cell longer than that does not show how bending fades at its end.
 UNRESOLVED = 3.0
 
@@ -56,6 +62,34 @@ def strains(view: Observation) -> Floats:
         _end_catenaries(view, out, spans[~rods])
     _bend_on_through_joints(view, out, spans, rods)
     return out
+
+
+def bend_directions(view: Observation) -> Floats:
+    """Directions (n sides, 3, outputs) of the curvature vector, across both chords beside a node; (n sides, 1, outputs)
+
+    along the normal, 1 or -1, of a line in a plane.  At ends of the line that of the moment there; at ends of stretches
+    that no element bends across, that of the next node in the stretch, as at ends that are bent without a moment.
+    """
+    nodes, d, line = view.grid.side_nodes, view.d, view.line
+    inner = np.clip(nodes, 1, max(len(d) - 1, 1))
+    out = _directions(line, cross(d[inner - 1], d[np.minimum(inner, len(d) - 1)]))
+    spans = np.array(view.grid.spans).reshape(-1, 3)
+    rods, at = np.tile([zone.kind == "rod" for zone in view.grid.parts], 2), ends_of(spans)
+    outer = np.isin(at.node, view.end_nodes)
+    beside = np.flatnonzero(outer | ~rods | (line.element[at.node] == 0))
+    out[at.row[beside]] = out[at.row[beside] + at.inward[beside]]
+    bent = np.flatnonzero(outer & rods & ~line.k0[at.node].any(axis=1))
+    moment = across(view.node_moment[at.node[bent]], view.node_tangent[at.node[bent]])
+    out[at.row[bent]] = np.where(size(moment)[:, None] > 0.0, _directions(line, moment), out[at.row[bent]])
+    return out
+
+
+def _directions(line: Line, x: Floats) -> Floats:
+    """Of vectors (n, 3, outputs), or on which side of the plane of the line they are."""
+    if line.bits & PLANAR:
+        return np.where(np.einsum("j,njk->nk", line.plane[2], x) < 0.0, -1.0, 1.0)[:, None]
+    length = size(x)[:, None]
+    return np.where(length > 0.0, x / np.where(length > 0.0, length, 1.0), ANY_DIRECTION)
 
 
 def _end_rods(view: Observation, out: Floats, spans: Integers) -> None:

@@ -252,7 +252,33 @@ class Plain:
         strains = self._strains
         if self.shift is not None:
             strains = np.column_stack([self._curvature_of_moment(self.shift), strains[:, 1]])
-        return np.asarray(self.grid.sides @ strains)
+        bend = self.grid.sides @ (self._directions * strains[:, :1])
+        return np.column_stack([np.linalg.norm(bend, axis=1), self.grid.sides @ strains[:, 1]])
+
+    @cached_property
+    def _directions(self) -> Floats:
+        """Of the curvature vector (n sides, 3), across the chords beside a node, at ends of the line of the moment."""
+        if self._plain is not None:
+            return self._plain._directions
+        line, d, moment = self.line, self.d, self._across(self.node_moment)
+        last = line.h.size
+
+        def unit(x: Floats) -> Floats:
+            return np.asarray(x / np.linalg.norm(x) if x.any() else [0.0, 1.0, 0.0])
+
+        def between(i: int) -> Floats:
+            j = min(max(i, 1), max(last - 1, 1))
+            return unit(cross(d[j - 1], d[min(j, last - 1)]))
+
+        out = []
+        for zone, (a, b, _) in zip(self.grid.parts, self.grid.spans, strict=True):
+            for i in range(a, b + 1):
+                inward, outer, rod = int(i == a) - int(i == b), i in (0, last), zone.kind == "rod"
+                held = outer and rod and not line.k0[i].any() and moment[i].any()
+                out.append(unit(moment[i]) if held else between(i))
+                if inward and not held and (outer or not rod or not line.element[i]):
+                    out[-1] = between(i + inward)
+        return np.array(out)
 
     def _curvature_of_moment(self, shift: Shift) -> Floats:
         """Curvature (n sides,) 1/m of all of the moment, with what was left out; without stiffness, as it is."""
