@@ -95,13 +95,14 @@ def trail(loads: Floats, h: Floats, ck: Floats, held: int, place: Floats, on_bed
 
 
 def laid(
-    loads: Floats, h: Floats, ck: Floats, held: int, place: Floats, bed: Callable[[float, float], float]
+    loads: Floats, h: Floats, ck: Floats, held: int, place: Floats, bed: Callable[[Floats, Floats], Floats]
 ) -> Hanging | None:
     """As `trail` for a line that is held above the seabed and long enough to lie on it with its free end.
 
-    bed: height (m) of the seabed at x, y.  What lies on the bed goes on the way the line came down, without tension.
+    bed: heights (n,) m of the seabed at x, y (n,) m.  What lies on the bed goes on the way the line came down, without
+    tension.
     """
-    away = range(1, h.size + 1) if held == 0 else range(h.size - 1, -1, -1)
+    away = slice(None, None, 1 if held == 0 else -1)  # nodes and cells from the held end on
     lying = np.zeros(h.size + 1, bool)
     shape = None
     for _ in range(LAYING):
@@ -110,27 +111,28 @@ def laid(
             if shape is None:
                 return None
             found = shape
-        r, T = found.r.copy(), found.T.copy()
-        now = np.zeros_like(lying)
-        heading = np.array([1.0, 0.0, 0.0])
-        for i in away:
-            before, cell = (i - 1, i - 1) if held == 0 else (i + 1, i)
-            if not now[before]:
-                step = found.r[i] - found.r[before]
-                level = np.hypot(step[0], step[1])
-                if level > 1e-6 * h[cell]:
-                    heading = np.array([step[0] / level, step[1] / level, 0.0])
-                r[i] = r[before] + step
-                now[i] = r[i, 2] <= bed(r[i, 0], r[i, 1])
-            else:
-                r[i], now[i], T[cell] = r[before] + h[cell] * heading, True, 0.0
-            if now[i]:
-                r[i, 2] = bed(r[i, 0], r[i, 1])
-        shape = Hanging(r, T)
+        shape, now = found, np.zeros_like(lying)
+        r = found.r[away].copy()
+        down = np.flatnonzero(r[1:, 2] <= bed(r[1:, 0], r[1:, 1]))
+        if down.size:
+            first = int(down[0]) + 1
+            r[first + 1 :, :2] = r[first, :2] + np.cumsum(h[away][first:])[:, None] * _heading(r[: first + 1], h[away])
+            r[first:, 2] = bed(r[first:, 0], r[first:, 1])
+            T = found.T[away].copy()
+            T[first:], now[away][first:] = 0.0, True
+            shape = Hanging(r[away], T[away])
         if (now == lying).all():
             break
         lying = now
     return shape
+
+
+def _heading(r: Floats, h: Floats) -> Floats:
+    """Direction (2,) along the ground of the last chord between nodes r (n, 3) m that has one; cells h (>= n-1,) m."""
+    steps = np.diff(r[:, :2], axis=0)
+    level = np.hypot(steps[:, 0], steps[:, 1])
+    some = np.flatnonzero(level > 1e-6 * h[: level.size])
+    return steps[some[-1]] / level[some[-1]] if some.size else np.array([1.0, 0.0])
 
 
 def moored(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from hybrid.model.sea import Surroundings
 from hybrid.model.sections import swivels
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.schema import Body, Equilibrium, Points, RodZone, Scene, Straight, ZonesModel
+from hybrid.scene.sea import Seabed
 
 SHORTEST_SPAN = 1e-3  # of the length: a line between nearer ends has no straight span to start from
 DRAG_ROUNDS = 4  # of the first shape: drag follows the shape, half of it first
@@ -116,6 +117,18 @@ def dead_loads(line: Line) -> Floats:
     return loads
 
 
+def _heights_of(bed: Seabed) -> Callable[[Floats, Floats], Floats]:
+    """Heights (n,) m of the bed at places x, y (n,) m."""
+
+    def heights(x: Floats, y: Floats) -> Floats:
+        if bed.depths is None:
+            rise_x, rise_y = bed.slope or (0.0, 0.0)
+            return np.asarray(bed.z + rise_x * x + rise_y * y)
+        return np.array([bed.height(*place) for place in zip(x.tolist(), y.tolist(), strict=True)])
+
+    return heights
+
+
 def hung(scene: Scene, line: Line, sea: Sea, clamp_leads: bool = True) -> Hanging | None:
     """The elastic catenary that a search for equilibrium starts from; None where it does not apply or stays slack.
 
@@ -159,7 +172,7 @@ def hung(scene: Scene, line: Line, sea: Sea, clamp_leads: bool = True) -> Hangin
                 found = trail(loads + drag, line.h, line.ck, held, place, on_bed)
             elif floating is None:
                 assert bed is not None
-                found = laid(loads + drag, line.h, line.ck, held, place, bed.height)
+                found = laid(loads + drag, line.h, line.ck, held, place, _heights_of(bed))
             else:
                 lift = float(line.point_buoy[floating])
                 found = moored(loads + drag, lift, sea.surface, line.h, line.ck, held, place, on_bed)
