@@ -27,7 +27,8 @@ def change_base(
     """
     old, n, places = manager.zones, layout.rod.size, layout.starts[-1] + 1
     calm = np.zeros(places, np.int64) if anew else on_other_parts(manager.layout, old.calm, source, layout.parts)
-    blank = blank_zones(1, n)._replace(here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=calm)
+    waves = np.zeros(places) if anew else on_other_parts(manager.layout, old.waves, source, layout.parts)
+    blank = blank_zones(1, n)._replace(here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=calm, waves=waves)
     kept = {name: getattr(old, name) for name in OF_LINE} | {"ratios": old.ratios[:, source].copy()}
     kept |= {name: getattr(old, name)[source] for name in CARRIED}
     assert set(kept) <= set(OF_BASE)

@@ -44,7 +44,7 @@ SHORTEST = 2.0  # base cells that make a zone
 # What a checkpoint holds of the manager; the rest follows from the scene, the layout and the next step.
 CHECKPOINTED = (
     "tolerance", "held", "ratios", "seen", "grown", "leaving", "haste", "calm_since", "calmed", "patience", "released",
-    "going", "next_review", "total_twist", "past", "recent", "age", "recent_age", "largest",
+    "going", "next_review", "total_twist", "past", "recent", "age", "recent_age", "largest", "fastest",
 )  # fmt: skip
 
 
@@ -87,7 +87,7 @@ def _flag(k: int, text: str) -> Any:
 # Arrays of `Zones` that are the same for every layout.
 OF_BASE = (
     "clock", "counts", "clamped", "tangents", "moments", "asked", "largest", "shares", "limits", "ratios", "rod",
-    "leaving", "grown", "haste", "parts", "H", "next_rod", "here", "plan", "calm",
+    "leaving", "grown", "haste", "parts", "H", "next_rod", "here", "plan", "calm", "waves",
 )  # fmt: skip
 
 
@@ -128,8 +128,9 @@ class DomainManager:
         self.scale, self.user, self.free = scale, user, (given >= 0).astype(np.int8)
         places = layout.starts[-1] + 1
         self.zones = blank_zones(1, n)._replace(  # what the compiled run knows of them
-            here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=np.zeros(places, np.int64)
-        )
+            here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=np.zeros(places, np.int64),
+            waves=np.zeros(places),
+        )  # fmt: skip
         self.zones.clock[z.SHARE], self.zones.clock[z.FINENESS] = curvature_error or 0.0, fineness
         self.tolerance, self.zones.clock[z.LEFT] = tolerance, left
         for quantity, part in asked.items():
@@ -159,6 +160,7 @@ class DomainManager:
     total_twist = _number(z.TOTAL_TWIST, "Turn of the ends against each other, rad.")
     compliance = _number(z.COMPLIANCE, "Turn per torque of all the line, rad per N m.")
     age, recent_age = _number(z.AGE, "Of `past`, s."), _number(z.RECENT_AGE, "Of `recent`, s.")
+    fastest = _number(z.FASTEST, "By how much velocities of nodes differed of late, m/s.")
     going, coming = _flag(z.GOING, "Some stiffness is ramped down."), _flag(z.COMING, "Some is ramped up.")
     twisted = _flag(z.HOLDS_TWIST, "Both ends hold the twist.")
 
@@ -196,6 +198,7 @@ class DomainManager:
         self.zones.place[:] = layout.places
         self.zones.here[:] = False
         self.zones.here[layout.places] = True
+        self.zones.waves[~self.zones.here] = 0.0
         clock, flags = self.zones.clock, self.zones.counts
         clock[z.AGE] = clock[z.RECENT_AGE] = 0.0
         flags[[z.KNOWN, z.RELAXING, z.STRAINED]], flags[z.ALL_ROD] = 0, layout.rod.all()
@@ -250,7 +253,7 @@ class DomainManager:
         loudest, grown = saved["calmed"][0], saved["grown"]
         if not (good and 0.0 <= loudest.min(initial=0.0) <= loudest.max(initial=0.0) < len(CRITERIA)):
             raise ValueError("invalid checkpoint of the domain manager")
-        least = min(saved["age"], saved["recent_age"], *saved["largest"])
+        least = min(saved["age"], saved["recent_age"], saved["fastest"], *saved["largest"])
         if not (0.0 <= grown.min() <= grown.max() <= 1.0 and least >= 0.0):
             raise ValueError("invalid checkpoint: a part of stiffness outside 0 to 1, or a negative time or size")
         for name in CHECKPOINTED:

@@ -218,6 +218,9 @@ def renew(table):
     for i in range(job.place.shape[0]):
         zones.place[i] = job.place[i]
         zones.here[job.place[i]] = True
+    for k in range(zones.here.shape[0]):
+        if not zones.here[k]:
+            zones.waves[k] = 0.0
     if job.push.shape[0] > 0:
         carry_push(job.push, job.s, job.line.s, job.new_push)
         clear(job.next_push)

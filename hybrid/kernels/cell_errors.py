@@ -112,7 +112,38 @@ def longest_cell(EI, w, kappa, bends, shares):
     return 1.0 / math.sqrt(over) if over > 0.0 else math.inf
 
 
+@inner
+def longest_behind_hinge(part):
+    """h/l0 at which a straight line from 0 at a hinge to kappa (1 - exp(-h/l0)) is off that curve by `part` of kappa.
+
+    Off it is by 1 - m + m log m with m = (1 - exp(-x))/x, x = h/l0; this is its inverse to 16 %, on the safe side.
+    """
+    return math.sqrt(8.0 * part) * (1.0 - part) ** -1.2
+
+
+@inner
+def longest_in_wave(error, bends):
+    """Its square, m^2: the length at which a straight line between two velocities is off by `error`, m/s.
+
+    bends: |v''|, 1/(m s).
+    """
+    return 8.0 * error / bends
+
+
 # --- what a line has ------------------------------------------------------------------------------
+
+
+@inner
+def lowest_beside(kinds, T, i):
+    """The lowest tension beside node i, N, its floor at least."""
+    n = T.shape[0]
+    return max(min(T[max(i - 1, 0)], T[min(i, n - 1)]), kinds.floor[i], 1e-300)
+
+
+@inner
+def bending_length(kinds, T, i):
+    """l0 at node i."""
+    return layer_length(kinds.EI[i], kinds.w[i], lowest_beside(kinds, T, i))
 
 
 @inner

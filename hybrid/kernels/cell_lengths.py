@@ -19,9 +19,12 @@ import math
 from hybrid.kernels.bed import bed_under
 from hybrid.kernels.cell_errors import (
     CURVATURE,
+    bending_length,
     lack_at_edge,
     layer_length,
+    longest_behind_hinge,
     longest_cell,
+    lowest_beside,
     node_curvature,
     over_shares,
     second_slope,
@@ -31,6 +34,7 @@ from hybrid.kernels.criteria import EDGE
 from hybrid.kernels.forces import SEABED
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.rotations import dot, scale, sub
+from hybrid.kernels.wave_lengths import lower_by_waves
 from hybrid.kernels.zone_criteria import FORESEEN, depth, raise_ratio
 
 TURN = 0.3  # rad that a cell turns through
@@ -52,19 +56,6 @@ FADE = 10.0  # ramp times over which the largest curvature of earlier is forgott
 SAVED = 0.12  # of all cells: so many must go before any goes
 KAPPA, BENDS = range(2)  # columns of the work array `moment` of zones: curvature, 1/m, and |kappa''|, 1/m^3, of nodes
 SMOOTHED = 0.1  # part by which delta comes nearer to what it is, in a step: at once it is unstable in slack lines
-
-
-@inner
-def lowest_beside(kinds, T, i):
-    """The lowest tension beside node i, N, its floor at least."""
-    n = T.shape[0]
-    return max(min(T[max(i - 1, 0)], T[min(i, n - 1)]), kinds.floor[i], 1e-300)
-
-
-@inner
-def bending_length(kinds, T, i):
-    """l0 at node i."""
-    return layer_length(kinds.EI[i], kinds.w[i], lowest_beside(kinds, T, i))
 
 
 @inner
@@ -153,6 +144,34 @@ def lower_by_twist(zones, finer):
         twist = zones.kinds.twist[i]
         if twist > 0.0 and (zones.next_rod[of[max(i - 1, 0)]] or zones.next_rod[of[min(i, n - 1)]]):
             W[i] = min(W[i], TWIST / (twist * finer))
+
+
+@inner
+def lower_at_end(line, state, zones, end, way, finer):
+    """W at an end node where no moment is: behind it the line is bent as it would be without bending stiffness.
+
+    That is what it bends by beside the layer, at most at the three nodes behind the end, or on a line through two.
+    """
+    a, b, c = end + way, end + 2 * way, end + 3 * way
+    bend, s = zones.moment, line.s
+    rises = (bend[a, KAPPA] - bend[b, KAPPA]) * abs(s[a] - s[end]) / abs(s[b] - s[a])
+    kappa = max(bend[a, KAPPA] + max(rises, 0.0), bend[b, KAPPA], bend[c, KAPPA])
+    l0, T = bending_length(zones.kinds, state.T, end), lowest_beside(zones.kinds, state.T, end)
+    taut = l0 * l0 * T >= 0.99 * zones.kinds.EI[end]
+    if taut and kappa > zones.limits[CURVATURE]:
+        W = l0 * longest_behind_hinge(zones.limits[CURVATURE] / kappa)
+        zones.wanted[end] = min(zones.wanted[end], max(W, SHORTEST_CELL * l0 / finer))
+
+
+@inner
+def lower_at_ends(line, state, zones, finer):
+    """W at taut ends of rods without a moment: there the curvature falls to 0 over l0, which shorter cells must show."""
+    n = line.h.shape[0]
+    if n >= 4:
+        if line.spin[0] == 1 and not line.element[0]:
+            lower_at_end(line, state, zones, 0, 1, finer)
+        if line.spin[n - 1] == 1 and not line.element[n]:
+            lower_at_end(line, state, zones, n, -1, finer)
 
 
 @inner
@@ -250,6 +269,8 @@ def find_wanted(line, sea, state, zones, dt, finer):
         zones.wanted[i] = wanted_length(zones.kinds, state.T, zones.moment, i, zones.limits, finer)
     raise_at_hinges(line, state, zones, finer)
     lower_by_twist(zones, finer)
+    lower_by_waves(zones)
+    lower_at_ends(line, state, zones, finer)
     lower_at_edges(line, sea, state, zones, dt, finer)
     now = is_too_long(zones, line.s)
     if line.bits & SEABED:

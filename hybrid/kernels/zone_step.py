@@ -35,6 +35,7 @@ from hybrid.kernels.rotations import dot
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
 from hybrid.kernels.stiffness_ramp import advance, freed, length_defect, shares, soften
 from hybrid.kernels.tension_torque import twist_of_line
+from hybrid.kernels.wave_lengths import QUIET, TAU, WAVES, follow_waves, spread_of_velocity
 from hybrid.kernels.zone_criteria import (
     MOST,
     TWISTED,
@@ -69,8 +70,9 @@ REJECT_RATIO = 4.0  # a step that ends with a catenary above this is rejected, a
     SHARE,  # of the largest curvature that the length of cells may make it wrong by, where they follow it; 0: they stay
     LEFT,  # part of what catenaries leave out that remains in results: 1, but for results that are corrected
     FINENESS,  # of cells that follow the curvature: those that lengths ask for are so many times as short
-) = range(17)  # fmt: skip
-CLOCK_SIZE = 17
+    FASTEST,  # m/s, by how much velocities of nodes differed of late
+) = range(18)  # fmt: skip
+CLOCK_SIZE = 18
 # Flags of `counts`.
 (
     KNOWN,  # tensions of earlier are of these cells
@@ -113,6 +115,7 @@ class Zones(NamedTuple):
     here: NDArray[np.bool_]  # (K+1,) places of nodes now
     plan: NDArray[np.bool_]  # (K+1,) and where they should be
     calm: NDArray[np.int64]  # (K+1,) steps for which a node could have gone
+    waves: Floats  # (K+1,) m^2, squares of the longest cells that waves allow; 0: no node, or not known yet
     place: NDArray[np.int64]  # (N+1,) places of nodes
     wanted: Floats  # (N+1,) m, longest cells that the curvature allows
     share: Floats  # (N+1,) the same of nodes, at the end of a step
@@ -137,7 +140,8 @@ def blank_zones(cells: int, base: int) -> Zones:
         clamped=z(2), tangents=z((2, 3)), moments=z((2, 3)), past=z(cells), recent=z(cells),
         asked=z(QUANTITIES), largest=z(QUANTITIES), shares=z(QUANTITIES), limits=z(QUANTITIES), ratios=z((len(CRITERIA), base)), rod=z(base, bool), leaving=z(base, bool), grown=np.ones(base),
         haste=np.ones(base), parts=np.ones(base, np.int64), H=np.ones(base), next_rod=z(base, bool),
-        here=z(base + 1, bool), plan=z(base + 1, bool), calm=z(base + 1, np.int64), place=z(nodes, np.int64),
+        here=z(base + 1, bool), plan=z(base + 1, bool), calm=z(base + 1, np.int64),
+        waves=z(base + 1), place=z(nodes, np.int64),
         wanted=z(nodes), share=z(nodes), stiff=z((nodes, 3)), true=z(cells), lengths=z(cells), lack=z(cells),
         rate=z(cells), since=np.full(cells, -np.inf), keeps=z(cells, bool), strain=z((2, nodes, 3)),
         moment=z((nodes, 3)), energy=z(4),
@@ -342,6 +346,16 @@ def book(line, ends, before, state, dt, zones):
 
 
 @inner
+def watch_waves(line, state, zones, dt):
+    """What the velocities after a step of dt ask of lengths."""
+    z = zones.clock
+    z[FASTEST] = max(z[FASTEST] * math.exp(-dt / (FADE * z[PACE])), spread_of_velocity(state.v))
+    fast = max(z[FASTEST], QUIET * z[TOLERANCE] / z[PACE])
+    error = WAVES * z[SHARE] * fast / (z[FINENESS] * z[FINENESS])
+    follow_waves(line, state, zones, error, dt / (TAU * z[PACE]), z[FINENESS])
+
+
+@inner
 def other_cells(line, sea, state, zones, dt):
     """Whether rods should have other cells, after a step of dt."""
     z = zones.clock
@@ -416,6 +430,7 @@ def follow_zones(table):
     job.work[0, b.ZONES] += book(line, ends, before, state, clock[b.LAST_DT], zones)
     if zones.clock[SHARE] > 0.0:
         follow_arcs(line, state, zones)
+        watch_waves(line, state, zones, clock[b.LAST_DT])
         zones.counts[CELLS_DUE] = other_cells(line, job.sea, state, zones, clock[b.LAST_DT])
     ramping = zones.counts[GOING] or zones.counts[COMING]
     clock[b.ALLOWED] = zones.clock[RAMP_STEP] if ramping else zones.clock[CALM_STEP]

@@ -16,7 +16,7 @@ from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.system import System
 from hybrid.simulation.restore import program, refused, resolution_from, resolution_tree
 from hybrid.simulation.system_contact import let_touch
-from hybrid.simulation.transient_checkpoint import FIRST_REPORT
+from hybrid.simulation.transient_checkpoint import FIRST_REPORT, zoning_of_today
 from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import matched
@@ -52,6 +52,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     older = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "rotations": run.rotations.last}
     older["rho"] = run.system.require_time().rho_inf
     saved = older | dict(saved)
+    saved["zones"] = zones_of_today(saved["zones"])
     near = [x.number for x in run.lines if "self_contact" in _of(saved, x.name) and not x.touches]
     let_touch(run, near)
     if run.zones is not None:
@@ -98,6 +99,16 @@ def of_today(lines: Any, template: Mapping[str, Any]) -> Any:
             line = line | {"report": np.pad(report, (0, REPORT_SIZE - report.size))}
         found[name] = line
     return found
+
+
+def zones_of_today(zones: Any) -> Any:
+    """Zones of lines of a checkpoint with what earlier programs did not have."""
+    if not (isinstance(zones, dict) and all(isinstance(x, dict) for x in zones.values())):
+        return zones
+    return {
+        name: x | {"switching": zoning_of_today(x["switching"])} if isinstance(x.get("switching"), dict) else x
+        for name, x in zones.items()
+    }
 
 
 def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:

@@ -140,14 +140,20 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
 
 
 def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
-    """The zones of a checkpoint, of an older version too: that had no cells that follow, or one largest curvature."""
+    """The zones of a checkpoint, of an older version too: that had no cells that follow, or one largest curvature, or
+
+    did not look at velocities.
+    """
     saved = {"following": None} | saved
     following, manager, largest = saved["following"], saved.get("manager"), np.zeros(QUANTITIES)
     if isinstance(following, dict) and isinstance(following.get("peak"), float):
         largest[CURVATURE] = following["peak"]
         saved["following"] = {name: x for name, x in following.items() if name != "peak"}
+    following = saved["following"]
+    if isinstance(following, dict) and isinstance(following.get("calm"), np.ndarray):
+        saved["following"] = {"waves": np.zeros(following["calm"].shape)} | following
     if isinstance(manager, dict):
-        saved["manager"] = {"largest": largest} | manager
+        saved["manager"] = {"largest": largest, "fastest": 0.0} | manager
     return saved
 
 

@@ -141,7 +141,7 @@ class ZoneSwitching:
         relaxing = {name: getattr(zones, name) for name in RELAXING} if zones.counts[z.RELAXING] else None
         following = None
         if zones.clock[z.SHARE] > 0.0:
-            following = {"true": zones.true, "calm": zones.calm}
+            following = {"true": zones.true, "calm": zones.calm, "waves": zones.waves}
         return {
             "following": following,
             "manager": self.manager.checkpoint(), "h": line.h, "kb": line.kb, "force": line.force,
@@ -167,11 +167,11 @@ class ZoneSwitching:
                 getattr(zones, name)[:] = x
             zones.counts[z.RELAXING] = 1
         if (following := saved["following"]) is not None:
-            needs = {"true": zones.true, "calm": zones.calm}
+            needs = {"true": zones.true, "calm": zones.calm, "waves": zones.waves}
             found = matched(following, needs, "following")
-            if not found["true"].min() > 0.0:
+            if not (found["true"].min() > 0.0 and found["waves"].min() >= 0.0):
                 raise ValueError("lengths that no line has")
-            zones.true[:], zones.calm[:] = found["true"], found["calm"]
+            zones.true[:], zones.calm[:], zones.waves[:] = found["true"], found["calm"], found["waves"]
         line.h[:], line.kb[:], line.force[:] = saved["h"], saved["kb"], saved["force"]
         zones.lengths[:] = line.h
         if strain.size:

@@ -432,8 +432,8 @@ def test_what_is_asked_along_the_line_is_a_share_of_the_rule(asked: str, share: 
 
 
 def test_zones_of_an_older_checkpoint() -> None:
-    """It had one largest curvature, or none."""
-    rest = {"true": np.ones(3), "calm": np.zeros(4)}
+    """It had one largest curvature, or none; that it did not look at velocities is tested with them."""
+    rest = {"true": np.ones(3), "calm": np.zeros(4), "waves": np.zeros(4)}
     found = zoning_of_today({"manager": {"ratios": 1}, "following": rest | {"peak": 0.2}})
     assert found["following"] == rest and found["manager"]["largest"].tolist() == [0, 0, 0.2, 0]
     assert zoning_of_today({"manager": {"ratios": 1}})["following"] is None
