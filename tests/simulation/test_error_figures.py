@@ -75,7 +75,7 @@ def test_the_figure_of_a_swayed_line_with_a_clump_is_not_too_small():
     """A line of zones that move, clamped at its swayed end, in a current that veers: 0.10 was estimated, once.
 
     Where outputs are far below the largest error, the figure may be larger than three times the truth.  What leaving
-    bending out does to the tension just after zones have changed at the clamp is not in it (0.31 of it, 0.06 s after
+    bending out does to the tension just after zones have changed at the clamp is not in it (0.32 of it, 0.16 s after
     one), and the run says that it was not estimated.
     """
     scene = {
@@ -109,7 +109,7 @@ def test_the_figure_of_a_swayed_line_with_a_clump_is_not_too_small():
     assert "model error not estimated" in {event.kind for event in result.events}
     changes = np.array([event.t for event in result.events if event.kind in ("grow", "split")])
     since = result.times[:, None] - changes
-    calm = ~((since >= 0.0) & (since < 0.1)).any(axis=1)
+    calm = ~((since >= 0.0) & (since < 0.2)).any(axis=1)
     for name, there in (("position", slice(None)), ("tension", calm)):
         found = at_outputs(result, truth, name)[there]
         assert found.size > 15 and found.min() >= SHARP[0], (name, found)
