@@ -6,9 +6,11 @@ A scene's own step, mesh and model.tolerance stand; what it leaves open follows 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import sqrt
+from math import inf, sqrt
 
 from hybrid.model.mesh_grading import Grading
+from hybrid.model.scales import tension_scale
+from hybrid.model.start_vibration import start_vibrations
 from hybrid.scene.accuracy import Accuracy, amount
 from hybrid.scene.motion_checks import shortest_period
 from hybrid.scene.schema import AdaptiveModel, JonswapWaves, Scene, ZonesModel
@@ -27,6 +29,10 @@ COARSEST, FINEST = 0.5, 20.0
 STEP_FOR_TENSION, STEP_FOR_POSITION = 3e-5, 1.5e-3
 # Steps to the shortest period that the scene names: fewer cannot show it, whatever the error control thinks.
 PER_PERIOD = 12
+# A vibration that a ramp sets off is shown where its force is more than this part of what is asked (ordinary ramps:
+# 4e-4 of it), in steps so many times as short: the coarsest of the runs that errors are estimated by, with steps four
+# times as long, then has PER_PERIOD to the period.  Of runs of more than so many steps an event speaks of it.
+OF_VIBRATION, SHOWN_WHEN_COARSE, MOST_VIBRATION_STEPS = 0.5, 4, 10_000
 # An end may turn so far in a step (rad), in runs of longer steps twice as far: with LARGEST_TWIST of
 # simulation.diagnostics, an element can then not pass half a turn, where its twist would be taken for the opposite one.
 TURN, MOST_TURN = 1.0, 2.0
@@ -221,5 +227,16 @@ def first_resolution(scene: Scene) -> Resolution:
         assert time.step is not None
         return Resolution(fineness, time.step, None, zones or part)
     step = min(time.step or time.duration / LEAST_STEPS, time.duration)
-    step = min(step, shortest_period(scene.ends, scene.environment) / PER_PERIOD)
+    step = min(step, shortest_period(scene.ends, scene.environment) / PER_PERIOD, vibration_step(scene, want))
     return Resolution(fineness, step, time.tolerance or local, zones or part)
+
+
+def vibration_step(scene: Scene, want: RequestedAccuracy | None) -> float:
+    """The longest step, s, that shows what ramps set off along the line; infinity where nothing asks for it."""
+    if want is None or scene.time is None or not (want.tension or want.of_end_force):
+        return inf
+    allowed = want.tension or (want.of_end_force or 0.0) * tension_scale(scene, scene.cable.sections, True)
+    duration = scene.time.duration
+    found = [x.period for x in start_vibrations(scene) if x.force > OF_VIBRATION * allowed and x.t < duration]
+    step = min(found, default=inf) / (PER_PERIOD * SHOWN_WHEN_COARSE)
+    return step if duration <= MOST_VIBRATION_STEPS * step else inf

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from hybrid.kernels.state import Floats
+from hybrid.model.resolution import OF_VIBRATION
+from hybrid.model.start_vibration import Vibration, start_vibrations, strain_travel
 from hybrid.scene.schema import Scene
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store.reader import Result
@@ -86,17 +88,15 @@ def cubic_spline(x: Floats, y: Floats, at: Floats) -> Floats:
     )
 
 
-def jolts(scene: Scene) -> list[tuple[float, float, float]]:
-    """Where the slope of a load's history jumps: s; N, of the vibration along the line that starts; its period, s.
+def jolts(scene: Scene) -> list[Vibration]:
+    """Where the slope of a load's history jumps, and the vibration along the line that starts there.
 
     A jump a (N/s) at one end of a bar that is held at the other makes a triangle of a L/c about the slow answer, of
     period 4 L/c; L/c is the time in which strain runs along it.  None in a line that does not stretch.
     """
-    travel = 0.0
-    for section in scene.cable.sections:
-        if section.stiffness is None:
-            return []
-        travel += section.length * float(np.sqrt(section.mass / section.stiffness))
+    travel = strain_travel(scene.cable)
+    if travel is None:
+        return []
     found = []
     for load in (load for end in scene.ends.both for load in end.loads if load.what == "force"):
         rows = np.array(load.rows)
@@ -109,31 +109,40 @@ def jolts(scene: Scene) -> list[tuple[float, float, float]]:
         along = np.abs((jump * values).sum(axis=1)) / np.where(
             sizes > 0.0, sizes, 1.0
         )  # lines lie along what pulls them
-        found += [(float(t), float(a) * travel, 4.0 * travel) for t, a in zip(times, along, strict=True) if t > 0.0]
+        both = zip(times, along, strict=True)
+        found += [Vibration(float(t), float(a) * travel, 4.0 * travel) for t, a in both if t > 0.0]
     return found
 
 
 def damped_jolts(scene: Scene, result: RunSample, error: float, allowed: float | None) -> list[tuple[str, str]]:
-    """The event that says so where steps damp a vibration that a jump in the slope of a load starts (see `jolts`).
+    """The events that say so where steps damp a vibration that a jump in the slope of a load, or a ramp, starts.
 
     error: N, figure of the forces at the ends, which does not see it, as all runs damp it; allowed: N, None: not asked.
     """
-    steps, worst = result.forces[:, 0], (0.0, 0.0, 0.0)
-    for jolt in jolts(scene):
-        t, size, period = jolt
-        near = steps[(steps >= t - 1e-9 * period) & (steps <= t + 2.0 * period)]
-        shown = near.size > 2.0 * STEPS_PER_VIBRATION
-        if not shown and t < steps[-1] and size > worst[1]:
-            worst = jolt
-    t, size, period = worst
-    if not size > (error if allowed is None else max(allowed - error, 0.0)):
-        return []
-    text = (
-        f"the slope of a force given at an end jumps at t = {t:.4g} s: a vibration along the line of {size:.2g} N "
-        f"and a period of {period:.2g} s starts, which steps damp out, and the error figure of forces ({error:.2g} N) "
-        f"does not see it; time.step: {period / STEPS_PER_VIBRATION:.2g} shows it, or a smoother history has none"
-    )
-    return [("error uncertain", text)]
+    worth = error if allowed is None else max(allowed - error, 0.0)
+    of_ramps = worth if allowed is None else max(worth, OF_VIBRATION * allowed)
+    out = []
+    for found, least, begins, cure in (
+        (jolts(scene), worth, "the slope of a force given at an end jumps", "a smoother history"),
+        (start_vibrations(scene), of_ramps, "the ramp or move of an end begins or ends", "a longer ramp or move"),
+    ):
+        worst = max((x for x in found if not _is_shown(x, result.forces[:, 0])), key=lambda x: x.force, default=None)
+        if worst is None or not worst.force > least:
+            continue
+        text = (
+            f"{begins} at t = {worst.t:.4g} s: a vibration along the line of {worst.force:.2g} N and a period of "
+            f"{worst.period:.2g} s starts, which steps damp out, and the error figure of forces ({error:.2g} N) "
+            f"does not see it; time.step: {worst.period / STEPS_PER_VIBRATION:.2g} shows it, or {cure} has none"
+        )
+        out.append(("error uncertain", text))
+    return out
+
+
+def _is_shown(found: Vibration, steps: Floats) -> bool:
+    """Whether the steps (s, when they end) after a vibration has begun follow it, or the run is over before."""
+    t, period = found.t, found.period
+    near = (steps >= t - 1e-9 * period) & (steps <= t + 2.0 * period)
+    return bool(t >= steps[-1] or np.count_nonzero(near) > 2.0 * STEPS_PER_VIBRATION)
 
 
 def damped_vibrations(result: Result) -> tuple[tuple[str, str], ...]:
