@@ -209,17 +209,18 @@ def test_laying_keeps_its_share_at_the_held_end_and_its_pull() -> None:
     assert h[-1] < 2.0 and h[60:].max() == 25.0 and h.size < 110
 
 
-def test_laying_is_continued_to_the_last_bit(tmp_path: Path) -> None:
-    """In the middle of the time in which cells become shorter for waves."""
-    whole = hybrid.run(laying(5.0, FOLLOWING, 32))
-    hybrid.run(laying(2.5, FOLLOWING, 32), tmp_path / "r.h5").close()
-    more = hybrid.resume(tmp_path / "r.h5", until=5.0)
+@pytest.mark.parametrize("cut, until", [(2.5, 5.0), (6.5, 8.0)])
+def test_laying_is_continued_to_the_last_bit(cut: float, until: float, tmp_path: Path) -> None:
+    """While cells become shorter for waves; and while the ship's heave turns round, when it has been faster of late."""
+    whole = hybrid.run(laying(until, FOLLOWING, 32))
+    hybrid.run(laying(cut, FOLLOWING, 32), tmp_path / "r.h5").close()
+    more = hybrid.resume(tmp_path / "r.h5", until=until)
     for name in ("position", "tension", "curvature", "work/zones"):
         np.testing.assert_array_equal(more[name], whole[name], err_msg=name)
     for mine, its in zip(more.mesh, whole.mesh, strict=True):
         np.testing.assert_array_equal(mine.s, its.s)
-    at_ship = [int((more.mesh[k].s > 650.0).sum()) for k in (0, 5, -1)]
-    assert at_ship[0] < at_ship[1] < at_ship[2]  # at rest, after 2.5 s, at the end
+    at_ship = [int((more.mesh[k].s > 650.0).sum()) for k in (0, 5, 10)]
+    assert at_ship[0] < at_ship[1] < at_ship[2]  # at rest, after 2.5 s, after 5 s
 
 
 def test_waves_are_not_known_in_an_older_checkpoint() -> None:
