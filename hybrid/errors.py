@@ -114,6 +114,7 @@ EVENTS_BY_WEIGHT = (
     "out of plane",
     "unresolved twist",
     "unresolved bend",
+    "unresolved change of section",
     "deep in the seabed",
     "numerical dissipation",
     "vibrations damped",

@@ -35,7 +35,7 @@ from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.outputs.local_means import means_beside, means_on_line
 from hybrid.outputs.moments import across, node_tangents, node_torques, passed_torques
 from hybrid.outputs.output_grid import Grid
-from hybrid.outputs.strains import bend_directions, strains
+from hybrid.outputs.strains import bend_directions, ends_of, strains
 from hybrid.outputs.touchdown import Touchdown, carried, contact_pressure, penetration, sinking, touchdown
 from hybrid.outputs.vectors import cross, size
 from hybrid.solve.bending_corrector import Shift
@@ -232,8 +232,15 @@ class Observation:
             if zone.kind == "rod":
                 out[o : o + b - a + 1] = 0.0
         out[[0, -1]] = 0.0
-        EI = shift.stiffness[self.grid.side_nodes][:, None]
+        EI = self._side_stiffness(shift)
         return np.divide(out, EI, out=np.zeros_like(out), where=EI > 0.0)
+
+    def _side_stiffness(self, shift: Shift) -> Floats:
+        """Bending stiffness (n sides, 1) N m2: where a section ends, of either side its own, as at the node beside."""
+        EI, at = shift.stiffness[self.grid.side_nodes], ends_of(np.array(self.grid.spans).reshape(-1, 3))
+        changes = np.isin(at.node, self.changes)
+        EI[at.row[changes]] = shift.stiffness[at.inner[changes]]
+        return EI[:, None]
 
     @cached_property
     def tangent(self) -> Floats:
@@ -324,6 +331,11 @@ class Observation:
         """(n sides, 3 or 1, nb), of the curvature that was computed."""
         return bend_directions(self)
 
+    @property
+    def curvature_on_sides(self) -> Floats:
+        """(n sides, nb) 1/m, of what was computed, at the nodes of the grid's stretches."""
+        return self._plain._strains[:, 0]
+
     @cached_property
     def _strains(self) -> Floats:
         """Curvature and twist (n sides, 2, nb), 1/m, of what was computed."""
@@ -332,7 +344,7 @@ class Observation:
     def _curvature_of_moment(self, shift: Shift) -> Floats:
         """Curvature (n sides, nb) 1/m of all of the moment, with what was left out; without stiffness, as it is."""
         bending = np.sqrt(self._square_of_moment(self.node_moment))
-        EI = shift.stiffness[self.grid.side_nodes][:, None]
+        EI = self._side_stiffness(shift)
         return np.divide(bending, EI, out=self._plain._strains[:, 0].copy(), where=EI > 0.0)
 
     def _square_of_moment(self, moment: Floats) -> Floats:

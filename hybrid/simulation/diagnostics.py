@@ -27,6 +27,7 @@ from hybrid.outputs.observation import Observation
 from hybrid.simulation.doubtful_outputs import Bounds, doubtful
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.hockling_watch import LOOP, note_hockling, note_loops
+from hybrid.simulation.section_layers import hidden_layer, layer_text
 from hybrid.solve.run import CompiledRun
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium
@@ -69,10 +70,10 @@ NOWHERE: Floats = np.zeros((0, 3))
 # What a checkpoint holds of it as plain values.
 REMEMBERED = (
     "_bend", "_twist", "_slack", "_fold", "_sunk", "_off", "_gain", "_loss", "_rested", "_left_out", "_jump",
-    "_put_in", "_potential", "_alive", "_loop", "_writhe", "_writhes",
+    "_put_in", "_potential", "_alive", "_loop", "_writhe", "_writhes", "_section",
 )  # fmt: skip
-# What checkpoints of 0.6 files may lack of it: loops were not watched.
-UNWATCHED = {"_loop": 1.0, "_writhe": np.nan, "_writhes": LOOP}
+# What checkpoints of 0.6 files may lack of it: loops, and changes of section, were not watched.
+UNWATCHED = {"_loop": 1.0, "_writhe": np.nan, "_writhes": LOOP, "_section": False}
 
 Stop = tuple[Outcome, int] | None
 
@@ -105,7 +106,7 @@ class Diagnostics:
         self._fold, self._sunk = UNRESOLVED, SUNK * model.length
         self._off = OFF * model.length
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
-        self._rested = self._left_out = False
+        self._rested = self._left_out = self._section = False
         self._jump = SNAP * model.tension_scale  # N
         self._put_in = self._potential = self._alive = 0.0  # J
         self._loop, self._writhe, self._writhes = UNWATCHED["_loop"], UNWATCHED["_writhe"], UNWATCHED["_writhes"]
@@ -343,6 +344,12 @@ class Diagnostics:
                 if sag.max() > self._off:
                     self._note_sag(float(batch.t[k]), sag)
         self._layers(batch)
+        layer = None if self._section else hidden_layer(self._model, seen)
+        if layer is not None:
+            rod = bool(line.spin[layer.node if layer.stiffness[1] < layer.stiffness[0] else layer.node - 1])
+            text = layer_text(layer, float(line.s[layer.node]), rod)
+            self.note(float(batch.t[layer.output]), layer.node, "unresolved change of section", text)
+            self._section = True
         if line.bits & SEABED:
             sea = self._model.sea.values
             depth = planes_under(sea, batch.r.reshape(-1, 3))[1].reshape(batch.r.shape[:2]) - 0.5 * sea.onset
