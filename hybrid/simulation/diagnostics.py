@@ -149,6 +149,12 @@ class Diagnostics:
 
     def equilibrium(self, found: Equilibrium) -> None:
         """What a static solution leaves open."""
+        if found.pushed:
+            text = (
+                "the line was pushed off an equilibrium that is not stable, to one side: on the other it may rest as "
+            )
+            text += "well, as a mirror image, and which is found depends on the mesh; initial.points near one choose it"
+            self.events.event(0.0, 0.0, self._model.length, "several equilibria", text)
         if found.slack >= 0:
             s, tension = float(self._model.line.s[found.slack]), float(found.state.T[found.slack])
             text = f"the only equilibrium found has a tension of {tension:.3g} N in a catenary at s = {s:g} m"

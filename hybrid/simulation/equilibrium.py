@@ -22,7 +22,7 @@ from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.schema import Scene
 from hybrid.simulation.contact_equilibrium import with_contact
 from hybrid.solve.stability import is_stable
-from hybrid.solve.statics import Equilibrium, solve_statics
+from hybrid.solve.statics import PUSHED, Equilibrium, solve_statics
 
 # Turns that close the frames of the initial shape, at most, and round-off; the twist of a cell, rad, that is resolved.
 CLOSING, MOST_TWIST = 0.5 + 1e-6, 1.0
@@ -195,5 +195,5 @@ def _from_coarser(scene: Scene, model: Model, fewer: Model, t: float) -> Equilib
     """From the equilibrium of the model with fewer cells; ComputationError: there is none, or it leads to none."""
     coarse = _by_coarser(scene, fewer, t) or _statics(scene, fewer, t)
     start = refined(coarse.state, fewer.line, model.line)
-    shape = f"the equilibrium with {fewer.cells} cells"
+    shape = f"the equilibrium with {fewer.cells} cells{f', {PUSHED}' if coarse.pushed else ''}"
     return _statics(scene, replace(model, start=start, start_shape=shape, other_starts=()), t, quick=True)

@@ -34,6 +34,8 @@ LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get t
 NEARLY_STIFF = 1e-6  # strain at the tension scale at which hardening ends; the last part of the way is Newton's
 HARDENING = 8  # parts of the way from a soft, short line to the real one; a part that fails is halved
 LEAST_TENSION = 1e-3  # of the slack floor of a motion, with the opposite sign
+# The way to an equilibrium that has a mirror image on the other side, or may have: which it is hangs on round-off.
+PUSHED = "pushed off an unstable equilibrium"
 PUSH, TURN = 1e-2, 0.1  # the push off an unstable equilibrium: of the length per time scale, and rad about the chord
 RELAXING_STEPS = 2000  # of the pseudo-transient, at most
 SOFT_BED = 0.05  # of the length: how deep a cable may rest in the seabed where a continuation begins
@@ -56,6 +58,11 @@ class Equilibrium:
     judged: bool  # False when its stability could not be judged (an end moment, or `blurred`)
     blurred: bool = False  # True when round-off of the bending of very short cells hides whether it buckles
     touch: Floats = field(default_factory=lambda: np.zeros(0))  # (N+1,) N/m, where the line touches itself
+
+    @property
+    def pushed(self) -> bool:
+        """Whether it, or one on fewer cells that it was found from, is beside an equilibrium that is not stable."""
+        return PUSHED in self.path[-1]
 
     @property
     def summary(self) -> str:
@@ -304,7 +311,7 @@ def _attempts(
         if outcome == Outcome.UNSTABLE:
             time_scale = float(np.sqrt(float(solver.line.mass.sum()) * solver.length / solver.scale))
             fallen = _relax(solver, ends, nudged(solver.line, state, solver.length, time_scale))
-            yield "pushed off an unstable equilibrium", *solver.newton(solver.line, ends, fallen)
+            yield PUSHED, *solver.newton(solver.line, ends, fallen)
 
 
 def solve_statics(
