@@ -17,8 +17,9 @@ from hybrid.simulation.run_sample import END_FORCES, RunSample, every_of
 ORDER, ORDERS, MOST_ORDER = 1.5, (1.5, 2.0), 3.0
 # The same of forces at the ends where a motion begins from what is no equilibrium.  At its first output the half cell
 # at a held end bears the load that the line beside it falls with, w h/2, which is of order 1; and the waves that begin
-# there have all lengths, of which finer cells carry shorter ones (docs/accuracy.md).
-START_ORDERS = (1.0, 2.0)
+# there have all lengths, of which finer cells carry shorter ones (docs/accuracy.md): more than ORDER is shown by runs
+# that are too coarse to carry them.
+START_ORDERS = (1.0, ORDER)
 # Runs that differ in a force at an end by more than this part of its largest are too coarse to show an order above
 # ORDER: a difference that falls from three times the force to half of it would be of order 2.7.
 TOO_COARSE = 1.0

@@ -181,6 +181,10 @@ def test_runs_that_are_too_coarse_show_no_high_order():
     runs = [sample(resolution, 100, 2.0, 1, 0.15), sample(resolution.coarser(2, 2), 50, 2.0, 2, 0.5)]
     runs += [sample(resolution.coarser(2, 4), 25, 2.0, 4, 0.5), sample(resolution.coarser(4, 4), 25, 2.0, 4, 3.0)]
     assert Estimate(*runs).order == {"position": ORDERS[1], "reaction_end": ORDERS[0]}
+    runs = [sample(resolution, 100, 2.0), sample(resolution.coarser(2, 2), 50, 2.0, 2)]
+    runs += [sample(resolution.coarser(2, 4), 25, 2.0, 4), sample(resolution.coarser(4, 4), 25, 2.0, 4)]
+    found = [Estimate(*runs, from_rest=x).order["reaction_end"] for x in (True, False)]
+    assert found == pytest.approx([2.0, ORDER])  # runs that show 2 after a shock do not carry its waves
 
 
 @pytest.mark.parametrize(("first", "order"), [(1.0, START_ORDERS[0]), (1.25, 1.25), (2.0, ORDER)])
