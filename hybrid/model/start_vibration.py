@@ -2,15 +2,15 @@
 
 A ramp 10 x^3 - 15 x^4 + 6 x^5 (scene/motion.py) has third and higher derivatives that jump at its ends.  Of a bar of
 stiffness k and frequency w whose end moves by u(t), jumps J_n of the n-th derivatives leave a free vibration of
-k |sum J_n (i/w)^n|: the solution u - u''/w^2 + u''''/w^4 - .. of q''/w^2 + q = u has to be met in value and rate.  The
-longest period of strain along a line is 4 L/c, c the speed at which it runs.  A small motion is a large force there:
-steps that follow the motion in metres damp it, and so do the longer steps of the runs that errors are estimated by.
+k |sum J_n (i/w)^n|: the solution u - u''/w^2 + u''''/w^4 - .. of q''/w^2 + q = u has to be met in value and rate.
+A small motion is a large force there: steps that follow the motion in metres damp it, and so do the longer steps of the
+runs that errors are estimated by.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import comb, hypot, pi, radians, sin, sqrt
+from math import comb, hypot, pi, radians, sin, sqrt, tan
 from typing import NamedTuple
 
 from hybrid.scene.cable import Cable
@@ -37,12 +37,29 @@ def strain_travel(cable: Cable) -> float | None:
     return sum(x.length * sqrt(x.mass / x.stiffness) for x in cable.sections if x.stiffness)
 
 
+def longest_period(cable: Cable) -> float | None:
+    """The longest period, s, of strain along a cable; None: nothing of it stretches.
+
+    That of a bar which is held at one end, 4 L/c, with what does not stretch as a mass M at the other: frequencies are
+    x c/L with x tan x = m/M, m the mass of the bar.
+    """
+    stretches = [x for x in cable.sections if x.stiffness]
+    if not stretches:
+        return None
+    travel = sum(x.length * sqrt(x.mass / x.stiffness) for x in stretches if x.stiffness)
+    bar, rigid = (sum(x.length * x.mass for x in cable.sections if bool(x.stiffness) == y) for y in (True, False))
+    low, high = 0.0, 0.5 * pi
+    while rigid and high - low > 1e-9:
+        x = 0.5 * (low + high)
+        low, high = (x, high) if x * tan(x) * rigid < bar else (low, x)
+    return 2.0 * pi * travel / high
+
+
 def start_vibrations(scene: Scene) -> list[Vibration]:
     """What harmonic motions with a ramp, and moves to another place, set off; none in a line that does not stretch."""
-    travel = strain_travel(scene.cable)
-    if travel is None:
+    period = longest_period(scene.cable)
+    if period is None:
         return []
-    period = 4.0 * travel
     w, k = 2.0 * pi / period, 1.0 / sum(x.length / x.stiffness for x in scene.cable.sections if x.stiffness)
     found = []
     for motion in (end.prescribed_motion for end in scene.ends.both):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import factorial, hypot, pi, radians, sin
+from math import factorial, hypot, pi, radians, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.polynomial import Polynomial
 
 import hybrid
 from hybrid.model.resolution import first_resolution
-from hybrid.model.start_vibration import start_vibrations
+from hybrid.model.start_vibration import longest_period, start_vibrations
 
 LENGTH, EA, MASS = 12.0, 1e5, 2.0
 PERIOD = 4.0 * LENGTH * (MASS / EA) ** 0.5
@@ -63,6 +63,17 @@ def test_a_move_and_a_line_that_does_not_stretch():
     stiff = sag(heave(1.0))
     del stiff["cable"]["sections"][0]["axial_stiffness"]
     assert not start_vibrations(hybrid.validate_scene(stiff))
+
+
+@pytest.mark.parametrize(("rigid", "times"), [(1e-6, 4.0), (1e5, 2.0 * pi * sqrt(1e5)), (1.0, 2.0 * pi / 0.860334)])
+def test_what_does_not_stretch_is_a_mass_on_the_rest(rigid, times):
+    """Periods in L/c of a bar with so many times its mass at its end: 0.860334 is the root of x tan x = 1."""
+    scene = sag(heave(1.0))
+    (bar,) = scene["cable"]["sections"]
+    stiff = {k: v for k, v in bar.items() if k != "axial_stiffness"} | {"length": rigid * bar["length"]}
+    cable = hybrid.validate_scene(scene).cable
+    with_mass = cable.model_copy(update={"sections": (*cable.sections, type(cable.sections[0])(**stiff))})
+    assert longest_period(with_mass) == pytest.approx(times * PERIOD / 4.0, rel=1e-5)
 
 
 def test_steps_show_a_vibration_that_matters():
