@@ -414,6 +414,8 @@ class ErrorController:
             now = run.resolution
             worth = found and max(found.fineness / now.fineness, now.step / max(found.step, 1e-300)) >= WORTH_REPEATING
             return found if worth else None
+        if self.estimate.share_unknown:  # either may be to blame
+            verdict = replace(verdict, time=max(verdict.time, verdict.mesh))
         found = refined(run.resolution, verdict, self.free)
         if found is None or self.moves or found.fineness == run.resolution.fineness:
             return found

@@ -120,6 +120,8 @@ class Estimate:
         self.by_mesh: dict[str, np.ndarray] | None = None  # the same by the mesh
         self.has_step = self._rough is not None and any(name in self._rough.values for name in self.order)
         self.has_mesh = bool(self.order) and result.cells >= LEAST_RATIO * coarse.cells
+        # Steps of the result are shorter than those of the coarser run, and what that does is not known.
+        self.share_unknown = not self.has_step and 0 < LEAST_RATIO * coarse.steps <= result.steps
 
     def _bounds(self, name: str, found: Falls) -> tuple[float, float]:
         """Bounds of the order of convergence of an output."""
@@ -153,9 +155,12 @@ class Estimate:
     ) -> np.ndarray:
         """Error by the mesh, from a change since a run with other cells: less what its steps have changed.
 
-        begins: the first of these outputs is that at the start.
+        Where that is not known it is of both, and falls as what has become finer by less.  begins: the first of these
+        outputs is that at the start.
         """
-        p, finer = self.order[name], self.run.cells / before.cells
+        p, finer, shorter = self.order[name], self.run.cells / before.cells, self.run.steps / max(before.steps, 1)
+        if self.share_unknown and shorter > LEAST_RATIO:
+            finer = min(finer, shorter)
         if by_step is not None:
             change = change - by_step * ((self.run.steps / before.steps) ** p - 1.0)
         error = np.asarray(change / (finer**p - 1.0))
@@ -244,6 +249,9 @@ class Estimate:
                     by_step[name] = by_step[name] / shorter**p
                 shown, kept = self._mesh_error(name, change, by_step.get(name), before), by_mesh[name]
                 by_mesh[name] = blended(shown, kept / finer**p, finer, p)
+                if self.share_unknown and shorter <= LEAST_RATIO:  # what steps make of it has not changed
+                    left = kept - change
+                    by_mesh[name] = np.where(np.abs(left) > np.abs(by_mesh[name]), left, by_mesh[name])
                 if name in self.at_start:
                     q = self.at_start[name]
                     by_mesh[name][:1] = blended(shown[:1], kept[:1] / finer**q, finer, q)
@@ -376,6 +384,7 @@ class Estimate:
         found: Tree = {
             "order": self.order,
             "at_start": self.at_start,
+            "share_unknown": self.share_unknown,
             "falls": self.falls,
             "changes": changes,
             "start": np.array(self.start),
@@ -414,6 +423,7 @@ class Estimate:
             raise ValueError("a model error of no run")
         self._model_of = count, every, catenary
         self.has_step, self.has_mesh = bool(late), bool(cells)
+        self.share_unknown = bool(tree.get("share_unknown", False))  # of checkpoints that have it
         if not (set(late) | set(cells) <= set(self.order) <= set(self.run.values) and self.run.every == 1):
             raise ValueError("errors of outputs that are not there")
         if not (set(self.at_start) <= set(self.order) and set(self.at_start) <= set(END_FORCES)):

@@ -12,13 +12,14 @@ converges, and in the next run a snap exceeds it.
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import stdtrit
 
 from hybrid.kernels.state import Floats
 
 # Part of its largest force to which the force at an end comes back where a line snaps.
 SLACKENS = 0.1
-# Standard deviations of a snap that one may be larger by.
-DEVIATIONS = 2.0
+# Chance that a snap of all of a run is larger than is foretold: that of two standard deviations.
+CHANCE = 0.0228
 
 
 def snap_times(t: Floats, F: Floats) -> list[tuple[float, float]]:
@@ -58,7 +59,8 @@ def snap_excess(after: Floats, before: Floats) -> Floats:
     """By how much snaps may exceed the largest forces of a run: (2,) N at start and end, at least 0.
 
     after, before: forces of all steps of a run and of one that is less fine, as of `RunSample`.  The difference of two
-    runs has twice the variance that a snap of one has.
+    runs has twice the variance that a snap of one has.  Of n snaps that variance is known as well as n numbers tell it
+    (Student's t of n degrees of freedom), and none of the n is to exceed the largest.
     """
     if not (len(after) and len(before)):
         return np.zeros(2)
@@ -67,5 +69,6 @@ def snap_excess(after: Floats, before: Floats) -> Floats:
     if not times:
         return np.zeros(2)
     now, then = peaks(after, times), peaks(before, times)
-    deviation = np.sqrt(0.5 * np.mean((now - then) ** 2, axis=0))
-    return np.maximum(now.max(axis=0) + DEVIATIONS * deviation - after[:, 1:].max(axis=0), 0.0)
+    deviation, n = np.sqrt(0.5 * np.mean((now - then) ** 2, axis=0)), len(times)
+    most = now.max(axis=0) + float(stdtrit(n, 1.0 - CHANCE / n)) * deviation
+    return np.asarray(np.maximum(most - after[:, 1:].max(axis=0), 0.0))
