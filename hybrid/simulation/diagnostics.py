@@ -27,7 +27,7 @@ from hybrid.outputs.observation import Observation
 from hybrid.simulation.doubtful_outputs import Bounds, doubtful
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.hockling_watch import LOOP, note_hockling, note_loops
-from hybrid.simulation.section_layers import hidden_layer, layer_text
+from hybrid.simulation.section_layers import ASKEW, hidden_layer, layer_text
 from hybrid.solve.run import CompiledRun
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium
@@ -53,9 +53,8 @@ PRESSED = 1e-3
 COARSE = 0.35
 # Of the length, and of the largest tension: what Newton's tolerance changes them by is no motion.
 HARDLY_MOVED = 1e-7
-# An angle at a clamp (rad) that is more than what Newton leaves; a bend there that falls by more than this part to the
-# next node is a boundary layer.
-ASKEW, LAYER = 1e-5, 0.5
+# A bend at a clamp that falls by more than this part to the next node is a boundary layer.
+LAYER = 0.5
 # A jump of tension within a step, as a part of the largest that anything in the scene can ask for.
 SNAP = 3.0
 # A turn of one end against the other (rad) whose torque is worth a word where no rod carries it.

@@ -20,10 +20,10 @@ from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
 from hybrid.outputs.observation import Observation
 
-# Cells of a rod longer than this many lambda do not show the bend.
+# Cells of a rod that are longer than this many lambda do not show the bend.
 LONG = 1.5
-# Times the curvature that is shown, from which on the event is written.
-FALSE = 1.5
+# The event is written where the curvature is more than this times the one that is shown.
+MORE = 1.5
 # rad: bends by less than this are what Newton's tolerance leaves.
 ASKEW = 1e-5
 # Part of the largest curvature along the line below which the bend decides nothing.
@@ -49,7 +49,7 @@ def hidden_layer(model: Model, seen: Observation) -> SectionLayer | None:
             continue
         s, near = line.s[node], 1e-6 * model.length
         EI = cable.B[cable.piece(np.array([s - near, s + near])), :2].min(axis=1)
-        if not (EI.min() > 0.0 and EI.max() > FALSE * EI.min()):
+        if not (EI.min() > 0.0 and EI.max() > MORE * EI.min()):
             continue
         found = _hidden_at(model, seen, node, EI)
         if found is not None:
@@ -71,10 +71,10 @@ def _hidden_at(model: Model, seen: Observation, node: int, EI: Floats) -> Sectio
     side = int(np.flatnonzero(seen.grid.side_nodes == node)[-1 if after else 0])
     shown = seen.curvature_on_sides[side]
     cell = node if after else node - 1
-    shows = (line.spin[cell] == 1) | model.corrected
-    hidden = (true > FALSE * shown) & (true * fades.min(axis=0) > ASKEW) & (true > SMALL * kappa.max(axis=0))
+    may_show = line.spin[cell] == 1 or model.corrected
+    hidden = (true > MORE * shown) & (true * fades.min(axis=0) > ASKEW) & (true > SMALL * kappa.max(axis=0))
     hidden &= (seen.T[node] > 0.0) & (fades.min(axis=0) < 0.1 * length)
-    if shows:
+    if may_show:
         hidden &= line.h[cell] > LONG * fades.min(axis=0)
     at = np.flatnonzero(hidden)
     if not at.size:

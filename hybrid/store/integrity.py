@@ -87,9 +87,9 @@ def sign_new(path: Path) -> None:
         file.write(_TAIL.pack(_NAME, size, _sum_of(file, size)))
 
 
-def signed(image: bytes) -> tuple[bytes, bytes]:
-    """The bytes of a file, and its sum that goes behind them."""
-    return image, _TAIL.pack(_NAME, len(image), zlib.crc32(image))
+def sum_behind(image: bytes) -> bytes:
+    """What goes behind the end of a file with these bytes: their sum."""
+    return _TAIL.pack(_NAME, len(image), zlib.crc32(image))
 
 
 def sign(path: Path) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 import h5py
 
 from hybrid.store.hdf5_file import beside, image_of, unwritable
-from hybrid.store.integrity import signed
+from hybrid.store.integrity import sum_behind
 
 
 class LateFile:
@@ -46,8 +46,9 @@ class LateFile:
         self.change(self.at_last)
         new = beside(self.path)
         try:
+            image = image_of(self.file)
             with new.open("wb") as file:
-                file.writelines(signed(image_of(self.file)))
+                file.writelines((image, sum_behind(image)))
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(new, self.path)
