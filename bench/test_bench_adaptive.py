@@ -62,6 +62,11 @@ def share(result: hybrid.Result) -> float:
     return float(np.mean([rods(x) for x in result.zones]) / result.s[-1])
 
 
+def cells_of(result: hybrid.Result) -> int:
+    """Cells of the finest mesh of a run."""
+    return max(mesh.kinds.size for mesh in result.mesh)
+
+
 def apart(a: hybrid.Result, b: hybrid.Result) -> float:
     """Largest distance, m, at any output, of the same arc lengths."""
     return float(np.linalg.norm(a.position - b.position, axis=2).max())
@@ -78,7 +83,12 @@ SEEDS = int(os.environ.get("HYBRID_BENCH_SEEDS", "200"))
 
 
 def test_adaptive_random() -> None:
-    """SEEDS seeds: all finish, and the distance to all rod over the tolerance."""
+    """SEEDS seeds: all finish, and the distance to all rod over the tolerance.
+
+    Both have the same base cells and steps, so that what they differ by is what zones do.  A scene in which a small
+    difference grows shows more than that: the rod itself is off by more.  The error figure of the run with zones tells
+    whoever asks for it (`output: {errors: true}`); beyond five tolerances it has to be no less than that distance.
+    """
     ratios, ratio_cpu, worst, failed = [], [], [], []
     for seed in range(SEEDS):
         kind, text = random_scene(seed)
@@ -99,12 +109,13 @@ def test_adaptive_random() -> None:
         ratios.append(ratio)
         ratio_cpu.append(cpu(r) / cpu(a))
         if ratio > 2.0:
-            # how well determined is the scene itself?  The rod with a tenth more cells, and with half the step
-            finer = run(text | {"mesh": {"cells": 66}}, force_rod=[[0, L]])
+            said = run(text | {"output": text["output"] | {"errors": True}}).attributes["error_total_position"]
             shorter = copy.deepcopy(text)
-            shorter["time"]["step"] /= 2
-            own = [apart(x, r) / L / tolerance for x in (finer, run(shorter, force_rod=[[0, L]]))]
-            worst.append((seed, kind, ratio, *own))
+            shorter["time"]["step"] /= 4
+            resolved, rod = run(shorter), run(shorter, force_rod=[[0, L]])
+            many = run(shorter | {"mesh": {"cells": 4 * cells_of(r)}}, kind="rod")
+            own = [said, apart(a, many), apart(r, many), apart(resolved, rod)]
+            worst.append((seed, kind, ratio, *(x / L / tolerance for x in own)))
     x = np.array(ratios)
     print(
         f"\n{SEEDS} random runs, {len(failed)} of them failed; of the others, distance to all rod over the tolerance: median {np.median(x):.2f}, ",
@@ -113,12 +124,13 @@ def test_adaptive_random() -> None:
     print(", ".join(f"{p} % {np.percentile(x, p):.2f}" for p in (75, 90, 95, 98, 99)), f", largest {x.max():.1f}")
     print(f"<= 1: {np.mean(x <= 1):.1%}, <= 2: {np.mean(x <= 2):.1%}, <= 5: {np.mean(x <= 5):.1%}")
     print(f"CPU all rod/adaptive: median {median(ratio_cpu):.2f}, {min(ratio_cpu):.2f} to {max(ratio_cpu):.2f}")
-    print("seed kind       adaptive   all rod itself: 66 base cells, half the step")
-    for seed, kind, ratio, *own in worst:
-        print(f"{seed:4d} {kind:10s} {ratio:8.2f}   {own[0]:8.2f} {own[1]:8.2f}")
+    print("seed kind        to all rod   its figure   to rods on a quarter of cells and steps   all rod to those")
+    print("                                                        to all rod, both with a quarter of the steps")
+    for seed, kind, ratio, figure, true, of_rod, both in worst:
+        print(f"{seed:4d} {kind:10s} {ratio:10.2f} {figure:12.2f} {true:42.2f} {of_rod:18.2f} {both:9.2f}")
     assert not failed
-    assert np.mean(x <= 2) >= 0.95
-    assert all(ratio <= max(5.0, 2.0 * max(own)) for _, _, ratio, *own in worst)
+    assert np.mean(x <= 2) >= 0.98
+    assert all(figure >= ratio for _, _, ratio, figure, *_ in worst if ratio > 5.0)
 
 
 # --- the suspension -----------------------------------------------------------------------------------------------

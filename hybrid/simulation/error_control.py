@@ -318,6 +318,14 @@ class ErrorController:
         assert found[0] is not None
         return found[0], found[1], found[2]
 
+    def _in_shorter_steps(self, coarse: RunSample) -> RunSample | None:
+        """The first of the runs to compare with in steps as short as those of the result; None: it fails."""
+        of_result = replace(coarse.resolution.coarser(1.0, 1.0 / COARSER), every=coarse.every, follow=False)
+        try:
+            return self._counted(self.sample(of_result))
+        except ComputationError:
+            return None
+
     def _counted(self, run: RunSample) -> RunSample:
         self.runs.append(run.cpu)
         return run
@@ -328,6 +336,8 @@ class ErrorController:
             self._notes += result.notes
             return False
         estimate = Estimate(result, *self.comparisons, self.from_rest)
+        if estimate.share_unknown and (faster := self._in_shorter_steps(self.comparisons[0])) is not None:
+            estimate.show_steps(faster)
         self.excess = snap_excess(result.forces, self.comparisons[0].forces)
         self._set_statistics(result, *self.comparisons)
         if not estimate.has_mesh:

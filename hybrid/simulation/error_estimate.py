@@ -112,16 +112,26 @@ class Estimate:
         self.start = start_change(result, coarse), start_change(coarse, coarsest)
         self.set_model_errors(coarse)
         self.notes += doubt
-        slower = rough is not None and coarse.steps > LEAST_RATIO * rough.steps
-        self._coarse, self._rough = coarse, rough if slower else None
+        self._coarse, self._of_steps = coarse, self._pair(rough, coarse)
         self.by_step: dict[str, np.ndarray] | None = (
             None  # errors by the time step, with their sign, once they are kept
         )
         self.by_mesh: dict[str, np.ndarray] | None = None  # the same by the mesh
-        self.has_step = self._rough is not None and any(name in self._rough.values for name in self.order)
+        self.has_step = self._of_steps is not None
         self.has_mesh = bool(self.order) and result.cells >= LEAST_RATIO * coarse.cells
         # Steps of the result are shorter than those of the coarser run, and what that does is not known.
         self.share_unknown = not self.has_step and 0 < LEAST_RATIO * coarse.steps <= result.steps
+
+    def _pair(self, slow: RunSample | None, fast: RunSample) -> tuple[RunSample, RunSample] | None:
+        """Two runs on the same cells, of longer and of shorter steps, that show what steps do; None: they do not."""
+        shows = slow is not None and fast.steps > LEAST_RATIO * slow.steps
+        return (slow, fast) if slow and shows and any(name in slow.values for name in self.order) else None
+
+    def show_steps(self, fast: RunSample) -> None:
+        """Take a run on the cells of the coarser one in shorter steps, where that in longer steps shows nothing."""
+        self._errors, self._of_steps = None, self._pair(self._coarse, fast)
+        self.has_step = self._of_steps is not None
+        self.share_unknown = self.share_unknown and not self.has_step
 
     def _bounds(self, name: str, found: Falls) -> tuple[float, float]:
         """Bounds of the order of convergence of an output."""
@@ -142,13 +152,13 @@ class Estimate:
 
     def _by_step(self, name: str, a: int, b: int) -> np.ndarray | None:
         """Error by the time step of the outputs from number a to b, with its sign; None: not known."""
-        result, coarse, rough, p = self.run, self._coarse, self._rough, self.order[name]
-        if rough is None or name not in rough.values:
+        if self._of_steps is None or name not in self._of_steps[0].values:
             return None
-        known, own = around(every_of(len(result.values[name]), rough.every), a, b)
-        later = coarse.some(name, every_of(len(coarse.values[name]), rough.every // coarse.every)[own])
-        late = (later - rough.values[name][own]) / ((coarse.steps / rough.steps) ** p - 1.0)
-        return at_all_outputs(late / (result.steps / coarse.steps) ** p, known, a, b)
+        (slow, fast), steps, p = self._of_steps, self.run.steps, self.order[name]
+        known, own = around(every_of(len(self.run.values[name]), slow.every), a, b)
+        faster = fast.some(name, every_of(len(fast.values[name]), slow.every // fast.every)[own])
+        late = (faster - slow.values[name][own]) / ((fast.steps / slow.steps) ** p - 1.0)
+        return at_all_outputs(late / (steps / fast.steps) ** p, known, a, b)
 
     def _mesh_error(
         self, name: str, change: np.ndarray, by_step: np.ndarray | None, before: RunSample, begins: bool = True
@@ -174,7 +184,7 @@ class Estimate:
             signed = {name: self._signed(name, 0, len(self.run.values[name])) for name in self.order}
             self.by_step = {name: x for name, (x, _) in signed.items() if x is not None}
             self.by_mesh = {name: x for name, (_, x) in signed.items() if x is not None}
-            del self._coarse, self._rough
+            del self._coarse, self._of_steps
         return self.by_step, self.by_mesh
 
     def _take(self, result: RunSample) -> Notes:

@@ -91,6 +91,9 @@ class LineController(ErrorController):
     def _renew_model_errors(self, estimate: Estimate, resolution: Resolution) -> None:
         pass
 
+    def _in_shorter_steps(self, coarse: RunSample) -> None:
+        pass
+
     def takes_model_errors(self, run: RunSample) -> None:
         """Take what leaving bending out changes from a run, in place of what is known."""
         assert self.estimate is not None

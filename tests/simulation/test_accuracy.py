@@ -286,6 +286,27 @@ def test_without_the_rougher_runs_an_order_in_between_is_taken():
     assert "time" not in estimate.errors.fields
 
 
+@pytest.mark.parametrize("rough_steps", [None, 48])
+def test_where_longer_steps_show_nothing_shorter_ones_do(rough_steps):
+    """Runs of longer steps fail, or are halved to what they were: then the coarse cells take steps of the result."""
+    resolution, asked = Resolution(1.0, 0.1, 1e-3, 1e-3), []
+
+    def compute(coarse: Resolution) -> RunSample:
+        asked.append(coarse)
+        return sample(coarse, 100, 2.0, coarse.every)
+
+    control = ErrorController(None, Free(True, True, False), True, compute, compute)
+    rough = sample(resolution.coarser(2, 4), rough_steps, 2.0, 4) if rough_steps else None
+    control.comparisons = sample(resolution.coarser(2, 2), 50, 2.0, 2), rough, None
+    assert control.first_estimate(sample(resolution, 100, 2.0))
+    assert [(x.fineness, x.step, x.local, x.every) for x in asked] == [(0.5, 0.1, 1e-3, 2)]
+    estimate = control.estimate
+    assert not control.notes and estimate.has_step and not estimate.share_unknown
+    estimate.order["position"] = 2.0  # three runs on other cells would show it
+    assert estimate.errors.largest("time", "position") == pytest.approx(0.01, rel=1e-6)
+    assert estimate.errors.largest("mesh", "position") == pytest.approx(0.02, rel=1e-6)
+
+
 def test_what_steps_do_that_no_run_shows_stays_in_the_figure():
     """And does not fall with cells: laying at 1 % had twice the error of its figure, which was said to be met."""
     resolution = Resolution(1.0, 0.1, None, 1e-3)
