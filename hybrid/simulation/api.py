@@ -111,7 +111,7 @@ def run(
         if isinstance(target, Path):
             beside(target).unlink(missing_ok=True)  # of a run that was cut off
         _compute(case, target)
-    return written_result(target)
+    return written_result(target, case.late_file)
 
 
 def static(scene: SceneLike | System, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
@@ -191,7 +191,7 @@ def resume(
         case = Case(remaining.scene, criterion, remaining.changes, remaining.points)
         with _supervised(case, progress):
             _compute(case, target, path, remaining)
-    return written_result(target)
+    return written_result(target, case.late_file)
 
 
 def _several_lines(

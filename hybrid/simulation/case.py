@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
@@ -213,6 +213,7 @@ class Case:
         """The pass of a result begins, and that before it is where it belongs; s of processor time."""
         if self.late_file is not None:
             self.late_file.place()
+            self.late_file = None
         self.progress.begin(REFINEMENT if self._results else RESULT, resolution)
         self._results += 1
         return clock.process_time()
@@ -260,20 +261,18 @@ class Case:
             return RunSample(resolution, {}, cells, run.steps, 0.0)
         assert not isinstance(target, MemoryTarget), "errors are written into a file"
         late = self.late_file
-        if late is not None and sum(late.file[x].size for x in COMPARED if x in late.file) > MOST_IN_MEMORY:
-            late.place()  # they stay in the file
-            late = None
-        with nullcontext(late.file) if late is not None else open_file(target, summed=False) as file:
-            model_errors = [f"{MODEL_ERRORS}{x}" for x in file.get(MODEL_ERRORS, ())]
-            stored = {name: file[name] for name in (*COMPARED, *model_errors) if name in file}
+        with ExitStack() as stack:
+            data = late.data if late is not None else stack.enter_context(open_file(target, summed=False))
+            errors = [*(MODEL_ERRORS + x for x in data.get(MODEL_ERRORS, ())), *(x for x in data if MODEL_ERRORS in x)]
+            stored = {name: data[name] for name in (*COMPARED, *errors) if name in data}
             # they stay in the file, if they are many, that is one, and no finer result may replace it
-            many = sum(data.size for data in stored.values()) > MOST_IN_MEMORY
+            many = late is None and sum(x.size for x in stored.values()) > MOST_IN_MEMORY
             stay = target if many and isinstance(target, Path) and requested_accuracy(self.scene) is None else None
             found = {name: StoredArray(stay, name) if stay is not None else x[()] for name, x in stored.items()}
-            unresolved = b"unresolved bend" in file["events/kind"][()]
+            unresolved = b"unresolved bend" in data["events/kind"][()]
             if follows_curvature(self.scene):
-                cells = compared_cells(run.model, resolution.fineness, usual_cells(file[THERE][()]))
-            forces = np.column_stack([file[f"steps/{name}"][()] for name in FORCES])
+                cells = compared_cells(run.model, resolution.fineness, usual_cells(data[THERE][()]))
+            forces = np.column_stack([data[f"steps/{name}"][()] for name in FORCES])
         values, model_error = split_outputs(found)
         notes: Notes = ()
         catenary, bound = np.zeros(0), 0.0

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 from h5py import h5d, h5p, h5s
 
+from hybrid.store.array_contents import ArrayContents, ArrayDataset
 from hybrid.store.checkpoint import BEFORE
 from hybrid.store.format import EVENTS, Field, annotate, attach_scales, checked, plain_text
 from hybrid.store.hdf5_file import beside, in_memory, redrafted, unwritable
@@ -45,9 +46,13 @@ def amend(
             del file[BEFORE]
         _add(file, fields, blocks, others)
 
-    if isinstance(target, LateFile) and done:
-        target.at_last = lambda file: None  # what a refinement would be resumed from
-    change_complete(target, add)
+    if isinstance(target, LateFile):
+        if done:
+            target.before = None
+        _add_to_arrays(target.contents, fields, blocks, others)
+        target.place()
+    else:
+        change_complete(target, add)
 
 
 def amend_lines(
@@ -77,12 +82,8 @@ def amend_lines(
     change_complete(target, add)
 
 
-def change_complete(target: Path | io.BytesIO | LateFile, change: Callable[[h5py.File], None]) -> None:
+def change_complete(target: Path | io.BytesIO, change: Callable[[h5py.File], None]) -> None:
     """Change a complete result, in a copy that takes its place; ResultError where it cannot be written."""
-    if isinstance(target, LateFile):
-        target.change(change)
-        target.place()
-        return
     if isinstance(target, io.BytesIO):
         with in_memory(target.getvalue()) as file:
             change(file)
@@ -104,6 +105,31 @@ def change_complete(target: Path | io.BytesIO | LateFile, change: Callable[[h5py
         raise unwritable(target, error, "free some disk space; close programs that hold the file") from error
     finally:
         new.unlink(missing_ok=True)
+
+
+def _add_to_arrays(
+    contents: ArrayContents, fields: Sequence[Field], blocks: Iterable[Block], others: Callable[[Happened], Others]
+) -> None:
+    """The same of a result that is in memory."""
+    times, named, found = contents.values("t", None), {x.name: x for x in fields}, dict[str, np.ndarray]()
+    for name, begin, values in blocks:
+        field = named[name]
+        checked(field, values[0])
+        if begin == 0 and len(values) == len(times):
+            found[name] = np.ascontiguousarray(values, field.dtype)
+        else:
+            found.setdefault(name, np.zeros((len(times), *field.shape)))[begin : begin + len(values)] = values
+    contents.add({name: ArrayDataset(named[name], ("t", *named[name].dims), values) for name, values in found.items()})
+    kinds = [plain_text(x) for x in contents.values("events/kind", None)]
+    attributes, events = others(list(zip(contents.values("events/t", None).tolist(), kinds, strict=True)))
+    contents.attributes |= {key: x.item() if isinstance(x, np.generic) else x for key, x in attributes.items()}
+    if events:
+        table, end = Table(None, "events", EVENTS), float(contents.values("s", None)[-1])
+        table.add([contents.values(f"events/{x.name}", None) for x in EVENTS])
+        for event in events:
+            table.add_row((0.0, 0.0, end, *event, "", nan, nan, nan))
+        for name, values in table.columns().items():
+            contents.data[name].values = values
 
 
 def _add(

@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.format import plain_text
+from hybrid.store.format import chunk_rows, plain_text
 from hybrid.store.integrity import check_stored
 
 _BLOCK = 1 << 22  # bytes that are copied at a time
@@ -61,9 +61,12 @@ def _copied_dataset(data: h5py.Dataset, new: h5py.Group, name: str, kept: Mappin
     shape = (count, *data.shape[1:]) if data.ndim else ()
     check_stored(data, int(np.prod(shape, dtype=object)))
     grows = data.chunks is not None
+    if grows:  # a result that was written in one go has all its rows in one chunk
+        rows = min(data.chunks[0], chunk_rows(data.dtype.itemsize * int(np.prod(data.chunks[1:], dtype=int))))
     copy = new.create_dataset(
-        name, shape, data.dtype, maxshape=data.maxshape if grows else None, chunks=data.chunks if grows else None
-    )
+        name, shape, data.dtype, maxshape=data.maxshape if grows else None,
+        chunks=(rows, *data.chunks[1:]) if grows else None,
+    )  # fmt: skip
     if not data.ndim:
         copy[()] = data[()]
     else:

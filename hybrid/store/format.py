@@ -31,7 +31,7 @@ BLOCK = 512
 # Widths of fixed texts (bytes): a kind is a word, an event a sentence or two.
 _KIND, _TEXT = "S32", "S512"
 INDEX = "index"  # description of a dimension that has no scale of its own
-_STATUS_WIDTHS = {"status": 32, "message": 2048}  # bytes
+STATUS_WIDTHS = {"status": 32, "message": 2048}  # bytes
 _RESERVED = {"t", "s", "xyz", "scene", "steps", "zones", "events", "changes", "checkpoint"}
 
 
@@ -102,7 +102,7 @@ def create_attributes(file: h5py.File) -> None:
     """Root attributes that are the same in all files of this version; `write_attributes` adds the others."""
     for name, value in attributes_of_format().items():
         file.attrs[name] = value
-    for name, width in _STATUS_WIDTHS.items():
+    for name, width in STATUS_WIDTHS.items():
         dtype = h5py.string_dtype("utf-8", width)  # fixed, to be overwritten by `close`
         file.attrs.create(name, fixed_text(status_attributes("running", "")[name], dtype), dtype=dtype)
 
@@ -110,7 +110,7 @@ def create_attributes(file: h5py.File) -> None:
 def status_attributes(status: str, message: str) -> dict[str, str]:
     """The attributes that say how a run ended, cut to what a file has room for."""
     given = {"status": status, "message": message}
-    return {name: cut(given[name], width).decode() for name, width in _STATUS_WIDTHS.items()}
+    return {name: cut(given[name], width).decode() for name, width in STATUS_WIDTHS.items()}
 
 
 def write_attributes(file: Any, attributes: Mapping[str, str | float | int]) -> None:
@@ -212,7 +212,7 @@ def create_table(file: h5py.File, group: str, fields: Sequence[Field], rows: int
         is_text = field.dtype.startswith("S")
         dtype = h5py.string_dtype("utf-8", int(field.dtype[1:])) if is_text else np.dtype(field.dtype)
         size = int(dtype.itemsize * np.prod(field.shape, dtype=int))
-        chunk = max(1, min(_CHUNK_BYTES // max(size, 1), BLOCK, rows or BLOCK))
+        chunk = max(1, min(chunk_rows(size), BLOCK, rows or BLOCK))
         data = parent.create_dataset(
             field.name, (0, *field.shape), dtype, maxshape=(None, *field.shape), chunks=(chunk, *field.shape)
         )
@@ -223,6 +223,11 @@ def create_table(file: h5py.File, group: str, fields: Sequence[Field], rows: int
             data.dims[0].label = data.name.lstrip("/")
         else:
             attach(data, (scale.name.lstrip("/"), *field.dims), [scale, *(file[d] for d in field.dims)])
+
+
+def chunk_rows(size: int) -> int:
+    """Rows of so many bytes in a chunk of a table that grows."""
+    return max(1, _CHUNK_BYTES // max(size, 1))
 
 
 def attach(data: h5py.Dataset, dims: Sequence[str], scales: Sequence[h5py.Dataset]) -> None:

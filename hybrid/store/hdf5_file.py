@@ -22,7 +22,7 @@ from hybrid.store.format import CACHE, FORMAT, FORMAT_VERSION, plain_text
 from hybrid.store.integrity import being_written, is_signed, unmarked
 from hybrid.store.lock import is_held
 
-_LIBVER = ("v110", "v110")
+LIBVER = ("v110", "v110")
 # Places for chunks in the cache of a dataset, which is written at its end: HDF5 2.0 takes 8191, 64 kB a dataset.
 SLOTS = 31
 # Bytes by which a file in memory grows: by 64 kB, as HDF5 would, one of 12 MB takes 15 ms more.
@@ -150,7 +150,7 @@ class _Draft(io.FileIO):
 def drafted(path: Path, mode: str = "w") -> Iterator[h5py.File]:
     """A new file that is made in one go; OSError when it could not be written."""
     with _Draft(path, f"{mode.rstrip('+')}+") as draft:
-        with h5py.File(draft, mode, libver=_LIBVER) as file:
+        with h5py.File(draft, mode, libver=LIBVER) as file:
             yield file
         if draft.error is not None:
             raise draft.error
@@ -177,7 +177,7 @@ def created(path: Path, make: bytes | Callable[[Path], None], many: bool = False
         if many:
             file = _opened_for_many(new)
         else:
-            file = h5py.File(new, "r+", libver=_LIBVER, locking="best-effort", rdcc_nbytes=CACHE, rdcc_nslots=SLOTS)
+            file = h5py.File(new, "r+", libver=LIBVER, locking="best-effort", rdcc_nbytes=CACHE, rdcc_nslots=SLOTS)
         file.swmr_mode = True
         os.replace(new, path)
     except OSError as error:
@@ -220,7 +220,7 @@ def hold_metadata(file: h5py.File) -> None:
 
 def in_memory(content: bytes = b"") -> h5py.File:
     """A file in memory, to be written; content: of an existing one."""
-    return h5py.File.in_memory(content, block_size=GROWTH, libver=_LIBVER, rdcc_nbytes=CACHE, rdcc_nslots=SLOTS)
+    return h5py.File.in_memory(content, block_size=GROWTH, libver=LIBVER, rdcc_nbytes=CACHE, rdcc_nslots=SLOTS)
 
 
 def image_of(file: h5py.File) -> bytes:

@@ -87,9 +87,9 @@ def sign_new(path: Path) -> None:
         file.write(_TAIL.pack(_NAME, size, _sum_of(file, size)))
 
 
-def sum_behind(image: bytes) -> bytes:
-    """What goes behind the end of a file with these bytes: their sum."""
-    return _TAIL.pack(_NAME, len(image), zlib.crc32(image))
+def tail_of(size: int, crc: int) -> bytes:
+    """What goes behind the end of a file of so many bytes: their sum."""
+    return _TAIL.pack(_NAME, size, crc)
 
 
 def sign(path: Path) -> None:

@@ -2,39 +2,46 @@
 
 A file that readers may open while it grows is flushed before and after every change of its lengths, and what is known
 of a result afterwards goes into a copy.  A run that takes less than the time for which outputs are held back anyhow
-needs neither: its file is made in memory, is added to until all is known, and is then written to its place.
+needs neither: its result waits in memory, is added to until all is known, and is then written to its place.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from contextlib import suppress
+import zlib
+from collections.abc import Mapping
 from pathlib import Path
+from weakref import WeakSet
 
-import h5py
+import numpy as np
 
-from hybrid.store.hdf5_file import beside, image_of, unwritable
-from hybrid.store.integrity import sum_behind
+from hybrid.store.array_contents import ArrayContents
+from hybrid.store.hdf5_file import beside, unwritable
+from hybrid.store.integrity import tail_of
+from hybrid.store.named_arrays import Tree
+from hybrid.store.whole_file import parts_of_file
+
+# Bytes of all results in memory whose files are written; of those after them the arrays are read when they are needed.
+MOST_STAYING = 256_000_000
+_staying: WeakSet[ArrayContents] = WeakSet()
 
 
 class LateFile:
-    """A file in memory, open to be added to until it is written to its place."""
+    """A result in memory, to be added to until it is written to its place."""
 
-    def __init__(self, path: Path, file: h5py.File) -> None:
-        """path: its place; file: in memory, nothing of which is held open by others when it is placed."""
-        self.path, self.file, self.placed = path, file, False
-        self.at_last: Callable[[h5py.File], None] = lambda file: None  # what is added when nothing else is
+    def __init__(
+        self, path: Path, contents: ArrayContents, checkpoints: Mapping[int, bytes] | None, before: Tree | None,
+        templates: Path | None,
+    ) -> None:  # fmt: skip
+        """path: its place; checkpoints, before, templates: as of `parts_of_file`."""
+        self.path, self.contents, self.placed = path, contents, False
+        self._checkpoints, self._templates = checkpoints, templates
+        self.before = before  # what a run that goes on needs, until all is done
 
-    def change(self, change: Callable[[h5py.File], None]) -> None:
-        """Add to it; ResultError: there is no room for it, and it is dropped."""
-        try:
-            change(self.file)
-        except (OSError, RuntimeError) as error:
-            raise self._gone(error) from error
-        except BaseException:
-            self.drop()
-            raise
+    @property
+    def data(self) -> dict[str, np.ndarray]:
+        """Its arrays by name."""
+        return {name: x.values for name, x in self.contents.data.items()}
 
     def place(self) -> None:
         """Put it in its place, on the disk when this returns; a second call does nothing.
@@ -43,28 +50,34 @@ class LateFile:
         """
         if self.placed:
             return
-        self.change(self.at_last)
+        self.placed = True
         new = beside(self.path)
         try:
-            image = image_of(self.file)
+            parts = parts_of_file(self.contents, self._checkpoints, self.before, self._templates)
+            size = found = 0
             with new.open("wb") as file:
-                file.writelines((image, sum_behind(image)))
+                for part in parts:
+                    file.write(part)
+                    size, found = size + len(part), zlib.crc32(part, found)
+                file.write(tail_of(size, found))
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(new, self.path)
         except (OSError, RuntimeError) as error:
-            raise self._gone(error) from error
+            raise unwritable(self.path, error, "free some disk space; close programs that hold the file") from error
         finally:
-            self.drop()
             new.unlink(missing_ok=True)
+
+    def may_stay(self) -> bool:
+        """Whether the contents may stay in memory, where they are read from; a program may keep thousands of results.
+
+        They are then counted until nobody holds them, or they are closed.
+        """
+        if sum(x.size for x in (*_staying, self.contents)) > MOST_STAYING:
+            return False
+        _staying.add(self.contents)
+        return True
 
     def drop(self) -> None:
         """Nothing is written of it any more."""
         self.placed = True
-        with suppress(OSError, RuntimeError):  # what they say is of a file that nobody wants
-            if self.file:
-                self.file.id.close()
-
-    def _gone(self, error: Exception) -> Exception:
-        self.drop()
-        return unwritable(self.path, error, "free some disk space; close programs that hold the file")

@@ -44,6 +44,7 @@ from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.contents import Contents, FileContents
 from hybrid.store.histories import Histories
 from hybrid.store.integrity import readable
+from hybrid.store.late_file import LateFile
 from hybrid.store.lines import Lines
 from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, right_of
 from hybrid.store.records import (
@@ -70,16 +71,24 @@ class Result(Histories):
     is.  Use `refresh` to see what a running computation has added since.
     """
 
-    def __init__(self, source: str | Path | io.BytesIO | MemoryTarget, summed: bool = True, line: str = "") -> None:
-        """summed: as of `open_file`; line: name of a line of a result of several lines, of which alone it is then."""
-        self._source, self._line = Path(source) if isinstance(source, str) else source, line
-        self._open(summed)
+    def __init__(
+        self, source: str | Path | io.BytesIO | MemoryTarget, summed: bool = True, line: str = "",
+        contents: Contents | None = None,
+    ) -> None:  # fmt: skip
+        """summed: as of `open_file`; line: name of a line of a result of several lines, of which alone it is then.
 
-    def _open(self, summed: bool = True) -> None:
+        contents: of the file, where they are in memory already.
+        """
+        self._source, self._line = Path(source) if isinstance(source, str) else source, line
+        self._open(summed, contents)
+
+    def _open(self, summed: bool = True, contents: Contents | None = None) -> None:
         source = self._source
-        if isinstance(source, MemoryTarget):
+        if contents is not None:
+            self._contents: Contents = contents
+        elif isinstance(source, MemoryTarget):
             assert source.contents is not None, "nothing was recorded"
-            self._contents: Contents = source.contents.part(self._line) if self._line else source.contents
+            self._contents = source.contents.part(self._line) if self._line else source.contents
         else:
             self._contents = FileContents(source, summed, self._line)
         try:
@@ -380,9 +389,14 @@ def open_result(source: str | Path | bytes | io.BytesIO) -> Result:
     return Result(source if isinstance(source, io.BytesIO) else Path(source).expanduser().resolve())
 
 
-def written_result(source: Path | io.BytesIO | MemoryTarget) -> Result:
-    """Open a result that this process has written just now, without holding its bytes against their sum."""
-    return Result(source, summed=False)
+def written_result(source: Path | io.BytesIO | MemoryTarget, late: LateFile | None = None) -> Result:
+    """Open a result that this process has written just now, without holding its bytes against their sum.
+
+    late: the last file that was written in one go: where that is the source, its arrays are in memory.
+    """
+    if late is None or late.path != source or not late.may_stay():
+        return Result(source, summed=False)
+    return Result(source, contents=late.contents)
 
 
 def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim: str, unit: str) -> Any:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -33,7 +33,7 @@ from hybrid.store.hdf5_file import in_memory
 _KEPT = 64  # files of 60 kB each; the oldest are deleted
 _DIGEST = 32  # bytes before the template, of the template
 _SUFFIX = ".template"
-_known: dict[str, bytes] = {}
+_known: dict[tuple[Hashable, ...], bytes] = {}
 
 
 def template(
@@ -45,12 +45,17 @@ def template(
     outputs: how many, None: not known; resumable: whether it has checkpoints; folder: where templates are kept.
     """
     shape = (points, tuple(fields), tuple(step_fields), tuple(fixed), min(outputs or BLOCK, BLOCK), resumable)
-    key = hashlib.sha256(f"{shape} {_makers()}".encode()).hexdigest()[:32]
-    if key not in _known:
+    return kept(shape, lambda: _made(*shape), folder)
+
+
+def kept(shape: tuple[Hashable, ...], make: Callable[[], bytes], folder: Path | None) -> bytes:
+    """What is made of all that shapes it, from this process, from the folder, or made anew."""
+    if shape not in _known:
+        key = hashlib.sha256(f"{shape} {_makers()}".encode()).hexdigest()[:32]
         if len(_known) >= _KEPT:
             _known.clear()
-        _known[key] = _read(folder, key) or _kept(folder, key, _made(*shape))
-    return _known[key]
+        _known[shape] = _read(folder, key) or _kept(folder, key, make())
+    return _known[shape]
 
 
 def _made(
@@ -72,7 +77,9 @@ def _made(
 def _makers() -> str:
     """All that shapes a template besides what is asked for: versions, and the code that makes it."""
     here = Path(__file__).parent
-    code = hashlib.sha256(b"".join((here / f"{x}.py").read_bytes() for x in ("template", "format", "checkpoint")))
+    code = hashlib.sha256(
+        b"".join((here / f"{x}.py").read_bytes() for x in ("template", "format", "checkpoint", "whole_file"))
+    )
     return f"{FORMAT_VERSION} {h5py.version.hdf5_version} {versions()} {np.dtype(float).str} {code.hexdigest()}"
 
 

@@ -19,15 +19,15 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 from h5py import h5d
 
+from hybrid.store.array_contents import HeldValues
 from hybrid.store.checkpoint import BEFORE, SLOTS, Checkpoint, check_tables, create_slots, write_before, write_slot
 from hybrid.store.copying import copied, names_in
 from hybrid.store.format import (
@@ -69,6 +69,16 @@ _MOST_WAITING = 16_000_000
 AFTERWARDS = ("error_", "effort_", "accuracy_")  # attributes that `amend` brings
 
 
+class Late(NamedTuple):
+    """A result that has no file as yet."""
+
+    held: HeldValues
+    make: Callable[[], h5py.File]  # a file in memory that has all but its tables
+    checkpoints: dict[int, bytes] | None  # that no other took the place of, by slot; None: nobody can go on with it
+    before: Tree | None
+    templates: Path | None
+
+
 class Recorder(BaseRecorder):
     """Writes one result file; a context manager that closes it with the right status.
 
@@ -83,12 +93,12 @@ class Recorder(BaseRecorder):
     templates: folder where templates of files are kept (store.template); None: in this process alone.
     parts: results of lines, laid by in memory, that are groups of this file from now on and are written with it.
     late: whether there is no file before the first flush; without one it is written when this is closed, and if that
-    is "complete" and `amended`, it is left in `late_file` for whoever puts it in its place.
+    is "complete" and `amended`, it waits in `late_file` for whoever puts it in its place.
     """
 
     late_file: LateFile | None = None
     amended = False
-    _before: Tree | None  # to be written with a file that is late; None: the file is there
+    _late: Late | None  # what there is instead of a file; None: the file is there
 
     def __init__(
         self,
@@ -112,17 +122,23 @@ class Recorder(BaseRecorder):
         path = None if isinstance(target, io.BytesIO) else Path(target).expanduser().resolve()
         if path is not None:
             check_target(path, overwrite)
-        shape = [field for field, _ in fixed]
-        points, kept = np.size(grid_s), before is not None
-        file = in_memory(template(points, fields, step_fields, shape, outputs, kept, templates))
-        write_attributes(file, attributes)
-        write_texts(file, texts)
-        write_fixed(file, np.asarray(grid_s, dtype=float), fixed)
+
+        def made() -> h5py.File:
+            points, shape = np.size(grid_s), [field for field, _ in fixed]
+            file = in_memory(template(points, fields, step_fields, shape, outputs, before is not None, templates))
+            write_attributes(file, attributes)
+            write_texts(file, texts)
+            write_fixed(file, np.asarray(grid_s, dtype=float), fixed)
+            write_before(file, before)
+            return file
+
         if late and path is not None:
-            self._write_to(file, path, tables_of(fields, step_fields))
-            self._before, self._flushed = before or {}, monotonic()
+            self._write_to(None, path, tables_of(fields, step_fields))
+            held = HeldValues(grid_s, fields, fixed, attributes, texts)
+            self._late = Late(held, made, {} if before is not None else None, before, templates)
+            self._flushed = monotonic()
             return
-        write_before(file, before)
+        file = made()
         if parts:
             add_parts(file, {name: part._take_image for name, part in parts.items()})
         if path is not None:
@@ -185,16 +201,16 @@ class Recorder(BaseRecorder):
             part._go_on(of_part(name, at.rows), of_part(name, at.happened))
         return self
 
-    def _write_to(self, file: h5py.File, path: Path | None, tables: Mapping[str, Sequence[Field]]) -> None:
+    def _write_to(self, file: h5py.File | None, path: Path | None, tables: Mapping[str, Sequence[Field]]) -> None:
         self._file: Any = file  # a group of the file of `_whole`, where this is a part of that
-        self._before = None
+        self._late = None
         self._begin(file, tables)
         self.path = path
         self._whole: Recorder | None = None  # never itself: a reference cycle would keep outputs in memory
         self._parts: dict[str, Recorder] = {}
         self._image = b""  # of a file in memory that is closed
         self._number = 0  # of the next checkpoint
-        self._slots = _slots_of(file)
+        self._slots = _slots_of(file) if file is not None else []
         self._fixed: dict[str, h5d.DatasetID] = {}  # their datasets
         self._packed = b""  # a checkpoint that waits
         self._flushed, self._took = -np.inf, 0.0  # when the file was last brought up to date, and how long it took, s
@@ -242,24 +258,25 @@ class Recorder(BaseRecorder):
     @property
     def is_late(self) -> bool:
         """Whether there is no file as yet."""
-        return self._before is not None
+        return self._late is not None
+
+    def _end_lateness(self) -> None:
+        """Make a file that is late, in memory, to which all that waits can be written."""
+        if self._late is not None:
+            late, self._late = self._late, None
+            self._continue_in(late.make())
+            for number, packed in (late.checkpoints or {}).items():
+                write_slot(self._slots, number, packed)
 
     def _appear(self) -> None:
-        """Let readers see a file that is late, with all that it holds now; nothing where it is there."""
-        if self._before is None:
-            return
+        """Let readers see a file that was made in memory, with all that it holds now."""
         assert self.path is not None
-        before, self._before = self._before, None
-        write_before(self._file, before)
-        image = self._image_so_far()
+        self._leave()
+        self._slots = []
+        image = image_of(self._file)
         self._broken = True  # until there is a file again
         self._continue_in(created(self.path, image))
         self._broken = False
-
-    def _image_so_far(self) -> bytes:
-        self._leave()
-        self._slots = []
-        return image_of(self._file)
 
     def _continue_in(self, file: h5py.File) -> None:
         """Write to another file that is the same until now."""
@@ -275,16 +292,19 @@ class Recorder(BaseRecorder):
         return late or sum(x._outputs.bytes_waiting for x in (self, *self._parts.values())) > _MOST_WAITING
 
     def _has_fixed(self, name: str) -> bool:
-        return name in self._file
+        return name in (self._file if self._late is None else self._late.held.fixed)
 
     def _fixed_values(self, name: str) -> np.ndarray:
+        if self._late is not None:
+            return self._late.held.fixed[name].values
         return np.asarray(self._file[name][()])
 
     def checkpoint(self, content: Callable[[], Mapping[str, Any]]) -> None:
         """Keep a checkpoint at the last output, written with the next flush; content: makes `program`, `asks`,
         `resolution` and `state` of it."""
-        if self._packed and self._before is not None:  # of a file that is late, which has had no flush since
-            write_slot(self._slots, self._number, self._packed)
+        if self._packed and self._late is not None:  # which has had no flush since
+            assert self._late.checkpoints is not None
+            self._late.checkpoints[self._number % 2] = self._packed
             self._number += 1
         parts = {"": self, **self._parts}
         rows = of_all(
@@ -297,10 +317,13 @@ class Recorder(BaseRecorder):
     def flush(self) -> None:
         """Write what is held back, for readers to see."""
         begin = monotonic()
+        late = self.is_late
+        self._end_lateness()
         with self._writing():
             parts = [*self._parts.values(), self]
             self._write([x for part in parts for x in reversed(part._all)], self._packed)
-            self._appear()
+            if late:
+                self._appear()
             if self._packed and self.path is not None:
                 os.fsync(self._file.id.get_vfd_handle())  # a machine that goes down then loses no more than a kill does
         self._number += bool(self._packed)
@@ -309,7 +332,8 @@ class Recorder(BaseRecorder):
         self._took = self._flushed - begin
 
     def _write_many_steps(self) -> None:
-        if self._steps.waiting >= BLOCK:  # alone: outputs are written together with their checkpoint
+        if self._steps.waiting >= BLOCK and self._late is None:
+            # alone: outputs are written together with their checkpoint
             whole = self if self._whole is None else self._whole
             with whole._writing():
                 whole._write([self._steps])
@@ -365,8 +389,8 @@ class Recorder(BaseRecorder):
                 set_status(self._file, status, message)
             self._whole = None  # a cycle no more: it has this among its parts
             return
-        if self._before is not None:
-            self._write_late(status, message)
+        if self._late is not None:
+            self._write_late(self._late, status, message)
             return
         self.flush()
         with self._writing():
@@ -380,32 +404,15 @@ class Recorder(BaseRecorder):
         if self.path is not None:
             sign(self.path)
 
-    def _write_late(self, status: str, message: str) -> None:
+    def _write_late(self, late: Late, status: str, message: str) -> None:
         """Write the file in one go, and put it in its place unless it will be amended."""
         assert self.path is not None
-        before, self._before = self._before, None
-        late = LateFile(self.path, self._file)
-        late.at_last = partial(write_before, before=before)
-
-        def write(file: h5py.File) -> None:
-            for table in reversed(self._all):
-                table.write()
-                table.commit(at_once=False)
-            for name, values in self._replaced.items():
-                write_all(h5d.open(file.id, name.encode()), values)
-            if self._packed:
-                write_slot(self._slots, self._number, self._packed)
-            set_status(file, status, message)
-            self._leave()
-            self._slots = []
-
-        self._broken = True
-        late.change(write)
-        self._broken = False
-        if self.amended and status == "complete":
-            self.late_file = late
-        else:
-            late.place()
+        if self._packed and late.checkpoints is not None:
+            late.checkpoints[self._number % 2] = self._packed
+        contents = late.held.contents(self._tables, self._all, self._replaced, status, message)
+        self._late, self.late_file = None, LateFile(self.path, contents, *late[2:])
+        if not (self.amended and status == "complete"):
+            self.late_file.place()
 
 
 def _slots_of(file: h5py.Group) -> list[h5py.Dataset]:

@@ -14,7 +14,9 @@ from bits import Stopping, differences
 import hybrid
 from hybrid.simulation import api
 from hybrid.simulation.progress import RESULT, Progress
-from hybrid.store import writer
+from hybrid.store import late_file, writer
+from hybrid.store.array_contents import ArrayContents
+from hybrid.store.contents import FileContents
 from hybrid.store.late_file import LateFile
 
 TIMES = ("cpu", "created", "effort_cpu")  # that differ from run to run
@@ -63,6 +65,41 @@ def test_a_file_that_is_late_is_as_one_that_grew(errors: bool, tmp_path: Path, m
     assert not made
     assert contents(tmp_path / "late.h5") == contents(tmp_path / "grew.h5")
     assert {x.name for x in tmp_path.iterdir()} == {"grew.h5", "late.h5"}
+
+
+def test_the_result_is_read_from_memory_as_from_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with hybrid.run(described(True), tmp_path / "run.h5") as mine, hybrid.open(tmp_path / "run.h5") as its:
+        hybrid.run(described(), tmp_path / "run.h5").close()  # neither hears of what takes their place
+        assert isinstance(mine._contents, ArrayContents) and isinstance(its._contents, FileContents)
+        assert (mine.names, mine._groups) == (its.names, its._groups)
+        for name in mine.names:
+            assert (mine[name].dtype, mine[name].shape) == (its[name].dtype, its[name].shape), name
+            np.testing.assert_array_equal(mine[name], its[name], name)
+            assert (mine.dims(name), mine.units[name], mine.label(name)) == (
+                its.dims(name), its.units[name], its.label(name)
+            )  # fmt: skip
+        assert mine.attributes == its.attributes
+        assert {type(x) for x in mine.attributes.values()} == {type(x) for x in its.attributes.values()}
+        assert (mine.zones[:], mine.events, mine.scene_text) == (its.zones[:], its.events, its.scene_text)
+        assert len(mine.refresh().names) < len(its.names)  # of the file that is there now
+    monkeypatch.setattr(late_file, "MOST_STAYING", 0)
+    with hybrid.run(described(), tmp_path / "run.h5") as result:
+        assert isinstance(result._contents, FileContents)
+
+
+def test_rows_are_added_to_a_copy_of_one_that_was_written_in_one_go(tmp_path: Path) -> None:
+    """Its outputs have one chunk, that of a copy some 64 kB."""
+    scene = described() | {"output": {"every": 0.005, "points": 101}}
+    longer = scene | {"time": {"duration": 3.0, "step": 0.05}}
+    hybrid.run(scene, tmp_path / "run.h5").close()
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert file["position"].chunks == file["position"].shape == (401, 101, 3)
+    hybrid.resume(tmp_path / "run.h5", until=3.0).close()
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert file["position"].chunks == (27, 101, 3) and file["position"].shape == (601, 101, 3)
+    hybrid.run(longer, tmp_path / "longer.h5").close()
+    found = differences(tmp_path / "longer.h5", tmp_path / "run.h5")
+    assert [x for x in found if x != "other values: scene" and "message" not in x] == []
 
 
 def test_it_is_there_when_the_run_is_stopped_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

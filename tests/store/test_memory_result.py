@@ -22,7 +22,8 @@ def pair(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["time.duration=1", "output.errors=false"])
     path = tmp_path_factory.mktemp("pair") / "x.h5"
     compute = hybrid.run if request.param == "motion" else hybrid.static
-    with compute(scene) as memory, compute(scene, path) as file:
+    compute(scene, path).close()
+    with compute(scene) as memory, hybrid.open(path) as file:
         yield memory, file
 
 

@@ -1,0 +1,221 @@
+"""The file of a result that is complete and in memory, made in one go.
+
+HDF5 takes longer to find room for some hundred arrays, to copy them there and to copy all of that again than a short
+run takes to compute them.  So it makes a template: a file with all datasets, whose arrays have their places and no
+values, and of which the bytes between these places are kept.  A new file is these bytes, to which HDF5 adds attributes,
+texts, rows of tables whose lengths differ from run to run, and checkpoints; the arrays go to the disk from where they
+are.
+
+Fields over the outputs have one chunk each, so that a run that goes on can add rows to a copy (store.copying).
+"""
+
+from __future__ import annotations
+
+import io
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from h5py import h5a, h5d, h5p, h5s, h5t
+
+from hybrid.store.array_contents import ArrayContents, ArrayDataset
+from hybrid.store.checkpoint import SLOTS, create_slots, write_before, write_slot
+from hybrid.store.format import (
+    STATUS_WIDTHS,
+    Field,
+    annotate,
+    attach,
+    attributes_of_format,
+    create_table,
+    fixed_text,
+    write_texts,
+)
+from hybrid.store.hdf5_file import CACHE, LIBVER
+from hybrid.store.hdf5_file import SLOTS as CHUNK_SLOTS
+from hybrid.store.named_arrays import Tree, pack, unpack
+from hybrid.store.table import NUMBERS, write_rows
+from hybrid.store.template import kept
+
+# Tables whose lengths are known when a run has ended: HDF5 writes their rows.
+TABLES = ("steps", "zones", "events")
+Part = bytearray | memoryview
+
+
+def parts_of_file(
+    contents: ArrayContents, checkpoints: Mapping[int, bytes] | None, before: Tree | None, templates: Path | None
+) -> list[Part]:
+    """The bytes of a file, one part after the other; arrays of the contents are among them.
+
+    checkpoints: packed, by the number of the slot; None: nobody can go on with it.  before: as of `Recorder`.
+    templates: folder where templates are kept.
+    """
+    arrays = {name: x for name, x in contents.data.items() if name.split("/")[0] not in TABLES}
+    tables = {name: [x.field for x in of_table(contents, name)] for name in TABLES}
+    shape = (
+        "whole", tuple((x.field, x.dims, x.values.shape, x.grows) for x in arrays.values()),
+        tuple((name, *fields) for name, fields in tables.items()), checkpoints is not None,
+    )  # fmt: skip
+    plan = unpack(kept(shape, lambda: _made(arrays, tables, checkpoints is not None), templates))
+    pieces = _Pieces(plan)
+    with h5py.File(pieces, "r+", libver=LIBVER, rdcc_nbytes=CACHE, rdcc_nslots=CHUNK_SLOTS) as file:
+        write_attributes(file, contents.attributes)
+        write_texts(file, {name: contents.text(name) for name in contents.texts})
+        for name in TABLES:
+            _write_table(file, of_table(contents, name))
+        slots = [file[name] for name in SLOTS] if checkpoints else []
+        for number, data in (checkpoints or {}).items():
+            write_slot(slots, number, data)
+        write_before(file, before)
+    return list(pieces.with_arrays([arrays[name].values for name in plan["names"]]))
+
+
+def of_table(contents: ArrayContents, table: str) -> list[ArrayDataset]:
+    """Columns of a table, the scale first."""
+    found = [x for name, x in contents.data.items() if name.startswith(f"{table}/")]
+    return sorted(found, key=lambda x: len(x.dims) > 1 or x.dims != (x.field.name,))
+
+
+def write_attributes(file: h5py.File, attributes: Mapping[str, Any]) -> None:
+    """Root attributes besides those of all files, by HDF5's own interface: h5py takes five times as long."""
+    text, scalar, always = h5py.string_dtype(), h5s.create(h5s.SCALAR), attributes_of_format()
+    for name, value in attributes.items():
+        if name in always:
+            continue
+        if name in STATUS_WIDTHS:
+            array = fixed_text(value, h5py.string_dtype("utf-8", STATUS_WIDTHS[name]))
+        else:
+            array = np.array(value, text if isinstance(value, str) else None)
+        h5a.create(file.id, name.encode(), h5t.py_create(array.dtype, logical=True), scalar).write(array)
+
+
+def _write_table(file: h5py.File, columns: Sequence[ArrayDataset]) -> None:
+    for x in columns if columns and len(columns[0].values) else ():
+        data = h5d.open(file.id, x.field.name.encode())
+        data.set_extent(x.values.shape)
+        write_rows(data, 0, np.ascontiguousarray(x.values), NUMBERS.get(x.field.dtype) or data.get_type())
+
+
+# ---- the template ---------------------------------------------------------------------------------
+
+
+def _made(arrays: Mapping[str, ArrayDataset], tables: Mapping[str, Sequence[Field]], resumable: bool) -> bytes:
+    """A file without the values of its arrays: names and places of these, and what is between them."""
+    memory = io.BytesIO()
+    with h5py.File(memory, "w", libver=LIBVER) as file:
+        for name, value in attributes_of_format().items():
+            file.attrs[name] = value
+        scales = {name: x for name, x in arrays.items() if x.dims == (name,)}
+        others = {name: x for name, x in arrays.items() if name not in scales}
+        for name, x in scales.items():
+            data = _create(file, x)
+            data.make_scale(name)
+            data.dims[0].label = name
+        for x in others.values():
+            attach(_create(file, x), x.dims, [file[dim] for dim in x.dims])
+        for name, fields in tables.items():
+            rows = len(arrays["t"].values) if name == "zones" else None  # as of a file that grows
+            create_table(file, name, [_within(name, field) for field in fields], rows)
+        if resumable:
+            create_slots(file)
+        places = sorted((_place(file[name].id), name) for name, x in arrays.items() if x.values.size)
+    content = memory.getbuffer()
+    begins, pieces, at = [0], [], 0
+    for place, name in places:
+        pieces.append(bytes(content[at:place]))
+        at = place + arrays[name].values.nbytes
+        begins.append(at)
+    pieces.append(bytes(content[at:]))
+    plan = {"names": [name for _, name in places], "begins": begins, "sizes": [len(x) for x in pieces]}
+    return pack({**plan, "bytes": np.frombuffer(b"".join(pieces), "u1")})
+
+
+def _within(group: str, field: Field) -> Field:
+    return Field(**{**vars(field), "name": field.name.removeprefix(f"{group}/")})
+
+
+def _create(file: h5py.File, x: ArrayDataset) -> h5py.Dataset:
+    """A dataset whose numbers have their place, where nothing is written."""
+    shape, dtype = x.values.shape, x.values.dtype
+    if dtype.kind == "S" and x.grows:
+        dtype = h5py.string_dtype("utf-8", dtype.itemsize)
+    kind = NUMBERS.get(x.field.dtype) or h5t.py_create(dtype, logical=True)
+    how, links = h5p.create(h5p.DATASET_CREATE), h5p.create(h5p.LINK_CREATE)
+    links.set_create_intermediate_group(True)
+    most: tuple[int, ...] | None = None
+    if x.grows:
+        most = (h5s.UNLIMITED, *shape[1:])
+        how.set_chunk(tuple(max(n, 1) for n in shape))
+    how.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+    how.set_fill_time(h5d.FILL_TIME_NEVER)
+    space = h5s.create_simple(shape, most) if shape else h5s.create(h5s.SCALAR)
+    data = h5py.Dataset(h5d.create(file.id, x.field.name.encode(), kind, space, how, links))
+    annotate(data, x.field.unit, x.field.description, x.field.frame)
+    return data
+
+
+def _place(data: h5d.DatasetID) -> int:
+    """Where in the file the numbers of a dataset are."""
+    if data.get_create_plist().get_layout() == h5d.CHUNKED:
+        return int(data.get_chunk_info(0).byte_offset)
+    return int(data.get_offset())
+
+
+class _Pieces(io.RawIOBase):
+    """A file as HDF5 sees it, of which only the pieces between arrays are there; the last one grows."""
+
+    def __init__(self, plan: Tree) -> None:
+        content, ends = plan["bytes"].tobytes(), np.cumsum(plan["sizes"]).tolist()
+        self._begins = plan["begins"]
+        self._pieces = [bytearray(content[a:b]) for a, b in zip([0, *ends], ends, strict=False)]
+        self._at = 0
+
+    @property
+    def _end(self) -> int:
+        return int(self._begins[-1]) + len(self._pieces[-1])
+
+    def _piece(self) -> tuple[bytearray, int, bool]:
+        """The piece with the present place, where in it that is, and whether it is the last."""
+        k = bisect_right(self._begins, self._at) - 1
+        return self._pieces[k], self._at - self._begins[k], k == len(self._pieces) - 1
+
+    def seek(self, at: int, whence: int = io.SEEK_SET) -> int:
+        self._at = self._end if whence == io.SEEK_END else at
+        return self._at
+
+    def tell(self) -> int:
+        return self._at
+
+    def readinto(self, out: Any) -> int:
+        piece, first, _ = self._piece()  # what HDF5 reads beyond a piece to save a second look, it does not use
+        out[:] = piece[first : first + len(out)].ljust(len(out), b"\0")
+        return len(out)
+
+    def write(self, data: Any) -> int:
+        piece, first, last = self._piece()
+        if first + len(data) > len(piece) and not last:
+            raise OSError(f"bytes {self._at} to {self._at + len(data)} of a file belong to an array")
+        if first > len(piece):
+            piece.extend(bytes(first - len(piece)))
+        piece[first : first + len(data)] = data
+        return len(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        more = (self._at if size is None else size) - self._end
+        if more > 0:
+            self._pieces[-1].extend(bytes(more))
+        elif more < 0:
+            del self._pieces[-1][more:]
+        return self._end
+
+    def flush(self) -> None:
+        """Nothing waits."""
+
+    def with_arrays(self, arrays: Sequence[np.ndarray]) -> Iterator[Part]:
+        """The pieces, and the arrays between them."""
+        for piece, array in zip(self._pieces, arrays, strict=False):
+            yield piece
+            yield np.ascontiguousarray(array).reshape(-1).view(np.uint8).data
+        yield self._pieces[-1]
