@@ -258,8 +258,10 @@ def _compute(case: Case, target: Target, source: Path | None = None, remaining: 
     def complete() -> Path | io.BytesIO | LateFile:
         """The result, which nothing is to be done to but to add its errors."""
         assert not isinstance(target, MemoryTarget)
-        late = case.late_file
-        return late if late is not None and not late.placed else target
+        if case.late_file is not None and not case.late_file.placed:
+            return case.late_file
+        case.late_file = None  # they go into the file alone
+        return target
 
     def found() -> Tree:
         return control.checkpoint() if control is not None else {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
@@ -63,7 +63,7 @@ from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.hdf5_file import is_result, open_file, opened
 from hybrid.store.late_file import LateFile
 from hybrid.store.named_arrays import Tree, pack
-from hybrid.store.reader import open_result, written_result
+from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.records import THERE
 from hybrid.store.stored_array import StoredArray
 from hybrid.store.stored_rows import RowsRecorder, rows_path
@@ -118,8 +118,7 @@ class Case:
         loop, recorder, equilibrium = self.prepare(resolution, target, kept, late=not self.progress.heard)
         loop.recorder = recorder
         if isinstance(recorder, Recorder):
-            plain = resolution.local is None and loop.run.switching is None
-            recorder.amended = plain and self.beside_result is not None and target == self.beside_result
+            recorder.amended = self.beside_result is not None and target == self.beside_result
         with recorder:
             loop.begin(equilibrium)
             loop.to_the_end(self._duration, self._exact, self.changes)
@@ -279,7 +278,8 @@ class Case:
         if run.switching is not None:
             bound = resolution.zones * run.model.length
         if resolution.local is not None or run.switching is not None:
-            with written_result(target) as result:
+            whole = Result(late.path, contents=late.contents) if late is not None else None
+            with written_result(target) if whole is None else nullcontext(whole) as result:
                 if resolution.local is not None:
                     notes = damped_vibrations(result)
                 if run.switching is not None:
