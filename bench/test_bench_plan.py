@@ -100,7 +100,7 @@ DEFAULTS = "touchdown", "s_tether", "rov_tether", "laying", "slack_on_seabed"
 
 @pytest.mark.parametrize("name", DEFAULTS)
 def test_default_is_no_dearer(name):
-    """CPU time of everything at 1 %, medians of three: model not named over the cheaper of rods and catenaries.
+    """CPU time of everything at 1 %, medians of five: model not named over the cheaper of rods and catenaries.
 
     Catenaries count where they meet what is asked.  1.05 is asked of the project.
     """
@@ -108,21 +108,22 @@ def test_default_is_no_dearer(name):
     base = hybrid.load_scene(path).model_dump(mode="json", exclude_none=True, exclude_unset=True)
     base = {k: v for k, v in base.items() if k not in ("model", "mesh")}
     base |= {"time": {"duration": base["time"]["duration"]}, "accuracy": "1%"}
-    cost = {}
+    scenes = {}
     for model in (None, "rod", "catenary"):
         scene = hybrid.validate_scene(base | ({"model": model} if model else {}))
         try:
             missed = "accuracy missed" in {e.kind for e in hybrid.run(scene).events}
         except hybrid.ComputationError:
             continue
-        if missed and model == "catenary":
-            continue
-        tries = []
-        for _ in range(3):
+        if not (missed and model == "catenary"):
+            scenes[model or "default"] = scene
+    tries: dict[str, list[float]] = {name: [] for name in scenes}
+    for _ in range(5):  # in turn: what the machine does beside is shared alike
+        for title, scene in scenes.items():
             begin = time.process_time()
             hybrid.run(scene)
-            tries.append(time.process_time() - begin)
-        cost[model or "default"] = median(tries)
+            tries[title].append(time.process_time() - begin)
+    cost = {title: median(x) for title, x in tries.items()}
     ratio = cost["default"] / min(cost[x] for x in cost if x != "default")
     each = ", ".join(f"{x} {y:.2f} s" for x, y in cost.items())
     print(f"{name}: {each}; default over the cheaper {ratio:.2f}")

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from hybrid.kernels import books as b
 from hybrid.kernels.books import Books
+from hybrid.kernels.carried_extremes import carry_extremes, fold_gone, match_nodes
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.end_motion import ends_at, sea_at
-from hybrid.kernels.extremes import fold_extremes
 from hybrid.kernels.forces import FRICTION, SEABED, WAVES
 from hybrid.kernels.references import reader
 from hybrid.kernels.report import SEABED_ENERGY
@@ -53,6 +53,9 @@ class RenewJob(NamedTuple):
     """What a run knows of a line beside its state: before a change, of N cells, and after it, of M, in the same memory."""
 
     s: Floats  # (N+1,) m, old nodes
+    rods: NDArray[np.bool_]  # (N,) whether old cells are rod
+    to_s: Floats  # (M+1,) m, new nodes
+    to_rods: NDArray[np.bool_]  # (M,) and cells
     line: Line
     place: NDArray[np.int64]  # (M+1,)
     of: NDArray[np.int64]  # (M,)
@@ -72,8 +75,8 @@ class RenewJob(NamedTuple):
     next_push: Floats  # (M+1, 4) room for the next
     envelope_s: Floats  # (E,) m, places of extremes of all meshes
     bounds: Floats  # (4, EXTREMES, E)
-    places: Floats  # room for all nodes and all marked ones once more
-    columns: NDArray[np.int64]  # likewise
+    stays: NDArray[np.int64]  # room for all nodes
+    spare: Floats  # room for the extremes of all nodes
     width: Floats  # (M,) m, diameters of the new cells; empty: nobody watches whether the line meets itself
     nearest: NDArray[np.int64]  # (2,) the pair of its cells that was nearest
     widths: Floats  # (n,) m, diameters of base cells
@@ -84,9 +87,9 @@ def blank_renew_job() -> RenewJob:
     """A job with the types that every one has."""
     z, state, books = np.zeros, blank_state(1), blank_books()
     return RenewJob(
-        z(2), blank_line(1), z(2, np.int64), z(1, np.int64), z(2, np.int64), z((2, 3)), z(2, np.int8), z(1), state,
-        state, no_sea(1), no_work(), blank_zones(1, 1), books, books, z((0, 4)), z((0, 4)), z((0, 4)), z(2),
-        z((4, b.EXTREMES, 2)), z(2), z(2, np.int64), z(0), z(2, np.int64), z(1), 1.0,
+        z(2), z(1, bool), z(2), z(1, bool), blank_line(1), z(2, np.int64), z(1, np.int64), z(2, np.int64), z((2, 3)),
+        z(2, np.int8), z(1), state, state, no_sea(1), no_work(), blank_zones(1, 1), books, books, z((0, 4)), z((0, 4)), z((0, 4)), z(2),
+        z((4, b.EXTREMES, 2)), z(2, np.int64), z(2), z(0), z(2, np.int64), z(1), 1.0,
     )  # fmt: skip
 
 
@@ -114,16 +117,14 @@ def lay_out(table):
 
 
 @inner
-def fold(job):
-    """Take the extremes of the old cells into those of the finest mesh."""
-    books, n, k = job.before, job.s.shape[0], 0
-    for i in range(n):
-        job.places[k], job.columns[k] = job.s[i], i
-        k += 1
-        if books.right[i] != i:
-            job.places[k], job.columns[k] = job.s[i], books.right[i]
-            k += 1
-    fold_extremes(job.places[:k], job.envelope_s, job.columns[:k], books.extremes, job.bounds)
+def set_aside(job):
+    """Copy the extremes of the old nodes, which lie in the memory of those of the new ones."""
+    now, k = job.before.extremes, 0
+    for bound in range(now.shape[0]):
+        for row in range(now.shape[1]):
+            for column in range(now.shape[2]):
+                job.spare[k] = now[bound, row, column]
+                k += 1
 
 
 @inner
@@ -202,9 +203,14 @@ def renew(table):
     """What a run knows of its new cells, as of the beginning; what it knew of the old ones is kept where it must be."""
     job = read_renew(table)
     zones, books, clock = job.zones, job.books, job.books.clock
+    cells, columns = job.rods.shape[0], job.before.extremes.shape[2]
     if books.extremes.shape[1] > 0:
-        fold(job)
+        match_nodes(job.s, job.rods, job.to_s, job.to_rods, job.stays)
+        fold_gone(job.s, job.before.extremes, job.before.right, job.stays, job.envelope_s, job.bounds)
+        set_aside(job)
     fill_books(job)
+    if books.extremes.shape[1] > 0:
+        carry_extremes(job.stays, cells, job.spare, columns, books.right, job.of.shape[0], books.extremes)
     copy_state(job.state, job.twin)
     clear(job.sea.axis)
     clear(job.sea.slip)

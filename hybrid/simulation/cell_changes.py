@@ -86,7 +86,8 @@ class CellChanges:
         self._numbers = np.zeros(NUMBERS)
         self._watch = owner.itself if owner.itself is not None and owner.itself.on else None
         self._twist, self._clamps, self._held = np.zeros(self.base), np.zeros((2, 2, 3)), np.zeros(2, bool)
-        self._room_for_places = np.zeros(self.most + 1 + extra), np.zeros(self.most + 1 + extra, np.int64)
+        self._stays = np.zeros(self.most + 1, np.int64)
+        self._spare = np.zeros(4 * b.EXTREMES * (self.most + 1 + extra))
         self._match = Room(Packed(blank_joined), self.most), Room(Packed(blank_single), self.most)
         self._following, self._review = Table(f.blank_following_job), Table(blank_review_job)
         self._rods_then: list[tuple[int, np.ndarray]] = []  # rods (n,) of the outputs that waited, up to so many
@@ -179,16 +180,16 @@ class CellChanges:
             }  # fmt: skip
 
         def renew_job(k: int, parity: int, n: int, m: int) -> dict[str, Any]:
-            to, at = 1 - k, on.layout(1 - k, m)
+            to, at, of_old = 1 - k, on.layout(1 - k, m), on.layout(k, n)
             return {
-                "s": on.layout(k, n).s, "line": on.line(to, m), "place": at.place, "of": at.of,
-                "first": on.sides[to].first, "start": start, "marked": self._marked,
+                "s": of_old.s, "rods": of_old.rods, "to_s": at.s, "to_rods": at.rods, "line": on.line(to, m),
+                "place": at.place, "of": at.of, "first": on.sides[to].first, "start": start, "marked": self._marked,
                 "borne": borne, "state": on.state(to, 0, m),
                 "twin": on.state(to, 1, m), "sea": on.sea_on(m), "work": on.work_on(m),
                 "zones": on.zones(to, m), "before": on.books(n), "books": on.books(m),
                 "push": on.push(k, parity, n), "new_push": on.push(to, 0, m), "next_push": on.push(to, 1, m),
-                "envelope_s": places, "bounds": bounds, "places": self._room_for_places[0],
-                "columns": self._room_for_places[1], "width": on.width(m), "nearest": on.itself.cells,
+                "envelope_s": places, "bounds": bounds, "stays": self._stays, "spare": self._spare,
+                "width": on.width(m), "nearest": on.itself.cells,
                 "widths": widths, "scale": model.tension_scale,
             }  # fmt: skip
 

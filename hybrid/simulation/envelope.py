@@ -1,8 +1,9 @@
 """Extremes of a run over all accepted steps, on the finest mesh that its zones may have.
 
 The compiled run keeps them on the mesh of the moment (kernels.extremes).  Every node of any layout is a node of the
-layout that is all rod, so when zones change they are folded into those on its nodes: inside a catenary cell the
-extremes of its two nodes are interpolated, with the time of the nearer one.
+layout that is all rod, so when cells change, the extremes of those that go are folded into those on its nodes: inside
+a cell the extremes of its two nodes are interpolated, with the time of the nearer one.  Nodes whose cells stay go on
+with theirs (kernels.carried_extremes).
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import numpy as np
 
 from hybrid.errors import LIMIT_EVENTS
 from hybrid.kernels import books as b
+from hybrid.kernels.books import Books
+from hybrid.kernels.carried_extremes import pass_on
 from hybrid.kernels.extremes import fold_extremes
 from hybrid.kernels.forces import MAY_TOUCH, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.self_distance import blank_itself
@@ -73,6 +76,11 @@ def marks_on(s: Floats, places: Sequence[tuple[float, int]]) -> np.ndarray:
 def marks_of(scene: Scene, model: Model) -> np.ndarray:
     """The same for the nodes of a model."""
     return marks_on(model.line.s, marked_places(scene, model))
+
+
+def _rods(model: Model) -> np.ndarray:
+    """(N,) whether the cells of a model are rod."""
+    return model.line.spin != 0 if model.layout is None else model.layout.rod_cells
 
 
 def _doubled(nodes: Floats, marked: Floats) -> Floats:
@@ -141,6 +149,16 @@ class Envelope:
         """Take in the extremes (4, EXTREMES, N+1+K) of a mesh that ends; of no rows, before the first mesh."""
         if extremes.shape[1]:
             self.bounds[:] = self._with(nodes, extremes)
+
+    def pass_on(self, model: Model, books: Books, to_model: Model, to_books: Books) -> None:
+        """The run goes on with another mesh: extremes of nodes whose cells stay do, all others are taken in."""
+        if self._grows:
+            self.fold(model.nodes, books.extremes)
+        elif books.extremes.shape[1]:
+            pass_on(
+                model.line.s, _rods(model), books.extremes, books.right, to_model.line.s, _rods(to_model),
+                to_books.right, to_books.extremes, np.zeros(model.cells + 1, np.int64), self.s, self.bounds,
+            )  # fmt: skip
 
     def _with(self, nodes: Floats, extremes: Floats) -> Floats:
         """All extremes (4, EXTREMES, n), with those (4, EXTREMES, N+1+K) of the mesh of now."""

@@ -568,8 +568,7 @@ class Transient:
 
     def set_model(self, model: Model, state: State) -> None:
         """Go on with another line: other zones, or out of the plane."""
-        if self.envelope is not None and self.run.books.extremes.shape[1]:
-            self.envelope.fold(self.model.nodes, self.run.books.extremes)
+        before, books = self.model, self.run.books
         self.model = model
         if self._cells is not None:
             self._cells.adopted = False
@@ -593,6 +592,7 @@ class Transient:
         else:
             self.run.touch_no_more()
         if self.envelope is not None:
+            self.envelope.pass_on(before, books, model, self.run.books)
             self.run.books.start[:] = self.envelope.start_of(model.nodes)
         if self.itself is not None:
             self.itself.attach(model, self.run)
