@@ -19,7 +19,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5p, h5s, h5t
+from h5py import h5a, h5d, h5ds, h5p, h5s, h5t
 
 from hybrid.store.array_contents import ArrayContents, ArrayDataset
 from hybrid.store.checkpoint import SLOTS, create_slots, write_before, write_slot
@@ -27,7 +27,7 @@ from hybrid.store.format import (
     STATUS_WIDTHS,
     Field,
     annotate,
-    attach,
+    attach_scales,
     attributes_of_format,
     create_table,
     fixed_text,
@@ -107,20 +107,21 @@ def _made(arrays: Mapping[str, ArrayDataset], tables: Mapping[str, Sequence[Fiel
     with h5py.File(memory, "w", libver=LIBVER) as file:
         for name, value in attributes_of_format().items():
             file.attrs[name] = value
-        scales = {name: x for name, x in arrays.items() if x.dims == (name,)}
-        others = {name: x for name, x in arrays.items() if name not in scales}
-        for name, x in scales.items():
-            data = _create(file, x)
-            data.make_scale(name)
-            data.dims[0].label = name
-        for x in others.values():
-            attach(_create(file, x), x.dims, [file[dim] for dim in x.dims])
+        made = dict[str, h5d.DatasetID]()  # to find them anew by their names takes a third of the time
+        for name, x in sorted(arrays.items(), key=lambda item: item[1].dims != (item[0],)):  # scales first
+            made[name] = data = _create(file, x)
+            if x.dims == (name,):
+                h5ds.set_scale(data, name.encode())
+                h5ds.set_label(data, 0, name.encode())
+            else:
+                attach_scales(data, x.dims, [made[dim] for dim in x.dims])
         for name, fields in tables.items():
             rows = len(arrays["t"].values) if name == "zones" else None  # as of a file that grows
             create_table(file, name, [_within(name, field) for field in fields], rows)
         if resumable:
             create_slots(file)
-        places = sorted((_place(file[name].id), name) for name, x in arrays.items() if x.values.size)
+        places = sorted((_place(made[name]), name) for name, x in arrays.items() if x.values.size)
+        made.clear()
     content = memory.getbuffer()
     begins, pieces, at = [0], [], 0
     for place, name in places:
@@ -136,7 +137,7 @@ def _within(group: str, field: Field) -> Field:
     return Field(**{**vars(field), "name": field.name.removeprefix(f"{group}/")})
 
 
-def _create(file: h5py.File, x: ArrayDataset) -> h5py.Dataset:
+def _create(file: h5py.File, x: ArrayDataset) -> h5d.DatasetID:
     """A dataset whose numbers have their place, where nothing is written."""
     shape, dtype = x.values.shape, x.values.dtype
     if dtype.kind == "S" and x.grows:
@@ -151,7 +152,7 @@ def _create(file: h5py.File, x: ArrayDataset) -> h5py.Dataset:
     how.set_alloc_time(h5d.ALLOC_TIME_EARLY)
     how.set_fill_time(h5d.FILL_TIME_NEVER)
     space = h5s.create_simple(shape, most) if shape else h5s.create(h5s.SCALAR)
-    data = h5py.Dataset(h5d.create(file.id, x.field.name.encode(), kind, space, how, links))
+    data = h5d.create(file.id, x.field.name.encode(), kind, space, how, links)
     annotate(data, x.field.unit, x.field.description, x.field.frame)
     return data
 
