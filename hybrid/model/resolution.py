@@ -39,6 +39,9 @@ TURN, MOST_TURN = 1.0, 2.0
 # Refinements that may follow the first result where an accuracy is asked; of an irregular motion, in which chance is
 # soon more than cells and steps are; of an equilibrium, whose errors need not fall evenly.
 MOST_REFINEMENTS, IRREGULAR_REFINEMENTS, REFINEMENTS_AT_REST = 3, 1, 6
+# Part of the force, the moment and the curvature typical of a scene below which an error is one of round-off: parts of
+# a force that is nothing are not asked for.
+ROUND_OFF = 1e-12
 # Least steps to a run, and the shortest step, as a part of the longest, before a step counts as failed.
 LEAST_STEPS, SHORTEST = 10, 1e-6
 
@@ -54,6 +57,13 @@ class RequestedAccuracy:
     of_moment: float | None = None  # the same of the bending moment
     of_tension: float | None = None  # the same of the tension along the line
     instant: bool = False  # at every output, also where a motion is irregular
+    force: float = 0.0  # N, typical of the scene (`tension_scale`); 0: not known
+    length: float = 0.0  # m, of the line
+
+    def round_off(self, unit: str) -> float:
+        """Error of a quantity in N, N m or 1/m that numbers of this scene have by round-off alone."""
+        scales = {"N": self.force, "N m": self.force * self.length, "1/m": 1.0 / self.length if self.length else 0.0}
+        return ROUND_OFF * scales.get(unit, 0.0)
 
     def asks(self, name: str) -> bool:
         """Whether an output is asked for: position, tension (of the line), curvature, bending_moment, an end force."""
@@ -134,8 +144,10 @@ def requested_accuracy(scene: Scene) -> RequestedAccuracy | None:
         amount(x)[1] if x is not None else None
         for x in (accuracy.curvature, accuracy.bending_moment, accuracy.line_tension)
     )
-    instant = accuracy.instant is not None
-    return RequestedAccuracy(position, tension, of_end_force, curvature, moment, line_tension, instant)
+    instant, force = accuracy.instant is not None, tension_scale(scene, scene.cable.sections, True)
+    return RequestedAccuracy(
+        position, tension, of_end_force, curvature, moment, line_tension, instant, force, scene.length
+    )
 
 
 def is_irregular(scene: Scene) -> bool:

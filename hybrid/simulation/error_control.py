@@ -73,6 +73,9 @@ CPU_AT_REST = 5.0
 IRREGULAR_FINER = 2.0
 # A run that is hardly finer is not made of it: what it changes is chance.
 WORTH_REPEATING = 1.2
+# A change of a quantity by less than this part of its largest value is round-off: a thousandth of the least error that
+# can be asked for.
+ROUND_OFF_OF = 1e-9
 # Values at an instant do not converge where halved cells and steps leave more of a difference than this: order 0.25.
 DIVERGES = 0.85
 
@@ -157,7 +160,17 @@ class ErrorController:
     @property
     def diverging(self) -> dict[str, float]:
         """As `Estimate.not_converged`; none of an irregular motion, which is judged otherwise."""
-        return {} if self.estimate is None or self.irregular else self.estimate.not_converged
+        if self.estimate is None or self.irregular:
+            return {}
+        return {x: left for x, left in self.estimate.not_converged.items() if not self._is_round_off(x)}
+
+    def _is_round_off(self, name: str) -> bool:
+        """Whether runs differ in a quantity by no more than numbers of this scene do by round-off."""
+        assert self.estimate is not None
+        raw, unit = RAW.get(name, name), {"bending_moment": "N m", "curvature": "1/m", "position": "m"}.get(name, "N")
+        least = self.asked.round_off(unit) if self.asked is not None else 0.0
+        values = self.estimate.run.values[raw]
+        return self.estimate.changes[raw][0] <= max(least, ROUND_OFF_OF * float(np.abs(np.asarray(values)).max()))
 
     def _irregular_note(self) -> list[tuple[str, str]]:
         """What is judged of an irregular motion, and how far the result may be off in what is not."""
@@ -424,8 +437,8 @@ class ErrorController:
             now = run.resolution
             worth = found and max(found.fineness / now.fineness, now.step / max(found.step, 1e-300)) >= WORTH_REPEATING
             return found if worth else None
-        if self.estimate.share_unknown:  # either may be to blame
-            verdict = replace(verdict, time=max(verdict.time, verdict.mesh))
+        if self.estimate.share_unknown or RAW.get(verdict.name, verdict.name) in self.estimate.shares_mixed:
+            verdict = replace(verdict, time=max(verdict.time, verdict.mesh))  # either may be to blame
         found = refined(run.resolution, verdict, self.free)
         if found is None or self.moves or found.fineness == run.resolution.fineness:
             return found

@@ -62,6 +62,9 @@ OTHER_SOLUTION, VISIBLE, SEVERAL = 0.75, 2e-3, "several equilibria"
 NOT_CONVERGED, NOTHING = 0.9, 0.005
 # The same of tension along the line in the first three runs: order 0.4.
 HARDLY_CONVERGES = 0.75
+# Halved cells and steps leave more than this of a difference (order 1): of vibrations that last, runs this coarse have
+# damped what longer steps change, so that what steps make of it is not known from them, if it is most of it.
+SLOWLY_CONVERGES, MOST_BY_STEPS = 0.5, 0.5
 # Ratio of step or cell lengths of two runs below which their difference does not show the effect of either.
 LEAST_RATIO = 1.1
 # Part of the length of catenaries, or of rods, by which two runs may differ whose model errors count as the same.
@@ -121,6 +124,14 @@ class Estimate:
         self.has_mesh = bool(self.order) and result.cells >= LEAST_RATIO * coarse.cells
         # Steps of the result are shorter than those of the coarser run, and what that does is not known.
         self.share_unknown = not self.has_step and 0 < LEAST_RATIO * coarse.steps <= result.steps
+        # Outputs of which the runs with longer steps do not show it either (docs/accuracy.md).
+        slow = {name for name, x in fall.items() if max(x.mean, x.largest) > SLOWLY_CONVERGES}
+        mixed = {name for name in slow if step_share(name, coarse, rough, coarsest) > MOST_BY_STEPS}
+        self.shares_mixed = mixed if self.has_step and self.cancels else set[str]()
+
+    def _mixes(self, name: str) -> bool:
+        """Whether what cells and steps make of an output is not known apart."""
+        return self.share_unknown or name in self.shares_mixed
 
     def _pair(self, slow: RunSample | None, fast: RunSample) -> tuple[RunSample, RunSample] | None:
         """Two runs on the same cells, of longer and of shorter steps, that show what steps do; None: they do not."""
@@ -169,7 +180,7 @@ class Estimate:
         outputs is that at the start.
         """
         p, finer, shorter = self.order[name], self.run.cells / before.cells, self.run.steps / max(before.steps, 1)
-        if self.share_unknown and shorter > LEAST_RATIO:
+        if self._mixes(name) and shorter > LEAST_RATIO:
             finer = min(finer, shorter)
         if by_step is not None:
             change = change - by_step * ((self.run.steps / before.steps) ** p - 1.0)
@@ -258,8 +269,9 @@ class Estimate:
                 if name in by_step:
                     by_step[name] = by_step[name] / shorter**p
                 shown, kept = self._mesh_error(name, change, by_step.get(name), before), by_mesh[name]
-                by_mesh[name] = blended(shown, kept / finer**p, finer, p)
-                if self.share_unknown and shorter <= LEAST_RATIO:  # what steps make of it has not changed
+                both = min(finer, shorter) if name in self.shares_mixed and shorter > LEAST_RATIO else finer
+                by_mesh[name] = blended(shown, kept / both**p, both, p)
+                if self._mixes(name) and shorter <= LEAST_RATIO:  # what steps make of it has not changed
                     left = kept - change
                     by_mesh[name] = np.where(np.abs(left) > np.abs(by_mesh[name]), left, by_mesh[name])
                 if name in self.at_start:
@@ -395,6 +407,7 @@ class Estimate:
             "order": self.order,
             "at_start": self.at_start,
             "share_unknown": self.share_unknown,
+            "shares_mixed": sorted(self.shares_mixed),
             "falls": self.falls,
             "changes": changes,
             "start": np.array(self.start),
@@ -434,6 +447,7 @@ class Estimate:
         self._model_of = count, every, catenary
         self.has_step, self.has_mesh = bool(late), bool(cells)
         self.share_unknown = bool(tree.get("share_unknown", False))  # of checkpoints that have it
+        self.shares_mixed = {name for name in self.order if name in list(tree.get("shares_mixed", ()))}
         if not (set(late) | set(cells) <= set(self.order) <= set(self.run.values) and self.run.every == 1):
             raise ValueError("errors of outputs that are not there")
         if not (set(self.at_start) <= set(self.order) and set(self.at_start) <= set(END_FORCES)):

@@ -86,14 +86,15 @@ def bounds_of(asked: RequestedAccuracy, run: RunSample) -> list[tuple[str, str, 
         if asked.tension is not None:
             bounds.append((name, "N", asked.tension, None))
         if asked.of_end_force is not None:
-            bounds.append((name, "N", asked.of_end_force * run.largest_end_force, run.largest_end_force))
+            bound = max(asked.of_end_force * run.largest_end_force, asked.round_off("N"))
+            bounds.append((name, "N", bound, run.largest_end_force))
     for name, unit, part in (
         ("curvature", "1/m", asked.of_curvature), ("bending_moment", "N m", asked.of_moment),
         ("tension", "N", asked.of_tension),
     ):  # fmt: skip
         if part is not None and name in run.values:
             largest = float(np.asarray(run.values[name]).max())
-            bounds.append((name, unit, part * largest, largest))
+            bounds.append((name, unit, max(part * largest, asked.round_off(unit)), largest))
     return bounds
 
 

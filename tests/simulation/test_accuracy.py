@@ -682,7 +682,7 @@ def test_what_steps_damp_out_is_said():
         "model": "rod",
         "time": {"duration": 3.2},
         "output": {"every": 0.1, "points": 11},
-        "accuracy": "1%",
+        "accuracy": "1 cm",
     }
     assert "vibrations damped" in {e.kind for e in hybrid.run(hybrid.validate_scene(data)).events}
     assert "vibrations damped" not in {e.kind for e in hybrid.run(swinging()).events}
