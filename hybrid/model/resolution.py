@@ -93,7 +93,8 @@ class Resolution:
     fineness: number of cells, relative to the default mesh; grading: density of cells along the line, None: as the
     scene or the program places them; step: s, fixed, or the largest; local: m, error allowed per step, None: steps are
     fixed; zones: error that neglected bending may make, as a part of the length; every: outputs of the result to one
-    of such a run; follow: whether the error of neglected bending is followed along the run.
+    of such a run; follow: whether the error of neglected bending is followed along the run.  later: s, the largest step
+    where no vibration is there that a ramp has set off along the line with more than `still` (N); 0: all are alike.
     """
 
     fineness: float
@@ -103,12 +104,15 @@ class Resolution:
     grading: Grading | None = None
     every: int = 1
     follow: bool = False
+    later: float = 0.0
+    still: float = 0.0
 
     def coarser(self, cells: float = 1.0, steps: float = 1.0) -> Resolution:
         """With cells and steps longer by these factors; the error of a step is of third order."""
         local = None if self.local is None else self.local * steps**3
         every = round(steps) if steps > 1.0 else 1
-        return replace(self, fineness=self.fineness / cells, step=self.step * steps, local=local, every=every)
+        step, later = self.step * steps, self.later * steps
+        return replace(self, fineness=self.fineness / cells, step=step, local=local, every=every, later=later)
 
     @property
     def turn(self) -> float:
@@ -239,16 +243,22 @@ def first_resolution(scene: Scene) -> Resolution:
         assert time.step is not None
         return Resolution(fineness, time.step, None, zones or part)
     step = min(time.step or time.duration / LEAST_STEPS, time.duration)
-    step = min(step, shortest_period(scene.ends, scene.environment) / PER_PERIOD, vibration_step(scene, want))
-    return Resolution(fineness, step, time.tolerance or local, zones or part)
+    step = min(step, shortest_period(scene.ends, scene.environment) / PER_PERIOD)
+    found = Resolution(fineness, step, time.tolerance or local, zones or part)
+    shown, still = vibration_step(scene, want)
+    return replace(found, step=shown, later=step, still=still) if shown < step else found
 
 
-def vibration_step(scene: Scene, want: RequestedAccuracy | None) -> float:
-    """The longest step, s, that shows what ramps set off along the line; infinity where nothing asks for it."""
+def vibration_step(scene: Scene, want: RequestedAccuracy | None) -> tuple[float, float]:
+    """The longest step, s, that shows what ramps set off along the line, and its force, N, from which on it counts.
+
+    Infinity for the step where nothing asks for it.
+    """
     if want is None or scene.time is None or not (want.tension or want.of_end_force):
-        return inf
-    allowed = want.tension or (want.of_end_force or 0.0) * tension_scale(scene, scene.cable.sections, True)
+        return inf, 0.0
+    still = want.tension or (want.of_end_force or 0.0) * tension_scale(scene, scene.cable.sections, True)
+    still *= OF_VIBRATION
     duration = scene.time.duration
-    found = [x.period for x in start_vibrations(scene) if x.force > OF_VIBRATION * allowed and x.t < duration]
+    found = [x.period for x in start_vibrations(scene) if x.force > still and x.t < duration]
     step = min(found, default=inf) / (PER_PERIOD * SHOWN_WHEN_COARSE)
-    return step if duration <= MOST_VIBRATION_STEPS * step else inf
+    return step if duration <= MOST_VIBRATION_STEPS * step else inf, still

@@ -50,7 +50,7 @@ class SystemResolution:
         """The resolution for the accuracy of each line, before anything is known of its errors."""
         found = {name: first_resolution(system.scene_of(name)) for name in system.lines}
         step = min(x.step for x in found.values())
-        return cls({name: replace(x, step=step) for name, x in found.items()})
+        return cls({name: replace(x, step=step, later=0.0) for name, x in found.items()})
 
     @property
     def one(self) -> Resolution:

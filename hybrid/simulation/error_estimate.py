@@ -146,7 +146,8 @@ class Estimate:
 
     def _bounds(self, name: str, found: Falls) -> tuple[float, float]:
         """Bounds of the order of convergence of an output."""
-        return force_orders(found, self._from_rest) if name in END_FORCES else ORDERS
+        shaken = self.run.resolution.later > 0.0
+        return force_orders(found, self._from_rest, shaken) if name in END_FORCES else ORDERS
 
     def _signed(self, name: str, a: int, b: int) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Errors by time step and mesh of the outputs from number a to b, with their sign; None: not known."""

@@ -20,6 +20,9 @@ ORDER, ORDERS, MOST_ORDER = 1.5, (1.5, 2.0), 3.0
 # there have all lengths, of which finer cells carry shorter ones (docs/accuracy.md): more than ORDER is shown by runs
 # that are too coarse to carry them.
 START_ORDERS = (1.0, ORDER)
+# So it is where a ramp has set off vibrations along the line and a halving of cells and steps leaves more than this of
+# what forces at the ends differ by, root mean square: less than first order.
+BELOW_FIRST = 0.6
 # Runs that differ in a force at an end by more than this part of its largest are too coarse to show an order above
 # ORDER: a difference that falls from three times the force to half of it would be of order 2.7.
 TOO_COARSE = 1.0
@@ -104,9 +107,12 @@ def as_halved(found: Falls, finer: tuple[float, float], share: float) -> Falls:
     return Falls(mean, halved(found.largest), mean * found.before, found.before, found.part)
 
 
-def force_orders(found: Falls, from_rest: bool = True) -> tuple[float, float]:
-    """Bounds of the order with which a force at an end converges; from_rest: in a motion from an equilibrium."""
-    low, high = ORDERS if from_rest else START_ORDERS
+def force_orders(found: Falls, from_rest: bool = True, shaken: bool = False) -> tuple[float, float]:
+    """Bounds of the order with which a force at an end converges.
+
+    from_rest: in a motion from an equilibrium; shaken: in which a ramp sets off vibrations along the line that matter.
+    """
+    low, high = ORDERS if from_rest and not (shaken and found.mean > BELOW_FIRST) else START_ORDERS
     return low, ORDER if found.part > TOO_COARSE else high
 
 

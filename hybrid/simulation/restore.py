@@ -80,12 +80,14 @@ def resolution_tree(resolution: Resolution) -> Tree:
 def resolution_from(tree: Any, scene: Scene) -> Resolution:
     """The resolution again.  ValueError: it is none for this scene."""
     first = first_resolution(scene)
+    if "later" not in tree:  # of a checkpoint of before, whose steps were short from one end to the other
+        tree = tree | {"later": first.later * tree["step"] / first.step if first.step else 0.0, "still": first.still}
     saved = matched(tree, resolution_tree(first) | {"grading": None}, "resolution")
-    for name in ("fineness", "step", "local", "zones"):
+    for name in ("fineness", "step", "local", "zones", "later", "still"):
         asked, is_ = getattr(first, name), saved[name]
         if (asked is None) != (is_ is None):
             raise ValueError("steps that follow the motion in one place, fixed ones in the other")
-        if asked and not asked / FARTHEST <= is_ <= asked * FARTHEST:
+        if asked is not None and not asked / FARTHEST <= is_ <= asked * FARTHEST:
             raise ValueError(f"{name} = {is_:g}, where the scene asks for {asked:g}")
     grading = saved["grading"]
     if grading is not None:

@@ -28,6 +28,7 @@ from hybrid.simulation.restore import program, resolution_tree
 from hybrid.simulation.step_events import count_energy_gains, count_iterations, note_unknown_correction
 from hybrid.simulation.transient import StepFailed, Transient
 from hybrid.simulation.transient_checkpoint import checkpoint, restore
+from hybrid.simulation.vibration_steps import VibrationSteps
 from hybrid.solve.run import Tried
 from hybrid.solve.statics import Equilibrium
 from hybrid.store.array_recorder import ArrayRecorder, Target
@@ -90,6 +91,7 @@ class TimeLoop:
         self._nodes_aside = 0  # of all of these
         self._ratios: list[np.ndarray] = []  # (criteria, points) of outputs that wait, where criteria are written
         run.asks_samples = run.switching is not None and observer.writes_criteria
+        self._vibration = VibrationSteps(run.scene, run.resolution)
         self._kept = (-1, 0)  # steps and changes at the last checkpoint
         self._logged = 0.0  # s of processor time since then, at the last row of the log
 
@@ -106,6 +108,7 @@ class TimeLoop:
         self.diagnostics.follow(run.model)
         self._stop_if(self.diagnostics.stretch(run.state))
         self._stop_if(self.diagnostics.still(run.model.ends.values, run.state))
+        self._vibration.begin(run.run.clock)
         self.diagnostics.scheme(run.rho)
         self.diagnostics.watch(run.run)
         self._settle()
@@ -162,11 +165,16 @@ class TimeLoop:
         breaks = run.model.ends.breaks
         stops = [t for t in (*breaks, *run.model.ends.release_times) if t < end]
         if run.controlled:
-            stops += [t for t in ramp_ends(run.scene) if t < end]
+            stops += [t for t in (*ramp_ends(run.scene), *self._vibration.begins) if t < end]
         if exact:
             stops += [float(t) for t in run.run.books.outputs if t < end]
         for stop in apart([*stops, end], run.t, run.resolution.step):
+            while self._vibration.look < stop - SAME_STOP * run.resolution.step:
+                self.go_to(self._vibration.look)
+                self.write_down(everything=True)
+                self._vibration.judge(run.run.clock)
             self.go_to(stop)
+            self._vibration.begin(run.run.clock)
             if exact:
                 run.begin_leg()
             if breaks and any(abs(t - stop) <= SAME_STOP * run.resolution.step for t in breaks):
@@ -301,6 +309,7 @@ class TimeLoop:
         cpu = np.linspace(self._logged, now, len(rows) + 1)[1:]
         self._logged = now
         if len(rows):
+            self._vibration.log(rows[:, FORCE_COLUMNS])
             self.recorder.log_rows(np.column_stack([rows, cpu]))
 
     def _record(self, batch: Batch, errors: np.ndarray) -> None:
@@ -430,7 +439,7 @@ class TimeLoop:
         """What the rest of the run depends on, between two steps."""
         return checkpoint(self.run) | {
             "watch": self.diagnostics.checkpoint(self.run.run), "cpu": clock.process_time() - self._cpu,
-            "first_energy": self.observer.first_energy or 0.0,
+            "first_energy": self.observer.first_energy or 0.0, "vibration": self._vibration.checkpoint(),
         } | self._first_places()  # fmt: skip
 
     def _first_places(self) -> dict[str, np.ndarray]:
@@ -445,7 +454,8 @@ class TimeLoop:
         """Continue as `checkpoint` has said; ValueError or ResultError where that cannot be."""
         mine = {"watch": self.diagnostics.checkpoint(self.run.run), "cpu": 0.0, "first_energy": 0.0}
         mine |= {name: np.full_like(x, np.nan) for name, x in self._first_places().items()}
-        restore(self.run, {name: x for name, x in saved.items() if name not in mine})
+        restore(self.run, {name: x for name, x in saved.items() if name not in (*mine, "vibration")})
+        self._vibration.restore(saved.get("vibration"), self.run.run.clock)
         if "first_turns" in mine:
             saved = {"first_turns": mine["first_turns"], **saved}  # files of before have none
         older = {name: saved[name] for name in mine}

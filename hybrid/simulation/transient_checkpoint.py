@@ -173,7 +173,7 @@ def _restore_envelope(run: Transient, saved: Mapping[str, Any] | None) -> None:
 
 
 def _restore_control(run: Transient, saved: Mapping[str, Any]) -> None:
-    clock, largest = run.run.clock, run.resolution.step
+    clock, largest = run.run.clock, max(run.resolution.step, run.resolution.later)
     clock[b.NEXT_DT], clock[b.ERROR_RATIO] = saved["next"], saved["before"]
     run.run.count[b.WARY] = saved["wary"]
     good = clock[b.SHORTEST] <= saved["next"] <= largest and saved["before"] > 0.0

@@ -175,6 +175,15 @@ def test_a_force_at_an_end_may_be_of_low_order():
         assert SAFETY * 0.03 * 0.95 < total <= SAFETY * 0.03 * 1.001
 
 
+@pytest.mark.parametrize(("order", "later", "found"), [(0.6, 0.0, 1.5), (0.6, 0.4, 1.0), (1.0, 0.4, 1.5)])
+def test_forces_of_a_shaken_line_that_fall_slower_than_first_order(order, later, found):
+    """A ramp that sets off vibrations along the line (steps are longer later) is a shock to it."""
+    resolution = Resolution(1.0, 0.1, 1e-3, 1e-3, later=later)
+    runs = [sample(resolution, 100, order), sample(resolution.coarser(2, 2), 50, order)]
+    runs += [sample(resolution.coarser(2, 4), 25, order), sample(resolution.coarser(4, 4), 25, order)]
+    assert Estimate(*runs).order["reaction_end"] == found
+
+
 def test_runs_that_are_too_coarse_show_no_high_order():
     """A force that the coarsest run has three times too large falls by 2.7 orders, and the next run shows 1.3."""
     resolution = Resolution(1.0, 0.1, None, 1e-3)

@@ -1,0 +1,102 @@
+"""Steps that show a vibration along the line while it lasts, and longer ones once it has died out (docs/accuracy.md).
+
+Drag and slack may set it off again in every period of the motion: it has died out where a whole period shows little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hybrid.kernels import books as b
+from hybrid.kernels.state import Floats
+from hybrid.model.resolution import Resolution
+from hybrid.model.start_vibration import start_vibrations
+from hybrid.scene.motion_checks import stationary_from
+from hybrid.scene.schema import Scene
+from hybrid.store.named_arrays import matched
+
+# Periods of the vibration over which its amplitude is found, which are those from one look at it to the next; what
+# else a force does in this time is a polynomial of this degree.  Of fewer steps nothing is known.
+SEEN, DEGREE, FEWEST = 2.0, 3, 12
+# It counts as gone below this part of what would be shown at its begin: the errors of what is damped do not show.
+GONE = 0.5
+
+
+class VibrationSteps:
+    """Of one run whose steps follow the motion: when a vibration begins steps are short, until it has died out."""
+
+    def __init__(self, scene: Scene, resolution: Resolution) -> None:
+        regular = stationary_from(scene) if resolution.later > resolution.step else None
+        shown = [x for x in start_vibrations(scene) if x.force > resolution.still] if regular is not None else []
+        self.begins = sorted({x.t for x in shown})  # s
+        self.look = np.inf  # s, when to look whether it lasts; infinity: none is there
+        self._recurs = (0.0, 0.0) if regular is None else regular  # s: from when on, and after how long, all does
+        self._period = shown[0].period if shown else np.inf  # s
+        self._still, self._short, self._long = resolution.still, resolution.step, resolution.later
+        self._rows = np.zeros((0, 3))  # of steps since the last look: s; N, at start and end
+        self._counts_from = 0.0  # s, from when on little has been seen
+
+    def begin(self, clock: Floats) -> None:
+        """Steps are short from here on if a vibration begins here; clock: of kernels.books."""
+        now = float(clock[b.NOW])
+        if any(abs(now - t) <= 1e-9 * self._period for t in self.begins):
+            self.look, self._rows = now + SEEN * self._period, self._rows[:0]
+            self._counts_from = max(now, self._recurs[0])
+        if self.begins:
+            self._bound(clock)
+
+    def log(self, rows: Floats) -> None:
+        """Remember the forces (n, 3) at the ends in steps: s; N, at start and end."""
+        if self.look < np.inf:
+            self._rows = np.vstack([self._rows, rows])
+
+    def judge(self, clock: Floats) -> None:
+        """At `look`: longer steps, if a whole period of the motion has shown little of the vibration."""
+        if not self.amplitude() <= GONE * self._still:
+            self._counts_from = max(self.look, self._recurs[0])
+        gone = self.look - self._counts_from >= max(self._recurs[1], SEEN * self._period)
+        self.look, self._rows = np.inf if gone else self.look + SEEN * self._period, self._rows[:0]
+        self._bound(clock)
+
+    def amplitude(self) -> float:
+        """Of the larger vibration of the forces at both ends, N, since the last look; infinity: not known."""
+        if len(self._rows) < FEWEST:
+            return np.inf
+        t = (self._rows[:, 0] - self.look) / self._period
+        phase = 2.0 * np.pi * t
+        smooth = np.polynomial.legendre.legvander(1.0 + 2.0 * t / SEEN, DEGREE)
+        fit = np.column_stack([smooth, np.cos(phase), np.sin(phase)])
+        found = np.linalg.lstsq(fit, self._rows[:, 1:], rcond=None)[0]
+        return float(np.hypot(found[-2], found[-1]).max())
+
+    def _bound(self, clock: Floats) -> None:
+        clock[b.LARGEST] = self._short if self.look < np.inf else self._long
+        clock[b.NEXT_DT] = min(clock[b.NEXT_DT], clock[b.LARGEST])
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What later steps depend on; look: -1 for none."""
+        look = self.look if self.look < np.inf else -1.0
+        return {"look": float(look), "from": float(self._counts_from), "rows": self._rows}
+
+    def restore(self, saved: Mapping[str, Any] | None, clock: Floats) -> None:
+        """Continue as `checkpoint` has said; None: of a file from before, a vibration may last from here on.
+
+        ValueError: that cannot be.
+        """
+        if not self.begins:
+            return
+        now, span = float(clock[b.NOW]), SEEN * self._period
+        if saved is None:
+            self._counts_from = max(now, self._recurs[0])
+            self.look = now + span if now > self.begins[0] else np.inf
+        else:
+            found = matched(dict(saved), {"look": 0.0, "from": 0.0, "rows": np.zeros((0, 3))}, "vibration")
+            self.look = found["look"] if found["look"] >= 0.0 else np.inf
+            self._rows, self._counts_from = found["rows"], found["from"]
+            due = self.look == np.inf or now - 1e-9 * span <= self.look <= now + (1.0 + 1e-9) * span
+            if not due or self._rows.ndim != 2 or self._rows.shape[1] != 3:
+                raise ValueError("a vibration that no run shows")
+        self._bound(clock)
