@@ -124,8 +124,9 @@ class Estimate:
         self.has_mesh = bool(self.order) and result.cells >= LEAST_RATIO * coarse.cells
         # Steps of the result are shorter than those of the coarser run, and what that does is not known.
         self.share_unknown = not self.has_step and 0 < LEAST_RATIO * coarse.steps <= result.steps
-        # Outputs of which the runs with longer steps do not show it either (docs/accuracy.md).
-        slow = {name for name, x in fall.items() if max(x.mean, x.largest) > SLOWLY_CONVERGES}
+        # Outputs of which the runs with longer steps do not show it either (docs/accuracy.md).  Forces at ends after a
+        # shock are of order 1 to 1.5 whatever lasts: their slow fall is in their order.
+        slow = {name for name, x in fall.items() if name not in own and max(x.mean, x.largest) > SLOWLY_CONVERGES}
         mixed = {name for name in slow if step_share(name, coarse, rough, coarsest) > MOST_BY_STEPS}
         self.shares_mixed = mixed if self.has_step and self.cancels else set[str]()
 
