@@ -92,8 +92,9 @@ def test_a_hose_whose_end_is_lowered_touches_itself() -> None:
     (touch,) = [e for e in result.events if e.kind == "line touches itself"]
     assert 9.0 < touch.t < 10.5 and "line meets itself" not in {e.kind for e in result.events}
     assert float(result["self_distance/distance"]) > 0.85 * 0.03
-    # a pre-run, three to compare with, the result, and at most one finer, which must have met what is asked
-    assert result.attributes["effort_runs"] <= 6
+    # a pre-run, three to compare with and one that shows what their steps do (longer ones are halved), the result, and
+    # at most one finer, which must have met what is asked
+    assert result.attributes["effort_runs"] <= 7
     assert "accuracy missed" not in {e.kind for e in result.events}
 
 
