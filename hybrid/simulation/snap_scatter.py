@@ -12,7 +12,6 @@ converges, and in the next run a snap exceeds it.
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import stdtrit
 
 from hybrid.kernels.state import Floats
 
@@ -68,6 +67,8 @@ def snap_excess(after: Floats, before: Floats) -> Floats:
     times = joined([x for run in (after, before) for x in snap_times(run[:, 0], run[:, pulled])])
     if not times:
         return np.zeros(2)
+    from scipy.special import stdtrit  # 0.2 s to import, and few runs snap
+
     now, then = peaks(after, times), peaks(before, times)
     deviation, n = np.sqrt(0.5 * np.mean((now - then) ** 2, axis=0)), len(times)
     most = now.max(axis=0) + float(stdtrit(n, 1.0 - CHANCE / n)) * deviation
