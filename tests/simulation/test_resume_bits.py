@@ -18,7 +18,7 @@ CASES = {
     "fixed zones": ("02_suspension", ["time.duration=2"]),
     "catenary": ("07_forced_taut_cable", ["time.duration=2"]),
     "rod in a plane": ("06_whip", ["time.duration=0.1"]),
-    "adaptive in a plane": ("touchdown", ["time.duration=10"]),
+    "adaptive in a plane": ("touchdown", ["time.duration=14"]),
     "cells that follow": (
         "touchdown",
         ["time.duration=8", "model={kind: adaptive, curvature_error: 0.05}", "mesh=null"],
