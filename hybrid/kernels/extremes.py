@@ -74,6 +74,19 @@ def second_cell(h, marks, k):
 
 
 @inner
+def beyond_spring(t, d, part):
+    """Tangent of the line at a clamp with tangent t: between it and the chord d, if an angular spring turns as well.
+
+    part: of the turn from t to d that the half cell bends by; 1 without a spring.
+    """
+    cosine = min(max(dot(t, d), -1.0), 1.0)
+    angle = math.acos(cosine)
+    if part > 1.0 - 1e-9 or angle < 1e-6:
+        return t
+    return add(scale(math.sin(part * angle), t), scale(math.sin((1.0 - part) * angle), d))
+
+
+@inner
 def end_tension(line, ends, state, report, loaded, marks, k):
     """Tension at an end: the force of what holds or loads it along the tangent; of an end body, that of the cable."""
     n = line.h.shape[0]
@@ -85,7 +98,7 @@ def end_tension(line, ends, state, report, loaded, marks, k):
     t = sub(scale(1.5, d), scale(0.5, d2))
     if line.element[k * n]:
         R = get9(ends.frame, k)
-        t = (R[2], R[5], R[8])
+        t = beyond_spring((R[2], R[5], R[8]), d, 0.5 * line.h[first] / line.hn[k * n])
     f = scale(2.0 * k - 1.0, get3(ends.force, k))
     if ends.held[k]:
         at = FORCE_A + 3 * k

@@ -213,7 +213,7 @@ class Observation:
                 t = np.where(self._kink_beside(k), t, 1.5 * t - 0.5 * self.at_end(self.d, k, 1))
             knows = self.has_element(k) | (self.shift is not None and self.shift.clamped[k])
             if np.any(knows):  # a clamp or guide knows the tangent
-                t = np.where(knows, self.batch.frame[:, k, 2::3].T, t)
+                t = np.where(knows, self._held_tangent(k), t)
             if self.loaded(k):
                 ends.append(self._end_tension(k))
             else:
@@ -221,6 +221,16 @@ class Observation:
                 ends.append((force * t).sum(axis=0) / np.sqrt((t * t).sum(axis=0)))
         found = self.grid.held @ self.with_ends(self.T, ends)
         return found if self.shift is None else found - self.grid.sides @ self._borne_by_bending(self.shift)
+
+    def _held_tangent(self, k: int) -> Floats:
+        """Tangent (3, nb) of the line at the clamp at end k, not normalized; as `kernels.extremes.beyond_spring`."""
+        t, d = self.batch.frame[:, k, 2::3].T, self.at_end(self.d, k)
+        part = 0.5 * self.at_end(self.cell_lengths, k) / self.at_end(self.of_line("hn", slice(None)), k)
+        if part.min() > 1.0 - 1e-9:
+            return t
+        angle = np.arccos(np.clip((t * d).sum(axis=0), -1.0, 1.0))
+        between = np.sin(part * angle) * t + np.sin((1.0 - part) * angle) * d
+        return np.where((part > 1.0 - 1e-9) | (angle < 1e-6), t, between)
 
     def _borne_by_bending(self, shift: Shift) -> Floats:
         """Tension (n sides, nb), N, that a catenary has and the rod in its place has not: M^2/(2 EI) of an elastica,

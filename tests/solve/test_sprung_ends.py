@@ -112,3 +112,22 @@ def test_what_knows_no_springs_is_refused(change: dict[str, Any], where: str) ->
     with pytest.raises(SceneError) as refused:
         hybrid.plan(one(START, end, cable={"sections": [section]}, **more))
     assert where in str(refused.value)
+
+
+@pytest.mark.parametrize("spring", [1.0, 300.0, 1e5, None])
+def test_the_tension_at_a_spring_is_that_of_the_line_beside_it(spring: float | None) -> None:
+    """A line of 5 m hangs from a clamp that points sideways: its own tangent there is not that of the clamp."""
+    section = {"length": 5.0, "mass": 1.0, "bending_stiffness": 20.0}
+    start = {"kind": "clamped", "position": A, "tangent": [1, 0, 0], "bend_stiffness": spring}
+    scene = {
+        "cable": {"sections": [section]}, "ends": {"start": start, "end": {"kind": "free"}}, "model": "rod",
+        "mesh": {"cells": 400}, "initial": "equilibrium", "output": {"points": 401},
+    }  # fmt: skip
+    tension = hybrid.static(scene)["tension"][0]
+    near = 3.0 * tension[1] - 3.0 * tension[2] + tension[3]
+    assert tension[0] == pytest.approx(near, abs=2e-3 * tension.max())
+    moving = scene | {"time": {"duration": 0.1, "step": 0.05}, "mesh": {"cells": 50}, "output": {"points": 51}}
+    with hybrid.run(moving) as result:
+        assert result["envelope/tension_max"][0] == pytest.approx(result["tension"][:, 0].max(), rel=1e-6)
+    coarse = hybrid.static(scene | {"mesh": {"cells": 50}, "output": {"points": 101, "errors": True}})
+    assert "error uncertain" not in {e.kind for e in coarse.events}
