@@ -69,3 +69,21 @@ def random_scene(seed: int) -> tuple[str, dict[str, Any]]:
         "time": {"duration": 5 * T, "step": dt, "rho_inf": float(rng.choice([0.5, 0.8]))},
         "output": {"every": 5 * T / 40, "points": 51},
     }
+
+
+def hanging_line(seed: int) -> dict[str, Any]:
+    """A line at rest in air, clamped and pinned: lengths over two decades, bending layers over three."""
+    rng = np.random.default_rng(seed)
+    L, mass = float(10 ** rng.uniform(0, 2)), float(10 ** rng.uniform(-2, 0.5))
+    EI = float(mass * 9.81 * L**3 * 10 ** rng.uniform(-8, -3))
+    span, height, angle = L * rng.uniform(0.5, 0.95), L * rng.uniform(-0.2, 0.2), rng.uniform(-1.2, 1.2)
+    tangent = [float(np.cos(angle)), 0.0, float(np.sin(angle))]
+    return {
+        "cable": {"sections": [{"length": L, "mass": mass, "bending_stiffness": EI}]},
+        "ends": {
+            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": tangent},
+            "end": {"kind": "pinned", "position": [float(span), 0, float(height)]},
+        },
+        "initial": "equilibrium",
+        "output": {"points": int(rng.choice([41, 101, 201]))},
+    }

@@ -306,12 +306,17 @@ class Estimate:
         """
         found = {}
         for name, (last, before) in self.changes.items():
-            if name not in RIGHT and last > NOT_CONVERGED * before:
+            if name not in RIGHT and last > NOT_CONVERGED * before and not self._is_of_edges(name):
                 most = float(np.abs(np.asarray(self.run.values[name])).max(initial=0.0))
                 if last > NOTHING * most:
                     found[END_FORCES.get(name, name)] = last / before
         fall = self.falls.get("tension", np.nan)
         return found | ({"tension": fall} if fall > HARDLY_CONVERGES else {})
+
+    def _is_of_edges(self, name: str) -> bool:
+        """Whether the largest error of an equilibrium by its cells is known otherwise than by what these change."""
+        edges = self.run.at_edges.get(name)
+        return edges is not None and edges.max(initial=0.0) >= self.errors.largest("mesh", name) > 0.0
 
     @property
     def several_equilibria(self) -> Notes:

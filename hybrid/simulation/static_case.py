@@ -18,6 +18,7 @@ from hybrid.model.output_points import output_points
 from hybrid.model.resolution import Resolution, wants_errors
 from hybrid.model.sections import section_changes
 from hybrid.outputs.edge_errors import edge_errors
+from hybrid.outputs.layer_errors import layer_errors
 from hybrid.outputs.probes import Observer
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
@@ -152,7 +153,11 @@ def _values(
     seen = observer.look(batch)
     values = {name: x[0] for name, x in observer.values_of(seen, shift=shift).items()}
     doubt = correction.doubt if correction is not None else np.array(NO_DOUBT)
-    return values, edge_errors(seen) if model.line.bits & SEABED else {}, doubt
+    found_errors = edge_errors(seen) if model.line.bits & SEABED else {}
+    loads = [int(np.argmin(np.abs(model.line.s - at))) for at in model.attached]
+    for name, error in layer_errors(seen, loads).items():
+        found_errors[name] = np.maximum(error, found_errors.get(name, 0.0))
+    return values, found_errors, doubt
 
 
 def _sample(

@@ -1,0 +1,73 @@
+"""What cells miss of the bending of a rod beside its ends, where it fades within less than a few of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.outputs.layer_errors import layer_missed, shown_at_clamp
+
+
+@pytest.mark.parametrize("fade", [0.01, 0.3, 3.0, 100.0])
+@pytest.mark.parametrize("held", [False, True])
+def test_a_moment_that_fades_is_found_exactly(fade: float, held: bool) -> None:
+    s, at = np.array([0.0, 1.0, 2.3]), np.linspace(0.0, 2.3, 47)
+    line, part = np.array([[0.2, -0.1, 0.0], [0.03, 0.0, 0.1]]), np.array([2.0, -1.0, 0.5])
+
+    def moment(x: np.ndarray, size: float = 1.0) -> np.ndarray:
+        return line[0] + line[1] * x[:, None] + size * part * np.exp(-x[:, None] / fade)
+
+    straight = np.stack([np.interp(at, s, x) for x in moment(s).T], axis=1)
+    exact = moment(at, 1.0 / shown_at_clamp(1.0 / fade) if held else 1.0)
+    off = np.linalg.norm(exact - straight, axis=1)
+    np.testing.assert_allclose(layer_missed(s, moment(s), fade, at, held), off, atol=1e-7 * off.max())
+
+
+@pytest.mark.parametrize("x", [1e-9, 0.01, 0.3, 1.0, 4.0, 30.0])
+def test_what_cells_show_of_the_moment_at_a_clamp(x: float) -> None:
+    """Beside the balance of moments of many cells, of length x fades; all of it on short ones."""
+    count = max(8, int(40.0 / max(x, 0.01)))
+    balance = np.diag(np.r_[-3.0, np.full(count - 1, -2.0)] - x * x) + np.eye(count, k=1) + np.eye(count, k=-1)
+    phi = np.linalg.solve(balance, np.r_[-2.0, np.zeros(count - 1)])
+    shown = 2.0 * (1.0 - phi[0]) / x if x > 1e-6 else 1.0
+    assert shown_at_clamp(x) == pytest.approx(shown, rel=1e-6)
+    assert shown_at_clamp(x) == pytest.approx(1.0, abs=0.25 * x)
+
+
+def line(start: dict, EI: float, points: int = 201) -> dict:
+    return {
+        "cable": {"sections": [{"length": 64.0, "mass": 1.0, "bending_stiffness": EI}]},
+        "ends": {
+            "start": {"position": [0, 0, 0], **start},
+            "end": {"kind": "pinned", "position": [57.0, 0, 5.0]},
+        },
+        "initial": "equilibrium", "output": {"points": points},
+    }  # fmt: skip
+
+
+def effectivity(result: hybrid.Result, truth: hybrid.Result, name: str) -> float:
+    return float(np.max(result.errors[f"total/{name}"]) / np.abs(result[name] - truth[name]).max())
+
+
+CLAMPED = {"kind": "clamped", "tangent": [0.5, 0, 0.8]}
+
+
+@pytest.mark.parametrize("start, EI", [({"kind": "pinned"}, 50.0), (CLAMPED, 1.0), (CLAMPED, 50.0), (CLAMPED, 1e3)])
+def test_curvature_of_an_equilibrium_beside_its_ends(start: dict, EI: float) -> None:
+    """80 equal cells, of a tenth to six times sqrt(EI/T): figures were 0.01 to 0.5 of the error."""
+    scene = line(start, EI)
+    truth = hybrid.static(scene | {"model": "rod", "accuracy": {"curvature": "0.05%"}})
+    fixed = {"model": "rod", "mesh": {"cells": 80}, "output": scene["output"] | {"errors": True}}
+    result = hybrid.static(scene | fixed)
+    for name in ("curvature", "bending_moment"):
+        assert 0.7 <= effectivity(result, truth, name) <= 3.0
+        assert name not in result.attributes.get("errors_not_converged", "")
+
+
+def test_curvature_beside_a_load() -> None:
+    scene = line({"kind": "pinned"}, 5.0)
+    scene["cable"] |= {"attachments": [{"kind": "clump", "at": 20.0, "mass": 20.0, "volume": 0.0}]}
+    truth = hybrid.static(scene | {"model": "rod", "accuracy": {"curvature": "0.05%"}})
+    fixed = {"model": "rod", "mesh": {"cells": 80}, "output": scene["output"] | {"errors": True}}
+    assert 0.7 <= effectivity(hybrid.static(scene | fixed), truth, "curvature") <= 3.0
