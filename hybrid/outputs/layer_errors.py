@@ -1,11 +1,12 @@
 """What cells miss of the bending of a rod beside its ends, point loads and joints, where a layer is short for them.
 
-Moments go over to those of a hanging line within the layer fade = sqrt(EI/T), as exp(-s/fade).  On cells that are not
+Moments go over to those of a hanging line within the layer fade = sqrt(EI/F), as exp(-s/fade).  On cells that are not
 much shorter results go straight from node to node, and at a clamp or a load the moment itself is too small; coarser
 cells show little of that, because their errors do not fall by any order yet.
 
     symbol   meaning                                                        unit
-    fade     sqrt(EI/T), the length over which bending fades                m
+    F        force in the cell beside the end                               N
+    fade     sqrt(EI/F), the length over which bending fades                m
     x        h/fade, length of the cell beside the end                      1
     M        moments at the three nodes nearest to the end                  N m
     B        part of M that fades, M = c + d s + B exp(-s/fade)             N m
@@ -22,11 +23,14 @@ import numpy as np
 from hybrid.kernels.state import Floats
 from hybrid.outputs.observation import Observation
 
+# Lengths of two cells over which bending fades at most: longer, it is a parabola over them but for round-off.
+LONGEST = 1e3
+
 
 def layer_errors(view: Observation, loads: Iterable[int]) -> dict[str, Floats]:
     """Errors (ns,) of curvature, 1/m, and bending moment, N m, of one output; loads: nodes of point loads.
 
-    Only of the two cells beside an end, a joint or a load; none where a rod has no tension there.
+    Only of the two cells beside an end, a joint or a load.
     """
     out, line = dict[str, Floats](), view.line
     if not view.node_moment.size:
@@ -45,9 +49,10 @@ def layer_errors(view: Observation, loads: Iterable[int]) -> dict[str, Floats]:
                 cell, EI = min(node, nodes[1]), line.kb[nodes[1], :2].max() * line.hn[nodes[1]]
                 shear = np.cross(d[cell], moment[cell + 1] - moment[cell]) / view.length[cell, 0]
                 F = float(np.hypot(T[cell], np.linalg.norm(shear)))
-                if not (F > 0.0 and EI > 0.0):
+                if EI <= 0.0:
                     continue
-                s, fade = abs(line.s[nodes] - line.s[node]), np.sqrt(EI / F)
+                s = abs(line.s[nodes] - line.s[node])
+                fade = np.sqrt(EI / max(F, EI / (LONGEST * s[2]) ** 2))
                 at = step * (points - line.s[node])
                 inside = np.flatnonzero((at >= 0.0) & (at < s[2]))
                 missed = layer_missed(s, moment[nodes], fade, at[inside], held=bool(bends[node]))
