@@ -55,18 +55,19 @@ def layer_errors(view: Observation, loads: Iterable[int]) -> dict[str, Floats]:
                 fade = np.sqrt(EI / max(F, EI / (LONGEST * s[2]) ** 2))
                 at = step * (points - line.s[node])
                 inside = np.flatnonzero((at >= 0.0) & (at < s[2]))
-                missed = layer_missed(s, moment[nodes], fade, at[inside], held=bool(bends[node]))
+                turns = line.hn[node] / line.h[cell] if node in (0, line.h.size) else 0.5
+                missed = layer_missed(s, moment[nodes], fade, at[inside], turns if bends[node] else 0.0)
                 for name, scale in (("curvature", EI), ("bending_moment", 1.0)):
                     found = out.setdefault(name, np.zeros(points.size))
                     found[inside] = np.maximum(found[inside], missed / scale)
     return out
 
 
-def layer_missed(s: Floats, M: Floats, fade: float, at: Floats, held: bool) -> Floats:
+def layer_missed(s: Floats, M: Floats, fade: float, at: Floats, turns: float) -> Floats:
     """Distance (n,) N m of straight interpolation from a moment that fades with the distance from an end.
 
-    s: (3,) m, nodes from the end on, 0 the first; M: (3, 3) N m; at: (n,) m; held: whether the direction is given
-    there, not the moment.
+    s: (3,) m, nodes from the end on, 0 the first; M: (3, 3) N m; at: (n,) m; turns: cells that bend as much as what
+    holds the direction at the end, as of `shown_at_clamp`, 0: the moment is given there.
     """
     e = np.exp(-s / fade)
     part = s[1] / s[2]
@@ -75,16 +76,17 @@ def layer_missed(s: Floats, M: Floats, fade: float, at: Floats, held: bool) -> F
     straight = np.stack([np.interp(at, s, x) for x in M.T], axis=1)
     rest = M - B * e[:, None]  # c + d s
     true = rest[0] + (rest[2] - rest[0]) * (at / s[2])[:, None]
-    true = true + B / (shown_at_clamp(s[1] / fade) if held else 1.0) * np.exp(-at / fade)[:, None]
+    true = true + B / (shown_at_clamp(s[1] / fade, turns) if turns else 1.0) * np.exp(-at / fade)[:, None]
     return np.linalg.norm(true - straight, axis=1)
 
 
-def shown_at_clamp(x: float) -> float:
+def shown_at_clamp(x: float, turns: float = 0.5) -> float:
     """Part of the moment at a clamp under tension that cells of x fades show; 1 on short ones.
 
-    Of the balance of moments of cells of equal length: T h phi_j = M_j+1 - M_j, M_j = EI (phi_j+1 - phi_j)/h, at the
-    clamp M_0 = 2 EI (phi_1 - alpha)/h; exactly it is EI alpha/fade.
+    turns: cells that bend as much as the half cell at the clamp and an angular spring there.
+    Of the balance of moments of cells of equal length: F h phi_j = M_j+1 - M_j, M_j = EI (phi_j - phi_j-1)/h, at the
+    clamp M_0 = EI (phi_1 - alpha)/(turns h); exactly it is -EI alpha/(fade + (turns - 1/2) h).
     """
     root = 1.0 + 0.5 * x * x - x * np.sqrt(1.0 + 0.25 * x * x)
-    first = 2.0 / (x * x + 3.0 - root)  # phi_1/alpha
-    return float(2.0 * (1.0 - first) / x) if x > 1e-6 else 1.0
+    left = 1.0 / (1.0 + turns * (x * x + 1.0 - root))  # phi_1/alpha
+    return float((1.0 - left) / (turns * x) * (1.0 + (turns - 0.5) * x))
