@@ -71,11 +71,15 @@ def truth(name):
 
 def figures(name, asked):
     """Of one run: true error over what is asked, figure over true error, of all that is asked; whether it says so."""
-    data = SCENES[name][0]
-    result, fine = hybrid.run(data | {"accuracy": asked}), truth(name)
+    result = hybrid.run(SCENES[name][0] | {"accuracy": asked})
+    return judged(result, truth(name), asked)
+
+
+def judged(result, fine, asked):
+    """The same of a result, against one in fine cells and steps."""
     found = []
     for quantity, percent in ({"position": asked, "tension": asked} if isinstance(asked, str) else asked).items():
-        part, size = 0.01 * float(percent.removesuffix("%")), data["cable"]["sections"][0]["length"]
+        part, size = 0.01 * float(percent.removesuffix("%")), float(result.s[-1])
         fields = {"tension": ("reaction_start", "reaction_end"), "line_tension": ("tension",)}.get(
             quantity, (quantity,)
         )
@@ -107,4 +111,55 @@ def test_figures_of_vibrations_that_last():
     print(f"\nmissed in silence: {len(silent)}; figures below 0.5 of the truth {np.sum(r < 0.5)}, below 0.7 "
           f"{np.sum(r < 0.7)}, of {r.size}, median {np.median(r):.2f}; {cpu:.0f} s of CPU")  # fmt: skip
     print(*silent, sep="\n")
-    assert len(silent) <= 5
+    assert len(silent) <= 4
+
+
+def random_line(seed):
+    """A cantilever, a taut line, a line that sags between pins of which one moves, or one that hangs with a weight."""
+    r, kind = np.random.default_rng(1000 + seed), seed % 4
+    if kind == 0:
+        stiffness = 10.0 ** r.uniform(0, 3)
+        period = 2.0 * np.pi / (3.516 * np.sqrt(stiffness)) * 10.0 ** r.uniform(-0.3, 0.7)
+        data = cantilever(1.0, stiffness, 0.02, period, period * r.uniform(8, 25))
+        data["ends"]["start"]["motion"]["ramp"] = period * r.uniform(0.5, 3)
+    elif kind == 1:
+        data = taut(r.uniform(10, 60), 10.0 ** r.uniform(-0.3, 0.5), ramp=r.uniform(0.5, 2))
+    elif kind == 2:
+        over, duration = r.uniform(1, 4), r.uniform(15, 30)
+        section = {"length": 12.0, "mass": 2.0, "diameter": 0.02, "axial_stiffness": 1e6, "bending_stiffness": 5.0}
+        end = {"kind": "pinned", "position": [10, 0, r.uniform(-2, 2)]}
+        end["motion"] = {"travel": {"by": [0, 0.3, r.uniform(-0.3, 0.3)], "over": over}}
+        start = {"kind": "pinned", "position": [0, 0, 0]}
+        data = scene(section, start, end, duration, duration / 120) | {"model": "rod"}
+    else:
+        period = r.uniform(1, 5)
+        duration = period * r.uniform(6, 15)
+        section = {"length": 10.0, "mass": 0.5, "diameter": 0.01, "bending_stiffness": 1.0}
+        surge = {"surge": {"amplitude": 0.3, "period": period}, "ramp": period * r.uniform(0.5, 2)}
+        start = {"kind": "pinned", "position": [0, 0, 0], "motion": surge}
+        data = scene(section, start, {"kind": "body", "mass": 10.0}, duration, duration / 120) | {"model": "rod"}
+    last = {"bending_moment": "2%"} if kind != 1 else {"position": "0.1%"}
+    return data, ("1%", "0.3%", last)[(seed // 4) % 3]
+
+
+def test_figures_of_random_lines():
+    """Of 48 in vacuum, against 2.5 times as many cells and six times as many steps, and 100 and 4000 at least."""
+    rows, uncertain = [], 0
+    for seed in range(48):
+        data, asked = random_line(seed)
+        result = hybrid.run(data | {"accuracy": asked})
+        duration = data["time"]["duration"]
+        steps = max(4000, 6 * len(result.steps["t"]))
+        cells = max(100, int(2.5 * result.mesh[-1].kinds.size))
+        fine = hybrid.run(data | {"mesh": {"cells": cells}, "time": {"duration": duration, "step": duration / steps}})
+        found, said = judged(result, fine, asked)
+        rows += [(seed, asked, round(times, 2), round(ratio, 2), said) for times, ratio in found]
+        texts = [e.text for e in result.events if e.kind == "error uncertain" and "free vibration with" in e.text]
+        uncertain += bool(texts)
+        if texts:
+            print(seed, asked, [tuple(round(x, 2) for x in y) for y in found], texts[0])
+    r = np.array([x[3] for x in rows])
+    print(f"\n{r.size} figures: below 0.5 of the truth {np.sum(r < 0.5)}, below 0.7 {np.sum(r < 0.7)}, above 3 "
+          f"{np.sum(r > 3.0)}, median {np.median(r):.2f}; free vibrations said of {uncertain} lines")  # fmt: skip
+    print(*(x for x in rows if x[3] < 0.7 or (x[2] > 1.0 and not x[4])), sep="\n")
+    assert not [x for x in rows if x[3] < 0.5 and not x[4]]

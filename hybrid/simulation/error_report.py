@@ -14,7 +14,8 @@ from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bounded_model_errors import bounded
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.errors_by_cause import Errors, summary
-from hybrid.simulation.refinement import END_FORCE
+from hybrid.simulation.free_vibrations import uncertain_by_vibrations
+from hybrid.simulation.refinement import END_FORCE, bounds_of
 from hybrid.simulation.result_checks import damped_jolts, undersampled_end_forces
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.store.amend import Happened, amend
@@ -85,6 +86,9 @@ def known(
         if control.asked is None or control.asked.asks(END_FORCE):
             error = max(largest.get(name, 0.0) for name in END_FORCES.values())
             undersampled += damped_jolts(scene, result, error, control.allowed_force)
+        if not control.irregular:
+            bounds = None if control.asked is None else {x: y for x, _, y, _ in bounds_of(control.asked, result)}
+            undersampled += uncertain_by_vibrations(scene, result, largest, bounds)
     found: dict[str, float | str] = {**summary(errors)} if errors is not None else {}
     found |= not_converged_attribute([control.diverging])
     if control.irregular:
