@@ -26,6 +26,7 @@ from hybrid.simulation.error_order import (
     at_all_outputs,
     blended,
     confirmed_order,
+    exceeds,
     falls,
     force_orders,
     magnitude,
@@ -256,6 +257,9 @@ class Estimate:
         self.start = start_change(result, before), self.start[0]
         finer, shorter = result.cells / before.cells, result.steps / before.steps
         other_zones = result.resolution.zones != before.resolution.zones
+        more = not other_zones and self._exceeds("position", before, finer, shorter)
+        if more:  # what cells and steps make of all outputs is not what it was thought to be
+            self.shares_mixed = set(self.order)
         for name, p in list(self.order.items()):
             self.changes[name] = np.nan, self.changes[name][0]
             if other_zones:  # what has changed is not by cells and steps alone
@@ -272,7 +276,10 @@ class Estimate:
                     by_step[name] = by_step[name] / shorter**p
                 shown, kept = self._mesh_error(name, change, by_step.get(name), before), by_mesh[name]
                 both = min(finer, shorter) if name in self.shares_mixed and shorter > LEAST_RATIO else finer
-                by_mesh[name] = blended(shown, kept / both**p, both, p)
+                if more and name == "position":
+                    by_mesh[name] = shown
+                else:
+                    by_mesh[name] = blended(shown, kept / both**p, both, p)
                 if self._mixes(name) and shorter <= LEAST_RATIO:  # what steps make of it has not changed
                     left = kept - change
                     by_mesh[name] = np.where(np.abs(left) > np.abs(by_mesh[name]), left, by_mesh[name])
@@ -282,6 +289,14 @@ class Estimate:
             elif shorter > LEAST_RATIO:
                 shown = change / (shorter**p - 1.0)
                 by_step[name] = blended(shown, by_step[name] / shorter**p, shorter, p) if name in by_step else shown
+
+    def _exceeds(self, name: str, before: RunSample, finer: float, shorter: float) -> bool:
+        """Whether a finer run in shorter steps has changed an output by clearly more than was foretold."""
+        by_step, by_mesh = self._keep()
+        if not (self.has_step and self.cancels and name in by_step and name in by_mesh and finer > LEAST_RATIO):
+            return False
+        change = np.asarray(self.run.values[name]) - np.asarray(before.values[name])
+        return exceeds(name, self.order[name], change, [(by_step[name], shorter), (by_mesh[name], finer)])
 
     def _confirmed_order(self, name: str, change: np.ndarray, finer: float, shorter: float) -> float:
         """The order of a force, after a finer run: another, where that changes it by less or more than was foretold.

@@ -121,16 +121,36 @@ def order(found: float, bounds: tuple[float, float]) -> float:
     return ORDER if np.isnan(found) else float(np.clip(-np.log(found) / np.log(COARSER), *bounds))
 
 
-def confirmed_order(name: str, p: float, change: np.ndarray, errors: Sequence[tuple[np.ndarray, float]]) -> float:
-    """The order of a force at an end that p has foretold, after a finer run has changed it.
+def times_foretold(
+    name: str, p: float, change: np.ndarray, errors: Sequence[tuple[np.ndarray, float]]
+) -> tuple[float, float] | None:
+    """How many times what p has foretold a finer run changes an output, at most and on average; None: of nothing.
 
     errors: of the run before, with their sign, by order p, and how many times as fine the run is in what makes them.
     """
     foretold = sum((x * (1.0 - ratio**-p) for x, ratio in errors), np.zeros_like(change))
     most, mean = float(np.max(magnitude(foretold, name), initial=0.0)), squares(foretold)
-    if p > ORDER or not mean > 0.0:
+    if not mean > 0.0:
+        return None
+    return float(np.max(magnitude(change, name))) / most, float(np.sqrt(squares(change) / mean))
+
+
+def exceeds(name: str, p: float, change: np.ndarray, errors: Sequence[tuple[np.ndarray, float]]) -> bool:
+    """Whether that is more than EXCEEDED times, both, of a clearly finer run; errors: as of `times_foretold`."""
+    if not max(ratio for _, ratio in errors) > CLEARLY_FINER:
+        return False
+    times = times_foretold(name, p, change, errors)
+    return times is not None and min(times) > EXCEEDED
+
+
+def confirmed_order(name: str, p: float, change: np.ndarray, errors: Sequence[tuple[np.ndarray, float]]) -> float:
+    """The order of a force at an end that p has foretold, after a finer run has changed it.
+
+    errors: as of `times_foretold`.
+    """
+    times = times_foretold(name, p, change, errors)
+    if p > ORDER or times is None:
         return p
-    times = float(np.max(magnitude(change, name))) / most, float(np.sqrt(squares(change) / mean))
     if max(times) < CONFIRMED:
         return ORDER
     clearly = max(ratio for _, ratio in errors) > CLEARLY_FINER
