@@ -241,10 +241,14 @@ def batch_of_one(
     )  # fmt: skip
 
 
-def state_in(batch: Batch, k: int) -> State:
-    """The state at output k, in arrays of its own; algorithmic accelerations and friction are not known."""
-    state = blank_state(batch.T.shape[1], batch.turn.shape[1])
+def state_in(batch: Batch, k: int, line: Line) -> State:
+    """The state of a line at output k, in arrays of its own; algorithmic accelerations and friction are not known, and
+
+    mean tensions are taken for those of a line at rest.
+    """
+    state = state_for(line)
     state.turn[:] = batch.turn[k] if batch.turn.size else 0.0
+    state.slow[:] = batch.T[k] if state.slow.size else 0.0
     for name in ("r", "v", "vd", "e", "T", "a1", "w"):
         getattr(state, name)[:] = getattr(batch, name)[k]
     return state

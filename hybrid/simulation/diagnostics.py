@@ -476,7 +476,7 @@ class Diagnostics:
         if "energy/self_contact" in values:
             calm &= values["energy/self_contact"] == 0.0
         for k in np.flatnonzero(pressed & calm):
-            ends, state = ends_in(batch, int(k)), state_in(batch, int(k))
+            ends, state = ends_in(batch, int(k)), state_in(batch, int(k), line)
             if not is_stable(line, model.sea.values, ends, state, model.length, model.tension_scale):
                 text = "the rod rests where it would buckle: only its perfect symmetry keeps it there"
                 text += "; give it a small bow"

@@ -11,10 +11,10 @@ from hybrid.kernels import entry
 from hybrid.kernels.block_elimination import SIZE, WIDTH
 from hybrid.kernels.block_elimination_plane import WIDE
 from hybrid.kernels.entry import block_rows, workspace
-from hybrid.kernels.forces import DRAG, PLANAR
+from hybrid.kernels.forces import AXIAL_LAW, DRAG, PLANAR
 from hybrid.kernels.out_of_plane import BAND, REACH, wrong_pivots_at_rest
 from hybrid.kernels.sparse_rows import is_definite
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State
+from hybrid.kernels.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
 
 # What drifts freely (a line between two buoys) is held where it starts by springs of this part of tension scale over
 # length in all: an error far below Newton's tolerance.  The check of stability lets modes as soft as NEUTRAL pass.
@@ -98,8 +98,9 @@ class Stability:
 
     def __init__(self, line: Line, sea: Sea, length: float, scale: float) -> None:
         """length: m; scale: the tension scale, N."""
-        # drag counts as a load that keeps its direction: how it turns with the cable is not conservative
-        self.line, self.sea = line._replace(bits=line.bits & ~DRAG), sea
+        # drag counts as a load that keeps its direction: how it turns with the cable is not conservative; a law of
+        # stretch is not followed, which would write into the line, and `ck` is what it made of it last
+        self.line, self.sea = line._replace(bits=line.bits & ~(DRAG | AXIAL_LAW), law_at=NO_ADDRESS), sea
         self.length, self.scale = length, scale
         self.anchor = ANCHOR * scale / (float(line.mass.sum()) * length)  # 1/s2
         self.blurred = False  # whether round-off had the last word on stability

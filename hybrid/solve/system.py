@@ -31,7 +31,7 @@ from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, Limit
 from hybrid.kernels.report import FORCE_A, LOCAL_ERROR, RESIDUAL, USED_RHO
 from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.run import blank_books, blank_job, in_space
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work, blank_state
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work, state_for
 from hybrid.kernels.step import friction_axes
 from hybrid.kernels.system import JUNCTIONS, book_system_step, solve_system
 from hybrid.kernels.system_contact import blank_touching_job, room_for_products, touch_system
@@ -184,7 +184,7 @@ class SystemSolver:
 
     def _touch(self) -> None:
         """Lines that touch themselves do so from now on, with the books as they are."""
-        states = [blank_state(x.line.h.size) for x in self.lines]
+        states = [state_for(x.line) for x in self.lines]
         for k, contact in self._contacts.items():
             table, both = self._tables[k], (states[k], states[k])
             numbers = contact.attach(self.lines[k].line, self.lines[k].ends, both, self.work[k], self.books[k])

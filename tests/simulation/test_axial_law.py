@@ -13,14 +13,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from bits import differences
 from scipy.integrate import quad, solve_ivp
 
 import hybrid
+from hybrid.model.build import build
+from hybrid.solve.stability import is_stable
 
 TABLE = [[0, 0], [0.01, 1000], [0.02, 3000], [0.03, 9000]]
 DYNAMIC = {"constant": 4e5, "per_tension": 20.0, "relaxation_time": 3.0}
 KINDS = ("catenary", "rod")
+DEFECTS = Path(__file__).parent.parent / "data" / "defects"
 
 
 def strain_at_rest(T: Any) -> Any:
@@ -190,3 +194,22 @@ def test_a_rope_goes_on_bit_for_bit(tmp_path: Path, system: bool) -> None:
     hybrid.resume(short, until=until)
     same = ("lines/rope/scene", "lines/upper/scene")  # with a duration each
     assert [x for x in differences(long, short) if not x.endswith(same)] == []
+
+
+@pytest.mark.parametrize("name", ["polyester_on_depths", "table_with_turns"])
+def test_a_rod_that_is_judged_at_rest_may_have_a_law_of_stretch(name: str) -> None:
+    """Both rest compressed or twisted at the start, where their stability is judged from the outputs."""
+    found = hybrid.run(
+        yaml.safe_load((DEFECTS / f"{name}.yaml").read_text()) | {"time": {"duration": 0.5, "step": 0.1}}
+    )
+    assert found.status == "complete"
+
+
+def test_judging_stability_leaves_the_law_of_stretch_of_a_line_alone() -> None:
+    model = build(hybrid.validate_scene(bar({"tension_strain": TABLE}, HISTORY, model="rod")))
+    line, ends = model.line, model.ends.at(0.0)
+    line.ck[:] = 1e-7
+    law = line.law.copy()
+    assert is_stable(line, model.sea.at(0.0), ends, model.start, model.length, model.tension_scale)
+    assert (line.ck == 1e-7).all()
+    assert np.array_equal(line.law, law)
