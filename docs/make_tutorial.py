@@ -54,7 +54,7 @@ Save this as `tow.yaml`: a cable of 80 m hangs from a ship in a current, with a 
 
 ## 2. What would be computed
 
-A plan costs nothing: it says which forces are on, by which key, and how many cells there are.
+A plan takes some tenths of a second: it says which forces are on, by which key, and how many cells there are.
 """,
     ("hybrid plan tow.yaml",),
     """## 3. The equilibrium

@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.exports.api import export
     from hybrid.interop.moordyn import export_moordyn, import_moordyn
-    from hybrid.model.plan import plan
     from hybrid.scene.read import load_scene, load_system, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
     from hybrid.scene.system import System
     from hybrid.simulation.api import resume, run, static
     from hybrid.simulation.listed_outputs import kinds_of_quantities, listed_outputs
+    from hybrid.simulation.run_forecast import plan
     from hybrid.simulation.stepping import Simulation
     from hybrid.simulation.system_stepping import SystemSimulation
     from hybrid.simulation.system_stiffness import offsets, stiffness
@@ -67,7 +67,7 @@ _HOME = {
     "offsets": ("hybrid.simulation.system_stiffness", "offsets"),
     "open": ("hybrid.store.reader", "open_result"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
-    "plan": ("hybrid.model.plan", "plan"),
+    "plan": ("hybrid.simulation.run_forecast", "plan"),
     "listed_outputs": ("hybrid.simulation.listed_outputs", "listed_outputs"),
     "kinds_of_quantities": ("hybrid.simulation.listed_outputs", "kinds_of_quantities"),
     "plot": ("hybrid.view.plots", "plot_summary"),

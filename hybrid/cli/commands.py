@@ -172,7 +172,7 @@ def plan(
     ] = False,
     as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Show what a run would compute, and by which keys of the scene; compute nothing."""
+    """Show what a run would compute, by which keys of the scene, and how long it takes: its first steps are computed."""
     with session(as_json, False) as console:
         asked = load_either(console, scene, settings)
         if outputs:

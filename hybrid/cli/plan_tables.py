@@ -143,7 +143,8 @@ def _model(plan: Plan) -> str:
     if plan.choice:
         each = ", ".join(f"{kind} {span(seconds)}" for kind, seconds in plan.choice)
         none = f"; no catenary: {plan.no_choice}" if plan.no_choice else ""
-        return f"the cheapest, by a pre-run: {each}{none}"
+        which = f"{plan.chosen}, the cheapest" if plan.chosen else "the cheapest"
+        return f"{which} by a pre-run: {each}{none}"
     if plan.base_cells is not None:
         return "adaptive: rod where a criterion asks for it, catenary elsewhere"
     if len(plan.zones) == 1:
@@ -191,13 +192,22 @@ def _steps(time: Time | None, plan: Plan | SystemPlan, touches: bool = False) ->
     """touches: contact of the line with itself is asked for, and nobody knows for how long it does."""
     if time is None:
         return "no motion, statics only"
-    cpu = f"about {span(plan.seconds)} of CPU{', several times as much while it touches itself' if touches else ''}"
+    cpu = _cpu(plan, touches)
     if time.controlled:
         return f"{time.duration:.6g} s in about {plan.steps} steps, as the motion asks; {cpu}"
     steps = f"{time.duration:.6g} s in {plan.steps} steps"
     asked = time.step or plan.step
     short = f" ({asked:.6g} s asked)" if plan.step < 0.999 * asked else ""
     return f"{steps} of {plan.step:.6g} s{short}; {cpu}"
+
+
+def _cpu(plan: Plan | SystemPlan, touches: bool) -> str:
+    """Processor time of all runs, and what it rests on."""
+    most = plan.most_seconds
+    notes = [f"up to {span(most)} if finer runs are needed"] if most is not None and most > 1.05 * plan.seconds else []
+    notes += ["several times as much while it touches itself"] if touches else []
+    notes += [] if plan.measured else ["estimated from tables: the kernels are not compiled yet"]
+    return f"about {span(plan.seconds)} of CPU for all runs" + (f" ({'; '.join(notes)})" if notes else "")
 
 
 def _runs(plan: Plan) -> str:

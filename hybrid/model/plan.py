@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, replace
 from math import ceil, isnan
-from typing import TYPE_CHECKING, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
@@ -51,7 +51,7 @@ class Plan:
     unknowns: int
     steps: int
     step: float  # s, of most steps
-    seconds: float  # of processor time, within a factor of two (hybrid.model.run_time), but for contact with itself
+    seconds: float  # of processor time, of all runs that are expected
     runs: int = (
         1  # until there is a first result with its errors: the mesh pre-run and three to compare with among them
     )
@@ -62,6 +62,9 @@ class Plan:
     # None: an end turns freely, nothing resists bending, or the shape under all loads is not known without a search
     critical_torque: CriticalTorque | None = None
     payout: PayoutForecast | None = None  # of a line that is paid out; `cells` are those at t = 0
+    most_seconds: float | None = None  # of processor time, if finer runs turn out to be needed; None: not known
+    measured: bool = False  # whether cells, steps and seconds follow from the first steps of the run on this machine
+    chosen: str = ""  # kind of model, where the pre-run has chosen it
 
     @property
     def ledger(self) -> tuple[Entry, ...]:
@@ -129,7 +132,9 @@ class SystemPlan:
     unknowns: int
     steps: int
     step: float  # s
-    seconds: float  # of processor time, without what the points take
+    seconds: float  # of processor time, of all runs that are expected
+    most_seconds: float | None = None  # as of `Plan`
+    measured: bool = False
 
 
 def plan_system(system: System) -> SystemPlan:
@@ -174,15 +179,13 @@ def plan(scene: SceneLike | System) -> Plan | SystemPlan:
 def _plan(scene: Scene) -> Plan:
     """The same of a scene that names its model."""
     model = build(scene)
-    middle = 0.5 * (model.line.s[:-1] + model.line.s[1:])
-    cells = tuple(int(((middle > z.s_a) & (middle < z.s_b)).sum()) for z in model.zones)
+    mesh = mesh_of(model)
+    cells: tuple[int, ...] = mesh["cells"]
     steps, step = 0, 0.0
     if scene.time:
         resolution = first_resolution(scene)
         steps = foretold_steps(scene, model, resolution, count_steps(scene))
         step = min(resolution.step, scene.time.duration / steps)
-    names = {"catenary": "corrected"} if model.corrected else {}
-    zones = tuple(replace(z, kind=names.get(z.kind, z.kind)) for z in model.zones)
     outputs = scene.time.duration / output_interval(scene) if scene.time else 0.0
     paid = model.payout.forecast(scene.time.duration) if model.payout is not None and scene.time else None
     if paid is not None and not isnan(paid.mean_cells):
@@ -190,11 +193,21 @@ def _plan(scene: Scene) -> Plan:
     else:
         mean = cells
     seconds = processor_time(scene, model, mean, steps, outputs)
+    runs, most_runs = predicted_runs(scene) if scene.time else (1, 1)
     return Plan(
-        model.contents, zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
-        seconds, *(predicted_runs(scene) if scene.time else (1, 1)),
+        model.contents, **mesh, steps=steps, step=step, seconds=seconds, runs=runs, most_runs=most_runs,
         critical_torque=_critical_torque(scene, model), payout=paid,
     )  # fmt: skip
+
+
+def mesh_of(model: Model) -> dict[str, Any]:
+    """What a plan says of the mesh of a model: zones, cells, base_cells, unknowns."""
+    middle = 0.5 * (model.line.s[:-1] + model.line.s[1:])
+    cells = tuple(int(((middle > z.s_a) & (middle < z.s_b)).sum()) for z in model.zones)
+    names = {"catenary": "corrected"} if model.corrected else {}
+    zones = tuple(replace(z, kind=names.get(z.kind, z.kind)) for z in model.zones)
+    base = model.layout.rod.size if model.layout else None
+    return {"zones": zones, "cells": cells, "base_cells": base, "unknowns": model.unknowns}
 
 
 def _critical_torque(scene: Scene, model: Model) -> CriticalTorque | None:

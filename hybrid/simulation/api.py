@@ -42,7 +42,7 @@ from hybrid.simulation.finer_result import FinerResult, beside
 from hybrid.simulation.first_use import OF_LINES, compile_beside, kernels_of
 from hybrid.simulation.interrupts import interrupts
 from hybrid.simulation.mesh_survey import survey_resolution
-from hybrid.simulation.model_choice import choose_model, rods_instead, surveyed
+from hybrid.simulation.model_choice import chosen_and_surveyed, rods_instead, surveyed
 from hybrid.simulation.progress import (
     ESTIMATION,
     PRE_RUN,
@@ -336,11 +336,12 @@ def _controller(case: Case, compute: FinerResult, choice: ModelChoice = NAMED) -
 
 def _surveyed(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
     """The model, if the scene names none, and cells by a pre-run, if an accuracy is asked for."""
-    surveys = wants_survey(case.scene)
-    _expect(case, resolution, surveys)
-    if surveys and case.criterion is None and model_is_free(case.scene):
-        return choose_model(case, resolution)
-    return NAMED, surveyed(case, resolution) if surveys else resolution
+    named = case.scene.model
+    _expect(case, resolution, wants_survey(case.scene))
+    found = chosen_and_surveyed(case, resolution)
+    if case.scene.model != named:
+        compile_beside(case.scene)
+    return found
 
 
 def _surveyed_at_rest(case: StaticCase, resolution: Resolution) -> tuple[ModelChoice, Resolution]:

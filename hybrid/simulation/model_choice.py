@@ -13,6 +13,7 @@ import numpy as np
 from hybrid.model.build import rod_cells
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.model_costs import (
+    NAMED,
     ModelChoice,
     cheapest,
     costs,
@@ -23,10 +24,9 @@ from hybrid.model.model_costs import (
     structural,
     with_model,
 )
-from hybrid.model.resolution import Resolution
+from hybrid.model.resolution import Resolution, model_is_free, wants_survey
 from hybrid.scene.schema import AdaptiveModel
 from hybrid.simulation.case import Case
-from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.mesh_survey import allowed, with_survey
 from hybrid.simulation.static_case import StaticCase
 
@@ -59,8 +59,16 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
     kind = cheapest(each).kind
     if kind != "rod":
         case.scene = with_model(scene, kind)
-        compile_beside(case.scene)
     return ModelChoice(kind, reasons(each)), replace(resolution, grading=gradings[kind])
+
+
+def chosen_and_surveyed(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
+    """The model, if the scene names none, and cells by a pre-run, if it wants one."""
+    if not wants_survey(case.scene):
+        return NAMED, resolution
+    if case.criterion is None and model_is_free(case.scene):
+        return choose_model(case, resolution)
+    return NAMED, surveyed(case, resolution)
 
 
 def surveyed(case: Case | StaticCase, resolution: Resolution) -> Resolution:

@@ -25,9 +25,36 @@ def test_steps_are_about_those_of_the_run() -> None:
 
 def test_a_finer_result_costs_more() -> None:
     """Steps of third order in their error, of which 1.5 orders of what is asked."""
-    coarse, fine = hybrid.plan(scene("1%")), hybrid.plan(scene("0.01%"))
+    coarse, fine = (hybrid.plan(scene(x), measure=False) for x in ("1%", "0.01%"))
     assert fine.steps == pytest.approx(10.0 * coarse.steps, rel=0.15)
     assert fine.seconds > 10.0 * coarse.seconds
+
+
+def test_what_the_first_steps_show_is_in_the_plan() -> None:
+    """Cells that the mesh pre-run grades, and steps, are those of the result; without it they come from tables."""
+    asked = scene("3%")
+    hybrid.run(asked)  # compiles what it needs
+    plan, guess = hybrid.plan(asked), hybrid.plan(asked, measure=False)
+    with hybrid.run(asked) as result:
+        first = result.attributes["cells"] if result.attributes["effort_runs"] == plan.runs - 1 else None
+        assert 0.7 < len(result["steps/t"]) / plan.steps < 1.8
+    assert plan.measured and not guess.measured
+    assert first is None or sum(plan.cells) == first
+    assert plan.most_seconds is not None and plan.most_seconds > plan.seconds > 0.0
+
+
+def test_first_steps_of_lines_are_measured_too() -> None:
+    section = {"length": 12, "mass": 2, "diameter": 0.03, "axial_stiffness": 1e6}
+    points = {"low": {"position": [0, 0, 0]}, "high": {"position": [20, 0, 0]}}
+    points["joint"] = {"kind": "free", "mass": 5, "initial_guess": [10, 0, -3]}
+    lines = {
+        name: {"start": a, "end": b, "model": "catenary", "sections": [section]}
+        for name, a, b in (("one", "low", "joint"), ("two", "joint", "high"))
+    }
+    asked = {"points": points, "lines": lines, "time": {"duration": 1, "step": 0.1}}
+    hybrid.run(asked)
+    plan = hybrid.plan(asked)
+    assert plan.measured and plan.steps == 10 and plan.seconds > 0.0
 
 
 def test_steps_of_fixed_length_are_counted() -> None:

@@ -143,10 +143,13 @@ def test_rods_unless_others_cost_clearly_less():
 
 
 def test_the_plan_predicts_each():
-    plan = hybrid.plan(TAUT)
+    plan = hybrid.plan(TAUT, measure=False)
     assert [kind for kind, _ in plan.choice] == ["rod", "catenary", "adaptive"]
     assert [kind for kind, _ in hybrid.plan(CLAMPED).choice] == ["rod", "adaptive"]
     assert {zone.kind for zone in plan.zones} == {"rod"}
+    measured = hybrid.plan(TAUT)
+    assert measured.chosen == "catenary" and {zone.kind for zone in measured.zones} == {"catenary"}
+    assert measured.choice == plan.choice
     assert hybrid.plan(TAUT | {"model": "rod"}).choice == ()
     assert hybrid.plan(TAUT | {"model": "adaptive"}).choice == plan.choice
     assert hybrid.plan(TAUT | {"model": MOVING}).choice == ()
