@@ -10,6 +10,7 @@ from hybrid.kernels.state import Line
 from hybrid.scene.analysis import CorrectedZone
 from hybrid.scene.payout import Payout
 from hybrid.scene.schema import AdaptiveModel, CatenaryModel, CorrectedModel, Scene, ZonesModel
+from hybrid.scene.system import System
 
 # Diameters of slack of the smallest loop: WINDOW of kernels.self_contact_pairs less OUTER of kernels.self_contact_law,
 # which a plan does not import.
@@ -98,6 +99,17 @@ def without_contact(scene: Scene) -> Scene:
     if scene.contact.self is not None:
         return scene
     return scene.model_copy(update={"contact": scene.contact.model_copy(update={"self": False})})
+
+
+def system_without_contact(system: System) -> System:
+    """The same of all lines of a system."""
+    lines = {
+        name: line.model_copy(update={"contact": line.contact.model_copy(update={"self": False, "friction": 0.0})})
+        if line.contact.self is None
+        else line
+        for name, line in system.lines.items()
+    }
+    return system.model_copy(update={"lines": lines})
 
 
 def touching(line: Line, friction: float) -> Line:

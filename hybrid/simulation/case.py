@@ -103,7 +103,10 @@ class Case:
         self.beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
         self.late_file: LateFile | None = None  # of a result that is complete, and may not be in its place yet
         self._results = 0  # that were begun
-        self.came_near_itself = False  # whether contact with itself was computed in a run to compare with
+        self.came_near_itself = False  # whether the line did in a run to compare with
+        # Whether contact with itself is computed in runs to compare with: where it is asked for, or the line has
+        # touched itself in a result.  Before, coarse cells would meet where those of the result do not.
+        self.touches_itself = bool(scene.contact.self)
         self._unwanted = Event()  # what runs to compare with still compute
 
     # --- results --------------------------------------------------------------------------------
@@ -268,10 +271,12 @@ class Case:
             many = late is None and sum(x.size for x in stored.values()) > MOST_IN_MEMORY
             stay = target if many and isinstance(target, Path) and requested_accuracy(self.scene) is None else None
             found = {name: StoredArray(stay, name) if stay is not None else x[()] for name, x in stored.items()}
-            unresolved = b"unresolved bend" in data["events/kind"][()]
+            kinds = data["events/kind"][()]
+            unresolved, touches = b"unresolved bend" in kinds, b"line touches itself" in kinds
             if follows_curvature(self.scene):
                 cells = compared_cells(run.model, resolution.fineness, usual_cells(data[THERE][()]))
             forces = np.column_stack([data[f"steps/{name}"][()] for name in FORCES])
+        self.touches_itself |= touches
         values, model_error = split_outputs(found)
         notes: Notes = ()
         catenary, bound = np.zeros(0), 0.0
@@ -286,7 +291,7 @@ class Case:
                     catenary = np.array([catenary_share(x) for x in result.zones])
         return RunSample(
             resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, bound, notes, forces=forces,
-            catenary=catenary, doubt=doubt_of(run),
+            catenary=catenary, doubt=doubt_of(run), touches=touches,
         )  # fmt: skip
 
     # --- runs to compare with -------------------------------------------------------------------
@@ -323,7 +328,7 @@ class Case:
             loop.to_the_end(until or self._duration, self._exact, self.changes)
         finally:
             found.close("", "")
-        self.came_near_itself |= loop.run.run.contact is not None
+        self.came_near_itself |= loop.run.came_near_itself or loop.run.run.contact is not None
         values, errors = split_outputs({name: found[name] for name in found.names})
         cpu = clock.thread_time() - begin
         bound = resolution.zones * model.length if switching is not None else 0.0
@@ -343,6 +348,7 @@ class Case:
             found.steps,
             found.catenary if switching is not None else np.zeros(0),
             doubt_of(loop.run),
+            touches=loop.run.touches,
         )
 
     def survey(self, resolution: Resolution) -> Survey | None:
@@ -391,7 +397,11 @@ class Case:
             times = [*times[resolution.every - 1 : -1 : resolution.every], times[-1]]
         if until is not None and until < times[-1]:
             times = [t for t in times if t < until] + [until]
-        run = Transient(scene, model, resolution, switching, correction, EventLog(), [0.0, *times], target is not None)
+        of_result = target is not None
+        run = Transient(
+            scene, model, resolution, switching, correction, EventLog(), [0.0, *times], of_result,
+            of_result or self.touches_itself,
+        )  # fmt: skip
         if points is None:
             points = self.points.s
         observer = self.observer(model, switching is not None, points, None if target is not None else COMPARED)

@@ -13,6 +13,15 @@ if TYPE_CHECKING:
     from hybrid.simulation.transient import Transient
 
 
+def comes_near(moving: Transient) -> bool:
+    """The line has come near itself: whether contact begins; where it does not, nobody watches from now on."""
+    assert moving.itself is not None
+    moving.came_near_itself = True
+    if not moving.touches:
+        moving.itself.rest(moving.run)
+    return moving.touches
+
+
 def begin_contact(moving: Transient) -> None:
     """Contact is computed from now on, in space; where the line is within itself it goes on without."""
     watch, model, state, monitor = moving.itself, moving.model, moving.state.copy(), moving.plane_monitor

@@ -345,6 +345,8 @@ class ErrorController:
 
     def first_estimate(self, result: RunSample) -> bool:
         """Compare the first result with the coarser runs; False: they say nothing of its errors."""
+        if self.comparisons is not None and result.touches and not self.comparisons[0].touches:
+            self.comparisons = self._compute_comparisons(self.first or result.resolution)  # with contact now
         if self.comparisons is None:
             self._notes += result.notes
             return False

@@ -57,6 +57,7 @@ class RunSample:
     forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of all steps: s; N, at start and end
     catenary: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (nt,) part of the line, of zones that move
     doubt: np.ndarray = field(default_factory=lambda: np.array(NO_DOUBT))  # of the model error
+    touches: bool = False  # of a result: whether the line touched itself; of others: whether contact was computed
     # of an equilibrium: errors (ns,) by its cells beside edges of contact (outputs.edge_errors); in no checkpoint
     at_edges: Mapping[str, np.ndarray] = field(default_factory=dict)
 
@@ -128,7 +129,7 @@ def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int, int], result
     """
     blank = RunSample(first_resolution(scene), {}, 1, 1, 0.0).checkpoint()
     free = dict.fromkeys(("resolution", "values", "model_error", "notes", "rows"))
-    older = {"rows": {}, "catenary": np.zeros(0), "doubt": np.array(NO_DOUBT)}  # that a checkpoint of 0.6 has not
+    older = {"rows": {}, "catenary": np.zeros(0), "doubt": np.array(NO_DOUBT), "touches": False}  # not in 0.6
     saved = matched(older | tree, blank | free, "run")
     if saved["forces"].ndim != 2 or saved["forces"].shape[1] != 3 or not np.isfinite(saved["forces"]).all():
         raise ValueError("forces of steps that no run has")

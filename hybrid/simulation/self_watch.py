@@ -128,6 +128,11 @@ class SelfWatch:
         )  # fmt: skip
         run.watch_itself(self._job.numbers, self._address)
 
+    def rest(self, run: CompiledRun) -> None:
+        """Watch no longer."""
+        self.on, self._address = False, UNBENT
+        run.watch_itself(np.zeros(0, np.int64), 0)
+
     def renew(self, model: Model) -> None:
         """Go on with the cells of a model; events tell of contact from now on where it is computed."""
         self.itself = blank_itself(diameters(model))._replace(found=self.itself.found)

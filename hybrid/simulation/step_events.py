@@ -8,6 +8,7 @@ from hybrid.kernels import books as b
 from hybrid.kernels.self_distance import MEETS, NEARS, TOLD
 from hybrid.model.resolution import ZONES, wants_errors
 from hybrid.simulation.bounded_model_errors import doubt_text
+from hybrid.simulation.contact_start import comes_near
 from hybrid.simulation.events import energy_gains_text, slack_steps_text, steps_cut_text
 from hybrid.simulation.run_sample import NOT_ESTIMATED
 
@@ -92,7 +93,7 @@ def look_at_itself(moving: Transient, flags: int) -> None:
     found = (MEETS if flags & b.MEETS_ITSELF else 0) | (NEARS if flags & b.NEARS_ITSELF else 0)
     found = found or watch.look(moving.run)
     if found & NEARS:
-        moving.nears_itself = True  # contact begins after the outputs of this step
+        moving.nears_itself = comes_near(moving)  # contact begins after the outputs of this step
         if found & MEETS:
             watch.itself.found[TOLD] = 0.0
     elif found & MEETS and moving.envelope is not None:

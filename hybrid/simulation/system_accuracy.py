@@ -31,6 +31,7 @@ from hybrid.model.resolution import (
     wants_survey,
     zones_are_free,
 )
+from hybrid.model.self_reach import system_without_contact
 from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.read import scene_text
 from hybrid.scene.system import System
@@ -50,7 +51,7 @@ from hybrid.simulation.run_sample import (
 from hybrid.simulation.system_checkpoint import kept_resolution
 from hybrid.simulation.system_model_errors import Stretches, as_rods, leaves_bending_out, rods_of, with_model_errors
 from hybrid.simulation.system_run import run_system, static_system
-from hybrid.simulation.system_samples import compared, sample_of
+from hybrid.simulation.system_samples import compared, sample_of, touch_unasked
 from hybrid.store.amend import amend_lines
 from hybrid.store.checkpoint import read_before
 from hybrid.store.comparison_recorder import ComparisonRecorder
@@ -127,6 +128,8 @@ class SystemPasses:
         }  # fmt: skip
         # Of lines, stretches (m) that were rod at any output: of the last run to compare with, and of the result.
         self._compared_rods, self._result_rods = dict[str, Stretches](), dict[str, Stretches]()
+        # Whether a line has touched itself in a result: then lines may in runs to compare with; and whether they could.
+        self._touches = self._compared_touching = False
         self._costs: list[float] = []  # s of processor time, of all runs
         self._notes: list[tuple[str, str]] = []  # events of the system
         self._begin = clock.process_time()
@@ -176,6 +179,8 @@ class SystemPasses:
     ) -> Samples:  # fmt: skip
         """Compute the system, or another; what is compared of its lines.  target: None: it is for that alone."""
         begin, asked = clock.process_time(), system or self.system
+        if target is None and self.moves and not self._touches:
+            asked = system_without_contact(asked)
         if self.moves:
             text, look = scene_text(asked), self.interrupted
             run = run_system(asked, target, text, self.reporter, look, source, name, resolution, found)
@@ -194,6 +199,7 @@ class SystemPasses:
         models = dict(zip(system.names, system.models, strict=True))
         with open_result(target) as result:
             self._result_rods = {name: rods_of(line) for name, line in result.lines.items()}
+            self._touches |= touch_unasked(self.system, result)
             return {n: sample_of(line, resolution.lines[n], models[n], cpu) for n, line in result.lines.items()}
 
     def _surveyed(self, first: SystemResolution) -> SystemResolution:
@@ -232,6 +238,7 @@ class SystemPasses:
 
     def _compare(self, first: SystemResolution) -> None:
         """The runs to compare with, as of `ErrorController`."""
+        self._compared_touching = self._touches
         every = {name: comparison_resolutions(x, self.moves) for name, x in first.lines.items()}
         found: list[Samples | None] = [None, None, None]
         failed = ""
@@ -336,7 +343,8 @@ class SystemPasses:
             if x is not None and resolution.lines[name].zones < x.run.resolution.zones
         }  # fmt: skip
         anew = any(known[name].differs_in_zones(result[name]) for name in stricter)  # type: ignore[union-attr]
-        if anew:  # runs to compare with have other zones
+        anew |= self.moves and self._touches and not self._compared_touching
+        if anew:  # runs to compare with have other zones, or no contact
             self._compare(resolution)
         judged = []
         for name, control in self.controls.items():

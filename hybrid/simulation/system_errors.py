@@ -19,9 +19,11 @@ from hybrid.errors import ComputationError
 from hybrid.kernels.state import Floats
 from hybrid.model.plan import output_interval
 from hybrid.model.sections import section_changes
+from hybrid.model.self_reach import system_without_contact
 from hybrid.model.system import build_system
 from hybrid.scene.system import System
 from hybrid.simulation.error_report import CAUSES, UNITS
+from hybrid.simulation.system_samples import touch_unasked
 from hybrid.store.amend import amend_lines
 from hybrid.store.format import Field
 from hybrid.store.reader import Result, open_result
@@ -74,6 +76,9 @@ def write_system_errors(system: System, target: Path | io.BytesIO, compute: Comp
     Where such a run fails, an event says so.
     """
     given = system.model_copy(update={"output": system.output.model_copy(update={"errors": None})})
+    with open_result(target) as result:
+        if not touch_unasked(system, result):  # coarser cells would meet where those of the result do not
+            given = system_without_contact(given)
     found, failed = dict[str, Result](), ""
     try:
         for cause, make in (("mesh", coarser), ("time", longer_steps)):

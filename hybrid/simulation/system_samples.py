@@ -7,6 +7,7 @@ import numpy as np
 from hybrid.model.build import Model
 from hybrid.model.resolution import Resolution
 from hybrid.scene.schema import AdaptiveModel
+from hybrid.scene.system import System
 from hybrid.simulation.run_sample import COMPARED, RunSample, catenary_share, compared_cells, split_outputs
 from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.system_run import SystemRun
@@ -24,6 +25,14 @@ def compared(line: LineResult, run: SystemRun, cpu: float) -> RunSample:
         resolution, values, compared_cells(line.model), max(run.steps, 1), cpu, resolution.every, forces=found.steps,
         catenary=catenary,
     )  # fmt: skip
+
+
+def touch_unasked(system: System, result: Result) -> bool:
+    """Whether a line of which contact is not asked for touches itself in a result."""
+    return any(
+        system.lines[name].contact.self is None and any(event.kind == "line touches itself" for event in line.events)
+        for name, line in result.lines.items()
+    )
 
 
 def sample_of(line: Result, resolution: Resolution, model: Model, cpu: float) -> RunSample:

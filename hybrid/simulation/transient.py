@@ -27,7 +27,7 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.blended import note_blended, rotate_ends_in
 from hybrid.simulation.cell_changes import CellChanges
-from hybrid.simulation.contact_start import begin_contact
+from hybrid.simulation.contact_start import begin_contact, comes_near
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog
@@ -74,10 +74,12 @@ class Transient:
         events: EventLog,
         outputs: Sequence[float] = (),
         extremes: bool = False,
+        touches: bool = True,
     ) -> None:
         """It has no state before `begin` or `restore`.  outputs: s, increasing, times of samples; extremes: whether
 
-        lowest and highest values of all accepted steps are kept.
+        lowest and highest values of all accepted steps are kept; touches: whether contact with itself begins by itself
+        where the line comes near itself, else that is only noticed.
         """
         assert scene.time is not None
         self.scene, self.model, self.resolution, self.events = scene, model, resolution, events
@@ -92,6 +94,7 @@ class Transient:
         elif model.line.bits & MAY_TOUCH:
             self.itself = SelfWatch(model, "")
         self.nears_itself = False  # whether contact with itself has to begin after this step
+        self.touches, self.came_near_itself = touches, False
         self.marked = marked_places(scene, model)
         self.payout = PayingOut(model) if model.payout is not None else None
         self.paid_zones = None
@@ -239,7 +242,7 @@ class Transient:
         if self.run.contact is not None:
             self.stepper.work.u[:] = 0.0
             refuse_start_in_itself(self.run.contact, self.scene, begun)
-        elif self.itself is not None and self.itself.is_near(self.run, self.resolution.step):
+        elif self.itself is not None and self.itself.is_near(self.run, self.resolution.step) and comes_near(self):
             begin_contact(self)
             begun, state = self.model, self.state
         self._find_accelerations()

@@ -1,0 +1,82 @@
+"""Runs to compare with compute contact of a line with itself where it touches itself in the result, and not before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from test_self_contact_default import led_through
+from test_system_contact import RUBS, TIME, system
+
+import hybrid
+from hybrid.simulation.case import Case
+from hybrid.simulation.run_sample import RunSample
+from hybrid.simulation.system_run import SystemRun
+
+DEFECTS = Path(__file__).parents[1] / "data" / "defects"
+
+
+@pytest.fixture
+def touched(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """Whether contact was computed, of every run to compare with."""
+    found: list[bool] = []
+    sample = Case.sample
+
+    def noted(self: Case, *args: Any, **more: Any) -> RunSample:
+        run = sample(self, *args, **more)
+        found.append(run.touches)
+        return run
+
+    monkeypatch.setattr(Case, "sample", noted)
+    return found
+
+
+def test_they_are_made_again_with_contact_where_the_result_touches(touched: list[bool]) -> None:
+    result = hybrid.run(hybrid.validate_scene(led_through(output={"every": 0.1, "points": 21, "errors": True})))
+    assert "line touches itself" in {event.kind for event in result.events}
+    assert touched == [False] * 3 + [True] * 3 and result.attributes["effort_runs"] == 7
+    assert float(result["errors/total/position"].max()) > 0.0
+
+
+def test_they_compute_none_where_it_does_not(touched: list[bool]) -> None:
+    near = led_through(time={"duration": 1.5, "step": 0.02}, output={"every": 0.1, "points": 21, "errors": True})
+    result = hybrid.run(hybrid.validate_scene(near))
+    assert "line touches itself" not in {event.kind for event in result.events}
+    assert touched == [False] * 3
+
+
+def test_they_do_from_the_start_where_contact_is_asked(touched: list[bool]) -> None:
+    more = {"contact": {"self": True}, "time": {"duration": 0.1, "step": 0.02}}
+    hybrid.run(hybrid.validate_scene(led_through(**more, output={"every": 0.1, "points": 21, "errors": True})))
+    assert touched == [True] * 3
+
+
+def test_a_tether_far_from_itself_does_not_stall() -> None:
+    """Two parts 12 m apart, 367 diameters, on chords longer than their bend, began contact in the coarsest run."""
+    result = hybrid.run(hybrid.load_scene(DEFECTS / "long_s_tether.yaml", ["time.duration=60"]))
+    assert result.attributes["effort_runs"] <= 6 and result.attributes["cells"] < 1500
+    assert len(result["steps/t"]) < 1500
+    assert not {event.kind for event in result.events} & {"line touches itself", "line meets itself", "no error figure"}
+
+
+@pytest.mark.parametrize("tail", ["rod", "catenary"])  # with the latter, leaving bending out is a cause of its own
+@pytest.mark.parametrize("duration", [0.1, TIME["duration"]])
+def test_those_of_a_system_likewise(duration: float, tail: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    contact: list[bool | None] = []
+    make = SystemRun.__init__
+
+    def noted(self: SystemRun, given: Any, *args: Any, **more: Any) -> None:
+        contact.append(given.lines["hose"].contact.self)
+        make(self, given, *args, **more)
+
+    monkeypatch.setattr(SystemRun, "__init__", noted)
+    scene = system(contact={"friction": RUBS["friction"]})
+    scene |= {"time": {**TIME, "duration": duration}, "output": {"every": 0.1, "points": 21, "errors": True}}
+    scene["lines"]["tail"] |= {"model": tail, "mesh": {"cells": 20}}
+    result = hybrid.run(scene, progress=False)
+    touches = "line touches itself" in {event.kind for event in result.lines["hose"].events}
+    assert touches == (duration > 1.0)
+    of_result = contact.index(None)
+    assert contact[:of_result] == [False] * of_result and len(contact) > 1
+    assert set(contact[of_result + 1 :]) == ({None} if touches else {False} if tail == "rod" else set())
