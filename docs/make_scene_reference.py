@@ -138,9 +138,11 @@ Without a fluid there is neither drag nor wind; a cable that swings in still air
 ## Currents
 
 The shortest form is a vector, `current: [0.3, 0, 0]`.
+In every form a velocity may be a speed and a direction instead: `current: {speed: 0.5, direction: 30}` flows towards
+30 degrees from x, counter-clockwise seen from above, as waves travel, so that a study can vary either.
 A list gives velocities at heights, `current: [{z: 0, velocity: [0.6, 0, 0]}, {z: -100, velocity: [0, 0.1, 0]}]`: linear
 between them, constant above the highest and below the lowest.
-A table says its kind, and may have a `ramp`, the time over which the current grows from nothing:
+A table has a kind, which its keys tell, and may have a `ramp`, the time over which the current grows from nothing:
 
 ```yaml
 environment:

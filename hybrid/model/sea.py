@@ -114,12 +114,12 @@ def current_table(scene: Scene) -> tuple[Floats, Floats]:
     if current is None:
         return np.zeros(1), np.zeros((1, 3))
     if isinstance(current, UniformCurrent):
-        return np.zeros(1), np.array([current.velocity], float)
+        return np.zeros(1), np.array([current.flow], float)
     if isinstance(current, PowerLawCurrent):
         top = current.top_under(fluid.surface if fluid else None)
         part = (np.arange(POWER_LAW_HEIGHTS + 1) / POWER_LAW_HEIGHTS) ** CROWDING  # of the height above the foot
         angle = np.radians(current.veer) * (1.0 - part)
-        x, y, up = current.velocity
+        x, y, up = current.flow
         speed = part**current.exponent
         turned = np.column_stack(
             [x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle), np.full(part.size, up)]
@@ -129,7 +129,7 @@ def current_table(scene: Scene) -> tuple[Floats, Floats]:
     if isinstance(points[0], float):
         return np.zeros(1), np.array([points], float)
     ordered = sorted(points, key=lambda p: p.z)
-    return np.array([p.z for p in ordered], float), np.array([p.velocity for p in ordered], float)
+    return np.array([p.z for p in ordered], float), np.array([p.flow for p in ordered], float)
 
 
 def components(waves: RegularWaves | JonswapWaves, depth: float, gravity: float) -> Floats:

@@ -84,6 +84,7 @@ class Table(BaseModel):
     )
 
     former: ClassVar[Mapping[str, str]] = {}  # of each former name, the key of today
+    usual: ClassVar[tuple[str, ...]] = ()  # keys that examples show beside those that are required
     instead: ClassVar[Mapping[str, str]] = {}  # of keys that other tables have and this one cannot: what to do
 
     @classmethod
@@ -107,6 +108,11 @@ class Table(BaseModel):
                 return super().__getattr__(name)
             warnings.warn(f"{name} is now {now}", DeprecationWarning, stacklevel=2)
             return getattr(self, now)
+
+    @classmethod
+    def shown(cls) -> list[str]:
+        """Keys of the shortest example: those that are required, and the usual ones."""
+        return [name for name, field in cls.model_fields.items() if field.is_required() or name in cls.usual]
 
     def __dir__(self) -> list[str]:
         """Without the names that pydantic has deprecated (`copy`, `dict`, `json`, ...) and its class methods."""
@@ -310,7 +316,8 @@ class Kinds:
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         tables = handler(schema)
         descriptions = [handler.resolve_ref_schema(arm) for arm in tables.get("oneOf") or tables.get("anyOf") or []]
-        alone = [table["properties"]["kind"]["const"] for table in descriptions if not table.get("required")]
+        bare = [table for table in descriptions if not {"required", "anyOf"} & table.keys()]
+        alone = [table["properties"]["kind"]["const"] for table in bare]
         if not alone:  # every kind needs more than its name
             return tables
         return {"anyOf": [tables, {"enum": alone, "description": "short for {kind: ...}"}]}

@@ -39,8 +39,9 @@ class Fluid(Table):
     density: Positive = Field(description="density rho of the fluid; gives buoyancy, drag and added mass [kg/m^3]")
     current: Current | None = Field(
         default=None,
-        description="velocity of the fluid (of air: the wind), inertial frame: the same everywhere; or a list of "
-        "{z, velocity}, linear between its heights and constant beyond; or by kind; absent: still water [m/s]",
+        description="velocity of the fluid (of air: the wind), inertial frame: the same everywhere; or a table with "
+        "speed and direction; or a list of {z, velocity} or {z, speed, direction}, linear between its heights and "
+        "constant beyond; or by kind; absent: still water [m/s]",
     )
     surface: Number | None = Field(
         default=None, description="height of the still water (sea level, MSL); absent: everything is under water [m]"
@@ -51,9 +52,9 @@ class Fluid(Table):
         """Whether there is a current anywhere."""
         current = self.current
         if current is None or isinstance(current, UniformCurrent | PowerLawCurrent):
-            return current is not None and any(current.velocity)
+            return current is not None and any(current.flow)
         points = current.table if isinstance(current, CurrentProfile) else current
-        return any(any(p.velocity) if isinstance(p, CurrentPoint) else p != 0.0 for p in points)
+        return any(any(p.flow) if isinstance(p, CurrentPoint) else p != 0.0 for p in points)
 
     @model_validator(mode="after")
     def _levels(self) -> Fluid:

@@ -245,19 +245,19 @@ def _sea(environment: Environment) -> Iterator[Witness]:
     here: Place = ("environment", "fluid", "current")
     current = fluid.current
     if isinstance(current, UniformCurrent | PowerLawCurrent):
-        if any(current.velocity):
-            yield Witness((*here, "velocity"), "along", current.velocity)
-        if isinstance(current, PowerLawCurrent) and current.veer != 0.0 and any(current.velocity[:2]):
-            x, y, _ = current.velocity
+        if any(current.flow):
+            yield Witness((*here, _flow_key(current)), "along", current.flow)
+        if isinstance(current, PowerLawCurrent) and current.veer != 0.0 and any(current.flow[:2]):
+            x, y, _ = current.flow
             yield Witness((*here, "veer"), "along", (-y, x, 0.0))
     elif current is not None:
         profile = isinstance(current, CurrentProfile)
         table = current.table if isinstance(current, CurrentProfile) else current
         points = [p for p in table if isinstance(p, CurrentPoint)]
         for i, point in enumerate(points):
-            if any(point.velocity):
-                where: Place = (*here, "table", i, "velocity") if profile else (*here, i, "velocity")
-                yield Witness(where, "along", point.velocity)
+            if any(point.flow):
+                where: Place = (*here, *(("table",) if profile else ()), i, _flow_key(point))
+                yield Witness(where, "along", point.flow)
         if not points and any(table):
             x, y, z = (float(v) for v in table if not isinstance(v, CurrentPoint))
             yield Witness(here, "along", (x, y, z))
@@ -265,6 +265,11 @@ def _sea(environment: Environment) -> Iterator[Witness]:
         towards = math.radians(fluid.waves.direction)
         level = (round(math.cos(towards), 15), round(math.sin(towards), 15), 0.0)
         yield Witness(("environment", "fluid", "waves", "direction"), "along", level)
+
+
+def _flow_key(flow: UniformCurrent | PowerLawCurrent | CurrentPoint) -> str:
+    """The key that says where the water flows."""
+    return "velocity" if flow.velocity is not None else "direction" if flow.direction is not None else "speed"
 
 
 def _given(v: Triple) -> str:

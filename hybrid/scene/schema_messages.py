@@ -55,8 +55,7 @@ def _type_in_words(annotation: Any, metadata: tuple[Any, ...]) -> str:
         entry = " or ".join(dict.fromkeys(_type_in_words(a, m) for a, m in arms(get_args(annotation)[0])))
         return f"a list of at least {least} entries, each {entry}" if least > 1 else f"a list, each entry {entry}"
     if isinstance(annotation, type) and issubclass(annotation, Table):
-        needed = [name for name, f in annotation.model_fields.items() if f.is_required()]
-        some = needed or list(annotation.model_fields)[:2]
+        some = annotation.shown() or list(annotation.model_fields)[:2]
         return f"a table {{{', '.join(f'{name}: ...' for name in some)}}}"
     return "something else"
 
@@ -167,7 +166,7 @@ def _missing_fix(key: str, words: str, spot: Spot, bare: bool) -> str:
 
 def _example(kind: str, table: type[Table]) -> str:
     """The shortest table of a kind, or its bare word; without a kind, a table with what it needs."""
-    needs = {name: own for name, own in table.model_fields.items() if own.is_required()}
+    needs = {name: table.model_fields[name] for name in table.shown()}
     if not kind and not needs:
         needs = dict(list(table.model_fields.items())[:1])
     shapes = [f"{name}: {_shape(Spot(own.annotation, tuple(own.metadata), table, own))}" for name, own in needs.items()]
@@ -214,7 +213,7 @@ def _number_for_more(key: str, value: float, spot: Spot) -> str:
     if len(inner) != 1:
         return ""
     fields = inner[0].model_fields
-    first, *others = [name for name, field in fields.items() if field.is_required()] or list(fields)[:1]
+    first, *others = inner[0].shown() or list(fields)[:1]
     if all(a is not float for a, _ in arms(fields[first].annotation)):
         return ""
     written = f"{{{first}: {value}{''.join(f', {name}: ...' for name in others)}}}"

@@ -8,9 +8,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, AliasChoices, BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    AliasChoices,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
 
 from hybrid.scene.base import (
     Finding,
@@ -36,11 +45,51 @@ from hybrid.scene.depths import Depths
 _RAMP = "time over which the {what} grows from nothing, smoothly; absent: there from the beginning [s]"
 
 
-class CurrentPoint(Table):
+_VELOCITY = "velocity of the water{where}, inertial frame; or speed and direction [m/s]"
+_SPEED = "speed of the water{where}, in place of velocity, level in its `direction` [m/s]"
+_TOWARDS = (
+    "direction (heading) towards which the water flows with `speed`, from x counter-clockwise seen from above, as of "
+    "waves; absent: 0, along x [deg]"
+)
+
+
+class _Flow(Table):
+    """A velocity of the water: as a vector, or level, by its speed and the direction in which it flows."""
+
+    model_config = ConfigDict(json_schema_extra={"anyOf": [{"required": ["velocity"]}, {"required": ["speed"]}]})
+    usual = ("velocity",)
+    if TYPE_CHECKING:
+        velocity: Vector | None
+        speed: float | None
+        direction: float | None
+
+    @property
+    def flow(self) -> tuple[float, float, float]:
+        """Velocity of the water, inertial frame [m/s]."""
+        if self.velocity is not None:
+            return self.velocity
+        towards, speed = math.radians(self.direction or 0.0), self.speed or 0.0
+        return speed * round(math.cos(towards), 15), speed * round(math.sin(towards), 15), 0.0
+
+    @model_validator(mode="after")
+    def _one_way_to_say_it(self) -> Self:
+        if self.velocity is not None:
+            given = [key for key in ("speed", "direction") if getattr(self, key) is not None]
+            expected = "nothing, because velocity gives both"
+            refuse(Finding((key,), expected, "leave the one or the other out") for key in given)
+        elif self.speed is None:
+            expected = "three numbers [x, y, z] in m/s; or a speed in m/s, and a direction in degrees from x towards y"
+            refuse([Finding(("velocity",), expected, "add `speed: 0.5` and `direction: 0`")])
+        return self
+
+
+class CurrentPoint(_Flow):
     """The velocity of the water at a height."""
 
     z: Number = Field(description="height, inertial frame [m]")
-    velocity: Vector = Field(description="velocity of the water there, inertial frame [m/s]")
+    velocity: Vector | None = Field(default=None, description=_VELOCITY.format(where=" there"))
+    speed: NonNegative | None = Field(default=None, description=_SPEED.format(where=" there"))
+    direction: Number | None = Field(default=None, description=_TOWARDS)
 
 
 def _one_way(points: tuple[CurrentPoint, ...]) -> tuple[CurrentPoint, ...]:
@@ -56,11 +105,13 @@ def _one_way(points: tuple[CurrentPoint, ...]) -> tuple[CurrentPoint, ...]:
 CurrentPoints = Annotated[tuple[CurrentPoint, ...], Field(min_length=2), AfterValidator(_one_way)]
 
 
-class UniformCurrent(Table):
+class UniformCurrent(_Flow):
     """The same velocity everywhere."""
 
     kind: Literal["uniform"] = Field(default="uniform", description="the same everywhere")
-    velocity: Vector = Field(description="velocity of the water, inertial frame [m/s]")
+    velocity: Vector | None = Field(default=None, description=_VELOCITY.format(where=""))
+    speed: NonNegative | None = Field(default=None, description=_SPEED.format(where=""))
+    direction: Number | None = Field(default=None, description=_TOWARDS)
     ramp: Positive | None = Field(default=None, description=_RAMP.format(what="current"))
 
 
@@ -72,11 +123,13 @@ class CurrentProfile(Table):
     ramp: Positive | None = Field(default=None, description=_RAMP.format(what="current"))
 
 
-class PowerLawCurrent(Table):
+class PowerLawCurrent(_Flow):
     """velocity x ((z - bottom) / (top - bottom))^exponent; that of the top above it, nothing below the bottom."""
 
     kind: Literal["power_law"] = Field(default="power_law", description="a power of the height above the bottom")
-    velocity: Vector = Field(description="velocity of the water at the top, inertial frame [m/s]")
+    velocity: Vector | None = Field(default=None, description=_VELOCITY.format(where=" at the top"))
+    speed: NonNegative | None = Field(default=None, description=_SPEED.format(where=" at the top"))
+    direction: Number | None = Field(default=None, description=_TOWARDS)
     top: Number | None = Field(
         default=None, description="height of the top; absent: the surface of the fluid, or 0 without one [m]"
     )
@@ -114,7 +167,10 @@ def _current_form(value: Any) -> str:
     return "<list>" if listed and any(isinstance(x, Mapping | Table) for x in value) else "<vector>"
 
 
-_FORMS = f"three numbers [x, y, z] (or a list of {{z, velocity}}, or a table with kind: {' | '.join(_KINDS)})"
+_FORMS = (
+    "three numbers [x, y, z] (or a table with speed and direction, or a list of {z, velocity}, "
+    f"or a table with kind: {' | '.join(_KINDS)})"
+)
 
 Current = Annotated[
     Annotated[tuple[Number, Number, Number], BeforeValidator(numbers(3)), Words(_FORMS), Tag("<vector>")]
@@ -124,7 +180,11 @@ Current = Annotated[
         | Annotated[CurrentProfile, Tag("<profile>")]
         | Annotated[PowerLawCurrent, Tag("<power_law>")],
         Discriminator(by_kind),
-        Kinds(_KINDS, usual=("uniform",)),
+        Kinds(
+            _KINDS,
+            usual=("uniform",),
+            implied=(("table", "profile"), ("bottom", "power_law"), ("speed", "uniform"), ("velocity", "uniform")),
+        ),
         Tag("<table>"),
     ],
     Discriminator(_current_form),

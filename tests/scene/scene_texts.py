@@ -175,7 +175,7 @@ model: {kind: catenary}
 """
 
 SEA_UNIFORM = """\
-environment: {fluid: {density: 1.2, current: {kind: uniform, velocity: [0.0, 8.0, 0.0], ramp: 4.0}}}
+environment: {fluid: {density: 1.2, current: {kind: uniform, speed: 8.0, direction: 90.0, ramp: 4.0}}}
 cable: {sections: [{length: 10.0, mass: 2.0, diameter: 0.03, drag: {normal: 1.0}}]}
 ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
 initial: {kind: equilibrium}

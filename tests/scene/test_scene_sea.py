@@ -115,8 +115,12 @@ def test_currents_of_every_form() -> None:
     assert Fluid(density=1, current=list(points)).current == points
     assert Fluid(density=1, current={"kind": "profile", "table": points}).current == CurrentProfile(table=points)
     assert parse_scene(SEA_LIST).environment.fluid.current[1].z == 0.0
-    assert parse_scene(SEA_UNIFORM).environment.fluid.current == UniformCurrent(velocity=(0, 8, 0), ramp=4.0)
+    assert parse_scene(SEA_UNIFORM).environment.fluid.current == UniformCurrent(speed=8, direction=90, ramp=4.0)
     assert isinstance(parse_scene(SEA_TOO).environment.fluid.current, CurrentProfile)
+    assert parse_scene(SEA_UNIFORM).environment.fluid.current.flow == (0.0, 8.0, 0.0)
+    assert Fluid(density=1, current={"speed": 2, "direction": -60}).current.flow == (1.0, -2 * 0.866025403784439, 0.0)
+    assert Fluid(density=1, current=[{"z": 0, "speed": 1}, below]).current[0].flow == (1.0, 0.0, 0.0)
+    assert Fluid(density=1, current={"speed": 1, "bottom": -9}).current == PowerLawCurrent(speed=1, bottom=-9)
     law = PowerLawCurrent(velocity=(1, 0, 0), bottom=-40)
     assert (law.exponent, law.veer, law.top_under(None), law.top_under(3.0)) == (1 / 7, 0.0, 0.0, 3.0)
     assert PowerLawCurrent(velocity=(1, 0, 0), top=-2, bottom=-40).top_under(3.0) == -2.0
@@ -248,7 +252,7 @@ RISING = change(AFLOAT, f"{HELD}, end: {FREE}", "free, end: free")
 CASES = {
     # --- currents
     "one entry": (SEA_LIST, LIST, "§[{z: 0.0, velocity: [0.3, 0, 0]}]", "environment.fluid.current", "at least 2 entries"),
-    "no velocity in an entry": (SEA_LIST, LIST, "[§{z: -100}, {z: 0, velocity: [0, 0, 0]}]", "environment.fluid.current[0].velocity", "add `velocity: [x, y, z]` (m/s)"),
+    "no velocity in an entry": (SEA_LIST, LIST, "[§{z: -100}, {z: 0, velocity: [0, 0, 0]}]", "environment.fluid.current[0].velocity", "add `speed: 0.5` and `direction: 0`"),
     "a number as entry": (SEA_LIST, LIST, "[{z: 0, velocity: [0, 0, 0]}, §3]", "environment.fluid.current[1]", "write {z: 3, velocity: ...}"),
     "the same z twice": (SEA_LIST, LIST, "[{z: 0, velocity: [0, 0, 0]}, {z: §0, velocity: [0, 1, 0]}]", "environment.fluid.current[1].z", "sort the entries"),
     "z up and down": (SEA_LIST, LIST, "[{z: 0, velocity: [0, 0, 0]}, {z: -9, velocity: [0, 1, 0]}, {z: §-8, velocity: [0, 1, 0]}]", "environment.fluid.current[2].z", "sort the entries"),
@@ -256,7 +260,9 @@ CASES = {
     "misspelt in an entry": (SEA_LIST, LIST, "[{z: 0, §velocty: [0, 0, 0], velocity: [0, 0, 0]}, {z: -9, velocity: [0, 1, 0]}]", "environment.fluid.current[0].velocty", "did you mean velocity?"),
     "two numbers": (SEA_LIST, LIST, "§[0.3, 0]", "environment.fluid.current", "there are 2"),
     "kind of current": (SEA, POWER, "{kind: §profil}", "environment.fluid.current.kind", "did you mean profile?"),
-    "current of no kind": (SEA, POWER, "§{velocity: [0, 1, 0]}", "environment.fluid.current.kind", "add `kind: uniform`"),
+    "current of no kind": (SEA, POWER, "§{ramp: 3}", "environment.fluid.current.kind", "add `kind: uniform`"),
+    "speed beside velocity": (SEA_UNIFORM, "speed: 8.0, direction: 90.0,", "velocity: [0, 8, 0], speed: §8.0,", "environment.fluid.current.speed", "leave the one"),
+    "direction without speed": (SEA_UNIFORM, "speed: 8.0, ", "", "environment.fluid.current.velocity", "add `speed: 0.5`"),
     "profile without table": (SEA, POWER, "§profile", "environment.fluid.current.table", "table: [{z: ..., velocity: [x, y, z]}"),
     "uniform with a table": (SEA, POWER, "{kind: uniform, velocity: [0, 1, 0], §table: 3}", "environment.fluid.current.table", "use kind: profile"),
     "bottom over top": (SEA, "bottom: -80.0", "bottom: §80.0", "environment.fluid.current.bottom", "negative"),
