@@ -13,7 +13,7 @@ from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.connections import connection_findings
 from hybrid.scene.ends import Clamped, Ends, Free
 from hybrid.scene.motion_checks import motion_findings
-from hybrid.scene.points import Failure, Fairlead, FixedPoint, FreePoint
+from hybrid.scene.points import Fairlead, FixedPoint, FreePoint
 from hybrid.scene.quantities import of_several_lines
 from hybrid.scene.schema import Scene
 from hybrid.scene.suggestions import nearest
@@ -57,25 +57,11 @@ def _lonely_points(system: System) -> Iterator[Finding]:
             expected = f"a line at point {name} that does not break there and carries what is left"
             fix = "leave it out of one of them, or let it break at its other end"
             yield Finding(("lines", line, "break_at"), expected, fix)
-    for name, failure, at in _failures(system):
-        if system.time is not None and failure.time is not None and failure.time >= system.time.duration:
-            expected = f"a time before the end, {system.time.duration:g} s"
-            yield Finding((*at, "break_at", "time"), expected, "a longer duration, or leave it out", name)
     on = {point.body for point in system.points.values() if isinstance(point, Fairlead)}
     for name in system.bodies:
         if name not in on:
             fix = f"add a point `{{body: {name}, place: [0, 0, 0]}}` and a line to it, or leave the body out"
             yield Finding(("bodies", name), "a body with a fairlead among the points", fix, "no fairlead")
-
-
-def _failures(system: System) -> Iterator[tuple[str, Failure, Place]]:
-    """What may break: its name, when, and where that stands."""
-    for name, line in system.lines.items():
-        if line.break_at is not None:
-            yield f"line {name}", line.break_at, ("lines", name)
-    for name, point in system.points.items():
-        if not isinstance(point, FreePoint) and point.break_at is not None:
-            yield f"point {name}", point.break_at, ("points", name)
 
 
 def _floating_groups(system: System) -> Iterator[Finding]:

@@ -188,12 +188,23 @@ def test_a_stopped_run_goes_on_bit_for_bit(tmp_path: Path, monkeypatch: pytest.M
     assert differences(whole, path) == []
 
 
+def test_a_line_breaks_after_the_end_of_a_run_that_is_continued(tmp_path: Path) -> None:
+    """Lines and points that break at times behind the end of a run, which goes on as the longer run, bit for bit."""
+    short, whole = tmp_path / "short.h5", tmp_path / "whole.h5"
+    breaks = {"b": {"break_at": {"time": 0.625}}}, {"left": {"break_at": {"time": 0.75}}}
+    more: dict[str, Any] = {"output": {"every": 0.25}}
+    hybrid.run(scene(*breaks, time={"duration": 1.0, "step": 1 / 64}, **more), whole).close()
+    hybrid.run(scene(*breaks, time={"duration": 0.5, "step": 1 / 64}, **more), short).close()
+    hybrid.resume(short, until=1.0).close()
+    assert [x for x in differences(whole, short) if not x.endswith("/scene")] == []  # each says its duration
+    with hybrid.open(short) as result:
+        assert [x.t for x in result.events if x.kind == "end released"] == [0.625, 0.75]
+
+
 @pytest.mark.parametrize(
     ("lines", "points", "words"),
     [
         ({"a": {"break_at": {}}}, {}, "time or tension"),
-        ({"a": {"break_at": {"time": 2.0}}}, {}, "before the end"),
-        ({}, {"left": {"break_at": {"time": 2.0}}}, "before the end"),
         ({"a": {"break_at": {"time": 1.0}}, "b": {"break_at": {"time": 1.0, "end": "start"}}}, {}, "carries what is left"),
         ({}, {"weight": {"break_at": {"time": 1.0}}}, "break_at"),
     ],
