@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import inf, pi
+from math import inf
 
 from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.forces import DRAG, FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state import Line
 from hybrid.model.mesh import Zone
+from hybrid.model.plausibility import implausible
 from hybrid.model.resolution import (
     USUAL,
     first_resolution,
@@ -20,13 +21,9 @@ from hybrid.model.resolution import (
     wants_errors,
     wants_survey,
 )
-from hybrid.model.sea import current_table
-from hybrid.model.sections import swivels, weight
+from hybrid.model.sections import swivels
 from hybrid.model.self_reach import self_reach
 from hybrid.scene.schema import AdaptiveModel, Scene
-
-# Mean densities of real cables, kg/m^3, with room: from hollow and foamed to solid heavy metal.
-PLAUSIBLE = (50.0, 25_000.0)
 
 
 @dataclass(frozen=True)
@@ -37,33 +34,7 @@ class Entry:
     on: bool
     why: str
     event: str = ""  # kind of event that a result gets for it: "ignored", "implausible"
-
-
-# Fluids, kg/m^3: gases, and liquids from oil to heavy brine.  Seabed friction and currents that nobody has met.
-GASES, LIQUIDS, ROUGHEST, FASTEST = (0.05, 10.0), (500.0, 2500.0), 2.0, 5.0
-# A cable whose axial stiffness is less than this many times its weight is hardly one.
-SOFTEST = 5.0
-
-
-def _implausible(scene: Scene) -> Iterator[tuple[str, str]]:
-    """What and why: numbers that are more likely in another unit."""
-    fluid, bed = scene.environment.fluid, scene.environment.seabed
-    if fluid is not None:
-        if not any(low <= fluid.density <= high for low, high in (GASES, LIQUIDS)):
-            yield f"a fluid of {fluid.density:g} kg/m^3", "environment.fluid.density: is it in kg/m^3?"
-        _, current = current_table(scene)
-        fastest = float((current**2).sum(axis=1).max()) ** 0.5
-        if fluid.density >= LIQUIDS[0] and fastest > FASTEST:
-            yield f"a current of {fastest:g} m/s", "environment.fluid.current: is it in m/s?"
-    if bed is not None and bed.friction is not None and max(bed.friction.axial, bed.friction.lateral) > ROUGHEST:
-        yield (
-            f"friction of {max(bed.friction.axial, bed.friction.lateral):g}",
-            "environment.seabed.friction is a part of 1",
-        )
-    for i, x in enumerate(scene.cable.sections):
-        if x.axial_stiffness and x.axial_stiffness < SOFTEST * abs(weight(x, scene)) * scene.length:
-            text = f"cable.sections[{i}].axial_stiffness: is it in N?"
-            yield f"a cable that stretches by more than {1 / SOFTEST:.0%} under its own weight", text
+    s: tuple[float, float] | None = None  # the stretch of line (m) that it is about; None: all of it
 
 
 def _watched(scene: Scene) -> Iterator[Entry]:
@@ -173,6 +144,15 @@ def _force(scene: Scene, line: Line, name: str, bit: int, needs: str) -> Entry:
     return Entry(name, bool(line.bits & bit), needs)
 
 
+def _let_go(scene: Scene, name: str) -> str:
+    """When an end is let go, by time; a run that ends before can be continued."""
+    release = scene.ends.named()[name].release
+    if release is None or release.time is None or scene.time is None:
+        return ""
+    late = f", after the end of this run, {scene.time.duration:g} s" * (release.time >= scene.time.duration)
+    return f", let go at {release.time:g} s{late}"
+
+
 IDLE = "the current acts on nothing"
 
 
@@ -211,14 +191,7 @@ def contents_of(
                     f"assumed (solid round section): {which} gives none",
                 )
             )
-    entries += [Entry(what, True, why, event="implausible") for what, why in _implausible(scene)]
-    for i, section in enumerate(scene.cable.sections):
-        if section.diameter:
-            density = section.mass / (0.25 * pi * section.diameter**2)
-            if not PLAUSIBLE[0] <= density <= PLAUSIBLE[1]:
-                what = f"sections[{i}] has a mean density of {density:.3g} kg/m^3"
-                why = f"mass {section.mass:g} kg/m, diameter {section.diameter:g} m: are both in these units?"
-                entries.append(Entry(what, True, why, event="implausible"))
+    entries += [Entry(x.what, True, x.why, "implausible", x.s) for x in implausible(scene)]
     entries.append(followed(scene, zones, corrects))
     if corrects:
         text = "position, tension, curvature and moment with what bending adds to them"
@@ -247,7 +220,7 @@ def contents_of(
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
         moving = end.prescribed_motion is not None
         spring = f", by a spring of {end.spring:g} N m/rad" if end.spring < inf else ""
-        text = f"ends.{name}: {end.kind}{spring}{', moving' if moving else ''}"
+        text = f"ends.{name}: {end.kind}{spring}{', moving' if moving else ''}{_let_go(scene, name)}"
         entries.append(Entry(text, True, f"ends.{name}"))
         if not line.spin[cell] and end.acts_by_moment:
             entries.append(

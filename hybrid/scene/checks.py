@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import Any
 
-from hybrid.scene import attachment_checks, payout_checks, sea_checks, start_checks, torque_checks
+from hybrid.scene import attachment_checks, magnitude_checks, payout_checks, sea_checks, start_checks, torque_checks
 from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.analysis import (
     AdaptiveModel,
@@ -210,15 +210,11 @@ def _arbiter_steps(time: Time | None, solver: str, accuracy: Accuracy | None) ->
         yield Finding(("time", "step"), "a fixed step, because shooting has no other", "add `step: ...` (s)")
 
 
-def _releases(ends: Ends, time: Time | None, solver: str) -> Iterator[Finding]:
-    """Ends that are let go never, or by a solver that cannot."""
+def _releases(ends: Ends, solver: str) -> Iterator[Finding]:
+    """Ends that are let go, by a solver that cannot."""
     for name, end in ends.named().items():
-        release = end.release
-        if release is not None and solver == "shooting":
+        if end.release is not None and solver == "shooting":
             yield Finding(("solver",), f"elimination, because ends.{name} is let go (release_at)", "leave solver out")
-        if release is not None and release.time is not None and time is not None and release.time >= time.duration:
-            expected = f"a time before time.duration, {time.duration:g} s"
-            yield Finding(("ends", name, "release_at", "time"), expected, "a longer duration, or leave it out")
 
 
 def _tolerance_is_felt(cable: Cable, time: Time | None) -> Iterator[Finding]:
@@ -410,6 +406,8 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     sea_checks.surface_over_seabed,
     sea_checks.nothing_in_the_ground,
     sea_checks.arbiter_knows,
+    magnitude_checks.friction,
+    magnitude_checks.end_forces,
     _zones_fill,
     _rods_can_bend,
     _corrections_know_the_bending,

@@ -16,6 +16,7 @@ from hybrid.scene.base import Finding, Place, dotted
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import End, Ends
 from hybrid.scene.load_checks import load_findings, turning_times
+from hybrid.scene.magnitude_checks import moved_into_the_ground
 from hybrid.scene.motion_tables import SHIFTS, Harmonic, Motion, Vessel
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ def motion_findings(tables: Mapping[str, Any]) -> list[Finding]:
             wrong += _vessel(end, motion.vessel)
         if not wrong and isinstance(cable, Cable):
             wrong = list(_too_fast(cable, motion, record))
+            wrong += moved_into_the_ground(end, motion, record, time, environment, cable.length)
         found += [Finding((*here, *f.at), f.expected, f.fix, f.given) for f in wrong]
         if step is not None and not wrong:
             late += _unresolved(here, motion, record, environment, step)

@@ -114,7 +114,8 @@ class Diagnostics:
         """Note what the contents of the model warn of."""
         for entry in self._model.contents:
             if entry.event:
-                self.events.event(0.0, 0.0, self._model.length, entry.event, f"{entry.what}: {entry.why}")
+                s_a, s_b = entry.s or (0.0, self._model.length)
+                self.events.event(0.0, s_a, s_b, entry.event, f"{entry.what}: {entry.why}")
 
     def checkpoint(self, run: CompiledRun) -> dict[str, Any]:
         """What has been noted so far, and what `finish` will judge by."""

@@ -1,0 +1,221 @@
+"""Numbers of a scene that are possible, and more likely in another unit: each with place, expected range and remedy.
+
+A bound is a property of all materials and seas that are known, with room; what no reading could make right is refused
+when the scene is read (`scene/magnitude_checks.py` and the tables themselves).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import accumulate
+from typing import NamedTuple
+
+from hybrid.model.sea import current_table
+from hybrid.model.sections import bending_stiffness, weight
+from hybrid.scene.motion_tables import SHIFTS
+from hybrid.scene.schema import Scene, Section
+
+# Mean densities of real cables, kg/m^3, with room: from hollow and foamed to solid heavy metal.
+DENSITIES = (50.0, 25_000.0)
+# Fluids, kg/m^3: gases, and liquids from oil to heavy brine.
+GASES, LIQUIDS = (0.05, 10.0), (500.0, 2500.0)
+# Friction on a seabed: chain in gravel reaches 1.  Current, m/s: the fastest tidal streams reach 8 m/s in narrows, and
+# above 5 m/s nothing is moored.  Gravity, m/s^2, of Jupiter, and of a model in a centrifuge none is known here.
+ROUGHEST, FASTEST, HEAVIEST = 2.0, 5.0, 30.0
+# Significant wave height, m: the largest measured by a buoy is 19 m.  Depth of the sea, m: the deepest is 10.9 km.
+HIGHEST_SEA, DEEPEST = 25.0, 12_000.0
+# Drag and added mass coefficients: with vortex-induced vibrations a cable's drag doubles or triples, from 1.2.
+LARGEST_COEFFICIENT = 10.0
+# Young's modulus, Pa, and speed of tension waves, m/s: ten times those of diamond, so that a line that is meant not to
+# stretch passes, and a unit that is wrong by a thousand does not.
+STIFFEST, FASTEST_WAVE = 1.2e13, 1e5
+# Of metal all through, by mean density, kg/m^3, and speed of tension waves in it, m/s: in wire ropes, spiral strands
+# and chains it is 2000 to 4000 m/s and in solid steel 5000, so that with a stiffness in kN it is 60 to 160.
+METAL, SLOWEST_IN_METAL = 4000.0, 180.0
+# Speed of tension waves in the softest rubber cord, m/s: 1 MPa and 1000 kg/m^3 are 32 m/s.
+SLOWEST_WAVE = 10.0
+# EI over EA d^2: a thin-walled tube of diameter d has 1/8, and no section more; spiral strands and umbilicals have
+# 0.001 to 0.06, and a thousand times that where EA is in kN.
+STIFFEST_BENDING = 1.0
+# Parts of what a pipe's wall gives, EA and EI, between which coatings, armour and rounding may lie.
+OF_A_PIPE = (0.2, 5.0)
+# A line at rest sinks into real beds by less than this many of its diameters, or by less than half a metre.
+DEEPEST_TRENCH = (10.0, 0.5)
+# Speed of an end in a liquid, m/s, by its amplitudes and periods: twice that of the fastest ships.
+FASTEST_END = 40.0
+
+
+class Note(NamedTuple):
+    """An implausible number: what, where it stands with expected range and remedy, and the stretch of line (m)."""
+
+    what: str
+    why: str
+    s: tuple[float, float]
+
+
+def implausible(scene: Scene) -> Iterator[Note]:
+    """Numbers that are more likely in another unit."""
+    whole = (0.0, scene.length)
+    for what, why in (*_water(scene), *_bed(scene), *_motions(scene)):
+        yield Note(what, why, whole)
+    begins = accumulate((x.length for x in scene.cable.sections), initial=0.0)
+    for i, (section, begin) in enumerate(zip(scene.cable.sections, begins, strict=False)):
+        for what, key, why in (*_material(section), *_stiffness(section), *_use(section, scene)):
+            yield Note(what, f"cable.sections[{i}].{key}: {why}", (begin, begin + section.length))
+
+
+def _water(scene: Scene) -> Iterator[tuple[str, str]]:
+    """The fluid, its current and its waves; gravity and depth."""
+    gravity, fluid = scene.environment.gravity, scene.environment.fluid
+    if gravity > HEAVIEST:
+        why = f"environment.gravity: expected at most {HEAVIEST:g} m/s^2; on earth 9.81: is it in m/s^2?"
+        yield f"a gravity of {gravity:g} m/s^2", why
+    if fluid is None:
+        return
+    if not any(low <= fluid.density <= high for low, high in (GASES, LIQUIDS)):
+        why = f"expected {LIQUIDS[0]:g} to {LIQUIDS[1]:g} kg/m^3 of a liquid, {GASES[0]:g} to {GASES[1]:g} of a gas"
+        yield f"a fluid of {fluid.density:g} kg/m^3", f"environment.fluid.density: {why}: is it in kg/m^3?"
+    _, current = current_table(scene)
+    fastest = float((current**2).sum(axis=1).max()) ** 0.5
+    if fluid.density >= LIQUIDS[0] and fastest > FASTEST:
+        why = f"environment.fluid.current: expected at most {FASTEST:g} m/s: is it in m/s?"
+        yield f"a current of {fastest:g} m/s", why
+    height = getattr(fluid.waves, "significant_height", 0.0)
+    if height > HIGHEST_SEA:
+        why = f"expected at most {HIGHEST_SEA:g} m; the largest ever measured is 19 m: is it in m?"
+        yield f"a significant wave height of {height:g} m", f"environment.fluid.waves.significant_height: {why}"
+    depth = scene.environment.depth
+    if depth is not None and depth > DEEPEST:
+        why = f"expected at most {DEEPEST:g} m; the deepest sea has 10 900 m: is seabed.z in m?"
+        yield f"a depth of {depth:g} m", f"environment.seabed: {why}"
+
+
+def _bed(scene: Scene) -> Iterator[tuple[str, str]]:
+    """The seabed: friction, and how deep the line sinks into it."""
+    bed = scene.environment.seabed
+    if bed is None:
+        return
+    if bed.friction is not None and (roughest := max(bed.friction.axial, bed.friction.lateral)) > ROUGHEST:
+        why = f"environment.seabed.friction: expected 0 to {ROUGHEST:g}, a coefficient: is it in percent?"
+        yield f"friction of {roughest:g}", why
+    deepest = 0.0
+    for section in scene.cable.sections:
+        sinks = weight(section, scene) / bed.stiffness
+        diameters, least = DEEPEST_TRENCH
+        if sinks > max(diameters * (section.diameter or 0.0), least):
+            deepest = max(deepest, sinks)
+    if deepest:
+        why = "expected 1e3 to 1e6 N/m per m of line: is it in kN/m per m (kPa)? then multiply it by 1000"
+        what = f"a line that sinks {deepest:.3g} m into the seabed by its own weight"
+        yield what, f"environment.seabed.stiffness, {bed.stiffness:g} N/m per m: {why}"
+
+
+def _motions(scene: Scene) -> Iterator[tuple[str, str]]:
+    """Ends that move faster than ships do."""
+    fluid = scene.environment.fluid
+    if fluid is None or fluid.density < LIQUIDS[0]:
+        return
+    for name, end in scene.ends.named().items():
+        motion = end.prescribed_motion
+        for key, harmonics in (motion.harmonics() if motion is not None else {}).items():
+            speed = max((2.0 * math.pi * h.amplitude / h.period for h in harmonics), default=0.0)
+            if key in SHIFTS and speed > FASTEST_END:
+                why = f"expected at most {FASTEST_END:g} m/s: is the amplitude in m and the period in s?"
+                yield f"an end that moves at {speed:.3g} m/s", f"ends.{name}.motion.{key}: {why}"
+
+
+# What is wrong with a section: what, the key, and why.
+Wrong = tuple[str, str, str]
+
+
+def _material(section: Section) -> Iterator[Wrong]:
+    """Mass and diameter, drag and added mass."""
+    if section.diameter:
+        density = section.mass / _area(section)
+        if not DENSITIES[0] <= density <= DENSITIES[1]:
+            why = (
+                f"expected {DENSITIES[0] * _area(section):.3g} to {DENSITIES[1] * _area(section):.3g} kg/m with a "
+                f"diameter of {section.diameter:g} m: are mass in kg/m and diameter in m?"
+            )
+            yield f"a mean density of {density:.3g} kg/m^3, of {section.mass:g} kg/m", "mass", why
+    for key, given in (("drag", section.drag), ("added_mass", section.added_mass)):
+        largest = max(given.normal, given.tangential) if given is not None else 0.0
+        if largest > LARGEST_COEFFICIENT:
+            why = f"expected at most {LARGEST_COEFFICIENT:g}, a coefficient without unit; a bare cylinder has about 1"
+            yield f"{key.replace('_', ' ')} of {largest:g}", key, why
+
+
+def _stiffness(section: Section) -> Iterator[Wrong]:
+    """Axial stiffness against mass, diameter and bending stiffness."""
+    axial, bending = section.stiffness, max(bending_stiffness(section))
+    key = "axial_stiffness" if section.axial_stiffness is not None else "tension_strain"
+    if section.pipe is not None:
+        yield from _of_a_pipe(section)
+    if axial is None:
+        return
+    wave = math.sqrt(axial / section.mass)  # m/s
+    metal = section.diameter is not None and section.mass / _area(section) > METAL
+    slowest = SLOWEST_IN_METAL if metal else SLOWEST_WAVE
+    if wave < slowest:
+        least, made = section.mass * slowest**2, "metal" if metal else "any rubber or fibre"
+        why = f"expected more than {least:.3g} N of {section.mass:g} kg/m of {made}: is it in kN? then {1e3 * axial:g}"
+        yield f"an axial stiffness of {axial:.3g} N, soft for its mass", key, why
+    modulus = axial / _area(section) if section.diameter else 0.0
+    if modulus > STIFFEST or wave > FASTEST_WAVE:
+        what = f"an axial stiffness of {axial:.3g} N, beyond that of any material"
+        most = min(STIFFEST * _area(section) if section.diameter else math.inf, section.mass * FASTEST_WAVE**2)
+        why = f"expected at most {most:.3g} N: is it in N? leave it out for a line that does not stretch"
+        yield what, key, why
+    if section.diameter and bending > STIFFEST_BENDING * axial * section.diameter**2:
+        most = axial * section.diameter**2 / 8.0
+        why = (
+            f"expected at most {most:.3g} N m^2, that of a tube of {section.diameter:g} m with an axial stiffness of "
+            f"{axial:.3g} N: is that one in kN, or this one in N mm^2?"
+        )
+        yield f"a bending stiffness of {bending:.3g} N m^2, beyond that of a tube", "bending_stiffness", why
+
+
+def _of_a_pipe(section: Section) -> Iterator[Wrong]:
+    """Stiffnesses that are far from those of the wall of the pipe that the section is said to be."""
+    pipe = section.pipe
+    assert pipe is not None
+    outer = pipe.outer_diameter or section.diameter
+    assert outer is not None
+    inner = outer - 2.0 * pipe.wall
+    axial = pipe.modulus * 0.25 * math.pi * (outer**2 - inner**2)
+    bending = pipe.modulus * math.pi / 64.0 * (outer**4 - inner**4)
+    for key, unit, given, own in (
+        ("axial_stiffness", "N", section.axial_stiffness, axial),
+        ("bending_stiffness", "N m^2", max(bending_stiffness(section)) or None, bending),
+    ):
+        low, high = (part * own for part in OF_A_PIPE)
+        if given is not None and not low <= given <= high:
+            what = f"{key.replace('_', ' ')} of {given:.3g} {unit} beside a wall that has {own:.3g}"
+            why = (
+                f"expected {low:.3g} to {high:.3g} {unit}: is it in k{unit}? or check pipe.wall (m), pipe.modulus (Pa)"
+            )
+            yield what, key, why
+
+
+def _use(section: Section, scene: Scene) -> Iterator[Wrong]:
+    """A section that its own weight, hung straight down, stretches by more than it bears."""
+    if not section.stiffness:
+        return
+    depth = scene.environment.depth
+    hung = abs(weight(section, scene)) * min(scene.length, math.inf if depth is None else max(depth, 0.0))
+    if hung > section.borne:
+        why = (
+            f"expected more than {hung / section.strain_limit:.3g} N, which {section.strain_limit:.0%} (max_strain) of "
+            f"{hung:.3g} N, its weight, asks for: is it in N?"
+        )
+        yield (
+            f"a cable that stretches by {section.strain(hung):.3g} of its length by its own weight",
+            "axial_stiffness",
+            why,
+        )
+
+
+def _area(section: Section) -> float:
+    assert section.diameter is not None
+    return 0.25 * math.pi * section.diameter**2

@@ -1,0 +1,193 @@
+"""Numbers in a wrong unit get a word, or are refused: with place, value, expected range and remedy; others do not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import hybrid
+from hybrid.errors import SceneError
+from hybrid.model.plausibility import implausible
+from hybrid.scene.read import read_scene
+from hybrid.scene.schema import Scene
+
+ROOT = Path(__file__).parents[2]
+CHAIN = {"mass": 20.0, "diameter": 0.05, "axial_stiffness": 8.5e7, "bending_stiffness": 50.0}
+PIPE = {
+    "mass": 160.0, "diameter": 0.4, "axial_stiffness": 5e9, "bending_stiffness": 9e7,
+    "pipe": {"wall": 0.02},
+}  # fmt: skip
+
+
+def scene(section: dict[str, Any] | None = None, **changes: Any) -> Scene:
+    """A line from the seabed, 100 m deep, to a vessel that heaves."""
+    heave = {"heave": {"amplitude": 2.0, "period": 8.0}, "ramp": 16.0}
+    data: dict[str, Any] = {
+        "environment": {
+            "fluid": {"density": 1025, "surface": 0.0, "current": [0.5, 0, 0]},
+            "seabed": {"z": -100.0, "stiffness": 1e4, "friction": 0.5},
+        },
+        "cable": {"sections": [{"length": 50.0} | CHAIN, {"length": 200.0} | (section or CHAIN)]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, -100.0]},
+            "end": {"kind": "pinned", "position": [205.0, 0, 0], "motion": heave},
+        },
+        "initial": "equilibrium", "model": "catenary", "time": {"duration": 60.0, "step": 0.05},
+    }  # fmt: skip
+    return hybrid.validate_scene(data | changes)
+
+
+def environment(**changes: Any) -> dict[str, Any]:
+    given = {"density": 1025, "surface": 0.0, "current": [0.5, 0, 0]}
+    bed = {"z": -100.0, "stiffness": 1e4, "friction": 0.5}
+    return {
+        "environment": {
+            "gravity": changes.get("gravity", 9.81),
+            "fluid": given | {k: x for k, x in changes.items() if k in ("density", "current", "waves")},
+            "seabed": bed | {k: x for k, x in changes.items() if k in ("stiffness", "friction", "z")},
+        }
+    }
+
+
+def moved(**harmonic: Any) -> dict[str, Any]:
+    motion = {"surge": harmonic, "ramp": 16.0}
+    return {
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, -100.0]},
+            "end": {"kind": "pinned", "position": [205.0, 0, 0], "motion": motion},
+        }
+    }
+
+
+SECTIONS = {
+    "EA in kN": (CHAIN | {"axial_stiffness": 8.5e4}, "axial_stiffness", "in kN? then 8.5e+07"),
+    "EA in mN": (CHAIN | {"axial_stiffness": 8.5e10 * 10}, "axial_stiffness", "is it in N?"),
+    "EA of a light rope in N, its weight in kN": (
+        {"mass": 0.5, "diameter": 0.025, "axial_stiffness": 20.0}, "axial_stiffness", "in kN? then 20000"),
+    "EI in N mm2": (CHAIN | {"bending_stiffness": 50e6}, "bending_stiffness", "in N mm^2"),
+    "EI of a pipe in kN m2": (PIPE | {"bending_stiffness": 9e4}, "bending_stiffness", "kN m^2"),
+    "EA of a pipe in kN": (PIPE | {"axial_stiffness": 5e6}, "axial_stiffness", "kN"),
+    "drag of a percentage": (CHAIN | {"drag": {"normal": 120}}, "drag", "at most 10"),
+    "a rubber cord under its weight": (
+        {"mass": 20.0, "diameter": 0.1, "axial_stiffness": 4e3}, "axial_stiffness", "max_strain"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SECTIONS)
+def test_a_section_in_a_wrong_unit_is_noted_at_its_place(name: str) -> None:
+    section, key, words = SECTIONS[name]
+    notes = [x for x in implausible(scene(section)) if f"cable.sections[1].{key}: expected" in x.why]
+    assert len(notes) >= 1, list(implausible(scene(section)))
+    assert any(words in x.why for x in notes), notes
+    assert all(x.s == (50.0, 250.0) for x in notes)
+
+
+SURROUNDINGS = {
+    "friction in tens of percent": (environment(friction=5.0), "friction of 5"),
+    "current in cm/s": (environment(current={"speed": 50.0, "direction": 30.0}), "a current of 50 m/s"),
+    "a bed in kPa": (environment(stiffness=10.0), "sinks"),
+    "gravity in cm/s2": (environment(gravity=981.0), "a gravity of 981"),
+    "a period in minutes": (moved(amplitude=20.0, period=0.5), "an end that moves at"),
+    "depth in cm": ({
+        **environment(z=-20_000.0), "cable": {"sections": [{"length": 25_000.0} | CHAIN]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, -20_000.0]},
+                 "end": {"kind": "pinned", "position": [205.0, 0, 0]}}}, "a depth of 20000 m"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SURROUNDINGS)
+def test_surroundings_in_a_wrong_unit_are_noted(name: str) -> None:
+    changes, words = SURROUNDINGS[name]
+    step = {"time": {"duration": 60.0, "step": 0.02}} if "ends" in changes else {}
+    notes = list(implausible(scene(**changes | step)))
+    assert any(words in x.what and "expected" in x.why for x in notes), notes
+
+
+def test_the_note_is_an_event_where_the_section_is() -> None:
+    with hybrid.static(scene(CHAIN | {"drag": {"normal": 120.0}})) as result:
+        event = next(x for x in result.events if x.kind == "implausible")
+        assert (event.s_a, event.s_b) == (50.0, 250.0)
+        assert event.text.startswith("drag of 120: cable.sections[1].drag: expected at most 10")
+
+
+REFUSED = {
+    "friction of 50": (environment(friction=50.0), "environment.seabed.friction", "not percent: 0.5"),
+    "a force of 2^63 N": ({"ends": {
+        "start": {"kind": "pinned", "position": [0, 0, -100.0]},
+        "end": {"kind": "free", "force": [0, 0, 2.0**63]}}}, "ends.end.force", "less than 2e+09 N"),
+    "a thrust of 2^63 N": ({"ends": {
+        "start": {"kind": "pinned", "position": [0, 0, -100.0]},
+        "end": {"kind": "body", "mass": 500.0, "thrust": [2.0**63, 0, 0]}}}, "ends.end.thrust", "forces are in N"),
+    "an end that heaves into the bed": ({"ends": {
+        "start": {"kind": "pinned", "position": [205.0, 0, 0]},
+        "end": {"kind": "pinned", "position": [0, 0, -100.0],
+                "motion": {"heave": {"amplitude": 2.0, "period": 8.0}, "ramp": 16.0}}}},
+        "ends.end.motion", "exchange start and end"),
+    "an end that sinks into the bed": ({"ends": {
+        "start": {"kind": "pinned", "position": [100.0, 0, -97.0]},
+        "end": {"kind": "pinned", "position": [0, 0, -97.0], "motion": {"velocity": [0, 0, -0.1], "ramp": 5.0}}}},
+        "ends.end.motion", "under the seabed"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_nothing_makes_right_is_refused(name: str) -> None:
+    changes, where, words = REFUSED[name]
+    with pytest.raises(SceneError) as caught:
+        scene(**changes)
+    complaint = next(x for x in caught.value.complaints if x.where.startswith(where))
+    assert words in f"{complaint.value} {complaint.expected} {complaint.fix}"
+
+
+def test_a_point_of_several_lines_that_heaves_into_the_bed_is_refused() -> None:
+    heave = {"heave": {"amplitude": 2.0, "period": 8.0}, "ramp": 16.0}
+    system = environment() | {
+        "points": {"anchor": {"position": [0, 0, -100.0], "motion": heave}, "top": {"position": [205.0, 0, 0]}},
+        "lines": {"leg": {"start": "anchor", "end": "top", "sections": [{"length": 250.0} | CHAIN]}},
+        "time": {"duration": 60.0, "step": 0.05},
+    }
+    with pytest.raises(SceneError) as caught:
+        hybrid.validate_scene(system)
+    assert [x.where for x in caught.value.complaints] == ["points.anchor.motion"]
+
+
+def test_an_end_on_the_bed_may_heave_up_and_slide() -> None:
+    up = {"surge": {"amplitude": 2.0, "period": 8.0}, "travel": {"by": [0, 0, 5.0], "over": 9.0}, "ramp": 16.0}
+    start = {"kind": "pinned", "position": [0, 0, -100.0], "motion": up}
+    scene(ends={"start": start, "end": {"kind": "pinned", "position": [205.0, 0, 0]}})
+
+
+def test_the_seabed_end_of_a_mooring_whose_ends_are_exchanged_is_refused() -> None:
+    with pytest.raises(SceneError, match="2 m under the seabed"):
+        read_scene(ROOT / "tests" / "data" / "defects" / "swapped_ends.yaml")
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.yaml")), ids=lambda x: x.stem)
+def test_no_example_is_called_implausible(path: Path) -> None:
+    read, *_ = read_scene(path)
+    assert isinstance(read, Scene)
+    assert list(implausible(read)) == []
+
+
+STEEL, WIRE = {"mass": 20.0, "diameter": 0.05}, {"mass": 0.7, "diameter": 0.014}
+REAL = {
+    "studless chain": STEEL | {"axial_stiffness": 2.1e8},
+    "spiral strand": {"mass": 42.0, "diameter": 0.1, "axial_stiffness": 8.5e8},
+    "wire rope": WIRE | {"axial_stiffness": 9e6},
+    "polyester": {"mass": 23.0, "diameter": 0.19, "axial_stiffness": 6e7},
+    "nylon": {"mass": 1.5, "diameter": 0.048, "axial_stiffness": 1.2e6},
+    "bungee": {"mass": 2.0, "diameter": 0.05, "axial_stiffness": 1.5e4, "max_strain": 2.0},
+    "rubber hose": {"mass": 250.0, "diameter": 0.66, "axial_stiffness": 4e6, "bending_stiffness": 6e4},
+    "umbilical": {"mass": 41.0, "diameter": 0.15, "axial_stiffness": 4e8, "bending_stiffness": 1.5e4},
+    "steel riser": {"mass": 160.0, "diameter": 0.4, "axial_stiffness": 5e9, "bending_stiffness": 9e7},
+    "tether": {"mass": 0.6, "diameter": 0.025, "axial_stiffness": 1e6, "bending_stiffness": 1.0},
+    "carbon rod": {"mass": 0.8, "diameter": 0.025, "axial_stiffness": 8e7, "bending_stiffness": 3e3},
+    "fishing line": {"mass": 4e-4, "diameter": 7e-4, "axial_stiffness": 800.0},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_lines_are_not_called_implausible(name: str) -> None:
+    assert list(implausible(scene(REAL[name]))) == []
