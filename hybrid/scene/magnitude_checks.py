@@ -30,9 +30,9 @@ TO_A_PERIOD, MOST_TIMES = 24, 4000
 
 def friction(environment: Environment) -> Iterator[Finding]:
     """A coefficient of friction of the seabed that no ground has."""
-    bed = environment.seabed
-    for key in ("axial", "lateral") if bed is not None and bed.friction is not None else ():
-        value = getattr(bed.friction, key)
+    given = environment.seabed.friction if environment.seabed is not None else None
+    for key in ("axial", "lateral") if given is not None else ():
+        value = getattr(given, key)
         if value > ROUGHEST:
             fix = f"a coefficient, not percent: {value / 100.0:g}" if value <= 200.0 else "a coefficient, such as 0.5"
             place = ("environment", "seabed", "friction", key)
