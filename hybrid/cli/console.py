@@ -222,14 +222,17 @@ class Console:
 
     def interrupted(self) -> None:
         """What the file holds after Ctrl-C."""
-        t, text = None, self.left or "nothing was written"
+        t, pending, text = None, "", self.left or "no result yet: nothing was written"
         if self.written:
             with hybrid.open(self.written) as result:
                 t = float(result.times[-1]) if len(result.times) else None
+                pending = result.pending
             text = f"{self.written} " + ("holds no output yet" if t is None else f"is complete up to t = {t:.6g} s")
-            if t is not None:
+            if pending:
+                text += f"; {pending.replace(f'resume {self.written.name}', f'resume {self.written}')}"
+            elif t is not None:
                 text += f"; `hybrid resume {self.written}` goes on"
-        self.json("done", file=self.written, status="interrupted", t=t)
+        self.json("done", file=self.written, status="interrupted", t=t, pending=pending)
         self._err.print(f"interrupted; {text}", style="yellow", soft_wrap=True)
 
     def refused(self, error: SceneError) -> None:

@@ -188,7 +188,7 @@ def export(
             for text in made.notes:
                 console.json("note", text=text, line=name.removeprefix("."))
                 console.note(f"note: {name.removeprefix('.')}{': ' if name else ''}{text}")
-        status = "" if opened.status == "complete" else f"; {opened.status_text}"
+        status = "" if opened.done else f"; {opened.status_text}"
         files, notes = [x for made in all_made for x in made.files], [x for made in all_made for x in made.notes]
         console.done(all_made[0].text + status, *files, status=opened.status, notes=notes)
 

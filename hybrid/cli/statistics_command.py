@@ -70,6 +70,8 @@ def stats(
         console.show(lambda: _table(rows, hours))
         if opened.status != "complete":
             console.note(f"note: of a run that has not come to its end; {opened.status_text}")
+        elif opened.pending:
+            console.note(f"note: {opened.pending}")
         without: dict[str, dict[str, None]] = {}
         for row in rows:
             if "no_extreme" in row:

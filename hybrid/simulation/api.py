@@ -11,59 +11,47 @@ import io
 import time as clock
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hybrid.adapt.user_criterion import UserCriterion
-from hybrid.errors import ComputationError, ResultError, SceneError
+from hybrid.errors import ResultError, SceneError
 from hybrid.model.model_costs import NAMED, REST, ModelChoice, with_model
 from hybrid.model.resolution import (
     Resolution,
     first_resolution,
-    follows_curvature,
-    is_irregular,
-    mesh_is_free,
     model_is_free,
     requested_accuracy,
     wants_errors,
     wants_survey,
-    zones_are_free,
 )
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.payout_checks import check_fixed_step
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.simulation.case import Case
-from hybrid.simulation.error_control import ErrorController, comparison_resolutions
+from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.error_report import write_errors
 from hybrid.simulation.finer_result import FinerResult, beside
 from hybrid.simulation.first_use import OF_LINES, compile_beside, kernels_of
 from hybrid.simulation.interrupts import interrupts
-from hybrid.simulation.mesh_survey import survey_resolution
-from hybrid.simulation.model_choice import chosen_and_surveyed, rods_instead, surveyed
+from hybrid.simulation.model_choice import surveyed
+from hybrid.simulation.passes import Passes, free_in
 from hybrid.simulation.progress import (
     ESTIMATION,
-    PRE_RUN,
-    RESULT,
     Listener,
     ProgressReporter,
     listener_of,
     tell_of_compiling,
 )
-from hybrid.simulation.refinement import Free
-from hybrid.simulation.restart import RemainingRun, remaining_run, remaining_system
-from hybrid.simulation.restore import refused
-from hybrid.simulation.run_sample import RunSample
+from hybrid.simulation.restart import remaining_run, remaining_system
 from hybrid.simulation.static_case import StaticCase
 from hybrid.store.array_recorder import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target
-from hybrid.store.late_file import LateFile
 from hybrid.store.lock import locked
-from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result, written_result
-from hybrid.store.stored_rows import remove_rows
+from hybrid.store.records import ERROR_ESTIMATE
 
 if TYPE_CHECKING:
     from hybrid.scene.system import System
@@ -110,7 +98,7 @@ def run(
     with locked(_path(output)), _supervised(case, progress):
         if isinstance(target, Path):
             beside(target).unlink(missing_ok=True)  # of a run that was cut off
-        _compute(case, target)
+        Passes(case, target).compute()
     return written_result(target, case.late_file)
 
 
@@ -139,7 +127,7 @@ def static(scene: SceneLike | System, output: str | Path | None = None, *, overw
             return written_result(target)
         assert not isinstance(target, MemoryTarget)
         compute = FinerResult(target, case.record, case.record)
-        free = _free(scene)._replace(steps=False)
+        free = free_in(scene)._replace(steps=False)
         control = ErrorController(
             requested_accuracy(scene), free, False, case.sample, compute, choice=choice, settle=compute.settle
         )
@@ -190,7 +178,7 @@ def resume(
             raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
         case = Case(remaining.scene, criterion, remaining.changes, remaining.points)
         with _supervised(case, progress):
-            _compute(case, target, path, remaining)
+            Passes(case, target, path, remaining).compute()
     return written_result(target, case.late_file)
 
 
@@ -226,7 +214,8 @@ def _move_lines(system: System, target: Target, progress: bool | Listener, sourc
             assert not isinstance(target, MemoryTarget), "errors are written into a file"
             refine_system(system, target, reporter, stopped, source)
             return
-        run_system(system, target, scene_text(system), reporter, stopped, source)
+        pending = ERROR_ESTIMATE if system.output.errors else ""
+        run_system(system, target, scene_text(system), reporter, stopped, source, pending=pending)
         if system.output.errors:
             assert not isinstance(target, MemoryTarget), "errors are written into a file"
             from hybrid.simulation.system_errors import write_system_errors
@@ -237,113 +226,6 @@ def _move_lines(system: System, target: Target, progress: bool | Listener, sourc
             write_system_errors(system, target, compare)
 
 
-def _compute(case: Case, target: Target, source: Path | None = None, remaining: RemainingRun | None = None) -> None:
-    """Compute a result, and its errors if they are wanted; source, remaining: what to continue."""
-    begin = clock.process_time()
-    control: ErrorController | None = None
-
-    def first(resolution: Resolution, to: Target) -> RunSample:
-        if remaining is None or remaining.anew or source is None or not isinstance(to, Path):
-            return case.record(resolution, to, found())
-        return case.resume(source, to, found())
-
-    def refinement(resolution: Resolution, to: Path | io.BytesIO) -> RunSample:
-        if isinstance(to, Path) and case.is_unfinished(to, resolution):
-            return case.resume(to, to, found())
-        return case.record(resolution, to, found())
-
-    def anew(resolution: Resolution, to: Path | io.BytesIO) -> RunSample:
-        return case.record(resolution, to, found())
-
-    def complete() -> Path | io.BytesIO | LateFile:
-        """The result, which nothing is to be done to but to add its errors."""
-        assert not isinstance(target, MemoryTarget)
-        if case.late_file is not None and not case.late_file.placed:
-            return case.late_file
-        case.late_file = None  # they go into the file alone
-        return target
-
-    def found() -> Tree:
-        return control.checkpoint() if control is not None else {}
-
-    resolution = first_resolution(case.scene) if remaining is None else remaining.resolution
-    if not wants_errors(case.scene):
-        first(_surveyed(case, resolution)[1] if remaining is None else resolution, target)
-        return
-    assert not isinstance(target, MemoryTarget)
-    kept = False
-    case.beside_result = target if isinstance(target, Path) else None
-    try:
-        if remaining is not None and remaining.before:
-            control = _controller(case, FinerResult(target, first, refinement))
-            with refused(source or Path()):
-                control.restore(remaining.before, case.scene, case.points, source)
-            go_on = control.proceed
-        else:
-            choice, resolution = _surveyed(case, resolution) if remaining is None else (NAMED, resolution)
-            control = _controller(case, FinerResult(target, first, refinement), choice)
-            moves = isinstance(case.scene.model, AdaptiveModel) and not follows_curvature(case.scene)
-            go_on = partial(control.start, replace(resolution, follow=moves))
-        try:
-            result, errors = go_on()
-            failed = control.model_misses
-        except ComputationError as error:
-            if control.choice.kind != "catenary":
-                raise
-            failed = str(error).splitlines()[0]
-        if control.choice.kind == "catenary" and failed:
-            if case.late_file is not None:
-                case.late_file.drop()
-            _emptied(target)
-            choice, resolution = rods_instead(case, first_resolution(case.scene), failed)
-            control = _controller(case, FinerResult(target, anew, refinement), choice)
-            result, errors = control.start(resolution)
-    except KeyboardInterrupt:
-        if control is not None and control.estimate is not None:  # the result before the finer run stands
-            result, errors = control.without_refinement("a finer run was stopped from outside")
-            write_errors(complete(), case.scene, control, result, errors, clock.process_time() - begin, done=False)
-        begun = control is not None and (control.comparisons or control.estimate) is not None
-        kept = begun and isinstance(target, Path) and target.exists()  # it can be resumed
-        raise
-    else:
-        write_errors(complete(), case.scene, control, result, errors, clock.process_time() - begin)
-    finally:
-        if case.late_file is not None:
-            case.late_file.place()
-        if isinstance(target, Path) and not kept:
-            remove_rows(target)
-
-
-def _emptied(target: Path | io.BytesIO) -> None:
-    """Drop what a run has left that failed and is made again with another model."""
-    if isinstance(target, io.BytesIO):
-        target.seek(0)
-        target.truncate()
-        return
-    for left in (target, target.with_suffix(".snapshot.npz")):
-        left.unlink(missing_ok=True)
-
-
-def _controller(case: Case, compute: FinerResult, choice: ModelChoice = NAMED) -> ErrorController:
-    """What chooses how finely a case is computed."""
-    asked = requested_accuracy(case.scene)
-    irregular = is_irregular(case.scene)
-    from_rest = case.scene.initial.kind == "equilibrium" and not any(end.release for end in case.scene.ends.both)
-    return ErrorController(
-        asked, _free(case.scene), True, case.sample, compute, case.beside, irregular, choice, compute.settle, from_rest
-    )
-
-
-def _surveyed(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
-    """The model, if the scene names none, and cells by a pre-run, if an accuracy is asked for."""
-    named = case.scene.model
-    _expect(case, resolution, wants_survey(case.scene))
-    found = chosen_and_surveyed(case, resolution)
-    if case.scene.model != named:
-        compile_beside(case.scene)
-    return found
-
-
 def _surveyed_at_rest(case: StaticCase, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
     """The same of an equilibrium, whose model is rods where the scene names none and asks for an accuracy."""
     if not wants_survey(case.scene):
@@ -352,22 +234,6 @@ def _surveyed_at_rest(case: StaticCase, resolution: Resolution) -> tuple[ModelCh
     if model_is_free(case.scene, moves=False):
         choice, case.scene = ModelChoice("rod", REST), with_model(case.scene, "rod")
     return choice, surveyed(case, resolution)
-
-
-def _free(scene: Scene) -> Free:
-    """What the scene leaves to the program."""
-    time = scene.time
-    steps = time is not None and time.controlled and time.tolerance is None
-    # where cells follow the curvature its share decides kinds, and the tolerance cells as well: both stay
-    follows = follows_curvature(scene)
-    return Free(mesh_is_free(scene), steps, zones_are_free(scene) and not follows, follows)
-
-
-def _expect(case: Case, resolution: Resolution, surveys: bool) -> None:
-    """Tell the progress which passes are to come; surveys: whether the first is the mesh pre-run."""
-    passes = [(PRE_RUN, survey_resolution(resolution))] if surveys else []
-    passes += [(ESTIMATION, x) for x in comparison_resolutions(resolution, moves=True)]
-    case.progress.expect([*passes, (RESULT, resolution)], resolution)
 
 
 def _path(output: str | Path | None) -> Path | None:

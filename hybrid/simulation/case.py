@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+import threading
 import time as clock
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from threading import Event
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from hybrid.model.plan import output_times
 from hybrid.model.release import check_releases
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, requested_accuracy, wants_errors
 from hybrid.model.sections import section_changes
-from hybrid.model.self_reach import without_contact
+from hybrid.model.self_reach import self_reach, without_contact
 from hybrid.outputs.probes import Observer
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
@@ -64,7 +64,7 @@ from hybrid.store.hdf5_file import is_result, open_file, opened
 from hybrid.store.late_file import LateFile
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.reader import Result, open_result, written_result
-from hybrid.store.records import THERE
+from hybrid.store.records import ERROR_ESTIMATE, THERE
 from hybrid.store.stored_array import StoredArray
 from hybrid.store.stored_rows import RowsRecorder, rows_path
 from hybrid.store.writer import Recorder
@@ -103,11 +103,12 @@ class Case:
         self.beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
         self.late_file: LateFile | None = None  # of a result that is complete, and may not be in its place yet
         self._results = 0  # that were begun
+        self._owner = threading.get_ident()  # the thread that puts files in their places
         self.came_near_itself = False  # whether the line did in a run to compare with
         # Whether contact with itself is computed in runs to compare with: where it is asked for, or the line has
         # touched itself in a result.  Before, coarse cells would meet where those of the result do not.
         self.touches_itself = bool(scene.contact.self)
-        self._unwanted = Event()  # what runs to compare with still compute
+        self._unwanted = threading.Event()  # what runs to compare with still compute
 
     # --- results --------------------------------------------------------------------------------
 
@@ -142,7 +143,7 @@ class Case:
         assert loop.run.envelope is not None
         recorder = result_recorder(
             self.scene, model, loop.observer, target, self._texts, equilibrium, loop.run.envelope,
-            len(output_times(self.scene)), kept, late,
+            len(output_times(self.scene)), kept, late, ERROR_ESTIMATE if kept else "",
         )  # fmt: skip
         recorder.files = self._files
         if switching is not None and switching.manager.held:
@@ -164,7 +165,9 @@ class Case:
             point = read_checkpoint(file)
             self._check(point, source)
             texts = self._texts
-            if "self_contact" not in file:  # of a version that did not compute contact without being asked
+            if (
+                "self_contact" not in file and self_reach(self.scene).may
+            ):  # of a version that did not compute contact without being asked
                 self.scene = without_contact(self.scene)
                 self.changes = tuple(replace(x, scene=without_contact(x.scene)) for x in self.changes)
             scenes = (self.scene, *(x.scene for x in self.changes))
@@ -183,7 +186,7 @@ class Case:
             assert loop.run.envelope is not None
             loop.recorder = recorder = Recorder.again(
                 file, target, loop.observer.fields, STEP_FIELDS, point, texts, before or {},
-                [*loop.run.envelope.fixed(), *mesh_fields(model)],
+                [*loop.run.envelope.fixed(), *mesh_fields(model)], pending=ERROR_ESTIMATE if before else "",
             )  # fmt: skip
         recorder.files = self._files
         with recorder:
@@ -405,8 +408,14 @@ class Case:
         if points is None:
             points = self.points.s
         observer = self.observer(model, switching is not None, points, None if target is not None else COMPARED)
-        interrupted = self.interrupted if target is not None else lambda: self._unwanted.is_set() or self.interrupted()
+        interrupted = self.interrupted if target is not None else self._comparison_interrupted
         return TimeLoop(run, observer, target, self._report, interrupted)
+
+    def _comparison_interrupted(self) -> bool:
+        """Whether a run to compare with is to stop; a result that has waited long enough is put in its place."""
+        if self.late_file is not None and threading.get_ident() == self._owner:
+            self.late_file.place_if_due()
+        return self._unwanted.is_set() or self.interrupted()
 
     def observer(self, model: Model, zones_move: bool, s: Floats, only: Sequence[str] | None) -> Observer:
         """What records outputs at points s (m); only: names of quantities, None: all."""

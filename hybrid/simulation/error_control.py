@@ -1,7 +1,7 @@
 """Computes a scene as often and as finely as it takes for the accuracy that is asked.
 
-First the runs that errors are estimated by, then the result; where its estimated errors are larger than asked, finer
-results follow, each from what the one before has shown.
+First the result, which stands from then on, then the runs that its errors are estimated by; where these are larger
+than asked, finer results follow, each from what the one before has shown.
 docs/accuracy.md
 """
 
@@ -30,7 +30,6 @@ from hybrid.model.resolution import (
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bounded_model_errors import doubtful
 from hybrid.simulation.error_estimate import Estimate
-from hybrid.simulation.error_forecast import forecast
 from hybrid.simulation.error_order import COARSER
 from hybrid.simulation.error_statistics import (
     LARGEST,
@@ -122,6 +121,7 @@ class ErrorController:
     first: Resolution | None = None  # that the runs to compare with are for; the result may be finer
     next: Resolution | None = None  # of the result that is to be computed
     comparisons: tuple[RunSample, RunSample | None, RunSample | None] | None = None  # for the first result
+    compared: Tree | None = None  # checkpoint of the first result with its comparisons, as long as that stands
     estimate: Estimate | None = None  # of the result as it is
     scattered: list[str] = field(default_factory=list)  # end forces whose largest values are by chance: not judged
     excess: np.ndarray = field(default_factory=lambda: np.zeros(2))  # N, by which snaps may exceed the largest forces
@@ -180,34 +180,23 @@ class ErrorController:
 
     def start(self, resolution: Resolution) -> tuple[RunSample, Errors | None]:
         """From a first resolution to the result and its errors, None where they cannot be estimated."""
-        self.comparisons, self.first = self._compute_comparisons(resolution), resolution
-        self.next = self.forecast_resolution(resolution)
+        self.first = self.next = resolution
         return self.proceed()
 
     def compare_with(self, runs: Sequence[RunSample | None], failed: str = "") -> None:
         """Take over runs to compare with; failed: why there is not even the first."""
         if failed or runs[0] is None:
-            text = f"no error figure: a coarser run to compare with failed: {failed}"
+            text = f"error not known: a coarser run to compare with failed: {failed}"
             self._notes.append(("no error figure", text))
             return
         self.comparisons = runs[0], runs[1], runs[2]
 
-    def forecast_resolution(self, resolution: Resolution) -> Resolution:
-        """How finely the first result is computed: finer, where the runs to compare with show that it must be."""
-        if self.comparisons is None or self.asked is None or not self.moves or self.irregular:
-            return resolution
-        coarse, rough, coarsest = self.comparisons
-        if coarsest is None:
-            return resolution
-        return forecast(self.asked, resolution, self.free, (coarse, rough, coarsest))
-
     def proceed(self) -> tuple[RunSample, Errors | None]:
         """The same from the next result on."""
-        if self._lost and self.next is not None:
+        if self._lost:
             self.runs, self._notes, self._lost = [], [], False
-            self.comparisons = self._compute_comparisons(self.first or self.next)
         while self.next is not None:
-            resolution = self.next
+            resolution, own = self.next, len(self.runs)
             try:
                 result = self._counted(self.result(resolution))
             except ComputationError as error:
@@ -217,7 +206,12 @@ class ErrorController:
                 self._notes.append((NOT_KEPT, f"{why}; the result is the one before"))
                 return self.without_refinement(why)
             if self.estimate is None:
-                if not self.first_estimate(result):
+                if self.comparisons is None:
+                    self.comparisons = self._compute_comparisons(self.first or resolution)
+                self.compared = self.checkpoint() | {"runs": np.delete(self.runs, own)}
+                known = self.first_estimate(result)
+                self.settle(True)  # it may be beside one of another model
+                if not known:
                     return result, None
                 self._judge(resolution)
             else:
@@ -242,20 +236,28 @@ class ErrorController:
 
     def _judge_finer(self, estimate: Estimate, resolution: Resolution, result: RunSample) -> None:
         """The same of a finer result; where it is the last and no better than that before it, that one stays."""
-        before, kept = self.judged(True).copied(), True
+        before = self.judged(True).copied()
         try:
             self.next_estimate(estimate, resolution, result)
             self._judge(resolution)
-            if self.asked is None or self.next is not None:
-                return
-            finer = self.judged(self.irregular)
-            found = is_no_better({"": self.asked}, {"": before}, {"": finer})
-            if found is not None:
-                kept = False
-                self.keep(before, finer)
-                self._notes.append((NOT_KEPT, not_kept_text(result, found)))
-        finally:
-            self.settle(kept)
+        except KeyboardInterrupt:  # in a run to compare with: the finer result stays beside, until it is resumed
+            self.estimate, self.statistics = before.estimate, dict(before.statistics)
+            raise
+        if self.asked is None or self.next is not None:
+            self._take_finer()
+            return
+        finer = self.judged(self.irregular)
+        found = is_no_better({"": self.asked}, {"": before}, {"": finer})
+        if found is not None:
+            self.keep(before, finer)
+            self._notes.append((NOT_KEPT, not_kept_text(result, found)))
+            self.settle(False)
+        else:
+            self._take_finer()
+
+    def _take_finer(self) -> None:
+        self.settle(True)
+        self.compared = None
 
     def judged(self, of_statistics: bool) -> Judged:
         """The errors of the result; of_statistics: with those of extremes and standard deviations."""
@@ -325,7 +327,7 @@ class ErrorController:
                     found[k] = self._counted(run())
                 except ComputationError as error:
                     if not k:
-                        text = f"no error figure: a coarser run to compare with failed: {str(error).splitlines()[0]}"
+                        text = f"error not known: a coarser run to compare with failed: {str(error).splitlines()[0]}"
                         self._notes.append(("no error figure", text))
                         return None
         assert found[0] is not None

@@ -18,9 +18,10 @@ from hybrid.simulation.free_vibrations import uncertain_by_vibrations
 from hybrid.simulation.refinement import END_FORCE, bounds_of
 from hybrid.simulation.result_checks import damped_jolts, undersampled_end_forces
 from hybrid.simulation.run_sample import END_FORCES, RunSample
-from hybrid.store.amend import Happened, amend
+from hybrid.store.amend import NOTHING_MORE, Happened, amend
 from hybrid.store.format import Field
 from hybrid.store.late_file import LateFile
+from hybrid.store.named_arrays import Tree
 from hybrid.store.records import not_converged_attribute
 
 UNITS = {
@@ -36,11 +37,11 @@ CAUSES = {
 
 def write_errors(
     target: Path | io.BytesIO | LateFile, scene: Scene, control: ErrorController, result: RunSample,
-    errors: Errors | None, cpu: float, done: bool = True,
+    errors: Errors | None, cpu: float, before: Tree | None = NOTHING_MORE,
 ) -> None:  # fmt: skip
     """Add errors (None: they could not be estimated), attributes and events to a complete result.
 
-    cpu: s, of all passes; done: nothing is left to be refined; else the file keeps what a refinement is resumed from.
+    cpu: s, of all passes; before: as of `amend`.
     """
     attributes = effort(scene, control, result, cpu)
     fields = error_fields(result, errors) if errors is not None else []
@@ -55,7 +56,7 @@ def write_errors(
         found, notes = known(scene, control, result, errors, happened)
         return attributes | found, notes
 
-    amend(target, fields, blocks(), known_then, done)
+    amend(target, fields, blocks(), known_then, before)
 
 
 def effort(scene: Scene, control: ErrorController, result: RunSample, cpu: float) -> dict[str, str | float | int]:

@@ -26,6 +26,8 @@ A_LITTLE = 0.8
 # Times the processor time of its last run beyond which an accuracy says what it will cost, and the kind of event; less
 # than the last, in s, is not worth a word.
 COSTLY, COSTLY_ACCURACY, LITTLE = 4.0, "costly accuracy", 0.5
+# s of processor time that a finer run will take, from which on the errors of the result before it are written first.
+WORTH_WRITING = 2.0
 END_FORCE = next(iter(END_FORCES.values()))
 RAW = {of: raw for raw, of in END_FORCES.items()}  # what runs call the forces at the ends
 
@@ -126,16 +128,18 @@ def not_converged(found: Mapping[str, float], asked: RequestedAccuracy | None) -
     return [(kind, f"{why}: {', '.join(names)}; {end}") for kind, names in texts.items()]
 
 
+def times_the_cost(now: Resolution, finer: Resolution) -> float:
+    """How many times as long as a run a finer one takes."""
+    more = finer.fineness / now.fineness * (now.step / finer.step if finer.step else 1.0)
+    return more * float(now.local / finer.local) ** (1.0 / 3.0) if now.local and finer.local else more
+
+
 def costly(runs: Sequence[float], before: RunSample, resolution: Resolution) -> list[tuple[str, str]]:
     """Before a finer run: the event that says so where all runs take more than COSTLY times as long as it will.
 
     runs: s of processor time, until now; before: the last result; resolution: of the finer one.
     """
-    now = before.resolution
-    more = resolution.fineness / now.fineness * (now.step / resolution.step if resolution.step else 1.0)
-    if now.local and resolution.local:
-        more *= float(now.local / resolution.local) ** (1.0 / 3.0)
-    one = before.cpu * more
+    one = before.cpu * times_the_cost(before.resolution, resolution)
     total = sum(runs) + one
     if total <= COSTLY * one or total < LITTLE:
         return []

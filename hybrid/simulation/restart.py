@@ -112,15 +112,13 @@ def remaining_system(
         if isinstance(found, Scene):
             return None
         found = as_begun(found, result)
-        status, reached = result.status, float(result.times[-1]) if len(result.times) else 0.0
-    with opened(path) as file:
-        unjudged = bool(read_before(file))
+        done, reached = result.done, float(result.times[-1]) if len(result.times) else 0.0
     if settings or start is not None:
         given = ", ".join(settings) or f"from {start:g} s"
         expected = "nothing to change, because the result is of several lines: they go on with the loads they have"
         raise _refused("settings", given, expected, "run the changed scene from its start")
     if until is None:
-        if status == "complete" and not unjudged:
+        if done:
             fix = "--until T goes on beyond its end"
             raise ResultError(f"{path} is complete: there is nothing left to do\n    try:      {fix}")
         return found

@@ -23,6 +23,7 @@ from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target, Tex
 from hybrid.store.format import Field
 from hybrid.store.named_arrays import Tree
 from hybrid.store.recorder import BaseRecorder
+from hybrid.store.records import PENDING
 from hybrid.store.writer import Recorder
 
 if TYPE_CHECKING:
@@ -56,17 +57,20 @@ def result_recorder(
     outputs: int = 0,
     before: Tree | None = None,
     late: bool = False,
+    pending: str = "",
 ) -> Recorder | ArrayRecorder:
     """A new result, in a file or in memory; whether a file may be replaced was asked before anything was computed.
 
     found: the equilibrium at the start; envelope: of what is computed, its values not yet known; outputs: after the
-    first, 0 of an equilibrium; before, late: as of `Recorder`.
+    first, 0 of an equilibrium; before, late: as of `Recorder`; pending: what is to come when it is complete.
     """
     attributes: dict[str, str | float | int] = {
         "title": scene.title, "cells": model.cells, "length": model.length, "tension_scale": model.tension_scale,
     }  # fmt: skip
     if found is not None:
         attributes |= {"static_path": found.summary, "static_residual": found.residual}
+    if pending:
+        attributes[PENDING] = pending
     fixed = [*_surroundings(model), *_limits(scene, observer), *envelope.fixed(), *mesh_fields(model)]
     if scene.output.history:
         points = np.array(scene.output.history)

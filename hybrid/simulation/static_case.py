@@ -37,6 +37,7 @@ from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import POWERS
 from hybrid.store.array_recorder import Target
+from hybrid.store.records import ERROR_ESTIMATE
 
 
 class StaticCase:
@@ -54,7 +55,8 @@ class StaticCase:
         if model.line.bits & SELF_CONTACT and (where := within_itself(model, np.inf, found.state)):
             refuse_contact(model, where)
         envelope = Envelope(self.scene, model, moves=False)
-        with result_recorder(self.scene, model, observer, target, texts, found, envelope) as recorder:
+        pending = ERROR_ESTIMATE if wants_errors(self.scene) else ""
+        with result_recorder(self.scene, model, observer, target, texts, found, envelope, pending=pending) as recorder:
             ends, events = model.ends.at(np.inf), EventLog()
             diagnostics = Diagnostics(model, events)
             diagnostics.begin()

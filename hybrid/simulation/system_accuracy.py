@@ -1,9 +1,9 @@
 """Several lines, computed as often and as finely as it takes for the accuracy that is asked of each.
 
-As of one cable (simulation.error_control): a coarse run shows where cells should be short, coarser runs what the errors
-will be, and where a result misses what is asked, a finer one follows.  Each line has an error control of its own, which
-sees the line in all of the runs; what one of them asks for, all get: steps are the same, and the error of a line may
-come from the cells of the next.
+As of one cable (simulation.error_control): a coarse run shows where cells should be short, the result follows, coarser
+runs show what its errors are, and where it misses what is asked, a finer one follows.  Each line has an error control
+of its own, which sees the line in all of the runs; what one of them asks for, all get: steps are the same, and the
+error of a line may come from the cells of the next.
 """
 
 from __future__ import annotations
@@ -42,7 +42,14 @@ from hybrid.simulation.error_statistics import statistics_of
 from hybrid.simulation.finer_result import NOT_KEPT, Replacement, is_no_better, not_kept_text
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution, with_survey
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
-from hybrid.simulation.refinement import COSTLY_ACCURACY, Free, costly, verdicts
+from hybrid.simulation.refinement import (
+    COSTLY_ACCURACY,
+    WORTH_WRITING,
+    Free,
+    costly,
+    times_the_cost,
+    verdicts,
+)
 from hybrid.simulation.restore import refused, resolution_from, resolution_tree
 from hybrid.simulation.run_sample import (
     NOT_ESTIMATED,
@@ -59,7 +66,7 @@ from hybrid.store.format import Field
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
-from hybrid.store.records import not_converged_attribute
+from hybrid.store.records import ERROR_ESTIMATE, not_converged_attribute
 
 # Events that make it uncertain whether an accuracy is met.
 DOUBTS = (
@@ -140,16 +147,14 @@ class SystemPasses:
         """The result, as fine as it takes, with its errors; source: a result to go on with."""
         first, result = self._goes_on(source) if source is not None else (None, None)
         if first is None:
-            first = self._surveyed(SystemResolution.first(self.system))
+            resolution = first = self._surveyed(SystemResolution.first(self.system))
             self._expect(first)
-            self._compare(first)
-            resolution = self._forecast(first)
             result = self._record(resolution, self.target, RESULT, found=_tree(first))
         else:
             assert source is not None
             resolution = kept_resolution(self.system, source)
-            self._compare(first)
         assert result is not None
+        self._compare(first)
         self._refine(resolution, result)
 
     def _goes_on(self, source: Path) -> tuple[SystemResolution, Samples]:
@@ -183,9 +188,9 @@ class SystemPasses:
             asked = system_without_contact(asked)
         if self.moves:
             text, look = scene_text(asked), self.interrupted
-            run = run_system(asked, target, text, self.reporter, look, source, name, resolution, found)
+            run = run_system(asked, target, text, self.reporter, look, source, name, resolution, found, ERROR_ESTIMATE)
         else:
-            run = static_system(asked, target, scene_text(asked), resolution)
+            run = static_system(asked, target, scene_text(asked), resolution, ERROR_ESTIMATE)
         self._costs.append(clock.process_time() - begin)
         if target is not None:
             return self._samples(target, run.resolution, self._costs[-1])
@@ -234,7 +239,7 @@ class SystemPasses:
         if not self.moves:
             return
         passes = [(ESTIMATION, x) for x in comparison_resolutions(first.one, self.moves)]
-        self.reporter.expect([*passes, (RESULT, first.one)], first.one)
+        self.reporter.expect([(RESULT, first.one), *passes], first.one)
 
     def _compare(self, first: SystemResolution) -> None:
         """The runs to compare with, as of `ErrorController`."""
@@ -268,11 +273,6 @@ class SystemPasses:
             failed = str(error).splitlines()[0]
         return with_model_errors(runs, found, names, failed)
 
-    def _forecast(self, first: SystemResolution) -> SystemResolution:
-        """How finely the first result is computed: finer, where the runs to compare with show that it must be."""
-        wanted = {name: x.forecast_resolution(first.lines[name]) for name, x in self.controls.items()}
-        return self._finer(first, wanted)
-
     def _finer(self, now: SystemResolution, wanted: Mapping[str, Resolution]) -> SystemResolution:
         """As fine as the finest that is wanted; what the scene gives stays."""
         cells = max(x.fineness / now.lines[name].fineness for name, x in wanted.items())
@@ -293,6 +293,9 @@ class SystemPasses:
         while wanted:
             finer = self._finer(resolution, wanted)
             self._warn_of_costs(result, finer)
+            run = next(iter(result.values()))
+            if run.cpu * times_the_cost(run.resolution, next(iter(finer.lines.values()))) > WORTH_WRITING:
+                self._write(resolution, result, done=False)  # what follows takes long
             try:
                 found = self._replacement.finer(partial(self._record, finer, name=REFINEMENT, found=_tree(finer)))
             except ComputationError as error:
@@ -306,7 +309,7 @@ class SystemPasses:
             if kept:
                 result, resolution = found, finer
         self._note_missed(why)
-        self._write(resolution, result)
+        self._write(resolution, result, done=stopped is None)
         if stopped is not None:
             raise stopped
 
@@ -388,8 +391,8 @@ class SystemPasses:
 
     # --- the file -------------------------------------------------------------------------------
 
-    def _write(self, resolution: SystemResolution, result: Samples) -> None:
-        """Add errors, what was asked and whether it is met to the result of each line."""
+    def _write(self, resolution: SystemResolution, result: Samples, done: bool = True) -> None:
+        """Add errors, what was asked and whether it is met to the result of each line; done: as of `amend`."""
         cpu = clock.process_time() - self._begin
         fields, values = dict[str, list[Field]](), dict[str, dict[str, np.ndarray]]()
         attributes, notes = dict[str, dict[str, str | float | int]](), dict[str, list[tuple[str, str]]]()
@@ -418,7 +421,7 @@ class SystemPasses:
         of_all |= {"effort_runs": len(self._costs), "effort_cpu": cpu}
         of_all |= not_converged_attribute(x.diverging for x in self.controls.values())
         events = [(kind, f"line {name}: {text}") for name, each in notes.items() for kind, text in each]
-        amend_lines(self.target, fields, values, attributes, of_all, [*self._notes, *events], notes)
+        amend_lines(self.target, fields, values, attributes, of_all, [*self._notes, *events], notes, done)
 
 
 def _elsewhere(resolution: Resolution) -> RunSample:

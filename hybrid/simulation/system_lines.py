@@ -75,12 +75,12 @@ class LineResult:
 
     def __init__(
         self, number: int, name: str, scene: Scene, model: Model, found: SystemEquilibrium | None, state: State,
-        outputs: int, target: Target | None = None,
+        outputs: int, target: Target | None = None, pending: str = "",
     ) -> None:  # fmt: skip
         """number: of the line in its system; found: the equilibrium that it starts from, None: it goes on; state: from
 
         which displacements count; outputs: after the first, 0 of an equilibrium; target: of the system, None: it is
-        only to be compared with.
+        only to be compared with; pending: as of the run.
         """
         self.number, self.name, self.model, self.scene = number, name, model, scene
         self.events = EventLog()
@@ -96,7 +96,9 @@ class LineResult:
         self.recorder = ComparisonRecorder(FORCE_COLUMNS)
         if target is not None:
             to, texts = self.target or io.BytesIO(), {"scene": partial(scene_text, scene)}
-            recorder = result_recorder(scene, model, self.observer, to, texts, found, self.envelope, outputs)
+            recorder = result_recorder(
+                scene, model, self.observer, to, texts, found, self.envelope, outputs, pending=pending
+            )
             if isinstance(recorder, Recorder):
                 recorder.lay_by()
             self.recorder = recorder

@@ -48,6 +48,7 @@ from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
+from hybrid.store.records import PENDING
 from hybrid.store.writer import Recorder
 
 # A step that fails is repeated in halves, down to this part of it.
@@ -63,14 +64,16 @@ class SystemRun:
     def __init__(
         self, system: System, target: Target | None, text: Text, moves: bool, kept: bool = False,
         source: Path | None = None, resolution: SystemResolution | None = None, found: Tree | None = None,
+        pending: str = "",
     ) -> None:  # fmt: skip
         """target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether
 
         its motion is wanted, else its equilibrium under full loads; kept: whether a file gets checkpoints; source: the
         result to go on with, from its checkpoint, in place of a start; resolution: how finely, None: as the scene asks
-        for, or the checkpoint says; found: what was found before the run, for whoever goes on with its file.
+        for, or the checkpoint says; found: what was found before the run, for whoever goes on with its file; pending:
+        what is to come when it is complete (store.records).
         """
-        self._before = found or {}
+        self._before, self._pending = found or {}, pending
         self.system, self.target, self.moves = system, target, moves
         self.kept = kept and isinstance(target, Path)
         if source is not None:
@@ -101,7 +104,7 @@ class SystemRun:
             managers = managers_for(dict(zip(names, self.scenes, strict=True)), self.model)
             self.start_from(self.model.body_places)
         self.lines = [
-            LineResult(k, name, scene, model, self.found, state, len(self.times), target)
+            LineResult(k, name, scene, model, self.found, state, len(self.times), target, pending)
             for k, (name, scene, model, state) in enumerate(
                 zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
             )
@@ -145,6 +148,8 @@ class SystemRun:
             "static_residual": self.found.residual,
         }  # fmt: skip
         on_bodies = {x: point.body for x, point in self.system.points.items() if isinstance(point, Fairlead)}
+        if self._pending:
+            attributes[PENDING] = self._pending
         if on_bodies:
             attributes["fairleads"] = json.dumps(on_bodies)
         fields = [*fields_of(self.system), *self.quantities.fields]
@@ -179,7 +184,7 @@ class SystemRun:
             self.other, self._between = self.state.copy(), True
             fields = [*fields_of(self.system), *self.quantities.fields]
             recorder = Recorder.again(
-                file, self.target, fields, (), point, {"scene": text}, self._before, (), self._parts
+                file, self.target, fields, (), point, {"scene": text}, self._before, (), self._parts, self._pending
             )
         recorder.files = files_of(self.system)
         if why := other_program(point):
@@ -496,23 +501,25 @@ class SystemRun:
 def run_system(
     system: System, target: Target | None, text: str, reporter: ProgressReporter,
     interrupted: Callable[[], bool], source: Path | None = None, name: str = RESULT,
-    resolution: SystemResolution | None = None, found: Tree | None = None,
+    resolution: SystemResolution | None = None, found: Tree | None = None, pending: str = "",
 ) -> SystemRun:  # fmt: skip
     """Compute the motion of a system into a file, into memory, or (target None) to be compared with.
 
     source: what to go on with; name: of the pass;
-    resolution: how finely, None: as the scene asks for; found: as of `SystemRun`.
+    resolution: how finely, None: as the scene asks for; found, pending: as of `SystemRun`.
     """
-    run = SystemRun(system, target, text, moves=True, kept=True, source=source, resolution=resolution, found=found)
+    run = SystemRun(
+        system, target, text, moves=True, kept=True, source=source, resolution=resolution, found=found, pending=pending
+    )
     reporter.begin(name, run.resolution.one)
     run.record_motion(reporter, interrupted)
     return run
 
 
 def static_system(
-    system: System, target: Target | None, text: Text, resolution: SystemResolution | None = None
+    system: System, target: Target | None, text: Text, resolution: SystemResolution | None = None, pending: str = ""
 ) -> SystemRun:
-    """Compute the equilibrium of a system under full loads; target, resolution: as of `run_system`."""
-    run = SystemRun(system, target, text, moves=False, resolution=resolution)
+    """Compute the equilibrium of a system under full loads; target, resolution, pending: as of `run_system`."""
+    run = SystemRun(system, target, text, moves=False, resolution=resolution, pending=pending)
     run.record_equilibrium()
     return run

@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import nan
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 from h5py import h5d, h5p, h5s
 
 from hybrid.store.array_contents import ArrayContents, ArrayDataset
-from hybrid.store.checkpoint import BEFORE
+from hybrid.store.checkpoint import BEFORE, write_before
 from hybrid.store.format import EVENTS, Field, annotate, attach_scales, checked, plain_text
 from hybrid.store.hdf5_file import beside, in_memory, redrafted, unwritable
 from hybrid.store.integrity import copy_unsigned, sign_new
 from hybrid.store.late_file import LateFile
 from hybrid.store.lines import GROUP
+from hybrid.store.named_arrays import Tree
+from hybrid.store.records import FINER_RESULT, PENDING
 from hybrid.store.table import NUMBERS, Table, write_rows
+
+AFTERWARDS = ("error_", "effort_", "accuracy_")  # what attributes begin with that are brought here
+NOTHING_MORE: Tree = {}  # what a run that is done leaves to go on with
+AMENDED = "amended"  # attribute of a result that will be amended again: what is to be taken back then
 
 # Name of a quantity, number of its first output, and values; attributes, and events (kind, text).
 Block = tuple[str, int, np.ndarray]
@@ -32,24 +40,27 @@ def amend(
     fields: Sequence[Field],
     blocks: Iterable[Block],
     others: Callable[[Happened], Others],
-    done: bool = True,
+    before: Tree | None = NOTHING_MORE,
 ) -> None:
     """Add to a complete result what is known only afterwards.
 
     fields: quantities over the output times, (nt, ...); blocks: all their values: name, number of the first output, and
     values (n, ...) of n outputs; others: gives attributes, and events of all the cable (kind, text), after the last
-    block, from the events that the result has; done: whether nothing is left to go on with.
+    block, from the events that the result has; before: what a run needs that goes on from here, None: what is there;
+    a finer result is to come then, and what is added here is taken back when more is added.  Else all is done.
     """
+    done = before is not None and not before
 
     def add(file: h5py.File) -> None:
-        if done and BEFORE in file:
+        if before is not None and BEFORE in file:
             del file[BEFORE]
-        _add(file, fields, blocks, others)
+        write_before(file, before)
+        _add(file, fields, blocks, others, done)
 
     if isinstance(target, LateFile):
-        if done:
-            target.before = None
-        _add_to_arrays(target.contents, fields, blocks, others)
+        if before is not None:
+            target.before = before or None
+        _add_to_arrays(target.contents, fields, blocks, others, done)
         target.place()
     else:
         change_complete(target, add)
@@ -63,21 +74,23 @@ def amend_lines(
     of_all: Mapping[str, str | float | int],
     events: Sequence[tuple[str, str]],
     of_lines: Mapping[str, Sequence[tuple[str, str]]] | None = None,
+    done: bool = True,
 ) -> None:
     """Add to a complete result of several lines what is known of each only afterwards.
 
     fields, values, attributes: by the name of the line, as of `amend`; of_all: attributes of the system; events: of it,
-    of_lines: of lines.
+    of_lines: of lines; done: whether nothing is left to go on with, as of `amend`.
     """
     notes = of_lines or {}
 
     def add(file: h5py.File) -> None:
-        if BEFORE in file:
+        if done and BEFORE in file:
             del file[BEFORE]
         for name, each in fields.items():
             blocks = [(field.name, 0, values[name][field.name]) for field in each]
-            _add(file[f"{GROUP}/{name}"], each, blocks, lambda _, name=name: (attributes[name], notes.get(name, ())))  # type: ignore[misc]
-        _add(file, (), (), lambda _: (of_all, events))
+            known = attributes[name], notes.get(name, ())
+            _add(file[f"{GROUP}/{name}"], each, blocks, lambda _, known=known: known, done)  # type: ignore[misc]
+        _add(file, (), (), lambda _: (of_all, events), done)
 
     change_complete(target, add)
 
@@ -108,8 +121,9 @@ def change_complete(target: Path | io.BytesIO, change: Callable[[h5py.File], Non
 
 
 def _add_to_arrays(
-    contents: ArrayContents, fields: Sequence[Field], blocks: Iterable[Block], others: Callable[[Happened], Others]
-) -> None:
+    contents: ArrayContents, fields: Sequence[Field], blocks: Iterable[Block], others: Callable[[Happened], Others],
+    done: bool,
+) -> None:  # fmt: skip
     """The same of a result that is in memory."""
     times, named, found = contents.values("t", None), {x.name: x for x in fields}, dict[str, np.ndarray]()
     for name, begin, values in blocks:
@@ -123,6 +137,7 @@ def _add_to_arrays(
     kinds = [plain_text(x) for x in contents.values("events/kind", None)]
     attributes, events = others(list(zip(contents.values("events/t", None).tolist(), kinds, strict=True)))
     contents.attributes |= {key: x.item() if isinstance(x, np.generic) else x for key, x in attributes.items()}
+    _say_what_is_to_come(contents.attributes, done, fields, len(kinds))
     if events:
         table, end = Table(None, "events", EVENTS), float(contents.values("s", None)[-1])
         table.add([contents.values(f"events/{x.name}", None) for x in EVENTS])
@@ -133,8 +148,9 @@ def _add_to_arrays(
 
 
 def _add(
-    file: h5py.Group, fields: Sequence[Field], blocks: Iterable[Block], others: Callable[[Happened], Others]
+    file: h5py.Group, fields: Sequence[Field], blocks: Iterable[Block], others: Callable[[Happened], Others], done: bool
 ) -> None:
+    _take_back(file)
     count, named, scales = len(file["t"]), {field.name: field for field in fields}, dict[str, h5d.DatasetID]()
     with_groups = h5p.create(h5p.LINK_CREATE)
     with_groups.set_create_intermediate_group(True)
@@ -157,6 +173,7 @@ def _add(
     attributes, events = others(list(zip(file["events/t"][:].tolist(), kinds, strict=True)))
     for name, value in attributes.items():
         file.attrs[name] = value
+    _say_what_is_to_come(file.attrs, done, fields, len(kinds))
     if events:
         table = Table(file, "events", EVENTS)
         table.count = len(file["events/t"])
@@ -164,3 +181,24 @@ def _add(
             table.add_row((0.0, 0.0, float(file["s"][-1]), *event, "", nan, nan, nan))
         table.write()
         table.commit()
+
+
+def _say_what_is_to_come(attributes: Any, done: bool, fields: Sequence[Field], events: int) -> None:
+    """Set the attributes of a result that say whether more is to come; events: that it had before."""
+    attributes.pop(PENDING, None)
+    if not done:
+        attributes[PENDING] = FINER_RESULT
+        attributes[AMENDED] = json.dumps({"fields": [x.name for x in fields], "events": events})
+
+
+def _take_back(file: h5py.Group) -> None:
+    """Remove what was added while more was to come."""
+    added = json.loads(file.attrs.get(AMENDED, "{}"))
+    if not added:
+        return
+    for name in [x for x in file.attrs if x.startswith((*AFTERWARDS, AMENDED))]:
+        del file.attrs[name]
+    for name in added["fields"]:
+        del file[name]
+    for column in EVENTS:
+        file[f"events/{column.name}"].resize(added["events"], axis=0)

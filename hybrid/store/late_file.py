@@ -11,6 +11,7 @@ import os
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
+from time import monotonic
 from weakref import WeakSet
 
 import numpy as np
@@ -21,6 +22,7 @@ from hybrid.store.integrity import tail_of
 from hybrid.store.named_arrays import Tree
 from hybrid.store.whole_file import parts_of_file
 
+WAITS = 0.2  # s, that it waits at most while errors of the result are estimated, as outputs are held back
 # Bytes of all results in memory whose files are written; of those after them the arrays are read when they are needed.
 MOST_STAYING = 256_000_000
 _staying: WeakSet[ArrayContents] = WeakSet()
@@ -36,12 +38,18 @@ class LateFile:
         """path: its place; checkpoints, before, templates: as of `parts_of_file`."""
         self.path, self.contents, self.placed = path, contents, False
         self._checkpoints, self._templates = checkpoints, templates
+        self._made = monotonic()  # s
         self.before = before  # what a run that goes on needs, until all is done
 
     @property
     def data(self) -> dict[str, np.ndarray]:
         """Its arrays by name."""
         return {name: x.values for name, x in self.contents.data.items()}
+
+    def place_if_due(self) -> None:
+        """Put it in its place where it has waited for as long as outputs are held back."""
+        if monotonic() - self._made > WAITS:
+            self.place()
 
     def place(self) -> None:
         """Put it in its place, on the disk when this returns; a second call does nothing.

@@ -48,6 +48,8 @@ from hybrid.store.late_file import LateFile
 from hybrid.store.lines import Lines
 from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, right_of
 from hybrid.store.records import (
+    FINER_RESULT,
+    PENDING,
     THERE,
     Attributes,
     Columns,
@@ -344,10 +346,33 @@ class Result(Histories):
         return str(self.attributes["message"])
 
     @property
+    def pending(self) -> str:
+        """What is still to come of a complete result, and the one thing to do, in words; empty: nothing is.
+
+        The result comes first, and its errors and finer results after it, unless the run is stopped in between.
+        """
+        pending = str(self.attributes.get(PENDING, ""))
+        if not pending or self.status != "complete":
+            return ""
+        what = "its errors are not estimated yet"
+        if pending == FINER_RESULT:
+            what = "the finer result that its accuracy asks for is not computed yet"
+        name = self._source.name if isinstance(self._source, Path) else "the file"
+        fix = f"`hybrid resume {name}` makes up for it"
+        if len(self.times) < 2:
+            fix = "`hybrid static` of its scene, which is computed anew, makes up for it"
+        return f"{what}; {fix}"
+
+    @property
+    def done(self) -> bool:
+        """Whether the run has come to its end, and nothing is to come."""
+        return self.status == "complete" and not self.pending
+
+    @property
     def status_text(self) -> str:
-        """The status in words, with its message."""
+        """The status in words, with its message, and with what is still to come."""
         status = "interrupted or still running" if self.status == "running" else self.status
-        return f"{status}: {self.message}" if self.message else status
+        return "; ".join(filter(None, (f"{status}: {self.message}" if self.message else status, self.pending)))
 
     @property
     def versions(self) -> dict[str, str]:

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from hybrid.store.reader import Result
 
 
+# Attribute of a result that is complete and to which more will be added, and what that is.
+PENDING, ERROR_ESTIMATE, FINER_RESULT = "pending", "error estimate", "finer result"
+
 UNKNOWN = "error not known: not converged"  # in place of the figure of an error that says nothing
 
 

@@ -185,6 +185,8 @@ def missing_parts(part: Part) -> list[str]:
     said, t, whole = [], part.times, part.result["t"]
     if part.result.status != "complete":
         said.append(f"the run is not complete ({part.result.status_text}): t ends at {whole[-1]:.9g} s")
+    elif part.result.pending:
+        said.append(part.result.pending)
     if len(t) < len(whole):
         said.append(f"only t = {t[0]:.9g} to {t[-1]:.9g} s of {whole[0]:.9g} to {whole[-1]:.9g} s")
     return said

@@ -27,6 +27,7 @@ import h5py
 import numpy as np
 from h5py import h5d
 
+from hybrid.store.amend import AFTERWARDS, AMENDED
 from hybrid.store.array_contents import HeldValues
 from hybrid.store.checkpoint import BEFORE, SLOTS, Checkpoint, check_tables, create_slots, write_before, write_slot
 from hybrid.store.copying import copied, names_in
@@ -58,6 +59,7 @@ from hybrid.store.late_file import LateFile
 from hybrid.store.lines import GROUP, add_parts, in_turn, of_all, of_part
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.recorder import STATUS, BaseRecorder
+from hybrid.store.records import PENDING
 from hybrid.store.table import Table
 from hybrid.store.template import template
 
@@ -66,7 +68,6 @@ from hybrid.store.template import template
 _PAUSE, _PART = 0.2, 50.0
 # Bytes of outputs that wait at most, so that the memory of a long run stays flat: it computes 30 MB a second.
 _MOST_WAITING = 16_000_000
-AFTERWARDS = ("error_", "effort_", "accuracy_")  # attributes that `amend` brings
 
 
 class Late(NamedTuple):
@@ -152,12 +153,13 @@ class Recorder(BaseRecorder):
     def again(
         cls, source: h5py.File, path: Path, fields: Sequence[Field], step_fields: Sequence[Field], at: Checkpoint,
         texts: Mapping[str, str], before: Tree, fixed: Sequence[tuple[Field, np.ndarray]] = (),
-        parts: Mapping[str, Recorder] | None = None,
+        parts: Mapping[str, Recorder] | None = None, pending: str = "",
     ) -> Recorder:  # fmt: skip
         """Go on with a result from one of its checkpoints; what came after is left out.  path: where, perhaps the same.
 
         fixed: quantities that do not depend on time, with values for those that the file does not have.  parts: results
-        of lines, laid by in memory, which go on with the groups of the file that have their names.
+        of lines, laid by in memory, which go on with the groups of the file that have their names.  pending: what is
+        to come when it is complete (store.records).
         ResultError if the file holds other fields, or cannot be written.
         """
         self, tables = cls.__new__(cls), tables_of(fields, step_fields)
@@ -186,8 +188,10 @@ class Recorder(BaseRecorder):
                     copied(groups[name], file.create_group(f"{GROUP}/{name}"), of_part(name, at.rows), {"errors"})
                 for each in (file, *(file[f"{GROUP}/{name}"] for name in parts or {})):
                     set_status(each, "running", "")
-                    for name in [x for x in each.attrs if x.startswith(AFTERWARDS)]:
+                    for name in [x for x in each.attrs if x.startswith((*AFTERWARDS, AMENDED, PENDING))]:
                         del each.attrs[name]
+                    if pending:
+                        each.attrs[PENDING] = pending
 
         self._memory = None
         file = created(path.expanduser().resolve(), make, many=bool(parts))

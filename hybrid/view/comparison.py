@@ -95,7 +95,7 @@ def _verdict(results: Mapping[str, Result]) -> str:
     for name, result in results.items():
         kinds = [event.kind for event, _ in warnings_of(result)]
         broken = [x.limit for x in limits_of(result, result) if x.broken]
-        bad |= bool(kinds or broken) or result.status != "complete"
+        bad |= bool(kinds or broken) or not result.done
         told = [result.status_text.splitlines()[0], ", ".join(kinds) or "no warnings"]
         told += [f"broken: {', '.join(broken)}"] if broken else []
         lines.append(f"<li><b>{escape(name)}.</b> {escape('; '.join(told))}</li>")

@@ -15,7 +15,7 @@ from hybrid.view.summary import warnings_of
 def page_of(result: Result, facts: list[str], **more: Any) -> Page:
     """A page about a result: title and facts above the panels, warnings below."""
     n, complete = len(result.times), result.status == "complete"
-    head = [] if complete else [result.status_text]
+    head = [] if result.done else [result.status_text]
     if n:
         span = f"{n} outputs, t = {short(result.times[0], 5)} … {short(result.times[-1], 5)} s"
         head.append(span if n > 1 else "static" if complete else f"one output, t = {short(result.times[0], 5)} s")
@@ -31,7 +31,7 @@ def page_of(result: Result, facts: list[str], **more: Any) -> Page:
     if broken:
         more_of = f" and {len(broken) - 1} more" * (len(broken) > 1)
         note = f"{note or 'Warning'}{';' if note else ':'} {broken[0].text}{broken[0].when}{more_of}"
-    texts, alarm = "; ".join(filter(None, [*head, *facts])), (not complete, bool(alarms or broken))
+    texts, alarm = "; ".join(filter(None, [*head, *facts])), (not result.done, bool(alarms or broken))
     empty = "" if n else "no output was saved"
     return Page(
         result.title or "(no title)",

@@ -24,11 +24,10 @@ def card(result: Result) -> str:
     """The HTML of one result; it holds no script and asks for nothing from outside."""
     facts = facts_of(result)
     first = attention(facts)
-    good = result.status == "complete"
+    good = result.done
     n, s = len(result.times), result.s
-    span = (
-        f"t = {short(result.times[0], 6)} … {short(result.times[-1], 6)} s" if n > 1 else "static" if n and good else ""
-    )
+    span = f"t = {short(result.times[0], 6)} … {short(result.times[-1], 6)} s" if n > 1 else ""
+    span = "static" if n == 1 and result.status == "complete" else span
     head = (
         f"{n} output{'s' * (n != 1)}"
         + f", {span}" * bool(span)

@@ -134,7 +134,7 @@ def _warnings(result: Result) -> list[Fact]:
     if not any(fact.weight == "alarm" for fact in facts):
         held = [x for one in (result, *result.lines.values()) for x in held_of(one)]
         broken = any(event.kind in LIMIT_EVENTS.values() for event in result.events) or any(x.broken for x in held)
-        beside = [*["limits that are broken"] * broken, *["how it ended"] * (result.status != "complete")]
+        beside = [*["limits that are broken"] * broken, *["how it ended"] * (not result.done)]
         none = f"None, beside {' and '.join(beside)}." if beside else "None were given."
         facts.insert(0, Fact("warning", "Warnings", none, values={"count": 0}))
     return facts
@@ -460,6 +460,6 @@ def _status(result: Result) -> Fact:
         held = f" One output, at t = {short(result.times[0], 6)} s."
     else:
         held = f" {n} outputs, t = {short(result.times[0], 6)} to {short(result.times[-1], 6)} s."
-    good = result.status == "complete"
+    good = result.done
     text = f"{result.status_text[:1].upper()}{result.status_text[1:].rstrip('.')}.{held}"
     return Fact("status", "How it ended", text, "plain" if good else "alarm", values)

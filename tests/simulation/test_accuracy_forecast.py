@@ -1,4 +1,4 @@
-"""The first result is as fine as the runs to compare with show that it must be; long storms have short pre-runs."""
+"""Orders that runs to compare with show, whatever the result is finer by; long storms have short pre-runs."""
 
 from __future__ import annotations
 
@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.model.resolution import RequestedAccuracy, Resolution
+from hybrid.model.resolution import Resolution
 from hybrid.simulation.error_estimate import Estimate
-from hybrid.simulation.error_forecast import FORECAST_FINER, forecast
 from hybrid.simulation.mesh_survey import PERIODS, survey_duration
-from hybrid.simulation.refinement import Free, judge
 from hybrid.simulation.run_sample import RunSample
 
 FIRST = Resolution(1.0, 0.1, 1e-3, 1e-3)
-ALL_FREE = Free(True, True, False)
 
 
 def run(resolution: Resolution, order: float, mesh: float = 0.01, time: float = 0.004) -> RunSample:
@@ -43,24 +40,6 @@ def test_an_order_is_found_whatever_the_result_is_finer_by(order, mesh, time):
     assert estimate.order["position"] == pytest.approx(order, abs=0.02)
     assert estimate.errors.largest("mesh", "position") == pytest.approx(2 * mesh / 1.3**order, rel=0.03)
     assert estimate.errors.largest("time", "position") == pytest.approx(2 * time / 1.65**order, rel=0.03)
-
-
-@pytest.mark.parametrize("order", [1.6, 1.75, 2.0])
-@pytest.mark.parametrize("part", [0.6, 0.8])
-def test_a_first_result_that_would_miss_is_made_finer(order, part):
-    """Asked for 0.6 and 0.8 of its error: finer in both, and enough without a repetition."""
-    asked = RequestedAccuracy(part * 0.028, None, None)
-    found = forecast(asked, FIRST, ALL_FREE, runs(order))
-    assert 1.0 < found.fineness <= FORECAST_FINER + 1e-12 and FIRST.step / FORECAST_FINER - 1e-12 <= found.step < 0.1
-    result = run(found, order)
-    assert judge(asked, Estimate(result, *runs(order)).errors, result).ratio <= 1.1
-    assert forecast(asked, FIRST, Free(True, False, False), runs(order)).step == FIRST.step  # what is fixed
-
-
-def test_a_first_result_that_would_meet_what_is_asked_stays():
-    assert forecast(RequestedAccuracy(0.1, None, None), FIRST, ALL_FREE, runs(2.0)) == FIRST
-    # runs that are as wrong as this say nothing of a finer one
-    assert forecast(RequestedAccuracy(1e-4, None, None), FIRST, ALL_FREE, runs(2.0)) == FIRST
 
 
 def storm(duration: float, **more) -> hybrid.Scene:

@@ -35,7 +35,7 @@ def comparisons() -> list[RunSample]:
 
 
 def refined(second: RunSample | ComputationError) -> tuple[RunSample, ErrorController, list[bool]]:
-    """What control returns of a first result and what follows it, and what became of the latter."""
+    """What control returns of a first result and what follows it, and what became of both."""
     samples, results, settled = iter(comparisons()), iter([made_up(), second]), list[bool]()
 
     def result(_: Resolution) -> RunSample:
@@ -52,7 +52,7 @@ def refined(second: RunSample | ComputationError) -> tuple[RunSample, ErrorContr
 
 def test_a_finer_run_that_is_better_is_returned() -> None:
     found, control, settled = refined(made_up(3.0, 300))
-    assert found.cells == 300 and settled == [True]
+    assert found.cells == 300 and settled == [True, True]
     assert not {kind for kind, _ in control.notes} & {NOT_KEPT, "accuracy missed"}
 
 
@@ -62,7 +62,7 @@ def test_a_finer_run_far_off_does_not_replace_the_one_before() -> None:
     So it was with a curvature of 53 1/m where 2.6 are true: the finer run was returned.
     """
     found, control, settled = refined(made_up(3.0, 300, off=2.0))
-    assert found.cells == 100 and settled == [False]
+    assert found.cells == 100 and settled == [True, False]
     assert control.estimate is not None and control.estimate.run is found
     total = {name: x for cause, name, _, x in control.estimate.errors.blocks() if cause == "total"}["position"]
     assert total[5, 2] > 2.0 and total[2, 1] < 0.03

@@ -106,16 +106,18 @@ def test_it_is_there_when_the_run_is_stopped_and_goes_on(tmp_path: Path, monkeyp
     Stopping(monkeypatch, checkpoints=False)  # a step a call
     hybrid.run(described(True), tmp_path / "whole.h5").close()
     calls: list[int] = []
-    for stop in (10, 60):  # in the runs to compare with, of which nothing stays, or in the result
+    for stop, status in ((10, "interrupted"), (60, "complete")):  # in the result, or in the runs to compare with
         calls.clear()
         asked = nullcontext(lambda stop=stop: calls.append(0) or len(calls) >= stop)
         with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
             patched.setattr(api, "interrupts", lambda asked=asked: asked)
             hybrid.run(described(True), tmp_path / "run.h5")
-    with hybrid.open(tmp_path / "run.h5") as result:
-        assert result.status == "interrupted" and result.times[-1] < 2.0
-    hybrid.resume(tmp_path / "run.h5").close()
-    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+        with hybrid.open(tmp_path / "run.h5") as result:
+            assert result.status == status and (result.times[-1] == 2.0) == (status == "complete")
+            assert ("errors are not estimated yet" in result.pending) == (status == "complete")
+            assert result.pending in result.status_text and not result.done
+        hybrid.resume(tmp_path / "run.h5").close()
+        assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
     assert {x.name for x in tmp_path.iterdir()} == {"run.h5", "whole.h5"}
 
 

@@ -32,7 +32,7 @@ def test_every_pass_is_named_and_one_bar_spans_them(heard: list[Progress]) -> No
     scene = hybrid.parse_scene(HANGING + "time: {duration: 2.0}\naccuracy: 10 %\n")
     hybrid.run(scene, progress=heard.append).close()
     names = [p.name for k, p in enumerate(heard) if k == 0 or p.run != heard[k - 1].run]
-    assert names[:5] == [PRE_RUN, ESTIMATION, ESTIMATION, ESTIMATION, RESULT]
+    assert names[:5] == [PRE_RUN, RESULT, ESTIMATION, ESTIMATION, ESTIMATION]
     assert set(names[5:]) <= {REFINEMENT, ESTIMATION}
     planned = [p for p in heard if p.run <= 5]
     assert {p.runs for p in planned} == {5}
@@ -40,7 +40,7 @@ def test_every_pass_is_named_and_one_bar_spans_them(heard: list[Progress]) -> No
     assert fractions == sorted(fractions) and 0.0 < fractions[0] < 0.1 and fractions[-1] == pytest.approx(1.0)
     assert heard[-1].fraction == pytest.approx(1.0) and heard[-1].seconds_left == pytest.approx(0.0)
     assert all(p.seconds_left is None or p.seconds_left >= 0.0 for p in heard)
-    assert "run 2 of 5: error estimation" in next(p.text for p in heard if p.run == 2)
+    assert "run 3 of 5: error estimation" in next(p.text for p in heard if p.run == 3)
 
 
 def test_a_run_without_an_error_figure_is_one_pass(heard: list[Progress], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,176 @@
+"""The result comes first: what stops a run after it leaves it there, says what is missing, and is made up for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bits import Stopping, differences
+from test_late_file import described
+
+import hybrid
+from hybrid.errors import ComputationError, Outcome
+from hybrid.model.resolution import Resolution
+from hybrid.model.system import SystemResolution
+from hybrid.simulation import passes, system_accuracy, system_run
+from hybrid.simulation.case import Case
+from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
+from hybrid.simulation.static_case import StaticCase
+
+ERRORS, FINER = "its errors are not estimated yet", "the finer result that its accuracy asks for is not computed yet"
+
+
+def asked(accuracy: str = "0.3%") -> dict[str, Any]:
+    """Misses that in its first result, and takes a finer one."""
+    scene = described() | {"accuracy": accuracy, "time": {"duration": 2.0}, "output": {"every": 0.1, "points": 11}}
+    del scene["mesh"]
+    return scene
+
+
+def two_lines(accuracy: str = "0.03%") -> dict[str, Any]:
+    """The same of two lines that meet."""
+    section = {"length": 1.0, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e5}
+    motion = {"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0}
+    return {
+        "points": {
+            "a": {"position": [0, 0, 0]}, "b": {"position": [1.5, 0, 0], "motion": motion},
+            "m": {"initial_guess": [0.75, 0, -0.5], "mass": 0.2},
+        },
+        "lines": {x: {"start": x, "end": "m", "sections": [section], "model": "catenary"} for x in "ab"},
+        "time": {"duration": 1.0}, "accuracy": accuracy, "output": {"every": 0.1, "points": 5},
+    }  # fmt: skip
+
+
+def rougher(resolution: Resolution) -> Resolution:
+    assert resolution.local is not None
+    return replace(resolution.coarser(2.0, 1.0), local=10.0 * resolution.local)
+
+
+@pytest.fixture
+def rough(monkeypatch: pytest.MonkeyPatch) -> None:
+    """First results that are far too coarse for what is asked, so that finer ones follow."""
+    one, several = passes.Passes._surveyed, system_accuracy.SystemPasses._surveyed
+
+    def of_one(self: passes.Passes, resolution: Resolution) -> tuple[Any, Resolution]:
+        choice, found = one(self, resolution)
+        return choice, rougher(found)
+
+    def of_several(self: system_accuracy.SystemPasses, first: SystemResolution) -> SystemResolution:
+        return SystemResolution({name: rougher(x) for name, x in several(self, first).lines.items()})
+
+    monkeypatch.setattr(system_run, "LOOK", 1)
+    monkeypatch.setattr(passes.Passes, "_surveyed", of_one)
+    monkeypatch.setattr(system_accuracy.SystemPasses, "_surveyed", of_several)
+
+
+def stopped_in(name: str, scene: dict[str, Any], path: Path) -> None:
+    """A run that is stopped, like by Ctrl-C, at the first step that is heard of a pass with this name."""
+
+    def stop(progress: Progress) -> None:
+        if progress.name == name and progress.t < progress.duration:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(scene, path, progress=stop)
+
+
+@pytest.mark.parametrize(("name", "pending"), [(ESTIMATION, ERRORS), (REFINEMENT, FINER)])
+@pytest.mark.parametrize("scene", [asked(), two_lines()], ids=["one", "several"])
+@pytest.mark.usefixtures("rough")
+def test_stopped_after_the_result(
+    scene: dict[str, Any], name: str, pending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The result is complete and says what is to come; resumed, it is what it would have been."""
+    Stopping(monkeypatch)
+    hybrid.run(scene, tmp_path / "whole.h5").close()
+    stopped_in(name, scene, tmp_path / "run.h5")
+    with hybrid.open(tmp_path / "run.h5") as result:
+        assert result.status == "complete" and not result.done
+        assert pending in result.pending and "`hybrid resume run.h5`" in result.pending
+        assert result.times[-1] == scene["time"]["duration"]
+        assert any(x.startswith("error_total") for x in result.attributes) == (name == REFINEMENT)
+    hybrid.resume(tmp_path / "run.h5").close()
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+    assert sorted(x.name for x in tmp_path.iterdir()) == ["run.h5", "whole.h5"]
+    with hybrid.open(tmp_path / "run.h5") as result:
+        assert result.done and not result.pending and "amended" not in result.attributes
+
+
+def test_stopped_before_the_result_nothing_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Stopping(monkeypatch)
+    stopped_in(PRE_RUN, asked(), tmp_path / "run.h5")
+    assert not list(tmp_path.iterdir())
+
+
+def test_stopped_in_the_result_what_there_is_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Stopping(monkeypatch)
+    stopped_in(RESULT, asked(), tmp_path / "run.h5")
+    with hybrid.open(tmp_path / "run.h5") as result:
+        assert result.status == "interrupted" and not result.pending
+    hybrid.resume(tmp_path / "run.h5").close()
+    hybrid.run(asked(), tmp_path / "whole.h5").close()
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+
+
+@pytest.mark.usefixtures("rough")
+@pytest.mark.parametrize("module", [passes, system_accuracy])
+def test_errors_are_written_before_a_long_finer_run(
+    module: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are there while it runs, and the file that comes out is the same."""
+    scene = asked() if module is passes else two_lines()
+    hybrid.run(scene, tmp_path / "whole.h5").close()
+    monkeypatch.setattr(module, "WORTH_WRITING", -1.0)
+    seen: list[tuple[str, bool]] = []
+
+    def look(progress: Progress) -> None:
+        if progress.name == REFINEMENT:
+            with hybrid.open(tmp_path / "run.h5") as result:
+                line = next(iter(result.lines.values()), result)
+                seen.append((result.pending, "errors/total/position" in line))
+
+    hybrid.run(scene, tmp_path / "run.h5", progress=look).close()
+    assert seen and all(FINER in text and there for text, there in seen)
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+
+
+@pytest.mark.usefixtures("rough")
+def test_what_was_added_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A finer run that fails leaves the result before it, whose events and errors are there once."""
+    monkeypatch.setattr(passes, "WORTH_WRITING", -1.0)
+    record = Case.record
+
+    def failing(self: Case, resolution: Any, target: Any, before: Any = None) -> Any:
+        if isinstance(target, Path) and target.name.startswith("."):
+            raise ComputationError(Outcome.SINGULAR, 1.0, 0.0)
+        return record(self, resolution, target, before)
+
+    monkeypatch.setattr(Case, "record", failing)
+    with hybrid.run(asked(), tmp_path / "run.h5") as result:
+        kinds = [event.kind for event in result.events]
+        assert result.done and len(kinds) == len(set(kinds)) and {"finer run not kept", "accuracy missed"} <= set(kinds)
+        assert "errors/total/position" in result
+
+
+def test_a_comparison_that_fails_leaves_the_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(self: Case, resolution: Any, points: Any = None, until: Any = None) -> Any:
+        raise ComputationError(Outcome.SINGULAR, 1.0, 0.0)
+
+    monkeypatch.setattr(Case, "sample", failing)
+    with hybrid.run(described(True), tmp_path / "run.h5") as result:
+        (event,) = [x for x in result.events if x.kind == "no error figure"]
+        assert event.text.startswith("error not known: a coarser run to compare with failed") and result.done
+
+
+def test_an_equilibrium_is_there_before_its_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stopped(self: StaticCase, resolution: Any) -> Any:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(StaticCase, "sample", stopped)
+    scene = {key: x for key, x in asked().items() if key not in ("time", "output")}
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.static(scene, tmp_path / "rest.h5")
+    with hybrid.open(tmp_path / "rest.h5") as result:
+        assert result.status == "complete" and ERRORS in result.pending and "hybrid static" in result.pending
