@@ -19,7 +19,7 @@ from rich.console import Console as RichConsole
 
 import hybrid
 from hybrid.cli.pipe import reader_has_gone
-from hybrid.cli.progress_line import ProgressLine, span
+from hybrid.cli.progress_line import LINE_EVERY, ProgressLine, span
 from hybrid.errors import EXPECTED, is_of_the_run, weight_of_event
 
 if TYPE_CHECKING:
@@ -161,7 +161,7 @@ class Console:
         columns = (BarColumn(24), MofNCompleteColumn(), TextColumn("{task.description}", markup=False))
         shown = self._err.is_terminal  # elsewhere an empty line would be left of it
         with Progress(*columns, TimeElapsedColumn(), console=self._err, transient=True, disable=not shown) as bar:
-            task, begun = bar.add_task("starting workers"), [-1, 0.0]
+            task, begun, told = bar.add_task("starting workers"), [-1, 0.0], [0.0]
 
             def tell(now: StudyRunning) -> None:
                 ended = now.done + now.failed
@@ -172,6 +172,9 @@ class Console:
                 parts += [f"{span(pace * now.left)} left"] if pace is not None else []
                 parts += [now.dashboard] if now.dashboard else []
                 bar.update(task, total=now.total, completed=ended, description=", ".join(parts))
+                if not shown and now.elapsed - told[0] >= LINE_EVERY:
+                    told[0] = now.elapsed
+                    self._err.print(", ".join([f"{ended} of {now.total} cases", *parts]), soft_wrap=True)
 
             yield tell
 

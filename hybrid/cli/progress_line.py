@@ -1,6 +1,7 @@
 """The line that a run draws over itself on a terminal: which pass, how far, how fast, how long still.
 
-It is written to the error stream, so that the output stays free for results.
+Where the error stream is no terminal it is a line of its own every few seconds.  It is written to the error stream, so
+that the output stays free for results.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 REMEMBERED = (
     50  # reports (about 5 s) that the speed shown is taken from: the compilation of the first step is not in it
 )
+LINE_EVERY = 5.0  # s of wall time between two lines where there is no terminal: a long run must not fill a log
 BAR = (4, 36)  # columns, least and most: less shows nothing, more pushes the numbers apart
 MARGIN = 3  # columns left free: the terminal writes ^C there, and wraps what does not fit
 
@@ -49,12 +51,16 @@ def zones_in_short(zones: tuple[Zone, ...], width: int) -> str:
 
 
 class ProgressLine:
-    """Draws one line over itself on a terminal or in a notebook, nowhere else; gone when all passes are done."""
+    """Draws one line over itself on a terminal or in a notebook, gone when all passes are done; elsewhere a line now
+
+    and then.
+    """
 
     def __init__(self, console: Console | None = None) -> None:
         self._console = console or Console(stderr=True, highlight=False)
         self._past: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)  # wall time and t of this pass
         self._run = 0
+        self._told = 0.0  # s of wall time, of the last line of its own
         self._drawn = False
         self._display: Any = None
 
@@ -69,6 +75,9 @@ class ProgressLine:
             self._show(self.text(progress, 100).plain)
         elif self._console.is_terminal and not self._console.is_dumb_terminal:
             self._draw(self.text(progress, self._console.width - MARGIN))
+        elif progress.wall - self._told >= LINE_EVERY:
+            self._told = progress.wall
+            self._console.print(progress.text, soft_wrap=True)
 
     def close(self) -> None:
         """Take the line away; a second call does nothing."""

@@ -35,6 +35,7 @@ from hybrid.simulation.beside import beside, thread_count
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.initial_zones import zones_at_start
+from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
@@ -374,12 +375,13 @@ class Case:
 
     def _start(self, resolution: Resolution) -> tuple[Model, Equilibrium | None, ZoneSwitching | None]:
         """The model, its equilibrium if it starts from one, and what moves its zones if they move."""
-        model = build(self.scene, resolution)
-        check_releases(self.scene, model)
-        if model.layout is not None:
-            return zones_at_start(self.scene, model, resolution, 0.0, self.criterion)
-        found = equilibrium_of(self.scene, model, 0.0) if self.scene.initial.kind == "equilibrium" else None
-        return model, found, None
+        with at_once(self.interrupted):
+            model = build(self.scene, resolution)
+            check_releases(self.scene, model)
+            if model.layout is not None:
+                return zones_at_start(self.scene, model, resolution, 0.0, self.criterion)
+            found = equilibrium_of(self.scene, model, 0.0) if self.scene.initial.kind == "equilibrium" else None
+            return model, found, None
 
     def _loop(
         self,

@@ -29,6 +29,7 @@ from hybrid.model.resolution import (
 )
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bounded_model_errors import doubtful
+from hybrid.simulation.budget import Budget
 from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.error_order import COARSER
 from hybrid.simulation.error_statistics import (
@@ -117,6 +118,8 @@ class ErrorController:
     choice: ModelChoice = NAMED  # of a scene that leaves the choice
     settle: Callable[[bool], None] = lambda kept: None  # whether a finer result takes the place of that before it
     from_rest: bool = True  # whether it begins from an equilibrium, or is one
+    budget: Budget | None = None  # of all results; None: there is no limit
+    stopped: str = ""  # why it is refined no further although it misses what is asked; empty: more would not help
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
     first: Resolution | None = None  # that the runs to compare with are for; the result may be finer
     next: Resolution | None = None  # of the result that is to be computed
@@ -205,10 +208,12 @@ class ErrorController:
                 why = f"a finer run failed: {str(error).splitlines()[0]}"
                 self._notes.append((NOT_KEPT, f"{why}; the result is the one before"))
                 return self.without_refinement(why)
+            if self.budget is not None:
+                self.budget.spend([result])
             if self.estimate is None:
                 if self.comparisons is None:
                     self.comparisons = self._compute_comparisons(self.first or resolution)
-                self.compared = self.checkpoint() | {"runs": np.delete(self.runs, own)}
+                self.compared = self.checkpoint() | {"runs": np.delete(self.runs, own), "budget": []}
                 known = self.first_estimate(result)
                 self.settle(True)  # it may be beside one of another model
                 if not known:
@@ -232,7 +237,10 @@ class ErrorController:
         assert self.estimate is not None
         if self.estimate.lacks_model_errors():
             self._renew_model_errors(self.estimate, resolution)
-        self.next = self.next_resolution()
+        found, run, self.stopped = self.next_resolution(), self.estimate.run, ""
+        if found is not None and self.budget is not None and not self.budget.allows([run], [found]):
+            self.stopped, found = self.budget.text([run], [found]), None
+        self.next = found
 
     def _judge_finer(self, estimate: Estimate, resolution: Resolution, result: RunSample) -> None:
         """The same of a finer result; where it is the last and no better than that before it, that one stays."""
@@ -481,7 +489,7 @@ class ErrorController:
 
     def note_missed(self, verdict: Verdict) -> None:
         """Say that what was asked is not met, whose doing it is, and what to try."""
-        text = missed(verdict, self.free, len(self.runs), self._by_chance(verdict))
+        text = missed(verdict, self.free, len(self.runs), self._by_chance(verdict), self.stopped)
         self._notes.append(("accuracy missed", text))
 
     def checkpoint(self) -> Tree:
@@ -494,6 +502,7 @@ class ErrorController:
             "statistics": {name: x.checkpoint() for name, x in self.statistics.items()}, "every": self._every,
             "scattered": list(self.scattered), "excess": self.excess, "choice": list(self.choice),
             "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": list(self._notes),
+            "budget": self.budget.checkpoint() if self.budget is not None else [],
         }  # fmt: skip
 
     def restore(self, tree: Mapping[str, Any], scene: Scene, points: OutputPoints, source: Path | None = None) -> None:
@@ -504,8 +513,8 @@ class ErrorController:
         """
         template = {"runs": np.zeros(0), "ratio": np.inf, "finer": 0, "every": 1, "irregular": False}
         template["excess"] = np.zeros(2)
-        names = ("next", "first", "coarse", "estimate", "statistics", "scattered", "notes", "choice")
-        older = {"choice": ["", ""], "first": None, "excess": np.zeros(2)}  # not in every checkpoint of 0.6
+        names = ("next", "first", "coarse", "estimate", "statistics", "scattered", "notes", "choice", "budget")
+        older = {"choice": ["", ""], "first": None, "excess": np.zeros(2), "budget": []}  # not in every one of 0.6
         saved = matched(older | dict(tree), template | dict.fromkeys(names), "error control")
         shape = len(output_times(scene)) + 1, points.s.size, points.jumps.size
         self.runs, self._ratio, self._judged = saved["runs"].tolist(), saved["ratio"], saved["finer"]
@@ -514,6 +523,8 @@ class ErrorController:
             raise ValueError("statistics of no outputs")
         self._notes = list(restored_notes(saved["notes"]))
         self.next, self.first = (x and resolution_from(x, scene) for x in (saved["next"], saved["first"]))
+        if self.budget is not None and saved["budget"]:
+            self.budget.restore(matched(saved["budget"], [0.0, 0.0], "budget"))
         if saved["coarse"] is not None:
             try:
                 first, second, third = (x and restored_sample(x, scene, shape, source) for x in saved["coarse"])

@@ -11,6 +11,8 @@ from contextlib import contextmanager
 # s between two signals of which the second ends a run at once: process managers may send the same one twice.
 IMPATIENT = 1.0
 
+_AT_ONCE = [0]  # how many sections are entered in which a signal is raised when it comes
+
 
 @contextmanager
 def interrupts() -> Iterator[Callable[[], bool]]:
@@ -28,7 +30,7 @@ def interrupts() -> Iterator[Callable[[], bool]]:
 
     def catch(number: int, _frame: object) -> None:
         nonlocal first
-        if caught and clock.monotonic() - first > IMPATIENT:
+        if _AT_ONCE[0] or (caught and clock.monotonic() - first > IMPATIENT):
             raise KeyboardInterrupt
         first = first if caught else clock.monotonic()
         caught.append(number)
@@ -46,3 +48,21 @@ def interrupts() -> Iterator[Callable[[], bool]]:
             signal.signal(number, handler)
         if caught:
             signal.raise_signal(caught[0])
+
+
+@contextmanager
+def at_once(heard: Callable[[], bool] = lambda: False) -> Iterator[None]:
+    """A section that nothing is written in, such as the search of an equilibrium: a signal is raised when it comes.
+
+    heard: the flag of `interrupts`: one that came before is raised here.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    if heard():
+        raise KeyboardInterrupt
+    _AT_ONCE[0] += 1
+    try:
+        yield
+    finally:
+        _AT_ONCE[0] -= 1

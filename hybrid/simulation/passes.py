@@ -13,6 +13,7 @@ from pathlib import Path
 
 from hybrid.errors import ComputationError
 from hybrid.model.model_costs import NAMED, ModelChoice
+from hybrid.model.plan import output_times
 from hybrid.model.resolution import (
     Resolution,
     first_resolution,
@@ -25,6 +26,7 @@ from hybrid.model.resolution import (
     zones_are_free,
 )
 from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.simulation.budget import Budget
 from hybrid.simulation.case import Case
 from hybrid.simulation.error_control import ErrorController, comparison_resolutions
 from hybrid.simulation.error_report import write_errors
@@ -178,7 +180,7 @@ class Passes:
         from_rest = scene.initial.kind == "equilibrium" and not any(end.release for end in scene.ends.both)
         self.control = ErrorController(
             requested_accuracy(scene), free_in(scene), True, case.sample, compute, case.beside, is_irregular(scene),
-            choice, compute.settle, from_rest,
+            choice, compute.settle, from_rest, Budget(len(output_times(scene)), case.points.s.size),
         )  # fmt: skip
         return self.control
 

@@ -130,8 +130,11 @@ def not_converged(found: Mapping[str, float], asked: RequestedAccuracy | None) -
 
 def times_the_cost(now: Resolution, finer: Resolution) -> float:
     """How many times as long as a run a finer one takes."""
-    more = finer.fineness / now.fineness * (now.step / finer.step if finer.step else 1.0)
-    return more * float(now.local / finer.local) ** (1.0 / 3.0) if now.local and finer.local else more
+    if now.local and finer.local:  # an error of a step of third order, not the longest step, decides how many there are
+        steps = float(now.local / finer.local) ** (1.0 / 3.0)
+    else:
+        steps = now.step / finer.step if finer.step else 1.0
+    return finer.fineness / now.fineness * steps
 
 
 def costly(runs: Sequence[float], before: RunSample, resolution: Resolution) -> list[tuple[str, str]]:
@@ -150,10 +153,11 @@ def costly(runs: Sequence[float], before: RunSample, resolution: Resolution) -> 
     return [(COSTLY_ACCURACY, text)]
 
 
-def missed(verdict: Verdict, free: Free, runs: int, chance: bool) -> str:
+def missed(verdict: Verdict, free: Free, runs: int, chance: bool, stopped: str = "") -> str:
     """That what was asked is not met, whose doing it is, and what to try.
 
-    runs: how many there were; chance: whether another run would differ in what is missed as much, however fine.
+    runs: how many there were; chance: whether another run would differ in what is missed as much, however fine;
+    stopped: why no finer run was made that would help.
     """
     main = max((verdict.mesh, "mesh"), (verdict.time, "time step"), (verdict.model, "model"))[1]
     is_free = {"mesh": free.mesh, "time step": free.steps, "model": free.zones}[main]
@@ -168,6 +172,8 @@ def missed(verdict: Verdict, free: Free, runs: int, chance: bool) -> str:
     if chance:
         whose = "the line snaps at other instants in every run, and finer ones differ as much"
         try_ = f"a longer run, several seeds, or accuracy: {{{verdict.reached}}}, which this run meets"
+    if stopped:
+        whose, try_ = stopped, f"accuracy: {{{verdict.reached}}}, which this run meets; or such a mesh and steps"
     return f"{verdict.text}; {whose}, {runs} runs; try: {try_}"
 
 

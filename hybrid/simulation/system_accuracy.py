@@ -21,7 +21,7 @@ import numpy as np
 
 from hybrid.errors import ComputationError, SceneError
 from hybrid.model.output_points import output_points
-from hybrid.model.plan import output_interval
+from hybrid.model.plan import output_interval, output_times
 from hybrid.model.resolution import (
     Resolution,
     is_irregular,
@@ -35,6 +35,7 @@ from hybrid.model.self_reach import system_without_contact
 from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.read import scene_text
 from hybrid.scene.system import System
+from hybrid.simulation.budget import Budget
 from hybrid.simulation.error_control import ErrorController, comparison_resolutions
 from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.error_report import effort, error_fields, known
@@ -137,6 +138,8 @@ class SystemPasses:
         self._compared_rods, self._result_rods = dict[str, Stretches](), dict[str, Stretches]()
         # Whether a line has touched itself in a result: then lines may in runs to compare with; and whether they could.
         self._touches = self._compared_touching = False
+        points = sum(output_points(scene).s.size for scene in self.scenes.values())
+        self._budget = Budget(len(output_times(next(iter(self.scenes.values())))), points) if moves else None
         self._costs: list[float] = []  # s of processor time, of all runs
         self._notes: list[tuple[str, str]] = []  # events of the system
         self._begin = clock.process_time()
@@ -154,6 +157,8 @@ class SystemPasses:
             assert source is not None
             resolution = kept_resolution(self.system, source)
         assert result is not None
+        if self._budget is not None:
+            self._budget.spend(list(result.values()))
         self._compare(first)
         self._refine(resolution, result)
 
@@ -292,9 +297,13 @@ class SystemPasses:
         why, wanted = "", self._judged(resolution, result)
         while wanted:
             finer = self._finer(resolution, wanted)
+            runs, asks = list(result.values()), [finer.lines[name] for name in result]
+            if self._budget is not None and not self._budget.allows(runs, asks):
+                for control in self.controls.values():
+                    control.stopped = self._budget.text(runs, asks)
+                break
             self._warn_of_costs(result, finer)
-            run = next(iter(result.values()))
-            if run.cpu * times_the_cost(run.resolution, next(iter(finer.lines.values()))) > WORTH_WRITING:
+            if runs[0].cpu * times_the_cost(runs[0].resolution, asks[0]) > WORTH_WRITING:
                 self._write(resolution, result, done=False)  # what follows takes long
             try:
                 found = self._replacement.finer(partial(self._record, finer, name=REFINEMENT, found=_tree(finer)))
@@ -305,6 +314,8 @@ class SystemPasses:
             except KeyboardInterrupt as error:
                 why, stopped = "a finer run was stopped from outside", error
                 break
+            if self._budget is not None:
+                self._budget.spend(list(found.values()))
             wanted, kept = self._judged_finer(finer, found)
             if kept:
                 result, resolution = found, finer

@@ -22,6 +22,7 @@ from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
 from hybrid.simulation.deferred_recorder import DeferredRecorder
+from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restore import refused
 from hybrid.simulation.system_checkpoint import (
@@ -91,11 +92,12 @@ class SystemRun:
             self.times = [*self.times[one.every - 1 : -1 : one.every], self.times[-1]]
         self.found, managers = None, _NO_ZONES
         if source is None:
-            self.found = equilibrium_of_system(system, self.model, 0.0 if moves else np.inf)
-            if system.adaptive:
-                scenes = dict(zip(names, self.scenes, strict=True))
-                start = zones_at_rest(scenes, self.model, self.found, 0.0 if moves else np.inf)
-                self.model, self.found, managers = start
+            with at_once():
+                self.found = equilibrium_of_system(system, self.model, 0.0 if moves else np.inf)
+                if system.adaptive:
+                    scenes = dict(zip(names, self.scenes, strict=True))
+                    start = zones_at_rest(scenes, self.model, self.found, 0.0 if moves else np.inf)
+                    self.model, self.found, managers = start
             self.state: SystemState = self.found.state.copy()
             self.start_from(self.found.state.bodies)
         else:

@@ -17,7 +17,7 @@ _OURS: set[Path] = set()  # results that this process holds
 
 
 def is_held(path: Path) -> bool:
-    """Whether another process holds a result for writing."""
+    """Whether another process holds a result for writing; a lock that a killed one has left is removed."""
     if path in _OURS or not _beside(path).exists():
         return False
     try:
@@ -58,11 +58,22 @@ def locked(path: Path | None) -> Iterator[None]:
 
 
 def _remove_left(path: Path) -> None:
-    """Remove what a process that was killed has left beside a result (hdf5_file.beside)."""
-    begin = f".{path.name}."
-    for name in os.listdir(path.parent):
+    """Remove what killed processes have left: beside a result (hdf5_file.beside), and locks of others in its folder."""
+    begin, names = f".{path.name}.", set(os.listdir(path.parent))
+    for name in names:
         if name.startswith(begin) and name.endswith(".new") and name[len(begin) : -4].isdigit():
             path.with_name(name).unlink(missing_ok=True)
+        of = name[1:-5]
+        ours = name.startswith(".") and name.endswith(".lock") and of != path.name
+        if ours and (of in names or of.endswith(".h5")) and _is_empty(path.with_name(name)):
+            is_held(path.with_name(of))  # which removes it, unless it is held
+
+
+def _is_empty(path: Path) -> bool:
+    try:
+        return path.stat().st_size == 0
+    except OSError:
+        return False
 
 
 def _beside(path: Path) -> Path:

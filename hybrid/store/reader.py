@@ -46,6 +46,7 @@ from hybrid.store.histories import Histories
 from hybrid.store.integrity import readable
 from hybrid.store.late_file import LateFile
 from hybrid.store.lines import Lines
+from hybrid.store.lock import is_held
 from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, right_of
 from hybrid.store.records import (
     FINER_RESULT,
@@ -411,7 +412,11 @@ def open_result(source: str | Path | bytes | io.BytesIO) -> Result:
     with the outputs that were complete.  ResultError when it is not a result.
     """
     source = io.BytesIO(source) if isinstance(source, bytes) else source
-    return Result(source if isinstance(source, io.BytesIO) else Path(source).expanduser().resolve())
+    if isinstance(source, io.BytesIO):
+        return Result(source)
+    path = Path(source).expanduser().resolve()
+    is_held(path)  # which removes the lock that a killed process has left
+    return Result(path)
 
 
 def written_result(source: Path | io.BytesIO | MemoryTarget, late: LateFile | None = None) -> Result:

@@ -166,3 +166,12 @@ def test_shells_complete_commands(capsys: pytest.CaptureFixture[str], monkeypatc
     with pytest.raises(SystemExit):
         main([])
     assert capsys.readouterr().out.split() == ["report", "resume"]
+
+
+def test_without_a_terminal_there_is_a_line_every_few_seconds() -> None:
+    stream = io.StringIO()
+    line = ProgressLine(Console(file=stream, force_terminal=False, width=40, color_system=None, _environ={}))
+    for wall in (0.0, 4.9, 5.1, 9.0, 10.2):
+        line(progress(wall, wall))
+    line.close()
+    assert [text.split(",")[0] for text in stream.getvalue().splitlines()] == ["t = 5.1 of 20 s", "t = 10.2 of 20 s"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ import hybrid
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.resolution import Resolution
 from hybrid.model.system import SystemResolution
+from hybrid.simulation import case as cases
 from hybrid.simulation import passes, system_accuracy, system_run
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
@@ -29,7 +32,7 @@ def asked(accuracy: str = "0.3%") -> dict[str, Any]:
     return scene
 
 
-def two_lines(accuracy: str = "0.03%") -> dict[str, Any]:
+def two_lines(accuracy: str = "0.3%") -> dict[str, Any]:
     """The same of two lines that meet."""
     section = {"length": 1.0, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e5}
     motion = {"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0}
@@ -45,7 +48,7 @@ def two_lines(accuracy: str = "0.03%") -> dict[str, Any]:
 
 def rougher(resolution: Resolution) -> Resolution:
     assert resolution.local is not None
-    return replace(resolution.coarser(2.0, 1.0), local=10.0 * resolution.local)
+    return replace(resolution.coarser(8.0, 1.0), local=10.0 * resolution.local)
 
 
 @pytest.fixture
@@ -174,3 +177,21 @@ def test_an_equilibrium_is_there_before_its_errors(tmp_path: Path, monkeypatch: 
         hybrid.static(scene, tmp_path / "rest.h5")
     with hybrid.open(tmp_path / "rest.h5") as result:
         assert result.status == "complete" and ERRORS in result.pending and "hybrid static" in result.pending
+
+
+@pytest.mark.parametrize("scene", [described(), two_lines()], ids=["one", "several"])
+def test_a_stop_is_heard_while_the_equilibrium_is_searched(
+    scene: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is raised where it comes, not after the search: nothing is written by then."""
+    reached: list[str] = []
+
+    def long(*_: Any) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        reached.append("the end of a long search")
+
+    monkeypatch.setattr(cases, "equilibrium_of", long)
+    monkeypatch.setattr(system_run, "equilibrium_of_system", long)
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(scene, tmp_path / "run.h5")
+    assert not reached and not list(tmp_path.iterdir())

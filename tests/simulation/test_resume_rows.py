@@ -6,29 +6,42 @@ import shutil
 import subprocess
 import sys
 import textwrap
-import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 from bits import Stopping, differences
 
 import hybrid
+from hybrid.model.resolution import Resolution
 from hybrid.simulation import case as cases
-from hybrid.simulation.progress import RESULT, Progress
+from hybrid.simulation.passes import Passes
+from hybrid.simulation.progress import PRE_RUN, REFINEMENT, Progress
+from hybrid.store.checkpoint import read_before
+from hybrid.store.hdf5_file import opened
 
 TOUCHDOWN = Path(__file__).parents[2] / "examples" / "touchdown.yaml"
 
 
 @pytest.fixture(autouse=True)
 def always(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Files for short runs as well."""
+    """Files for short runs as well, and first results that miss what is asked."""
     monkeypatch.setattr(cases, "MOST_IN_MEMORY", 0)
+    surveyed = Passes._surveyed
+
+    def rougher(self: Passes, resolution: Resolution) -> tuple[Any, Resolution]:
+        choice, found = surveyed(self, resolution)
+        assert found.local is not None
+        return choice, replace(found.coarser(8.0, 1.0), local=10.0 * found.local)
+
+    monkeypatch.setattr(Passes, "_surveyed", rougher)
 
 
 def scene(*settings: str) -> hybrid.Scene:
-    return hybrid.load_scene(TOUCHDOWN, ["output.errors=true", "time.duration=10", *settings])
+    return hybrid.load_scene(TOUCHDOWN, list(settings))
 
 
 def rows(folder: Path) -> list[Path]:
@@ -36,10 +49,10 @@ def rows(folder: Path) -> list[Path]:
 
 
 def interrupted(what: hybrid.Scene, path: Path, stopping: Stopping) -> list[Path]:
-    """A run that is stopped in its result; the files beside it."""
+    """A run that is stopped in a finer result; the files beside it."""
 
     def stop(progress: Progress) -> None:
-        if progress.name == RESULT and progress.t > 5.0:
+        if progress.name == REFINEMENT and progress.t > 5.0:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -57,7 +70,8 @@ def shorten(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-8])
 
 
-CASES = {"rods": ["model=rod"], "model left open": [], "accuracy": ["accuracy={tension: 0.3%}", "time={duration: 12}"]}
+ASKED = ["accuracy={tension: 0.3%}", "time={duration: 12}", "mesh=null"]
+CASES = {"rods": [*ASKED, "model=rod"], "model left open": ASKED}
 
 
 @pytest.fixture(scope="module")
@@ -104,54 +118,62 @@ def test_a_stopped_run_goes_on_bit_for_bit(
 
 
 def test_the_file_of_the_result_does_not_hold_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    interrupted(scene("model=rod"), tmp_path / "run.h5", Stopping(monkeypatch))
+    interrupted(scene(*CASES["rods"]), tmp_path / "run.h5", Stopping(monkeypatch))
     beside = sum(x.stat().st_size for x in rows(tmp_path))
     assert (tmp_path / "run.h5").stat().st_size > beside > 0
-    with hybrid.open(tmp_path / "run.h5") as result:
-        assert result._contents._file["checkpoint/before"].size < 10_000
+    with opened(tmp_path / "run.h5") as file:
+        kept = read_before(file)["coarse"]
+    assert len(kept) == 3 and all(x["rows"] and not x["values"] for x in kept)
 
 
 def test_into_another_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Those beside the source are used, and stay there: it can be resumed again."""
-    interrupted(scene("model=rod"), tmp_path / "run.h5", Stopping(monkeypatch))
-    hybrid.run(scene("model=rod"), tmp_path / "whole.h5").close()
+    interrupted(scene(*CASES["rods"]), tmp_path / "run.h5", Stopping(monkeypatch))
+    hybrid.run(scene(*CASES["rods"]), tmp_path / "whole.h5").close()
     hybrid.resume(tmp_path / "run.h5", tmp_path / "other.h5").close()
     assert differences(tmp_path / "whole.h5", tmp_path / "other.h5") == []
     assert len(rows(tmp_path)) == 3
 
 
-def test_nothing_is_left_where_there_is_no_result(tmp_path: Path) -> None:
+def test_nothing_is_left_where_there_is_no_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Stopping(monkeypatch)
+
     def stop(progress: Progress) -> None:
+        assert progress.name == PRE_RUN
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        hybrid.run(scene("model=rod"), tmp_path / "run.h5", progress=stop)
+        hybrid.run(scene(*CASES["rods"]), tmp_path / "run.h5", progress=stop)
     assert not list(tmp_path.iterdir())
 
 
 def test_killed_and_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """kill -9 in the result: the files beside it are found by another process."""
+    """kill -9 in a finer result: the files beside the first are found by another process."""
     code = f"""
+        import os
+        from dataclasses import replace
         import hybrid
-        from hybrid.simulation import case
-        case.MOST_IN_MEMORY = 0
-        hybrid.run(hybrid.load_scene({str(TOUCHDOWN)!r}, {["output.errors=true", "model=rod", "time.duration=1000"]}),
-                   {str(tmp_path / "run.h5")!r})
+        from hybrid.simulation import case, passes
+        case.MOST_IN_MEMORY, passes.WORTH_WRITING = 0, -1.0
+        surveyed = passes.Passes._surveyed
+        def rougher(self, resolution):
+            choice, found = surveyed(self, resolution)
+            return choice, replace(found.coarser(8.0, 1.0), local=10.0 * found.local)
+        passes.Passes._surveyed = rougher
+        def kill(progress):
+            if progress.name == "refinement":
+                os.kill(os.getpid(), 9)
+        hybrid.run(hybrid.load_scene({str(TOUCHDOWN)!r}, {CASES["rods"]}), {str(tmp_path / "run.h5")!r}, progress=kill)
     """
-    process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(code)])
-    try:
-        until = time.monotonic() + 120.0
-        while not (tmp_path / "run.h5").exists() or (tmp_path / "run.h5").stat().st_size < 4_000_000:
-            assert process.poll() is None and time.monotonic() < until
-            time.sleep(0.005)
-    finally:
-        process.kill()
-        process.wait()
-    assert len(rows(tmp_path)) == 3
+    process = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], check=False)
+    assert process.returncode == -9 and len(rows(tmp_path)) == 3
+    with hybrid.open(tmp_path / "run.h5") as result:
+        assert "finer result" in result.pending and "errors/total/position" in result
+    assert not (tmp_path / ".run.h5.lock").exists()  # it was left, and opening has removed it
     computed: list[object] = []
     sample = cases.Case.sample
     monkeypatch.setattr(cases.Case, "sample", lambda self, *x: computed.append(x) or sample(self, *x))
     hybrid.resume(tmp_path / "run.h5").close()
     assert not computed and not rows(tmp_path)
-    hybrid.run(scene("model=rod", "time.duration=1000"), tmp_path / "whole.h5").close()
+    hybrid.run(scene(*CASES["rods"]), tmp_path / "whole.h5").close()
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
