@@ -31,6 +31,9 @@ def stats(
     above: Annotated[
         float | None, typer.Option(metavar="X", help="Also the part of the time above X, in the unit of the quantity.")
     ] = None,
+    below: Annotated[
+        float | None, typer.Option(metavar="X", help="Also the part of the time below X, in the unit of the quantity.")
+    ] = None,
     curve: Annotated[str | None, typer.Option(metavar="NAME", help="Fatigue damage by this curve ..")] = None,
     strength: Annotated[
         float | None, typer.Option(metavar="N", help=".. of tension over this strength (N), or ..")
@@ -40,7 +43,8 @@ def stats(
     ] = None,
     line: LineName = None, quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Statistics of a result: means, deviations, extremes, periods, what three hours bring; fatigue damage."""
+    """Statistics of a result: mean, standard deviation, extremes, period, most probable maximum (MPM) and P90 in 3 h,
+    fatigue damage and fatigue life; where each is largest, or at the places of --at."""
     if not 0.0 < hours < np.inf:
         raise UsageError(f"--hours: {hours:g} is no time; give a number above 0, such as 3")
     if curve is None and (strength is not None or section is not None):
@@ -59,11 +63,12 @@ def stats(
         if curve is not None:
             s, damage = opened.damage(curve, strength=strength, section=section, times=times, at=at)
             facts = _fatigue_facts(opened, s, damage, times)
-        if above is not None and (names is None or len(names) > 1):
-            raise ResultError(
-                "--above is of one quantity\n    try:      hybrid stats RUN.h5 --names end_force_end --above 5e4"
-            )
-        rows = rows_of(opened, names, at, times, hours * HOUR, above)
+            facts["places"] = [] if at is None else _fatigue_at(s, damage, facts)
+        for key, value in (("--above", above), ("--below", below)):
+            if value is not None and (names is None or len(names) > 1):
+                fix = f"hybrid stats RUN.h5 --names end_force_end {key} 5e4"
+                raise ResultError(f"{key} is of one quantity\n    try:      {fix}")
+        rows = rows_of(opened, names, at, times, hours * HOUR, above, below)
         used = {} if opened.lines else {name: found._asdict() for name, found in opened.utilisation().items()}
         for row in rows:
             console.json("statistics", **row)
@@ -77,14 +82,16 @@ def stats(
             if "no_extreme" in row:
                 without.setdefault(row["no_extreme"], {})[row["quantity"]] = None
         for text, of in without.items():
-            console.note(f"note: no extreme of {hours:g} h of {', '.join(of)}: {text}")
+            console.note(f"note: no MPM in {hours:g} h of {', '.join(of)}: {text}")
+        if any(row["extreme"] for row in rows):
+            console.note(f"note: MPM: most probable maximum of {hours:g} h; P90: what it does not exceed with 90 %")
         for text in [row["beyond_outputs"] for row in rows if "beyond_outputs" in row]:
             console.note(f"note: {text}")
-        lines = _limit_lines(opened, rows, above)
+        lines = [*_parts_of_time(rows, above, below), *_limit_lines(opened)]
         if lines:
             console.show(lambda: "\n".join(lines))
         if curve is not None:
-            console.show(lambda: f"fatigue by {curve}: {_fatigue_text(facts)}")
+            console.show(lambda: _fatigue_lines(curve, facts))
         console.json("done", file=str(result), status=opened.status, fatigue=facts, utilisation=used)
 
 
@@ -96,13 +103,13 @@ def _table(rows: list[dict[str, Any]], hours: float) -> Any:
     for title in (
         "s (m)",
         "mean",
-        "deviation",
+        "standard\ndeviation",
         "skewness",
         "smallest",
         "largest",
         "period (s)",
-        f"in {hours:g} h",
-        "90 %",
+        f"MPM\nin {hours:g} h",
+        f"P90\nin {hours:g} h",
     ):
         table.add_column(title, justify="right", no_wrap=True)
 
@@ -112,7 +119,7 @@ def _table(rows: list[dict[str, Any]], hours: float) -> Any:
     for row in rows:
         extreme = row["extreme"]
         table.add_row(
-            f"{row['quantity']} ({row['unit']})", text(row["s"]), text(row["mean"]), text(row["deviation"]),
+            f"{row['quantity']} ({row['unit']})", text(row["s"]), text(row["mean"]), text(row["standard_deviation"]),
             "" if row["skewness"] is None else f"{row['skewness']:.2f}", text(row["minimum"]), text(row["maximum"]),
             text(row["crossing_period"]), text(extreme and extreme["most_probable"]),
             text(extreme and extreme["fractile"]),
@@ -120,16 +127,22 @@ def _table(rows: list[dict[str, Any]], hours: float) -> Any:
     return table
 
 
-def _limit_lines(result: Result, rows: list[dict[str, Any]], above: float | None) -> list[str]:
-    """For which part of the time quantities are above a value, which part of the limits of sections is used, and the
-    limits of quantities."""
+def _parts_of_time(rows: list[dict[str, Any]], above: float | None, below: float | None) -> list[str]:
+    """For which part of the time quantities are above, or below, a value."""
+    found = []
+    for key, side, value in (("exceedance", "above", above), ("exceedance_below", "below", below)):
+        for row in rows if value is not None else ():
+            place = "" if row["s"] is None else f" at s = {row['s']:.5g} m"
+            part = f"{100.0 * row[key]:.3g} % of the time"
+            found.append(f"{row['quantity']}{place} is {side} {value:g} {row['unit']} for {part}")
+    return found
+
+
+def _limit_lines(result: Result) -> list[str]:
+    """Which part of the limits of sections is used, and the limits of quantities."""
     from hybrid.store.limits import held_of
 
     found = []
-    for row in rows if above is not None else ():
-        place = "" if row["s"] is None else f" at s = {row['s']:.5g} m"
-        part = f"{100.0 * row['exceedance']:.3g} % of the time"
-        found.append(f"{row['quantity']}{place} is above {above:g} {row['unit']} for {part}")
     for x in () if result.lines else result.utilisation().values():
         part = "" if x.used is None else f"{100.0 * x.used:.4g} % of {x.limit} used: "
         found.append(f"{part}{x.text}, s = {x.s:.5g} m, t = {x.t:.5g} s, of every step and output")
@@ -151,6 +164,20 @@ def _fatigue_facts(result: Result, s: np.ndarray, damage: np.ndarray, times: Any
     }
 
 
-def _fatigue_text(facts: dict[str, Any]) -> str:
-    life = "no end" if facts["life"] is None else f"{facts['life']:.3g} years of this"
-    return f"most at s = {facts['s']:.5g} m, {facts['damage']:.3g} in {facts['duration']:.6g} s; life {life}"
+def _fatigue_at(s: np.ndarray, damage: np.ndarray, facts: dict[str, Any]) -> list[dict[str, Any]]:
+    """Damage and fatigue life at each place that was chosen; one where the line jumps comes twice."""
+    years = facts["life"]
+    return [
+        {"s": float(x), "damage": float(d), "life": years * facts["damage"] / float(d) if years and d > 0.0 else None}
+        for x, d in zip(s, damage, strict=True)
+    ]
+
+
+def _fatigue_lines(curve: str, facts: dict[str, Any]) -> str:
+    """The largest damage, or that at each place that was chosen, and the life that goes with it."""
+    lines = []
+    for x in facts["places"] or [facts]:
+        life = "unlimited" if x["life"] is None else f"{x['life']:.3g} years"
+        place = f"{'' if facts['places'] else 'largest '}damage at s = {x['s']:.5g} m"
+        lines.append(f"{place}: {x['damage']:.3g} in {facts['duration']:.6g} s; fatigue life {life}")
+    return "\n".join(f"fatigue by {curve}: {line}" for line in lines)

@@ -114,7 +114,7 @@ def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path 
 
 
 def ranges_of(done: Any) -> list[dict[str, Any]]:
-    """Of each number that was kept: least, median and largest value of all cases, and the case of the largest."""
+    """Of each number that was kept: smallest, median and largest value of all cases, and the case of the largest."""
     import numpy as np
 
     rows = []
@@ -123,12 +123,12 @@ def ranges_of(done: Any) -> list[dict[str, Any]]:
         if done[name].dims != ("case",) or values.dtype.kind != "f" or name == "cpu":
             continue
         if not np.isfinite(values).any():
-            blank = {key: None for key in ("least", "median", "largest", "case")}
+            blank = {key: None for key in ("smallest", "median", "largest", "case")}
             rows.append({"name": str(name), "unit": done[name].attrs.get("units", "")} | blank)
             continue
         worst = int(np.nanargmax(values))
         rows.append({
-            "name": str(name), "unit": done[name].attrs.get("units", ""), "least": float(np.nanmin(values)),
+            "name": str(name), "unit": done[name].attrs.get("units", ""), "smallest": float(np.nanmin(values)),
             "median": float(np.nanmedian(values)), "largest": float(values[worst]),
             "case": int(done["case"].values[worst]),
         })  # fmt: skip
@@ -136,7 +136,7 @@ def ranges_of(done: Any) -> list[dict[str, Any]]:
 
 
 HEADS = {
-    "sobol": ("first order", "total", "± (95 %)"), "morris": ("mean effect", "deviation", "± (95 %)"),
+    "sobol": ("first order", "total", "± (95 %)"), "morris": ("mean effect", "standard deviation", "± (95 %)"),
     "rank": ("rank correlation", "", "by chance"),
 }  # fmt: skip
 
@@ -164,10 +164,10 @@ def _table(rows: list[dict[str, Any]]) -> Any:
 
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("", no_wrap=True)
-    for title in ("least", "median", "largest", "in case"):
+    for title in ("smallest", "median", "largest", "in case"):
         table.add_column(title, justify="right", no_wrap=True)
     for row in rows:
         name = f"{row['name']} ({row['unit']})" if row["unit"] else row["name"]
-        figures = ("" if row[key] is None else f"{row[key]:.5g}" for key in ("least", "median", "largest"))
+        figures = ("" if row[key] is None else f"{row[key]:.5g}" for key in ("smallest", "median", "largest"))
         table.add_row(name, *figures, "" if row["case"] is None else str(row["case"]))
     return table

@@ -144,14 +144,15 @@ class Kept(Table):
         | None
     ) = Field(default=None, description="arc length, or several; absent: the worst along the line [m]")
     take: Annotated[tuple[Literal[TAKES], ...], Field(min_length=1)] = Field(  # type: ignore[valid-type]
-        default=("max",), description="what of its history: max, min, mean, median, deviation, skewness, period, "
-        "significant, extreme (most probable largest in `hours`), fractile (90 % of that), damage, exceedance (part of "
-        "the time above `above`), utilisation (part of max_tension or of min_bend_radius that is used), history, "
-        "profile (max along s)"
+        default=("max",), description="what of its history: max, min, mean, median, deviation (standard deviation), "
+        "skewness, period, significant, extreme (most probable maximum, MPM, in `hours`), fractile (P90 of that "
+        "maximum), damage, exceedance (part of the time above `above`, or below `below`), utilisation (part of "
+        "max_tension or of min_bend_radius that is used), history, profile (max along s)"
     )  # fmt: skip
     times: tuple[Number, Number] | None = Field(default=None, description="only from one time to another [s]")
     hours: Positive = Field(default=3.0, description="of extreme and fractile [h]")
     above: Number | None = Field(default=None, description="of exceedance: the value, in the unit of the quantity")
+    below: Number | None = Field(default=None, description="of exceedance: the value below which it is, or above")
     curve: Text | None = Field(default=None, description="of damage: a curve of fatigue")
     strength: Positive | None = Field(default=None, description="of damage by a T-N curve: reference strength [N]")
     section: tuple[Positive, Positive, Positive] | None = Field(
@@ -160,8 +161,9 @@ class Kept(Table):
 
     @model_validator(mode="after")
     def _of_limits(self) -> Self:
-        if ("exceedance" in self.take) != (self.above is not None):
-            refuse([Finding(("above",), "a value with take: [exceedance], and nothing without", "above: 5.0e+4")])
+        if int("exceedance" in self.take) != sum(x is not None for x in (self.above, self.below)):
+            expected = "a value with take: [exceedance], above or below, and nothing without"
+            refuse([Finding(("above",), expected, "above: 5.0e+4")])
         if "utilisation" in self.take:
             if self.quantity not in LIMIT_OF:
                 expected = "tension or curvature, which sections have limits of"

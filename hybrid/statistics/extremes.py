@@ -38,7 +38,8 @@ EULER = 0.5772156649015329
 
 
 class Extreme(NamedTuple):
-    """The largest value in a time: `most_probable`, its `median`, and the `fractile` not exceeded with `probability`.
+    """The largest value in a time: the `most_probable` maximum (MPM), its `median`, and the `fractile` that it does not
+    exceed with `probability` (P90 with 0.9).
 
     Each has its interval (low, high) at CONFIDENCE.  most_probable: what is exceeded once in that time on average;
     median: what the largest values of many such times exceed in every other one;
@@ -101,7 +102,7 @@ def of_record(
     threshold: in the unit of x; None: the fractile USUAL_THRESHOLD of the peaks, but so that LEAST_PEAKS are left.
     ResultError with fewer peaks than that.
     """
-    _check(duration, probability)
+    check(duration, probability)
     times, _ = checked(t, x)
     peaks = peaks_of(t, x)
     if threshold is None and peaks.size >= LEAST_PEAKS:
@@ -146,8 +147,8 @@ def of_maxima(
 
     ResultError with less than LEAST_RECORDS, or values that are all alike.
     """
-    _check(duration, probability)
-    _check(record, probability)
+    check(duration, probability)
+    check(record, probability)
     values = np.asarray(maxima, float).ravel()
     if values.size < LEAST_RECORDS or not np.all(np.isfinite(values)):
         raise ResultError(
@@ -172,7 +173,7 @@ def of_maxima(
     )  # fmt: skip
 
 
-def _check(duration: float, probability: float) -> None:
+def check(duration: float, probability: float) -> None:
     """ResultError for times and probabilities that are none."""
     if not 0.0 < duration < math.inf:
         raise ResultError(f"duration = {duration:g} s is no time\n    expected: a number above 0")

@@ -1,4 +1,4 @@
-"""Mean, deviation, skewness, extremes and periods of histories.
+"""Mean, standard deviation, skewness, extremes and periods of histories.
 
 Samples need not be even in time, because an end force is known at every step and steps may have any length: a mean is
 the integral over time (trapezoidal rule) divided by the time.
@@ -6,6 +6,7 @@ the integral over time (trapezoidal rule) divided by the time.
 
 from __future__ import annotations
 
+import warnings
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from hybrid.errors import ResultError
 
 Floats = NDArray[np.float64]
 
-# A deviation below this part of the largest value is round-off: there is no skewness and no period.
+# A standard deviation below this part of the largest value is round-off: there is no skewness and no period.
 STEADY = 1e-9
 
 
@@ -27,7 +28,7 @@ class Summary(NamedTuple):
     """
 
     mean: Floats
-    deviation: Floats
+    standard_deviation: Floats
     skewness: Floats
     minimum: Floats
     t_minimum: Floats
@@ -36,6 +37,12 @@ class Summary(NamedTuple):
     crossing_period: Floats
     significant_range: Floats
     cycles: NDArray[np.int64]
+
+    @property
+    def deviation(self) -> Floats:
+        """Former name of `standard_deviation`."""
+        warnings.warn("deviation is now standard_deviation", DeprecationWarning, stacklevel=2)
+        return self.standard_deviation
 
 
 def checked(t: ArrayLike, x: ArrayLike, least: int = 2) -> tuple[Floats, Floats]:
@@ -62,12 +69,13 @@ def mean_over_time(t: Floats, x: Floats) -> Floats:
     return np.asarray(np.trapezoid(x, t, axis=0) / (t[-1] - t[0]))
 
 
-def exceedance(t: ArrayLike, x: ArrayLike, above: float) -> Floats:
-    """The part of the time (...) for which histories x (nt, ...) at times t (nt,) s are above a value; linear between
-
-    samples.
-    """
+def exceedance(t: ArrayLike, x: ArrayLike, above: float | None = None, below: float | None = None) -> Floats:
+    """The part of the time (...) for which histories x (nt, ...) at times t (nt,) s are above a value, or below one;
+    linear between samples."""
     times, values = checked(t, x)
+    if above is None:
+        assert below is not None
+        values, above = -values, -below
     lasts = np.diff(times).reshape(-1, *[1] * (values.ndim - 1))
     least, most = np.minimum(values[1:], values[:-1]), np.maximum(values[1:], values[:-1])
     width = np.where(most > least, most - least, 1.0)

@@ -14,6 +14,7 @@ from hybrid.errors import ResultError
 from hybrid.statistics import extremes, fatigue, moments, spectrum
 from hybrid.store.bends import bends_of
 from hybrid.store.envelope import Judged, limits_of
+from hybrid.store.extrapolation import extreme_of
 from hybrid.store.names import ALIASES
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ class Histories:
     def statistics(
         self: Any, names: Sequence[str] | None = None, *, times: Window | None = None, at: Any = None
     ) -> dict[str, moments.Summary]:
-        """Summaries of histories by name, each of the shape of the quantity at one time: mean, deviation, skewness,
+        """Summaries of histories, each of the shape of the quantity at one time: mean, standard deviation, skewness,
         extremes with their times, period between up-crossings of the mean, significant range, number of cycles.
 
         names: None for end forces, tension, curvature, bending moment, torque, contact force, and what the scene asks
@@ -148,27 +149,29 @@ class Histories:
         """The largest (or smallest) value that a time of `duration` (s) brings, by peaks over a threshold of a history.
 
         at: arc length (m), of a quantity along the line; threshold: in the unit of the quantity, None: nine tenths of
-        the peaks are below it.  ResultError with too few peaks.
+        the peaks are below it.  ResultError with too few peaks, of what is round-off, and where the law leads beyond
+        what an angle can be.
         """
         history = _one(history_of(self, name, times, at))
-        if not smallest:
-            return extremes.of_record(history.t, history.values, duration, threshold, probability)
-        low = None if threshold is None else -threshold
-        found = extremes.of_record(history.t, -history.values, duration, low, probability)
-        return found._replace(
-            most_probable=-found.most_probable, median=-found.median, fractile=-found.fractile,
-            most_probable_interval=_negated(found.most_probable_interval),
-            median_interval=_negated(found.median_interval),
-            fractile_interval=_negated(found.fractile_interval), fitted=f"of the negative values: {found.fitted}",
+        return extreme_of(
+            self, name, history.unit, history.t, history.values, duration,
+            threshold=threshold, smallest=smallest, probability=probability,
         )  # fmt: skip
 
-    def exceedance(self: Any, name: str, above: float, *, at: Any = None, times: Window | None = None) -> Floats:
-        """The part of the time for which a history is above a value in the unit of its quantity, of the shape of the
-        quantity at one time; at, times: as of `statistics`.  ResultError: `above` is no number."""
-        if isinstance(above, bool) or not isinstance(above, int | float | np.integer | np.floating):
-            raise ResultError(f"above: expected a number in the unit of {name!r}, found {above!r:.60}")
+    def exceedance(
+        self: Any, name: str, above: float | None = None, *, below: float | None = None, at: Any = None,
+        times: Window | None = None,
+    ) -> Floats:  # fmt: skip
+        """The part of the time for which a history is above a value, or below one, in the unit of its quantity; of the
+        shape of the quantity at one time; at, times: as of `statistics`.  ResultError: not one number of the two."""
+        if (above is None) is (below is None):
+            raise ResultError("exceedance\n    expected: one of above and below, in the unit of the quantity")
+        value = above if below is None else below
+        if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+            key = "above" if below is None else "below"
+            raise ResultError(f"{key}: expected a number in the unit of {name!r}, found {value!r:.60}")
         history = history_of(self, name, times, at)
-        return moments.exceedance(history.t, history.values, above)
+        return moments.exceedance(history.t, history.values, above, below)
 
     def utilisation(self: Any) -> dict[str, Judged]:
         """How near the line came to each limit of its sections over all steps and outputs, by the key of the limit:
@@ -244,7 +247,3 @@ def _one(history: History) -> History:
         fix = "at=..., an arc length in m" if history.s is not None else "a quantity with one value"
         raise ResultError(f"'{history.name}' has {values.shape[1]} values at a time\n    try:      {fix}")
     return history._replace(values=values[:, 0])
-
-
-def _negated(interval: tuple[float, float]) -> tuple[float, float]:
-    return -interval[1], -interval[0]

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.statistics.extremes import THREE_HOURS, of_record
+from hybrid.statistics.extremes import THREE_HOURS
 from hybrid.statistics.moments import exceedance
 from hybrid.store.envelope import extreme
+from hybrid.store.extrapolation import extreme_of
 from hybrid.store.histories import Window, history_of, lies_along, summary_of, usual_names
 from hybrid.store.limits import at_every_step
 
@@ -23,14 +24,14 @@ WORTH_A_NOTE = 0.01
 
 def rows_of(
     result: Result, names: Sequence[str] | None = None, at: Sequence[float] | None = None, times: Window | None = None,
-    duration: float = THREE_HOURS, above: float | None = None,
+    duration: float = THREE_HOURS, above: float | None = None, below: float | None = None,
 ) -> list[dict[str, Any]]:  # fmt: skip
     """One row for each history: its summary, and the extreme of `duration` (s) or why there is none.
 
     names: None for the usual ones that are not zero throughout and are known at all outputs; at: arc lengths, m, None:
-    where the quantity is largest; times: from and to, s; above: in the unit of the quantity, `exceedance` is the part
-    of the time above it.  A row with `beyond_outputs` says how far all nodes and steps went beyond what its outputs
-    show.
+    where the quantity is largest; times: from and to, s; above, below: in the unit of the quantity, `exceedance`
+    (`exceedance_below`) is the part of the time above (below) it.  A row with `beyond_outputs` says how far all nodes
+    and steps went beyond what its outputs show.
     """
     rows = []
     for name in usual_names(result) if names is None else names:
@@ -52,9 +53,11 @@ def rows_of(
             row |= {key: _number(value) for key, value in found._asdict().items()}
             if above is not None:
                 row["exceedance"] = float(exceedance(history.t, values[:, k], above))
+            if below is not None:
+                row["exceedance_below"] = float(exceedance(history.t, values[:, k], below=below))
             row["extreme"] = None
             try:
-                row["extreme"] = of_record(history.t, values[:, k], duration)._asdict()
+                row["extreme"] = extreme_of(result, name, history.unit, history.t, values[:, k], duration)._asdict()
             except ResultError as error:
                 row["no_extreme"] = str(error).splitlines()[0]
             if at is None and (text := _beyond_outputs(result, name, history.t, found.maximum)):

@@ -10,9 +10,10 @@ import numpy as np
 
 from hybrid.errors import HybridError, ResultError
 from hybrid.scene.study import LIMIT_OF, Kept
-from hybrid.statistics import extremes, moments
+from hybrid.statistics import moments
 from hybrid.store.envelope import farthest, limits_of
-from hybrid.store.histories import history_of, lies_along
+from hybrid.store.extrapolation import extreme_of
+from hybrid.store.histories import History, history_of, lies_along
 from hybrid.store.limits import at_every_step
 from hybrid.store.reader import Result
 
@@ -30,15 +31,15 @@ AT_REST: dict[str, tuple[str, tuple[str, ...]]] = {
 }  # fmt: skip
 # Of a summary, and its unit; none: that of the quantity.
 OF_SUMMARY = {
-    "mean": ("mean", None), "deviation": ("deviation", None), "skewness": ("skewness", ""),
+    "mean": ("mean", None), "deviation": ("standard_deviation", None), "skewness": ("skewness", ""),
     "period": ("crossing_period", "s"), "significant": ("significant_range", None),
 }  # fmt: skip
 WORDS = {
     "max": "largest", "min": "smallest", "mean": "mean of", "median": "median of", "deviation": "standard deviation of",
     "skewness": "skewness of", "period": "period between up-crossings of the mean of",
-    "significant": "significant range of", "extreme": "most probable largest",
-    "fractile": "90 % fractile of the largest", "damage": "fatigue damage", "history": "history",
-    "exceedance": "part of the time above", "utilisation": "largest part that is used of",
+    "significant": "significant range of", "extreme": "most probable maximum (MPM) of",
+    "fractile": "P90 of the maximum of", "damage": "fatigue damage", "history": "history",
+    "exceedance": "part of the time", "utilisation": "largest part that is used of",
     "profile": "largest at each place",
 }  # fmt: skip
 
@@ -170,15 +171,16 @@ def _taken(
         raise NotAlwaysThere(f"'{name}' has times or places without a value, and {take} needs all of them")
     text = f"{WORDS[take]} {about}"
     if take in ("extreme", "fractile"):
-        found = [_extreme(history.t, flat[:, k], kept.hours, take) for k in range(flat.shape[1])]
+        found = [_extreme(result, history, flat[:, k], kept.hours, take) for k in range(flat.shape[1])]
         return _placed(Variable(unit, f"{text} ({kept.hours:g} h)", dims, places), np.array(found))
     if take in ("max", "min"):
         worst = (np.fmax if take == "max" else np.fmin).reduce(flat, axis=0)
         return _placed(Variable(unit, text, dims, places), worst, take)
     if take == "exceedance":
-        assert kept.above is not None
-        text = f"{WORDS[take]} {kept.above:g} {unit}: {about}"
-        return _placed(Variable("", text, dims, places), moments.exceedance(history.t, flat, kept.above))
+        side, value = ("above", kept.above) if kept.above is not None else ("below", kept.below)
+        text = f"{WORDS[take]} {side} {value:g} {unit}: {about}"
+        part = moments.exceedance(history.t, flat, kept.above, kept.below)
+        return _placed(Variable("", text, dims, places), part)
     if take == "median":
         return _placed(Variable(unit, text, dims, places), moments.median_over_time(history.t, flat))
     attribute, other = OF_SUMMARY[take]
@@ -193,10 +195,10 @@ def _places(own: str, s: Floats) -> tuple[tuple[str, ...], dict[str, tuple[str, 
     return ((), {}) if s.size == 1 else ((f"{own}_at",), {f"{own}_at": ("m", s)})
 
 
-def _extreme(t: Floats, x: Floats, hours: float, take: str) -> float:
-    """NaN where there are too few peaks."""
+def _extreme(result: Result, history: History, x: Floats, hours: float, take: str) -> float:
+    """NaN where there are too few peaks, of round-off, and beyond what an angle can be."""
     try:
-        found = extremes.of_record(t, x, hours * HOUR)
+        found = extreme_of(result, history.name, history.unit, history.t, x, hours * HOUR)
     except ResultError:
         return np.nan
     return found.most_probable if take == "extreme" else found.fractile

@@ -237,7 +237,7 @@ def statistics_html(result: Result) -> str:
     rows, found = [], rows_of(result)
     for x in found:
         extreme = x["extreme"] or {}
-        numbers = [x["mean"], x["deviation"], x["minimum"], x["maximum"], x["significant_range"]]
+        numbers = [x["mean"], x["standard_deviation"], x["minimum"], x["maximum"], x["significant_range"]]
         longer = [extreme.get("most_probable"), extreme.get("fractile")]
         size = max(abs(y) for y in numbers if y is not None)
         factor, unit = prefix(x["unit"], size) if size else (1.0, x["unit"])
@@ -251,20 +251,20 @@ def statistics_html(result: Result) -> str:
         "",
         "s (m)",
         "mean",
-        "deviation",
+        "standard deviation",
         "smallest",
         "largest",
         "significant range",
         "period (s)",
-        "in 3 h",
-        "90 %",
+        "MPM in 3 h",
+        "P90 in 3 h",
     ]
     note = (
         "Of the time from the first output to the last, starts of loads and motions included; along the cable where a "
         "quantity is largest. Significant range: mean of the largest third between up-crossings of the mean; period: "
-        "mean time between them; in 3 h: most probable largest value of three hours, by peaks over a threshold, and "
-        "what it does not exceed with 90 %. “–”: too few peaks or cycles. End forces are those of every step, all "
-        "else is that of the outputs."
+        "mean time between them; MPM in 3 h: most probable maximum of three hours, by peaks over a threshold; P90 in "
+        "3 h: what that maximum does not exceed with a probability of 90 %. “–”: too few peaks or cycles, round-off, "
+        "or an angle at its bound. End forces are those of every step, all else is that of the outputs."
     )
     beyond = [x["beyond_outputs"] for x in found if "beyond_outputs" in x]
     more = f"<p>{escape('; '.join(beyond))}.</p>" if beyond else ""

@@ -106,7 +106,7 @@ def _ranges(found: Any, results: list[str]) -> str:
             about = escape(str(found[name].attrs.get("long_name", "")))
             unit = escape(str(found[name].attrs.get("units", "")))
             rows.append(f"<tr><td>{escape(name)}</td><td>{about}</td><td>{unit}</td>{cells}</tr>")
-    heads = ("", "what it is", "unit", "least", "median", "largest", "in case")
+    heads = ("", "what it is", "unit", "smallest", "median", "largest", "in case")
     head = "".join(f'<th scope="col"{" class=number" if k > 2 else ""}>{text}</th>' for k, text in enumerate(heads))
     return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
 

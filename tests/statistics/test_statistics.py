@@ -49,7 +49,7 @@ def test_moments_of_a_sine_and_of_uneven_times() -> None:
     for t in (even, crowded):
         found = moments.summary(t, 3.0 + 2.0 * np.sin(2.0 * np.pi * t / 5.0))
         assert found.mean == pytest.approx(3.0, abs=1e-5)
-        assert found.deviation == pytest.approx(math.sqrt(2.0), rel=1e-5)
+        assert found.standard_deviation == pytest.approx(math.sqrt(2.0), rel=1e-5)
         assert found.skewness == pytest.approx(0.0, abs=1e-5)
         assert found.crossing_period == pytest.approx(5.0, rel=1e-6)
         assert found.significant_range == pytest.approx(4.0, rel=1e-4)
@@ -84,7 +84,7 @@ def test_fields_are_taken_column_by_column() -> None:
         one = moments.summary(t, x[:, k])
         for all_of_them, alone in zip(found, one, strict=True):
             assert all_of_them[k] == pytest.approx(alone, rel=1e-9, abs=1e-12)
-    assert found.deviation[2] < 1e-9 and np.isnan(found.skewness[2]) and np.isnan(found.crossing_period[2])
+    assert found.standard_deviation[2] < 1e-9 and np.isnan(found.skewness[2]) and np.isnan(found.crossing_period[2])
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ def test_what_is_no_history_is_refused(t: list, x: list) -> None:
 def test_significant_height_of_a_jonswap_record() -> None:
     """Within 2 %: an hour of one record, and four deviations; and Tz of its spectrum."""
     t, x = record(3.0 * HOUR, 3)
-    assert 4.0 * moments.summary(t, x).deviation == pytest.approx(4.0, rel=0.02)
+    assert 4.0 * moments.summary(t, x).standard_deviation == pytest.approx(4.0, rel=0.02)
     found = spectrum.welch(t, x)
     assert found.significant == pytest.approx(4.0, rel=0.02)
     assert found.peak_period == pytest.approx(10.0, rel=0.1)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from functools import partial
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from hybrid.cli.commands import main
 from hybrid.errors import ResultError
 from hybrid.statistics import fatigue, moments
 from hybrid.store.bends import bends_of
+from hybrid.store.extrapolation import extreme_of
 from hybrid.store.histories import history_of
 from hybrid.store.statistics_table import rows_of
 
@@ -52,7 +55,7 @@ def test_statistics_are_of_steps_and_of_outputs(result: hybrid.Result) -> None:
     assert tension.mean.shape == result.s.shape
     late = result.t >= 30.0
     one = moments.summary(result.t[late], result.tension[late, 7])
-    assert tension.deviation[7] == pytest.approx(one.deviation, rel=1e-12)
+    assert tension.standard_deviation[7] == pytest.approx(one.standard_deviation, rel=1e-12)
     assert tension.crossing_period[-1] == pytest.approx(5.0, rel=2e-3)
     assert result.statistics(["tension"], at=[10.0, 20.0])["tension"].mean.shape == (2,)
 
@@ -70,18 +73,23 @@ def test_what_outputs_have_missed_is_said() -> None:
     assert "beyond_outputs" not in rows_of(fine, ["tension"])[0]
 
 
-def test_extremes_and_their_negative(result: hybrid.Result) -> None:
+def test_extremes_and_their_negative() -> None:
     """The smallest value is the negative of the largest of what is negated, with its interval the right way round."""
-    low = result.extreme("tension", at=30.0, smallest=True, duration=600.0)
-    assert low.fractile < low.median < low.most_probable < result.at(s=30.0, names=["tension"])["tension"].mean()
+    t, x = irregular(10.0, 300.0)
+    low = extreme_of(Line(), "tension", "N", t, x, 3600.0, smallest=True)  # type: ignore[arg-type]
+    high = extreme_of(Line(), "tension", "N", t, -x, 3600.0)  # type: ignore[arg-type]
+    assert low.fractile < low.median < low.most_probable < x.min()
     assert low.fractile_interval[0] <= low.fractile <= low.fractile_interval[1]
     assert low.median_interval[0] <= low.median <= low.median_interval[1]
+    assert (low.most_probable, low.fractile) == (-high.most_probable, -high.fractile)
+    with pytest.raises(ResultError, match="less than one peak"):
+        extreme_of(Line(), "tension", "N", t, x, 1.0)  # type: ignore[arg-type]
 
 
 def test_spectrum_has_its_peak_where_the_motion_is(result: hybrid.Result) -> None:
     found = result.spectrum("end_force_end", times=(30.0, None), segment=50.0)
     assert found.peak_period == pytest.approx(5.0, rel=0.05)
-    deviation = result.statistics(["end_force_end"], times=(30.0, None))["end_force_end"].deviation
+    deviation = result.statistics(["end_force_end"], times=(30.0, None))["end_force_end"].standard_deviation
     assert found.significant == pytest.approx(4.0 * deviation, rel=0.02)
 
 
@@ -114,7 +122,7 @@ def test_damage_along_the_line(result: hybrid.Result) -> None:
         (lambda r: r.statistics(["tension"], at=[1e3]), "outside the result"),
         (lambda r: r.extreme("tension"), "an arc length"),
         (lambda r: r.extreme("end_force_end", at=3.0), "no value at an arc length"),
-        (lambda r: r.extreme("end_force_end", duration=0.1), "less than one peak"),
+        (lambda r: r.extreme("end_force_end", times=(20.0, None)), "peaks are alike"),
         (lambda r: r.extreme("end_force_end", times=(0.0, 20.0)), "too few"),
         (lambda r: r.spectrum("tension", segment=1e6), "expected"),
         (lambda r: r.damage("D sea", strength=1e6), "ranges of stress"),
@@ -209,4 +217,88 @@ def test_the_command_prints_rows(result: hybrid.Result, capsys: pytest.CaptureFi
     with pytest.raises(SystemExit):
         main(["stats", str(result.file), "--times", "100:"])
     shown = capsys.readouterr()
-    assert "tension (N)" in shown.out and "no extreme of 3 h" in shown.err
+    assert "tension (N)" in shown.out and "no MPM in 3 h of" in shown.err
+    head = " ".join(shown.out.splitlines()[0].split()), " ".join(shown.out.splitlines()[1].split())
+    assert head == ("standard MPM P90", "s (m) mean deviation skewness smallest largest period (s) in 3 h in 3 h")
+
+
+def test_damage_and_fatigue_life_at_chosen_places(result: hybrid.Result, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["--names", "tension", "--at", "12,48", "--curve", "studless chain T-N", "--strength", "1e6"]
+    with pytest.raises(SystemExit) as ended:
+        main(["stats", str(result.file), "--below", "100", *asked])
+    assert not ended.value.code
+    lines = capsys.readouterr().out.splitlines()
+    damage = result.damage("studless chain T-N", strength=1e6, at=[12.0, 48.0])[1]
+    part = 100.0 * result.exceedance("tension", below=100.0, at=[12.0, 48.0])
+    for s, d, p in zip((12, 48), damage, part, strict=True):
+        assert f"tension at s = {s} m is below 100 N for {p:.3g} % of the time" in lines
+        years = 130.0 / d / (365.25 * 86400.0)
+        text = f"damage at s = {s} m: {d:.3g} in 130 s; fatigue life {years:.3g} years"
+        assert f"fatigue by studless chain T-N: {text}" in lines
+
+
+class Line:
+    """A line of 100 m with 1e4 N of tension, as far as extremes of a longer time ask."""
+
+    lines: ClassVar[dict[str, object]] = {}
+    s, tension = np.array([0.0, 100.0]), np.array([[1e4, 1e4]])
+
+    def __contains__(self, name: str) -> bool:
+        return name == "tension"
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.tension
+
+
+def irregular(size: float, mean: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """A narrow Gaussian process of half an hour, periods about 8 s."""
+    rng, t = np.random.default_rng(3), np.arange(0.0, 1800.0, 0.25)
+    waves = rng.uniform(0.7, 0.9, 100), rng.uniform(0.0, 2.0 * np.pi, 100)
+    return t, mean + size * np.cos(np.outer(t, waves[0]) + waves[1]).sum(axis=1) / np.sqrt(50.0)
+
+
+@pytest.mark.parametrize(
+    ("unit", "size", "mean", "smallest", "why"),
+    [
+        ("N m", 1.0, 0.0, False, ""), ("N", 100.0, 1e4, True, ""), ("deg", 5.0, 20.0, False, ""),
+        ("N m", 1e-15, 0.0, False, "round-off of 1e"), ("N", 1e-9, 1e4, False, "round-off"),
+        ("1/m", 1e-16, 0.0, False, "round-off"), ("N m", 1e-10, 1e3, False, "round-off of .* its size"),
+        ("deg", 5.0, 165.0, False, "bounded by 180 deg"), ("rad", 0.1, 3.0, False, "bounded by 3.142 rad"),
+        ("deg", 2.0, 8.0, True, "bounded by 0 deg"),
+    ],
+)  # fmt: skip
+def test_round_off_and_angles_at_their_bound_are_not_extrapolated(
+    unit: str, size: float, mean: float, smallest: bool, why: str
+) -> None:
+    t, x = irregular(size, mean)
+    ask = partial(extreme_of, Line(), "some", unit, t, x, smallest=smallest)  # type: ignore[arg-type]
+    if not why:
+        found = ask()
+        assert (found.most_probable < x.min()) if smallest else (found.most_probable > x.max())
+        return
+    with pytest.raises(ResultError, match=why):
+        ask()
+
+
+def test_a_regular_motion_has_no_larger_maximum_in_a_longer_time(result: hybrid.Result) -> None:
+    with pytest.raises(ResultError, match="peaks are alike"):
+        result.extreme("end_force_end", times=(20.0, None))
+    row = rows_of(result, ["end_force_end"], times=(20.0, None))[0]
+    assert row["extreme"] is None and "alike" in row["no_extreme"]
+    t = np.linspace(0.0, 200.0, 2001)
+    beating = np.sin(t) * (1.0 + 0.5 * np.sin(0.11 * t))
+    assert extreme_of(Line(), "some", "m", t, beating).most_probable > 1.4  # type: ignore[arg-type]
+
+
+def test_the_former_name_of_the_standard_deviation_is_read() -> None:
+    found = moments.summary([0.0, 1.0, 2.0], [0.0, 1.0, 0.0])
+    with pytest.warns(DeprecationWarning, match="now standard_deviation"):
+        assert found.deviation == found.standard_deviation
+
+
+def test_exceedance_is_above_or_below(result: hybrid.Result) -> None:
+    above, below = (result.exceedance("end_force_end", **{key: 400.0}) for key in ("above", "below"))
+    assert float(above) + float(below) == pytest.approx(1.0, abs=1e-12)
+    for asked in ({}, {"above": 1.0, "below": 2.0}):
+        with pytest.raises(ResultError, match="one of above and below"):
+            result.exceedance("end_force_end", **asked)

@@ -215,6 +215,6 @@ def test_statistics_are_those_of_the_histories() -> None:
     found = result.statistics()["hang_off"]
     row = re.search(r"hang_off \(deg\)\s+([\d.]+)\s+([\d.]+)\s+([\d.]+)\s+([\d.]+)", page)
     assert re.search(r"Statistics of \d histories", page) and row
-    expected = [found.mean, found.deviation, found.minimum, found.maximum]
+    expected = [found.mean, found.standard_deviation, found.minimum, found.maximum]
     assert [float(x) for x in row.groups()] == pytest.approx([float(x) for x in expected], rel=1e-3)
     assert "Hang off" in page and "above the 10 deg allowed" in page
