@@ -68,6 +68,18 @@ def rough(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(system_accuracy.SystemPasses, "_surveyed", of_several)
 
 
+def fixed() -> dict[str, Any]:
+    """Two lines in steps of fixed length, with errors."""
+    scene = two_lines() | {
+        "time": {"duration": 1.0, "step": 0.02},
+        "output": {"every": 0.1, "points": 5, "errors": True},
+    }
+    del scene["accuracy"]
+    for line in scene["lines"].values():
+        line["mesh"] = {"cells": 8}
+    return scene
+
+
 def stopped_in(name: str, scene: dict[str, Any], path: Path) -> None:
     """A run that is stopped, like by Ctrl-C, at the first step that is heard of a pass with this name."""
 
@@ -99,6 +111,17 @@ def test_stopped_after_the_result(
     assert sorted(x.name for x in tmp_path.iterdir()) == ["run.h5", "whole.h5"]
     with hybrid.open(tmp_path / "run.h5") as result:
         assert result.done and not result.pending and "amended" not in result.attributes
+
+
+def test_stopped_in_the_errors_of_fixed_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Stopping(monkeypatch)
+    monkeypatch.setattr(system_run, "LOOK", 1)
+    hybrid.run(fixed(), tmp_path / "whole.h5").close()
+    stopped_in(ESTIMATION, fixed(), tmp_path / "run.h5")
+    with hybrid.open(tmp_path / "run.h5") as result:
+        assert result.status == "complete" and ERRORS in result.pending and ERRORS in result.lines["a"].pending
+    hybrid.resume(tmp_path / "run.h5").close()
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
 def test_stopped_before_the_result_nothing_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

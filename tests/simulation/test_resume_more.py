@@ -16,6 +16,7 @@ import hybrid.simulation.time_loop
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.simulation import case, restore
 from hybrid.simulation.error_estimate import Estimate
+from hybrid.simulation.progress import ESTIMATION, RESULT
 from hybrid.store import checkpoint, lock
 from hybrid.store import writer as record
 from hybrid.store.hdf5_file import opened
@@ -348,21 +349,27 @@ def test_a_file_of_a_newer_format_is_refused(whole):
 )
 def test_a_change_that_is_stopped_has_the_errors_of_the_change(more, tmp_path, monkeypatch):
     """The climb of the run before it is not that of the run that goes on."""
-    settings = ["output.errors=true", "time.duration=5", "model=catenary"]  # no run to compare with after the result
+    settings = ["output.errors=true", "time.duration=5", "model=catenary"]
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", settings)
-    stopping = Stopping(monkeypatch)
-    hybrid.run(scene, progress=stopping).close()
-    begun = stopped(tmp_path / "begun.h5", monkeypatch, scene, stopping.heard - 10)
-    (tmp_path / "run.h5").write_bytes(begun.read_bytes())
-    hybrid.resume(begun, tmp_path / "whole.h5", **more).close()
-    stopping = Stopping(monkeypatch)
-    hybrid.resume(begun, tmp_path / "counted.h5", progress=stopping, **more).close()
-    steps = stopping.heard
-    stopping.left = steps - 5  # in the result, after the runs to compare with
+    Stopping(monkeypatch)
+
+    def stop_after(name, t):
+        def stop(progress):
+            if progress.name == name and progress.t > t:
+                raise KeyboardInterrupt
+
+        return stop
+
+    begun = tmp_path / "begun.h5"
     with pytest.raises(KeyboardInterrupt):
-        hybrid.resume(tmp_path / "run.h5", progress=stopping, **more)
-    hybrid.resume(tmp_path / "run.h5").close()
-    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+        hybrid.run(scene, begun, progress=stop_after(RESULT, 4.0))
+    hybrid.resume(begun, tmp_path / "whole.h5", **more).close()
+    for name, t in ((RESULT, 4.7), (ESTIMATION, 1.0)):
+        (tmp_path / "run.h5").write_bytes(begun.read_bytes())
+        with pytest.raises(KeyboardInterrupt):
+            hybrid.resume(tmp_path / "run.h5", progress=stop_after(name, t), **more)
+        hybrid.resume(tmp_path / "run.h5").close()
+        assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
 def test_a_run_that_is_stopped_while_its_model_error_is_followed_again(tmp_path, monkeypatch):
