@@ -79,6 +79,7 @@ class Outcome(IntEnum):
     OVERSTRETCHED = 11
     TURNS_LOST = 12
     WINCH_AT_END = 13
+    FOLDED = 14
 
     @property
     def cause(self) -> str:
@@ -187,6 +188,7 @@ _CAUSE = {
     Outcome.BURIED: "the only equilibrium found lies deep in the seabed",
     Outcome.TURNS_LOST: "the equilibrium found is not twisted by the turns asked for",
     Outcome.WINCH_AT_END: "the winch has no more line to pay out, or none to take in",
+    Outcome.FOLDED: "the only equilibrium found has a fold: a rod turns by more than 90 deg from one cell to the next",
     Outcome.OVERSTRETCHED: "the cable is stretched, or compressed, beyond what a section bears",
 }
 
@@ -204,6 +206,7 @@ _REMEDY = {
     Outcome.TURNS_LOST: "add cells, hold the cable tauter, or turn the end in time (ends.*.motion), with damping",
     Outcome.WINCH_AT_END: "another winch.tension, a longer payout.longest, more cells, or a shorter time.duration",
     Outcome.OVERSTRETCHED: "check axial_stiffness (N), mass (kg/m), lengths (m), loads (N); max_strain is the limit",
+    Outcome.FOLDED: "add cells where it bends (mesh), or begin nearer to the shape at rest (initial_guess)",
     Outcome.UNSTABLE: "start from another shape (initial.points, initial.direction), or run the motion with damping",
 }
 

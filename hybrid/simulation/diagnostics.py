@@ -149,16 +149,7 @@ class Diagnostics:
 
     def equilibrium(self, found: Equilibrium) -> None:
         """What a static solution leaves open."""
-        if found.pushed:
-            text = (
-                "the line was pushed off an equilibrium that is not stable, to one side: on the other it may rest as "
-            )
-            text += "well, as a mirror image, and which is found depends on the mesh; initial.points near one choose it"
-            self.events.event(0.0, 0.0, self._model.length, "several equilibria", text)
-        if found.slack >= 0:
-            s, tension = float(self._model.line.s[found.slack]), float(found.state.T[found.slack])
-            text = f"the only equilibrium found has a tension of {tension:.3g} N in a catenary at s = {s:g} m"
-            self.note(0.0, found.slack, "slack", f"{text}: it stands like a strut, which no cable does")
+        self.found_by(found.pushed, found.slack, found.state)
         if self._model.line.bits & FRICTION and not found.with_friction:
             text = "this equilibrium is the one without friction: say `initial: {kind: equilibrium, friction: settled}`"
             where = f"{text} for one that lies where it was laid"
@@ -182,6 +173,19 @@ class Diagnostics:
                 why = f"{there}a damped motion with contact, without friction, led there"
             text = f"the stability of this equilibrium is not judged, because {why}"
             self.events.event(0.0, 0.0, self._model.length, "stability not judged", text)
+
+    def found_by(self, pushed: bool, slack: int, state: State) -> None:
+        """An equilibrium beside one that is not stable, or with a slack catenary cell (-1: none)."""
+        if pushed:
+            text = (
+                "the line was pushed off an equilibrium that is not stable, to one side: on the other it may rest as "
+            )
+            text += "well, as a mirror image, and which is found depends on the mesh; initial.points near one choose it"
+            self.events.event(0.0, 0.0, self._model.length, "several equilibria", text)
+        if slack >= 0:
+            s, tension = float(self._model.line.s[slack]), float(state.T[slack])
+            text = f"the only equilibrium found has a tension of {tension:.3g} N in a catenary at s = {s:g} m"
+            self.note(0.0, slack, "slack", f"{text}: it stands like a strut, which no cable does")
 
     def still(self, ends: Ends, state: State) -> Stop:
         """As `shape`, for a state that no step has led to."""

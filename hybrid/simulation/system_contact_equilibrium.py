@@ -14,8 +14,8 @@ from hybrid.model.build import Model
 from hybrid.model.system import SystemModel
 from hybrid.simulation.contact_equilibrium import KEPT, contact_of
 from hybrid.solve.contact_statics import contact_energy
+from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.system import JoinedLine, SystemState
 from hybrid.solve.system_contact_statics import settled_system
 from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
 

@@ -17,7 +17,7 @@ from hybrid.kernels.zone_torque import TURN, torsion_energy
 from hybrid.model.build import Model
 from hybrid.model.failure import Weakness, after_failure, weaknesses
 from hybrid.simulation.releases import elastic
-from hybrid.solve.system import SystemState
+from hybrid.solve.joined import SystemState
 
 if TYPE_CHECKING:
     from hybrid.simulation.system_run import SystemRun

@@ -33,9 +33,10 @@ from hybrid.simulation.result_file import result_recorder
 from hybrid.simulation.run_sample import COMPARED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
 from hybrid.simulation.time_loop import FORCE_COLUMNS
+from hybrid.solve.joined import JoinedLine, SystemTaken
 from hybrid.solve.run import no_extremes
 from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.system import JoinedLine, SystemTaken
+from hybrid.solve.system_flaws import slack_cell
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.comparison_recorder import ComparisonRecorder
@@ -155,26 +156,30 @@ class LineResult:
         return self.contact
 
     def note_equilibrium(
-        self, x: JoinedLine, state: State, t: float | None, settled: bool, turned: bool = False
+        self, x: JoinedLine, state: State, t: float | None, found: SystemEquilibrium, turned: bool = False
     ) -> None:
         """What an equilibrium leaves open; t: s, where a motion starts from it, None: it is the result.
 
-        settled: whether a damped motion with contact led to it.  turned: whether the system has moments at points.
+        turned: whether the system has moments at points.
         """
         line = self.model.line
+        self.diagnostics.found_by(found.pushed, slack_cell(x, state), state)
         if line.bits & FRICTION:
             text = "this equilibrium of several lines is the one without friction on the seabed"
             self.events.event(0.0, 0.0, self.model.length, "static friction neglected", text)
-        touches = settled and bool(self.books.touch[:1].any())
+        touches = found.settled and bool(self.books.touch[:1].any())
         if line.bits & SELF_FRICTION and touches:
             text = "this equilibrium is the one without friction where the line touches itself"
             where = f"{text}: a run with damping that comes to rest in contact has it"
             self.events.event(0.0, 0.0, self.model.length, "static friction neglected", where)
-        if line.element.any() or touches:
-            text = "whether rods would buckle out of an equilibrium of several lines is not judged"
-            if settled:
-                there = "the line touches itself; " if touches else ""
-                text = f"{there}a damped motion with contact, without friction, led to this equilibrium; {text}"
+        why = "round-off of the bending of so short cells hides it" if self.number in found.solver.blurred else ""
+        if turned and line.element.any():
+            why = "a moment at a point is not conservative"
+        if found.settled and (line.element.any() or touches):
+            there = "the line touches itself; " if touches else ""
+            why = f"{there}a damped motion with contact, without friction, led there"
+        if why:
+            text = f"the stability of this equilibrium is not judged, because {why}"
             self.events.event(0.0, 0.0, self.model.length, "stability not judged", text)
         turns = 0.0 if turned else twist_at_rest(x, state)
         if abs(turns) > WOUND:

@@ -15,7 +15,8 @@ from hybrid.model.system import SystemModel
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.points import Fairlead, FreePoint, Point
 from hybrid.scene.system import System
-from hybrid.solve.system import SystemSolver, SystemState
+from hybrid.solve.joined import SystemState
+from hybrid.solve.system import SystemSolver
 from hybrid.store.format import Field
 
 WORKS = ("lines", "damping", "loads")

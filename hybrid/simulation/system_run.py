@@ -42,7 +42,8 @@ from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, 
 from hybrid.simulation.system_steps import StepControl
 from hybrid.simulation.system_zones import SystemZones, managers_for, zones_at_rest
 from hybrid.simulation.time_loop import SAME_STOP, WORK, apart
-from hybrid.solve.system import SystemSolver, SystemState, SystemTaken
+from hybrid.solve.joined import SystemState, SystemTaken
+from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_statics import LineFailed
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target, Text
 from hybrid.store.checkpoint import read_checkpoint
@@ -268,7 +269,7 @@ class SystemRun:
             solver.keep_books([line.books for line in self.lines])
             solver.evaluate_forces(self.state, 0.0)
             for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
-                line.note_equilibrium(x, state, None, self.found.settled, self.turned)
+                line.note_equilibrium(x, state, None, self.found, self.turned)
             self._output(solver)
             text = f"equilibrium: {self.found.summary}; residual force {self.found.residual:.2g} N"
             self._close("complete", text)
@@ -335,7 +336,7 @@ class SystemRun:
             for body in (x for x in self.model.bodies if x.members is None):
                 self.recorder.event(0.0, 0.0, 0.0, "waves on body neglected", f"body {body.name}: {text}")
         for line, x, state in zip(self.lines, self.solver.lines, self.state.lines, strict=True):
-            line.note_equilibrium(x, state, 0.0, self.found.settled, self.turned)
+            line.note_equilibrium(x, state, 0.0, self.found, self.turned)
             line.diagnostics.scheme(time.rho_inf)
         self._output(self.solver)
         self.gather_events()

@@ -15,7 +15,7 @@ from hybrid.model.system import SystemModel, balanced_places, starts_between
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
 from hybrid.simulation.system_contact_equilibrium import settle, solve_with_contact
-from hybrid.solve.system import JoinedLine, SystemState, joined_ends
+from hybrid.solve.joined import JoinedLine, SystemState, joined_ends
 from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
 
 # Equilibria until the water around members is that of the place found, and what of the largest wetted part, velocity
@@ -100,9 +100,12 @@ def joined_lines(model: SystemModel, t: float) -> list[JoinedLine]:
     """The lines with their ends and their sea at t (s), whose arrays `ends.at` and `sea.at` overwrite."""
     lines = []
     for x, joints, fairleads, seats in zip(model.models, model.joints, model.fairleads, model.seats, strict=True):
-        floor = x.slack_floor if x.slack == "stop" else -np.inf
-        ends = joined_ends(x.ends.at(t), joints)
-        lines.append(JoinedLine(x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints, fairleads, seats))
+        ends, floor, slackens = joined_ends(x.ends.at(t), joints), x.slack_floor, x.slack == "warn"
+        lines.append(
+            JoinedLine(
+                x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints, fairleads, seats, slackens
+            )
+        )  # fmt: skip
     return lines
 
 

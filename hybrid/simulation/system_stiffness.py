@@ -24,7 +24,8 @@ from hybrid.simulation.envelope import marks_of
 from hybrid.simulation.system_contact import refuse_within_itself
 from hybrid.simulation.system_contact_equilibrium import contacts_of
 from hybrid.simulation.system_start import equilibrium_of_system
-from hybrid.solve.system import SystemSolver, SystemState
+from hybrid.solve.joined import SystemState
+from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_contact_statics import touching_solver
 from hybrid.solve.system_statics import SystemEquilibrium
 

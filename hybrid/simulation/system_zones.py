@@ -32,8 +32,8 @@ from hybrid.simulation.initial_zones import MOST_ROUNDS, STRICTER, manager_for
 from hybrid.simulation.system_contact import renew_solver
 from hybrid.simulation.system_start import solve_from
 from hybrid.simulation.zone_switching import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, note_change, on_layout
+from hybrid.solve.joined import SystemState, SystemTaken
 from hybrid.solve.run import Tried
-from hybrid.solve.system import SystemState, SystemTaken
 from hybrid.solve.system_statics import SystemEquilibrium
 from hybrid.store.named_arrays import matched
 

@@ -10,13 +10,12 @@ import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels import entry
-from hybrid.kernels.bed import planes_under
 from hybrid.kernels.entry import Limits
 from hybrid.kernels.forces import AXIAL_LAW, FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
-from hybrid.kernels.resolution_checks import lowest, lowest_not_held
 from hybrid.kernels.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
 from hybrid.kernels.step import friction_axes
+from hybrid.solve.flaws import flaw_of_line, lowest_tension
 from hybrid.solve.laid import laid_on_bed
 from hybrid.solve.stability import Stability, is_judged
 from hybrid.solve.stepper import Stepper
@@ -26,9 +25,7 @@ MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 4
 REACH = 0.1  # of the length: largest shift of a node in one iteration
 # An equilibrium is out of balance by at most this part of its largest tension and of the scale; so many tries.
 BALANCED, BALANCING = 1e-6, 4
-# A line that has gone this many lengths from its start has drifted; one that lies this part of its length, and this
-# many onsets of contact, under the bed has gone through it.
-DRIFTED, BURIED, BURIED_ONSETS = 10.0, 0.02, 100.0
+DRIFTED = 10.0  # lengths that a line has gone from its start where it has drifted
 MOST_TURNING = 200  # of Newton with turning chords, which goes half a radian at a time: 8 pi are 40 turns of that size
 LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get there in one go
 NEARLY_STIFF = 1e-6  # strain at the tension scale at which hardening ends; the last part of the way is Newton's
@@ -37,6 +34,8 @@ LEAST_TENSION = 1e-3  # of the slack floor of a motion, with the opposite sign
 # The way to an equilibrium that has a mirror image on the other side, or may have: which it is hangs on round-off.
 PUSHED = "pushed off an unstable equilibrium"
 PUSH, TURN = 1e-2, 0.1  # the push off an unstable equilibrium: of the length per time scale, and rad about the chord
+# Of the length: unstable equilibria that are nearer than this are one; the most of them that a line is pushed off.
+SAME, MOST_PUSHES = 1e-3, 12
 RELAXING_STEPS = 2000  # of the pseudo-transient, at most
 SOFT_BED = 0.05  # of the length: how deep a cable may rest in the seabed where a continuation begins
 LIMP = 1e-3  # part of the bending stiffness there
@@ -106,31 +105,27 @@ class _Solver:
             if outcome != Outcome.OK or line is not self.line or sea is not None:
                 break
             # Newton stops by turns and tensions; a very stiff seabed makes much force of little way
-            if self.prove(ends, new) <= BALANCED * (float(np.abs(new.T).max()) + self.scale):
+            if self.is_balanced(ends, new):
                 break
             outcome, where = Outcome.NOT_CONVERGED, int(self.work.report[RESIDUAL_NODE])
         if outcome == Outcome.OK:
-            tension, cell = self.lowest(line, new)
+            tension, cell = lowest_tension(line, self.sea, new)
             if not tension > self.floor:
                 outcome, where = Outcome.SLACK, cell
         if outcome == Outcome.OK and line is self.line and sea is None:
             far = np.abs(new.r - start.r).max(axis=1)
             if far.max() > DRIFTED * self.length:  # what no bond holds is held by the anchor's springs alone
                 outcome, where = Outcome.SINGULAR, int(np.argmax(far))
-            elif line.bits & SEABED:
-                deep = planes_under(self.sea, new.r)[1] - 0.5 * self.sea.onset
-                if deep.max() > max(BURIED * self.length, BURIED_ONSETS * self.sea.onset):
-                    outcome, where = Outcome.BURIED, int(np.argmax(deep))
+            else:
+                outcome, where = flaw_of_line(line, self.sea, new, self.length, self.floor)
         judged = line is self.line and sea is None and is_judged(line, ends, self.length)
         if outcome == Outcome.OK and judged and not self.stability.holds(ends, new):
             outcome, where = Outcome.UNSTABLE, int(np.argmin(new.T))
         return Outcome(outcome), int(where), new
 
-    def lowest(self, line: Line, state: State) -> tuple[float, int]:
-        """Lowest tension of a catenary cell that no friction on the bed holds, N, and the cell."""
-        if line.bits & FRICTION:
-            return lowest_not_held(line, self.sea, state.T)
-        return lowest(line, state.T)
+    def is_balanced(self, ends: Ends, state: State) -> bool:
+        """Whether what is out of balance at the nodes is round-off of the forces."""
+        return self.prove(ends, state) <= BALANCED * (float(np.abs(state.T).max()) + self.scale)
 
     def prove(self, ends: Ends, state: State) -> float:
         """Largest force out of balance at a node, N; infinity when it cannot be told."""
@@ -291,27 +286,44 @@ def _attempts(
     solver: _Solver, ends: Ends, start: State, shape: str, others: Sequence[tuple[str, State]]
 ) -> Iterator[tuple[str, Outcome, int, State]]:
     """Ways to an equilibrium, the quickest first; each is tried only when those before it failed."""
-    first = (f"Newton from {shape}", *solver.newton(solver.line, ends, start))
+    unstable: list[State] = []
+
+    def noted(way: tuple[str, Outcome, int, State]) -> tuple[str, Outcome, int, State]:
+        _, outcome, _, state = way
+        same = SAME * solver.length
+        if outcome == Outcome.UNSTABLE and all(np.abs(state.r - x.r).max() > same for x in unstable):
+            unstable.append(state)
+        return way
+
+    def damped(other: State, name: str) -> tuple[str, Outcome, int, State]:
+        return noted((f"damped motion to rest{name}, then Newton", *solver.newton(solver.line, ends, relaxed(other))))
+
+    def relaxed(other: State) -> State:
+        return _relax(solver, ends, other)
+
+    first = noted((f"Newton from {shape}", *solver.newton(solver.line, ends, start)))
     yield first
     if solver.line.bits & (SEABED | FLOW):
-        yield _eased(solver, ends, start)
+        yield noted(_eased(solver, ends, start))
     for name, other in others:
-        yield f"Newton from {name}", *solver.newton(solver.line, ends, other)
-    soft = _hardened(
-        solver, ends, others[0][1] if others and first[1] in (Outcome.NOT_FINITE, Outcome.SINGULAR) else start
-    )
-    yield soft
+        yield noted((f"Newton from {name}", *solver.newton(solver.line, ends, other)))
+    soft = others[0][1] if others and first[1] in (Outcome.NOT_FINITE, Outcome.SINGULAR) else start
+    yield noted(_hardened(solver, ends, soft))
     for name, other in others:
-        how, outcome, where, state = _hardened(solver, ends, other)
-        yield f"{how}, from {name}", outcome, where, state
-    yield from _loaded(solver, ends, start)
-    settled = ("damped motion to rest, then Newton", *solver.newton(solver.line, ends, _relax(solver, ends, start)))
-    yield settled
-    for _, outcome, _, state in (settled, soft, first):
-        if outcome == Outcome.UNSTABLE:
-            time_scale = float(np.sqrt(float(solver.line.mass.sum()) * solver.length / solver.scale))
-            fallen = _relax(solver, ends, nudged(solver.line, state, solver.length, time_scale))
-            yield PUSHED, *solver.newton(solver.line, ends, fallen)
+        how, *found = noted(_hardened(solver, ends, other))
+        yield f"{how}, from {name}", *found
+    yield from map(noted, _loaded(solver, ends, start))
+    yield damped(start, "")
+    time_scale = float(np.sqrt(float(solver.line.mass.sum()) * solver.length / solver.scale))
+    pushed = 0
+    for name, other in (("", None), *others):  # pushes are few and cost little beside what follows
+        if other is not None:
+            yield damped(other, f" from {name}")
+        while pushed < min(len(unstable), MOST_PUSHES):
+            state = unstable[pushed]
+            pushed += 1
+            fallen = relaxed(nudged(solver.line, state, solver.length, time_scale))
+            yield noted((PUSHED, *solver.newton(solver.line, ends, fallen)))
 
 
 def solve_statics(
@@ -375,9 +387,11 @@ def solve_statics(
         Outcome.BURIED,
         failed[0][0],
     ):  # what says most about the line comes first
-        for outcome, where, state in failed:
-            if outcome == worst == Outcome.SLACK and take_slack:
+        for outcome, _, state in failed:
+            # what a continuation has left on its way is not balanced
+            if outcome == worst == Outcome.SLACK and take_slack and smooth.is_balanced(ends, state):
                 return _found(smooth, ends, state, path)
+        for outcome, where, _ in failed:
             if outcome == worst:
                 s = float(line.s[min(max(where, 0), line.s.size - 1)])
                 raise ComputationError(outcome, None, s, "\n              ".join(path))
@@ -386,7 +400,7 @@ def solve_statics(
 
 def _found(solver: _Solver, ends: Ends, state: State, path: list[str]) -> Equilibrium:
     residual = solver.prove(ends, state)
-    tension, cell = solver.lowest(solver.line, state)
+    tension, cell = lowest_tension(solver.line, solver.sea, state)
     slack = -1 if tension > solver.floor else cell
     with_friction = bool(solver.line.bits & FRICTION)
     blurred = solver.stability.blurred

@@ -8,18 +8,16 @@ point has none of its own, it is the last or first node of every line that is jo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from operator import is_
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.errors import Outcome
-from hybrid.kernels.assembly import JOINED
 from hybrid.kernels.binding import Table
 from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
-from hybrid.kernels.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, STATE, VD, WA, WD, WORK, A, U, V, W, X
+from hybrid.kernels.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, VD, WA, WD, WORK, A, U, V, W, X
 from hybrid.kernels.books import CARRIED, NOW, Books
 from hybrid.kernels.carried_frames import ANSWER, SEAT, TURNS
 from hybrid.kernels.entry import NO_PUSH
@@ -29,24 +27,24 @@ from hybrid.kernels.junctions import HANDED
 from hybrid.kernels.named_quantities import note_quantities
 from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, Limits, Task
 from hybrid.kernels.report import FORCE_A, LOCAL_ERROR, RESIDUAL, USED_RHO
-from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.run import blank_books, blank_job, in_space
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work, state_for
+from hybrid.kernels.state import Floats, State, Work, state_for
 from hybrid.kernels.step import friction_axes
 from hybrid.kernels.system import JUNCTIONS, book_system_step, solve_system
 from hybrid.kernels.system_contact import blank_touching_job, room_for_products, touch_system
 from hybrid.kernels.water import wave_kinematics
 from hybrid.solve.contact_statics import left_over
+from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.stability import ANCHOR
 from hybrid.solve.statics import (
     BALANCED,
     BALANCING,
-    LEAST_TENSION,
     MOST_ITERATIONS,
 )
 from hybrid.solve.stepper import HEAVY, REACH
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
+from hybrid.solve.system_flaws import buckling_line, flaw_of_lines
 from hybrid.solve.workspaces import workspace_of
 
 # Springs of points and bodies that nothing holds, in the test of stability, as a part of tension scale over length.
@@ -54,58 +52,6 @@ NEUTRAL = 1e-6
 # Of the longest line: arm by which moments on bodies are compared with forces, at least.
 LEAST_ARM = 0.01
 NO_BODIES: Floats = np.zeros((0, NUMBERS))
-
-
-class JoinedLine(NamedTuple):
-    """One line of a system."""
-
-    line: Line
-    sea: Sea
-    ends: Ends
-    length: float  # m
-    scale: float  # N, tension scale
-    floor: float  # N, tension at or below which a catenary cell is slack in motion; -infinity: it may be
-    joints: tuple[int, int]  # numbers of the points, or behind them bodies, that start and end are joined to; -1: held
-    fairleads: Floats = np.zeros((2, 3))  # m, of ends that are joined to bodies, in axes of the body
-    seats: Floats = np.zeros(
-        (2, SEAT)
-    )  # frames of ends that turn with these (kernels.carried_frames); zeros: none does
-
-
-class SystemState(NamedTuple):
-    """All that a system knows of itself at a time: the states of its lines, and (B, STATE) of its free bodies."""
-
-    lines: Sequence[State]
-    bodies: Floats = np.zeros((0, STATE))
-
-    def copy(self) -> SystemState:
-        """The same in arrays of its own."""
-        return SystemState([x.copy() for x in self.lines], self.bodies.copy())
-
-
-@dataclass(frozen=True)
-class SystemTaken:
-    """How a solution went: outcome, Newton iterations, predicted next correction, line and cell or node where it was
-    worst, the largest residual force at a node or point (N), the local error of a step (m), the largest of a line over
-    what is allowed of it: a step of more than REFUSED (kernels.step_law) is in no books, and is to be repeated; and its
-    spectral radius at infinity."""
-
-    outcome: Outcome
-    iterations: int
-    correction: float
-    line: int
-    where: int
-    residual: float
-    error: float = 0.0
-    ratio: float = 0.0
-    rho: float = 0.0
-
-
-def joined_ends(ends: Ends, joints: tuple[int, int]) -> Ends:
-    """The conditions of a line's ends with those that are joined to points; arrays are shared but for `held`."""
-    held = ends.held.copy()
-    held[[k for k in (0, 1) if joints[k] >= 0]] = JOINED
-    return ends._replace(held=held)
 
 
 def _carries(x: JoinedLine) -> bool:
@@ -153,8 +99,9 @@ class SystemSolver:
         self._contacts = {k: x for k, x in enumerate(contacts) if x is not None}
         self.work = [_room(x, k in self._contacts) for k, x in enumerate(lines)]
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
-        self._floors = np.array([x.floor for x in lines])
+        self._floors = np.array([-np.inf if x.slackens else x.floor for x in lines])
         self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
+        self.blurred: set[int] = set()  # lines of the last equilibrium of which round-off hides whether they buckle
         self.books_steps = True  # whether steps are booked at once; else by `book`
         self._unbooked = np.full(len(lines), -1.0)
         carried = [x.line.h.size + 1 if _carries(x) else 0 for x in lines]
@@ -454,9 +401,16 @@ class SystemSolver:
     def newton(self, start: SystemState) -> tuple[SystemTaken, SystemState]:
         """Static Newton from `start`; a new state is returned, the old one is left as it was.
 
-        SLACK: a catenary cell of what was found is not under tension.  UNSTABLE: a point or body would leave it; not
-        asked where a line touches itself.
+        An outcome other than OK also where what was found is no equilibrium (`flaw`).
         """
+        taken, new = self.balance(start)
+        if taken.outcome == Outcome.OK:
+            outcome, line, where = self.flaw(new)
+            taken = replace(taken, outcome=outcome, line=line, where=where)
+        return taken, new
+
+    def balance(self, start: SystemState) -> tuple[SystemTaken, SystemState]:
+        """As `newton`, whatever the state is in which all forces balance."""
         new = start.copy()
         for state in new.lines:
             for still in (state.v, state.a, state.vd, state.w, state.wa, state.wd):
@@ -470,16 +424,28 @@ class SystemSolver:
             if taken.outcome != Outcome.OK:
                 break
             proof = self._proof(new)
-            greatest = max(float(np.abs(state.T).max()) for state in new.lines)
             taken = SystemTaken(taken.outcome, iterations, taken.correction, taken.line, taken.where, proof)
-            if proof <= BALANCED * (greatest + self.scale):
+            if self.is_balanced(new, proof):
                 break
             taken = SystemTaken(Outcome.NOT_CONVERGED, iterations, taken.correction, taken.line, taken.where, proof)
-        if taken.outcome == Outcome.OK:
-            for k, (x, state) in enumerate(zip(self.lines, new.lines, strict=True)):
-                tension, cell = lowest(x.line, state.T)
-                if np.isfinite(x.floor) and not tension > LEAST_TENSION * abs(x.floor):
-                    taken = SystemTaken(Outcome.SLACK, iterations, taken.correction, k, cell, taken.residual)
-        if taken.outcome == Outcome.OK and not self.in_contact() and not self.is_stable(new):
-            taken = SystemTaken(Outcome.UNSTABLE, iterations, taken.correction, -1, -1, taken.residual)
         return taken, new
+
+    def is_balanced(self, states: SystemState, residual: float) -> bool:
+        """Whether a largest residual force (N) is round-off of the forces in states."""
+        greatest = max(float(np.abs(state.T).max()) for state in states.lines)
+        return residual <= BALANCED * (greatest + self.scale)
+
+    def flaw(self, states: SystemState) -> tuple[Outcome, int, int]:
+        """Why a balanced state is no equilibrium (OK: it is one), the line (-1: a point or body), and its node or cell.
+
+        It is stable where lines would not buckle between joints that are held, and points and bodies come back with
+        what lines do to them then: these two parts are the second variation.  Not asked where a line touches itself.
+        """
+        outcome, line, where = flaw_of_lines(self.lines, states)
+        if outcome != Outcome.OK or self.in_contact():
+            return outcome, line, where
+        self.blurred.clear()
+        line = buckling_line(self.lines, states, self.blurred)
+        if line >= 0:
+            return Outcome.UNSTABLE, line, int(np.argmin(states.lines[line].T))
+        return (Outcome.OK if self.is_stable(states) else Outcome.UNSTABLE), -1, -1

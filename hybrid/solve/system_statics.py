@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.bodies import DAMPING, MASS, V
-from hybrid.kernels.forces import FLOW, FRICTION, SEABED, WAVES
-from hybrid.kernels.state import Floats
+from hybrid.kernels.forces import AXIAL_LAW, FLOW, FRICTION, SEABED, WAVES
+from hybrid.kernels.state import NO_ADDRESS, Floats
 from hybrid.solve.contact_statics import damped, stop
-from hybrid.solve.statics import CALM, LIMP, RELAXING_STEPS, SOFT_BED
-from hybrid.solve.system import JoinedLine, SystemSolver, SystemState, SystemTaken
+from hybrid.solve.flaws import folds, lowest_tension
+from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
+from hybrid.solve.statics import CALM, HARDENING, LIMP, NEARLY_STIFF, PUSHED, RELAXING_STEPS, SOFT_BED, nudged
+from hybrid.solve.system import SystemSolver
+
+RESOLVED = 0.3  # rad from one cell to the next, of a bend that cells show
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,11 @@ class SystemEquilibrium:
     residual: float
     solver: SystemSolver  # whose reports are those of the solution
     settled: bool = False  # True where a damped motion with contact led there
+
+    @property
+    def pushed(self) -> bool:
+        """Whether it is beside an equilibrium that is not stable."""
+        return self.path[-1].startswith(PUSHED)
 
     @property
     def summary(self) -> str:
@@ -58,18 +67,39 @@ def solve_system_statics(
     bits = FRICTION | WAVES
     solver = SystemSolver([x._replace(line=x.line._replace(bits=x.line.bits & ~bits)) for x in lines], points, bodies)
     path: list[str] = []
-    total, failed = 0, list[SystemTaken]()
+    total, failed = 0, list[tuple[SystemTaken, SystemState]]()
     for how, taken, states in _attempts(solver, points, starts):
         total += taken.iterations
         path.append(f"{how}: {taken.outcome.cause if taken.outcome else 'found'} ({total} iterations in all)")
         if taken.outcome == Outcome.OK:
             residual = solver.evaluate_forces(states, solver.anchor).residual
             return SystemEquilibrium(states, tuple(path), total, residual, solver)
-        failed.append(taken)
-    worst = next((x for x in failed if x.outcome == Outcome.SLACK), failed[0])
-    line = worst.line
-    s = float(lines[line].line.s[min(max(worst.where, 0), lines[line].line.s.size - 1)]) if line >= 0 else 0.0
-    raise LineFailed(line, worst.outcome, None, s, "\n              ".join(path))
+        failed.append((taken, states))
+    for worst in (Outcome.SLACK, Outcome.UNSTABLE, Outcome.FOLDED, Outcome.BURIED, failed[0][0].outcome):
+        for taken, states in failed:
+            if taken.outcome == worst == Outcome.SLACK and lines[taken.line].slackens:
+                residual = solver.evaluate_forces(states, solver.anchor).residual
+                if solver.is_balanced(states, residual):  # which what a continuation has left on its way is not
+                    return SystemEquilibrium(states, tuple(path), total, residual, solver)
+        for taken, states in failed:
+            if taken.outcome == worst:
+                raise _failed(lines, taken, states, path)
+    raise AssertionError("one of the ways has failed with the first way's outcome")
+
+
+def _failed(
+    lines: Sequence[JoinedLine], worst: SystemTaken, states: SystemState, path: Sequence[str]
+) -> LineFailed:  # fmt: skip
+    """The error of a search of which nothing came, with the place where the worst result has its flaw."""
+    if worst.line < 0:
+        return LineFailed(-1, worst.outcome, None, 0.0, "\n              ".join(path))
+    line = lines[worst.line].line
+    node = min(max(worst.where, 0), line.s.size - 1)
+    if worst.outcome == Outcome.FOLDED:
+        turn = float(folds(line, states.lines[worst.line])[node])
+        text = f"{np.degrees(turn):.0f} deg from one cell to the next; cells of {RESOLVED * line.hn[node] / turn:.2g} m"
+        path = [f"{text} would show the bend", *path]
+    return LineFailed(worst.line, worst.outcome, None, float(line.s[node]), "\n              ".join(path))
 
 
 def _attempts(
@@ -77,6 +107,7 @@ def _attempts(
 ) -> Iterator[tuple[str, SystemTaken, SystemState]]:
     """Ways to an equilibrium, the quickest first; each is tried only when those before it failed."""
     given: list[Start] = []
+    flawed: list[SystemState] = []
     for name, start in starts:
         given.append((name, start))
         yield f"Newton from {name}", *solver.newton(start)
@@ -85,7 +116,15 @@ def _attempts(
             how, taken, states = _eased(solver, points, start)
             yield f"{how}, from {name}", taken, states
     for name, start in given:
-        yield f"damped motion to rest from {name}, then Newton", *solver.newton(_relax(solver, points, start))
+        how, taken, states = _hardened(solver, points, start)
+        yield f"{how}, from {name}", taken, states
+    for name, start in given:
+        taken, states = solver.newton(_relax(solver, points, start))
+        yield f"damped motion to rest from {name}, then Newton", taken, states
+        if taken.outcome in (Outcome.UNSTABLE, Outcome.FOLDED):
+            flawed.append(states)
+    for states in flawed:
+        yield PUSHED, *solver.newton(_relax(solver, points, pushed(solver, states)))
 
 
 def _easier(x: JoinedLine, part: float) -> JoinedLine:
@@ -107,9 +146,9 @@ def _eased(solver: SystemSolver, points: int, start: SystemState) -> tuple[str, 
         here = solver
         if not last:
             here = SystemSolver([_easier(x, max(goal, 0.0)) for x in solver.lines], points, solver.bodies)
-        taken, found = here.newton(states)
+        taken, found = here.newton(states) if last else here.balance(states)
         steps += 1
-        if taken.outcome == Outcome.OK or (taken.outcome == Outcome.SLACK and not last):
+        if taken.outcome == Outcome.OK:
             states, done = found, goal
             part = min(1.5 * part, 0.25) if done <= 0.0 else 1.5 * part
         else:
@@ -118,11 +157,66 @@ def _eased(solver: SystemSolver, points: int, start: SystemState) -> tuple[str, 
             return f"from a soft seabed, no current and little bending in {steps} steps", taken, states
 
 
+def _hardened(solver: SystemSolver, points: int, start: SystemState) -> tuple[str, SystemTaken, SystemState]:
+    """From soft and short lines, stretched by their start, to the real ones, as of one cable.  A part of the way that
+    fails is halved."""
+    states, soft, short, hard = start.copy(), [], [], []
+    for x, state in zip(solver.lines, states.lines, strict=True):
+        state.T[:] = x.scale
+        soft.append(np.maximum(x.line.ck, 1.0 / x.scale))
+        short.append(0.5 * np.linalg.norm(state.e, axis=1))
+        hard.append(np.maximum(x.line.ck, NEARLY_STIFF / x.scale))
+    done, part, steps = 0.0, 1.0 / HARDENING, 0
+    while True:
+        goal = min(1.0, done + part)
+        longer, harder = min(1.0, 2.0 * goal), max(0.0, 2.0 * goal - 1.0)
+        here = solver
+        if goal < 1.0:
+            lines = [
+                x._replace(
+                    line=x.line._replace(
+                        h=a ** (1 - longer) * x.line.h**longer, ck=b ** (1 - harder) * c**harder,
+                        bits=x.line.bits & ~AXIAL_LAW, law_at=NO_ADDRESS,
+                    )
+                )
+                for x, a, b, c in zip(solver.lines, short, soft, hard, strict=True)
+            ]  # fmt: skip
+            here = SystemSolver(lines, points, solver.bodies)
+        taken, found = here.newton(states) if goal == 1.0 else _taut(here, *here.balance(states))
+        steps += 1
+        if taken.outcome == Outcome.OK:
+            states, done, part = found, goal, 1.5 * part
+        else:
+            part *= 0.5
+        if done >= 1.0 or part < 1e-3:
+            return f"soft lines hardened in {steps} steps", taken, found
+
+
+def _taut(solver: SystemSolver, taken: SystemTaken, states: SystemState) -> tuple[SystemTaken, SystemState]:
+    """What balances, with the outcome SLACK where a catenary is not under tension."""
+    for k, (x, state) in enumerate(zip(solver.lines, states.lines, strict=True)):
+        tension, cell = lowest_tension(x.line, x.sea, state)
+        if taken.outcome == Outcome.OK and not tension > 0.0:
+            return replace(taken, outcome=Outcome.SLACK, line=k, where=int(cell)), states
+    return taken, states
+
+
+def pushed(solver: SystemSolver, states: SystemState) -> SystemState:
+    """States with a small push off an equilibrium that is not stable; ends stay with what they are joined to."""
+    out = []
+    for x, state in zip(solver.lines, states.lines, strict=True):
+        time_scale = float(np.sqrt(float(x.line.mass.sum()) * x.length / x.scale))
+        moved = nudged(x.line, state, x.length, time_scale)
+        moved.v[[0, -1]] = 0.0
+        out.append(moved)
+    return SystemState(out, states.bodies.copy())
+
+
 def _relax(solver: SystemSolver, points: int, start: SystemState) -> SystemState:
     """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until the lines hardly move."""
     mass = sum(float(x.line.mass.sum()) for x in solver.lines) + float(solver.bodies[:, MASS].sum())
     time_scale = float(np.sqrt(mass * solver.length / solver.scale))
-    lines = [x._replace(line=damped(x.line, x.length, time_scale), floor=-np.inf) for x in solver.lines]
+    lines = [x._replace(line=damped(x.line, x.length, time_scale), slackens=True) for x in solver.lines]
     here = SystemSolver(lines, points, damped_bodies(solver.bodies, time_scale))
     old, new = start.copy(), start.copy()
     dt, calm = 1e-3 * time_scale, 0

@@ -114,7 +114,7 @@ def test_every_line_and_point_is_in_the_result(moved: hybrid.Result) -> None:
     assert np.abs(hose.position[:, -1] - moved["points/vessel/position"]).max() < 1e-12
     assert np.abs(hose.reaction_end + moved["points/vessel/force"]).max() < 1e-9 * np.abs(hose.reaction_end).max()
     assert "bending_moment" in hose and "bending_moment" not in moved.lines["west"]
-    assert any("line hose" in e.text and e.kind == "stability not judged" for e in moved.events)
+    assert not any(e.kind == "stability not judged" for e in moved.events)
     with pytest.raises(KeyError, match="west, east, hose"):
         moved.lines["north"]
     with pytest.raises(ResultError, match="several lines"):

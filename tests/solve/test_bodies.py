@@ -16,7 +16,8 @@ from hybrid.kernels import bodies as k
 from hybrid.model.bodies import angles_of, body_model, frame_of
 from hybrid.scene.bodies import FreeBody
 from hybrid.simulation.system_run import SystemRun
-from hybrid.solve.system import SystemSolver, SystemState
+from hybrid.solve.joined import SystemState
+from hybrid.solve.system import SystemSolver
 
 LEG = {"mass": 0.05, "diameter": 0.002, "axial_stiffness": 5e6}
 MASS, ADDED, HEAVE = 5e5, (2e5, 2e5, 3e5, 2e6, 2e6, 1e6), 8e5

@@ -14,9 +14,10 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.newton import TOLERANCE
 from hybrid.model.build import Model, build
 from hybrid.simulation.system_run import SystemRun
+from hybrid.solve.joined import JoinedLine, SystemState, joined_ends
 from hybrid.solve.statics import solve_statics
 from hybrid.solve.stepper import Stepper
-from hybrid.solve.system import JoinedLine, SystemSolver, SystemState, joined_ends
+from hybrid.solve.system import SystemSolver
 
 LENGTH, CELLS = 100.0, 40
 A, B = np.zeros(3), np.array([70.0, 10.0, -20.0])

@@ -1,0 +1,68 @@
+"""Lines that meet at points, as their solver takes them and gives them back (solve.system)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.errors import Outcome
+from hybrid.kernels.assembly import JOINED
+from hybrid.kernels.bodies import STATE
+from hybrid.kernels.carried_frames import SEAT
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State
+
+
+class JoinedLine(NamedTuple):
+    """One line of a system."""
+
+    line: Line
+    sea: Sea
+    ends: Ends
+    length: float  # m
+    scale: float  # N, tension scale
+    floor: float  # N, tension at or below which a catenary cell is slack in motion; -infinity: none is
+    joints: tuple[int, int]  # numbers of the points, or behind them bodies, that start and end are joined to; -1: held
+    fairleads: Floats = np.zeros((2, 3))  # m, of ends that are joined to bodies, in axes of the body
+    seats: Floats = np.zeros(
+        (2, SEAT)
+    )  # frames of ends that turn with these (kernels.carried_frames); zeros: none does
+    slackens: bool = False  # whether a motion goes on with slack catenaries, and rest is taken with them if need be
+
+
+class SystemState(NamedTuple):
+    """All that a system knows of itself at a time: the states of its lines, and (B, STATE) of its free bodies."""
+
+    lines: Sequence[State]
+    bodies: Floats = np.zeros((0, STATE))
+
+    def copy(self) -> SystemState:
+        """The same in arrays of its own."""
+        return SystemState([x.copy() for x in self.lines], self.bodies.copy())
+
+
+@dataclass(frozen=True)
+class SystemTaken:
+    """How a solution went: outcome, Newton iterations, predicted next correction, line and cell or node where it was
+    worst, the largest residual force at a node or point (N), the local error of a step (m), the largest of a line over
+    what is allowed of it: a step of more than REFUSED (kernels.step_law) is in no books, and is to be repeated; and its
+    spectral radius at infinity."""
+
+    outcome: Outcome
+    iterations: int
+    correction: float
+    line: int
+    where: int
+    residual: float
+    error: float = 0.0
+    ratio: float = 0.0
+    rho: float = 0.0
+
+
+def joined_ends(ends: Ends, joints: tuple[int, int]) -> Ends:
+    """The conditions of a line's ends with those that are joined to points; arrays are shared but for `held`."""
+    held = ends.held.copy()
+    held[[k for k in (0, 1) if joints[k] >= 0]] = JOINED
+    return ends._replace(held=held)

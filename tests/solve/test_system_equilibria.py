@@ -1,0 +1,133 @@
+"""What is no equilibrium of several lines although all forces balance: compressed catenaries, folds, rods that buckle.
+
+Scenes in which release 0.6.0 was wrong are in tests/data/defects.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+import hybrid
+from hybrid.errors import ComputationError, Outcome
+
+DEFECTS = Path(__file__).parents[1] / "data" / "defects"
+LEG = {"length": 10.0, "mass": 1e-3, "axial_stiffness": 1e6, "bending_stiffness": 100.0}
+
+
+def tables_of(name: str) -> dict[str, Any]:
+    return dict(yaml.safe_load((DEFECTS / f"{name}.yaml").read_text()))
+
+
+def turned(tables: dict[str, Any], heading: float) -> dict[str, Any]:
+    """The same scene turned about the vertical."""
+    c, s = np.cos(heading), np.sin(heading)
+
+    def about(v: list[float]) -> list[float]:
+        return [float(c * v[0] - s * v[1]), float(s * v[0] + c * v[1]), *v[2:]]
+
+    bed = tables["environment"]["seabed"]
+    bed["slope"] = about(bed["slope"])
+    for point in tables["points"].values():
+        point["position"] = about(point["position"])
+    return tables
+
+
+def folds(result: hybrid.Result) -> float:
+    """The largest turn of a chord to the next, rad, of all lines."""
+    largest = 0.0
+    for line in result.lines.values():
+        d = np.diff(np.asarray(line.position)[-1], axis=0)
+        d /= np.linalg.norm(d, axis=1)[:, None]
+        largest = max(largest, float(np.arccos(np.clip((d[1:] * d[:-1]).sum(axis=1), -1.0, 1.0)).max()))
+    return largest
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.5, 2.0, 4.4])
+def test_a_line_of_a_system_rests_as_the_cable_does(heading: float) -> None:
+    """0.6.0 found -455 to -44 N along the line, with 111 deg between two cells; the cable has 477.4 N at its end."""
+    found = hybrid.static(turned(tables_of("line_of_a_system_in_compression"), heading))
+    assert np.linalg.norm(found["points/end/force"]) == pytest.approx(477.43, abs=0.05)
+    assert np.ravel(found.lines["a"].tension).min() > 0.0
+    assert "stability not judged" not in {event.kind for event in found.events}
+
+
+def test_a_motion_of_a_system_starts_from_what_is_an_equilibrium() -> None:
+    tables = tables_of("line_of_a_system_in_compression") | {"time": {"duration": 0.1, "step": 0.05}}
+    begun = hybrid.run(tables)
+    assert np.linalg.norm(begun["points/end/force"][0]) == pytest.approx(477.43, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "tension"), [("buoy_with_folded_legs", 2014.2), ("buoy_catenaries_compressed", 4158.0)]
+)
+def test_legs_of_a_mooring_are_neither_folded_nor_compressed(name: str, tension: float) -> None:
+    """0.6.0: -384 N and 178 deg between two cells; -1524 N, and 4847 N at the buoy, in catenaries with `slack: warn`."""
+    found = hybrid.static(tables_of(name))
+    assert np.ravel(found.lines["l0"].tension).max() == pytest.approx(tension, rel=1e-4)
+    assert all(np.ravel(line.tension).min() > 0.0 for line in found.lines.values())
+    assert folds(found) < 0.5 * np.pi
+    assert not {event.kind for event in found.events} & {"slack", "unresolved bend"}
+
+
+def tripod(load: float) -> dict[str, Any]:
+    """A head that is pressed down on three straight legs: each bears load / (3 cos), and pi^2 EI/L^2 = 9.87 N at most."""
+    places = {"a": [-6.0, 0.0, 0.0], "b": [3.0, 5.196152423, 0.0], "c": [3.0, -5.196152423, 0.0]}
+    leg = {"sections": [LEG], "model": "rod", "mesh": {"cells": 20}, "end": "head"}
+    return {
+        "environment": {"gravity": 1e-6},
+        "points": {"head": {"initial_guess": [0.0, 0.0, 8.0], "force": [0, 0, -load]}}
+        | {name: {"position": place} for name, place in places.items()},
+        "lines": {f"leg_{name}": leg | {"start": name} for name in places},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("load", "height"), [(20.0, 8.0), (30.0, -8.0)])
+def test_a_rod_that_would_buckle_is_no_equilibrium_of_a_system(load: float, height: float) -> None:
+    """Straight legs balance any load; they stand below that of Euler alone, 3 * 0.8 * 9.87 = 23.7 N, and hang beyond."""
+    found = hybrid.static(tripod(load))
+    assert found["points/head/position"][-1, 2] == pytest.approx(height, abs=0.01)
+
+
+def test_a_fold_between_cells_is_refused_with_its_place() -> None:
+    """A hose of 20 m between points 0.4 m apart turns within (EI/w)^(1/3) = 0.3 m; 20 cells of 1 m do not show it."""
+    hose = {"sections": [{"length": 20.0, "mass": 1.0, "bending_stiffness": 0.25}], "model": "rod"}
+    ends = {"a": {"position": [0, 0, 0]}, "b": {"position": [0.4, 0, 0]}}
+
+    def scene(cells: int) -> dict[str, Any]:
+        return {"points": ends, "lines": {"hose": hose | {"start": "a", "end": "b", "mesh": {"cells": cells}}}}
+
+    with pytest.raises(ComputationError) as refused:
+        hybrid.static(scene(20))
+    assert refused.value.outcome == Outcome.FOLDED
+    assert refused.value.s == pytest.approx(10.0, abs=1.01)
+    assert "line hose" in str(refused.value) and "would show the bend" in str(refused.value)
+    assert folds(hybrid.static(scene(200))) < 0.5 * np.pi
+
+
+def test_a_slack_catenary_is_said_where_nothing_else_is_found() -> None:
+    """A mooring with a leg that lies without tension on a slope, which `slack: warn` lets pass."""
+    found = hybrid.static(slack_mooring())
+    assert np.ravel(found.lines["l1"].tension).min() < 0.0
+    (said,) = [event for event in found.events if event.kind == "slack"]
+    assert "line l1" in said.text
+
+
+def slack_mooring() -> dict[str, Any]:
+    """Mooring 69 of bench/test_bench_system_statics.py."""
+    section = {"length": 146.074, "mass": 8.0, "diameter": 0.05, "axial_stiffness": 5e6, "drag": {"normal": 1.2}}
+    leg = {"sections": [section], "model": {"kind": "catenary", "slack": "warn"}, "mesh": {"cells": 40}, "end": "buoy"}
+    anchors = [[-33.5025, -96.2728, -65.215], [100.689, 15.8936, -55.7141], [-71.8795, 72.2787, -66.1411]]
+    buoy = {"mass": 800.0, "volume": 6.0, "drag_area": 2.0, "initial_guess": [0, 0, -2]}
+    return {
+        "environment": {
+            "fluid": {"density": 1025, "surface": 0.0, "current": [0.6, 0.0, 0.0]},
+            "seabed": {"z": -62.2335, "stiffness": 3000.0, "slope": [0.0633392, 0.00892696]},
+        },
+        "points": {"buoy": buoy} | {f"a{k}": {"position": place} for k, place in enumerate(anchors)},
+        "lines": {f"l{k}": leg | {"start": f"a{k}"} for k in range(3)},
+    }
