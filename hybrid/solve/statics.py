@@ -295,9 +295,6 @@ def _attempts(
             unstable.append(state)
         return way
 
-    def damped(other: State, name: str) -> tuple[str, Outcome, int, State]:
-        return noted((f"damped motion to rest{name}, then Newton", *solver.newton(solver.line, ends, relaxed(other))))
-
     def relaxed(other: State) -> State:
         return _relax(solver, ends, other)
 
@@ -310,19 +307,16 @@ def _attempts(
     soft = others[0][1] if others and first[1] in (Outcome.NOT_FINITE, Outcome.SINGULAR) else start
     yield noted(_hardened(solver, ends, soft))
     for name, other in others:
-        how, *found = noted(_hardened(solver, ends, other))
-        yield f"{how}, from {name}", *found
+        how, outcome, where, state = noted(_hardened(solver, ends, other))
+        yield f"{how}, from {name}", outcome, where, state
     yield from map(noted, _loaded(solver, ends, start))
-    yield damped(start, "")
     time_scale = float(np.sqrt(float(solver.line.mass.sum()) * solver.length / solver.scale))
     pushed = 0
-    for name, other in (("", None), *others):  # pushes are few and cost little beside what follows
-        if other is not None:
-            yield damped(other, f" from {name}")
+    for name, other in (("", start), *((f" from {name}", other) for name, other in others)):
+        yield noted((f"damped motion to rest{name}, then Newton", *solver.newton(solver.line, ends, relaxed(other))))
         while pushed < min(len(unstable), MOST_PUSHES):
-            state = unstable[pushed]
+            fallen = relaxed(nudged(solver.line, unstable[pushed], solver.length, time_scale))
             pushed += 1
-            fallen = relaxed(nudged(solver.line, state, solver.length, time_scale))
             yield noted((PUSHED, *solver.newton(solver.line, ends, fallen)))
 
 

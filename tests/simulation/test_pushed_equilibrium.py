@@ -1,10 +1,15 @@
-"""A column beyond Greenhill's load falls to a side that nothing chooses, which is said; below it stands."""
+"""Ways over unstable equilibria. A column beyond Greenhill's load falls to a side that nothing chooses, which is said; below it stands."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 import hybrid
+
+DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 
 GREENHILL = 7.8373  # w L^3/EI at which a column that is clamped at its foot buckles under its own weight
 
@@ -21,3 +26,12 @@ def test_the_side_that_nothing_chooses(load: float, cells: int, falls: bool) -> 
     said = [x.text for x in result.events if x.kind == "several equilibria"]
     assert bool(said) == falls == (result.position[-1, -1, 2] < 0.9)
     assert all("initial.points" in text for text in said)
+
+
+@pytest.mark.parametrize(("name", "cells", "orcaflex"), [("lazy_s", 200, 59640.7), ("lazy_wave", 400, 24172.9)])
+def test_a_line_is_pushed_off_each_unstable_equilibrium_that_is_met(name: str, cells: int, orcaflex: float) -> None:
+    """0.6.0 refused both, unless the scene said `guess: arc` or `guess: span`."""
+    scene = hybrid.load_scene(DEFECTS / f"equilibrium_refused_{name}.yaml", [f"mesh.cells={cells}"])
+    found = hybrid.static(scene)
+    assert np.linalg.norm(found.reaction_start[-1]) == pytest.approx(orcaflex, rel=1e-3)
+    assert "several equilibria" in {event.kind for event in found.events}
