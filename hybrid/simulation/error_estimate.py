@@ -16,7 +16,9 @@ from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bounded_model_errors import bounded, scaled
 from hybrid.simulation.error_order import (
+    CLEARLY_FINER,
     COARSER,
+    EXCEEDED,
     MOST,
     MOST_ORDER,
     ORDERS,
@@ -36,6 +38,7 @@ from hybrid.simulation.error_order import (
     start_change,
     start_order,
     step_share,
+    times_foretold,
     with_neighbours,
 )
 from hybrid.simulation.errors_by_cause import Block, Errors
@@ -50,6 +53,7 @@ from hybrid.simulation.run_sample import (
     restored_outputs,
     restored_sample,
 )
+from hybrid.simulation.step_ratios import of_outputs, ratios_at, usual_ratio
 from hybrid.store.named_arrays import Tree, matched
 
 # Errors by mesh and time step add with their signs, as in the difference of two runs that they follow from; the sum is
@@ -66,6 +70,8 @@ HARDLY_CONVERGES = 0.75
 # Halved cells and steps leave more than this of a difference (order 1): of vibrations that last, runs this coarse have
 # damped what longer steps change, so that what steps make of it is not known from them, if it is most of it.
 SLOWLY_CONVERGES, MOST_BY_STEPS = 0.5, 0.5
+# What a finer run has changed less than this part of what was foretold may have changed so little by chance.
+LEAST_PART = 0.25
 # Ratio of step or cell lengths of two runs below which their difference does not show the effect of either.
 LEAST_RATIO = 1.1
 # Part of the length of catenaries, or of rods, by which two runs may differ whose model errors count as the same.
@@ -97,6 +103,7 @@ class Estimate:
         None: it failed, or nothing moves.  from_rest: it begins from an equilibrium, or is one.
         """
         doubt = self._take(result)
+        self.shares_mixed = set[str]()
         both = [name for name in result.values if name in coarse.values]
         self._from_rest = from_rest
         own = [name for name in both if name in END_FORCES and not from_rest]  # with an order at the start
@@ -124,7 +131,7 @@ class Estimate:
         self.has_step = self._of_steps is not None
         self.has_mesh = bool(self.order) and result.cells >= LEAST_RATIO * coarse.cells
         # Steps of the result are shorter than those of the coarser run, and what that does is not known.
-        self.share_unknown = not self.has_step and 0 < LEAST_RATIO * coarse.steps <= result.steps
+        self.share_unknown = not self.has_step and coarse.steps > 0 and self._shorter(result, coarse) >= LEAST_RATIO
         # Outputs of which the runs with longer steps do not show it either (docs/accuracy.md).  Forces at ends after a
         # shock are of order 1 to 1.5 whatever lasts: their slow fall is in their order.
         slow = {name for name, x in fall.items() if name not in own and max(x.mean, x.largest) > SLOWLY_CONVERGES}
@@ -137,8 +144,21 @@ class Estimate:
 
     def _pair(self, slow: RunSample | None, fast: RunSample) -> tuple[RunSample, RunSample] | None:
         """Two runs on the same cells, of longer and of shorter steps, that show what steps do; None: they do not."""
-        shows = slow is not None and fast.steps > LEAST_RATIO * slow.steps
+        shows = slow is not None and self._shorter(fast, slow) > LEAST_RATIO
         return (slow, fast) if slow and shows and any(name in slow.values for name in self.order) else None
+
+    def _shorter(self, fast: RunSample, slow: RunSample) -> float:
+        """How many times as short the steps of a run mostly are as those of another."""
+        return usual_ratio(fast, slow)
+
+    def _shorter_at(self, fast: RunSample, slow: RunSample, name: str) -> np.ndarray:
+        """The same around each output of the result (nt,).
+
+        What steps make of a vibration that lasts adds up: it goes by all steps, not by those around an output.
+        """
+        if name in self.shares_mixed:
+            return np.full(self._count, fast.steps / max(slow.steps, 1))
+        return ratios_at(fast, slow, self._count)
 
     def show_steps(self, fast: RunSample) -> None:
         """Take a run on the cells of the coarser one in shorter steps, where that in longer steps shows nothing."""
@@ -162,33 +182,35 @@ class Estimate:
             return by_step, None
         known, own = around(every_of(count, coarse.every), a, b)
         change = result.some(name, known) - coarse.values[name][own]
-        return by_step, self._mesh_error(name, at_all_outputs(change, known, a, b), by_step, coarse, not a)
+        return by_step, self._mesh_error(name, at_all_outputs(change, known, a, b), by_step, coarse, a)
 
     def _by_step(self, name: str, a: int, b: int) -> np.ndarray | None:
         """Error by the time step of the outputs from number a to b, with its sign; None: not known."""
         if self._of_steps is None or name not in self._of_steps[0].values:
             return None
-        (slow, fast), steps, p = self._of_steps, self.run.steps, self.order[name]
+        (slow, fast), p = self._of_steps, self.order[name]
         known, own = around(every_of(len(self.run.values[name]), slow.every), a, b)
         faster = fast.some(name, every_of(len(fast.values[name]), slow.every // fast.every)[own])
-        late = (faster - slow.values[name][own]) / ((fast.steps / slow.steps) ** p - 1.0)
-        return at_all_outputs(late / (steps / fast.steps) ** p, known, a, b)
+        both = self._shorter_at(fast, slow, name), self._shorter_at(self.run, fast, name)
+        shown, left = (of_outputs(x[known] ** p, faster) for x in both)
+        return at_all_outputs((faster - slow.values[name][own]) / (shown - 1.0) / left, known, a, b)
 
     def _mesh_error(
-        self, name: str, change: np.ndarray, by_step: np.ndarray | None, before: RunSample, begins: bool = True
+        self, name: str, change: np.ndarray, by_step: np.ndarray | None, before: RunSample, a: int = 0
     ) -> np.ndarray:
         """Error by the mesh, from a change since a run with other cells: less what its steps have changed.
 
-        Where that is not known it is of both, and falls as what has become finer by less.  begins: the first of these
-        outputs is that at the start.
+        Where that is not known it is of both, and falls as what has become finer by less.  a: number of the first of
+        these outputs.
         """
-        p, finer, shorter = self.order[name], self.run.cells / before.cells, self.run.steps / max(before.steps, 1)
-        if self._mixes(name) and shorter > LEAST_RATIO:
+        p, finer = self.order[name], self.run.cells / before.cells
+        if self._mixes(name) and (shorter := self._shorter(self.run, before)) > LEAST_RATIO:
             finer = min(finer, shorter)
         if by_step is not None:
-            change = change - by_step * ((self.run.steps / before.steps) ** p - 1.0)
+            each = self._shorter_at(self.run, before, name)[a : a + len(change)]
+            change = change - by_step * (of_outputs(each**p, change) - 1.0)
         error = np.asarray(change / (finer**p - 1.0))
-        if begins and name in self.at_start:
+        if not a and name in self.at_start:
             error[0] = change[0] / (finer ** self.at_start[name] - 1.0)
         return error
 
@@ -255,40 +277,76 @@ class Estimate:
         before = self.run
         self.notes = tuple(dict.fromkeys((*self.notes, *self._take(result))))
         self.start = start_change(result, before), self.start[0]
-        finer, shorter = result.cells / before.cells, result.steps / before.steps
+        finer, shorter = result.cells / before.cells, self._shorter(result, before)
         other_zones = result.resolution.zones != before.resolution.zones
         more = not other_zones and self._exceeds("position", before, finer, shorter)
         if more:  # what cells and steps make of all outputs is not what it was thought to be
             self.shares_mixed = set(self.order)
         for name, p in list(self.order.items()):
+            each = self._shorter_at(result, before, name)
             self.changes[name] = np.nan, self.changes[name][0]
             if other_zones:  # what has changed is not by cells and steps alone
-                for found, ratio in ((by_step, shorter), (by_mesh, finer)):
+                for found, ratio in ((by_step, each), (by_mesh, np.full(each.size, finer))):
                     if name in found:
-                        found[name] = found[name] / ratio**p
+                        found[name] = found[name] / of_outputs(ratio**p, found[name])
                 continue
             change = np.asarray(result.values[name]) - np.asarray(before.values[name])
             if name in END_FORCES and self.cancels:
                 p = self._confirmed_order(name, change, finer, shorter)
             self.changes[name] = float(np.sqrt(squares(change) / max(1, change.size))), self.changes[name][1]
+            clearly = min(shorter, finer) > CLEARLY_FINER and not more
+            if clearly and self._foretold(name, change, each, finer):
+                continue
             if finer > LEAST_RATIO and name in by_mesh:
-                if name in by_step:
-                    by_step[name] = by_step[name] / shorter**p
-                shown, kept = self._mesh_error(name, change, by_step.get(name), before), by_mesh[name]
-                both = min(finer, shorter) if name in self.shares_mixed and shorter > LEAST_RATIO else finer
-                if more and name == "position":
-                    by_mesh[name] = shown
-                else:
-                    by_mesh[name] = blended(shown, kept / both**p, both, p)
-                if self._mixes(name) and shorter <= LEAST_RATIO:  # what steps make of it has not changed
-                    left = kept - change
-                    by_mesh[name] = np.where(np.abs(left) > np.abs(by_mesh[name]), left, by_mesh[name])
-                if name in self.at_start:
-                    q = self.at_start[name]
-                    by_mesh[name][:1] = blended(shown[:1], kept[:1] / finer**q, finer, q)
+                self._renew_mesh_error(name, change, before, each, more and name == "position")
             elif shorter > LEAST_RATIO:
-                shown = change / (shorter**p - 1.0)
-                by_step[name] = blended(shown, by_step[name] / shorter**p, shorter, p) if name in by_step else shown
+                by_ratio = of_outputs(each**p, change)
+                shown = change / (by_ratio - 1.0)
+                by_step[name] = blended(shown, by_step[name] / by_ratio, shorter, p) if name in by_step else shown
+
+    def _foretold(self, name: str, change: np.ndarray, shorter: np.ndarray, finer: float) -> bool:
+        """Let the errors of an output be as they were foretold, by as much less as its change was; False: it was more.
+
+        Where cells and steps are refined together their change does not show which of the two has made it.  shorter,
+        finer: how many times as short steps are (nt,), and how many times as many cells there are.
+        """
+        by_step, by_mesh = self._keep()
+        if not (self.cancels and name in by_step and name in by_mesh) or self._mixes(name):
+            return False
+        p, steps = self.order[name], of_outputs(shorter, change)
+        times = times_foretold(name, p, change, [(by_step[name], steps), (by_mesh[name], finer)])
+        if times is None or max(times) > EXCEEDED:
+            return False
+        kept, part = by_mesh[name], max(*times, LEAST_PART)
+        by_step[name], by_mesh[name] = part * by_step[name] / steps**p, part * kept / finer**p
+        self._renew_start(name, change, kept, finer)
+        return True
+
+    def _renew_mesh_error(
+        self, name: str, change: np.ndarray, before: RunSample, each: np.ndarray, shown_alone: bool
+    ) -> None:
+        """The error by the mesh of an output that finer cells have changed.
+
+        each: how many times as short steps are (nt,); shown_alone: nothing of what was foretold counts.
+        """
+        by_step, by_mesh = self._keep()
+        p, finer, shorter = self.order[name], self.run.cells / before.cells, self._shorter(self.run, before)
+        if name in by_step:
+            by_step[name] = by_step[name] / of_outputs(each**p, change)
+        shown, kept = self._mesh_error(name, change, by_step.get(name), before), by_mesh[name]
+        both = min(finer, shorter) if name in self.shares_mixed and shorter > LEAST_RATIO else finer
+        by_mesh[name] = shown if shown_alone else blended(shown, kept / both**p, both, p)
+        if self._mixes(name) and shorter <= LEAST_RATIO:  # what steps make of it has not changed
+            left = kept - change
+            by_mesh[name] = np.where(np.abs(left) > np.abs(by_mesh[name]), left, by_mesh[name])
+        self._renew_start(name, change, kept, finer)
+
+    def _renew_start(self, name: str, change: np.ndarray, kept: np.ndarray, finer: float) -> None:
+        """The error by the mesh at the first output, where it has an order of its own; kept: before."""
+        if name in self.at_start:
+            _, by_mesh = self._keep()
+            q = self.at_start[name]
+            by_mesh[name][:1] = blended(change[:1] / (finer**q - 1.0), kept[:1] / finer**q, finer, q)
 
     def _exceeds(self, name: str, before: RunSample, finer: float, shorter: float) -> bool:
         """Whether a finer run in shorter steps has changed an output by clearly more than was foretold."""
