@@ -105,6 +105,7 @@ EVENTS_BY_WEIGHT = (
     "largest force uncertain",
     "windows uncertain",
     "irregular motion",
+    "snaps",
     "costly accuracy",
     "finer run not kept",
     "end force between outputs",
@@ -154,8 +155,9 @@ EXPECTED = (*ZONE_EVENTS, "loads change", "end released", "motion blended in")
 # Kinds that, noted at t = 0, are of the whole run and not of its start.
 OF_THE_RUN = frozenset({
     "implausible", "accuracy missed", "no error figure", "error uncertain", "several equilibria", "not converged",
-    "largest force uncertain", "windows uncertain", "irregular motion", "costly accuracy", "finer run not kept",
-    "torque neglected", "ignored", "undamped", "model error not estimated", "zones fixed", "static friction neglected",
+    "largest force uncertain", "windows uncertain", "irregular motion", "snaps", "costly accuracy",
+    "finer run not kept", "torque neglected", "ignored", "undamped", "model error not estimated", "zones fixed",
+    "static friction neglected",
     "numerical dissipation", "model chosen",
 })  # fmt: skip
 # Kind of the event of a run that another program had begun.

@@ -39,6 +39,7 @@ from hybrid.simulation.error_statistics import (
     estimates,
     irregular_notes,
     is_chance,
+    resolves_snaps,
     snaps,
     statistics_of,
 )
@@ -76,6 +77,8 @@ WORTH_REPEATING = 1.2
 # A change of a quantity by less than this part of its largest value is round-off: a thousandth of the least error that
 # can be asked for.
 ROUND_OFF_OF = 1e-9
+# A run of so many times as many cells and steps counts as twice as fine.
+TWICE = 1.8
 # Values at an instant do not converge where halved cells and steps leave more of a difference than this: order 0.25.
 DIVERGES = 0.85
 
@@ -130,6 +133,7 @@ class ErrorController:
     excess: np.ndarray = field(default_factory=lambda: np.zeros(2))  # N, by which snaps may exceed the largest forces
     _ratio: float = np.inf  # of the error of the result to what is asked
     _judged: int = 0  # results
+    _slow_from: list[float] | None = None  # cells and steps of the first result, where errors fell slowly until then
     _lost: bool = False  # whether the runs to compare with are to be computed again
     _every: int = 1  # outputs to one of which the statistics are
     _notes: list[tuple[str, str]] = field(default_factory=list)
@@ -179,7 +183,14 @@ class ErrorController:
         """What is judged of an irregular motion, and how far the result may be off in what is not."""
         if self.asked is None or not self.irregular or not self.statistics or self.estimate is None:
             return []
-        return irregular_notes(self.statistics, self.estimate.errors, self._left_out, self.excess, self.asked)
+        return irregular_notes(
+            self.statistics,
+            self.estimate.errors,
+            self._left_out,
+            self.excess,
+            self.asked,
+            by_snaps=bool(self._slow_from),
+        )
 
     def start(self, resolution: Resolution) -> tuple[RunSample, Errors | None]:
         """From a first resolution to the result and its errors, None where they cannot be estimated."""
@@ -432,6 +443,8 @@ class ErrorController:
         verdict = self.verdict(self.asked)
         while verdict.ratio > 1.0 and self._leaves_out(verdict, verdict.ratio / before):
             verdict, before = self.verdict(self.asked), np.inf
+        if not self.irregular and self._slow_from is None:
+            self.statistics = {}  # it is judged at every instant from now on
         before *= 1.0 if self.irregular else self.estimate.revised.get(RAW.get(verdict.name, ""), 1.0)
         self._ratio, falls = verdict.ratio, verdict.ratio / before  # 0 for the first
         self._judged += 1
@@ -459,25 +472,43 @@ class ErrorController:
 
     def _leaves_out(self, verdict: Verdict, falls: float) -> bool:
         """Whether what misses does not converge, and is not judged from now on: every instant, then a largest force."""
-        if not self.statistics or self.asked is None or self.asked.instant:
+        if self.asked is None or self.asked.instant:
             return False
-        estimate = self.statistics[LARGEST] if self.irregular else self.estimate
-        assert estimate is not None
         name = RAW.get(verdict.name, verdict.name)
-        of_largest = self.irregular and verdict.statistic == LARGEST
+        if not self.irregular:
+            assert self.estimate is not None
+            return self._turns_out_to_snap(self.estimate, name, falls)
+        if not self.statistics:
+            return False
+        estimate, of_largest = self.statistics[LARGEST], verdict.statistic == LARGEST
         diverges = falls > STALLED or estimate.falls.get(name, np.nan) > DIVERGES
         if not (diverges or (of_largest and is_chance(self.statistics, LARGEST, name))):
             return False
-        if not self.irregular:
-            assert self.estimate is not None
-            self.irregular = snaps(self.estimate.run)
-            return self.irregular
         if verdict.statistic != LARGEST or verdict.name not in END_FORCES.values():
             return False
         if self._left_out:
             return False
         self.scattered = [name for raw, name in END_FORCES.items() if raw in estimate.order]  # a snap pulls at both
         return True
+
+    def _turns_out_to_snap(self, estimate: Estimate, name: str, falls: float) -> bool:
+        """Whether values at an instant do not converge, because the line snaps: in two slow falls, one after the other.
+
+        Each is between runs of which one is twice as fine: in the runs that the first result is compared with, and from
+        that to a finer one.  One alone is that of coarse runs, also of a regular motion that converges.
+        """
+        run = estimate.run
+        if self._slow_from is None:
+            slow = self._judged == 0 and self.moves and estimate.falls.get(name, np.nan) > DIVERGES
+            self._slow_from = [float(run.cells), float(run.steps)] if slow else None
+            return False
+        if falls <= STALLED:
+            self._slow_from = None
+            return False
+        cells, steps = run.cells / self._slow_from[0], run.steps / self._slow_from[1]
+        twice = (cells >= TWICE or not self.free.mesh) and (steps >= TWICE or not self.free.steps)
+        self.irregular = twice and falls > STALLED and snaps(run) and resolves_snaps(run)
+        return self.irregular
 
     def _by_chance(self, verdict: Verdict) -> bool:
         """Whether what misses is an end force that another run would differ in as much, however fine."""
@@ -503,6 +534,7 @@ class ErrorController:
             "scattered": list(self.scattered), "excess": self.excess, "choice": list(self.choice),
             "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": list(self._notes),
             "budget": self.budget.checkpoint() if self.budget is not None else [],
+            "slow": list(self._slow_from or ()),
         }  # fmt: skip
 
     def restore(self, tree: Mapping[str, Any], scene: Scene, points: OutputPoints, source: Path | None = None) -> None:
@@ -511,14 +543,23 @@ class ErrorController:
 
         ResultError or ValueError: it is none of this scene.
         """
-        template = {"runs": np.zeros(0), "ratio": np.inf, "finer": 0, "every": 1, "irregular": False}
+        template = {
+            "runs": np.zeros(0),
+            "slow": [0.0] * len(tree.get("slow", ())),
+            "ratio": np.inf,
+            "finer": 0,
+            "every": 1,
+            "irregular": False,
+        }
         template["excess"] = np.zeros(2)
         names = ("next", "first", "coarse", "estimate", "statistics", "scattered", "notes", "choice", "budget")
-        older = {"choice": ["", ""], "first": None, "excess": np.zeros(2), "budget": []}  # not in every one of 0.6
+        # not in every checkpoint of 0.6
+        older = {"choice": ["", ""], "first": None, "excess": np.zeros(2), "budget": [], "slow": []}
         saved = matched(older | dict(tree), template | dict.fromkeys(names), "error control")
         shape = len(output_times(scene)) + 1, points.s.size, points.jumps.size
         self.runs, self._ratio, self._judged = saved["runs"].tolist(), saved["ratio"], saved["finer"]
         self._every, self.irregular, self.excess = saved["every"], saved["irregular"], saved["excess"]
+        self._slow_from = list(saved["slow"]) or None
         if self._every < 1:
             raise ValueError("statistics of no outputs")
         self._notes = list(restored_notes(saved["notes"]))

@@ -20,17 +20,21 @@ from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.error_order import MOST_ORDER, ORDER, Falls
 from hybrid.simulation.errors_by_cause import Errors
 from hybrid.simulation.run_sample import END_FORCES, RunSample
-from hybrid.simulation.snap_scatter import snap_times
+from hybrid.simulation.snap_scatter import snap_times, steps_in_rise
 from hybrid.store.named_arrays import Tree, matched
 
 # Windows of a run, and the outputs of the result that one has at least.
 WINDOWS, LEAST = 50, 20
 # What is judged, in this order, and what it is called.
 LARGEST = "largest"
+# Kinds of the event that says so: of waves, and of a line that snaps.
+IRREGULAR, SNAPS = "irregular motion", "snaps"
 STATISTICS = {
     LARGEST: "largest value", "deviation": "standard deviation", "windows_largest": "mean of the windows' largest",
     "windows_smallest": "mean of the windows' smallest",
 }  # fmt: skip
+# Steps from slack to the mean force from which on a run shows a snap.
+STEPS_IN_RISE = 3
 # Windows from which on their scatter is known.
 MANY = 10
 
@@ -164,21 +168,26 @@ def windows_uncertain(found: Mapping[str, StatisticEstimate], asked: RequestedAc
 
 def irregular_notes(
     found: Mapping[str, StatisticEstimate], errors: Errors, scattered: Sequence[str], excess: np.ndarray,
-    asked: RequestedAccuracy,
+    asked: RequestedAccuracy, by_snaps: bool,
 ) -> list[tuple[str, str]]:  # fmt: skip
     """What is judged of an irregular motion, and how far the result may be off in what is not.
 
     errors: at every output; scattered: end forces whose largest values are by chance; excess: (2,) N, by which snaps
-    may exceed those at start and end.
+    may exceed those at start and end; by_snaps: whether it is so because values at an instant do not converge.
     """
     force = max(errors.largest("total", name) for name in END_FORCES.values())
     position = errors.largest("total", "position")
+    why = (
+        "the line snaps, and finer runs differ at an instant as much as coarser ones"
+        if by_snaps
+        else "the motion is irregular"
+    )
     text = (
-        "the motion is irregular: accuracy is that of largest values, mean extremes of windows and standard "
+        f"{why}: accuracy is that of largest values, mean extremes of windows and standard "
         f"deviations; at an instant positions may be off by {position:.2g} m, end forces by {force:.2g} N; "
         "accuracy: {instant: 1%} asks for every instant"
     )
-    notes = [("irregular motion", text)]
+    notes = [(SNAPS if by_snaps else IRREGULAR, text)]
     if scattered:
         largest, snaps_by = found[LARGEST].errors, dict(zip(END_FORCES.values(), excess, strict=True))
         by = {x.removeprefix("end_force_"): max(largest.largest("total", x), snaps_by[x]) for x in scattered}
@@ -198,6 +207,12 @@ def snaps(run: RunSample) -> bool:
     """
     t = run.forces[:, 0]
     return any(snap_times(t, run.forces[:, k]) for k in (1, 2)) if t.size else False
+
+
+def resolves_snaps(run: RunSample) -> bool:
+    """Whether the force at an end rises over several steps where it snaps: else steps are too long to show anything."""
+    t = run.forces[:, 0]
+    return max(steps_in_rise(t, run.forces[:, k]) for k in (1, 2)) >= STEPS_IN_RISE
 
 
 def _thinned(x: np.ndarray, step: int) -> np.ndarray:

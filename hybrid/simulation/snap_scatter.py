@@ -37,6 +37,16 @@ def snap_times(t: Floats, F: Floats) -> list[tuple[float, float]]:
     return out
 
 
+def steps_in_rise(t: Floats, F: Floats) -> float:
+    """Steps from the lowest force of a snap to the mean force, the median over all snaps; 0: there are none."""
+    mean = np.average(F, weights=np.diff(t, prepend=0.0))
+    counts = []
+    for begin, end in snap_times(t, F):
+        a, b = np.searchsorted(t, (begin, end))
+        counts.append(int(np.argmax(F[a : b + 1] >= mean)))
+    return float(np.median(counts)) if counts else 0.0
+
+
 def joined(times: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """The same without overlaps, in order."""
     out: list[tuple[float, float]] = []
