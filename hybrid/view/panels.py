@@ -27,6 +27,7 @@ from hybrid.view.projections import (
     extent_in,
     free_edges,
     magnification,
+    not_to_scale,
     pieces_of,
     telling_times,
     view_named,
@@ -110,6 +111,7 @@ def framed(result: Result, view: View, items: list[Item], when: str = "") -> Pan
     across, up = Axis(view.across_label, "m", left, right), Axis(view.up_label, "m", low, high)
     size = " × ".join(f"{short(x, 4)}" for x in np.ptp(box, axis=1))
     caption = f"{view.across_label} – {view.up_label}, {size} m{stretch}"
+    caption += f" ({scale})" if (scale := not_to_scale(view, result)) else ""
     return Panel("shape", f"shape{above}{when}{stretch}", across, up, items, taller / wider, caption=caption)
 
 

@@ -21,6 +21,7 @@ from hybrid.view.projections import (
     Numbers,
     aspect_of,
     history_points,
+    not_to_scale,
     telling_times,
     touches_bed,
     views_of,
@@ -143,6 +144,7 @@ def _facts(result: Result, earlier: np.ndarray) -> list[str]:
         facts.append(", ".join(f"{z.kind} {short(z.s_a, 4)} … {short(z.s_b, 4)} m" for z in zones))
     if "error_total_position" in result.attributes:
         facts.insert(0, f"estimated error {error_words(result.attributes)}")
+    facts += [text for view in (views_of(result) if len(result.times) else ()) if (text := not_to_scale(view, result))]
     if len(earlier):
         facts.append("earlier shapes at t = " + ", ".join(f"{short(t, 3)}" for t in earlier) + " s")
     return facts

@@ -167,6 +167,44 @@ def magnification(view: View, result: Result) -> tuple[float, float]:
     return (1.0, factor) if up < across else (factor, 1.0)
 
 
+# Nodes between which crossings of a shape in a picture are looked for: pairs of these are a million.
+_CROSSING_POINTS = 1000
+
+
+def not_to_scale(view: View, result: Result) -> str:
+    """What a picture that opens one direction does to shapes, in words; "" where it has equal scales.
+
+    A line that turns back, such as an S, then looks like a loop where it is none: whether it crosses itself in this
+    plane is said.
+    """
+    factors = magnification(view, result)
+    if factors == (1.0, 1.0):
+        return ""
+    wide = factors[0] > 1.0
+    label, other = (view.across_label, view.up_label)[:: 1 if wide else -1]
+    text = f"not to scale: {label.split(',')[0]} is drawn {max(factors):g} times as large as {other.split(',')[0]}"
+    along = view.project(result.position[-1])[1 if wide else 0]
+    back = np.diff(along)[np.sign(np.diff(along)) == -np.sign(along[-1] - along[0])]
+    if abs(float(back.sum())) <= STILL * max(float(np.ptp(along)), 1e-300):
+        return text
+    crosses = _crosses_itself(np.column_stack(view.project(result.position[-1])))
+    return f"{text}; the line turns back and {'crosses' if crosses else 'does not cross'} itself in this view"
+
+
+def _crosses_itself(shape: np.ndarray) -> bool:
+    """Whether a polyline (n, 2) crosses itself."""
+    p = shape[np.unique(np.linspace(0, len(shape) - 1, min(len(shape), _CROSSING_POINTS)).round().astype(int))]
+    step = np.diff(p, axis=0)
+
+    def side(a: np.ndarray, along: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return np.sign(along[..., 0] * (b - a)[..., 1] - along[..., 1] * (b - a)[..., 0])
+
+    begin, way = p[:-1, None], step[:, None]
+    apart = side(begin, way, p[None, :-1]) * side(begin, way, p[None, 1:]) < 0.0  # of each chord, ends of the others
+    k = np.arange(len(step))
+    return bool((apart & apart.T & (np.abs(k[:, None] - k) > 1)).any())
+
+
 def aspect_of(views: list[View], result: Result) -> float:
     """Width over height as drawn; the geometric mean of the views; of a straight line, something large or small."""
     sizes = np.array([np.ptp(extent_in(v, result), axis=1) * magnification(v, result) for v in views])

@@ -23,11 +23,11 @@ from hybrid.view.system_views import (
     AllLines,
     arms_of,
     bodies_of,
+    clearest_view,
     colours,
     facts_line,
     fairleads_of,
     largest_tensions,
-    longest_view,
     motions,
     points_of,
     rotations,
@@ -302,7 +302,7 @@ def _marks(result: Result, frames: np.ndarray, store: Store) -> list[dict[str, A
 
 
 def _space(result: Result, every: AllLines, scene: dict[str, Any], shown: dict[str, Kept]) -> str:
-    poster = draw([shape(result, every, longest_view(every))])
+    poster = draw([shape(result, every, clearest_view(every))])
     thinned = next(iter(shown.values()))
     moves = len(thinned.frames) > 1
     when = (

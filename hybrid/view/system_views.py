@@ -23,6 +23,8 @@ LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 MOST_NAMED = 12  # lines in a legend: more would hide the picture
 AT_REST = 1e-6  # of the longest line: steps are solved to no less, and a motion below it is round-off
 NAME_ROOM = 0.13  # of the range of a panel, for a name in its legend
+# Part of the plan of a line that a picture has to show, and of its length that is level, so that it has a plan at all.
+SEEN, LEVEL_PART = 0.25, 0.05
 _EARLIER = 4  # shapes of the motion behind the last one
 
 
@@ -49,14 +51,43 @@ class AllLines:
         return cast(Result, self)
 
 
-def longest_view(every: AllLines) -> View:
-    """The upright plane in which the lines, as they are last, are longest: no line is seen from its end."""
+def views_of_lines(every: AllLines) -> list[View]:
+    """Planes in which all lines are seen: those of `views_of`, but beside a plan the clearest upright one."""
+    first, *others = views_of(every.as_result)
+    plan = len(others) == 1 and not others[0].upright
+    return [clearest_view(every), *others] if plan and first.across_label in "xy" else [first, *others]
 
-    def length(view: View) -> float:
-        shapes = (np.stack(view.project(line.position[-1])) for line in every.lines.values())
-        return sum(float(np.linalg.norm(np.diff(shape), axis=0).sum()) for shape in shapes)
 
-    return max((views_of(every.as_result)[0], view_named("xz"), view_named("yz")), key=length)
+def clearest_view(every: AllLines) -> View:
+    """The upright plane in which the lines, as they are last, are longest, and none is seen from its end.
+
+    Planes along x, y and that of the lines come before turned ones, which are taken where they alone show each line.
+    """
+
+    def seen(view: View) -> tuple[bool, float]:
+        """Whether all lines show, and the length of all of them."""
+        parts, total = [1.0], 0.0
+        for line in every.lines.values():
+            steps = np.diff(line.position[-1], axis=0)
+            shown = float(np.hypot(*view.project(steps)).sum())
+            level, whole = float(np.abs(steps @ view.across).sum()), float(np.hypot(steps[:, 0], steps[:, 1]).sum())
+            total += shown
+            if whole > LEVEL_PART * float(np.linalg.norm(steps, axis=1).sum()):
+                parts.append(level / whole)
+        return min(parts) >= SEEN, total
+
+    usual = [views_of(every.as_result)[0], view_named("xz"), view_named("yz")]
+    angles = np.radians([30.0, 45.0, 60.0, 120.0, 135.0, 150.0])
+    turned = [_upright(float(angle)) for angle in angles]
+    return max(
+        [view for view in usual if seen(view)[0]] or [view for view in turned if seen(view)[0]] or usual, key=seen
+    )
+
+
+def _upright(angle: float) -> View:
+    """The upright plane along a direction, rad from x."""
+    across = np.array([np.cos(angle), np.sin(angle), 0.0])
+    return View(across, np.eye(3)[2], f"horizontal, {short(np.degrees(angle), 3)}° from x", "z")
 
 
 def colours(result: Result) -> dict[str, str]:
@@ -248,7 +279,7 @@ def page(result: Result) -> Page:
     if not len(result.times):
         return page_of(result, [])
     every = AllLines(result)
-    views = views_of(every.as_result)
+    views = views_of_lines(every)
     names = ["s", "S"][: len(views)]
     panels = {name: shape(result, every, view) for name, view in zip(names, views, strict=True)}
     panels["p"] = tensions(result, every)
@@ -279,7 +310,7 @@ Moving = Any
 def film_page(result: Result, factor: float) -> tuple[Page, Moving]:
     """The page of a film of several lines, and what moves on it: by output, the time in words and items by panel."""
     every = AllLines(result)
-    views = dict(zip(("shape", "second"), views_of(every.as_result), strict=False))
+    views = dict(zip(("shape", "second"), views_of_lines(every), strict=False))
     none = np.zeros(0)
     legend: list[Item] = [Line(none, none, x, c, 1.8) for x, c in list(colours(result).items())[:MOST_NAMED]]
     panels: dict[str, Panel] = {}

@@ -631,3 +631,31 @@ def test_no_pyplot_and_no_matplotlib_before_something_is_drawn() -> None:
     )
     env = os.environ | {"PYTHONPATH": str(Path(hybrid.__file__).parents[1])}
     subprocess.run([sys.executable, "-c", code, str(Path(__file__).parent)], check=True, env=env)
+
+
+class Drawn:
+    """A line in the x-z plane, as far as views ask."""
+
+    def __init__(self, x: np.ndarray, z: np.ndarray) -> None:
+        self.position = np.stack([x, 0.0 * x, z], axis=1)[None]
+
+    def __contains__(self, name: str) -> bool:
+        return False
+
+
+def test_a_picture_that_is_not_to_scale_says_whether_a_line_crosses_itself() -> None:
+    """An S in deep water looks like a loop where one direction is opened."""
+    s = np.linspace(0.0, 1.0, 401)
+    turn = 0.5 - 0.5 * np.cos(np.pi * np.clip((s - 0.45) / 0.1, 0.0, 1.0))
+    down = -3000.0 * s + 400.0 * np.sin(np.pi * turn) * np.sin(2.0 * np.pi * turn)
+    view, loop = views.view_named("xz"), 2.0 * np.pi * turn
+    cases = {
+        "": (3000.0 * s, down),
+        "not to scale: x is drawn 7 times as large as z": (100.0 * s, -3000.0 * s),
+        "does not cross": (100.0 * s + 20.0 * turn, down),
+        "and crosses": (100.0 * s - 90.0 * (1.0 - np.cos(loop)), -3000.0 * s + 400.0 * np.sin(loop)),
+    }
+    for text, (x, z) in cases.items():
+        said = views.not_to_scale(view, Drawn(x, z))  # type: ignore[arg-type]
+        assert text in said and bool(said) is bool(text), (text, said)
+    assert "turns back" not in views.not_to_scale(view, Drawn(100.0 * s, -3000.0 * s))  # type: ignore[arg-type]

@@ -22,9 +22,17 @@ from hybrid.errors import ResultError
 from hybrid.store.records import Zone
 from hybrid.view.animation import animate
 from hybrid.view.figure import Line, Marks
-from hybrid.view.projections import views_of
 from hybrid.view.system_report import _extreme_text, html
-from hybrid.view.system_views import AllLines, arms_of, longest_view, motions, page, points_of, rotations
+from hybrid.view.system_views import (
+    AllLines,
+    arms_of,
+    clearest_view,
+    motions,
+    page,
+    points_of,
+    rotations,
+    views_of_lines,
+)
 
 SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
 PLACES = {"east": (100, 0), "north": (-50, 87), "south": (-50, -87)}
@@ -147,16 +155,26 @@ def test_a_line_that_was_catenary_throughout_has_no_moment() -> None:
     assert _extreme_text(Extremes("catenary", 2.0), *ask).startswith("2 N m at s")  # type: ignore[arg-type]
 
 
-def test_the_still_picture_shows_the_lines_where_they_are_longest() -> None:
-    """Three legs, one along x: its length is seen, though the others reach farther along y."""
-    angles = np.radians([0.0, 120.0, 240.0])
-    legs = [np.array([[0.0, 0.0, 0.0], [np.cos(a), np.sin(a), -1.0]]) for a in angles]
+@pytest.mark.parametrize(
+    ("angles", "across"),
+    [
+        ((0.0, 120.0, 240.0), "x"), ((90.0, 210.0, 330.0), "y"),
+        ((0.0, 90.0, 180.0, 270.0), "horizontal, 45° from x"),
+    ],
+)  # fmt: skip
+def test_the_overview_shows_every_line_in_both_planes(angles: tuple[float, ...], across: str) -> None:
+    """Three legs, one along x: its length is seen, though the others reach farther along y; four legs along the axes."""
+    legs = [np.array([[0.0, 0.0, 0.0], [np.cos(a), np.sin(a), -0.6]]) for a in np.radians(angles)]
     every = AllLines.__new__(AllLines)
     every.lines = {str(k): SimpleNamespace(position=leg[None]) for k, leg in enumerate(legs)}  # type: ignore[misc]
     every.position = np.concatenate(legs)[None]
     every._around = {}  # type: ignore[assignment]
-    assert views_of(every.as_result)[0].across_label == "y"
-    assert longest_view(every).across_label == "x"
+    upright, plan = views_of_lines(every)
+    assert clearest_view(every).across_label == upright.across_label == across
+    assert (plan.across_label, plan.up_label) == ("x", "y")
+    for leg in legs:
+        seen = np.ptp(leg @ upright.across)
+        assert seen > 0.25 * np.hypot(*np.ptp(leg, axis=0)[:2])
 
 
 def test_arms_lead_from_a_body_to_its_fairleads(result: hybrid.Result) -> None:
@@ -195,7 +213,7 @@ def test_the_table_of_a_run_judges_each_line(path: Path, capsys: pytest.CaptureF
 
 def test_the_stress_of_pipes_is_judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """As the only limit of a line it went by in the table of commands and in the report."""
-    pipe = {"bending_stiffness": 300, "diameter": 0.04, "pipe": {"wall": 0.004, "max_stress": 1e6}}
+    pipe = {"bending_stiffness": 300, "diameter": 0.04, "pipe": {"wall": 0.004, "modulus": 4e9, "max_stress": 1e6}}
     line = {"start": "a", "end": "b", "sections": [SECTION | pipe], "mesh": {"cells": 12}}
     points = {"a": {"position": [0, 0, -60]}, "b": {"position": [100, 0, 0]}}
     path = tmp_path / "pipe.h5"
