@@ -38,8 +38,9 @@ SLOWEST_WAVE = 10.0
 # EI over EA d^2: a thin-walled tube of diameter d has 1/8, and no section more; spiral strands and umbilicals have
 # 0.001 to 0.06, and a thousand times that where EA is in kN.
 STIFFEST_BENDING = 1.0
-# Parts of what a pipe's wall gives, EA and EI, between which coatings, armour and rounding may lie.
-OF_A_PIPE = (0.2, 5.0)
+# Parts of what a pipe's wall gives, EA and EI, between which coatings and armour may lie, and EA of a line that is
+# meant not to stretch.
+AXIAL_OF_A_PIPE, BENDING_OF_A_PIPE = (0.2, 500.0), (0.2, 5.0)
 # A line at rest sinks into real beds by less than this many of its diameters, or by less than half a metre.
 DEEPEST_TRENCH = (10.0, 0.5)
 # Speed of an end in a liquid, m/s, by its amplitudes and periods: twice that of the fastest ships.
@@ -185,11 +186,11 @@ def _of_a_pipe(section: Section) -> Iterator[Wrong]:
     inner = outer - 2.0 * pipe.wall
     axial = pipe.modulus * 0.25 * math.pi * (outer**2 - inner**2)
     bending = pipe.modulus * math.pi / 64.0 * (outer**4 - inner**4)
-    for key, unit, given, own in (
-        ("axial_stiffness", "N", section.axial_stiffness, axial),
-        ("bending_stiffness", "N m^2", max(bending_stiffness(section)) or None, bending),
+    for key, unit, given, own, bounds in (
+        ("axial_stiffness", "N", section.axial_stiffness, axial, AXIAL_OF_A_PIPE),
+        ("bending_stiffness", "N m^2", max(bending_stiffness(section)) or None, bending, BENDING_OF_A_PIPE),
     ):
-        low, high = (part * own for part in OF_A_PIPE)
+        low, high = (part * own for part in bounds)
         if given is not None and not low <= given <= high:
             what = f"{key.replace('_', ' ')} of {given:.3g} {unit} beside a wall that has {own:.3g}"
             why = (

@@ -213,7 +213,7 @@ def test_the_table_of_a_run_judges_each_line(path: Path, capsys: pytest.CaptureF
 
 def test_the_stress_of_pipes_is_judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """As the only limit of a line it went by in the table of commands and in the report."""
-    pipe = {"bending_stiffness": 300, "diameter": 0.04, "pipe": {"wall": 0.004, "modulus": 4e9, "max_stress": 1e6}}
+    pipe = {"bending_stiffness": 1.5e4, "diameter": 0.04, "pipe": {"wall": 0.004, "max_stress": 1e6}}
     line = {"start": "a", "end": "b", "sections": [SECTION | pipe], "mesh": {"cells": 12}}
     points = {"a": {"position": [0, 0, -60]}, "b": {"position": [100, 0, 0]}}
     path = tmp_path / "pipe.h5"
