@@ -255,12 +255,13 @@ class ErrorController:
 
     def _judge_finer(self, estimate: Estimate, resolution: Resolution, result: RunSample) -> None:
         """The same of a finer result; where it is the last and no better than that before it, that one stays."""
-        before = self.judged(True).copied()
+        before, excess, notes = self.judged(True).copied(), self.excess, list(self._notes)
         try:
             self.next_estimate(estimate, resolution, result)
             self._judge(resolution)
         except KeyboardInterrupt:  # in a run to compare with: the finer result stays beside, until it is resumed
             self.estimate, self.statistics = before.estimate, dict(before.statistics)
+            self.excess, self._notes[:] = excess, notes
             raise
         if self.asked is None or self.next is not None:
             self._take_finer()

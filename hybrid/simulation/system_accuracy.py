@@ -345,6 +345,9 @@ class SystemPasses:
                         control.keep(before[name], finer[name])
                 self._notes.append((NOT_KEPT, not_kept_text(next(iter(result.values())), found)))
             return {}, kept
+        except KeyboardInterrupt:  # in a run to compare with: the result before it stays, and is gone on with
+            kept = False
+            raise
         finally:
             self._replacement.settle(kept)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 from dataclasses import replace
@@ -10,9 +11,13 @@ from typing import Any
 
 import pytest
 from bits import Stopping, differences
+from rich.console import Console as RichConsole
 from test_late_file import described
+from typer.testing import CliRunner
 
 import hybrid
+from hybrid.cli.commands import app
+from hybrid.cli.console import Console
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.resolution import Resolution
 from hybrid.model.system import SystemResolution
@@ -21,6 +26,9 @@ from hybrid.simulation import passes, system_accuracy, system_run
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
 from hybrid.simulation.static_case import StaticCase
+from hybrid.view.headed_page import page_of
+from hybrid.view.notebook_card import card
+from hybrid.view.summary import facts_of
 
 ERRORS, FINER = "its errors are not estimated yet", "the finer result that its accuracy asks for is not computed yet"
 
@@ -48,7 +56,7 @@ def two_lines(accuracy: str = "0.3%") -> dict[str, Any]:
 
 def rougher(resolution: Resolution) -> Resolution:
     assert resolution.local is not None
-    return replace(resolution.coarser(8.0, 1.0), local=10.0 * resolution.local)
+    return replace(resolution.coarser(16.0, 1.0), local=15.0 * resolution.local)
 
 
 @pytest.fixture
@@ -111,6 +119,27 @@ def test_stopped_after_the_result(
     assert sorted(x.name for x in tmp_path.iterdir()) == ["run.h5", "whole.h5"]
     with hybrid.open(tmp_path / "run.h5") as result:
         assert result.done and not result.pending and "amended" not in result.attributes
+
+
+def test_whoever_looks_at_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures, report, card, comparison, statistics, exports, and the command that was stopped."""
+    monkeypatch.chdir(tmp_path)
+    Stopping(monkeypatch)
+    stopped_in(ESTIMATION, described(True), tmp_path / "run.h5")
+    with hybrid.open("run.h5") as result:
+        facts = {fact.key: fact for fact in facts_of(result)}
+        assert ERRORS in facts["status"].text and facts["status"].weight == "alarm"
+        assert ERRORS in page_of(result, []).facts and ERRORS in card(result) and ERRORS in repr(result)
+        assert result.pending in hybrid.export(result, "run.csv").notes
+    told = CliRunner().invoke(app, ["stats", "run.h5"])
+    assert told.exit_code == 0 and ERRORS in " ".join(told.output.split())
+    console = Console(False, False)
+    console.will_write(tmp_path / "no.h5")
+    console._file = tmp_path / "run.h5"
+    err = io.StringIO()
+    console.__dict__["_err"] = RichConsole(file=err, width=500)
+    console.interrupted()
+    assert f"{ERRORS}; `hybrid resume {tmp_path / 'run.h5'}` makes up for it" in err.getvalue()
 
 
 def test_stopped_in_the_errors_of_fixed_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
