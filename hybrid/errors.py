@@ -160,6 +160,10 @@ OF_THE_RUN = frozenset({
     "static friction neglected",
     "numerical dissipation", "model chosen",
 })  # fmt: skip
+# How an event "ignored" begins that is about what an end bends the line by.
+OF_AN_END = "moment and tangent at ends."
+# Of an event "out of plane": the motion is right, because it is one in space from there on.
+IN_SPACE = "it goes on in space"
 # Kind of the event of a run that another program had begun.
 OTHER_PROGRAM = "other program"
 # Kind of the event that gives the number (value) of events of another kind (criterion) that were not written.

@@ -62,7 +62,7 @@ def stats(
         facts: dict[str, Any] = {}
         if curve is not None:
             s, damage = opened.damage(curve, strength=strength, section=section, times=times, at=at)
-            facts = _fatigue_facts(opened, s, damage, times)
+            facts = _fatigue_facts(opened, s, damage, times, section is not None)
             facts["places"] = [] if at is None else _fatigue_at(s, damage, facts)
         for key, value in (("--above", above), ("--below", below)):
             if value is not None and (names is None or len(names) > 1):
@@ -140,27 +140,33 @@ def _parts_of_time(rows: list[dict[str, Any]], above: float | None, below: float
 
 def _limit_lines(result: Result) -> list[str]:
     """Which part of the limits of sections is used, and the limits of quantities."""
-    from hybrid.store.limits import held_of
+    from hybrid.store.verdicts import quantity_limits
 
     found = []
     for x in () if result.lines else result.utilisation().values():
         part = "" if x.used is None else f"{100.0 * x.used:.4g} % of {x.limit} used: "
-        found.append(f"{part}{x.text}, s = {x.s:.5g} m, t = {x.t:.5g} s, of every step and output")
-    return found + [f"{x.text}{x.when}" + "; BROKEN" * x.broken for x in held_of(result)]
+        if x.limit == "min_bend_radius" and x.used is not None:
+            part = f"MBR utilisation of {100.0 * x.used:.4g} %: "
+        found.append(f"{part}{x.text}, s = {x.s:.5g} m, t = {x.t:.5g} s, of every step and output{x.ending}")
+    return found + [f"{x.text}{x.when}{x.ending}" for x in quantity_limits(result)]
 
 
-def _fatigue_facts(result: Result, s: np.ndarray, damage: np.ndarray, times: Any) -> dict[str, Any]:
+def _fatigue_facts(result: Result, s: np.ndarray, damage: np.ndarray, times: Any, bends: bool) -> dict[str, Any]:
+    """bends: whether stresses of bending are counted."""
     from hybrid.statistics.fatigue import life_in_years
     from hybrid.store.histories import history_of
+    from hybrid.store.verdicts import doubt_of
 
     t = history_of(result, "tension", times).t
     k, duration = int(damage.argmax()), float(t[-1] - t[0])
     life = float(life_in_years([damage[k]], [1.0], duration))
+    doubt = doubt_of(result, "tension", *(["curvature"] if bends else []))
     return {
         "s": float(s[k]),
         "damage": float(damage[k]),
         "duration": duration,
-        "life": life if np.isfinite(life) else None,
+        "life": life if np.isfinite(life) and doubt is None else None,
+        "life_not_verified": "" if doubt is None else doubt.text,
     }
 
 
@@ -178,6 +184,7 @@ def _fatigue_lines(curve: str, facts: dict[str, Any]) -> str:
     lines = []
     for x in facts["places"] or [facts]:
         life = "unlimited" if x["life"] is None else f"{x['life']:.3g} years"
+        life = facts["life_not_verified"] or life
         place = f"{'' if facts['places'] else 'largest '}damage at s = {x['s']:.5g} m"
         lines.append(f"{place}: {x['damage']:.3g} in {facts['duration']:.6g} s; fatigue life {life}")
     return "\n".join(f"fatigue by {curve}: {line}" for line in lines)

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 import hybrid
 from hybrid.cli.app import picture_beside
 from hybrid.cli.plan_tables import contents_table, system_plan_lines
-from hybrid.cli.tables import extremes_facts, judged_text, unknown_text, verdict_text, verdicts_of
-from hybrid.store.limits import held_of
+from hybrid.cli.tables import extremes_facts, judged_text, quantities_facts, unknown_text, verdict_text, verdicts_of
 from hybrid.store.records import error_words
 
 if TYPE_CHECKING:
@@ -74,7 +73,7 @@ def ended(console: Console, result: Result, target: Path, picture: Path | None, 
         hybrid.plot(result, picture)
     lines = {name: extremes_facts(line) | verdicts_of(line) for name, line in result.lines.items()}
     moves = len(result.times) > 1
-    held = [x._asdict() | {"text": x.text, "when": x.when * moves} for x in held_of(result)]
+    held = quantities_facts(result)
     points, bodies = _last(result, "points"), _last(result, "bodies")
     console.events(result.events)
     end = float(result.times[-1]) if moves else None
@@ -122,7 +121,7 @@ def _table(
             radius = f"{bent['value']:.5g} m at s = {bent['s']:.5g} m" + f", t = {bent['t']:.5g} s" * (end is not None)
             table.add_row("", f"smallest bend radius {radius}{judged_text(bend, 'm', bent)}{unknown_text(facts, 'm')}")
         for x in facts["quantities"]:
-            table.add_row("", x["text"] + x["when"] + "; BROKEN" * x["broken"])
+            table.add_row("", x["text"] + x["when"] + x["ending"])
         for each in facts.get("accuracy", ()):
             table.add_row("", verdict_text(each))
     for name, facts in points.items():
@@ -135,7 +134,7 @@ def _table(
         loads = f"force of the lines {_vector(facts['force'])} N, moment {_vector(facts['moment'])} N m"
         table.add_row(f"body {name}", f"{last}{turned}, {loads}")
     for x in held:
-        table.add_row(x["name"], x["text"] + x["when"] + "; BROKEN" * x["broken"])
+        table.add_row(x["name"], x["text"] + x["when"] + x["ending"])
     table.columns[0].style = "bold"
     return table
 

@@ -5,7 +5,6 @@ rich is imported when a table is made: a command that prints JSON does without.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -51,13 +50,11 @@ def extremes_facts(result: Result) -> dict[str, Any]:
 
     Of every accepted step where the file has its envelope, and of the outputs.
     """
-    from hybrid.store.envelope import limits_of
-    from hybrid.store.limits import held_of
     from hybrid.store.records import not_converged_in
+    from hybrid.store.verdicts import section_limits
     from hybrid.view.worst import worst
 
     found: dict[str, Any] = {}
-    moves = len(result.times) > 1
     for key, low in (("tension_max", False), ("tension_min", True)):
         x = worst(result, "tension", lowest=low)
         found[key] = {"value": x.value, "s": x.s, "t": x.t}
@@ -66,8 +63,16 @@ def extremes_facts(result: Result) -> dict[str, Any]:
         straight = not x.value * float(result.s[-1] - result.s[0]) > 1e-6
         found["bend_radius_min"] = None if straight else {"value": 1.0 / x.value, "s": x.s, "t": x.t}
     found["not_converged"] = sorted(not_converged_in(result.attributes))
-    found["quantities"] = [x._asdict() | {"text": x.text, "when": x.when * moves} for x in held_of(result)]
-    return found | {"limits": [x._asdict() for x in limits_of(result, result)]}
+    found["quantities"] = quantities_facts(result)
+    return found | {"limits": [x._asdict() | {"not_verified": x.not_verified} for x in section_limits(result)]}
+
+
+def quantities_facts(result: Result) -> list[dict[str, Any]]:
+    """The limits of named quantities and of stress, with their verdicts."""
+    from hybrid.store.verdicts import quantity_limits
+
+    moves = len(result.times) > 1
+    return [x._asdict() | {"text": x.text, "when": x.when * moves, "ending": x.ending} for x in quantity_limits(result)]
 
 
 def extremes_rows(facts: dict[str, Any], moves: bool) -> Iterator[tuple[str, str]]:
@@ -84,13 +89,16 @@ def extremes_rows(facts: dict[str, Any], moves: bool) -> Iterator[tuple[str, str
         text = f"{x['value']:.5g} {unit} at s = {x['s']:.5g} m" + f", t = {x['t']:.5g} s" * moves
         yield title, text + judged_text(held, unit, x) + unknown_text(facts, unit)
     for x in facts["quantities"]:
-        yield x["name"], x["text"] + x["when"] + "; BROKEN" * x["broken"]
+        yield x["name"], x["text"] + x["when"] + x["ending"]
 
 
 def judged_text(held: dict[str, Any] | None, unit: str, extreme: dict[str, Any]) -> str:
     """Whether a limit of sections is kept, behind the extreme that it is about; "" without a limit."""
     if held is None:
         return ""
+    if held["not_verified"]:
+        side = "at most" if held["limit"] == "max_tension" else "at least"
+        return f"; {held['limit']}, {side} {held['allowed']:.5g} {unit}, {held['not_verified']}"
     if not held["broken"]:
         return f"; within {held['limit']}"
     there = "" if (held["s"], held["t"]) == (extreme["s"], extreme["t"]) else f" at s = {held['s']:.5g} m"
@@ -183,30 +191,32 @@ def zones_over_time(result: Result) -> dict[str, Any]:
 def errors_facts(result: Result) -> dict[str, Any]:
     """The estimated errors: largest of position (m) and of the end forces (N), by kind; whether they are met."""
     from hybrid.store.records import not_converged_in
+    from hybrid.store.verdicts import MET, MISSED, asked_accuracy
 
     found: dict[str, Any] = {k[6:]: float(x) for k, x in result.attributes.items() if k.startswith("error_")}
-    if found and "accuracy_asked" in result.attributes:
-        kinds = {event.kind for event in result.events}
-        uncertain = "error uncertain", "largest force uncertain", "windows uncertain", "model error not estimated"
-        known = not kinds & {*uncertain, "several equilibria", "implausible"}
-        found["met"] = "accuracy missed" not in kinds and (known or None)
+    for asked in asked_accuracy(result) if found else ():
+        found["met"] = {MET: True, MISSED: False}.get(asked.verdict)
+        found["verdict"] = asked.text
     unknown = not_converged_in(result.attributes)
     return found | ({"not_converged": sorted(unknown)} if found and unknown else {})
 
 
 def verdicts_of(line: Result) -> dict[str, Any]:
     """What was asked of a line of several, and whether it is met, by quantity; empty if nothing was."""
-    found = line.attributes.get("accuracy_verdicts")
-    return {"accuracy": json.loads(str(found))} if found else {}
+    from hybrid.store.verdicts import MET, MISSED, asked_accuracy
+
+    met = {MET: True, MISSED: False}
+    found = [x._asdict() | {"met": met.get(x.verdict), "text": x.text} for x in asked_accuracy(line)]
+    return {"accuracy": found} if found else {}
 
 
 def verdict_text(found: Mapping[str, Any]) -> str:
     """The same of one quantity, for people."""
     name = str(found["quantity"]).replace("end_force_", "force at the ").replace("_", " ")
     if found["error"] is None:
-        return f"{name}: asked, not estimated"
-    unit, word = found["unit"], {True: "met", False: "MISSED", None: "not verified, see the note"}[found["met"]]
-    return f"{name}: error {_short(found['error'])} {unit}, asked {_short(found['asked'])} {unit}: {word}"
+        return f"{name}: asked, {found['text']}"
+    unit = found["unit"]
+    return f"{name}: error {_short(found['error'])} {unit}, asked {_short(found['asked'])} {unit}: {found['text']}"
 
 
 def errors_table(errors: dict[str, Any], result: Result) -> Any:
@@ -251,8 +261,7 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
         return table
     from rich.console import Group
 
-    verdict = {True: "met", False: "MISSED", None: "not verified, see the note"}[errors["met"]]
-    return Group(table, f"asked {asked}: {verdict}")
+    return Group(table, f"asked {asked}: {errors['verdict']}")
 
 
 def _largest_moment(result: Result) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf
 
+from hybrid.errors import OF_AN_END
 from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.forces import DRAG, FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state import Line
@@ -225,7 +226,7 @@ def contents_of(
         if not line.spin[cell] and end.acts_by_moment:
             entries.append(
                 Entry(
-                    f"moment and tangent at ends.{name}",
+                    f"{OF_AN_END}{name}",
                     False,
                     "the cable ends in a catenary zone, which transmits no bending moment",
                     event="ignored",

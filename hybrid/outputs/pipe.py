@@ -66,6 +66,14 @@ class Pipes:
         """Largest stress (ns,) Pa allowed at arc lengths s (m), after or before where sections meet; NaN: any."""
         return self.limits[self._sections(s, after)]
 
+    def gains(self, s: Floats, after: bool) -> tuple[Floats, Floats]:
+        """By how much a stress rises at most with tension (ns,) 1/m2 and with curvature (ns,) Pa m, likewise."""
+        walls = Walls(*(x[self._sections(s, after)] for x in self._walls))
+        area = 0.25 * np.pi * (walls.outer**2 - walls.inner**2)
+        none = np.isnan(walls.modulus)
+        by_tension = np.divide(1.0, area, out=np.full(s.size, np.nan), where=~none)
+        return by_tension, 0.5 * walls.modulus * walls.outer
+
     def rows(self) -> Floats:
         """(sections, WALL) of kernels.pipes."""
         found, walls = np.zeros((len(self.whole), wall_of.WALL)), self._walls

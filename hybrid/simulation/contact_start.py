@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from hybrid.errors import IN_SPACE
 from hybrid.kernels import books as b
 from hybrid.model.self_reach import touching
 from hybrid.simulation.self_watch import within_itself
@@ -27,7 +28,7 @@ def begin_contact(moving: Transient) -> None:
     watch, model, state, monitor = moving.itself, moving.model, moving.state.copy(), moving.plane_monitor
     assert watch is not None
     if model.plane is not None:
-        text = "the line comes near itself: it goes on in space, where it may touch itself"
+        text = f"the line comes near itself: {IN_SPACE}, where it may touch itself"
         moving.events.event(moving.t, 0.0, model.length, "out of plane", text)
         model = monitor.leave(model, moving.run, state)
     monitor.comes_back = False

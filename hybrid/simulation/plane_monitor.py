@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.errors import IN_SPACE
 from hybrid.kernels.accept import GROWN
 from hybrid.kernels.books import NEAR_PLANE, PUSH_GROWN, PUSH_START
 from hybrid.kernels.entry import NO_PUSH
@@ -55,7 +56,7 @@ class PlaneMonitor:
         if model.plane is None:
             return model
         if not self.insists and leaves_plane(model.plane, state, model.length):
-            text = "the equilibrium found leaves the plane of the scene: it goes on in space"
+            text = f"the equilibrium found leaves the plane of the scene: {IN_SPACE}"
             out = np.abs((state.r - state.r[0]) @ model.plane[2])
             note(int(np.argmax(out)), "out of plane", text)
             return replace(model, plane=None)
@@ -106,7 +107,7 @@ class PlaneMonitor:
             return False
         if self.home is None:
             back = f"; in the plane again where it is within {BACK:g} of its length" if self.comes_back else ""
-            note(where, "out of plane", f"{text}; it goes on in space, pushed by {HANDED_ON:g} of its length{back}")
+            note(where, "out of plane", f"{text}; {IN_SPACE}, pushed by {HANDED_ON:g} of its length{back}")
         return True
 
     def leave(self, model: Model, run: CompiledRun, state: State) -> Model:

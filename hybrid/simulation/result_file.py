@@ -174,6 +174,10 @@ def limits_of(wanted: Mapping[str, Quantity]) -> list[tuple[Field, np.ndarray]]:
     return out
 
 
+# Of what the stress of a pipe is known to rise with: units of the rise.
+STRESS_PER = {"tension": "1/m^2", "curvature": "Pa m"}
+
+
 def _limits_of_quantities(observer: Observer) -> list[tuple[Field, np.ndarray]]:
     """Limits of what the scene asks for, and the largest stress of pipes."""
     if observer.quantities is None:
@@ -186,6 +190,9 @@ def _limits_of_quantities(observer: Observer) -> list[tuple[Field, np.ndarray]]:
             allowed = pipes.largest_allowed(s, bool(name))
             field = Field(f"{name}max_stress", "Pa", f"{text} allowed; NaN: none", s.shape, (f"{name}s",), nan_ok=True)
             out.append((field, allowed))
+            for (of, unit), gain in zip(STRESS_PER.items(), pipes.gains(s, bool(name)), strict=True):
+                rise = f"rise of the stress of a pipe with {of}, at most; NaN: no pipe"
+                out.append((Field(f"{name}stress_per_{of}", unit, rise, s.shape, (f"{name}s",), nan_ok=True), gain))
     return out
 
 

@@ -35,6 +35,9 @@ LEAST_PEAKS, LEAST_RECORDS = 20, 5
 # of three hours is then 3 % too large in the mean; with 0.8 it is 6 %, with 0.5 10 %.
 USUAL_THRESHOLD = 0.9
 EULER = 0.5772156649015329
+# Shapes of Weibull laws: with the smallest what is exceeded once in e^7 is 7^10 scales above the threshold, with the
+# largest all are alike.  Peaks of a regular motion, all alike but for one of its beginning, ask for less and more.
+LEAST_SHAPE, LARGEST_SHAPE = 0.1, 1e9
 
 
 class Extreme(NamedTuple):
@@ -82,7 +85,8 @@ def fit_weibull(y: Floats) -> tuple[Floats, Floats]:
     from scipy.special import gamma
 
     first, second = l_moments(y)
-    shape = -math.log(2.0) / np.log1p(-second / first)
+    alike, unlike = (-math.expm1(-math.log(2.0) / x) for x in (LARGEST_SHAPE, LEAST_SHAPE))
+    shape = -math.log(2.0) / np.log1p(-np.clip(second / first, alike, unlike))
     return first / gamma(1.0 + 1.0 / shape), shape
 
 

@@ -23,6 +23,8 @@ _HELD = {"min_bend_radius": ("curvature", "max"), "max_tension": ("tension", "ma
 LIMITED = {"curvature": ("min_bend_radius",), "tension": ("max_tension", "min_tension"), "von_mises": ("max_stress",)}
 # Of the largest tension: what is below is what the solver's tolerance leaves of a force of zero, as at a free end.
 NOTHING = 1e-6
+# Verdicts on limits: `verdicts` decides which.
+WITHIN, BROKEN, NOT_VERIFIED = "within", "broken", "not verified"
 # Part of a value by which an output at a node may differ from that of its step: sums in another order.
 SAME = 1e-12
 
@@ -55,8 +57,9 @@ class Extreme(NamedTuple):
 class Judged(NamedTuple):
     """How near the cable came to a limit of its sections: where its limit was broken most, or nearly.
 
-    limit: its key in the scene; value, allowed: m or N; used: part of what is allowed, None for a smallest tension;
-    s: m; t: s.
+    limit: its key in the scene; value, allowed: m or N; used: part of what is allowed, None for a smallest tension,
+    and where it is not verified; s: m; t: s.  verdict: within, broken, or not verified, and then why, and the one thing
+    to do; "" before `verdicts` has decided.
     """
 
     limit: str
@@ -66,10 +69,18 @@ class Judged(NamedTuple):
     broken: bool
     s: float
     t: float
+    verdict: str = ""
+    why: str = ""
+    remedy: str = ""
 
     @property
     def margin(self) -> float:
-        """What is left of what is allowed: a part of it, of a smallest tension in N; negative where it is broken."""
+        """What is left of what is allowed: a part of it, of a smallest tension in N; negative where it is broken.
+
+        NaN: not verified.
+        """
+        if self.verdict == NOT_VERIFIED:
+            return np.nan
         return self.value - self.allowed if self.used is None else 1.0 - self.used
 
     @property
@@ -77,10 +88,29 @@ class Judged(NamedTuple):
         """What was reached, and what is allowed."""
         unit = "m" if self.limit == "min_bend_radius" else "N"
         what = "bend radius" if unit == "m" else "tension"
+        if self.verdict == NOT_VERIFIED:
+            side = "at most" if self.limit == "max_tension" else "at least"
+            allowed = f"{self.allowed:.4g} {unit} allowed {side} ({self.limit})"
+            return f"{what} of {self.value:.4g} {unit}, {allowed}"
         side = "above" if self.limit == "max_tension" else "below"
         if not self.broken:
             side = "within"
         return f"{what} of {self.value:.4g} {unit}, {side} the {self.allowed:.4g} {unit} allowed ({self.limit})"
+
+    @property
+    def not_verified(self) -> str:
+        """That it is not verified, why, and what to do; "" of what is."""
+        return not_verified(self.why, self.remedy) if self.verdict == NOT_VERIFIED else ""
+
+    @property
+    def ending(self) -> str:
+        """The same behind a text, with what divides them."""
+        return f"; {self.not_verified}" if self.verdict == NOT_VERIFIED else ""
+
+
+def not_verified(why: str, remedy: str) -> str:
+    """In words, as everything says it that shows a verdict."""
+    return f"{NOT_VERIFIED}: {why}; try: {remedy}"
 
 
 def has_envelope(result: Result) -> bool:

@@ -13,9 +13,10 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.statistics import extremes, fatigue, moments, spectrum
 from hybrid.store.bends import bends_of
-from hybrid.store.envelope import Judged, limits_of
+from hybrid.store.envelope import Judged
 from hybrid.store.extrapolation import extreme_of
 from hybrid.store.names import ALIASES
+from hybrid.store.verdicts import Verdicts, section_limits, verdicts_of
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
@@ -175,7 +176,8 @@ class Histories:
 
     def utilisation(self: Any) -> dict[str, Judged]:
         """How near the line came to each limit of its sections over all steps and outputs, by the key of the limit:
-        `used` is the part of max_tension or min_bend_radius that was used, None of min_tension; at s (m) and t (s).
+        `used` is the part of max_tension or min_bend_radius that was used, None of min_tension and of what is not
+        verified; `verdict` is within, broken or not verified, with `why` and `remedy`; at s (m) and t (s).
 
         ResultError of a result of several lines: each has its own."""
         if self.lines:
@@ -184,7 +186,14 @@ class Histories:
                 f"utilisation of a result with the lines {', '.join(self.lines)}\n"
                 f"    expected: that of one line\n    try:      result.lines[{first!r}].utilisation()"
             )
-        return {found.limit: found for found in limits_of(self, self)}
+        return {found.limit: found for found in section_limits(self)}
+
+    def verdicts(self: Any) -> Verdicts:
+        """What may be said of the result: limits of sections and of quantities are within or broken, an accuracy that
+        was asked for is met or missed, or it is not verified, with the reason and the one thing to do.
+
+        Of several lines each has its own, and the result those of quantities of all."""
+        return verdicts_of(self)
 
     def spectrum(
         self: Any, name: str, *, at: Any = None, times: Window | None = None, segment: float | None = None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybrid.store.envelope import GROUP as GROUP_OF_NODES
-from hybrid.store.envelope import SAME, Arrays, extremes_of_outputs, has_envelope
+from hybrid.store.envelope import NOT_VERIFIED, SAME, Arrays, extremes_of_outputs, has_envelope, not_verified
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
@@ -23,6 +23,7 @@ class Held(NamedTuple):
 
     limit: key in the scene: smallest, largest, or max_stress.  by_outputs: whether steps between outputs are not known.
     value and t are NaN of a quantity that never had a value, as the touchdown of a line that touches nothing.
+    verdict, why, remedy: as of `envelope.Judged`.
     """
 
     name: str
@@ -34,17 +35,29 @@ class Held(NamedTuple):
     t: float
     s: float | None = None
     by_outputs: bool = True
+    verdict: str = ""
+    why: str = ""
+    remedy: str = ""
 
     @property
     def text(self) -> str:
         """What was reached, and what is allowed."""
         allowed = f"the {self.allowed:.4g} {self.unit} allowed"
+        bound = "least" if self.limit == "smallest" else "most"
         if np.isnan(self.value):
-            bound = "least" if self.limit == "smallest" else "most"
             return f"{self.name} had no value at any time: not judged by {allowed} at {bound}"
         at = " at the outputs" * self.by_outputs
+        if self.verdict == NOT_VERIFIED:
+            return f"{self.name} of {self.value:.4g} {self.unit}{at}, {allowed[4:]} at {bound}"
         below = ("not below", "below") if self.limit == "smallest" else ("within", "above")
         return f"{self.name} of {self.value:.4g} {self.unit}{at}, {below[self.broken]} {allowed}"
+
+    @property
+    def ending(self) -> str:
+        """What stands behind text, place and time: that the limit is broken or not verified."""
+        if self.verdict == NOT_VERIFIED:
+            return f"; {not_verified(self.why, self.remedy)}"
+        return "; BROKEN" * self.broken
 
     @property
     def when(self) -> str:

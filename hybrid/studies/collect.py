@@ -11,11 +11,12 @@ import numpy as np
 from hybrid.errors import HybridError, ResultError
 from hybrid.scene.study import LIMIT_OF, Kept
 from hybrid.statistics import moments
-from hybrid.store.envelope import farthest, limits_of
+from hybrid.store.envelope import farthest
 from hybrid.store.extrapolation import extreme_of
 from hybrid.store.histories import History, history_of, lies_along
 from hybrid.store.limits import at_every_step
 from hybrid.store.reader import Result
+from hybrid.store.verdicts import section_limits
 
 Floats = np.ndarray
 HOUR = 3600.0
@@ -82,7 +83,8 @@ def one_value_of(quantity: str) -> str:
 
 
 class NotAlwaysThere(ResultError):
-    """A quantity of this run has times without a value, such as a touchdown point while nothing touches."""
+    """A quantity of this run has times without a value, such as a touchdown point while nothing touches, or a value
+    that is not verified."""
 
 
 class Collected(NamedTuple):
@@ -131,10 +133,12 @@ def _taken(
             return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(known[0])
     if take == "utilisation":
         limit = LIMIT_OF[name]
-        used = [x.used for x in limits_of(result, result) if x.limit == limit and x.used is not None]
-        if not used:
+        judged = next((x for x in section_limits(result) if x.limit == limit), None)
+        if judged is None:
             raise ResultError(f"no section has a {limit}, which {name} would be held against")
-        return Variable("", f"{WORDS[take]} {limit}, every step", (), {}), np.asarray(used[0])
+        if judged.used is None:
+            raise NotAlwaysThere(f"utilisation of {limit} {judged.not_verified}")
+        return Variable("", f"{WORDS[take]} {limit}, every step", (), {}), np.asarray(judged.used)
     if take == "damage":
         assert kept.curve is not None
         s, damage = result.damage(kept.curve, strength=kept.strength, section=kept.section, times=kept.times, at=at)

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.envelope import limits_of
+from hybrid.store.envelope import BROKEN, NOT_VERIFIED
 from hybrid.store.reader import Result
+from hybrid.store.verdicts import section_limits
 from hybrid.view import report_parts as parts
 from hybrid.view.along import along
 from hybrid.view.decimate import Store, script_json
@@ -23,8 +24,9 @@ from hybrid.view.plotly_backend import figure_of
 from hybrid.view.projections import views_of
 from hybrid.view.save import PAGES, REPORT_MARK, check_target, write_file
 from hybrid.view.style import ZERO, prefix, short, title_of
-from hybrid.view.summary import amount, length_of, warnings_of
+from hybrid.view.summary import amount, length_of
 from hybrid.view.worst import worst
+from hybrid.view.zones import warnings_of
 
 Curve = tuple[np.ndarray, np.ndarray]
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -94,10 +96,12 @@ def _verdict(results: Mapping[str, Result]) -> str:
     lines, bad = [], False
     for name, result in results.items():
         kinds = [event.kind for event, _ in warnings_of(result)]
-        broken = [x.limit for x in limits_of(result, result) if x.broken]
+        held = section_limits(result)
+        broken, open_ = ([x.limit for x in held if x.verdict == word] for word in (BROKEN, NOT_VERIFIED))
         bad |= bool(kinds or broken) or not result.done
         told = [result.status_text.splitlines()[0], ", ".join(kinds) or "no warnings"]
         told += [f"broken: {', '.join(broken)}"] if broken else []
+        told += [f"not verified: {', '.join(open_)}"] if open_ else []
         lines.append(f"<li><b>{escape(name)}.</b> {escape('; '.join(told))}</li>")
     look = "attention" if bad else "attention well"
     head = "How they ended, and what they warn of" if bad else "All are complete, without warnings"

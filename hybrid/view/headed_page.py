@@ -9,7 +9,7 @@ from hybrid.store.limits import held_of
 from hybrid.store.reader import Result
 from hybrid.view.figure import Page
 from hybrid.view.style import NEWS, short
-from hybrid.view.summary import warnings_of
+from hybrid.view.zones import warnings_of
 
 
 def page_of(result: Result, facts: list[str], **more: Any) -> Page:

@@ -10,6 +10,7 @@ from html import escape
 from importlib.resources import files
 from typing import Any
 
+from hybrid.store.envelope import NOT_VERIFIED
 from hybrid.store.reader import Result
 from hybrid.store.statistics_table import rows_of
 from hybrid.view.decimate import Store
@@ -73,10 +74,12 @@ def verdict_html(facts: list[Fact], several: bool) -> str:
         rows = "".join(f"<li><b>{escape(f.title)}.</b> {_code(f.text)} {_show(f, several)}</li>" for f in alarms)
         head = f'<div class="attention" role="alert"><h2>Look at this first</h2><ul>{rows}</ul></div>'
     else:
-        kept = "no limits were given to hold it against" if not count else f"all {count} limits are kept"
-        kept = "the one limit is kept" if count == 1 else kept
+        open_ = sum(x["verdict"] == NOT_VERIFIED for f in limits for x in f.values["limits"])
+        kept = "no limits were given to hold it against" if not count else f"within all {count} limits"
+        kept = "within the one limit" if count == 1 else kept
+        kept = f"{open_} of {count} limits not verified" if open_ else kept
         told = f"; {len(notes)} note{'s' * (len(notes) > 1)} below" * bool(notes)
-        look = "" if count and not notes else " open"
+        look = "" if count and not notes and not open_ else " open"
         head = f'<div class="attention well{look}"><h2>No warnings; {kept}{told}.</h2></div>'
     tables = "".join(
         f"<h3>{escape(f.title)}</h3>{_limit_table(f)}<p class='quiet'>{escape(f.text)}</p>" for f in limits
@@ -137,8 +140,8 @@ def _limit_table(fact: Fact) -> str:
     for x in fact.values["limits"]:
         unit = {"min_bend_radius": "m", "max_stress": "Pa"}.get(x["limit"], "N")
         used = "–" if x["used"] is None else f"{short(100 * x['used'], 3)} %"
-        part = 1.0 if x["broken"] else min(x["used"] or 0.0, 1.0)
-        look, verdict = ("broken", "broken") if x["broken"] else ("kept", "kept")
+        part, verdict = 1.0 if x["broken"] else min(x["used"] or 0.0, 1.0), x["verdict"]
+        look = verdict.replace(" ", "-")
         numbers = [amount(x["allowed"], unit), amount(x["value"], unit), used, short(x["s"], 5), short(x["t"], 5)]
         cells = "".join(f'<td class="number">{escape(y)}</td>' for y in numbers)
         bar = f'<span class="used {look}" aria-hidden="true"><i style="width:{short(100 * part, 3)}%"></i></span>'

@@ -7,23 +7,23 @@ values where a quantity jumps, whatever a page later draws of them.  A fact has 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import EVENTS_BY_WEIGHT, LIMIT_EVENTS, is_of_the_run, weight_of_event
-from hybrid.store.envelope import GROUP, NOTHING, SCALE, has_envelope, limits_of
+from hybrid.errors import LIMIT_EVENTS, is_of_the_run
+from hybrid.store.envelope import BROKEN, GROUP, NOT_VERIFIED, NOTHING, SCALE, has_envelope, not_verified
 from hybrid.store.hockling import formation_ratio, formation_tension
-from hybrid.store.limits import held_of
 from hybrid.store.reader import Result
-from hybrid.store.records import UNKNOWN, Event, not_converged_in
+from hybrid.store.records import UNKNOWN, not_converged_in
+from hybrid.store.verdicts import asked_accuracy, doubt_of, quantity_limits, section_limits
 from hybrid.view.along import along
 from hybrid.view.loops import held_loop, trapped_loop
 from hybrid.view.projections import STILL, free_edges
 from hybrid.view.style import NEWS, ZERO, prefix, short
 from hybrid.view.worst import Worst, worst
+from hybrid.view.zones import warnings_of
 
 HOCKLING = (
     "Criterion: a long rod under tension T and torque M is straight and stable where T > M²/(4 EI) (A. G. Greenhill, "
@@ -98,19 +98,6 @@ def _at(values: np.ndarray, k: int) -> tuple[int, int]:
 # ---- one function per fact ------------------------------------------------------------------------
 
 
-def warnings_of(result: Result) -> list[tuple[Event, int]]:
-    """The first event of every kind that calls an answer into question, the worst kind first, and how many there are.
-
-    News that are no warnings come last.
-    """
-    kinds: dict[str, list[Event]] = {}
-    failed = result.message if result.status == "failed" else ""
-    for event in sorted(result.events, key=lambda e: (e.kind in NEWS, weight_of_event(e.kind), e.t)):
-        if event.kind in EVENTS_BY_WEIGHT and event.text[:80] not in failed:  # that is reported as how it ended
-            kinds.setdefault(event.kind, []).append(event)
-    return [(found[0], len(found)) for found in kinds.values()]
-
-
 def _warnings(result: Result) -> list[Fact]:
     facts = []
     for event, count in warnings_of(result):
@@ -132,7 +119,7 @@ def _warnings(result: Result) -> list[Fact]:
         middle = 0.5 * (event.s_a + event.s_b)
         facts.append(Fact("warning", event.kind.capitalize(), text, weight, values, event.t, middle))
     if not any(fact.weight == "alarm" for fact in facts):
-        held = [x for one in (result, *result.lines.values()) for x in held_of(one)]
+        held = [x for one in (result, *result.lines.values()) for x in quantity_limits(one)]
         broken = any(event.kind in LIMIT_EVENTS.values() for event in result.events) or any(x.broken for x in held)
         beside = [*["limits that are broken"] * broken, *["how it ended"] * (not result.done)]
         none = f"None, beside {' and '.join(beside)}." if beside else "None were given."
@@ -160,9 +147,12 @@ def _tension(result: Result) -> Fact:
 
 def _with_limit(result: Result, limit: str, fact: Fact) -> Fact:
     """A fact on tension with the limit that it is held against."""
-    for x in limits_of(result, result):
+    for x in section_limits(result):
         if x.limit == limit:
             values = fact.values | {"allowed": x.allowed, "broken": x.broken}
+            if x.not_verified:
+                text = f"{fact.text} Allowed are {amount(x.allowed, 'N')}, {x.not_verified}."
+                return fact._replace(text=text, values=values, weight="note")
             if not x.broken:
                 text = f"{fact.text} Within the {amount(x.allowed, 'N')} allowed."
                 return fact._replace(text=text, values=values)
@@ -209,15 +199,12 @@ def _bend(result: Result) -> Fact:
         text += f"{doubt}."
         values["headline"] = f"{amount(1.0 / found.value, 'm')}{doubt}"
         place_of = (found.t, found.s)
-    unknown = _bends_left_out(result)
-    text += unknown
-    limits = [x for x in limits_of(result, result) if x.limit == "min_bend_radius"]
+    limits = [x for x in section_limits(result) if x.limit == "min_bend_radius"]
     if not limits:
-        weight = "note" if unknown else "plain"
-        return Fact("bend", title, f"{text} No allowed radius given.", weight, values, *place_of)
+        return Fact("bend", title, f"{text} No allowed radius given.", "plain", values, *place_of)
     (limit,) = limits
-    allowed, used, t, s = limit.allowed, limit.used or 0.0, limit.t, limit.s
-    values |= {"allowed": allowed, "ratio": used, "radius_there": limit.value}
+    allowed, t, s = limit.allowed, limit.t, limit.s
+    values |= {"allowed": allowed, "ratio": limit.used, "radius_there": limit.value}
     if limit.broken:
         bends = along(result, "curvature")
         least = bends.of(result, "min_bend_radius")
@@ -227,20 +214,11 @@ def _bend(result: Result) -> Fact:
         there = f": {amount(limit.value, 'm')} {place(result, s)}{moment(result, t)}"
         verdict = f"That is below the {amount(allowed, 'm')} allowed{'' if (t, s) == place_of else there}{part}."
         return Fact("bend", title, f"{text} {verdict}", "alarm", values, t, s)
-    if unknown:
-        verdict = f"Allowed are {amount(allowed, 'm')}; whether that holds there is not known."
-        return Fact("bend", title, f"{text} {verdict}", "alarm", values, t, s)
-    verdict = f"Allowed are {amount(allowed, 'm')}: {short(100 * used, 3)} % of that bend is used."
+    if limit.used is None:
+        verdict = f"Allowed are {amount(allowed, 'm')}, {limit.not_verified}."
+        return Fact("bend", title, f"{text} {verdict}", "note", values, t, s)
+    verdict = f"Allowed are {amount(allowed, 'm')}: MBR utilisation of {short(100 * limit.used, 3)} %."
     return Fact("bend", title, f"{text} {verdict}", "plain", values, t, s)
-
-
-def _bends_left_out(result: Result) -> str:
-    """Where a bend was left out, so that no radius is known; empty where none was."""
-    found = [e for e in result.events if e.kind in ("bending at point load neglected", "bending at clamp neglected")]
-    if not found:
-        return ""
-    where = ", ".join(dict.fromkeys(f"s = {short(x, 4)} m" for e in found for x in (e.s_a, e.s_b)))
-    return f" Not known at {where}, where the bend at a point load or clamp is left out: say force_rod there."
 
 
 def _kind_at(result: Result, found: Worst) -> str:
@@ -287,27 +265,30 @@ def _slack(result: Result) -> Fact:
 
 def _limits(result: Result) -> Fact:
     """All limits of the sections in one table."""
-    title, keys = "Limits of the sections", ("limit", "value", "allowed", "broken", "s", "t")
-    stresses = [x for x in held_of(result) if x.limit == "max_stress"]
-    rows = [x._asdict() for x in limits_of(result, result)]
-    rows += [{key: getattr(x, key) for key in keys} | {"used": x.value / x.allowed} for x in stresses]
+    keys = "limit", "value", "allowed", "broken", "s", "t", "verdict", "why", "remedy"
+    title, stresses = "Limits of the sections", [x for x in quantity_limits(result) if x.limit == "max_stress"]
+    rows = [x._asdict() for x in section_limits(result)]
+    for x in stresses:
+        used = None if x.verdict == NOT_VERIFIED else x.value / x.allowed
+        rows.append({key: getattr(x, key) for key in keys} | {"used": used})
     if not rows:
         none = "None given: min_bend_radius, max_tension, min_tension, or max_stress of the pipe, of a section."
         return Fact("limits", title, none, "absent")
-    broken = sum(x["broken"] for x in rows)
-    text = f"{broken} of {len(rows)} broken" if broken else "All are kept"
+    counts = [(sum(x["verdict"] == word for x in rows), word) for word in (BROKEN, NOT_VERIFIED)]
+    text = ", ".join(f"{n} of {len(rows)} {word}" for n, word in counts if n) or "All are within"
     text += ", over every accepted step and output." if has_envelope(result) else ", at the outputs that were saved."
-    return Fact("limits", title, text, "plain", {"limits": rows})
+    why = dict.fromkeys(f"{not_verified(x['why'], x['remedy'])}." for x in rows if x["verdict"] == NOT_VERIFIED)
+    return Fact("limits", title, " ".join([text, *(x[:1].upper() + x[1:] for x in why)]), "plain", {"limits": rows})
 
 
 def _quantities(result: Result) -> list[Fact]:
     """Quantities that the scene gives limits for, each at the output where it is nearest to them."""
     facts = []
-    for x in held_of(result):
+    for x in quantity_limits(result):
         known = x.value == x.value
         there = f" {place(result, x.s)}" if x.s is not None else ""
-        weight = "alarm" if x.broken else "plain" if known else "note"
-        text = f"{x.text}{there}{moment(result, x.t) if known else ''}."
+        weight = "alarm" if x.broken else "note" if x.verdict == NOT_VERIFIED else "plain"
+        text = f"{x.text}{there}{moment(result, x.t) if known else ''}{x.ending}."
         values = {"value": x.value if known else None, "allowed": x.allowed, "limit": x.limit}
         t = x.t if known else None
         facts.append(Fact("quantity", x.name.replace("_", " ").capitalize(), text, weight, values, t, x.s))
@@ -342,15 +323,18 @@ def _hockling(result: Result) -> Fact:
         "torque": float(torque[i, k]), "needed": float(needed[i, k]), "tension": float(tension[i, k]),
         "ratio": float(ratio[i, k]), "margin": 1.0 / float(ratio[i, k]),
     }  # fmt: skip
+    doubt = doubt_of(result, "torque", "tension") if values["ratio"] < 1.0 else None
     there = f"{place(result, s)}{moment(result, t)}"
     text = (
         f"Nearest to a loop {there}: a torque of {amount(abs(values['torque']), 'N m', 3)} needs a tension of "
         f"{amount(values['needed'], 'N', 3)}, there is {amount(values['tension'], 'N', 3)}"
     )
     verdict = ": the criterion is broken, a straight cable would throw a loop" if values["ratio"] >= 1.0 else ""
-    if not verdict:
+    if doubt is not None:
+        verdict = f"; the margin is {doubt.text}"
+    elif not verdict:
         verdict = f", {short(1.0 / values['ratio'], 3)} times as much"
-    weight = "alarm" if values["ratio"] >= 1.0 else "plain"
+    weight = "alarm" if values["ratio"] >= 1.0 else "note" if doubt is not None else "plain"
     text = f"{text}{verdict}."
     if (loop := trapped_loop(result, found, torque)) is not None:
         values |= loop
@@ -358,16 +342,15 @@ def _hockling(result: Result) -> Fact:
             f" A loop of the largest torque would lie on itself until {amount(loop['pop_out_tension'], 'N', 3)} pull "
             f"it open, bent to {amount(loop['pop_out_radius'], 'm', 3)}"
         )
-        if "kink_margin" in loop:
-            kinks = loop["kink_margin"] < 1.0
+        if (kinks := loop.get("kink_margin", np.inf) < 1.0) or ("kink_margin" in loop and doubt is None):
             text += f", {short(loop['kink_margin'], 3)} of the radius allowed" + (": it kinks first" if kinks else "")
         text += "."
     if (held := held_loop(result, found, torque, np.asarray(tension))) is not None:
         values |= held
         then = moment(result, held["pop_out_time"])
+        by = f"{short(held['pop_out_margin'], 3)} times its tension" if doubt is None else "a margin not verified"
         text += (
-            f" While the cable touches itself, a loop would be pulled open by {short(held['pop_out_margin'], 3)} times "
-            f"its tension{then}, at no other output by less."
+            f" While the cable touches itself, a loop would be pulled open by {by}{then}, at no other output by less."
         )
     return Fact("hockling", title, f"{text} {HOCKLING}.", weight, values, t, s)
 
@@ -436,19 +419,17 @@ def _errors(result: Result) -> Fact:
     if "extremes_total_position" in found:
         position, force = (found[f"extremes_total_{x}"] for x in ("position", "end_force"))
         text += f" at an instant; extremes {amount(position, 'm', 2)} and {amount(force, 'N', 2)}"
-    text += f"; asked was {asked}." if asked else "."
+    text += f"; asked was {asked}" if asked else "."
     return Fact("errors", title, text + _verdicts(result), "plain", found | not_known | {"asked": asked})
 
 
 def _verdicts(result: Result) -> str:
-    """Whether what was asked of a line of several is met, by quantity; empty if nothing was, or of one cable."""
-    given = result.attributes.get("accuracy_verdicts")
-    words = {True: "met", False: "missed", None: "not verified"}
-    each = [(x["quantity"].replace("end_force_", "force at the "), x) for x in json.loads(str(given or "[]"))]
-    texts = [
-        f"{name.replace('_', ' ')} {'not estimated' if x['error'] is None else words[x['met']]}" for name, x in each
-    ]
-    return f" Of that: {', '.join(texts)}." if texts else ""
+    """Whether what was asked is met, of a line of several by quantity; empty if nothing was."""
+    each = asked_accuracy(result)
+    if len(each) == 1 and not each[0].unit:
+        return f": {each[0].text}."
+    names = (x.quantity.replace("end_force_", "force at the ").replace("_", " ") for x in each)
+    return f". Of that: {', '.join(f'{name} {x.text}' for name, x in zip(names, each, strict=True))}." if each else ""
 
 
 def _status(result: Result) -> Fact:

@@ -321,3 +321,16 @@ def _event_lines(event: Event) -> list[str]:
     )
     energy = [] if event.energy is None else [f"energy put in: {short(event.energy, 3)} J"]
     return [event.kind, f"t = {short(event.t, 5)} s, {where}", *wrap(event.text, _WIDE)[:12], *energy]
+
+
+def warnings_of(result: Result) -> list[tuple[Event, int]]:
+    """The first event of every kind that calls an answer into question, the worst kind first, and how many there are.
+
+    News that are no warnings come last.
+    """
+    kinds: dict[str, list[Event]] = {}
+    failed = result.message if result.status == "failed" else ""
+    for event in sorted(result.events, key=lambda e: (e.kind in NEWS, weight_of_event(e.kind), e.t)):
+        if event.kind in EVENTS_BY_WEIGHT and event.text[:80] not in failed:  # that is reported as how it ended
+            kinds.setdefault(event.kind, []).append(event)
+    return [(found[0], len(found)) for found in kinds.values()]

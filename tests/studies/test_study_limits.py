@@ -29,7 +29,7 @@ initial: equilibrium
 model: rod
 mesh: {{cells: 30}}
 time: {{duration: 4, step: 0.05}}
-output: {{every: 0.1}}
+output: {{every: 0.1, errors: true}}
 """
 COLLECT: dict[str, Any] = {
     "strength": {"quantity": "tension", "take": ["utilisation"]},
@@ -74,6 +74,16 @@ def test_limits_and_whole_results_of_cases(scene: Path, tmp_path: Path) -> None:
             assert kept["above"] == pytest.approx(np.mean(history.values > 300.0), abs=0.05)
             assert kept["above"] == float(result.exceedance("end_force_end", 300.0))
     assert outcomes[0].kept["strength"][1] < outcomes[1].kept["strength"][1]
+
+
+def test_what_is_not_verified_is_not_kept(scene: Path) -> None:
+    """Without an error figure nobody knows which part of a limit is used."""
+    scene.write_text(SCENE.replace("errors: true", "errors: false"))
+    cases = cases_of(study_of(scene))
+    wanted = {name: Kept.model_validate(kept) for name, kept in COLLECT.items()}
+    (outcome,) = compute_batch(Job(cases.base, cases.keys, cases.rows[:1], wanted, False))
+    assert set(outcome.kept) == {"above"} and outcome.absent == ""
+    assert "utilisation of min_bend_radius not verified: the error of curvature is not estimated" in outcome.reason
 
 
 @pytest.mark.slow
@@ -164,12 +174,13 @@ def test_stats_tell_limits_and_the_time_above_a_value(
     said = " ".join(capsys.readouterr().out.split())
     assert f"end_force_end is above 400 N for {100.0 * part:.3g} % of the time" in said
     assert used is not None and f"{100.0 * used:.4g} % of max_tension used" in said
-    assert "% of min_bend_radius used" in said
+    assert "MBR utilisation of" in said
 
 
 def test_stats_of_a_run_that_was_stopped_say_so(
     scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    scene.write_text(SCENE.replace("errors: true", "errors: false"))
     stopping = Stopping(monkeypatch)
     stopping.left = 20
     with pytest.raises(KeyboardInterrupt):

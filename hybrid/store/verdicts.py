@@ -1,0 +1,367 @@
+"""What may be said of a result: a limit is within or broken, an accuracy met or missed, else it is *not verified*.
+
+The only place that decides this: terminal, `stats`, reports, studies, the live view and Python all ask here.  A limit
+is within, and an accuracy met, by values that are resolved, whose error is estimated, and from which nothing was
+neglected.  What is not verified has its reason, and the one thing to do.
+
+A value beyond its limit breaks it whatever its error: cells that are too long, and bending that is neglected, make
+bends too mild.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hybrid.errors import EVENTS_BY_WEIGHT, IN_SPACE, OF_AN_END
+from hybrid.store.envelope import BROKEN, GROUP, LIMITED, NOT_VERIFIED, WITHIN, Judged, limits_of, not_verified
+from hybrid.store.limits import Held, held_of
+from hybrid.store.records import Event, not_converged_in
+
+if TYPE_CHECKING:
+    from hybrid.store.reader import Result
+
+Floats = np.ndarray
+MET, MISSED = "met", "missed"
+# Quantities that follow from each other.
+BENDING = frozenset({"curvature", "bending_moment", "von_mises"})
+PULL = frozenset({"tension", "wall_tension", "von_mises", "end_force"})
+TORQUE = frozenset({"torque", "von_mises"})
+ALL: frozenset[str] = frozenset()
+NOTE = "do what its note says"
+SHORTER = "a shorter time.step"
+# Kinds of events that make values doubtful: which of them (ALL: every one), and what to do.
+DOUBTS: dict[str, tuple[frozenset[str], str]] = {
+    "gains energy": (ALL, SHORTER),
+    "implausible": (ALL, "check the units that the note names"),
+    "error uncertain": (ALL, NOTE),
+    "several equilibria": (ALL, "initial.points near the equilibrium that is meant"),
+    "largest force uncertain": (PULL, "a longer run, or several seeds"),
+    "end force between outputs": (PULL, "the output.every of its note"),
+    "line meets itself": (ALL, "contact: {self: true}"),
+    "slack": (BENDING | PULL, "model: rod, or force_rod there"),
+    "unstable": (ALL, NOTE),
+    "out of plane": (ALL, "dimension: 3"),
+    "unresolved twist": (TORQUE, "more mesh.cells"),
+    "unresolved bend": (BENDING, "cells as short as its note says"),
+    "unresolved change of section": (BENDING, "accuracy: {curvature: 5%}, with model: rod"),
+    "deep in the seabed": (ALL, "check seabed.stiffness, in N/m per m"),
+    "numerical dissipation": (ALL, SHORTER),
+    "vibrations damped": (ALL, "a time.step that follows them"),
+    "snap": (PULL, "give axial_stiffness"),
+    "coarse step": (ALL, "the time.step of its note"),
+    "iterations cut": (ALL, SHORTER),
+    "torque neglected": (TORQUE, "model: rod"),
+    "undamped": (PULL, "time.rho_inf: 0.9"),
+    "model error not estimated": (ALL, "model: rod"),
+    "bending at clamp neglected": (BENDING, "model: rod, or force_rod there"),
+    "bending at point load neglected": (BENDING, "model: rod, or force_rod there"),
+    "ignored": (BENDING, "model: rod"),
+    "envelope incomplete": (ALL, "compute it anew"),
+}
+# Of an equilibrium alone: a motion forgets it.
+AT_REST: dict[str, tuple[frozenset[str], str]] = {
+    "static friction neglected": (PULL, "initial: {kind: equilibrium, friction: settled}"),
+}
+# Of these an accuracy is not verified.
+UNCERTAIN = (
+    "error uncertain", "largest force uncertain", "windows uncertain", "several equilibria", "implausible",
+    "model error not estimated",
+)  # fmt: skip
+ESTIMATE = "`accuracy: 5%`, or `output: {errors: true}`, in the scene"
+FINER = "compare with a run of half the time.step and twice the mesh.cells"
+RESUME = "hybrid resume"
+
+
+class Doubt(NamedTuple):
+    """Why a value is not verified, and the one thing to do."""
+
+    why: str
+    remedy: str
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        return not_verified(self.why, self.remedy)
+
+
+class Asked(NamedTuple):
+    """An accuracy that was asked for: `quantity` in words, the error and the one asked in `unit` (None: not known).
+
+    verdict: met, missed or not verified, then with the reason and what to do.
+    """
+
+    quantity: str
+    unit: str
+    asked: float | None
+    error: float | None
+    verdict: str
+    why: str = ""
+    remedy: str = ""
+
+    @property
+    def text(self) -> str:
+        """The verdict in words."""
+        return not_verified(self.why, self.remedy) if self.verdict == NOT_VERIFIED else self.verdict
+
+
+class Verdicts(NamedTuple):
+    """All that may be said of a result, or of a line of several."""
+
+    limits: list[Judged]  # of sections
+    quantities: list[Held]  # of named quantities, and of the stress of pipes
+    accuracy: list[Asked]
+
+    @property
+    def words(self) -> dict[str, str]:
+        """The verdict of each by its name: key of the limit, name and limit of a quantity, what was asked."""
+        found = {x.limit: x.verdict for x in self.limits}
+        found |= {f"{x.name} {x.limit}": x.verdict for x in self.quantities}
+        return found | {f"accuracy of {x.quantity}": x.verdict for x in self.accuracy}
+
+
+def verdicts_of(result: Result) -> Verdicts:
+    """What may be said of a result: of its limits, and of the accuracy that was asked for."""
+    return Verdicts(section_limits(result), quantity_limits(result), asked_accuracy(result))
+
+
+def section_limits(result: Result) -> list[Judged]:
+    """Every limit of bend radius and tension of the sections, where it was broken most or nearly, with its verdict."""
+    found = [_verified(result, x) for x in limits_of(result, result)]
+    named = {x.limit for x in found}
+    for name, limits in LIMITED.items():
+        for limit in limits if name != "von_mises" else ():
+            if limit in result and limit not in named and not np.isnan(result[limit]).all():
+                k = int(np.nanargmax(np.isfinite(result[limit])))
+                lacking = Judged(limit, np.nan, float(result[limit][k]), None, False, float(result.s[k]), np.nan)
+                doubt = unfinished(result) or Doubt(f"the result has no {name} there", f"output.fields with {name}")
+                found.append(lacking._replace(verdict=NOT_VERIFIED, why=doubt.why, remedy=doubt.remedy))
+    return found
+
+
+def quantity_limits(result: Result) -> list[Held]:
+    """Every limit of a named quantity and of the stress of pipes, likewise."""
+    return [_held(result, x) for x in held_of(result)]
+
+
+def asked_accuracy(result: Result) -> list[Asked]:
+    """The accuracy that was asked for, of a line of several by quantity; empty where none was."""
+    each = json.loads(str(result.attributes.get("accuracy_verdicts", "[]")))
+    if each:
+        return [_asked(result, x["quantity"], x["unit"], x["asked"], x["error"], x["met"] is not False) for x in each]
+    if "accuracy_asked" not in result.attributes:
+        return []
+    kinds = {event.kind for event in result.events}
+    known = result.attributes.get("error_total_position")
+    text = str(result.attributes["accuracy_asked"])
+    return [_asked(result, text, "", None, known, "accuracy missed" not in kinds)]
+
+
+def doubt_of(result: Result, *names: str, s: Iterable[float] = ()) -> Doubt | None:
+    """Why quantities of a result are not verified; None: they are resolved, estimated and not neglected.
+
+    s: m, the only places that count; none: all of them.
+    """
+    return unfinished(result) or next(_doubts(result, frozenset(names), np.array([*s])), None)
+
+
+def unfinished(result: Result) -> Doubt | None:
+    """That a run has not come to its end."""
+    if result.status == "complete":
+        return None
+    reached = f" (t = {float(result.times[-1]):.5g} s)" if len(result.times) else ""
+    return Doubt(f"the run has not come to its end{reached}", RESUME)
+
+
+# ---- doubts ---------------------------------------------------------------------------------------
+
+
+def _doubts(result: Result, names: frozenset[str], s: Floats) -> Iterator[Doubt]:
+    """What makes quantities doubtful, the worst first: events, errors that are not known."""
+    rank = {kind: k for k, kind in enumerate(EVENTS_BY_WEIGHT)}
+    for event in sorted(result.events, key=lambda e: (rank.get(e.kind, len(rank)), e.t)):
+        if (found := _of_event(result, event, names, s)) is not None:
+            yield found
+    unknown = not_converged_in(result.attributes)
+    for name in sorted(names - {"torque", "von_mises", "wall_tension"}):
+        if name in unknown:
+            yield Doubt(f"the error of {_words(name)} is not known: it does not converge", "shorter steps and cells")
+        elif f"error_total_{name}" not in result.attributes and f"errors/total/{name}" not in result:
+            why = f"the error of {_words(name)} is not estimated"
+            yield Doubt(f"{why}: {result.pending}", RESUME) if result.pending else Doubt(why, ESTIMATE)
+
+
+def _of_event(result: Result, event: Event, names: frozenset[str], s: Floats) -> Doubt | None:
+    """The doubt that an event casts on quantities at places s (n,) m; None: none."""
+    table = DOUBTS if len(result.times) > 1 or event.kind not in AT_REST else AT_REST
+    if event.kind not in table or _is_harmless(event):
+        return None
+    which, remedy = table[event.kind]
+    if event.kind == "unresolved bend" and _is_catenary(result, event):
+        which = which | PULL  # what a catenary cuts off of a bend is missing in its tension
+    if which and not which & names:
+        return None
+    length = float(result.s[-1] - result.s[0])
+    reach = 1e-6 * length
+    if s.size and which == BENDING and not ((s >= event.s_a - reach) & (s <= event.s_b + reach)).any():
+        return None
+    everywhere = event.s_b - event.s_a >= length - reach
+    place = f"s = {event.s_a:.5g} m" if event.s_a == event.s_b else f"s = {event.s_a:.5g} to {event.s_b:.5g} m"
+    return Doubt(event.kind + ("" if everywhere else f" at {place}"), remedy)
+
+
+def _is_harmless(event: Event) -> bool:
+    """Whether an event of a kind that casts doubts is of one of its cases that do not."""
+    if event.kind == "ignored":
+        return not event.text.startswith(OF_AN_END)
+    return event.kind == "out of plane" and IN_SPACE in event.text
+
+
+def _is_catenary(result: Result, event: Event) -> bool:
+    """Whether a line is a catenary where an event is, and when."""
+    if not len(result.times):
+        return False
+    zones = result.zones[int(np.abs(result.times - event.t).argmin())]
+    return any(zone.kind != "rod" for zone in zones if zone.s_a <= event.s_a <= zone.s_b)
+
+
+def _words(name: str) -> str:
+    return {"end_force": "end forces"}.get(name, name.replace("_", " "))
+
+
+# ---- limits ---------------------------------------------------------------------------------------
+
+
+def _verified(result: Result, x: Judged) -> Judged:
+    """A limit of the sections with its verdict."""
+    if x.broken:
+        return x._replace(verdict=BROKEN)
+    name = next(name for name, limits in LIMITED.items() if x.limit in limits)
+    s, allowed = result.both_sides(x.limit) if f"right/{x.limit}" in result else (result.s, result[x.limit])
+    held = s[np.isfinite(allowed)]
+    # at a clamp or joint of the mesh that no output point shows, limits are those of the envelope
+    if f"{GROUP}/{x.limit}" in result:
+        held = np.append(held, result[f"{GROUP}/s"][np.isfinite(result[f"{GROUP}/{x.limit}"])])
+    doubt = doubt_of(result, name, s=held) or _reached(result, name, x)
+    if doubt is None:
+        return x._replace(verdict=WITHIN)
+    return x._replace(verdict=NOT_VERIFIED, why=doubt.why, remedy=doubt.remedy, used=None)
+
+
+def _reached(result: Result, name: str, x: Judged) -> Doubt | None:
+    """That values are so near to their limit that their errors may take them beyond."""
+    s, errors = result.both_sides(f"errors/total/{name}")
+    _, values = result.both_sides(name)
+    allowed = _along(result, x.limit, s)
+    at = int(np.abs(result.times - x.t).argmin()), int(np.abs(s - x.s).argmin())
+    here = _size(x, x.allowed, 1.0 / x.value if name == "curvature" and x.value > 0.0 else x.value, errors[at])
+    most = float(np.nanmax(np.append(_size(x, allowed, values, errors), here)))
+    if most <= 1.0:
+        return None
+    k = np.unravel_index(int(np.nanargmax(_size(x, allowed, values, errors))), values.shape)
+    place = f"s = {float(s[k[1]]):.5g} m" if not here >= most else f"s = {x.s:.5g} m"
+    return Doubt(f"with its error {_words(name)} may pass the limit at {place}", "a smaller accuracy")
+
+
+def _size(x: Judged, allowed: Floats | float, values: Floats | float, errors: Floats | float) -> Floats:
+    """What of a limit may be used at most, more than 1 where it may be broken."""
+    if x.limit == "min_tension":
+        return np.asarray(1.0 + np.asarray(allowed) - (np.asarray(values) - errors))
+    if x.limit == "min_bend_radius":
+        return np.asarray((np.asarray(values) + errors) * allowed)
+    return np.asarray((np.asarray(values) + errors) / allowed)
+
+
+def _held(result: Result, x: Held) -> Held:
+    """A limit of a quantity with its verdict."""
+    if x.broken:
+        return x._replace(verdict=BROKEN)
+    doubt = unfinished(result) or _no_value(x) or _doubt_of_held(result, x)
+    if doubt is None:
+        return x._replace(verdict=WITHIN)
+    return x._replace(verdict=NOT_VERIFIED, why=doubt.why, remedy=doubt.remedy)
+
+
+def _no_value(x: Held) -> Doubt | None:
+    if np.isnan(x.value):
+        return Doubt("it had no value at any time", "check that it can have one, such as a touchdown point")
+    return None
+
+
+def _doubt_of_held(result: Result, x: Held) -> Doubt | None:
+    """Of a force at an end, an angle of it, or a clearance the error follows from those that are estimated."""
+    name = {"N": "end_force", "deg": "end_force"}.get(x.unit, "position")
+    clearance = f"{x.name}_at" in result
+    names = frozenset({"von_mises", "tension", "curvature"} if x.unit == "Pa" else {name})
+    if (doubt := next(_doubts(result, names, np.zeros(0)), None)) is not None:
+        return doubt
+    if x.by_outputs:
+        return Doubt("its values between outputs are not known", "a shorter output.every")
+    if x.unit == "Pa":
+        return _stress_reached(result, x)
+    error = _error_of_held(result, x, clearance)
+    if error is None:
+        return Doubt(f"the error of {x.name} is not estimated", FINER)
+    left = x.value - x.allowed if x.limit == "smallest" else x.allowed - x.value
+    return None if error <= left else Doubt(f"its error may be {error:.2g} {x.unit}", "a smaller accuracy")
+
+
+def _stress_reached(result: Result, x: Held) -> Doubt | None:
+    """That the errors of tension and curvature may take the stress of a pipe beyond its limit."""
+    if "stress_per_tension" not in result:
+        return Doubt("the error of the stress is not estimated", FINER)
+    s, stress = result.both_sides("von_mises")
+    error = np.zeros(stress.shape)
+    for name in ("tension", "curvature"):
+        error += result.both_sides(f"errors/total/{name}")[1] * _along(result, f"stress_per_{name}", s)
+    used = (stress + error) / _along(result, "max_stress", s)
+    at = int(np.abs(result.times - x.t).argmin()), int(np.abs(s - (x.s or 0.0)).argmin())
+    if max(float(np.nanmax(used)), (x.value + error[at]) / x.allowed) <= 1.0:
+        return None
+    return Doubt("with the errors of tension and curvature it may pass the limit", "a smaller accuracy")
+
+
+def _along(result: Result, name: str, s: Floats) -> Floats:
+    """What is constant along the line at the places s (n,) m of quantities, of which one that jumps comes twice."""
+    found = result.both_sides(name)[1] if f"right/{name}" in result else np.asarray(result[name])
+    return found if found.size == s.size else found[np.searchsorted(result.s, s)]
+
+
+def _error_of_held(result: Result, x: Held, clearance: bool) -> float | None:
+    """The error of a quantity in its unit, by those of positions or end forces; None: it is not known."""
+    figures = result.attributes
+    force = float(figures.get("error_total_end_force", np.nan))
+    if x.unit == "N":
+        return force
+    if x.unit == "deg":
+        sizes = [np.linalg.norm(result[y], axis=1) for y in ("reaction_start", "reaction_end") if y in result]
+        least = min((float(y.min()) for y in sizes), default=0.0)
+        return float(np.degrees(np.arcsin(force / least))) if force < least else None
+    if x.unit == "m" and clearance:  # of two lines the errors of both
+        return (2.0 if result.lines else 1.0) * float(figures["error_total_position"])
+    return None
+
+
+# ---- accuracy -------------------------------------------------------------------------------------
+
+
+def _asked(result: Result, quantity: str, unit: str, asked: float | None, error: float | None, met: bool) -> Asked:
+    """The verdict on an accuracy; met: by its figure."""
+
+    def of(verdict: str, why: str = "", remedy: str = "") -> Asked:
+        return Asked(quantity, unit, asked, error, verdict, why, remedy)
+
+    if error is None:
+        open_ = Doubt(result.pending, RESUME) if result.pending else Doubt("its error is not estimated", NOTE)
+        return of(NOT_VERIFIED, *(unfinished(result) or open_))
+    if not met:
+        return of(MISSED)
+    if (open_ := unfinished(result)) is not None:
+        return of(NOT_VERIFIED, *open_)
+    kinds = {event.kind for event in result.events}
+    for kind in (x for x in EVENTS_BY_WEIGHT if x in kinds and x in UNCERTAIN):
+        return of(NOT_VERIFIED, kind, DOUBTS.get(kind, (ALL, NOTE))[1])
+    return of(MET)
