@@ -36,6 +36,7 @@ from hybrid.simulation.error_report import write_errors
 from hybrid.simulation.finer_result import FinerResult, beside
 from hybrid.simulation.first_use import OF_LINES, compile_beside, kernels_of
 from hybrid.simulation.interrupts import interrupts
+from hybrid.simulation.layer_mesh import layered
 from hybrid.simulation.model_choice import surveyed
 from hybrid.simulation.passes import Passes, free_in
 from hybrid.simulation.progress import (
@@ -229,7 +230,7 @@ def _move_lines(system: System, target: Target, progress: bool | Listener, sourc
 def _surveyed_at_rest(case: StaticCase, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
     """The same of an equilibrium, whose model is rods where the scene names none and asks for an accuracy."""
     if not wants_survey(case.scene):
-        return NAMED, resolution
+        return NAMED, layered(case, resolution)
     choice = NAMED
     if model_is_free(case.scene, moves=False):
         choice, case.scene = ModelChoice("rod", REST), with_model(case.scene, "rod")

@@ -16,7 +16,7 @@ from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, ResultError
 from hybrid.kernels.books import OUTPUT
 from hybrid.kernels.criteria import CRITERIA
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state import Floats, State
 from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model, build
 from hybrid.model.output_points import OutputPoints, output_points
@@ -105,6 +105,7 @@ class Case:
         self.late_file: LateFile | None = None  # of a result that is complete, and may not be in its place yet
         self._results = 0  # that were begun
         self._owner = threading.get_ident()  # the thread that puts files in their places
+        self._begun: tuple[Resolution, tuple[Model, Equilibrium | None, ZoneSwitching | None]] | None = None
         self.came_near_itself = False  # whether the line did in a run to compare with
         # Whether contact with itself is computed in runs to compare with: where it is asked for, or the line has
         # touched itself in a result.  Before, coarse cells would meet where those of the result do not.
@@ -373,8 +374,17 @@ class Case:
 
     # --- parts of a run -------------------------------------------------------------------------
 
+    def first_shape(self, resolution: Resolution) -> tuple[Model, State]:
+        """Model and state of a run as it begins, which are kept for a run of this resolution that comes next."""
+        model, found, _ = begun = self._start(resolution)
+        self._begun = resolution, begun
+        return model, model.start if found is None else found.state
+
     def _start(self, resolution: Resolution) -> tuple[Model, Equilibrium | None, ZoneSwitching | None]:
         """The model, its equilibrium if it starts from one, and what moves its zones if they move."""
+        kept, self._begun = self._begun, None
+        if kept is not None and kept[0] is resolution:
+            return kept[1]
         with at_once(self.interrupted):
             model = build(self.scene, resolution)
             check_releases(self.scene, model)

@@ -27,6 +27,7 @@ from hybrid.model.model_costs import (
 from hybrid.model.resolution import Resolution, model_is_free, wants_survey
 from hybrid.scene.schema import AdaptiveModel
 from hybrid.simulation.case import Case
+from hybrid.simulation.layer_mesh import layered
 from hybrid.simulation.mesh_survey import allowed, with_survey
 from hybrid.simulation.static_case import StaticCase
 
@@ -65,7 +66,7 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
 def chosen_and_surveyed(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
     """The model, if the scene names none, and cells by a pre-run, if it wants one."""
     if not wants_survey(case.scene):
-        return NAMED, resolution
+        return NAMED, layered(case, resolution)
     if case.criterion is None and model_is_free(case.scene):
         return choose_model(case, resolution)
     return NAMED, surveyed(case, resolution)

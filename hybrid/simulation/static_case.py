@@ -11,7 +11,7 @@ from hybrid.errors import Complaint, ComputationError, SceneError
 from hybrid.kernels.forces import SEABED, SELF_CONTACT
 from hybrid.kernels.report import REPORT_SIZE, SEABED_ENERGY
 from hybrid.kernels.seabed import stored
-from hybrid.kernels.state import Floats, batch_of_one
+from hybrid.kernels.state import Floats, State, batch_of_one
 from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model, build
 from hybrid.model.output_points import output_points
@@ -45,6 +45,7 @@ class StaticCase:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
+        self._begun: tuple[Resolution, tuple[Model, Equilibrium, ZoneSwitching | None]] | None = None
 
     def record(self, resolution: Resolution, target: Target) -> RunSample:
         """Compute the result into a file, or memory; what is to be compared of it."""
@@ -108,7 +109,16 @@ class StaticCase:
         run = {name: np.asarray(values[name])[None] for name in ("curvature", "tension")}
         return Survey.of(self.scene, resolution, model, s, run)
 
+    def first_shape(self, resolution: Resolution) -> tuple[Model, State]:
+        """Model and state of an equilibrium, which are kept for a result of this resolution that comes next."""
+        model, found, _ = begun = self._equilibrium(resolution)
+        self._begun = resolution, begun
+        return model, found.state
+
     def _equilibrium(self, resolution: Resolution) -> tuple[Model, Equilibrium, ZoneSwitching | None]:
+        kept, self._begun = self._begun, None
+        if kept is not None and kept[0] is resolution:
+            return kept[1]
         model = build(self.scene, resolution)
         if model.layout is None:
             return model, equilibrium_of(self.scene, model, np.inf), None

@@ -30,6 +30,7 @@ from hybrid.simulation.case import Case
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.direct_steps import DirectSteps
 from hybrid.simulation.first_use import compile_beside
+from hybrid.simulation.layer_mesh import layered
 from hybrid.simulation.stepped import CableState, Saved, Triple, in_space, iterations_allowed, one_thread, tension_now
 from hybrid.simulation.stepped_ends import STILL, SteppedEnds
 from hybrid.simulation.transient import StepFailed
@@ -87,7 +88,8 @@ class Simulation(SteppedEnds):
         compile_beside(self.scene)
         self._case = Case(self.scene, criterion)
         try:
-            self._loop, recorder, equilibrium = self._case.prepare(first_resolution(self.scene), self._target)
+            resolution = layered(self._case, first_resolution(self.scene))
+            self._loop, recorder, equilibrium = self._case.prepare(resolution, self._target)
         except BaseException:
             self._stack.close()
             raise

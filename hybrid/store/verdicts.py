@@ -176,6 +176,12 @@ def unfinished(result: Result) -> Doubt | None:
     return Doubt(f"the run has not come to its end{reached}", RESUME)
 
 
+def _pending(result: Result) -> Doubt | None:
+    """That the errors of a result are still to come."""
+    what, _, fix = result.pending.partition("; ")
+    return Doubt(what, fix.removesuffix(" makes up for it")) if what else None
+
+
 # ---- doubts ---------------------------------------------------------------------------------------
 
 
@@ -191,7 +197,7 @@ def _doubts(result: Result, names: frozenset[str], s: Floats) -> Iterator[Doubt]
             yield Doubt(f"the error of {_words(name)} is not known: it does not converge", "shorter steps and cells")
         elif f"error_total_{name}" not in result.attributes and f"errors/total/{name}" not in result:
             why = f"the error of {_words(name)} is not estimated"
-            yield Doubt(f"{why}: {result.pending}", RESUME) if result.pending else Doubt(why, ESTIMATE)
+            yield _pending(result) or Doubt(why, ESTIMATE)
 
 
 def _of_event(result: Result, event: Event, names: frozenset[str], s: Floats) -> Doubt | None:
@@ -355,8 +361,7 @@ def _asked(result: Result, quantity: str, unit: str, asked: float | None, error:
         return Asked(quantity, unit, asked, error, verdict, why, remedy)
 
     if error is None:
-        open_ = Doubt(result.pending, RESUME) if result.pending else Doubt("its error is not estimated", NOTE)
-        return of(NOT_VERIFIED, *(unfinished(result) or open_))
+        return of(NOT_VERIFIED, *(unfinished(result) or _pending(result) or Doubt("its error is not estimated", NOTE)))
     if not met:
         return of(MISSED)
     if (open_ := unfinished(result)) is not None:

@@ -1,0 +1,123 @@
+"""Shorter cells where a rod bends within less than a cell, of a scene that leaves the mesh open and asks for nothing.
+
+    symbol   meaning                                                             unit
+    EI       bending stiffness, about the weaker axis                            N m2
+    lambda   sqrt(EI/T), over which a bend at a clamp or point load fades        m
+
+What the equilibrium on the usual mesh shows decides: where cells are longer than a part of lambda beside a clamp, a
+point load or a change of section that bends the line, or turn too far.  Elsewhere, and where nothing is hidden, the
+mesh stays as it is.  Where an accuracy is asked for, a pre-run places the cells (`mesh_survey`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybrid.errors import ComputationError
+from hybrid.kernels.state import Floats, State
+from hybrid.model.build import Model, twist_rate
+from hybrid.model.mesh import DEFAULT_CELLS
+from hybrid.model.mesh_grading import GROWTH, SAMPLES, Grading, layers
+from hybrid.model.payout import payout_of
+from hybrid.model.resolution import Resolution, mesh_is_free
+from hybrid.scene.schema import AdaptiveModel
+from hybrid.simulation.section_layers import MORE
+
+if TYPE_CHECKING:
+    from hybrid.simulation.case import Case
+    from hybrid.simulation.static_case import StaticCase
+
+# Cells to a length lambda at a place that bends a rod, and beyond how many such lengths a longer cell hides the bend:
+# the curvature at the end of an exponential layer is then off by 1 % and by about 4 %.
+CELLS, HIDDEN = 4.0, 0.5
+# Shortest length lambda that is shown, as a part of the line: below, cells would be shorter than any cable is thick.
+SHORTEST = 1e-6
+# rad by which a point load or a change of section turns a line before it counts; a clamp always does.
+TURNED = 0.02
+# rad that a cell may turn through before it is cut, and does turn through then.
+MOST_TURN, TURN = 0.3, 0.1
+# Places in geometric order on either side of a disturbed one, as parts of lambda.
+BESIDE = np.concatenate([[0.0], np.geomspace(0.05, 20.0, 40)])
+
+
+def layered(case: Case | StaticCase, resolution: Resolution) -> Resolution:
+    """With cells as bends and layers of the equilibrium ask for, of rods whose mesh is left open."""
+    scene = case.scene
+    if isinstance(scene.model, AdaptiveModel) or resolution.grading is not None or not mesh_is_free(scene):
+        return resolution
+    if payout_of(scene) is not None:
+        return resolution
+    try:
+        model, state = case.first_shape(resolution)
+    except ComputationError:
+        return resolution  # the run says why
+    grading = grading_of(case, model, state)
+    return resolution if grading is None else replace(resolution, grading=grading)
+
+
+def grading_of(case: Case | StaticCase, model: Model, state: State) -> Grading | None:
+    """The cells that show all bends of a state; None: its own do."""
+    line, length = model.line, model.length
+    if not line.spin.any():
+        return None
+    turns = _turns(model, state)
+    sharp = np.where(turns > MOST_TURN, _rounded(turns / line.hn / TURN), 0.0)  # 1/m
+    found = [(s, float(_rounded(fade))) for s, fade, cell in _layers(model, state, turns) if cell > HIDDEN * fade]
+    for s, _ in found:
+        sharp[np.abs(line.s - s) <= line.h.max()] = 0.0  # that bend is the layer's
+    if not found and not sharp.any():
+        return None
+    beside = [s + sign * fade * BESIDE for s, fade in found for sign in (-1.0, 1.0)]
+    x = np.unique(np.concatenate([np.linspace(0.0, length, SAMPLES), line.s, *beside]))
+    x = x[(x >= 0.0) & (x <= length)]
+    density = np.interp(x, line.s, np.maximum(sharp, 0.0)) + DEFAULT_CELLS / length
+    for s, fade in found:
+        density += layers(x, np.array([0.0, length]), np.full(2, fade), [s], CELLS)
+    density = np.maximum(density, twist_rate(case.scene, model.cable, x))
+    grown = GROWTH * x
+    cell = np.minimum.accumulate(1.0 / density - grown) + grown
+    cell = np.minimum.accumulate((cell + grown)[::-1])[::-1] - grown
+    return Grading(x, 1.0 / cell)
+
+
+def _layers(model: Model, state: State, turns: Floats) -> Iterator[tuple[float, float, float]]:
+    """Places that bend a rod (s, m), the shorter lambda (m) beside them, and the longest cell there (m)."""
+    line, cable = model.line, model.cable
+    near = 1e-9 * model.length
+    last = line.s.size - 1
+    places = [node for node, held in zip((0, last), cable.held_tangent, strict=True) if held]
+    inner = {int(np.argmin(np.abs(line.s - at))) for at in model.attached} - {0, last}
+    changes = {int(np.argmin(np.abs(line.s - at))) for at in cable.bounds[1:-1]}
+    for node in sorted(changes - {0, last}):
+        EI = cable.weakest_bending[cable.piece(line.s[node] + np.array([-near, near]))]
+        if EI.max() > MORE * EI.min() > 0.0:
+            inner.add(node)
+    places += [node for node in sorted(inner) if turns[node] > TURNED]
+    for node in places:
+        cells = [k for k in (node - 1, node) if 0 <= k < last and line.spin[k]]
+        if not cells:
+            continue
+        middle = 0.5 * (line.s[:-1] + line.s[1:])[cells]
+        T, EI = np.asarray(state.T)[cells], cable.weakest_bending[cable.piece(middle)]
+        fades = np.sqrt(EI[T > 0.0] / T[T > 0.0])
+        fades = fades[fades > SHORTEST * model.length]
+        if fades.size:
+            yield float(line.s[node]), float(fades.min()), float(line.h[cells].max())
+
+
+def _rounded(x: Floats | float) -> Floats:
+    """To half a percent, so that round-off of an equilibrium (in a plane, in space) does not move nodes."""
+    return np.asarray(np.exp(0.01 * np.round(100.0 * np.log(np.maximum(x, 1e-300)))))
+
+
+def _turns(model: Model, state: State) -> Floats:
+    """Angles (N+1,) rad by which rods turn at their inner nodes; 0 at the ends and beside catenaries."""
+    d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+    out, spin = np.zeros(model.line.s.size), model.line.spin.astype(bool)
+    cosine = np.clip((d[1:] * d[:-1]).sum(axis=1), -1.0, 1.0)
+    out[1:-1] = np.where(spin[1:] & spin[:-1], np.arccos(cosine), 0.0)
+    return out
