@@ -138,6 +138,7 @@ class DomainManager:
         self.zones.clock[z.PACE] = self.pace
         self.zones.clamped[:] = cable.held_tangent
         self.seen = np.zeros((len(CRITERIA), n))  # ratios since the last output
+        self.first = np.zeros((len(CRITERIA), n))  # largest ratios by which the first rods were chosen
         self.near: Floats = np.zeros(0)  # (N+1,) of a line that touches itself: how near it is to itself
         self.calm_since, self.buffer = np.full(n, np.inf), np.zeros(n)
         self.calmed = np.zeros((2, n))  # of rods on their way out: which criterion was the loudest, and its ratio
@@ -353,6 +354,7 @@ class DomainManager:
         """Base cells that ask to be rod, whatever they are, after `evaluate_criteria`; the ratios begin anew."""
         n = self.layout.rod.size
         self._add_global_ratios()
+        np.maximum(self.first, self.ratios, out=self.first)
         rules = self.rules(state)
         asks = spread(wanted(self.ratios, np.zeros(n, bool)), self.layout.base, rules.buffer)
         self._reset_ratios()

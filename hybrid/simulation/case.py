@@ -34,7 +34,7 @@ from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.beside import beside, thread_count
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.events import EventLog
-from hybrid.simulation.initial_zones import zones_at_start
+from hybrid.simulation.initial_zones import reasons_at_start, zones_at_start
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
@@ -145,7 +145,7 @@ class Case:
         assert loop.run.envelope is not None
         recorder = result_recorder(
             self.scene, model, loop.observer, target, self._texts, equilibrium, loop.run.envelope,
-            len(output_times(self.scene)), kept, late, ERROR_ESTIMATE if kept else "",
+            len(output_times(self.scene)), kept, late, ERROR_ESTIMATE if kept else "", reasons_at_start(switching),
         )  # fmt: skip
         recorder.files = self._files
         if switching is not None and switching.manager.held:

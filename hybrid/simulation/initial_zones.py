@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,13 +14,14 @@ from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.cell_lengths import CALM_STEPS
+from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.forces import PLANAR, SELF_CONTACT
 from hybrid.kernels.state import Ends, Line, State
 from hybrid.kernels.torque_transfer import carry_torque
 from hybrid.model.bending_reference import LEFT
 from hybrid.model.build import Model, given_zones
 from hybrid.model.coarsen import FEWER, picked, refined
-from hybrid.model.layout import Layout
+from hybrid.model.layout import Layout, edges
 from hybrid.model.payout_law import fastest
 from hybrid.model.resolution import Resolution, follows_curvature, requested_accuracy
 from hybrid.scene.schema import AdaptiveModel, Scene
@@ -55,6 +58,23 @@ def zones_at_start(
     else:
         model = zones_without_equilibrium(model, manager)
     return model, equilibrium, ZoneSwitching(model, manager, loaded=scene.model.joint == "curvature")
+
+
+def reasons_at_start(switching: ZoneSwitching | None) -> str:
+    """Why each first rod is one, as JSON: [from, to (m), {criterion: its ratio, the largest first}]; "": no zones.
+
+    Without a criterion: rods that lie between others, or that were no equilibrium's, or that stay (`zones fixed`).
+    """
+    if switching is None:
+        return ""
+    manager, found = switching.manager, []
+    base, rod = manager.layout.base, manager.layout.rod
+    for a, b in pairwise(edges(rod.astype(int))):
+        if rod[a]:
+            ratios = manager.first[:, a:b].max(axis=1)
+            asks = {CRITERIA[c].name: float(f"{ratios[c]:.3g}") for c in np.argsort(-ratios) if ratios[c] > 1.0}
+            found.append([float(base[a]), float(base[b]), asks])
+    return json.dumps(found)
 
 
 def _with_followed_cells(scene: Scene, model: Model, manager: DomainManager, t: float) -> tuple[Model, Equilibrium]:

@@ -58,11 +58,13 @@ def result_recorder(
     before: Tree | None = None,
     late: bool = False,
     pending: str = "",
+    rods: str = "",
 ) -> Recorder | ArrayRecorder:
     """A new result, in a file or in memory; whether a file may be replaced was asked before anything was computed.
 
     found: the equilibrium at the start; envelope: of what is computed, its values not yet known; outputs: after the
-    first, 0 of an equilibrium; before, late: as of `Recorder`; pending: what is to come when it is complete.
+    first, 0 of an equilibrium; before, late: as of `Recorder`; pending: what is to come when it is complete; rods: why
+    the first ones are, as of `reasons_at_start`.
     """
     attributes: dict[str, str | float | int] = {
         "title": scene.title, "cells": model.cells, "length": model.length, "tension_scale": model.tension_scale,
@@ -71,6 +73,8 @@ def result_recorder(
         attributes |= {"static_path": found.summary, "static_residual": found.residual}
     if pending:
         attributes[PENDING] = pending
+    if rods:
+        attributes["rods_at_start"] = rods
     fixed = [*_surroundings(model), *_limits(scene, observer), *envelope.fixed(), *mesh_fields(model)]
     if scene.output.history:
         points = np.array(scene.output.history)

@@ -29,7 +29,7 @@ from hybrid.simulation.diagnostics import Diagnostics, stretch_text
 from hybrid.simulation.envelope import Envelope, of_equilibrium
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.events import EventLog
-from hybrid.simulation.initial_zones import zones_at_start
+from hybrid.simulation.initial_zones import reasons_at_start, zones_at_start
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution
 from hybrid.simulation.result_file import result_recorder
 from hybrid.simulation.run_sample import COMPARED, MODEL_ERRORS, RunSample, catenary_share, compared_cells
@@ -57,7 +57,10 @@ class StaticCase:
             refuse_contact(model, where)
         envelope = Envelope(self.scene, model, moves=False)
         pending = ERROR_ESTIMATE if wants_errors(self.scene) else ""
-        with result_recorder(self.scene, model, observer, target, texts, found, envelope, pending=pending) as recorder:
+        why = reasons_at_start(switching)
+        with result_recorder(
+            self.scene, model, observer, target, texts, found, envelope, pending=pending, rods=why
+        ) as recorder:
             ends, events = model.ends.at(np.inf), EventLog()
             diagnostics = Diagnostics(model, events)
             diagnostics.begin()

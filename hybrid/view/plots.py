@@ -29,7 +29,7 @@ from hybrid.view.projections import (
 )
 from hybrid.view.save import save_figure
 from hybrid.view.style import short
-from hybrid.view.zones import counted, share_of_rod, zone_map
+from hybrid.view.zones import counted, share_of_rod, why_rods, zone_map
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,7 +104,11 @@ def plot_zones(result: Result, path: str | Path | None = None, *, overwrite: boo
         more = {"panels": {"map": zones, "share": share_of_rod(result)}, "mosaic": [*rows, ["share", "."]]}
         more |= {"widths": [1.0, 0.022], "legend": ["map"]}
         more["heights"] = [*(3.0 / len(rows) for _ in rows), 0.8]
-    return save_figure(draw_page(page_of(result, [counted(result)], **more)), path, overwrite=overwrite)
+    return save_figure(
+        draw_page(page_of(result, [x for x in (counted(result), why_rods(result)) if x], **more)),
+        path,
+        overwrite=overwrite,
+    )
 
 
 def _summary(result: Result, times: Numbers | None, history: Numbers | None) -> Page:

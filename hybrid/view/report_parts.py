@@ -280,7 +280,7 @@ def statistics_html(result: Result) -> str:
 
 def settings_html(result: Result) -> str:
     """What was chosen, by the scene or by the program, and with which versions."""
-    hidden = {"title", "status", "message", "format", "format_version", "fairleads"}
+    hidden = {"title", "status", "message", "format", "format_version", "fairleads", "rods_at_start"}
     given = {k: v for k, v in result.attributes.items() if k not in hidden and not k.startswith(("version_", "error_"))}
     rows = [
         (_SETTINGS.get(k, k.replace("_", " ")), f"{short(v, 6)}" if isinstance(v, float) else v)

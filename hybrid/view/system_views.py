@@ -292,11 +292,10 @@ def page(result: Result) -> Page:
     below = [name for name in "pbhmn" if name in panels][:4]
     panels = {name: x for name, x in panels.items() if name in (*names, *below)}
     rows = [names] if aspect_of(views, every.as_result) < 3.0 else [[name] for name in names]
-    wide = 2 if len(below) > 1 else 1
+    wide = max(2 if len(below) > 1 else 1, len(rows[0]))
     rows = [[name for name in row for _ in range(wide // len(row) or 1)] for row in rows]
     grid = [below[k : k + wide] for k in range(0, len(below), wide)]
     rows += [row + [row[-1]] * (wide - len(row)) for row in grid]
-    rows = [row * (wide // len(row)) if len(row) < wide else row for row in rows]
     heights = [1.6 if set(row) <= {"s", "S"} else 1.0 for row in rows]
     return page_of(
         result, facts_line(result, every), panels=panels, mosaic=rows, widths=[1.0] * len(rows[0]), heights=heights,

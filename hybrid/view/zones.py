@@ -6,6 +6,8 @@ zone, in s; its colour is the recorded value. Nothing is made up between them: a
 
 from __future__ import annotations
 
+import json
+from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby, pairwise
 from textwrap import wrap
@@ -18,7 +20,7 @@ from hybrid.errors import EVENTS_BY_WEIGHT, ZONE_EVENTS, weight_of_event
 from hybrid.store.reader import Result
 from hybrid.store.records import Event, Zone
 from hybrid.view.decimate import Kept, even
-from hybrid.view.figure import Axis, Band, Box, Item, Line, Map, Marks, Panel
+from hybrid.view.figure import Axis, Band, Box, Item, Line, Map, Marks, Panel, Text
 from hybrid.view.projections import STILL, free_edges, whole_zones
 from hybrid.view.style import ALARM, INK, NEWS, colour_of, prefix, short
 
@@ -48,7 +50,42 @@ _MOST_ON_PAGE, _MOST_LISTED = 600, 400  # of a report, where one can be pointed 
 _MOST_CELLS = 150_000  # of the map of a report: a browser colours so many at once
 _MOST_COLUMNS = 230  # of a small drawing
 _WIDE = 46  # characters on a line of a label: a phone has no more
+_ROOM = 0.04  # of the length: a zone of less has no room for a text
 _SAME = 1e-12  # of the length: places so close are one, as they are to the recorder
+
+
+# Criteria by which a stretch is rod, in words.
+WHY = {
+    "bend": "bending", "slack": "low tension", "clamp": "a clamp or moment at an end", "point": "a point load or joint",
+    "edge": "the touchdown", "torsion": "torsion", "given": "asked for by the scene", "contact": "contact with itself",
+}  # fmt: skip
+
+
+class Rod(NamedTuple):
+    """A rod at the start of a run, from s_a to s_b (m), and why: criteria in words, the one that asks most first."""
+
+    s_a: float
+    s_b: float
+    why: tuple[str, ...]
+
+
+def rods_at_start(result: Result) -> list[Rod]:
+    """The first rods of zones that move; of results that do not say why, none."""
+    found = json.loads(str(result.attributes.get("rods_at_start", "[]")))
+    return [Rod(a, b, tuple(WHY.get(name, name) for name in asks)) for a, b, asks in found]
+
+
+def why_rods(result: Result) -> str:
+    """Why stretches are rod: at the start, and of those that became one later; "" where no zones move."""
+    first = [
+        f"s = {short(x.s_a, 4)} to {short(x.s_b, 4)} m, {', '.join(x.why[:2]) or 'no criterion'}"
+        for x in rods_at_start(result)
+    ]
+    grown = [x.criterion for x in result.events if x.kind in ("split", "grow") and x.criterion]
+    later = Counter(WHY.get(x, x) for x in grown)
+    parts = [f"rod at the start: {'; '.join(first)}"] if first else []
+    parts += [f"rod later: {', '.join(f'{name} × {n}' for name, n in later.most_common())}"] if later else []
+    return "; ".join(parts)
 
 
 class Cells(NamedTuple):
@@ -181,7 +218,12 @@ def zone_map(result: Result, shown: Kept | None = None) -> Panel:
     if ((cells.kind >= 0) & (cells.point < 0)).any():
         nowhere = np.zeros(0)
         items.append(Marks(nowhere, nowhere, "s", "no output point in the zone", _UNSEEN, _UNSEEN))
+    for rod in rods_at_start(result):
+        if rod.s_b - rod.s_a > _ROOM * float(np.ptp(result.s)):
+            text = ", ".join(rod.why[:2]) or "no criterion"
+            items.append(Text(float(cells.t[0]), rod.s_b, text, offset=(3.0, -2.0), up="top"))
     caption = "Zones along the cable over time: rods in shades of their curvature, catenaries of their tension."
+    caption += f" {why[0].upper()}{why[1:]}." if (why := why_rods(result)) else ""
     if shown and len(frames) < len(shown.frames):
         caption += f" {len(frames)} of {len(result.times)} outputs are drawn."
     if len(result.events) > _MOST_ON_PAGE:

@@ -288,3 +288,15 @@ def test_a_stopped_run_is_drawn(tmp_path: Path) -> None:
         assert "interrupted" in page(part).facts and "interrupted" in html(part).lower()
     still = hybrid.static(spar())
     assert set(page(still).panels) == {"s", "S", "p"} and "static, one output" in html(still)
+
+
+def test_a_page_of_an_equilibrium_of_catenaries_can_be_drawn() -> None:
+    """Two planes side by side over the one curve that there is: its page ended in an error of matplotlib."""
+    around = zip("abc", (0.0, 2.1, 4.2), strict=True)
+    points: dict[str, Any] = {x: {"position": [np.cos(a), np.sin(a), -0.3]} for x, a in around}
+    points |= {"top": {"position": [0, 0, 0]}}
+    sections = [{"length": 1.2, "mass": 1.0}]
+    lines = {x: {"start": x, "end": "top", "sections": sections, "model": "catenary"} for x in "abc"}
+    with hybrid.static({"points": points, "lines": lines}) as result:
+        made = page(result)
+    assert made.mosaic[0] == ["s", "S"] and {len(row) for row in made.mosaic} == {2}

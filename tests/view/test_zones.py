@@ -15,11 +15,13 @@ from test_result_plot import EVENTS, MIXED, assert_tidy, image, made, sag, texts
 
 import hybrid
 from hybrid.errors import ResultError
+from hybrid.kernels.criteria import CRITERIA
 from hybrid.store.reader import Result
 from hybrid.view import zones as zoneplot
-from hybrid.view.figure import Axis, Map, Panel
+from hybrid.view.figure import Axis, Map, Panel, Text
 from hybrid.view.matplotlib_backend import draw_panel
 from hybrid.view.plots import plot_zones
+from hybrid.view.zones import WHY, rods_at_start, why_rods, zone_map
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 Zones = list[tuple[str, float, float]]
@@ -336,3 +338,20 @@ def test_sums_that_differ_in_the_last_digit_are_one_place() -> None:
     cells, once = (zoneplot.cells_of(made(sag, zones=zones)) for zones in (noisy, lambda t: MIXED))
     assert cells.s == pytest.approx(once.s, abs=1e-12) and cells.t.tolist() == once.t.tolist()
     assert np.array_equal(cells.kind, once.kind) and np.array_equal(cells.point, once.point)
+
+
+def test_the_picture_of_zones_says_why_a_stretch_is_rod() -> None:
+    """Rods at the start by their criteria, of a run and of its equilibrium; later ones by those of their events."""
+    scene = hybrid.load_scene(EXAMPLES / "s_tether.yaml", ["time.duration=4", "output.points=21"])
+    assert set(WHY) == {x.name for x in CRITERIA}
+    for result in (hybrid.run(scene), hybrid.static(scene)):
+        first = rods_at_start(result)
+        assert [(x.s_a, x.s_b) for x in first] == [(z.s_a, z.s_b) for z in result.zones[0] if z.kind == "rod"]
+        assert [x.why[0] for x in first] == ["bending", "asked for by the scene"]
+        said = why_rods(result)
+        assert said.startswith("rod at the start: s = 14 to 47 m, bending; s = 55 to 60 m, asked for by the scene")
+        assert said.endswith("rod later: bending × 1") is any(x.kind == "grow" for x in result.events)
+        words = [x.text for x in zone_map(result).items if isinstance(x, Text)]
+        assert words == ["bending", "asked for by the scene"]
+        assert said in " ".join(texts(plot_zones(result)).split())
+        result.close()
