@@ -95,12 +95,16 @@ def test_kills(tmp_path: Path) -> None:
     assert all(row[2] for row in rows)
 
 
-def killed_run(command: list[str], number: int, after: float) -> str:
-    """A run that is stopped so many s after it began, by a signal; what it has written to the error stream."""
+def killed_run(command: list[str], number: int, after: float) -> tuple[str, float]:
+    """A run that is stopped so many s after it began, by a signal; what it has written to the error stream, and how
+
+    long it took to end, s.
+    """
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     clock.sleep(after)
     process.send_signal(number)
-    return process.communicate(timeout=300)[1]
+    begin = clock.monotonic()
+    return process.communicate(timeout=300)[1], clock.monotonic() - begin
 
 
 def left_by(target: Path, said: str, stopped: bool) -> str:
@@ -131,10 +135,13 @@ def test_kills_of_runs_with_an_accuracy(name: str, tmp_path: Path, monkeypatch: 
     begin = clock.monotonic()
     subprocess.run([*command, "whole.h5"], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     wall, draw, found, same = clock.monotonic() - begin, np.random.default_rng(43), Counter[str](), 0
+    ended: list[float] = []
     for k in range(-(-RUNS // len(ASKED))):
         number, target = (signal.SIGKILL, signal.SIGINT)[k % 2], tmp_path / f"run{k}.h5"
-        said = killed_run([*command, str(target)], number, float(draw.uniform(0.1, 1.0)) * wall)
+        said, took = killed_run([*command, str(target)], number, float(draw.uniform(0.1, 1.0)) * wall)
         left = left_by(target, said, number == signal.SIGINT)
+        if number == signal.SIGINT and left != "all":
+            ended.append(took)
         found[f"{number.name}: {left}"] += 1
         if target.exists() and left != "all":
             try:
@@ -146,5 +153,8 @@ def test_kills_of_runs_with_an_accuracy(name: str, tmp_path: Path, monkeypatch: 
         target.unlink(missing_ok=True)
     total = sum(found.values())
     print(f"\n{name}: {total} kills within {wall:.2g} s; " + ", ".join(f"{x} {n}" for x, n in sorted(found.items())))
+    print(
+        f"{name}: SIGINT to the end of the process {np.median(ended or [0]):.2g} s, at most {max(ended or [0]):.2g} s"
+    )
     print(f"{name}: {total} say what is missing, {same} are the same after a resume, or have left nothing")
     assert same >= total - found["SIGKILL: nothing yet"] - found["SIGINT: nothing yet"]
