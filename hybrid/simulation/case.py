@@ -175,7 +175,7 @@ class Case:
             scenes = (self.scene, *(x.scene for x in self.changes))
             with refused(source):
                 resolution = resolution_from(point.resolution, self.scene)
-                begin = self._begin_result(resolution)
+                self._begin_result(resolution)
                 model, switching, correction = restored_parts(scenes, resolution, point.state, self.criterion)
                 loop = self._loop(scenes[point.state["changes"]], model, resolution, switching, target, correction)
                 loop.restore(point.state)
@@ -198,7 +198,7 @@ class Case:
                 recorder.event(point.t, 0.0, model.length, OTHER_PROGRAM, f"{text}: the last digits may be others")
             loop.to_the_end(self._duration, self._exact, self.changes)
             loop.close()
-        return self._compared(loop.run, target, clock.process_time() - begin)
+        return self._compared(loop.run, target, loop.cpu)
 
     def is_unfinished(self, source: Path, resolution: Resolution) -> bool:
         """Whether a file holds a run of this case, with this resolution, that was cut off."""

@@ -132,18 +132,24 @@ def _holds(asked: RequestedAccuracy, estimate: Estimate, other: RunSample, skip:
 class Replacement:
     """Records finer results beside a complete one; `settle` lets such a one take its place, or drops it."""
 
+    goes_on = False  # whether one that was stopped stays beside, for whoever goes on with it
+
     def __init__(self, target: Target) -> None:
         self.target = target
         self._new: Target | None = None  # complete, and not settled
 
     def finer(self, record: Callable[[Target], T]) -> T:
-        """Record a finer result, which is then to be settled; one that fails leaves nothing."""
+        """Record a finer result, which is then to be settled; one that fails leaves nothing, and one that is stopped
+
+        nothing that nobody goes on with.
+        """
         new = io.BytesIO() if isinstance(self.target, io.BytesIO) else beside(self.target)
         self._new = new
         try:
             return record(new)
-        except BaseException:
-            self.settle(False)
+        except BaseException as error:
+            if not (self.goes_on and isinstance(error, KeyboardInterrupt)):
+                self.settle(False)
             raise
 
     def settle(self, kept: bool) -> None:
@@ -168,6 +174,8 @@ class Replacement:
 
 class FinerResult(Replacement):
     """Records results one after the other, those after the first beside it."""
+
+    goes_on = True
 
     def __init__(self, target: Target, first: Record, refinement: Record) -> None:
         super().__init__(target)

@@ -23,6 +23,7 @@ from hybrid.model.resolution import Resolution, first_resolution, requested_accu
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
+from hybrid.simulation.budget import COMPARISONS, FINER, LEAST, MOST_TIMES, OUTPUT, POINT
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import OF_LINES, kernels_of
 from hybrid.simulation.model_choice import chosen_and_surveyed
@@ -33,12 +34,10 @@ from hybrid.store.comparison_recorder import ComparisonRecorder
 
 # s of processor time that the pre-run, and the first steps of the result, may take.
 PRE_RUN, FIRST_STEPS = 0.2, 0.1
-# s of an output, of each of its points, and of the file of a result (bench/test_bench_plan.py).
-OUTPUT, POINT, FILE = 0.15e-3, 1.3e-6, 0.02
-# Of the steps of a result, what the runs cost that errors are estimated by; s of judging and writing errors.
-COMPARISONS, JUDGING = 0.9, 0.1
-# Results that an accuracy takes on average, and at most, over the first: finer ones may follow it.
-FINER, MOST_FINER = 0.5, 9.0
+# s of the file of a result, and of judging and writing errors (bench/test_bench_plan.py).
+FILE, JUDGING = 0.02, 0.1
+# Results that an accuracy takes at most over the first, where its budget allows them: finer ones may follow it.
+MOST_FINER = 9.0
 
 
 @overload
@@ -162,7 +161,8 @@ def _of_passes(scene: Scene, setup: float, motion: float, outputs: float, found:
     first = result + 3.0 * setup + COMPARISONS * motion + JUDGING
     if requested_accuracy(scene) is None or found.most_runs == found.runs:
         return first, first
-    return first + FINER * one, first + MOST_FINER * one
+    expected = first + FINER * one
+    return expected, min(first + MOST_FINER * one, max(MOST_TIMES * expected, LEAST))
 
 
 def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:

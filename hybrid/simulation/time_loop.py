@@ -95,6 +95,11 @@ class TimeLoop:
         self._kept = (-1, 0)  # steps and changes at the last checkpoint
         self._logged = 0.0  # s of processor time since then, at the last row of the log
 
+    @property
+    def cpu(self) -> float:
+        """s of processor time, with what was spent before it was restored."""
+        return clock.process_time() - self._cpu
+
     def begin(self, equilibrium: Equilibrium | None) -> None:
         """The first state, and the first output."""
         run = self.run

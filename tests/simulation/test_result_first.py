@@ -114,6 +114,8 @@ def test_stopped_after_the_result(
         assert pending in result.pending and "`hybrid resume run.h5`" in result.pending
         assert result.times[-1] == scene["time"]["duration"]
         assert any(x.startswith("error_total") for x in result.attributes) == (name == REFINEMENT)
+    left = (tmp_path / ".run.h5.finer").exists()  # from which a finer result of one line goes on
+    assert left == (name == REFINEMENT and "cable" in scene)
     hybrid.resume(tmp_path / "run.h5").close()
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
     assert sorted(x.name for x in tmp_path.iterdir()) == ["run.h5", "whole.h5"]
