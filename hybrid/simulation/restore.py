@@ -7,6 +7,7 @@ number that is read is checked for its type, its shape and, where a wrong one wo
 from __future__ import annotations
 
 import hashlib
+import platform
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, replace
@@ -46,7 +47,8 @@ FARTHEST = 1e4
 def program() -> str:
     """Which program this is: version, and a hash of all that computes.  The same one gives the same bits."""
     digest, package = hashlib.sha256(kernel_hash().encode()), Path(__file__).parents[1]
-    digest.update(f"scipy {version('scipy')} h5py {version('h5py')}".encode())
+    digest.update(" ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "h5py")).encode())
+    digest.update(platform.python_version().encode())
     for file in sorted(package.rglob("*.py")):
         if file.relative_to(package).with_suffix("").parts[0] in COMPUTES:
             digest.update(file.read_bytes())

@@ -10,10 +10,11 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.cache import kernel_hash, temporary_folder
+from hybrid.kernels.cache import LEVELS, kernel_hash, processor, temporary_folder
 
 PACKAGE = Path(hybrid.__file__).parent
 
@@ -58,7 +59,7 @@ print(sum(in_space.stats.cache_misses.values()))
 """
 
 
-def answer(folder: Path, script: str) -> float:
+def answer(folder: Path, script: str, *arguments: str) -> float:
     """What a script prints with the copy of the package in `folder` and the cache beside it; a warning fails it."""
     environment = os.environ | {
         "PYTHONPATH": str(folder),
@@ -66,7 +67,7 @@ def answer(folder: Path, script: str) -> float:
         "PYTHONWARNINGS": "error",
         "PYTHONDONTWRITEBYTECODE": "1",
     }
-    command = [sys.executable, "-c", script]
+    command = [sys.executable, "-c", script, *arguments]
     done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return float(done.stdout)
@@ -74,13 +75,13 @@ def answer(folder: Path, script: str) -> float:
 
 def compiled(folder: Path) -> set[Path]:
     """Machine code of the copy in `folder`."""
-    return set((folder / "cache").rglob("*.nbc"))
+    return set((folder / "cache").rglob("*.kernel"))
 
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
     """A folder with a copy of the package to edit."""
-    shutil.copytree(PACKAGE, tmp_path / "hybrid", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(PACKAGE, tmp_path / "hybrid", ignore=shutil.ignore_patterns("__pycache__", "compiled"))
     return tmp_path
 
 
@@ -112,6 +113,28 @@ def test_a_copy_elsewhere_compiles_nothing(copy: Path, tmp_path_factory: pytest.
     assert answer(elsewhere, SPIN) == pytest.approx(2.0)
     moved = {copy / x.relative_to(elsewhere): x.stat().st_mtime_ns for x in compiled(elsewhere)}
     assert moved == kept
+
+
+@pytest.mark.slow
+def test_code_that_comes_with_the_package_is_all_that_a_first_run_needs(copy: Path, tmp_path: Path) -> None:
+    """A copy of the package with machine code for x86-64-v3, as a release has it, and an empty cache: the suspension
+    compiles nothing, and its numbers are those of code made for this processor."""
+    if not {f"+{x}" for x in LEVELS[0].features} <= set(processor().features.split(",")):
+        pytest.skip("this processor has no AVX2")
+    ship = [sys.executable, str(Path(__file__).parents[1] / "ship_kernels.py"), "--few"]
+    subprocess.run(ship, env=os.environ | {"PYTHONPATH": str(copy)}, check=True, stdout=subprocess.DEVNULL)
+    scene = Path(__file__).parents[2] / "examples" / "02_suspension.yaml"
+    script = "import sys, hybrid; hybrid.run(hybrid.load_scene(sys.argv[1]), sys.argv[2]).close(); print(0)"
+    answer(copy, script, str(scene), str(tmp_path / "shipped.h5"))
+    assert not compiled(copy)
+    shutil.rmtree(copy / "hybrid" / "kernels" / "compiled")
+    result = hybrid.run(hybrid.load_scene(scene), tmp_path / "own.h5", progress=False)
+    with hybrid.open(tmp_path / "shipped.h5") as shipped:
+        if "+avx512f" in processor().features:  # native code may sum in another order there
+            np.testing.assert_allclose(shipped.tension, result.tension, rtol=1e-6, atol=1e-9)
+        else:
+            assert shipped.tension.tobytes() == result.tension.tobytes()
+            assert shipped.position.tobytes() == result.position.tobytes()
 
 
 def test_an_edit_of_any_file_with_a_kernel_means_another_folder(copy: Path) -> None:
@@ -153,7 +176,7 @@ def test_own_numba_functions_keep_their_own_cache(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", script], env=environment, cwd=tmp_path, capture_output=True, text=True)
     assert done.stdout == "3.0\n", done.stderr
     assert [p.name.split(".")[0] for p in own.rglob("*.nbc")] == ["mine"]
-    assert not any("mine" in p.name for p in ours.rglob("*.nbc"))
+    assert not any("mine" in p.name for p in ours.rglob("*.kernel"))
 
 
 def test_the_cache_folder_is_where_the_user_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

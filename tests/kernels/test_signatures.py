@@ -18,8 +18,7 @@ from hybrid.kernels.compile import inner
 SCRIPT = """
 import importlib, json, pkgutil, sys
 import hybrid, hybrid.kernels
-from hybrid.kernels.compile import Inner
-from numba.core.dispatcher import Dispatcher
+from hybrid.kernels.compile import Entry, Inner
 
 cable = {"length": 20.0, "diameter": 0.05, "mass": 4.0, "axial_stiffness": 1e7, "bending_stiffness": 50.0,
          "torsional_stiffness": 40.0, "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
@@ -50,12 +49,11 @@ rooms = [f"hybrid.kernels.{x.name}" for x in pkgutil.iter_modules(hybrid.kernels
 named = [(room, *x) for room in rooms for x in vars(importlib.import_module(room)).items()]
 if sys.argv[1:]:  # numba reads all that was called once more, with what it inlines; no machine code is made
     for room, name, f in named:
-        for sig in f.signatures if isinstance(f, Dispatcher) and f.__module__ == room else ():
+        for sig in f.signatures if isinstance(f, Entry) and f.__module__ == room else ():
             f.part.compile(sig)
 for room, name, f in named:
-    f = f.made if isinstance(f, Inner) else f
-    if isinstance(f, Dispatcher) and f.__module__ == room:
-        found[f"{room}.{name}"] = [str(x) for x in f.signatures]
+    if isinstance(f, Entry | Inner) and f.__module__ == room:
+        found[f"{room}.{name}"] = [str(x) for x in f.made.signatures]
 print(json.dumps(found))
 """
 

@@ -44,7 +44,7 @@ def differences(a: Path, b: Path) -> list[str]:
 
 def machine_code() -> set[Path]:
     """Files of the kernels that have been compiled."""
-    return {*cache_folder().rglob("*.nbc")}
+    return {*cache_folder().glob("*.kernel")}
 
 
 class Stopping:
