@@ -38,12 +38,12 @@ def view(
         console.source = str(file or "")
         viewed = session_of(file)
         at = listen()
-        server, address = make_server(viewed, at)
+        server, address, once = make_server(viewed, at)
         console.json("view", address=address, file=str(file) if file else None)
         console.show(lambda: f"{file or 'a new scene'}: {address}\nfor browsers of this machine alone; Ctrl-C ends it")
         if not no_browser:
             import webbrowser
 
-            webbrowser.open(address)
+            webbrowser.open(once)
         with suppress(KeyboardInterrupt):  # the way to end it
             server.run(sockets=[at])

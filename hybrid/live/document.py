@@ -37,6 +37,7 @@ class Document:
         self._former: dict[int, str] = {0: unified(text)}
         self.saved: str | None = self.text if path else None  # what the file holds as far as is known
         self._stamp = stamp_of(path)
+        self._opened = path.resolve() if path else None  # what it was, if it is a link, when it was asked for
 
     @property
     def text(self) -> str:
@@ -81,8 +82,15 @@ class Document:
         there = stamp_of(target) is not None  # one that was deleted is written anew
         if target == self.path and there and not force and _content(target) not in (self.saved, self.text):
             raise Refused(f"{target.name} was changed on disk by another program")
+        self._check_link(target)
         _write(target, self.text.replace("\n", self.newline))
         self.path, self.saved, self._stamp = target, self.text, stamp_of(target)
+
+    def _check_link(self, target: Path) -> None:
+        """Refuse a link to another folder, unless it was opened as what it is."""
+        to = target.resolve()
+        if to.parent != self.folder.resolve() and not (target == self.path and to == self._opened):
+            raise Refused(f"{target.name} is a link to {to}, which is outside {self.folder}: take another name")
 
     def look(self) -> str:
         """Look at the file: "" as it was; "taken" its new text is the text now; "differs" it has another text, and so

@@ -32,8 +32,9 @@ class Run:
     async def follow(self) -> None:
         """Start it, and follow it to its end."""
         new_group = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)  # of Windows: signals are for a group there
+        asked = "run", _argument(self.scene), "-o", _argument(self.target), "--json"
         self._child = child = await asyncio.create_subprocess_exec(
-            *own_process(CALL), "run", self.scene.name, "-o", self.target.name, "--json", cwd=self.scene.parent,
+            *own_process(CALL), *asked, cwd=self.scene.parent,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, limit=LONGEST_LINE,
             start_new_session=True, creationflags=new_group,
         )  # fmt: skip
@@ -101,3 +102,8 @@ class Run:
         else:
             return
         self._changed()
+
+
+def _argument(file: Path) -> str:
+    """The name of a file on a command line in its folder, where one that begins with - would be an option."""
+    return f"./{file.name}" if file.name.startswith("-") else file.name

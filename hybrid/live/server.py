@@ -4,6 +4,9 @@ Every request is held against three things before anything is done: its Host is 
 our port (a name that is made to lead here has another), its Origin, if it has one, is this page (another page in the
 same browser has another; a websocket must have one), and its path begins with a random token (other users of this
 machine do not know it).  No path of a request becomes a path of a file.
+
+Other users can read the command lines of this one's programs, so the browser is not started with the token but with a
+ticket that leads to the page once.
 """
 
 from __future__ import annotations
@@ -59,6 +62,7 @@ class Guard:
 
     def __init__(self, app: ASGIApp, port: int, token: str) -> None:
         self.app, self.token = app, token
+        self.ticket: str | None = secrets.token_urlsafe(24)  # None: it was used
         self.hosts = {f"{name}:{port}" for name in NAMES} | (set(NAMES) if port == 80 else set())
         self.origins = {f"http://{host}" for host in self.hosts}
 
@@ -70,7 +74,21 @@ class Guard:
             else:
                 await PlainTextResponse("not for you\n", 403, headers=HEADERS)(scope, receive, send)
             return
+        if self._has_ticket(scope):
+            to = {"Location": f"/{self.token}/"}
+            await Response(status_code=303, headers=HEADERS | to)(scope, receive, send)
+            return
         await self.app(scope, receive, send)
+
+    def _has_ticket(self, scope: Scope) -> bool:
+        """Whether a request opens the page for the first time by the ticket, which is gone then."""
+        path = scope.get("path", "").split("/")[1:]
+        if scope["type"] != "http" or scope["method"] != "GET" or len(path) != 1 or self.ticket is None:
+            return False
+        if not secrets.compare_digest(path[0].encode(), self.ticket.encode()):
+            return False
+        self.ticket = None
+        return True
 
     def _allowed(self, scope: Scope) -> bool:
         found: dict[str, list[str]] = {}
@@ -86,10 +104,11 @@ class Guard:
         if found.get("sec-fetch-site", ["none"])[-1] not in ("none", "same-origin"):
             return False
         first = scope["path"].split("/")[1:2]
-        return bool(first) and secrets.compare_digest(first[0].encode(), self.token.encode())
+        known = [x.encode() for x in (self.token, self.ticket) if x is not None]
+        return bool(first) and any(secrets.compare_digest(first[0].encode(), x) for x in known)
 
 
-def make_app(session: Session, port: int, token: str) -> ASGIApp:
+def make_app(session: Session, port: int, token: str) -> Guard:
     """The page of a session, for a server that listens at `port` of this machine."""
 
     async def page(_: Request) -> Response:
@@ -182,12 +201,14 @@ def listen(port: int = 0) -> socket.socket:
     return found
 
 
-def make_server(session: Session, at: socket.socket) -> tuple[uvicorn.Server, str]:
-    """A server for a socket of `listen`, and the address to open."""
+def make_server(session: Session, at: socket.socket) -> tuple[uvicorn.Server, str, str]:
+    """A server for a socket of `listen`, the address to open, and one that opens it once, for a command line."""
     port, token = at.getsockname()[1], secrets.token_urlsafe(24)
+    app = make_app(session, port, token)
     config = uvicorn.Config(
-        make_app(session, port, token), log_level="critical", access_log=False, server_header=False,
+        app, log_level="critical", access_log=False, server_header=False,
         ws="websockets-sansio", ws_max_size=LARGEST_MESSAGE, ws_max_queue=8, timeout_graceful_shutdown=2,
         proxy_headers=False, date_header=False, lifespan="on",
     )  # fmt: skip
-    return uvicorn.Server(config), f"http://127.0.0.1:{port}/{token}/"
+    root = f"http://127.0.0.1:{port}/"
+    return uvicorn.Server(config), f"{root}{token}/", f"{root}{app.ticket}"

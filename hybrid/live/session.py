@@ -138,7 +138,7 @@ class Session:
             await self._do(client, asked)
         except Refused as refused:
             client.send(_message("refused", text=str(refused)))
-        except (ValueError, TypeError, KeyError, RecursionError, UnicodeError) as error:
+        except (ValueError, TypeError, LookupError, ArithmeticError, RecursionError) as error:
             client.send(_message("refused", text=f"not understood: {type(error).__name__}: {error}"[:500]))
         self._tell_state()
 

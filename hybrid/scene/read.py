@@ -53,7 +53,7 @@ def as_scene_or_system(scene: SceneLike | System) -> Scene | System:
     if isinstance(scene, str | PathLike) and "\n" not in str(scene):
         return _warn_renamed(*read_either(scene))
     if isinstance(scene, Mapping) and names_lines(scene):
-        return _warn_renamed(*_validated(dict(scene), from_data(dict(scene)), [], ""))
+        return _warn_renamed(*_from_data(dict(scene)))
     return as_scene(scene)
 
 
@@ -212,7 +212,15 @@ def located_in(error: SceneError, text: str, file: str = "", overrides: Sequence
 
 def validate_scene(data: Any) -> Scene:
     """A scene from Python data (nested dicts, lists, numbers); SceneError with every complaint."""
-    return _warn_renamed(*one_cable(*_validated(data, from_data(data), [], "")))
+    return _warn_renamed(*one_cable(*_from_data(data)))
+
+
+def _from_data(data: Any) -> tuple[Scene | System, list[RenamedKey]]:
+    try:
+        return _validated(data, from_data(data), [], "")
+    except RecursionError:  # a table that is deep, or holds itself
+        fix = "a scene is a few tables within tables"
+        raise SceneError([Complaint("scene", "nested too deeply", "a scene", fix)]) from None
 
 
 def scene_text(scene: Scene | System) -> str:

@@ -272,7 +272,11 @@ def read_study(path: str | Path) -> Study:
 
 def study_from(data: Mapping[str, Any], folder: str | Path = ".") -> Study:
     """A study from Python data; files in it are relative to `folder`."""
-    return _validated(dict(data), from_data(dict(data)), [], "", Path(folder))
+    try:
+        return _validated(dict(data), from_data(dict(data)), [], "", Path(folder))
+    except RecursionError:  # a table that is deep, or holds itself
+        fix = "a study is a few tables within tables"
+        raise SceneError([Complaint("study", "nested too deeply", "a study", fix)]) from None
 
 
 def _validated(data: Any, root: Node, complaints: list[Complaint], file: str, folder: Path) -> Study:

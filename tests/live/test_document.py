@@ -140,3 +140,30 @@ def test_a_text_too_large_is_refused() -> None:
     with pytest.raises(Refused, match="4 MB"):
         document.edit("x" * 4_000_001, 0)
     assert document.text == BASE
+
+
+def test_a_link_out_of_the_folder_is_not_written_through(tmp_path: Path) -> None:
+    """Of a new name, or one that has become a link since it was opened; who opens a link edits what it leads to."""
+    folder, other = tmp_path / "scenes", tmp_path / "other"
+    folder.mkdir()
+    other.mkdir()
+    document = Document(BASE, folder=folder)
+    for name, there in (("there.yaml", "theirs\n"), ("dangling.yaml", None)):
+        (folder / name).symlink_to(other / name)
+        if there:
+            (other / name).write_text(there)
+        with pytest.raises(Refused, match="outside"):
+            document.save(name, force=True)
+    assert [x.name for x in other.iterdir()] == ["there.yaml"] and (other / "there.yaml").read_text() == "theirs\n"
+    document.save("mine.yaml")
+    (folder / "mine.yaml").unlink()
+    (folder / "mine.yaml").symlink_to(other / "there.yaml")
+    with pytest.raises(Refused, match="outside"):
+        document.save(force=True)
+    opened = Document("theirs\n", folder / "there.yaml")
+    opened.edit(BASE, opened.revision)
+    opened.save()
+    assert (other / "there.yaml").read_text() == BASE and (folder / "there.yaml").is_symlink()
+    (folder / "near.yaml").symlink_to("real.yaml")
+    Document(BASE, folder=folder).save("near.yaml")
+    assert (folder / "real.yaml").read_text() == BASE

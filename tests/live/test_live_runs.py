@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import signal
 import time
 from pathlib import Path
@@ -14,6 +15,7 @@ from viewed import SCENE, Page, served
 import hybrid
 from hybrid.live import playback as playing
 from hybrid.live.playback import Playback
+from hybrid.live.runs import Run
 
 
 def test_a_run_is_followed_stopped_and_played(tmp_path: Path) -> None:
@@ -104,3 +106,12 @@ def test_what_is_no_result_is_said(tmp_path: Path) -> None:
     file.write_bytes(b"\x89HDF\r\n\x1a\n nothing")
     broken = Playback(file)
     assert broken.read()[1] and "run.h5" in broken.problem and not broken.frames
+
+
+def test_a_scene_whose_name_begins_with_a_hyphen_is_no_option(tmp_path: Path) -> None:
+    scene = tmp_path / "-rf.yaml"
+    scene.write_text(SCENE.replace("duration: 4.0", "duration: 0.1"))
+    run = Run(scene, tmp_path / "-rf.h5", lambda: None)
+    asyncio.run(run.follow())
+    assert run.state["ended"] == "complete", run.state
+    assert sorted(x.name for x in tmp_path.iterdir()) == ["-rf.h5", "-rf.yaml"]

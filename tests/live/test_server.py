@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,10 +18,11 @@ pytest.importorskip("starlette", reason='not installed: pip install "hybrid-cabl
 from viewed import LINES, SCENE, Page, exchange, random_edit, served
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
+from hybrid.cli.commands import main
 from hybrid.live.document import Document
 from hybrid.live.named_files import MOST_FILES, named_files
 from hybrid.live.pictures import picture_of
-from hybrid.live.server import LARGEST_MESSAGE, listen
+from hybrid.live.server import LARGEST_MESSAGE, Guard, listen, make_app
 from hybrid.live.session import Session
 from hybrid.model.plan import plan
 from hybrid.scene.read import parse_either
@@ -386,3 +388,51 @@ def test_a_newer_text_does_not_wait_for_an_older_one(viewed: tuple[str, Session,
     time.sleep(0.1)  # it has begun
     assert page.picture(page.edit(SCENE.replace("A line", "The newer")))["title"] == "The newer"
     assert older not in [m["revision"] for m in page.got if m["is"] == "picture"], "the older one was waited for"
+
+
+def answered(app: Guard, path: str, method: str = "GET") -> tuple[int, dict[bytes, bytes]]:
+    """Status and headers of what the page answers to a browser that is started with an address."""
+    sent: list[Any] = []
+    scope = {"type": "http", "method": method, "path": path, "headers": [(b"host", b"127.0.0.1:1234")]}
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    async def receive() -> Any:
+        return {"type": "http.request", "body": b"", "more_body": False}
+
+    asyncio.run(app({**scope, "query_string": b"", "root_path": ""}, receive, send))
+    return sent[0]["status"], dict(sent[0]["headers"])
+
+
+def test_a_ticket_opens_the_page_once() -> None:
+    app = make_app(Session(None), 1234, "token")
+    ticket = app.ticket
+    assert ticket and len(ticket) >= 30
+    assert answered(app, f"/{ticket}/page.js")[0] == 404 and answered(app, f"/{ticket}/live")[0] == 404
+    status, headers = answered(app, f"/{ticket}")
+    assert status == 303 and headers[b"location"] == b"/token/"
+    assert answered(app, f"/{ticket}")[0] == 403, "whoever has read it from a command line comes too late"
+    assert answered(app, "/token/")[0] == 200
+
+
+def test_the_token_is_not_on_the_command_line_of_the_browser(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr("uvicorn.Server.run", lambda self, sockets: sockets[0].close())
+    with pytest.raises(SystemExit):
+        main(["view", str(tmp_path / "scene.yaml"), "--json"])
+    address = json.loads(capsys.readouterr().out.splitlines()[0])["address"]
+    token = address.split("/")[3]
+    assert len(opened) == 1 and opened[0].startswith(address.split(token)[0]) and token not in opened[0]
+
+
+@pytest.mark.parametrize("base", ["1e400", "-1e400", "NaN", "1e30", '"x"', "null", "[1]"])
+def test_a_number_that_is_none_is_refused(viewed: tuple[str, Session, Path], page: Page, base: str) -> None:
+    page.socket.send(f'{{"do": "edit", "text": "x", "base": {base}}}')
+    if base != "1e30":
+        assert "not understood" in page.hear("refused")["text"]
+    page.edit(SCENE)

@@ -48,7 +48,7 @@ lines:
 def served(file: Path | None) -> Iterator[tuple[str, Session]]:
     """The address of a server, until the end."""
     session, at = session_of(file), listen()
-    server, address = make_server(session, at)
+    server, address, _ = make_server(session, at)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [at]})
     thread.start()
     try:

@@ -17,7 +17,7 @@ from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, MEASURED, OCEAN, P
 
 from hybrid.errors import SceneError
 from hybrid.scene.base import dotted
-from hybrid.scene.read import parse_scene, validate_scene
+from hybrid.scene.read import as_scene_or_system, parse_scene, validate_scene
 from hybrid.scene.schema import Scene
 
 ADAPTIVE = (
@@ -382,3 +382,24 @@ def test_mutations_raise_nothing_but_scene_errors(data: st.DataObject) -> None:
     except SceneError as error:
         assert error.complaints
         assert all(c.line is not None and c.column is not None and c.expected for c in error.complaints)
+
+
+@pytest.mark.parametrize("depth", [100, 300, 500, 1200, 100_000])
+@pytest.mark.parametrize("key", ["cable", "environment", "lines", "anything"])
+def test_a_scene_nested_deep_is_refused(key: str, depth: int) -> None:
+    deep: dict[str, Any] = {}
+    for _ in range(depth):
+        deep = {key: deep}
+    with pytest.raises(SceneError):
+        validate_scene(deep)
+    with pytest.raises(SceneError):
+        as_scene_or_system({"lines": deep, "points": {}})
+    while deep:  # Python's own deletion of a chain of dicts is safe, and slow
+        (deep,) = deep.values()
+
+
+def test_a_scene_that_holds_itself_is_refused() -> None:
+    scene: dict[str, Any] = {"title": "x"}
+    scene["cable"] = {"sections": [scene]}
+    with pytest.raises(SceneError, match="nested too deeply"):
+        validate_scene(scene)
