@@ -7,12 +7,14 @@ import os
 import signal
 import threading
 import traceback
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+import typer.core
 
 import hybrid
 
@@ -35,7 +37,21 @@ DISK_ERRORS = {
     errno.ELOOP: "a file that is no link to itself",
 }
 
+
+class _Commands(typer.core.TyperGroup):
+    """Help as plain text: the boxes of rich take half of its time."""
+
+    def format_commands(self, context: Any, formatter: Any) -> None:
+        """Each command with the whole first sentence of its help."""
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [(x, self.commands[x].get_short_help_str(limit=1000)) for x in self.list_commands(context)]
+            )
+
+
 app = typer.Typer(
+    cls=_Commands,
+    rich_markup_mode=None,
     help="Dynamics of long cables: flexible catenaries where they are taut, rods where they bend.",
     epilog="Exit codes: 0 done, 1 input refused, 2 computation failed, 130 interrupted.",
     pretty_exceptions_enable=False,
@@ -106,7 +122,7 @@ def session(as_json: bool, quiet: bool) -> Iterator[Console]:
     from hybrid.cli.console import Console
 
     console, code = Console(as_json, quiet), 0
-    with _stops() as heard:
+    with _stops() as heard, _cache_warnings(console):
         try:
             yield console
         except (Exception, KeyboardInterrupt) as error:
@@ -117,6 +133,25 @@ def session(as_json: bool, quiet: bool) -> Iterator[Console]:
                 console.interrupted()
     if code:
         raise typer.Exit(code)
+
+
+@contextmanager
+def _cache_warnings(console: Console) -> Iterator[None]:
+    """Warnings of the cache of machine code as notes of one line; others as ever."""
+    as_ever = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+        if category.__name__ != "CacheWarning":  # its module imports what not every command needs
+            as_ever(message, category, *rest)
+            return
+        console.json("note", text=str(message))
+        console.note(f"note: {message}")
+
+    warnings.showwarning = show
+    try:
+        yield
+    finally:
+        warnings.showwarning = as_ever
 
 
 @contextmanager

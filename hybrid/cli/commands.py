@@ -42,23 +42,6 @@ from hybrid.cli.app import (
     words,
 )  # fmt: skip
 from hybrid.cli.pipe import guard_output
-from hybrid.cli.plan_tables import contents_table, outputs_table, plan_lines
-from hybrid.cli.system_commands import plan_of_lines, resume_lines, run_lines, static_lines
-from hybrid.cli.system_stiffness import check_holding, show_holding
-from hybrid.cli.tables import (
-    equilibrium_facts,
-    equilibrium_table,
-    errors_facts,
-    errors_table,
-    extremes_facts,
-    extremes_table,
-    import_notes,
-    judged,
-    level_table,
-    trade_table,
-    zones_line,
-    zones_over_time,
-)
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
@@ -76,6 +59,8 @@ def run(
         asked = load_either(console, scene, settings)
         duration = asked.require_time().duration
         if not isinstance(asked, hybrid.Scene):
+            from hybrid.cli.system_commands import run_lines
+
             run_lines(console, asked, output or Path(f"{scene.stem}.h5"), plot, keep)
             return
         target = console.will_write(output or Path(f"{scene.stem}.h5"))
@@ -108,6 +93,8 @@ def resume(
         target, changed = console.will_write(output or result), settings or []
         system = remaining_system(result.resolve(), until, changed, start)
         if system is not None:
+            from hybrid.cli.system_commands import resume_lines
+
             resume_lines(console, system, result, target, plot, until=until, settings=changed, start=start)
             return
         picture = picture_beside(target, plot)
@@ -136,8 +123,13 @@ def static(
     """Find the equilibrium of a cable at t = 0 and write it to a file."""
     with session(as_json, quiet) as console:
         asked = load_either(console, scene, settings)
+        from hybrid.cli.system_stiffness import check_holding, show_holding
+        from hybrid.cli.tables import equilibrium_facts, equilibrium_table, errors_facts, errors_table
+
         check_holding(asked, stiffness, offsets, reach, heading)
         if not isinstance(asked, hybrid.Scene):
+            from hybrid.cli.system_commands import static_lines
+
             static_lines(console, asked, output or Path(f"{scene.stem}.static.h5"), plot, keep)
             show_holding(console, asked, stiffness, offsets, reach, heading)
             return
@@ -172,8 +164,10 @@ def plan(
     ] = False,
     as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Show what a run would compute, by which keys of the scene, and how long it takes: its first steps are computed."""
+    """Show what a run would compute, by which keys of the scene, and how long it takes: first steps are computed."""
     with session(as_json, False) as console:
+        from hybrid.cli.plan_tables import contents_table, outputs_table, plan_lines
+
         asked = load_either(console, scene, settings)
         if outputs:
             found, more = hybrid.listed_outputs(asked), hybrid.kinds_of_quantities()
@@ -181,6 +175,8 @@ def plan(
             console.show(lambda: outputs_table(found, more))
             return
         if not isinstance(asked, hybrid.Scene):
+            from hybrid.cli.system_commands import plan_of_lines
+
             plan_of_lines(console, asked, verbose)
             return
         made = hybrid.plan(asked)
@@ -216,6 +212,8 @@ def trade(
 ) -> None:  # fmt: skip
     """Compare models and accuracies on a scene: error against CPU time; recommend one."""
     with session(as_json, quiet) as console:
+        from hybrid.cli.tables import judged, trade_table
+
         asked = load(console, scene, settings)
         folder = output or Path(scene.with_suffix(".trade").name)
         console.left = f"{folder} keeps the runs that are done; the same command makes the others"
@@ -242,6 +240,8 @@ def trade(
 
 def _trade_levels(console: Any, scene: Any, folder: Path, repeat: int, peers: bool, command: str) -> None:
     """The three levels of studies.levels, as a table and a sentence for each."""
+    from hybrid.cli.tables import level_table
+
     with console.study() as listener:
         table = hybrid.trade_levels(
             scene, folder, repeat=repeat, peers=peers, progress=listener, command=command
@@ -266,6 +266,8 @@ def import_(
 ) -> None:  # fmt: skip
     """Make a scene of a MoorDyn deck, or one for each cable, and say what could not be carried over."""
     with session(as_json, quiet) as console:
+        from hybrid.cli.tables import import_notes
+
         console.source = str(deck)
         made = hybrid.import_moordyn(deck, line, separate)
         files = made.write(output or Path(), overwrite)
@@ -298,6 +300,14 @@ def _ended(
 ) -> None:  # fmt: skip
     """Print the summary of a run that has ended; computed: s of it, by this command."""
     from hybrid.cli.progress_line import span, speed
+    from hybrid.cli.tables import (
+        errors_facts,
+        errors_table,
+        extremes_facts,
+        extremes_table,
+        zones_line,
+        zones_over_time,
+    )
 
     if picture:
         hybrid.plot(result, picture)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import stat
 import sys
 import time as clock
@@ -15,14 +16,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from rich.console import Console as RichConsole
-
 import hybrid
 from hybrid.cli.pipe import reader_has_gone
 from hybrid.cli.progress_line import LINE_EVERY, ProgressLine, span
 from hybrid.errors import EXPECTED, is_of_the_run, weight_of_event
 
 if TYPE_CHECKING:
+    from rich.console import Console as RichConsole
+
     from hybrid.errors import ComputationError, SceneError
     from hybrid.scene.schema import Scene
     from hybrid.simulation.progress import Progress
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
 JSON_EVERY = 1.0  # s of wall time between two progress lines for programs: a long run must not fill a log
 BAR_EVERY = 0.5  # s of wall time between two drawings of the bar of a study: below 1 % of what its runs cost
+COLOURED = {"FORCE_COLOR", "TTY_COMPATIBLE"}  # of the environment: colours in files and pipes too
 KINDS_SHOWN = 3  # kinds of events named at the end of a run; the report has them all
 
 
@@ -57,10 +59,14 @@ class Console:
 
     @cached_property
     def _out(self) -> RichConsole:
+        from rich.console import Console as RichConsole
+
         return RichConsole(highlight=False, markup=False, emoji=False, width=_width(sys.stdout))
 
     @cached_property
     def _err(self) -> RichConsole:
+        from rich.console import Console as RichConsole
+
         return RichConsole(stderr=True, highlight=False, markup=False, emoji=False, width=_width(sys.stderr))
 
     def json(self, event: str, **facts: Any) -> None:
@@ -74,7 +80,7 @@ class Console:
 
     def note(self, text: str) -> None:
         if not (self.quiet or self.as_json):
-            self._err.print(text, style="yellow", soft_wrap=not self._err.is_terminal)
+            self._tell(text, "yellow", wrap=True)
 
     def compiling(self, scene: Scene, static: bool = False) -> bool:
         """Whether kernels of a scene have to be compiled first, which takes long; if so, say it beforehand.
@@ -99,7 +105,19 @@ class Console:
     def show(self, content: Callable[[], Any]) -> None:
         """Something for people; made only if it is shown."""
         if not (self.quiet or self.as_json):
-            self._out.print(content())
+            made = content()
+            columns = min(80, shutil.get_terminal_size().columns)
+            if isinstance(made, str) and all(len(x) <= columns and x.isprintable() for x in made.splitlines()):
+                sys.stdout.write(f"{made}\n")  # rich, which takes long to import, has nothing to do
+            else:
+                self._out.print(made)
+
+    def _tell(self, text: str, style: str, wrap: bool = False) -> None:
+        """A line of the error stream; in colour, and wrapped between words, where somebody reads it."""
+        if sys.stderr.isatty() or COLOURED & set(os.environ):
+            self._err.print(text, style=style, soft_wrap=not (wrap and self._err.is_terminal))
+        else:
+            sys.stderr.write(f"{text}\n")
 
     def will_write(self, file: Path) -> Path:
         """Remember the file as it is now: only if it changes was it this command that wrote it."""
@@ -221,7 +239,7 @@ class Console:
         names = [str(file) for file in files if file is not None]
         self.json("done", file=names[0], files=names, **facts)
         if not (self.quiet or self.as_json):
-            self._out.print(f"{text} -> {_listed(names)}", soft_wrap=True)
+            sys.stdout.write(f"{text} -> {_listed(names)}\n")
 
     def interrupted(self) -> None:
         """What the file holds after Ctrl-C."""
@@ -236,7 +254,7 @@ class Console:
             elif t is not None:
                 text += f"; `hybrid resume {self.written}` goes on"
         self.json("done", file=self.written, status="interrupted", t=t, pending=pending)
-        self._err.print(f"interrupted; {text}", style="yellow", soft_wrap=True)
+        self._tell(f"interrupted; {text}", "yellow")
 
     def refused(self, error: SceneError) -> None:
         """Everything that is wrong with the scene."""
@@ -254,7 +272,7 @@ class Console:
     def error(self, kind: str, text: str, **facts: Any) -> None:
         self.json("error", kind=kind, message=text, **facts)
         for line in text.splitlines():
-            self._err.print(line, style="" if line.startswith(" ") else "bold red", soft_wrap=not self._err.is_terminal)
+            self._tell(line, "" if line.startswith(" ") else "bold red", wrap=True)
 
 
 def _width(stream: TextIO) -> int | None:

@@ -11,12 +11,10 @@ from collections.abc import Iterator
 from math import ceil, floor, log10
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.control import Control
-from rich.segment import ControlType
-from rich.text import Text
-
 if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.text import Text
+
     from hybrid.model.mesh import Zone
     from hybrid.simulation.progress import Progress
 
@@ -57,6 +55,8 @@ class ProgressLine:
     """
 
     def __init__(self, console: Console | None = None) -> None:
+        from rich.console import Console
+
         self._console = console or Console(stderr=True, highlight=False)
         self._past: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)  # wall time and t of this pass
         self._run = 0
@@ -84,11 +84,16 @@ class ProgressLine:
         if self._display is not None:
             self._show("")
         elif self._drawn:
+            from rich.control import Control
+            from rich.segment import ControlType
+
             self._console.control(Control(ControlType.CARRIAGE_RETURN, (ControlType.ERASE_IN_LINE, 2)))
         self._drawn = False
 
     def text(self, progress: Progress, width: int) -> Text:
         """The line for a screen of `width` columns: as many facts as fit, and a bar in what is left."""
+        from rich.text import Text
+
         for facts in self._choices(progress):
             room = width - sum(2 + len(fact) for fact in facts)
             if room >= BAR[0]:
@@ -129,6 +134,9 @@ class ProgressLine:
 
     def _draw(self, text: Text) -> None:
         """The new line over the old one in a single write: what does not change does not flicker."""
+        from rich.control import Control
+        from rich.segment import ControlType
+
         with self._console:
             self._console.control(Control(ControlType.CARRIAGE_RETURN))
             self._console.print(text, end="", overflow="crop", no_wrap=True)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from hybrid.cli.app import Json, LineName, Quiet, UsageError, app, numbers, opened_line, session, window, words
 from hybrid.errors import ResultError
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from hybrid.store.reader import Result
 
 HOUR = 3600.0
@@ -45,7 +47,7 @@ def stats(
 ) -> None:  # fmt: skip
     """Statistics of a result: mean, standard deviation, extremes, period, most probable maximum (MPM) and P90 in 3 h,
     fatigue damage and fatigue life; where each is largest, or at the places of --at."""
-    if not 0.0 < hours < np.inf:
+    if not 0.0 < hours < inf:
         raise UsageError(f"--hours: {hours:g} is no time; give a number above 0, such as 3")
     if curve is None and (strength is not None or section is not None):
         name = "--strength" if strength is not None else "--section"
@@ -165,7 +167,7 @@ def _fatigue_facts(result: Result, s: np.ndarray, damage: np.ndarray, times: Any
         "s": float(s[k]),
         "damage": float(damage[k]),
         "duration": duration,
-        "life": life if np.isfinite(life) and doubt is None else None,
+        "life": life if isfinite(life) and doubt is None else None,
         "life_not_verified": "" if doubt is None else doubt.text,
     }
 

@@ -21,9 +21,9 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from hybrid.view.figure import Area, Band, Box, Item, Line, Map, Marks, Page, Panel, Rule, Text, changes_sign
+from hybrid.view.save import DPI
 from hybrid.view.style import ALARM, GREY, INK, NORMAL, SMALL
 
-DPI = 150
 _DASHES: dict[str, Any] = {"": "-", "dash": (0, (4, 1.5)), "dot": ":"}
 _ENTRIES = 8  # of a legend, in a row
 _LEFT = 0.0125  # of the width of a page: where lines of text begin

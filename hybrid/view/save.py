@@ -28,6 +28,7 @@ _MARKS = {
 }
 _METADATA = {".png": "Software", ".pdf": "Creator", ".svg": "Publisher"}  # matplotlib's names of these keys
 PICTURES, PAGES = tuple(_METADATA), (".html", ".htm")
+DPI = 150
 _SEARCHED = 65536  # bytes at the head and at the foot of a file: metadata stand there
 
 
@@ -89,7 +90,14 @@ def save_figure(figure: Figure, path: str | Path | None, *, overwrite: bool = Fa
     """Save a figure as PNG, PDF or SVG, in the format of its name; None: nowhere."""
     if path is not None:
         target = check_target(path, PICTURES, overwrite=overwrite)
-        key = _METADATA[target.suffix.lower()]
-        metadata = {key: PROGRAM}
-        write_file(target, lambda new: figure.savefig(new, dpi=150, metadata=metadata))
+        write_file(target, lambda new: _save(figure, new))
     return figure
+
+
+def _save(figure: Figure, new: Path) -> None:
+    kind = new.suffix.lower()
+    metadata = {_METADATA[kind]: PROGRAM}
+    if kind == ".png" and figure.dpi == DPI and hasattr(figure.canvas, "print_png"):
+        figure.canvas.print_png(new, metadata=metadata)  # savefig draws it twice, once for the layout
+    else:
+        figure.savefig(new, dpi=DPI, metadata=metadata)
