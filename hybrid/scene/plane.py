@@ -200,11 +200,19 @@ def _witnesses(environment: Environment, ends: Ends, initial: Initial) -> Iterat
 
 def _moved(motion: Motion, here: Place) -> Iterator[Witness]:
     """Directions in which an end moves, and axes about which it turns."""
+    together: dict[tuple[float, float], list[tuple[str, float]]] = {}  # shifts of one period and phase are one way
     for name, parts in motion.harmonics().items():
-        if any(h.amplitude != 0.0 for h in parts):
-            k = (SHIFTS if name in SHIFTS else TURNS).index(name)
-            axis: Triple = (float(k == 0), float(k == 1), float(k == 2))
-            yield Witness((*here, name), "along" if name in SHIFTS else "normal", axis)
+        for h in (h for h in parts if h.amplitude != 0.0):
+            if name in SHIFTS:
+                half, phase = divmod(h.phase, 180.0)
+                together.setdefault((h.period, phase), []).append((name, h.amplitude * (1.0 - 2.0 * (half % 2.0))))
+            else:
+                k = TURNS.index(name)
+                yield Witness((*here, name), "normal", (float(k == 0), float(k == 1), float(k == 2)))
+    for ways in together.values():
+        x, y, z = (sum(amplitude for name, amplitude in ways if name == key) for key in SHIFTS)
+        if x or y or z:
+            yield Witness((*here, ways[-1][0]), "along", (x, y, z))
     if motion.velocity is not None and any(motion.velocity):
         yield Witness((*here, "velocity"), "along", motion.velocity)
     if motion.travel is not None and any(motion.travel.by):

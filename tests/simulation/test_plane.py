@@ -222,6 +222,35 @@ def test_equilibria_that_hold_in_the_plane_alone() -> None:
         hybrid.static(scene(what))
 
 
+def swinging(sway: float, phase: float, dimension: int | None = None) -> dict[str, Any]:
+    """A line in the vertical plane at 53 degrees from x, whose end surges by 0.6 m and sways."""
+    both = {"surge": {"amplitude": 0.6, "period": 4.0}, "sway": {"amplitude": sway, "period": 4.0, "phase": phase}}
+    motion = both | {"heave": {"amplitude": 0.3, "period": 5.0}, "ramp": 4.0}
+    section = {"length": 30, "mass": 2.0, "diameter": 0.03, "bending_stiffness": 20, "drag": {"normal": 1.2}}
+    return {
+        "environment": {"fluid": {"density": 1025}},
+        "cable": {"sections": [section]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {"kind": "pinned", "position": [15, 20, 0], "motion": motion},
+        },
+        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20}, "time": {"duration": 4, "step": 0.05},
+        "output": {"every": 0.5, "points": 11},
+    } | ({"dimension": dimension} if dimension else {})  # fmt: skip
+
+
+def test_surge_and_sway_in_phase_are_one_direction() -> None:
+    """As in space; in opposite phase with the sign turned; out of phase, or another way, they leave the plane."""
+    flat, space = (hybrid.run(swinging(0.8, 0.0, dimension)) for dimension in (2, 3))
+    np.testing.assert_allclose(flat.position, space.position, rtol=0, atol=1e-10)
+    assert np.ptp(flat.position[:, -1, 1]) > 0.5
+    assert entry(hybrid.validate_scene(swinging(0.8, 0.0))).on
+    hybrid.validate_scene(swinging(-0.8, 180.0, 2))
+    for sway, phase in ((0.8, 10.0), (0.7, 0.0), (0.8, 180.0)):
+        with pytest.raises(SceneError, match="dimension is 2"):
+            hybrid.validate_scene(swinging(sway, phase, 2))
+
+
 @pytest.mark.parametrize("period, grows", [(1.0, True), (0.67, False)])
 def test_a_string_whose_tension_swings_twice_as_fast_as_it_does(period: float, grows: bool) -> None:
     """Parametric resonance (Melde): no tangent matrix is ever indefinite, and yet the string leaves the plane."""
