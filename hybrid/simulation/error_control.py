@@ -224,7 +224,8 @@ class ErrorController:
             if self.estimate is None:
                 if self.comparisons is None:
                     self.comparisons = self._compute_comparisons(self.first or resolution)
-                self.compared = self.checkpoint() | {"runs": np.delete(self.runs, own), "budget": []}
+                if self.asked is not None:  # else no finer result follows, and they need not stay in memory
+                    self.compared = self.checkpoint() | {"runs": np.delete(self.runs, own), "budget": []}
                 known = self.first_estimate(result)
                 self.settle(True)  # it may be beside one of another model
                 if not known:
