@@ -80,6 +80,7 @@ class Outcome(IntEnum):
     TURNS_LOST = 12
     WINCH_AT_END = 13
     FOLDED = 14
+    COLLAPSED = 15
 
     @property
     def cause(self) -> str:
@@ -110,6 +111,8 @@ EVENTS_BY_WEIGHT = (
     "finer run not kept",
     "end force between outputs",
     "line meets itself",
+    "contact given up",
+    "steps collapse",
     "loop can form",
     "slack",
     "unstable",
@@ -195,6 +198,7 @@ _CAUSE = {
     Outcome.TURNS_LOST: "the equilibrium found is not twisted by the turns asked for",
     Outcome.WINCH_AT_END: "the winch has no more line to pay out, or none to take in",
     Outcome.FOLDED: "the only equilibrium found has a fold: a rod turns by more than 90 deg from one cell to the next",
+    Outcome.COLLAPSED: "steps have become so short that the run would not end",
     Outcome.OVERSTRETCHED: "the cable is stretched, or compressed, beyond what a section bears",
 }
 
@@ -211,6 +215,7 @@ _REMEDY = {
     Outcome.BURIED: "start from another shape (initial.points), and check stiffness and height of the seabed",
     Outcome.TURNS_LOST: "add cells, hold the cable tauter, or turn the end in time (ends.*.motion), with damping",
     Outcome.WINCH_AT_END: "another winch.tension, a longer payout.longest, more cells, or a shorter time.duration",
+    Outcome.COLLAPSED: "what cuts the steps has to go: see what the message names, and where",
     Outcome.OVERSTRETCHED: "check axial_stiffness (N), mass (kg/m), lengths (m), loads (N); max_strain is the limit",
     Outcome.FOLDED: "add cells where it bends (mesh), or begin nearer to the shape at rest (initial_guess)",
     Outcome.UNSTABLE: "start from another shape (initial.points, initial.direction), or run the motion with damping",

@@ -11,6 +11,11 @@ from hybrid.kernels.books import (
     BENT,
     CONTROLLED,
     CORRECTION,
+    CUT_AT,
+    CUT_BY_ERROR,
+    CUT_BY_GAIN,
+    CUT_BY_NEWTON,
+    CUT_BY_TURN,
     EARLIER_DT,
     FLOOR,
     IS_CUT,
@@ -22,6 +27,7 @@ from hybrid.kernels.books import (
     LEAST_PEAK,
     LEAVES_PLANE,
     LETS_GO,
+    LONGEST,
     MEASURED,
     MOVED,
     NEAR_PLANE,
@@ -49,6 +55,7 @@ from hybrid.kernels.books import (
     STIFF,
     STRETCHED,
     TAKEN,
+    TINY_STEPS,
     TRIED_DT,
     TRIES,
     TRY,
@@ -61,12 +68,13 @@ from hybrid.kernels.books import (
 )
 from hybrid.kernels.compile import inner
 from hybrid.kernels.forces import PLANAR, SEABED, SELF_FRICTION
-from hybrid.kernels.newton import CUT_SHORT, OK, SLACK
+from hybrid.kernels.newton import CUT_SHORT, OK, SLACK, TURNED_TOO_FAR
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.powers import book_work, find_powers, pull
 from hybrid.kernels.report import (
     BEND,
     LOCAL_ERROR,
+    LOCAL_ERROR_NODE,
     PUSH_ENERGY,
     RESIDUAL,
     SLACKEST,
@@ -87,6 +95,8 @@ LARGEST_TWIST = 2.0
 GROWN = 1e3
 # A push that has died to this part is given anew, so that an instability that begins late is seen as early.
 DIED = 1e-3
+# Steps that are less than TINY of the longest one, MANY after another, have collapsed: somebody has to know.
+TINY, MANY = 1e-3, 200
 
 
 @inner
@@ -108,11 +118,15 @@ def judge(clock, count, report, dt, gains):
 
     gains: whether it is to be repeated in halves because contact has put energy in, as long as it may be halved.
     """
+    count[CUT_AT] = count[WHERE]
     if gains and 0.5 * clock[TRIED_DT] >= clock[SHORTEST]:
         halve(clock, count, dt)
+        count[CUT_BY_GAIN] += 1
     elif count[OUTCOME] == OK:
         if not count[CONTROLLED] or passes(clock, count, dt, report[LOCAL_ERROR]):
             return 1
+        count[CUT_BY_ERROR] += 1
+        count[CUT_AT] = int(report[LOCAL_ERROR_NODE])
     elif 0.5 * clock[TRIED_DT] < clock[SHORTEST] or (count[OUTCOME] == SLACK and dt <= clock[WAVE_STEP]):
         # A catenary that is slack in a step that follows its waves is no matter of the step.
         return -1
@@ -120,10 +134,22 @@ def judge(clock, count, report, dt, gains):
         if count[OUTCOME] == SLACK:
             clock[SLACK_STEP], count[SLACK_CELL] = dt, count[WHERE]
         halve(clock, count, dt)
+        count[CUT_BY_TURN if count[OUTCOME] == TURNED_TOO_FAR else CUT_BY_NEWTON] += 1
     count[WASTED] += count[TRIES]
     count[REPEATS] += 1
     count[PHASE] = TRY
     return 0
+
+
+@inner
+def collapses(clock, count, dt):
+    """Whether steps have become so short, for so long, after a step of dt that is taken, that somebody has to know."""
+    clock[LONGEST] = max(clock[LONGEST], dt)
+    if not dt < TINY * clock[LONGEST]:
+        count[TINY_STEPS] = count[CUT_BY_GAIN] = count[CUT_BY_TURN] = count[CUT_BY_NEWTON] = count[CUT_BY_ERROR] = 0
+        return False
+    count[TINY_STEPS] += 1
+    return count[TINY_STEPS] % MANY == 0
 
 
 @inner

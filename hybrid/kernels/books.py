@@ -51,8 +51,9 @@ from hybrid.kernels.state import Floats
     CORRECTION,  # of the last try: next correction of Newton's method, as predicted
     RELEASE_START, RELEASE_END,  # N, force at which an end is let go; infinity: never
     NEAR_PLANE,  # m, distance from its plane below which a line in space has come back to it; 0: it never does
-) = range(43)  # fmt: skip
-CLOCK_SIZE = 43
+    LONGEST,  # of the accepted steps so far
+) = range(44)  # fmt: skip
+CLOCK_SIZE = 44
 
 # What `loaded` says of an end that carries a free point of several lines: forces on it are those of the line alone.
 CARRIED = 2
@@ -83,8 +84,11 @@ CARRIED = 2
     MOST_ITERATIONS,  # Newton iterations that a step may take in all its tries; 0: as many as converge
     TAKEN,  # iterations of all tries since `BEGIN`
     IS_CUT, CUT_SHORT,  # whether the last try was taken though it had not converged, and steps so far that were
-) = range(30)  # fmt: skip
-COUNT_SIZE = 30
+    # Since the last step that was no small part of the longest: steps; tries cut by energy that contact puts in, by what
+    # turns too far, by Newton's method, by their error; the node where the last was.
+    TINY_STEPS, CUT_BY_GAIN, CUT_BY_TURN, CUT_BY_NEWTON, CUT_BY_ERROR, CUT_AT,
+) = range(36)  # fmt: skip
+COUNT_SIZE = 36
 
 # Phases.
 START, BEGIN_STEP, TRY, SOLVE, JUDGE, SAMPLE, END_STEP = range(7)
@@ -100,6 +104,8 @@ LETS_GO = 2048
 ITERATIONS_CUT = 4096
 NEARS_PLANE = 8192
 NEARS_ITSELF = 16384
+PARTS_ITSELF, HIDES_ITSELF = 32768, 65536
+COLLAPSES = 131072
 
 # --- powers and work --------------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.accept import accept, end_step, judge, keep_imposed, note_try, watch, watch_push
+from hybrid.kernels.accept import accept, collapses, end_step, judge, keep_imposed, note_try, watch, watch_push
 from hybrid.kernels.books import (
     AFTER_START,
     ASK_BEFORE,
@@ -26,6 +26,7 @@ from hybrid.kernels.books import (
     AT_STOP,
     BEGIN_STEP,
     CLOCK_SIZE,
+    COLLAPSES,
     CONTROLLED,
     COUNT_SIZE,
     CUT_ANGLE,
@@ -33,6 +34,7 @@ from hybrid.kernels.books import (
     END_STEP,
     FAILED,
     FLAGS,
+    HIDES_ITSELF,
     IS_BENT,
     IS_CUT,
     ITERATIONS_CUT,
@@ -47,6 +49,7 @@ from hybrid.kernels.books import (
     NOW,
     OUTCOME,
     PARITY,
+    PARTS_ITSELF,
     PAUSED,
     PHASE,
     QUOTA,
@@ -82,7 +85,7 @@ from hybrid.kernels.powers import find_powers
 from hybrid.kernels.references import caller, reader
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.sampling import sample_step
-from hybrid.kernels.self_distance import MEETS, NEARS, UNBENT, is_bent
+from hybrid.kernels.self_distance import HIDES, MEETS, NEARS, PARTS, UNBENT, is_bent
 from hybrid.kernels.state import (
     Ends,
     Floats,
@@ -170,7 +173,8 @@ def watch_itself(job, state):
     if job.itself == 0:
         return 0
     found = call_itself(job.itself, job.itself_table)
-    return (MEETS_ITSELF if found & MEETS else 0) | (NEARS_ITSELF if found & NEARS else 0)
+    bits = (MEETS_ITSELF if found & MEETS else 0) | (NEARS_ITSELF if found & NEARS else 0)
+    return bits | (PARTS_ITSELF if found & PARTS else 0) | (HIDES_ITSELF if found & HIDES else 0)
 
 
 @inner
@@ -191,6 +195,8 @@ def conclude(table, job, old, new):
             count[CUT_SHORT] += 1
             if count[CUT_SHORT] == 1:
                 count[FLAGS] |= ITERATIONS_CUT
+        if collapses(clock, count, dt):
+            count[FLAGS] |= COLLAPSES
         if job.was.shape[0] > 0:
             count[FLAGS] |= watch_push(clock, work.report)
         if clock[CUT_ANGLE] > 0.0 and clock[MUTE_CUTS] == 0.0:
@@ -243,7 +249,7 @@ def between_steps(table, job, old, new):
         begin_step(clock, count)
         count[PHASE] = TRY
     if count[PHASE] == TRY:
-        if count[ROWS] == job.books.log.shape[0]:  # one step may be cut into many
+        if count[ROWS] == job.books.log.shape[0] or count[QUOTA] < 0:  # one step may be cut into many, or cost as many
             return PAUSED
         clock[TRY_END] = end_of_try(clock, job.moves)
         count[PHASE] = SOLVE

@@ -19,6 +19,7 @@ from hybrid.kernels.books import (
     COUNT_SIZE,
     NOW,
     PARITY,
+    QUOTA,
     RATES,
     RHO,
     RHO_BEFORE,
@@ -49,9 +50,11 @@ from hybrid.kernels.self_contact_pairs import (
     GRIPS,
     HORIZON,
     KEEPS,
+    LOOKS,
     OVERFLOW,
     PART,
     POINTS,
+    PRODUCTS,
     QUIET,
     REMESHED,
     RETURNS,
@@ -211,6 +214,18 @@ def prepare(line, ends, contact, old, u, now, dt):
 
 
 @inner
+def charge(line, contact, counts):
+    """Take what contact has cost in the try, in steps of the line, from those that the call may still make.
+
+    A look takes about as long as a cell of a step does, and a product a part of its solution.
+    """
+    cells = line.h.shape[0]
+    cost = contact.counts[LOOKS] + contact.counts[PRODUCTS] * max(cells // 4, 1)
+    counts[QUOTA] -= cost // cells
+    contact.counts[LOOKS], contact.counts[PRODUCTS] = cost % cells, 0
+
+
+@inner
 def press(line, contact, touch, row):
     """Force across per length, N/m, at the nodes, into a row of `touch`: of both strands, as the seabed has it."""
     n = line.h.shape[0]
@@ -313,6 +328,7 @@ def contact_task(table):
         return 1.0
     if phase != TOUCH:
         return numbers[ENERGY] + (numbers[TRIED] if rubs else 0.0)
+    charge(line, contact, job.counts)
     if contact.counts[OVERFLOW] or (contact.counts[POINTS] > 0 and not solve_contact(line, ends, contact, work)):
         return 0.0
     return 1.0

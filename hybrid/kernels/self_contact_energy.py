@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from hybrid.kernels.assembly import get9
 from hybrid.kernels.books import NOW, RATES, STORED, TRY_END
 from hybrid.kernels.cell import chord, turning
@@ -25,6 +23,7 @@ from hybrid.kernels.rotations import dot, frame, sub
 from hybrid.kernels.self_contact_pairs import (
     BALANCE,
     BEGUN,
+    CALMS,
     ENERGY,
     GAINED,
     HAD,
@@ -33,6 +32,7 @@ from hybrid.kernels.self_contact_pairs import (
     LED,
     NARROWEST,
     QUIET,
+    RETURNS,
     STALE,
     TRIED_BALANCE,
     farthest_from_mean,
@@ -95,33 +95,36 @@ def energy_without_weight(line, ends, contact, state, report):
 
 @inner
 def work_of_try(line, ends, contact, velocity, before, state, work, clock):
-    """Work, J, of a try as kernels.powers books it, with that of weight; and how much of it powers have done, either way.
+    """Work, J, of a try as kernels.powers books it, with that of weight; and by how much that may be off.
 
-    before: W, powers at its beginning.  What powers do is known to second order in the step.
+    before: W, powers at its beginning.  What a power that only rises, or falls, does in between is known but for half
+    of its change, and is missed by as much in long steps: of weight, in a heavy line, by far more than contact puts in.
     """
-    report, done, moved = work.report, work.report[SELF_FRICTION_WORK], 0.0
+    report, done, missed = work.report, work.report[SELF_FRICTION_WORK], 0.0
     half = 0.5 * (clock[TRY_END] - clock[NOW])
     find_powers(line, ends, velocity, state, report, contact.power)
     for k in range(RATES):
         done += half * (before[k] + contact.power[k])
-        moved += half * (abs(before[k]) + abs(contact.power[k]))
+        missed += half * abs(contact.power[k] - before[k])
     if line.bits & SEABED:
         done += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock[STORED] + report[FRICTION_WORK]
     for i in range(work.u.shape[0]):
         for k in range(3):
             done += line.force[i, k] * work.u[i, k]
-    return done, moved
+    return done, missed
 
 
 @inner
 def puts_energy_in(line, ends, contact, books, clock, old, new, work):
     """Whether the try has put in so much energy that it has to be repeated in halves.
 
-    A line that has not come to contact yet is not judged where powers move more in the step than it may put in: contact
-    has excited nothing, and what the work misses in a long step of a smooth motion would count.
+    A line that is not near contact, and whose vibrations from it have been damped, is not judged: contact has excited
+    nothing.
     books: velocity (2, 3) m/s of the ends, powers (2, RATES) W and reports of the state now, as kernels.books has them.
     """
     numbers = contact.numbers
+    if not (numbers[QUIET] < CALMS + RETURNS or numbers[ENERGY] > 0.0):
+        return False
     if numbers[BEGUN] != clock[NOW]:
         if numbers[LED] == clock[NOW]:
             numbers[HAD], numbers[BALANCE] = numbers[HAS], numbers[TRIED_BALANCE]
@@ -131,9 +134,9 @@ def puts_energy_in(line, ends, contact, books, clock, old, new, work):
         numbers[LARGEST] = max(numbers[LARGEST], numbers[HAD])
     numbers[HAS] = energy_without_weight(line, ends, contact, new, work.report)
     numbers[LED] = clock[TRY_END]
-    done, moved = work_of_try(line, ends, contact, books.velocity, books.power[0], new, work, clock)
-    most, touched = MOST_GAIN * numbers[LARGEST], numbers[QUIET] < math.inf or numbers[ENERGY] > 0.0
-    gain = numbers[HAS] - numbers[HAD] - done if touched or moved <= most else 0.0
+    done, missed = work_of_try(line, ends, contact, books.velocity, books.power[0], new, work, clock)
+    most, gain = MOST_GAIN * numbers[LARGEST], numbers[HAS] - numbers[HAD] - done
+    gain = max(gain - missed, 0.0) if gain > 0.0 else min(gain + missed, 0.0)
     numbers[TRIED_BALANCE] = numbers[BALANCE] + gain
     if gain <= most and (gain <= 0.0 or numbers[TRIED_BALANCE] <= most):
         return False

@@ -77,9 +77,11 @@ LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of wh
 ) = range(25)  # fmt: skip
 NUMBERS = 25
 WATCH, COLLECT = -1, -2  # beside LIMIT and TOUCH: how near the line is to itself; keep pairs for all of a step
-# Of `counts`.  STALE: the tree is of other positions; REMESHED: the grips are of other cells.
-POINTS, NODES, OVERFLOW, GRIPS, FRESH, PAIRS, STALE, REMESHED = range(8)
-COUNTS = 8
+# Of `counts`.  STALE: the tree is of other positions; REMESHED: the grips are of other cells; LOOKS: sample points, and
+# parts of pieces, that were looked at in the try; PRODUCTS: of GMRES in it.
+POINTS, NODES, OVERFLOW, GRIPS, FRESH, PAIRS, STALE, REMESHED, LOOKS, PRODUCTS = range(10)
+COUNTS = 10
+FEW = 16  # sample points of a piece that are looked at without asking which may be within reach
 
 
 class Contact(NamedTuple):
@@ -222,11 +224,46 @@ def largest_difference(move, p, q):
 
 
 @inner
+def samples_in_block(count):
+    """Sample points of a piece that are looked at together: all of few, else the root of their number."""
+    return count if count <= FEW else math.ceil(math.sqrt(count))
+
+
+@inner
+def is_beyond(r, n, p, begin, end, q, reach):
+    """Whether the part of piece p between two places on it is farther than `reach`, m, from piece q, however these lie."""
+    a, c = spline_point(r, p, spline_weights(n, p, begin)), spline_point(r, p, spline_weights(n, p, end))
+    b = spline_point(r, p, spline_weights(n, p, 0.5 * (begin + end)))
+    bend = sub(b, scale(0.5, add(a, c)))
+    first, last, bow = chord_of(r, q)
+    along, across = sub(c, a), sub(last, first)
+    x, y = nearest_feet(a, along, first, across)
+    away = sub(add(a, scale(x, along)), add(first, scale(y, across)))
+    return math.sqrt(dot(away, away)) - bow - math.sqrt(dot(bend, bend)) > reach
+
+
+@inner
+def next_sample(contact, r, n, p, q, g, reach):
+    """The sample point of piece p from g on that may be within `reach`, m, of piece q; their number: none is."""
+    count = contact.samples[p]
+    block = samples_in_block(count)
+    if block < count:
+        while g < count and g % block == 0 and is_beyond(r, n, p, g / count, min(g + block, count) / count, q, reach):
+            g += block
+    contact.counts[LOOKS] += 1
+    return min(g, count)
+
+
+@inner
 def limit_part(line, ends, contact, p, q, width, moved):
     """Shorten the part so that no sample point of piece p comes too near piece q by a difference of `moved`, m."""
     r, numbers = contact.at, contact.numbers
     n, count = line.h.shape[0], contact.samples[p]
-    for g in range(count):
+    reach, g = INNER * width + numbers[PART] * moved / SAFE, -1
+    while True:
+        g = next_sample(contact, r, n, p, q, g + 1, reach)
+        if g == count:
+            return
         x = spline_point(r, p, spline_weights(n, p, (g + 0.5) / count))
         v, side = foot(r, q, x)
         if side != 0 and 0 < q + side < n:
@@ -247,7 +284,11 @@ def gather(line, contact, p, q, width):
     a, b = end_factors(n, p)
     fast = IMPACT * numbers[SPEED] * numbers[SPEED]
     size = 0.5 * (max(contact.stiff[p], fast * contact.mass[p]) + max(contact.stiff[q], fast * contact.mass[q]))
-    for g in range(count):
+    g = -1
+    while True:
+        g = next_sample(contact, r, n, p, q, g + 1, nearest)
+        if g == count:
+            return
         u = (g + 0.5) / count
         x = spline_point(r, p, spline_weights(n, p, u))
         v, side = foot(r, q, x)

@@ -13,7 +13,7 @@ from hybrid.kernels.block_elimination import solve_again
 from hybrid.kernels.compile import inner
 from hybrid.kernels.self_contact_friction import add_held, add_held_product
 from hybrid.kernels.self_contact_law import add_gradient, add_product
-from hybrid.kernels.self_contact_pairs import FRICTION, MOST_PRODUCTS, NODES, POINTS, ROLLS
+from hybrid.kernels.self_contact_pairs import FRICTION, MOST_PRODUCTS, NODES, POINTS, PRODUCTS, ROLLS
 
 SOLVED = 1e-7  # residual of GMRES, as a part of the first
 
@@ -156,6 +156,7 @@ def find_solution(line, ends, contact, work):
             next_vector(contact, done)
             left = rotate_column(H, done)
             done += 1
+            contact.counts[PRODUCTS] += 1
     for j in range(done - 1, -1, -1):
         s = H[j, rhs]
         for k in range(j + 1, done):

@@ -29,14 +29,19 @@ TURNED = 0.4
 SAME = 1e-9  # of a diameter: a clearance that is less by this is the same
 NEIGHBOURS = 4  # cells between two cells that count, at least
 LEAF = 4  # cells in the smallest box
-BOX = 12  # numbers of a box: lowest and highest position, lowest and highest tangent
+BOX = 18  # numbers of a box: lowest and highest position, tangent, and displacement where that is asked for
 HORIZON = 10.0  # diameters; what is farther away is not looked for
 APART = 0.5  # diameters of clearance at which what has met has come apart
 DEPTH = 64  # levels of the tree, at most
 CLOSE = 1.0  # diameters of clearance below which contact begins to be computed, whatever the line does
 INSIDE = 0.15  # diameters that surfaces may be in each other for contact to begin (kernels.self_contact_law)
-CLOSING = 3.0  # steps like the last one, in which it is foreseen that the line comes so near
-MEETS, NEARS = 1, 2  # bits of what `watch_itself` returns
+CLOSING = 3.0  # steps like the last one, in which it is foreseen that two cells come so near
+WIDER = 2.0  # by how much farther they have to be apart for contact to end again, and
+ENDS = 30  # for so many steps: vibrations that contact leaves are damped for as many (kernels.self_contact_pairs)
+# Cosine of the largest angle, 1 rad, between cells of a bend that has a shape: beyond, its cells cannot tell how near
+# the parts beside it are, within so many cells of it.
+SHARPEST, BESIDE = 0.5403, 8
+MEETS, NEARS, PARTS, HIDES = 1, 2, 4, 8  # bits of what `watch_itself` returns
 UNBENT = 1  # in place of the address of `watch_itself`, while the line is not bent so far
 
 (
@@ -46,11 +51,15 @@ UNBENT = 1  # in place of the address of `watch_itself`, while the line is not b
     TOLD,  # 1 where it has been told that surfaces meet, until they have come apart
     MEETING,  # diameters of clearance below which surfaces meet
     LEAST, LEAST_DISTANCE, LEAST_S, LEAST_OTHER, LEAST_TIME,  # the same of the least clearance so far, and when, s
-) = range(11)  # fmt: skip
-FOUND = 11
-# Of `ahead`: by how much the line may come nearer to itself in the next steps, at least, < 0: nobody asks; clearance
-# below which it is near, m.
-AHEAD, WITHIN = 0, 1
+    WAITS,  # 1 where contact has been given up, until surfaces have come apart
+    AWAY,  # steps since two parts were near each other
+    HIDDEN,  # steps since a bend has hidden whether they are
+) = range(14)  # fmt: skip
+FOUND, OF_0_6 = 14, 11  # the latter of checkpoints of 0.6
+# Of `ahead`: what is asked, -1: nothing, 1: whether contact has to begin, WIDER: whether it may end; s, from the state
+# on, in which cells move at its velocities, 0: those of the step count; whether parts are near each other; whether a
+# bend hides that; the node of that bend, -1: none was found, and the cells beside it.
+ASKED, SECONDS, IS_NEAR, IS_HIDDEN, SHARP, HIDDEN_I, HIDDEN_J = range(7)
 
 
 class Itself(NamedTuple):
@@ -61,7 +70,7 @@ class Itself(NamedTuple):
     stack: NDArray[np.int64]  # (DEPTH 4, 2) pairs of boxes that are still to be looked at
     found: Floats  # (FOUND,)
     cells: NDArray[np.int64]  # (2,) the pair that was nearest
-    ahead: Floats  # (2,)
+    ahead: Floats  # (7,)
 
 
 def boxes_of(cells: int) -> int:
@@ -76,8 +85,9 @@ def blank_itself(width: Floats) -> Itself:
     """For a line of cells of these diameters (N,) m."""
     found = np.zeros(FOUND)
     found[[CLEARANCE, DISTANCE, LEAST]] = np.inf
+    found[HIDDEN] = ENDS
     stack = np.zeros((4 * DEPTH, 2), np.int64)
-    ahead = np.array([-1.0, 0.0])
+    ahead = np.array([-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0])
     return Itself(width, np.zeros((boxes_of(width.size), BOX)), stack, found, np.full(2, -1, np.int64), ahead)
 
 
@@ -146,6 +156,43 @@ def fill_tree(tree, before, r, e):
     for q in range(leaves):
         fill_leaf(tree, leaves + q, q, before, r, e)
     fill_parents(tree)
+
+
+@inner
+def travel(before, state, seconds, i):
+    """How far node i moves, m: in the step from the positions `before`, and within a time, s, from then on."""
+    d = sub(get3(state.r, i), get3(before, i))
+    return add(d, scale(seconds, get3(state.v, i)))
+
+
+@inner
+def fill_travels(tree, before, state, seconds):
+    """Lowest and highest displacements of the nodes of all boxes."""
+    leaves, n = tree.shape[0] // 2, state.e.shape[0]
+    for q in range(leaves):
+        leaf, first, last = leaves + q, q * LEAF, min((q + 1) * LEAF, n)
+        for k in range(3):
+            tree[leaf, 12 + k], tree[leaf, 15 + k] = math.inf, -math.inf
+        if first < last:
+            for i in range(first, last + 1):
+                d = travel(before, state, seconds, i)
+                for k in range(3):
+                    tree[leaf, 12 + k] = min(tree[leaf, 12 + k], d[k])
+                    tree[leaf, 15 + k] = max(tree[leaf, 15 + k], d[k])
+    for k in range(leaves - 1, 0, -1):
+        for j in range(3):
+            tree[k, 12 + j] = min(tree[2 * k, 12 + j], tree[2 * k + 1, 12 + j])
+            tree[k, 15 + j] = max(tree[2 * k, 15 + j], tree[2 * k + 1, 15 + j])
+
+
+@inner
+def largest_approach(tree, a, b):
+    """By how much a node of box a and one of box b come nearer to each other at most, m."""
+    square = 0.0
+    for k in range(3):
+        x = max(tree[a, 15 + k] - tree[b, 12 + k], tree[b, 15 + k] - tree[a, 12 + k])
+        square += x * x
+    return math.sqrt(square)
 
 
 @inner
@@ -219,8 +266,51 @@ def least_on_the_way(w, v):
 
 
 @inner
-def compare_cells(line, ends, before, r, itself, i, j):
-    """Keep the pair of cells i < j if they were nearer in the step than all before, and are no neighbours."""
+def has_shape(state, ahead, i, j):
+    """Whether cells i and j are not beside a bend that has no shape, between them; else SHARP is where that is."""
+    e = state.e
+    for k in range(max(i + 1, j - BESIDE), min(j, i + BESIDE) + 1):
+        if is_sharp(e, k):
+            ahead[SHARP] = k
+            return False
+    return True
+
+
+@inner
+def is_sharp(e, k):
+    """Whether the cells beside node k turn by more than SHARPEST."""
+    a, b = get3(e, k - 1), get3(e, k)
+    along = dot(a, b)
+    return not (along > 0.0 and along * along >= SHARPEST * SHARPEST * dot(a, a) * dot(b, b))
+
+
+@inner
+def note_near(before, state, itself, i, j, clearance):
+    """Whether two cells are so near each other, or come so near, that contact between them counts."""
+    ahead, width = itself.ahead, 0.5 * (itself.width[i] + itself.width[j])
+    square = 0.0
+    for p in range(i, i + 2):
+        for q in range(j, j + 2):
+            d = sub(travel(before, state, ahead[SECONDS], p), travel(before, state, ahead[SECONDS], q))
+            square = max(square, dot(d, d))
+    if not clearance < ahead[ASKED] * (CLOSE * width + CLOSING * math.sqrt(square)):
+        return
+    if ahead[ASKED] == WIDER:
+        ahead[IS_NEAR] = 1.0
+    elif not has_shape(state, ahead, i, j):
+        if ahead[IS_HIDDEN] == 0.0:
+            ahead[IS_HIDDEN], ahead[HIDDEN_I], ahead[HIDDEN_J] = 1.0, i, j
+    elif clearance > -2.0 * INSIDE * width:
+        ahead[IS_NEAR] = 1.0
+
+
+@inner
+def compare_cells(line, ends, before, state, itself, i, j):
+    """Keep the pair of cells i < j if they were nearer in the step than all before, and are no neighbours; and whether
+
+    any are near.
+    """
+    r = state.r
     p, q = get3(r, i), get3(r, j)
     x, y = nearest_feet(p, sub(get3(r, i + 1), p), q, sub(get3(r, j + 1), q))
     now = sub(add(scale(1.0 - x, p), scale(x, get3(r, i + 1))), add(scale(1.0 - y, q), scale(y, get3(r, j + 1))))
@@ -230,69 +320,62 @@ def compare_cells(line, ends, before, r, itself, i, j):
     )
     distance = least_on_the_way(now, was)
     clearance = distance - 0.5 * (itself.width[i] + itself.width[j])
-    found, n = itself.found, line.h.shape[0]
+    found, n, asked = itself.found, line.h.shape[0], itself.ahead[ASKED] > 0.0 and itself.ahead[IS_NEAR] == 0.0
+    if not (asked or clearance < found[CLEARANCE]):
+        return
+    s, other = line.s[i] + x * line.h[i], line.s[j] + y * line.h[j]
+    between = other - s
+    if ends.held[0] != 0 and ends.held[1] != 0:  # from one held end to the other is a way as well
+        gap = sub(get3(r, n), get3(r, 0))
+        between = min(between, s - line.s[0] + line.s[n] - other + math.sqrt(dot(gap, gap)))
+    if not distance < TURNED * between:
+        return
+    if asked:
+        note_near(before, state, itself, i, j, clearance)
     if clearance < found[CLEARANCE]:
-        s, other = line.s[i] + x * line.h[i], line.s[j] + y * line.h[j]
-        between = other - s
-        if ends.held[0] != 0 and ends.held[1] != 0:  # from one held end to the other is a way as well
-            gap = sub(get3(r, n), get3(r, 0))
-            between = min(between, s - line.s[0] + line.s[n] - other + math.sqrt(dot(gap, gap)))
-        if distance < TURNED * between:
-            found[CLEARANCE], found[DISTANCE], found[S], found[OTHER_S] = clearance, distance, s, other
-            itself.cells[0], itself.cells[1] = i, j
+        found[CLEARANCE], found[DISTANCE], found[S], found[OTHER_S] = clearance, distance, s, other
+        itself.cells[0], itself.cells[1] = i, j
 
 
 @inner
-def compare_leaves(line, ends, before, r, itself, a, b):
+def compare_leaves(line, ends, before, state, itself, a, b):
     """All pairs of cells of two leaves, a before b or the same."""
     n = line.h.shape[0]
     for i in range(a * LEAF, min((a + 1) * LEAF, n)):
         for j in range(max(b * LEAF, i + NEIGHBOURS + 1), min((b + 1) * LEAF, n)):
-            compare_cells(line, ends, before, r, itself, i, j)
-
-
-@inner
-def largest_approach(before, r):
-    """By how much two nodes may have come nearer to each other on the way, m."""
-    n = r.shape[0]
-    m0, m1, m2 = 0.0, 0.0, 0.0
-    for i in range(n):
-        d = sub(get3(r, i), get3(before, i))
-        m0, m1, m2 = m0 + d[0], m1 + d[1], m2 + d[2]
-    mean, square = (m0 / n, m1 / n, m2 / n), 0.0
-    for i in range(n):
-        d = sub(sub(get3(r, i), get3(before, i)), mean)
-        square = max(square, dot(d, d))
-    return 2.0 * math.sqrt(square)
+            compare_cells(line, ends, before, state, itself, i, j)
 
 
 @inner
 def search(line, ends, before, state, itself):
-    """The least clearance of the step from the positions `before` to a state, into itself.found."""
-    tree, stack, found, width = itself.tree, itself.stack, itself.found, itself.width
-    r, leaves, widest = state.r, tree.shape[0] // 2, 0.0
+    """The least clearance of the step from the positions `before` to a state, into itself.found, and what is asked."""
+    tree, stack, found, width, ahead = itself.tree, itself.stack, itself.found, itself.width, itself.ahead
+    leaves, widest = tree.shape[0] // 2, 0.0
     found[CLEARANCE], found[DISTANCE] = math.inf, math.inf
+    ahead[IS_NEAR], ahead[IS_HIDDEN] = 0.0, 0.0
     if not is_bent(state):
         return
     for i in range(width.shape[0]):
         widest = max(widest, width[i])
-    ahead = itself.ahead
-    if ahead[AHEAD] >= 0.0:
-        ahead[WITHIN] = CLOSE * widest + max(ahead[AHEAD], CLOSING * largest_approach(before, r))
-    found[CLEARANCE] = max(HORIZON * widest, ahead[WITHIN])
-    fill_tree(tree, before, r, state.e)
-    if itself.cells[0] >= 0:  # what was nearest is likely to be so again
-        compare_cells(line, ends, before, r, itself, itself.cells[0], itself.cells[1])
+    found[CLEARANCE] = HORIZON * widest
+    fill_tree(tree, before, state.r, state.e)
+    if ahead[ASKED] > 0.0:
+        fill_travels(tree, before, state, ahead[SECONDS])
+    if itself.cells[0] >= 0 and itself.cells[1] < width.shape[0]:  # what was nearest is likely to be so again
+        compare_cells(line, ends, before, state, itself, itself.cells[0], itself.cells[1])
     stack[0, 0], stack[0, 1], top = 1, 1, 1
     while top > 0:
         top -= 1
         a, b = stack[top, 0], stack[top, 1]
         if b - a <= 1 and runs_on(tree, a, b, TURNED):
             continue
-        if not box_distance(tree, a, b) - widest < found[CLEARANCE]:
+        within = found[CLEARANCE]
+        if ahead[ASKED] > 0.0 and ahead[IS_NEAR] == 0.0:
+            within = max(within, ahead[ASKED] * (CLOSE * widest + CLOSING * largest_approach(tree, a, b)))
+        if not box_distance(tree, a, b) - widest < within:
             continue
         if a >= leaves:
-            compare_leaves(line, ends, before, r, itself, a - leaves, b - leaves)
+            compare_leaves(line, ends, before, state, itself, a - leaves, b - leaves)
             continue
         c, d = 2 * a, 2 * b
         if a == b:
@@ -328,11 +411,33 @@ def note_found(found, t):
     return meets
 
 
+@inner
+def note_asked(found, ahead):
+    """Bits of what is asked: whether contact has to begin, may end, and whether a bend hides that, which is told once
+
+    until it has not for ENDS steps.
+    """
+    hidden, told = ahead[IS_HIDDEN] > 0.0 and ahead[IS_NEAR] == 0.0, found[HIDDEN] < ENDS
+    found[HIDDEN] = 0.0 if hidden else min(found[HIDDEN] + 1.0, ENDS)
+    found[AWAY] = 0.0 if ahead[IS_NEAR] > 0.0 else found[AWAY] + 1.0
+    if ahead[ASKED] == WIDER:
+        return PARTS if found[AWAY] >= ENDS else 0
+    if found[WAITS] > 0.0 and not found[CLEARANCE] < APART * (found[DISTANCE] - found[CLEARANCE]):
+        found[WAITS] = 0.0
+    if (
+        ahead[IS_NEAR] > 0.0
+        and found[WAITS] == 0.0
+        and found[CLEARANCE] > -INSIDE * (found[DISTANCE] - found[CLEARANCE])
+    ):
+        return NEARS
+    return HIDES if hidden and not told else 0
+
+
 @kernel
 def watch_itself(table):
-    """Look how near the line comes to itself in the step that led to its state; MEETS: surfaces have met; NEARS: they
+    """Look how near the line comes to itself in the step that led to its state; MEETS: surfaces have met; where that is
 
-    may do so soon, where that is asked.
+    asked, NEARS: contact has to begin; PARTS: it may end; HIDES: a bend without a shape hides which.
 
     The states of the job have changed places after the step, as in kernels.run.
     """
@@ -342,6 +447,5 @@ def watch_itself(table):
         state, before = before, state
     search(job.line, job.ends, before.r, state, job.itself)
     found, ahead = job.itself.found, job.itself.ahead
-    near = ahead[AHEAD] >= 0.0 and found[DISTANCE] < math.inf and found[CLEARANCE] < ahead[WITHIN]
-    near &= found[CLEARANCE] > -INSIDE * (found[DISTANCE] - found[CLEARANCE])
-    return (MEETS if note_found(found, job.clock[NOW]) else 0) | (NEARS if near else 0)
+    asked = note_asked(found, ahead) if ahead[ASKED] > 0.0 else 0
+    return (MEETS if note_found(found, job.clock[NOW]) else 0) | asked

@@ -112,6 +112,11 @@ def system_without_contact(system: System) -> System:
     return system.model_copy(update={"lines": lines})
 
 
+def touching_no_more(line: Line) -> Line:
+    """The line, of which contact with itself is computed no longer."""
+    return line._replace(bits=line.bits & ~(SELF_CONTACT | SELF_FRICTION))
+
+
 def touching(line: Line, friction: float) -> Line:
     """The line, of which contact with itself is computed from now on."""
     return line._replace(bits=line.bits | SELF_CONTACT | (SELF_FRICTION if friction else 0))

@@ -19,7 +19,7 @@ from hybrid.kernels.books import Books
 from hybrid.kernels.carried_extremes import pass_on
 from hybrid.kernels.extremes import fold_extremes
 from hybrid.kernels.forces import MAY_TOUCH, PLANAR, SEABED, SELF_CONTACT
-from hybrid.kernels.self_distance import blank_itself
+from hybrid.kernels.self_distance import OF_0_6, blank_itself
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
@@ -204,6 +204,9 @@ class Envelope:
         mine["itself"] = blank_itself(np.ones(1)).found  # infinite as long as the line was never near itself
         older = {"itself": self.itself.itself.found}  # files of before have none
         saved = dict(saved)
+        known = saved.get("itself")
+        if isinstance(known, np.ndarray) and known.shape == (OF_0_6,):  # nor when contact may end
+            saved["itself"] = np.append(known, mine["itself"][OF_0_6:])
         for name in ("bounds", "now"):  # nor wall tension and stress
             saved[name] = with_pipes(saved.get(name))
         self.quantities.restore(saved.get("quantities"))

@@ -35,6 +35,8 @@ def explanation(run: Transient, tried: Tried, dt: float) -> str:
         detail = (
             f"{np.ptp(run.model.line.s):.6g} m are out, of {least:.6g} m at least and {most:.6g} m (longest) at most"
         )
+    elif tried.outcome == Outcome.COLLAPSED:
+        detail = run.collapse
     elif tried.outcome == Outcome.GAINS_ENERGY:
         detail = "the fastest point is at this place"
     elif tried.outcome == Outcome.TWISTED_TOO_FAR:
@@ -45,6 +47,13 @@ def explanation(run: Transient, tried: Tried, dt: float) -> str:
         detail = "no accelerations are consistent with the shape and the loads"
     else:
         detail = f"smallest step tried {dt:.3g} s; {tried.iterations} Newton iterations in the last try"
+    contact = run.run.contact
+    if contact is not None and contact.touches and tried.outcome != Outcome.COLLAPSED:
+        p, q = (float(model.line.s[k]) for k in contact.deepest)
+        detail += (
+            f"; contact of the line with itself is computed, s = {min(p, q):.6g} m and s = {max(p, q):.6g} m touch: "
+            f"shorter cells there may help, and contact: {{self: false}} leaves it out"
+        )
     if _used_up(run):
         detail += f"; the {int(run.run.count[b.MOST_ITERATIONS])} iterations that a step may take are used up"
     ends = model.ends.at(run.t + dt)

@@ -15,10 +15,15 @@ from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT
 from hybrid.kernels.self_contact_law import INNER, OUTER
 from hybrid.kernels.self_contact_pairs import WINDOW
 from hybrid.kernels.self_distance import (
-    AHEAD,
+    ASKED,
+    AWAY,
     CLEARANCE,
-    CLOSING,
     DISTANCE,
+    ENDS,
+    HIDDEN,
+    HIDDEN_I,
+    HIDDEN_J,
+    HIDES,
     LEAST,
     LEAST_DISTANCE,
     LEAST_OTHER,
@@ -29,9 +34,14 @@ from hybrid.kernels.self_distance import (
     NEARS,
     NEIGHBOURS,
     OTHER_S,
+    PARTS,
+    SECONDS,
+    SHARP,
     TOLD,
     TURNED,
     UNBENT,
+    WAITS,
+    WIDER,
     S,
     blank_itself,
     blank_itself_job,
@@ -87,6 +97,26 @@ def meeting_text(
     )
 
 
+GIVEN_UP = "contact there let no step lead on, and begins again where parts are apart"
+HIDDEN_BY_BEND = "a bend between them is sharper than its cells show, and contact is not judged there"
+
+
+def hidden_text(model: Model, state: State, i: int, j: int, node: int) -> str:
+    """Text of the event of a bend at a node that hides how near cells i and j, beside it, are."""
+    s, e = model.line.s, state.e
+    turn = math.atan2(float(np.linalg.norm(np.cross(e[node - 1], e[node]))), float(e[node - 1] @ e[node]))
+    cells = min(float(model.line.h[node - 1]), float(model.line.h[node])) / turn
+    cable = model.cable
+    natural = float(cable.bending_length(1e-9 * model.tension_scale / model.length)[cable.piece(s[node : node + 1])][0])
+    if natural > 0.0:
+        cells = min(cells, natural)
+    return (
+        f"the line turns by {math.degrees(turn):.0f} deg from one cell to the next at s = {s[node]:.6g} m: how near "
+        f"s = {s[i]:.6g} m and s = {s[j + 1]:.6g} m beside it are is not known, and contact of the line with itself is "
+        f"not judged there; cells of at most {cells:.2g} m there (mesh) would show it"
+    )
+
+
 def touching_text(s: float, other: float, distance: float, width: float) -> str:
     """Text of the event of a line that touches itself, with contact; as `meeting_text`."""
     return (
@@ -139,7 +169,8 @@ class SelfWatch:
         self._touches = bool(model.line.bits & SELF_CONTACT)
         self.itself.found[MEETING] = OUTER - 1.0 if self._touches else 0.0
         self.asks = bool(model.line.bits & MAY_TOUCH) and not self._touches
-        self.itself.ahead[AHEAD] = 0.0 if self.asks else -1.0
+        ends = self._touches and bool(model.line.bits & MAY_TOUCH)
+        self.itself.ahead[ASKED] = 1.0 if self.asks else WIDER if ends else -1.0
 
     @property
     def table(self) -> Table:
@@ -164,11 +195,24 @@ class SelfWatch:
 
     def foresees(self, state: State, step: float, look: Callable[[], int]) -> bool:
         """Whether a look at a state, from which steps (s) are to be made, finds that the line will be near itself."""
-        v = state.v
-        self.itself.ahead[AHEAD] = 2.0 * CLOSING * step * float(np.linalg.norm(v - v.mean(axis=0), axis=1).max())
+        self.itself.ahead[SECONDS] = step
         found = look()
-        self.itself.ahead[AHEAD], self.itself.found[TOLD] = 0.0, 0.0
+        self.itself.ahead[SECONDS], self.itself.found[TOLD], self.itself.found[HIDDEN] = 0.0, 0.0, ENDS
         return bool(found & NEARS)
+
+    def begins(self) -> None:
+        """Contact is computed from now on."""
+        self.itself.found[AWAY] = 0.0
+
+    def waits(self) -> None:
+        """Contact is not computed again before parts have come apart; where they meet until then, that is told."""
+        self.itself.found[WAITS], self.itself.found[TOLD] = 1.0, 0.0
+
+    def tell_hidden(self, t: float, model: Model, state: State, event: Callable[..., None]) -> None:
+        """An event for a bend that hides how near parts are."""
+        i, j, node = (int(self.itself.ahead[k]) for k in (HIDDEN_I, HIDDEN_J, SHARP))
+        s = float(model.line.s[node])
+        event(t, s, s, "unresolved bend", hidden_text(model, state, i, j, node))
 
     def tell_again(self, t: float, dt: float, event: Callable[..., None]) -> None:
         """The event of a line that meets itself, where contact could not begin, unless it has been told."""
@@ -191,7 +235,12 @@ class SelfWatch:
             text = touching_text(s, other, distance, width)
             event(t, s, other, "line touches itself", text, value=distance, threshold=width)
         else:
-            text = meeting_text(s, other, distance, width, dt, self.why, self.remedy)
+            why, remedy = self.why, self.remedy
+            if self.asks and found[WAITS] > 0.0:
+                why, remedy = GIVEN_UP, "shorter cells"
+            elif self.asks and found[HIDDEN] == 0.0:
+                why, remedy = HIDDEN_BY_BEND, "shorter cells"
+            text = meeting_text(s, other, distance, width, dt, why, remedy)
             event(t, s, other, "line meets itself", text, value=distance, threshold=width)
 
     def tell_unkept(self, model: Model, event: Callable[..., None]) -> None:
@@ -247,23 +296,26 @@ class LineWatch:
         )  # fmt: skip
         return job
 
-    def look(self, t: float, dt: float, state: State, before: Floats, event: Callable[..., None]) -> bool:
-        """An event if surfaces have met in the step of dt (s) to t (s), from positions (N+1, 3) m to a state; whether
+    def look(self, t: float, dt: float, state: State, before: Floats, event: Callable[..., None]) -> int:
+        """An event if surfaces have met in the step of dt (s) to t (s), from positions (N+1, 3) m to a state, or a bend
 
-        the line is so near itself, in place of an event, that its contact has to begin.
+        hides it; NEARS where the line is so near itself, in place of an event, that its contact has to begin, PARTS
+        where it may end.
         """
         if not self._watch.on:
-            return False
+            return 0
         told = self._watch.itself.found
-        if not is_bent(state):
+        if not is_bent(state) and self._watch.itself.ahead[ASKED] != WIDER:
             told[TOLD] = 0.0
-            return False
+            return 0
         found = self._look(t, state, before)
+        if found & HIDES:
+            self._watch.tell_hidden(t, self._model, state, event)
         if found & NEARS:
             told[TOLD] = 0.0 if found & MEETS else told[TOLD]
         elif found & MEETS:
             self._watch.tell(t, dt, event)
-        return bool(found & NEARS)
+        return found & (NEARS | PARTS)
 
     def is_near(self, t: float, state: State, step: float) -> bool:
         """As `SelfWatch.is_near`, of a state at t (s)."""
@@ -276,7 +328,7 @@ class LineWatch:
         """MEETS and NEARS of kernels.self_distance."""
         if self._job is None:
             self._job = self._bind()
-        self._now.r[:], self._now.e[:], self._before.r[:] = state.r, state.e, before
+        self._now.r[:], self._now.e[:], self._now.v[:], self._before.r[:] = state.r, state.e, state.v, before
         self._clock[NOW] = t
         return int(watch_itself(self._job.numbers))
 

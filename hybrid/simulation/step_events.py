@@ -5,15 +5,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from hybrid.kernels import books as b
-from hybrid.kernels.self_distance import MEETS, NEARS, TOLD
+from hybrid.kernels.accept import MANY
+from hybrid.kernels.self_distance import HIDES, MEETS, NEARS, PARTS, TOLD
 from hybrid.model.resolution import ZONES, wants_errors
 from hybrid.simulation.bounded_model_errors import doubt_text
+from hybrid.simulation.collapse import COLLAPSE, ERROR, GAIN, GIVE_UP, NEWTON, TURN, collapse_text
 from hybrid.simulation.contact_start import comes_near
 from hybrid.simulation.events import energy_gains_text, slack_steps_text, steps_cut_text
 from hybrid.simulation.run_sample import NOT_ESTIMATED
 
 if TYPE_CHECKING:
     from hybrid.simulation.transient import Transient
+
+# What cuts steps, and where the tries are counted.
+CUTS = {GAIN: b.CUT_BY_GAIN, TURN: b.CUT_BY_TURN, NEWTON: b.CUT_BY_NEWTON, ERROR: b.CUT_BY_ERROR}
+# What a look at the line finds (kernels.self_distance), as flags of a step.
+ITSELF = {MEETS: b.MEETS_ITSELF, NEARS: b.NEARS_ITSELF, PARTS: b.PARTS_ITSELF, HIDES: b.HIDES_ITSELF}
 
 
 def note_cut(moving: Transient) -> None:
@@ -90,11 +97,29 @@ def look_at_itself(moving: Transient, flags: int) -> None:
     """
     watch = moving.itself
     assert watch is not None
-    found = (MEETS if flags & b.MEETS_ITSELF else 0) | (NEARS if flags & b.NEARS_ITSELF else 0)
-    found = found or watch.look(moving.run)
+    found = sum(bit for bit, flag in ITSELF.items() if flags & flag) or watch.look(moving.run)
+    moving.parts_itself = bool(found & PARTS)
+    if found & HIDES and moving.envelope is not None:
+        watch.tell_hidden(moving.t, moving.model, moving.state, moving.events.event)
+    elif found & HIDES and not moving.touches:
+        comes_near(moving)
     if found & NEARS:
         moving.nears_itself = comes_near(moving)  # contact begins after the outputs of this step
         if found & MEETS:
             watch.itself.found[TOLD] = 0.0
     elif found & MEETS and moving.envelope is not None:
         watch.tell(moving.t, float(moving.run.clock[b.LAST_DT]), moving.events.event)
+
+
+def note_collapse(moving: Transient) -> bool:
+    """Steps have become so short that the run may not end: an event; whether a run to compare with has to stop."""
+    clock, count = moving.run.clock, moving.run.count
+    steps, dt, node = int(count[b.TINY_STEPS]), float(clock[b.LAST_DT]), int(count[b.CUT_AT])
+    s = float(moving.model.line.s[min(max(node, 0), moving.model.line.s.size - 1)])
+    cuts = {cause: int(count[k]) for cause, k in CUTS.items()}
+    contact = moving.run.contact
+    text = collapse_text(steps, dt, float(clock[b.LONGEST]), cuts, s, contact is not None and contact.touches)
+    if steps == MANY:
+        moving.events.event(moving.t, s, s, COLLAPSE, text, value=dt)
+    moving.collapse = text
+    return moving.envelope is None and steps >= GIVE_UP

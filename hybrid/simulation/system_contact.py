@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from hybrid.errors import Complaint, Outcome, SceneError
 from hybrid.kernels.books import ZONES
-from hybrid.kernels.forces import SELF_CONTACT
+from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT
 from hybrid.kernels.report import SELF_CONTACT_ENERGY
-from hybrid.model.self_reach import touching
+from hybrid.model.self_reach import touching, touching_no_more
 from hybrid.model.system import SystemModel
 from hybrid.simulation.contact_equilibrium import contact_of
+from hybrid.simulation.contact_start import GIVEN_UP, given_up
 from hybrid.simulation.self_watch import deepest_text
 from hybrid.solve.contact_statics import contact_energy
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
@@ -62,31 +64,66 @@ def begin_contact(run: SystemRun) -> None:
         x, line.nears_itself = run.solver.lines[line.number], False
         model = run.model.models[line.number]
         energy = contact_energy(x.line, x.sea, x.ends, run.state.lines[line.number], contact_of(model))
+        watch = line.envelope.itself
         if math.isfinite(energy):
             begun.append(line.number)
-        elif run.steps:  # what is so at the start is told with the equilibrium
+            watch.begins()
+            continue
+        watch.waits()
+        if run.steps:  # what is so at the start is told with the equilibrium
             line.meets_itself(run.t, run.last_step)
-    if not begun:
-        return
-    let_touch(run, begun)
+    if begun:
+        let_touch(run, begun)
+        _go_on(run, begun, "where contact of the line with itself begins")
+
+
+def end_contact(run: SystemRun, numbers: Sequence[int]) -> None:
+    """Contact is computed no longer of lines of these numbers, until they come near themselves again."""
+    let_touch(run, numbers, touch=False)
+    _go_on(run, numbers, "where contact of the line with itself ends")
+
+
+def _go_on(run: SystemRun, numbers: Sequence[int], after: str) -> None:
+    """Another solver, for lines of these numbers that touch themselves now, or no longer.
+
+    The energy of contact that comes or goes so is booked.
+    """
+    moving = () if run.zones is None else run.zones.numbers
+    others = [k for k in numbers if k not in moving]
+    before = [float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) for k in others]
     if run.zones is not None:
         run.zones.go_on()
     else:
-        renew_solver(run, "where contact of the line with itself begins")
-    moving = () if run.zones is None else run.zones.numbers
-    for k in (k for k in begun if k not in moving):
-        run.lines[k].books.work[0, ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY])
+        renew_solver(run, after)
+    for k, energy in zip(others, before, strict=True):
+        run.lines[k].books.work[0, ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
 
 
-def let_touch(run: SystemRun, numbers: Iterable[int]) -> None:
-    """Give a run models of lines that touch themselves; its solver has still to follow."""
+def gives_up_contact(run: SystemRun, dt: float) -> bool:
+    """No step of dt (s) leads on: as simulation.contact_start.gives_up_contact, of all lines that touch themselves."""
+    numbers = []
+    for line in run.lines:
+        contact = line.contact
+        if contact is None or not (contact.touches and line.model.line.bits & MAY_TOUCH):
+            continue
+        s, other, text = given_up(contact, line.model, dt)
+        line.events.event(run.t, s, other, GIVEN_UP, text)
+        line.envelope.itself.waits()
+        numbers.append(line.number)
+    if numbers:
+        end_contact(run, numbers)
+    return bool(numbers)
+
+
+def let_touch(run: SystemRun, numbers: Iterable[int], touch: bool = True) -> None:
+    """Give a run models of lines that touch themselves, or no longer; its solver has still to follow."""
     models = [*run.model.models]
     for k in numbers:
-        friction = run.lines[k].scene.contact.friction
-        models[k] = replace(models[k], line=touching(models[k].line, friction))
+        change = partial(touching, friction=run.lines[k].scene.contact.friction) if touch else touching_no_more
+        models[k] = replace(models[k], line=change(models[k].line))
         run.lines[k].follow(models[k])
         if run.zones is not None:
-            run.zones.let_touch(k, friction)
+            run.zones.change_line(k, change)
     run.model = replace(run.model, models=tuple(models))
 
 

@@ -16,6 +16,7 @@ from hybrid.kernels.forces import FRICTION, MAY_TOUCH, SELF_CONTACT, SELF_FRICTI
 from hybrid.kernels.link import holds_twist
 from hybrid.kernels.report import FORCE_A, LOCAL_ERROR
 from hybrid.kernels.run import blank_books
+from hybrid.kernels.self_distance import NEARS, PARTS
 from hybrid.kernels.state import Batch, Ends, Floats, State, Work, batch_of_one
 from hybrid.kernels.zone_criteria import twist_of_rods
 from hybrid.model.build import Model
@@ -91,7 +92,7 @@ class LineResult:
         self.envelope = Envelope(scene, model, self._moves)
         self.envelope.itself.on &= target is not None or bool(model.line.bits & MAY_TOUCH)
         self._itself = LineWatch(self.envelope.itself, model)
-        self.nears_itself = False  # whether contact with itself has to begin
+        self.nears_itself = self.parts_itself = False  # whether contact with itself has to begin, or to end
         self.target = MemoryTarget() if isinstance(target, MemoryTarget) else None  # else it will be a part of a file
         self.recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder
         self.recorder = ComparisonRecorder(FORCE_COLUMNS)
@@ -187,7 +188,7 @@ class LineResult:
             where = f"{text}: begin nearer to rest (initial_guess, initial_rotation), unless it is meant"
             self.events.event(0.0, 0.0, self.model.length, "several equilibria", where)
         self.judge(t, sharpest(x.line, x.ends, state), state)
-        if self._itself.look(t or 0.0, 0.0, state, state.r, self.events.event):
+        if self._itself.look(t or 0.0, 0.0, state, state.r, self.events.event) & NEARS:
             self.meets_itself(t or 0.0, 0.0)
 
     def is_near_itself(self, t: float, state: State, step: float) -> bool:
@@ -228,7 +229,8 @@ class LineResult:
         self, t: float, dt: float, taken: SystemTaken, repeats: int, state: State, before: State, work: Work, cpu: float
     ) -> None:
         """Log a step of dt (s) that ended at t (s) in a state, after the one `before`."""
-        self.nears_itself = self._itself.look(t, dt, state, before.r, self.events.event)
+        found = self._itself.look(t, dt, state, before.r, self.events.event)
+        self.nears_itself, self.parts_itself = bool(found & NEARS), bool(found & PARTS)
         forces = work.report[FORCE_A : FORCE_A + 6]
         pulls = float(np.linalg.norm(forces[:3])), float(np.linalg.norm(forces[3:]))
         error = float(work.report[LOCAL_ERROR])

@@ -13,6 +13,7 @@ import numpy as np
 from hybrid.adapt.manager import DomainManager
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels import books
+from hybrid.kernels.accept import MANY
 from hybrid.kernels.bodies import FRAME, PLACE, V
 from hybrid.kernels.cache import cache_folder
 from hybrid.kernels.report import BEND, TWIST_NODE
@@ -21,6 +22,7 @@ from hybrid.model.plan import output_times, parts
 from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
+from hybrid.simulation.collapse import COLLAPSE, CONTACT, ERROR, GIVE_UP, StepLengths, cause_of, collapse_text
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.progress import RESULT, ProgressReporter
@@ -33,7 +35,13 @@ from hybrid.simulation.system_checkpoint import (
     other_program,
     restore,
 )
-from hybrid.simulation.system_contact import begin_contact, begin_where_near, refuse_within_itself
+from hybrid.simulation.system_contact import (
+    begin_contact,
+    begin_where_near,
+    end_contact,
+    gives_up_contact,
+    refuse_within_itself,
+)
 from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.system_points import Rotations, fields_of, values_of
@@ -117,6 +125,7 @@ class SystemRun:
         if moves and target is not None:
             self.quantities.keep_ranges(self.lines)
         self.t, self.steps, self.last_step, self.last_rho, self.cpu = 0.0, 0, 0.0, 0.0, 0.0
+        self._lengths = StepLengths()
         self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
         self.dry: set[str] = set()  # bodies that have been said to be out of the water
         self.failures = Failures(self)
@@ -460,11 +469,16 @@ class SystemRun:
                 repeats += 1
                 continue
             if taken.outcome != Outcome.OK:
+                self._lengths.cut(cause_of(taken.outcome), taken.line, self._place(solver, taken) or 0.0)
                 if 0.5 * dt < shortest:
-                    raise self._stopped(solver, taken, dt)
+                    if not gives_up_contact(self, dt):
+                        raise self._stopped(solver, taken, dt)
+                    dt, repeats = end - self.t, repeats + 1
+                    continue
                 dt, repeats = (0.5 * dt if control is None else control.failed(t - self.t)), repeats + 1
                 continue
             if control is not None and (again := control.shorter(t - self.t, taken.ratio)):
+                self._lengths.cut(ERROR, taken.line, self._place(solver, taken) or 0.0)
                 dt, repeats = again, repeats + 1
                 continue
             if zones is not None:
@@ -480,6 +494,10 @@ class SystemRun:
                 zones.accepted(self.last_step)
             if any(line.nears_itself for line in self.lines):
                 begin_contact(self)
+            if parted := [line.number for line in self.lines if line.parts_itself]:
+                end_contact(self, parted)
+            if self._lengths.taken(self.last_step):
+                self._tell_collapse()
             repeats = 0
             if control is not None:
                 return
@@ -489,11 +507,28 @@ class SystemRun:
         detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
         if dt == 0.0:
             detail = "no accelerations are consistent with the shape and the loads"
-        s = None
-        if taken.line >= 0:
-            nodes = solver.lines[taken.line].line.s
-            s = float(nodes[min(max(taken.where, 0), nodes.size - 1)])
-        return LineFailed(taken.line, taken.outcome, self.t, s, detail)
+        if any(line.contact is not None and line.contact.touches for line in self.lines):
+            detail += CONTACT
+        return LineFailed(taken.line, taken.outcome, self.t, self._place(solver, taken), detail)
+
+    def _place(self, solver: SystemSolver, taken: SystemTaken) -> float | None:
+        """Where (m) a step was worst; None: of no line."""
+        if taken.line < 0:
+            return None
+        nodes = solver.lines[taken.line].line.s
+        return float(nodes[min(max(taken.where, 0), nodes.size - 1)])
+
+    def _tell_collapse(self) -> None:
+        """Steps have become so short that the run may not end: an event; one to be compared with stops."""
+        lengths = self._lengths
+        k, s = lengths.at
+        line = self.lines[k]
+        touches = any(x.contact is not None and x.contact.touches for x in self.lines)
+        text = collapse_text(lengths.tiny, self.last_step, lengths.longest, lengths.cuts, s, touches)
+        if lengths.tiny == MANY:
+            line.events.event(self.t, s, s, COLLAPSE, text, value=self.last_step)
+        if self.target is None and lengths.tiny >= GIVE_UP:
+            raise LineFailed(k, Outcome.COLLAPSED, self.t, s, text)
 
     def _look(self, solver: SystemSolver) -> None:
         """Whether meshes resolve the lines, and sections bear them."""

@@ -7,7 +7,7 @@ proposes is carried out: the line has other cells then, and the system another s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,11 +20,10 @@ from hybrid.kernels import zone_step as z
 from hybrid.kernels.books import COUNT_SIZE
 from hybrid.kernels.forces import SELF_CONTACT
 from hybrid.kernels.report import SELF_CONTACT_ENERGY
-from hybrid.kernels.state import Ends, State, state_for
+from hybrid.kernels.state import Ends, Line, State, state_for
 from hybrid.kernels.zone_step import LOOKAHEAD, follow_zones
 from hybrid.model.build import Model
 from hybrid.model.coarsen import picked
-from hybrid.model.self_reach import touching
 from hybrid.model.system import SystemModel
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.contact_equilibrium import nearness
@@ -310,12 +309,12 @@ class SystemZones:
         run.model, run.state = replace(run.model, models=tuple(models)), run.state._replace(lines=states)
         line.take_zones(model)
 
-    def let_touch(self, number: int, friction: float) -> None:
-        """The line of this number touches itself from now on, if its zones move."""
+    def change_line(self, number: int, change: Callable[[Line], Line]) -> None:
+        """The line of this number is changed, if its zones move: it touches itself from now on, or no longer."""
         for x in (x for x in self.lines if x.number == number):
-            x.full = replace(x.full, line=touching(x.full.line, friction))
+            x.full = replace(x.full, line=change(x.full.line))
             model = x.switching.model
-            x.switching.model = replace(model, line=touching(model.line, friction))
+            x.switching.model = replace(model, line=change(model.line))
 
     @property
     def numbers(self) -> list[int]:

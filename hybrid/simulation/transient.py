@@ -27,7 +27,7 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.blended import note_blended, rotate_ends_in
 from hybrid.simulation.cell_changes import CellChanges
-from hybrid.simulation.contact_start import begin_contact, comes_near
+from hybrid.simulation.contact_start import begin_contact, comes_near, end_contact, gives_up_contact
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog
@@ -39,6 +39,7 @@ from hybrid.simulation.releases import let_go, overloaded, watch_forces
 from hybrid.simulation.self_watch import SelfWatch, let_touch_itself, refuse_start_in_itself
 from hybrid.simulation.step_events import (
     look_at_itself,
+    note_collapse,
     note_cut,
     note_iterations,
     note_slack,
@@ -94,6 +95,8 @@ class Transient:
         elif model.line.bits & MAY_TOUCH:
             self.itself = SelfWatch(model, "")
         self.nears_itself = False  # whether contact with itself has to begin after this step
+        self.collapse = ""  # what cuts steps that have become so short that it may not end
+        self.parts_itself = False  # whether it has to end after this step
         self.touches, self.came_near_itself = touches, False
         self.marked = marked_places(scene, model)
         self.payout = PayingOut(model) if model.payout is not None else None
@@ -103,7 +106,8 @@ class Transient:
             self.paid_zones = PaidZones(scene, self.payout, switching) if switching is not None else None
         self._set_control(resolution)
         self.plane_monitor = PlaneMonitor(scene)
-        self.plane_monitor.comes_back = switching is None and correction is None and self.payout is None
+        self.may_come_back = switching is None and correction is None and self.payout is None
+        self.plane_monitor.comes_back = self.may_come_back
         self.changes = 0  # of the scene, so far
         self.asks_samples = False  # whether Python looks at every output as it is sampled
         self.outputs_may_wait = False  # whether outputs may wait although the cells that they are of have changed
@@ -182,7 +186,7 @@ class Transient:
         """Whether the line that samples are of stays as it is in the next step, so that they may wait in the buffer."""
         joints = self.switching is not None and self.switching.joints is not None
         paid = self.payout is not None and self.payout.due
-        leaves = self._leaves or self._returns or self.nears_itself
+        leaves = self._leaves or self._returns or self.nears_itself or self.parts_itself
         return not (self._pending is not None or leaves or self._overloaded or joints or paid)
 
     def waiting(self) -> Iterator[list[Output]]:
@@ -348,7 +352,11 @@ class Transient:
                 self._adapt()
             elif code == b.FAILED:
                 yield code
-                raise StepFailed(run.tried, float(clock[b.TRY_END] - clock[b.NOW]))
+                if not gives_up_contact(self):
+                    raise StepFailed(run.tried, float(clock[b.TRY_END] - clock[b.NOW]))
+                self.evaluate_forces()
+                clock[b.TRIED_DT] = clock[b.UNTIL] - clock[b.NOW]
+                count[b.AFTER_START], count[b.NEW_STATE] = b.TRY, 0
             else:
                 yield code
                 if code == b.AT_STOP:
@@ -411,7 +419,8 @@ class Transient:
         count, switching, asks = self.run.count, self.switching, 0
         if self._leaves:
             asks |= b.ASK_STEPS
-        changes = self._leaves or self._returns or self.nears_itself or self._overloaded or self._pending is not None
+        changes = self._leaves or self._returns or self.nears_itself or self.parts_itself
+        changes = changes or bool(self._overloaded) or self._pending is not None
         if changes or self.asks_samples or (self.payout is not None and self.payout.due):
             asks |= b.ASK_SAMPLES
         if switching is not None and not switching.compiled:
@@ -445,6 +454,8 @@ class Transient:
         flags, end, dt = int(run.count[b.FLAGS]), self.t, float(run.clock[b.LAST_DT])
         if self.payout is not None and self.payout.at_its_end:
             raise StepFailed(Tried(Outcome.WINCH_AT_END, 0, 0.0, self.model.cells), dt)
+        if flags & b.COLLAPSES and note_collapse(self):
+            raise StepFailed(Tried(Outcome.COLLAPSED, 0, 0.0, int(run.count[b.CUT_AT])), dt)
         if flags & b.UNKNOWN_ERROR:
             note_unknown_error(self)
         if flags & b.STEPS_CUT:
@@ -453,7 +464,7 @@ class Transient:
             note_slack(self)
         if flags & b.ITERATIONS_CUT:
             note_iterations(self)
-        if flags & (b.IS_BENT | b.MEETS_ITSELF | b.NEARS_ITSELF):
+        if flags & (b.IS_BENT | b.MEETS_ITSELF | b.NEARS_ITSELF | b.PARTS_ITSELF | b.HIDES_ITSELF):
             look_at_itself(self, flags)
         if flags & b.PUSH_DIED:
             self.plane_monitor.renew(run)
@@ -468,7 +479,7 @@ class Transient:
             booked, self._pending = self.switching.book_step(end, run.before, run.state)
             run.books.work[0, b.ZONES] += booked
         changes = self._pending is not None or self._leaves or self._returns or self.nears_itself
-        changes |= bool(self._overloaded)
+        changes |= bool(self._overloaded) or self.parts_itself
         changes |= self.payout is not None and self.payout.due
         run.count[b.INSIDE] = changes
         changes |= bool(run.count[b.SAMPLES]) and not self.unchanging
@@ -492,6 +503,10 @@ class Transient:
         if self.nears_itself:
             self.nears_itself = self._leaves = self._returns = False
             begin_contact(self)
+            self.evaluate_forces()
+        if self.parts_itself:
+            self.parts_itself = False
+            end_contact(self)
             self.evaluate_forces()
         if self._returns:
             self._returns = False
@@ -535,10 +550,10 @@ class Transient:
         model = self.model
         self.stepper.evaluate_forces(model.sea.at(self.t), model.ends.at(self.t), self.state)
         run = self.run
+        before, now = float(run.report[SELF_CONTACT_ENERGY]), 0.0
         if run.contact is not None:
-            before = float(run.report[SELF_CONTACT_ENERGY])
             now = run.contact.settle(self.state, model.ends.values, self.stepper.work.report)
-            run.books.work[0, b.ZONES] += now - before
+        run.books.work[0, b.ZONES] += now - before
         self._restart_books()
 
     # --- another model --------------------------------------------------------------------------

@@ -22,6 +22,10 @@ FIRST_REPORT = 34  # numbers that a report had once; later ones have more behind
 SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
 
 
+# Of steps that have become short: kernels.books.
+LENGTHS = (b.TINY_STEPS, b.CUT_BY_GAIN, b.CUT_BY_TURN, b.CUT_BY_NEWTON, b.CUT_BY_ERROR, b.CUT_AT)
+
+
 def checkpoint(run: Transient) -> dict[str, Any]:
     """What the next steps depend on, between two steps: named arrays and plain values (simulation.restore)."""
     model, clock, count, books = run.model, run.run.clock, run.run.count, run.run.books
@@ -43,6 +47,7 @@ def checkpoint(run: Transient) -> dict[str, Any]:
         "last": float(clock[b.NOW] - clock[b.PREVIOUS]), "control": control if run.controlled else None,
         "state": run.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
         "push": run.plane_monitor.checkpoint(run.run), "home": run.plane_monitor.home,
+        "lengths": [float(clock[b.LONGEST]), *(int(count[k]) for k in LENGTHS)],
         "self_contact": run.run.contact and run.run.contact.checkpoint(run.t),
         "torsion": {name: x.copy() for name, x in run.run.answers.items()},
         "envelope": run.envelope and run.envelope.checkpoint(books.extremes),
@@ -73,6 +78,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     if "twist" not in saved:  # not in 0.6: outputs of the next step know of no step before
         older |= {"twist": np.zeros(2), "last": 0.0}
         saved = {name: x for name, x in saved.items() if name != "last"}
+    older |= {"lengths": [0.0] + [0] * len(LENGTHS)}  # not in 0.6
     older |= {"envelope": None, "_slackened": False, "self_contact": None, "payout": None, "home": None}
     older |= {"torsion": template["torsion"], "rho": run.rho}  # not in 0.6: found anew
     report = saved.get("report")
@@ -97,6 +103,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     clock, count, books = compiled.clock, compiled.count, compiled.books
     clock[b.NOW], clock[b.PREVIOUS] = saved["t"], saved["t"] - saved["last"]
     clock[b.LAST_RHO] = saved["rho"]
+    clock[b.LONGEST], count[list(LENGTHS)] = saved["lengths"][0], saved["lengths"][1:]
     clock[b.LAST_DT], clock[b.STORED], clock[b.FLOOR] = saved["dt"], saved["_stored"], saved["floor"]
     count[b.STEPS], count[b.ITERATIONS] = saved["steps"], saved["iterations"]
     run.changes, run.beyond = saved["changes"], saved["_beyond"]

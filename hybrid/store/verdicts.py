@@ -42,6 +42,7 @@ DOUBTS: dict[str, tuple[frozenset[str], str]] = {
     "largest force uncertain": (PULL, "a longer run, or several seeds"),
     "end force between outputs": (PULL, "the output.every of its note"),
     "line meets itself": (ALL, "contact: {self: true}"),
+    "contact given up": (ALL, "cells as short as its note says"),
     "slack": (BENDING | PULL, "model: rod, or force_rod there"),
     "unstable": (ALL, NOTE),
     "out of plane": (ALL, "dimension: 3"),

@@ -117,3 +117,98 @@ def test_what_was_told_is_told_again_only_after_it_has_come_apart() -> None:
         told.append(bool(k.note_found.py_func(found, 1.0)))
     assert told == [False, True, False, False, False, False, True]
     assert found[k.LEAST_DISTANCE] == 0.01
+
+
+# --- whether contact has to begin, or may end -----------------------------------------------------------------
+
+
+class Asked:
+    """A line whose steps are asked about contact, as of `look`."""
+
+    def __init__(self, after: np.ndarray, what: float = 1.0) -> None:
+        n = len(after) - 1
+        line = blank_line(n)
+        line.h[:] = np.linalg.norm(np.diff(after, axis=0), axis=1)
+        line.s[:] = np.append(0.0, np.cumsum(line.h))
+        self.itself, self._table = k.blank_itself(np.full(n, WIDTH)), Table(k.blank_itself_job())
+        self.itself.ahead[k.ASKED] = what
+        self._bound = {
+            "line": line, "ends": no_ends(), "clock": np.zeros(CLOCK_SIZE), "counts": np.zeros(COUNT_SIZE, np.int64),
+            "itself": self.itself,
+        }  # fmt: skip
+
+    def step(self, before: np.ndarray, after: np.ndarray) -> int:
+        """Bits but for MEETS after a step from one shape to another."""
+        self._table.bind(old=state_at(after), new=state_at(before), **self._bound)
+        return int(k.watch_itself(self._table.numbers)) & ~k.MEETS
+
+
+def two_legs(apart: float, slant: float = 0.4) -> np.ndarray:
+    """A leg of 10 m along x, and one on its way back, `apart` (m) above it and slanting away by ten times `slant` (m)."""
+    legs = np.linspace(0.0, 10.0, 101)
+    back = np.column_stack([legs, slant * legs, np.full(101, apart)])
+    return np.vstack([np.column_stack([legs[::-1], np.zeros(101), np.zeros(101)]), back])
+
+
+def test_contact_begins_by_the_approach_of_two_cells_not_of_the_line() -> None:
+    before = two_legs(2.5)
+    after = before.copy()
+    far = np.clip(np.linspace(-5.0, 5.0, 101), 0.0, None)
+    after[101:, 2] += 0.2 * far  # far from the other leg: three such steps of it would close 2.5 m elsewhere
+    assert Asked(after).step(before, after) == 0
+    assert Asked(after).step(two_legs(2.5), two_legs(1.6)) == k.NEARS
+    assert Asked(after).step(two_legs(1.6), two_legs(1.6)) == 0
+
+
+def test_a_look_ahead_from_velocities_is_that_of_a_step() -> None:
+    shape = two_legs(1.6)
+    asked, state = Asked(shape), state_at(shape)
+    state.v[101:, 2] = -0.9
+    asked.itself.ahead[k.SECONDS] = 1.0
+    asked._table.bind(old=state, new=state_at(shape), **asked._bound)
+    assert int(k.watch_itself(asked._table.numbers)) == k.NEARS
+
+
+def fold(angle: float) -> np.ndarray:
+    """Two legs of 4 m from one node, which are an angle (rad) apart."""
+    legs = np.linspace(4.0, 0.0, 41)
+    other = legs[-2::-1]
+    return np.vstack([
+        np.column_stack([legs, 0.0 * legs, 0.0 * legs]),
+        np.column_stack([other * np.cos(angle), other * np.sin(angle), 0.0 * other]),
+    ])  # fmt: skip
+
+
+def test_a_fold_without_a_shape_hides_what_is_beside_it_and_is_told_once() -> None:
+    asked, r = Asked(fold(0.2)), fold(0.2)
+    assert [asked.step(r, r) for _ in range(3)] == [k.HIDES, 0, 0]
+    assert int(asked.itself.ahead[k.SHARP]) == 40
+    apart = two_legs(5.0)[: len(r)]
+    assert [asked.step(apart, apart) for _ in range(k.ENDS)] == [0] * k.ENDS
+    assert asked.step(r, r) == k.HIDES
+
+
+def test_a_fold_hides_nothing_that_is_far_from_it() -> None:
+    """Legs that come as near to each other as a diameter and a half, far from the fold, where they are apart."""
+    x = np.linspace(0.0, 4.0, 41)
+    y = np.interp(x, [0.0, 1.0, 4.0], [0.0, 0.3, 0.08])
+    r = np.vstack([np.column_stack([x[::-1], 0.0 * x, 0.0 * x]), np.column_stack([x, y, 0.0 * x])[1:]])
+    assert Asked(r).step(r, r) == k.NEARS
+
+
+def test_contact_ends_after_so_many_steps_apart() -> None:
+    near, far = two_legs(0.12), two_legs(2.5)
+    asked = Asked(near, k.WIDER)
+    assert [asked.step(near, near) for _ in range(2 * k.ENDS)] == [0] * 2 * k.ENDS
+    assert [asked.step(far, far) for _ in range(k.ENDS - 1)] == [0] * (k.ENDS - 1)
+    assert asked.step(near, near) == 0
+    assert [asked.step(far, far) for _ in range(k.ENDS)] == [0] * (k.ENDS - 1) + [k.PARTS]
+
+
+def test_contact_that_was_given_up_begins_when_surfaces_have_come_apart() -> None:
+    near = two_legs(0.07, 0.0)
+    asked = Asked(near)
+    asked.itself.found[k.WAITS] = 1.0
+    assert asked.step(near, near) == 0
+    apart = two_legs(0.09, 0.0)  # by 0.8 diameters, and near
+    assert asked.step(apart, apart) == k.NEARS

@@ -1,0 +1,133 @@
+"""Contact of a line with itself begins where it is near itself, ends where it is not, and is given up where it fails."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from test_self_contact_default import WIDTH, led_through
+from test_system_contact import RUBS, system
+
+import hybrid
+import hybrid.simulation.transient
+import hybrid.solve.self_contact
+from hybrid.kernels import books as b
+from hybrid.kernels.accept import MANY, collapses
+from hybrid.kernels.run import blank_books
+from hybrid.simulation import contact_start
+from hybrid.simulation.transient import Transient
+
+GIVEN_UP, COLLAPSE = "contact given up", "steps collapse"
+
+
+def kinds(result: hybrid.Result) -> set[str]:
+    return {event.kind for event in result.events}
+
+
+def test_it_comes_and_goes_with_the_legs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An end that swings beside the other: the legs touch twice."""
+    happened: list[tuple[str, float]] = []
+    for name in ("begin_contact", "end_contact"):
+
+        def noted(moving: Transient, name: str = name) -> None:
+            happened.append((name, moving.t))
+            getattr(contact_start, name)(moving)
+
+        monkeypatch.setattr(hybrid.simulation.transient, name, noted)
+    sway = {"surge": {"amplitude": 0.26, "period": 2.0}, "ramp": 4.0}
+    ends = {
+        "start": {"kind": "pinned", "position": [0, 0, 0]},
+        "end": {"kind": "pinned", "position": [0.3, 0, 0], "motion": sway},
+    }
+    result = hybrid.run(hybrid.validate_scene(led_through(ends=ends, time={"duration": 7.0, "step": 0.01})))
+    assert [name for name, _ in happened] == ["begin_contact", "end_contact"] * 2
+    assert "line touches itself" in kinds(result) and "line meets itself" not in kinds(result)
+    assert float(result["self_distance/distance"]) > 0.85 * WIDTH
+    ends_at = [t for name, t in happened if name == "end_contact"]
+    assert not any(result["energy/self_contact"][np.searchsorted(result.times, ends_at)])
+    put_in = sum(
+        np.abs(result[name]).max() for name in result.names if name.startswith("work/") and name != "work/scheme"
+    )
+    assert result["work/scheme"].max() < 1e-3 * put_in  # nothing is put in where contact comes or goes
+
+
+@pytest.fixture
+def no_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Room for one point of contact: no step leads on with more."""
+    for name in ("LEAST_POINTS", "MOST_POINTS"):
+        monkeypatch.setattr(hybrid.solve.self_contact, name, 1)
+
+
+@pytest.mark.usefixtures("no_room")
+def test_where_no_step_leads_on_it_is_given_up() -> None:
+    result = hybrid.run(hybrid.validate_scene(led_through()))
+    (event,) = [x for x in result.events if x.kind == GIVEN_UP]
+    assert result.status == "complete" and event.s_a < 1.4 and event.s_b > 3.9
+    assert "cells of at most" in event.text and "until these are apart" in event.text
+    (meets,) = [x for x in result.events if x.kind == "line meets itself"]
+    assert "let no step lead on" in meets.text
+
+
+@pytest.mark.usefixtures("no_room")
+def test_where_it_is_asked_for_a_failure_names_it() -> None:
+    with pytest.raises(
+        hybrid.ComputationError, match=r"contact of the line with itself is computed, s = .*self: false"
+    ):
+        hybrid.run(hybrid.validate_scene(led_through(contact={"self": True})))
+
+
+@pytest.mark.usefixtures("no_room")
+def test_of_a_system_likewise() -> None:
+    result = hybrid.run(system(contact={"friction": RUBS["friction"]}), progress=False)
+    assert result.status == "complete" and GIVEN_UP in kinds(result.lines["hose"])
+    with pytest.raises(hybrid.ComputationError, match=r"touches itself there, and contact: \{self: false\}"):
+        hybrid.run(system(), progress=False)
+
+
+# --- steps that collapse ------------------------------------------------------------------------------------
+
+
+def test_many_steps_below_a_thousandth_of_the_longest_have_collapsed() -> None:
+    books = blank_books()
+    clock, count = books.clock, books.counts
+    assert not collapses.py_func(clock, count, 1.0)
+    told = [collapses.py_func(clock, count, 5e-4) for _ in range(2 * MANY)]
+    assert [k + 1 for k, x in enumerate(told) if x] == [MANY, 2 * MANY]
+    count[b.CUT_BY_ERROR] = 3
+    assert not collapses.py_func(clock, count, 2e-3) and count[b.TINY_STEPS] == count[b.CUT_BY_ERROR] == 0
+
+
+def hanging(**output: Any) -> dict[str, Any]:
+    """A line of 20 cells that an end shakes, in 12000 steps."""
+    section = {"length": 4.0, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e4, "bending_stiffness": 1e-3}
+    shaken = {"heave": {"amplitude": 0.1, "period": 1.0}, "ramp": 2.0}
+    return {
+        "cable": {"sections": [section]}, "model": "rod", "mesh": {"cells": 20}, "initial": "equilibrium",
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {"kind": "pinned", "position": [3.0, 0, 0], "motion": shaken},
+        },
+        "time": {"duration": 6.0, "step": 0.0005}, "output": {"every": 0.1, "points": 11} | output,
+    }  # fmt: skip
+
+
+@pytest.fixture
+def longest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All runs have made a very long step."""
+    begin = Transient.begin
+
+    def after_a_long_step(self: Transient, *args: Any) -> None:
+        begin(self, *args)
+        self.run.clock[b.LONGEST] = 1e3
+
+    monkeypatch.setattr(Transient, "begin", after_a_long_step)
+
+
+@pytest.mark.usefixtures("longest")
+def test_a_collapse_is_named_and_a_run_to_compare_with_is_given_up() -> None:
+    result = hybrid.run(hybrid.validate_scene(hanging(errors=True)))
+    (event,) = [x for x in result.events if x.kind == COLLAPSE]
+    assert event.t == pytest.approx(MANY * 0.0005) and "shorter than 0.001 of the longest, 1e+03 s" in event.text
+    (none,) = [x for x in result.events if x.kind == "no error figure"]
+    assert "steps have become so short" in none.text and result.status == "complete"
