@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 import typer.core
@@ -140,9 +140,12 @@ def _cache_warnings(console: Console) -> Iterator[None]:
     """Warnings of the cache of machine code as notes of one line; others as ever."""
     as_ever = warnings.showwarning
 
-    def show(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+    def show(
+        message: Warning | str, category: type[Warning], filename: str, lineno: int,
+        file: TextIO | None = None, line: str | None = None,
+    ) -> None:  # fmt: skip
         if category.__name__ != "CacheWarning":  # its module imports what not every command needs
-            as_ever(message, category, *rest)
+            as_ever(message, category, filename, lineno, file, line)
             return
         console.json("note", text=str(message))
         console.note(f"note: {message}")

@@ -6,11 +6,14 @@ import json
 import runpy
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import pytest
 
 import hybrid
+from hybrid.cli.app import session
+from hybrid.kernels.cache import CacheWarning
 
 HEAVY = {"numba", "h5py", "matplotlib", "scipy"}
 HANGING = {
@@ -100,3 +103,24 @@ def test_version_and_help() -> None:
     assert call()[0] == call("-h")[0]
     for line in ("Compute the motion of a cable", "Exit codes: 0 done"):
         assert line in call("--help")[0]
+
+
+def test_a_cache_that_is_not_used_is_said_in_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a note, or as a line of JSON; warnings of others are shown as ever."""
+    shown: list[object] = []
+    monkeypatch.setattr(warnings, "showwarning", lambda *of: shown.append(of[1]))
+    for as_json in (False, True):
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            monkeypatch.setattr(warnings, "showwarning", lambda *of: shown.append(of[1]))
+            with session(as_json, False):
+                warnings.warn("machine code x is truncated", CacheWarning, stacklevel=1)
+                warnings.warn("other", RuntimeWarning, stacklevel=1)
+        out, err = capsys.readouterr()
+        if as_json:
+            assert json.loads(out) == {"event": "note", "text": "machine code x is truncated"} and not err
+        else:
+            assert err == "note: machine code x is truncated\n" and not out
+    assert shown == [RuntimeWarning, RuntimeWarning]
