@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import signal
 from dataclasses import replace
@@ -11,7 +10,6 @@ from typing import Any
 
 import pytest
 from bits import Stopping, differences
-from rich.console import Console as RichConsole
 from test_late_file import described
 from typer.testing import CliRunner
 
@@ -123,7 +121,9 @@ def test_stopped_after_the_result(
         assert result.done and not result.pending and "amended" not in result.attributes
 
 
-def test_whoever_looks_at_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_whoever_looks_at_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Pictures, report, card, comparison, statistics, exports, and the command that was stopped."""
     monkeypatch.chdir(tmp_path)
     Stopping(monkeypatch)
@@ -138,10 +138,9 @@ def test_whoever_looks_at_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyP
     console = Console(False, False)
     console.will_write(tmp_path / "no.h5")
     console._file = tmp_path / "run.h5"
-    err = io.StringIO()
-    console.__dict__["_err"] = RichConsole(file=err, width=500)
+    capsys.readouterr()
     console.interrupted()
-    assert f"{ERRORS}; `hybrid resume {tmp_path / 'run.h5'}` makes up for it" in err.getvalue()
+    assert f"{ERRORS}; `hybrid resume {tmp_path / 'run.h5'}` makes up for it" in capsys.readouterr().err
 
 
 def test_stopped_in_the_errors_of_fixed_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
