@@ -203,7 +203,7 @@ def accept(line, ends, old, new, books, work, end, dt):
     row = books.log[count[ROWS]]
     row[0], row[1], row[2], row[3] = end, dt, count[TRIES] + count[WASTED], clock[CORRECTION]
     row[4], row[5], row[6] = report[RESIDUAL], count[REPEATS], report[LOCAL_ERROR]
-    row[7], row[8] = pull(ends, new, report, books.loaded, 0), pull(ends, new, report, books.loaded, 1)
+    row[7], row[8] = pull(report, 0), pull(report, 1)
     count[ROWS] += 1
     count[WASTED], count[PHASE] = 0, SAMPLE
 
@@ -267,9 +267,9 @@ def watch(line, ends, old, new, books, report, t, dt):
         flags |= SLACKENED
     if clock[NEAR_PLANE] > 0.0 and is_near_plane(line, new, clock[NEAR_PLANE]):
         flags |= NEARS_PLANE
-    if pull(ends, new, report, books.loaded, 0) > clock[RELEASE_START]:
+    if pull(report, 0) > clock[RELEASE_START]:
         flags |= LETS_GO
-    if pull(ends, new, report, books.loaded, 1) > clock[RELEASE_END]:
+    if pull(report, 1) > clock[RELEASE_END]:
         flags |= LETS_GO
     return flags
 

@@ -13,11 +13,10 @@ from hybrid.kernels.block_elimination import SIZE, WIDTH, eliminate_narrow, elim
 from hybrid.kernels.cell import Chord, chord, damped_stretch, moment_force, pull, rotary_force, stretch, turning
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import after, angular_velocity, before, bending, damped_bending
+from hybrid.kernels.end_forces import note_end
 from hybrid.kernels.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.node_forces import Z3, Z9, get3, node_loads
 from hybrid.kernels.report import (
-    FORCE_A,
-    FORCE_B,
     RESIDUAL,
     RESIDUAL_NODE,
     STIFFNESS_DAMPING_POWER,
@@ -256,10 +255,11 @@ def balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, fo
     held = (i == 0 and ends.held[0] != 0) or (i == n and ends.held[1] == 1)
     if i == 0:
         F = add(F, get3(ends.force, 0))
-        report[FORCE_A], report[FORCE_A + 1], report[FORCE_A + 2] = F
     if i == n:
         F = add(F, get3(ends.force, 1))
-        report[FORCE_B], report[FORCE_B + 1], report[FORCE_B + 2] = F
+    if i == 0 or i == n:
+        x = (r[i, 0] + u[i, 0], r[i, 1] + u[i, 1], r[i, 2] + u[i, 2])
+        note_end(line, sea, ends, state, 0 if i == 0 else 1, x, F, report)
     G1, G2 = madd(msub(force.Nm, force_before.N0), GL), madd(msub(force.N0, force_before.Np), GR)
     Dii = madd(msub(G1, G2), D)
     gap, size = Z3, 1.0

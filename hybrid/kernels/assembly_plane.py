@@ -13,6 +13,7 @@ from hybrid.kernels.block_elimination import ROW
 from hybrid.kernels.block_elimination_plane import KEPT, TRIPLE, WIDE, eliminate2, eliminate_chain
 from hybrid.kernels.cell import Chord
 from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.end_forces import note_end
 from hybrid.kernels.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.node_forces_plane import node_loads2
 from hybrid.kernels.plane import (
@@ -33,8 +34,6 @@ from hybrid.kernels.plane import (
 )
 from hybrid.kernels.report import (
     ASSEMBLED,
-    FORCE_A,
-    FORCE_B,
     MOMENT_A,
     MOMENT_B,
     RESIDUAL,
@@ -201,11 +200,12 @@ def balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, fo
     if i == 0:
         f = row_in_plane(plane, ends.force, 0)
         F = (F[0] + f[0], F[1] + f[1])
-        report[FORCE_A], report[FORCE_A + 1], report[FORCE_A + 2] = to_space(plane, F)
     if i == n:
         f = row_in_plane(plane, ends.force, 1)
         F = (F[0] + f[0], F[1] + f[1])
-        report[FORCE_B], report[FORCE_B + 1], report[FORCE_B + 2] = to_space(plane, F)
+    if i == 0 or i == n:
+        x = (r[i, 0] + u[i, 0], r[i, 1] + u[i, 1], r[i, 2] + u[i, 2])
+        note_end(line, sea, ends, state, 0 if i == 0 else 1, x, to_space(plane, F), report)
     if (i == 0 and ends.held[0]) or (i == n and ends.held[1]):
         x, y = row_in_plane(plane, ends.position, 0 if i == 0 else 1), row_in_plane(plane, r, i)
         f = row_in_plane(plane, u, i)

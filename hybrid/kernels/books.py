@@ -55,9 +55,6 @@ from hybrid.kernels.state import Floats
 ) = range(44)  # fmt: skip
 CLOCK_SIZE = 44
 
-# What `loaded` says of an end that carries a free point of several lines: forces on it are those of the line alone.
-CARRIED = 2
-
 # --- count -----------------------------------------------------------------------------------------
 
 (
@@ -139,8 +136,7 @@ class Books(NamedTuple):
     twist: Floats  # (2, 2) rad, of the elements at both ends, likewise
     velocity: Floats  # (2, 3) m/s, of held ends now
     imposed: Floats  # (2, 2, 21) now and before the last step, of each end: position, frame, spin, force, moment
-    # (2,) 1 where an end body makes the pull of the end the tension beside it; CARRIED: it is of a free point
-    loaded: NDArray[np.int8]
+    loaded: NDArray[np.int8]  # (2,) 1 where there is a body at the end
     base: NDArray[np.int64]  # nodes whose displacement is watched
     placed: Floats  # (base.size, 3) m, where they were at the start
     borne: Floats  # (N,) length over unstretched length that each cell bears

@@ -88,7 +88,7 @@ def beyond_spring(t, d, part):
 
 @inner
 def end_tension(line, ends, state, report, loaded, marks, k):
-    """Tension at an end: the force of what holds or loads it along the tangent; of an end body, that of the cable."""
+    """Tension at an end: the force of what holds or loads it along the tangent; beside a body, that of the cable."""
     n = line.h.shape[0]
     first, second = k * (n - 1), second_cell(line.h, marks, k)
     if loaded[k]:
@@ -99,11 +99,8 @@ def end_tension(line, ends, state, report, loaded, marks, k):
     if line.element[k * n]:
         R = get9(ends.frame, k)
         t = beyond_spring((R[2], R[5], R[8]), d, 0.5 * line.h[first] / line.hn[k * n])
-    f = scale(2.0 * k - 1.0, get3(ends.force, k))
-    if ends.held[k]:
-        at = FORCE_A + 3 * k
-        f = scale(1.0 - 2.0 * k, (report[at], report[at + 1], report[at + 2]))
-    return dot(f, t) / math.sqrt(dot(t, t))
+    at = FORCE_A + 3 * k
+    return (1.0 - 2.0 * k) * dot((report[at], report[at + 1], report[at + 2]), t) / math.sqrt(dot(t, t))
 
 
 @inner
@@ -129,28 +126,6 @@ def moment_at(line, state, i):
         return m
     m, _ = bending(Ra, Rb, kb, k0)
     return m
-
-
-@inner
-def force_in_cell(line, state, i):
-    """Force (N) in the middle of a cell, of what is after it on what is before it; an end of the line bears no moment."""
-    n = line.h.shape[0]
-    d, _, il = chord(get3(state.e, i))
-    first, last = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    if i > 0:
-        first = moment_at(line, state, i)
-    if i < n - 1:
-        last = moment_at(line, state, i + 1)
-    return add(scale(state.T[i], d), scale(il, cross(d, sub(last, first))))
-
-
-@inner
-def force_of_line(line, state, marks, k):
-    """Force (N) of the line alone on what is at end k, continued from the last two cells, from one across a kink."""
-    first, second = k * (line.h.shape[0] - 1), second_cell(line.h, marks, k)
-    near, far = force_in_cell(line, state, first), force_in_cell(line, state, second)
-    over = line.h[first] / (line.h[first] + line.h[second])
-    return scale(1.0 - 2.0 * k, add(near, scale(over, sub(near, far))))
 
 
 @inner

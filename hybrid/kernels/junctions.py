@@ -34,7 +34,7 @@ from hybrid.kernels.joined_lines import (
     moment_of_end,
     solve_back,
 )
-from hybrid.kernels.report import FORCE_A, MOMENT_A
+from hybrid.kernels.report import MOMENT_A, NET_A
 from hybrid.kernels.rotations import cross, hat, mat_mat
 from hybrid.kernels.run import read
 from hybrid.kernels.zone_torque import torsional_stiffness
@@ -84,7 +84,7 @@ def place_ends(l, job, joints, fairleads, seats, arms, gaps, points, old, new, w
 @inner
 def add_pull(joint, report, k, arm, clamped, net, work):
     """The force of an end on its point or body, and where it is clamped there its moment."""
-    o, points = FORCE_A + 3 * k, net.shape[0]
+    o, points = NET_A + 3 * k, net.shape[0]
     F = (report[o], report[o + 1], report[o + 2])
     if joint < points:
         for i in range(3):
@@ -112,8 +112,8 @@ def put_functional(f, low, high, joined, S, e):
 
 
 @inner
-def hand_over(l, job, joints, seats, first, columns, functional, gaps, answers, new, work, points, S):
-    """What a line hands over: its rows and columns of S."""
+def hand_over(l, job, joints, seats, first, columns, functional, gaps, answers, new, work, points, S, cv):
+    """What a line hands over: its rows and columns of S; cv: of this step (that in the job is being written)."""
     for r in range(RIGHT):
         for c in range(HANDED):
             S[r, c] = 0.0
@@ -124,7 +124,7 @@ def hand_over(l, job, joints, seats, first, columns, functional, gaps, answers, 
     for k in range(2):
         if turns(seats, l, k):
             b = joints[l, k] - points
-            answer_of_end(job, k, new[b], work[b], job.task.cv, answers[k])
+            answer_of_end(job, k, new[b], work[b], cv, answers[k])
     if start >= 0:
         carry_start(X_, job.work.W, columns, o, n, end >= 0)
     if starts:
@@ -221,7 +221,7 @@ def spread(l, joints, seats, job, arms, points, tensions, row, S, G, A, m):
                 if G[k, i, j] != 0.0:
                     add_row(S, AT[k] + i, G[k, i, j], A, at[k] + j, m, row, at, rows, size, G)
         if size[k] == 6:
-            o = FORCE_A + 3 * k
+            o = NET_A + 3 * k
             T = mat_mat(hat((report[o], report[o + 1], report[o + 2])), hat(vector(arms[l, k], 0)))
             for i in range(3):
                 for j in range(3):
@@ -277,7 +277,7 @@ def assemble_junctions(
         if start < 0 and end < 0:
             continue
         job = read(tables[l])
-        hand_over(l, job, joints, seats, first, columns, functional, gaps, answers, new, work, points, S)
+        hand_over(l, job, joints, seats, first, columns, functional, gaps, answers, new, work, points, S, cv)
         spread(l, joints, seats, job, arms, points, tensions, row if end >= 0 else -1, S, G, A, m)
         if end >= 0:
             row += 1

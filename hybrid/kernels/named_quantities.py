@@ -16,9 +16,7 @@ import math
 
 from hybrid.kernels.bed import bed_under
 from hybrid.kernels.books import NOW, PARITY, STEPS
-from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.extremes import beyond, second_cell
 from hybrid.kernels.newton import RUN
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.pipes import note_pipes
@@ -54,18 +52,12 @@ def row3(row, k):
 
 
 @inner
-def pull_at(job, state, k):
+def pull_at(job, k):
     """f at end k, and whether anything takes it."""
-    line, ends = job.line, job.ends
-    if ends.held[k]:
-        report, at = job.books.report, FORCE_A + 3 * k
-        return (report[0, at], report[0, at + 1], report[0, at + 2]), True
-    if not job.books.loaded[k]:
+    if not (job.ends.held[k] or job.books.loaded[k]):
         return (0.0, 0.0, 0.0), False
-    n = line.h.shape[0]
-    first, second = k * (n - 1), second_cell(line.h, job.books.marks, k)
-    d, _, _ = chord(get3(state.e, first))
-    return scale((1.0 - 2.0 * k) * beyond(state.T, line.h, first, second), d), True
+    report, at = job.books.report, FORCE_A + 3 * k
+    return (report[0, at], report[0, at + 1], report[0, at + 2]), True
 
 
 @inner
@@ -226,7 +218,7 @@ def of_pull(job, state, asked, reached, k):
     kind = asked[KIND]
     f, taken = (0.0, 0.0, 0.0), False
     if asked[IDLE] == 0.0:
-        f, taken = pull_at(job, state, k)
+        f, taken = pull_at(job, k)
     if kind == HORIZONTAL_FORCE:
         return math.hypot(f[0], f[1])
     if kind == VERTICAL_FORCE:

@@ -70,19 +70,34 @@ def half_cell_water(line, c, side, z, eta, u, U1, vi, b, af, chord, cv, ca, repo
 
 
 @inner
-def body_water(line, i, z, eta, u, U1, vi, b, af, cv, ca, report):
-    """Force of the water on a body at node i, and D."""
+def wet_parts(line, i, z, eta):
+    """Part of a body at node i under water at height z, of which its added mass counts, and their slopes by z, 1/m.
+
+    A body has the added mass that is given where it floats by itself, and deeper.
+    """
+    iH = 1.0 / line.point_height[i]
+    x, most = (eta - z) * iH + 0.5, line.point_floats[i]
+    wet, _, slope = wetted(x)
+    if line.point_upright[i]:
+        wet, slope = min(max(x, 0.0), 1.0), 1.0 if 0.0 < x < 1.0 else 0.0
+    slope *= -iH
+    if wet < most:
+        return wet, slope, wet / most, slope / most
+    return wet, slope, 1.0, 0.0
+
+
+@inner
+def body_water(line, i, z, eta, u, U1, vi, b, af, cv, ca):
+    """Force of the water on a body at node i, D, and its powers: of drag, of added mass, of waves and buoyancy."""
     bits = line.bits
     f, B = body_drag(u, line.point_drag[i])
     D = mscale(cv, B)
     if bits & FLOW:
         g = mat_vec(B, U1)
         D = (D[0], D[1], D[2] - g[0], D[3], D[4], D[5] - g[1], D[6], D[7], D[8] - g[2])
-    drag = dot(f, vi)
+    drag, pushed = dot(f, vi), 0.0
     a = line.point_added[i]
-    f = sub(f, scale(a, b))
-    D = (D[0] - ca * a, D[1], D[2], D[3], D[4] - ca * a, D[5], D[6], D[7], D[8] - ca * a)
-    added, pushed, wet = -a * dot(b, vi), 0.0, 1.0
+    added = scale(-a, b)
     if bits & WAVES:
         g = scale(line.point_displaced[i], af)
         f = add(f, g)
@@ -90,17 +105,12 @@ def body_water(line, i, z, eta, u, U1, vi, b, af, cv, ca, report):
     if bits & SURFACE and line.point_height[i] > 0.0:
         f = (f[0], f[1], f[2] + line.point_buoy[i])
         pushed += line.point_buoy[i] * vi[2]
-        iH = 1.0 / line.point_height[i]
-        x = (eta - z) * iH + 0.5
-        wet, _, slope = wetted(x)
-        if line.point_upright[i]:
-            wet, slope = min(max(x, 0.0), 1.0), 1.0 if 0.0 < x < 1.0 else 0.0
-        D = madd(mscale(wet, D), mscale(-slope * iH, outer(f, UP)))
-        f = scale(wet, f)
-    report[DRAG_POWER] -= wet * drag
-    report[ADDED_MASS_POWER] -= wet * added
-    report[WAVE_POWER] += wet * pushed
-    return f, D
+        wet, slope, part, change = wet_parts(line, i, z, eta)
+        D = madd(mscale(wet, D), outer(add(scale(slope, f), scale(change, added)), UP))
+        f, added = scale(wet, f), scale(part, added)
+        drag, pushed, a = wet * drag, wet * pushed, part * a
+    D = (D[0] - ca * a, D[1], D[2], D[3], D[4] - ca * a, D[5], D[6], D[7], D[8] - ca * a)
+    return add(f, added), D, (drag, dot(added, vi), pushed)
 
 
 @inner
@@ -188,8 +198,11 @@ def inertia_and_water(line, sea, i, z, vi, vdi, before, after, cv, ca, report):
             f, Df, GR = half_cell_water(line, i, 1.0, z, eta, w, U1, vi, b, af, after, cv, ca, report)
             F, D = add(F, f), madd(D, Df)
         if bits & BODIES:
-            f, Df = body_water(line, i, z, eta, w, U1, vi, b, af, cv, ca, report)
+            f, Df, (drag, added, pushed) = body_water(line, i, z, eta, w, U1, vi, b, af, cv, ca)
             F, D = add(F, f), madd(D, Df)
+            report[DRAG_POWER] -= drag
+            report[ADDED_MASS_POWER] -= added
+            report[WAVE_POWER] += pushed
     return F, D, GL, GR
 
 

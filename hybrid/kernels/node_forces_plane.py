@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from hybrid.kernels.compile import inner
 from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
+from hybrid.kernels.node_forces import wet_parts
 from hybrid.kernels.plane import (
     added_mass2,
     body_drag2,
@@ -23,7 +24,7 @@ from hybrid.kernels.plane import (
 )
 from hybrid.kernels.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_POWER, MASS_DAMPING_POWER, WAVE_POWER
 from hybrid.kernels.seabed import contact, pressure
-from hybrid.kernels.water import current_at, wetted, wetted_stretch
+from hybrid.kernels.water import current_at, wetted_stretch
 
 WATER = DRAG | ADDED_MASS | SURFACE | WAVES | BODIES
 Z2 = (0.0, 0.0)
@@ -78,11 +79,9 @@ def body_water2(line, i, up, z, eta, u, U1, vi, b, af, cv, ca, report):
     D = mscale2(cv, B)
     if bits & FLOW:
         D = msub2(D, outer2(1.0, (B[0] * U1[0] + B[1] * U1[1], B[2] * U1[0] + B[3] * U1[1]), up))
-    drag = dot2(f, vi)
+    drag, pushed = dot2(f, vi), 0.0
     a = line.point_added[i]
-    f = (f[0] - a * b[0], f[1] - a * b[1])
-    D = (D[0] - ca * a, D[1], D[2], D[3] - ca * a)
-    added, pushed, wet = -a * dot2(b, vi), 0.0, 1.0
+    g = (-a * b[0], -a * b[1])
     if bits & WAVES:
         x = line.point_displaced[i]
         f = (f[0] + x * af[0], f[1] + x * af[1])
@@ -91,17 +90,15 @@ def body_water2(line, i, up, z, eta, u, U1, vi, b, af, cv, ca, report):
         x = line.point_buoy[i]
         f = (f[0] + x * up[0], f[1] + x * up[1])
         pushed += x * dot2(up, vi)
-        iH = 1.0 / line.point_height[i]
-        x = (eta - z) * iH + 0.5
-        wet, _, slope = wetted(x)
-        if line.point_upright[i]:
-            wet, slope = min(max(x, 0.0), 1.0), 1.0 if 0.0 < x < 1.0 else 0.0
-        D = madd2(mscale2(wet, D), outer2(-slope * iH, f, up))
-        f = (wet * f[0], wet * f[1])
-    report[DRAG_POWER] -= wet * drag
-    report[ADDED_MASS_POWER] -= wet * added
-    report[WAVE_POWER] += wet * pushed
-    return f, D
+        wet, slope, part, change = wet_parts(line, i, z, eta)
+        D = madd2(mscale2(wet, D), outer2(1.0, (slope * f[0] + change * g[0], slope * f[1] + change * g[1]), up))
+        f, g = (wet * f[0], wet * f[1]), (part * g[0], part * g[1])
+        drag, pushed, a = wet * drag, wet * pushed, part * a
+    D = (D[0] - ca * a, D[1], D[2], D[3] - ca * a)
+    report[DRAG_POWER] -= drag
+    report[ADDED_MASS_POWER] -= dot2(g, vi)
+    report[WAVE_POWER] += pushed
+    return (f[0] + g[0], f[1] + g[1]), D
 
 
 @inner

@@ -103,7 +103,7 @@ def growing(line, reel):
 def fill_node(line, i, first, q, share):
     """Mass, loads and stiffness of node i between a cell that has `first` and one that has q; share: 1, or 0 of no cell."""
     line.mass[i] = 0.5 * (first[MASS] + share * q[MASS]) + line.point_mass[i]
-    line.force[i, 2] = -0.5 * (first[WEIGHT] + share * q[WEIGHT])
+    line.force[i, 2] = -0.5 * (first[WEIGHT] + share * q[WEIGHT]) + line.point_lift[i]
     line.damp[i] = 0.5 * (first[DAMP] + share * q[DAMP])
     line.hn[i] = 0.5 * (first[PER_LENGTH] + share * q[PER_LENGTH])
     if line.element[i]:

@@ -52,7 +52,7 @@ from hybrid.kernels.reel import (
     UNBALANCED,
     read,
 )
-from hybrid.kernels.report import FORCE_A, FORCE_B, LENGTH_OUT, PAYOUT_POWER, PAYOUT_RATE
+from hybrid.kernels.report import FORCE_A, FORCE_B, LENGTH_OUT, NET_A, PAYOUT_POWER, PAYOUT_RATE
 from hybrid.kernels.rotations import add, dot, frame, log_rotation, scale, sub
 from hybrid.kernels.winch import (
     BEGIN,
@@ -182,6 +182,8 @@ def correct_force(line, sea, ends, state, velocity, reel, report):
     more, slope = of_material(line, sea, ends, state, reel, line.h.shape[0])
     force, at = force_of_fairlead(reel, report, more)
     report[at], report[at + 1], report[at + 2] = force
+    for j in range(3):
+        report[NET_A - FORCE_A + at + j] += more[j]
     report[LENGTH_OUT], report[PAYOUT_RATE] = numbers[LENGTH], numbers[RATE]
     report[PAYOUT_POWER] = numbers[RATE] * dot(force, slope)
     numbers[FLUX] = dot(more, get3(velocity, end_of(reel)))

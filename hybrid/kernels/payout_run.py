@@ -94,10 +94,12 @@ def move_line(line, out, forward, cut, step):
     move_row(line.hn, out.hn, forward, cut, step)
     move_row(line.damp, out.damp, forward, cut, step)
     move_row(line.point_mass, out.point_mass, forward, cut, step)
+    move_row(line.point_lift, out.point_lift, forward, cut, step)
     move_row(line.point_drag, out.point_drag, forward, cut, step)
     move_row(line.point_added, out.point_added, forward, cut, step)
     move_row(line.point_buoy, out.point_buoy, forward, cut, step)
     move_row(line.point_displaced, out.point_displaced, forward, cut, step)
+    move_row(line.point_floats, out.point_floats, forward, cut, step)
     move_row(line.point_height, out.point_height, forward, cut, step)
     move_row(line.point_upright, out.point_upright, forward, cut, step)
     move_row(line.footing, out.footing, forward, cut, step)
@@ -131,6 +133,7 @@ def complete(whole, line, reel, k):
         whole.point_drag[of],
         whole.point_added[of],
     )
+    line.point_lift[i], line.point_floats[i] = whole.point_lift[of], whole.point_floats[of]
     line.point_buoy[i], line.point_displaced[i] = whole.point_buoy[of], whole.point_displaced[of]
     line.point_height[i], line.point_upright[i] = whole.point_height[of], whole.point_upright[of]
     for j in range(3):

@@ -17,6 +17,7 @@ from hybrid.kernels.report import (
     FRICTION_WORK,
     MASS_DAMPING_POWER,
     MOMENT_A,
+    NET_A,
     SEABED_ENERGY,
     SELF_FRICTION_WORK,
     STIFFNESS_DAMPING_POWER,
@@ -49,7 +50,7 @@ def find_powers(line, ends, velocity, state, report, power):
     power[6], power[7] = -report[ADDED_MASS_POWER], report[WAVE_POWER]
     for k in range(2):
         node, cell = k * n, k * (n - 1)
-        at = FORCE_A + 3 * k
+        at = NET_A + 3 * k
         if ends.held[k]:
             power[k] -= dot((report[at], report[at + 1], report[at + 2]), get3(velocity, k))
         if not ends.held[k] or ends.held[k] == JOINED:  # of a point that the line carries, the loads on it
@@ -83,12 +84,8 @@ def book_work(line, dt, report, books):
 
 
 @inner
-def pull(ends, state, report, loaded, k):
-    """Magnitude, N, of the force that holds or loads an end; of an end body the tension beside it."""
-    if loaded[k]:
-        return abs(state.T[k * (state.T.shape[0] - 1)])
+def pull(report, k):
+    """Magnitude, N, of the force of the line on what holds or loads an end, or is there."""
     at = FORCE_A + 3 * k
-    f = get3(ends.force, k)
-    if ends.held[k]:
-        f = (report[at], report[at + 1], report[at + 2])
+    f = (report[at], report[at + 1], report[at + 2])
     return math.sqrt(dot(f, f))

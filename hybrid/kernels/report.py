@@ -3,7 +3,8 @@
 The assembly of every iteration clears and writes the first `ASSEMBLED` numbers, the step the others.
 
     name                      meaning                                                          unit
-    FORCE_A, FORCE_B          resultant on the node at the start and at the end, 3 numbers     N
+    FORCE_A, FORCE_B          force of the line on what holds, carries or loads its start, its
+                              end (kernels.end_forces), 3 numbers                              N
     MOMENT_A, MOMENT_B        moment at the start and at the end, 3 numbers                    N m
     DRAG_POWER                power of the drag                                                W
     MASS_DAMPING_POWER        power lost to damping proportional to mass                       W
@@ -27,6 +28,7 @@ The assembly of every iteration clears and writes the first `ASSEMBLED` numbers,
     PAYOUT_POWER              power of the winch on the line                                   W
     STRETCH_ENERGY            energy of stretch where an axial law is no straight line         J
     USED_RHO                  spectral radius at infinity of the step                          -
+    NET_A, NET_B              resultant on the node at the start and at the end, 3 numbers     N
 """
 
 from __future__ import annotations
@@ -46,4 +48,5 @@ SELF_CONTACT_ENERGY, SELF_FRICTION_WORK = 33, 34
 LENGTH_OUT, PAYOUT_RATE, PAYOUT_POWER = 35, 36, 37
 STRETCH_ENERGY = 38
 USED_RHO = 39
-REPORT_SIZE = 40
+NET_A, NET_B = 40, 43
+REPORT_SIZE = 46

@@ -30,7 +30,7 @@ from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.generalized_alpha import before_fixed, radius_of_step, scheme
 from hybrid.kernels.newton import ASKED, FIND, FINISH, GAIN, LIMIT, NEAR, PREPARE, RADIUS, REST, TOUCH
 from hybrid.kernels.references import reader
-from hybrid.kernels.report import FORCE_A, REPORT_SIZE, SELF_FRICTION_WORK
+from hybrid.kernels.report import FORCE_A, NET_A, REPORT_SIZE, SELF_FRICTION_WORK
 from hybrid.kernels.self_contact_energy import puts_energy_in
 from hybrid.kernels.self_contact_friction import (
     GRIP,
@@ -260,6 +260,7 @@ def load_ends(line, ends, contact, report):
         if ends.held[k] != 0:
             for j in range(3):
                 report[FORCE_A + 3 * k + j] -= y[k * n, j]
+                report[NET_A + 3 * k + j] -= y[k * n, j]
 
 
 @kernel

@@ -61,10 +61,12 @@ class Line(NamedTuple):
     displaced: Floats  # (N,) kg, water displaced by half the cell, on which the pressure of waves acts
     diameter: Floats  # (N,) m, over which a cell passes through the surface
     point_mass: Floats  # (N+1,) kg, of a body at the node (part of `mass`)
+    point_lift: Floats  # (N+1,) N, buoyancy less weight of a body at the node (part of `force`)
     point_drag: Floats  # (N+1,) kg/m, rho CdA/2 of a body at the node
     point_added: Floats  # (N+1,) kg, added mass of a body at the node
     point_buoy: Floats  # (N+1,) N, buoyancy of a body at the node where it depends on the surface (else in `force`)
     point_displaced: Floats  # (N+1,) kg, water displaced by a body at the node
+    point_floats: Floats  # (N+1,) wetted part from which on a body has its added mass; less of it at a smaller one
     point_height: Floats  # (N+1,) m, over which a body passes through the surface
     point_upright: Floats  # (N+1,) 1 where a body is a cylinder that stands upright, 0 where it is a sphere
     footing: Floats  # (N+1,) m, length of cable that presses on the seabed as much as the body at the node
@@ -86,8 +88,8 @@ class Line(NamedTuple):
 
 # Of these there is one for every node; of all but what belongs to the whole line, one for every node or cell.
 NODES_OF_LINE = (
-    "s", "mass", "force", "element", "kb", "k0", "hn", "damp", "point_mass", "point_drag", "point_added", "point_buoy",
-    "point_displaced", "point_height", "point_upright", "footing",
+    "s", "mass", "force", "element", "kb", "k0", "hn", "damp", "point_mass", "point_lift", "point_drag", "point_added",
+    "point_buoy", "point_displaced", "point_floats", "point_height", "point_upright", "footing",
 )  # fmt: skip
 OF_WHOLE_LINE = ("bits", "plane", "torsion", "law", "law_table", "law_at", *TENSION_TORQUE)
 ALONG_LINE = tuple(name for name in Line._fields if name not in OF_WHOLE_LINE)
@@ -345,24 +347,11 @@ def with_waves(sea: Sea, waves: Floats, depth: float) -> Sea:
 
 def blank_line(n_cells: int) -> Line:
     """A line of `n_cells` cells without length, mass or load."""
-    node = dict.fromkeys(("force", "kb", "k0"), np.zeros((n_cells + 1, 3)))
-    cells = (
-        "h",
-        "ck",
-        "rotary",
-        "polar",
-        "drag_n",
-        "drag_t",
-        "added_n",
-        "added_t",
-        "tau",
-        "buoy",
-        "displaced",
-        "diameter",
-    )
-    cell = dict.fromkeys(cells, np.zeros(n_cells))
+    node = dict.fromkeys(NODES_OF_LINE, np.zeros(n_cells + 1))
+    node |= dict.fromkeys(("force", "kb", "k0"), np.zeros((n_cells + 1, 3)))
+    cell = {name: np.zeros(n_cells) for name in ALONG_LINE if name not in NODES_OF_LINE}
     kinds = {"element": np.zeros(n_cells + 1, np.int8), "spin": np.zeros(n_cells, np.int8), "bits": 0}
-    values: dict[str, Any] = dict.fromkeys(Line._fields, np.zeros(n_cells + 1)) | node | cell | kinds
+    values: dict[str, Any] = node | cell | kinds
     absent = {"plane": NO_PLANE, "torsion": NO_TORSION, "law": NO_LAW, "law_table": NO_TABLE, "law_at": NO_ADDRESS}
     return Line(**values | absent | {name: np.zeros(0) for name in TENSION_TORQUE})
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.assembly import JOINED
+from hybrid.kernels.accept import watch
 from hybrid.kernels.bodies import (
     LINES,
     adapt_springs,
@@ -23,11 +23,11 @@ from hybrid.kernels.bodies import (
     size_of_moves,
     start_here,
 )
-from hybrid.kernels.books import CARRIED, NOW, RATES, RHO, RHO_BEFORE, SHORTEST, STEP_BEFORE, STORED, TRY_END
+from hybrid.kernels.books import FLAGS, NOW, RATES, RHO, RHO_BEFORE, SHORTEST, STEP_BEFORE, STORED, TRY_END
 from hybrid.kernels.carried_frames import turns
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.configuration import first_bad, measure, update
-from hybrid.kernels.extremes import first_strains, force_of_line, note_extremes
+from hybrid.kernels.extremes import first_strains, note_extremes
 from hybrid.kernels.forces import FRICTION, SEABED
 from hybrid.kernels.generalized_alpha import Scheme, scheme
 from hybrid.kernels.joined_lines import solve_dense
@@ -77,7 +77,6 @@ from hybrid.kernels.node_forces import get3
 from hybrid.kernels.powers import book_work, find_powers
 from hybrid.kernels.references import caller
 from hybrid.kernels.report import (
-    FORCE_A,
     LOCAL_ERROR,
     RESIDUAL,
     RESIDUAL_NODE,
@@ -86,7 +85,6 @@ from hybrid.kernels.report import (
     SLACKEST,
     SLACKEST_CELL,
 )
-from hybrid.kernels.rotations import sub
 from hybrid.kernels.run import call_quantities, read
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
@@ -234,21 +232,6 @@ def move_joints(job, start, end):
 
 
 @inner
-def take_loads_off(line, ends, state, books, report):
-    """Leave in a report the forces of the line alone on free points, without what else is at a point it carries."""
-    for k in range(2):
-        at = FORCE_A + 3 * k
-        if ends.held[k] != JOINED:
-            continue
-        f = (report[at], report[at + 1], report[at + 2])
-        if books.loaded[k] == CARRIED:
-            f = force_of_line(line, state, books.marks, k)
-        else:
-            f = sub(f, get3(ends.force, k))
-        report[at], report[at + 1], report[at + 2] = f
-
-
-@inner
 def end_lines(tables, joints, floors, s, task, good):
     """Rates after a step of all lines, and if it is good their reports.
 
@@ -308,7 +291,6 @@ def begin_books(tables, joints, t):
             report[SELF_CONTACT_ENERGY] = ask_contact(job.contact, job.contact_table, REST)
         move_joints(job, joints[l, START], joints[l, END])
         find_powers(line, job.ends, books.velocity, new, report, books.power[0])
-        take_loads_off(line, job.ends, new, books, report)
         if books.extremes.shape[1] > 0:
             keep_report(books, report)
             first_strains(line, job.ends, new, books)
@@ -318,7 +300,7 @@ def begin_books(tables, joints, t):
 
 @inner
 def keep_books(tables, joints, dt, t):
-    """Work of a step of all lines, and extremes where they are kept; t: s, its end."""
+    """Work of a step of all lines, extremes where they are kept, and what there is to look at; t: s, its end."""
     for l in range(tables.shape[0]):
         job = read(tables[l])
         line, new, books, report = job.line, job.new, job.books, job.work.report
@@ -327,7 +309,8 @@ def keep_books(tables, joints, dt, t):
             books.power[1, k] = books.power[0, k]
         find_powers(line, job.ends, books.velocity, new, report, books.power[0])
         book_work(line, dt, report, books)
-        take_loads_off(line, job.ends, new, books, report)
+        if books.base.shape[0] > 0:
+            books.counts[FLAGS] |= watch(line, job.ends, job.old, new, books, report, t, dt)
         for i in range(books.touch.shape[1]):
             books.touch[0, i] = books.touch[2, i]
         if books.extremes.shape[1] > 0:

@@ -5,7 +5,7 @@ Sections, modules and points begin and end at base nodes, so a base cell has one
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,10 @@ from hybrid.kernels.state import Floats, Line, blank_line
 from hybrid.kernels.zone_criteria import LOAD, SMOOTH, STEP, NodeKinds, blank_kinds
 
 # Rows of `points`: what a body has; then its lift (N) and the cable that presses on the seabed as much (m).
-POINT_MASS, POINT_DRAG, POINT_ADDED, POINT_BUOY, POINT_DISPLACED, POINT_HEIGHT, POINT_UPRIGHT, LIFT, FOOTING = range(9)
+(
+    POINT_MASS, POINT_DRAG, POINT_ADDED, POINT_BUOY, POINT_DISPLACED, POINT_HEIGHT, POINT_UPRIGHT, POINT_FLOATS, LIFT,
+    FOOTING,
+) = range(10)  # fmt: skip
 
 
 class Cable(NamedTuple):
@@ -40,8 +43,8 @@ class Cable(NamedTuple):
     kappa: Floats  # (n, 3)
     EI: Floats  # N m2, mean of both axes
     w: Floats  # N/m, weight in water
-    points: Floats  # (9, n+1)
-    blank: Floats  # (9,) of nodes without a point
+    points: Floats  # (10, n+1)
+    blank: Floats  # (10,) of nodes without a point
     load: NDArray[np.int8]  # (n+1,) 1 where there is one
     turns: NDArray[np.int8]  # (n+1,) 1 where there is a swivel
     held: NDArray[np.int8]  # (2, 2) whether an element sits at the ends of a rod, and resists twist
@@ -51,11 +54,11 @@ class Cable(NamedTuple):
 def blank_cable(n: int) -> Cable:
     """A cable of nothing on n base cells."""
     z = np.zeros
-    return Cable(
-        z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z((n, 3)), z((n, 3)), z(n),
-        z(n), z((9, n + 1)), z(9), z(n + 1, np.int8), z(n + 1, np.int8), z((2, 2), np.int8),
-        np.full(2, np.inf),
-    )  # fmt: skip
+    other: dict[str, Any] = {
+        "B": z((n, 3)), "kappa": z((n, 3)), "points": z((10, n + 1)), "blank": z(10), "load": z(n + 1, np.int8),
+        "turns": z(n + 1, np.int8), "held": z((2, 2), np.int8), "springs": np.full(2, np.inf),
+    }  # fmt: skip
+    return Cable(**{name: z(n) for name in Cable._fields} | other)
 
 
 class LineJob(NamedTuple):
@@ -127,8 +130,8 @@ def fill_points(cable, of, line):
             j += 1
         line.point_mass[i] = point(cable, POINT_MASS, j)
         line.mass[i] += line.point_mass[i]
-        if j >= 0:
-            line.force[i, 2] += cable.points[LIFT, j]
+        line.point_lift[i], line.point_floats[i] = point(cable, LIFT, j), point(cable, POINT_FLOATS, j)
+        line.force[i, 2] += line.point_lift[i]
         line.point_drag[i], line.point_added[i] = point(cable, POINT_DRAG, j), point(cable, POINT_ADDED, j)
         line.point_buoy[i], line.point_displaced[i] = point(cable, POINT_BUOY, j), point(cable, POINT_DISPLACED, j)
         line.point_height[i], line.point_upright[i] = point(cable, POINT_HEIGHT, j), point(cable, POINT_UPRIGHT, j)

@@ -39,7 +39,9 @@ def line_on(
             point[name][place] = values
     force = np.zeros((n + 1, 3))
     force[:, 2] = -_to_nodes(h * material.weight[of])
-    force[place, 2] += material.lift
+    lift = np.zeros(n + 1)
+    lift[place] = material.lift
+    force[:, 2] += lift
     footing = np.full(n + 1, np.nan)
     if material.footing.size or more_bits:
         footing[:] = 0.0
@@ -57,7 +59,7 @@ def line_on(
         added_n=half * material.added_n[of], added_t=half * material.added_t[of],
         damp=_to_nodes(h * material.damp[of]), tau=material.tau[of],
         buoy=half * material.buoy[of], displaced=half * material.displaced[of], diameter=material.diameter[of],
-        footing=footing, bits=bits | (AXIAL_LAW if law_at.size else 0), torsion=torsion,
+        point_lift=lift, footing=footing, bits=bits | (AXIAL_LAW if law_at.size else 0), torsion=torsion,
         law=law, law_table=law_table, law_at=law_at, tension_torque=torque, tension_twist=twist, **point,
     )  # fmt: skip
 

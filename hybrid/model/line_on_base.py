@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 
 from hybrid.kernels.binding import Packed, Table
@@ -15,11 +17,9 @@ from hybrid.model.material import LEAST_TENSION, POINT, TENSION_FLOOR, Material
 
 lines = Packed(blank_line, given=("bits", "plane", "torsion", *TENSION_TORQUE))
 kinds_of = Packed(lambda n: blank_kinds(n, 1), given=("free",))
-# What a base cell has per length.
-PER_LENGTH = (
-    "mass", "weight", "ck", "damp", "tau", "drag_n", "drag_t", "added_n", "added_t", "buoy", "displaced", "diameter",
-    "B", "kappa",
-)  # fmt: skip
+# What a base cell has per length, under the names of the material.
+_OTHER = ("polar", "points", "springs")  # which a cable on base cells has in another form
+PER_LENGTH = tuple(x.name for x in fields(Material) if x.name in Cable._fields and x.name not in _OTHER)
 
 
 class LineOnBase:
@@ -34,7 +34,7 @@ class LineOnBase:
         load, turns = np.zeros(base.size, np.int8), np.zeros(base.size, np.int8)
         turns[material.swivel_nodes(base)] = 1
         load[place] = 1
-        self._points, self._place, self._material = np.zeros((9, base.size)), place, material
+        self._points, self._place, self._material = np.zeros((10, base.size)), place, material
         held = np.array([material.held_tangent, material.held_twist], np.int8).T.copy()
         EI, w = material.mean_bending[of], np.abs(material.submerged_weight[of])
         self._cable = Cable(
@@ -43,7 +43,7 @@ class LineOnBase:
             EI=EI,
             w=w,
             points=self._points,
-            blank=np.zeros(9),
+            blank=np.zeros(10),
             load=load,
             turns=turns,
             held=held,

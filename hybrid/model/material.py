@@ -31,8 +31,13 @@ from hybrid.scene.schema import Scene, Section
 # much as its tension straightens it.  A cable without weight or stiffness has a least one, as a part of the scale.
 TENSION_FLOOR, LEAST_TENSION = 0.2, 1e-6
 
+# Of its height, from which on the added mass of a body without mass counts in full.
+LEAST_DRAUGHT = 0.05
 SMALLEST_BODY = 0.01  # m, over which a body without volume and drag passes through the surface
-POINT = ("point_mass", "point_drag", "point_added", "point_buoy", "point_displaced", "point_height", "point_upright")
+POINT = (
+    "point_mass", "point_drag", "point_added", "point_buoy", "point_displaced", "point_height", "point_upright",
+    "point_floats",
+)  # fmt: skip
 
 
 class StretchLaw(NamedTuple):
@@ -271,6 +276,8 @@ def _points(out: Material, scene: Scene) -> None:
             height = body.height_in(rho, gravity) or 2.0 * np.sqrt(body.drag_area / np.pi) or SMALLEST_BODY
             out.points["point_height"][i] = max(out.points["point_height"][i], height)
             out.points["point_upright"][i] = float(body.shape == "cylinder")
+    floats = out.points["point_mass"] / np.maximum(out.points["point_displaced"], 1e-30)
+    out.points["point_floats"] = np.clip(floats, LEAST_DRAUGHT, 1.0)
     if scene.environment.seabed is not None:
         sinks = -(out.lift + out.points["point_buoy"])
         out.footing = np.maximum(sinks, 0.0) / pressing(scene)

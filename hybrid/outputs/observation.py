@@ -373,15 +373,14 @@ class Observation:
 
     def reaction(self, k: int) -> Floats:
         """(3, nb) N: force of the support, or of an end body, on the cable at end k; else the force applied there."""
-        b, out = self.batch, 2.0 * k - 1.0
+        b = self.batch
         held = b.held[:, k] != 0
         force = -b.report[:, FORCE_A + 3 * k : FORCE_A + 3 * k + 3].T
-        if self.shift is not None:
-            force = force - self.shift.resultants[k]
-        if held.all():
+        if self.shift is not None and held.any():
+            force = force - np.where(held, self.shift.resultants[k], 0.0)
+        if held.all() or self.loaded(k):
             return np.asarray(force)
-        given = out * self._end_tension(k) * self.at_end(self.d, k) if self.loaded(k) else b.force[:, k].T
-        return np.where(held, force, given)
+        return np.where(held, force, b.force[:, k].T)
 
     def loaded(self, k: int) -> bool:
         """Whether there is a point load at end k."""

@@ -23,7 +23,10 @@ HEIGHT = "vertical extent, for the part under water at the surface; absent: that
 Shape = Literal["sphere", "cylinder"]
 SHAPE = "how the part under water grows with the draught x of the height: sphere (3 x^2 - 2 x^3), upright cylinder (x)"
 DRAG_AREA = "drag area CdA, drag coefficient x frontal area [m^2]"
-ADDED_MASS = "mass of the fluid that moves with it [kg]"
+ADDED_MASS = (
+    "mass of the fluid that moves with it; of a body that floats: at the draught at which it floats by itself, and "
+    "deeper [kg]"
+)
 
 
 def sphere_diameter(volume: float) -> float:

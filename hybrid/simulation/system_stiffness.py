@@ -280,10 +280,7 @@ def _largest_tension(found: SystemEquilibrium, model: SystemModel, system: Syste
     marks = marks_of(system.scene_of(model.names[l]), line)
     d = state.e / np.linalg.norm(state.e, axis=1, keepdims=True)
     largest = float(state.T.max())
-    carried = system.carried(model.names[l])  # with a report that has the loads of a free point as well
     for k in (0, 1):
-        if ("start", "end")[k] in carried:
-            continue
         other = d[-k] if len(d) == 1 or marks[(1, -2)[k]] else d[(1, -2)[k]]  # no tangent is continued across a load
         t = 1.5 * d[-k] - 0.5 * other
         force = report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3] * (1.0 - 2.0 * k)

@@ -22,7 +22,7 @@ from hybrid.kernels.books import CONTROLLED, NOW, PARITY, STEP_BEFORE, TRY_END
 from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance
 from hybrid.kernels.forces import FRICTION, MASS_DAMPING, ROTARY, SELF_FRICTION, WAVES
 from hybrid.kernels.newton import EQUILIBRIUM, STEP, Task
-from hybrid.kernels.report import FORCE_A, SELF_CONTACT_ENERGY, TWIST
+from hybrid.kernels.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY, TWIST
 from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.run import blank_books, blank_job, in_space
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work
@@ -125,7 +125,8 @@ class _Job:
         work.u[:] = 0.0
         residual, force = left_over(self.line, self.sea, self.ends, self.state, self.contact, anchor, work)
         for k in np.flatnonzero(self.ends.held):
-            work.report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3] += force[k]
+            for at in (FORCE_A + 3 * k, NET_A + 3 * k):
+                work.report[at : at + 3] += force[k]
         work.report[SELF_CONTACT_ENERGY] = self.contact.energy()
         return residual
 

@@ -11,7 +11,7 @@ from hybrid.kernels.binding import Table
 from hybrid.kernels.books import Books
 from hybrid.kernels.forces import ROTARY
 from hybrid.kernels.newton import ADDRESS, ASKED, NEAR, REST
-from hybrid.kernels.report import FORCE_A, SELF_CONTACT_ENERGY
+from hybrid.kernels.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY
 from hybrid.kernels.self_contact import blank_contact_job, contact_task
 from hybrid.kernels.self_contact_friction import AT, GRIP, HELD, PIECE
 from hybrid.kernels.self_contact_law import DISTANCE, FORCE, NORMAL, WX, WY, P, Q
@@ -111,7 +111,8 @@ class SelfContact:
         self.contact.numbers[STORED] = self.contact.numbers[TRIED]
         report[SELF_CONTACT_ENERGY] = energy
         for k in np.flatnonzero(ends.held):  # 0 or 1: the first or the last node
-            report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3] += force[-k]
+            for at in (FORCE_A + 3 * k, NET_A + 3 * k):
+                report[at : at + 3] += force[-k]
         return energy
 
     @property

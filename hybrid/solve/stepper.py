@@ -15,7 +15,16 @@ from hybrid.kernels.bed import planes_under
 from hybrid.kernels.block_elimination import solve_again
 from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, WAVES
-from hybrid.kernels.report import FORCE_A, LOCAL_ERROR, RESIDUAL, SEABED_ENERGY, SLACKEST, SLACKEST_CELL, USED_RHO
+from hybrid.kernels.report import (
+    FORCE_A,
+    LOCAL_ERROR,
+    NET_A,
+    RESIDUAL,
+    SEABED_ENERGY,
+    SLACKEST,
+    SLACKEST_CELL,
+    USED_RHO,
+)
 from hybrid.kernels.seabed import normal_forces, stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.step import friction_axes
@@ -166,7 +175,8 @@ class Stepper:
         work.u[:] = 0.0
         entry.assembly(self.line, sea, held, state, 0.0, HEAVY, work)  # once more for the forces that go with them
         if force is not None:
-            work.report[FORCE_A : FORCE_A + 6] += (force[[0, -1]] * (ends.held[:, None] != 0)).ravel()
+            for at in (FORCE_A, NET_A):
+                work.report[at : at + 6] += (force[[0, -1]] * (ends.held[:, None] != 0)).ravel()
         if self.line.bits & SEABED:
             self.work.report[SEABED_ENERGY] = stored(self.line, sea, state.r)
             state.bed[:] = sea.bed

@@ -18,7 +18,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels.binding import Table
 from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
 from hybrid.kernels.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, VD, WA, WD, WORK, A, U, V, W, X
-from hybrid.kernels.books import CARRIED, NOW, Books
+from hybrid.kernels.books import NOW, Books
 from hybrid.kernels.carried_frames import ANSWER, SEAT, TURNS
 from hybrid.kernels.entry import NO_PUSH
 from hybrid.kernels.forces import FRICTION, WAVES
@@ -26,7 +26,7 @@ from hybrid.kernels.joined_lines import COLUMNS, FUNCTIONAL
 from hybrid.kernels.junctions import HANDED
 from hybrid.kernels.named_quantities import note_quantities
 from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, Limits, Task
-from hybrid.kernels.report import FORCE_A, LOCAL_ERROR, RESIDUAL, USED_RHO
+from hybrid.kernels.report import LOCAL_ERROR, NET_A, RESIDUAL, USED_RHO
 from hybrid.kernels.run import blank_books, blank_job, in_space
 from hybrid.kernels.state import Floats, State, Work, state_for
 from hybrid.kernels.step import friction_axes
@@ -323,10 +323,9 @@ class SystemSolver:
         """Put what contact does to held ends into the reports and powers of states that have just been evaluated."""
         for k, contact in self._contacts.items():
             x, books, report = self.lines[k], self.books[k], self.work[k].report
-            bears = np.where(books.loaded == CARRIED, 0, x.ends.held)  # what a line carries gets its force alone
-            before = report[FORCE_A : FORCE_A + 6].copy()
-            contact.settle(states.lines[k], x.ends._replace(held=bears), report)
-            added = (report[FORCE_A : FORCE_A + 6] - before).reshape(2, 3)
+            before = report[NET_A : NET_A + 6].copy()
+            contact.settle(states.lines[k], x.ends, report)
+            added = (report[NET_A : NET_A + 6] - before).reshape(2, 3)
             books.power[0, :2] -= np.einsum("ij,ij->i", added, books.velocity)
 
     def _around(self, x: JoinedLine, state: State, work: Work) -> None:

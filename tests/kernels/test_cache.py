@@ -33,7 +33,7 @@ line = Line(
     s=np.array([0.0, 1.0]), h=np.ones(1), ck=np.zeros(1), mass=np.zeros(2), force=np.zeros((2, 3)),
     element=np.zeros(2, np.int8), spin=np.ones(1, np.int8), kb=np.zeros((2, 3)), k0=np.zeros((2, 3)),
     hn=np.full(2, 0.5), rotary=np.ones(1), polar=np.ones(1), damp=np.zeros(2), tau=np.zeros(1),
-    **{x: np.zeros(1) for x in WET}, footing=np.zeros(2), **{x: np.zeros(2) for x in POINT}, bits=16,
+    **{x: np.zeros(1) for x in WET}, footing=np.zeros(2), point_lift=np.zeros(2), **{x: np.zeros(2) for x in POINT}, bits=16,
 )
 z = np.zeros((2, 3))
 ends = Ends(np.zeros(2, np.int8), z, np.zeros((2, 9)), z, z, z)

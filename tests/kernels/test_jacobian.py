@@ -64,7 +64,7 @@ def random_case(seed, element, bits, held=(0, 0)):
         polar=p(N), drag_n=p(N), drag_t=p(N), added_n=p(N), added_t=p(N), damp=p(N + 1), tau=0.2 * p(N),
         buoy=p(N), displaced=p(N), diameter=3.0 * p(N), point_mass=p(N + 1), point_drag=p(N + 1), point_added=p(N + 1),
         point_buoy=p(N + 1), point_displaced=p(N + 1), point_height=4.0 * p(N + 1), point_upright=np.arange(N + 1) % 2.0,
-        footing=p(N + 1), bits=bits,
+        footing=p(N + 1), point_lift=np.linspace(-1.0, 1.0, N + 1), point_floats=np.linspace(0.2, 0.9, N + 1), bits=bits,
     )  # fmt: skip
     sea = random_sea(g)
     frames = [np.linalg.qr(g.normal(size=(3, 3)))[0] for _ in range(2)]

@@ -301,13 +301,13 @@ class Plain:
 
     def reaction(self, k: int) -> Floats:
         """Force of the support, or of an end body, on the cable at end k; else the force applied there."""
+        force = -self.report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3]
         if self.ends.held[k]:
-            force = -self.report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3]
             return force if self.shift is None else force - self.shift.resultants[k]
-        first, out = (0, -1.0) if k == 0 else (-1, 1.0)
+        first = 0 if k == 0 else -1
         if not any(abs(x - self.line.s[first]) < 1e-9 * self.line.s[-1] for x in self.grid.loads):
             return self.ends.force[k].copy()
-        return np.asarray(out * self._end_tension(k) * self.d[first])
+        return np.asarray(force)
 
     def _end_tension(self, k: int) -> float:
         """Tension of the cable at end k, extrapolated from its last cells."""

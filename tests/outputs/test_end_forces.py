@@ -1,0 +1,147 @@
+"""Forces at ends that a body or the seabed carries: right at any mesh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+
+DEFECTS = Path(__file__).parents[1] / "data" / "defects"
+BED = -50.0
+CHAIN = {"length": 300, "mass": 40, "diameter": 0.08, "axial_stiffness": 1.5e8}
+RHO, G = 1025.0, 9.81
+WEIGHT = G * (40 - RHO * np.pi / 4 * 0.08**2)  # N/m, in water
+
+
+@pytest.mark.parametrize("cells", [5, 40])
+def test_the_force_of_an_end_body_is_what_acts_on_it(cells: int) -> None:
+    """A weight that hangs in a current: its drag and its weight in water, to round-off (defects/body_end_reaction)."""
+    towed = hybrid.load_scene(DEFECTS / "body_end_reaction.yaml", [f"mesh.cells={cells}"])
+    found = hybrid.static(towed)
+    drag, weight = 0.5 * 1025 * 0.23 * 0.5**2, 9.81 * (320 - 1025 * 0.083)
+    np.testing.assert_allclose(found.reaction_end[0], [drag, 0.0, -weight], rtol=1e-9, atol=1e-6)
+    assert found["h"][0] == pytest.approx(drag, rel=1e-9)
+    assert found.tension[0, -1] == pytest.approx(np.hypot(drag, weight), rel=1e-3)
+
+
+def heaved(cells: int, model: str, dimension: int = 3) -> hybrid.Result:
+    """A clump below a line in water, heaved."""
+    section = {"length": 20, "mass": 5, "diameter": 0.05, "axial_stiffness": 1e6, "bending_stiffness": 10}
+    heave = {"heave": {"amplitude": 0.4, "period": 3}, "ramp": 3}
+    return hybrid.run(
+        hybrid.validate_scene(
+            {
+                "environment": {"fluid": {"density": RHO}},
+                "cable": {"sections": [section | {"drag": {"normal": 1.2}, "added_mass": {"normal": 1}}]},
+                "ends": {
+                    "start": {"kind": "pinned", "position": [0, 0, 0], "motion": heave},
+                    "end": {"kind": "body", "mass": 60, "volume": 0.01, "drag_area": 0.1, "added_mass": 8},
+                },
+                "initial": "equilibrium",
+                "model": model,
+                "mesh": {"cells": cells},
+                "dimension": dimension,
+                "time": {"duration": 4.5, "step": 0.02},
+            }
+        )
+    )
+
+
+@pytest.mark.parametrize(("model", "dimension"), [("catenary", 3), ("rod", 2)])
+def test_in_motion_its_inertia_and_drag_are_in_it(model: str, dimension: int) -> None:
+    """Newton's law of the body, with its acceleration from three outputs; the pull of the last cell is off by 50 N."""
+    found = heaved(4, model, dimension)
+    z, dt = found.position[:, -1, 2], float(found.times[1] - found.times[0])
+    v, a = np.gradient(z, dt)[2:-2], np.gradient(np.gradient(z, dt), dt)[2:-2]
+    drag = -0.5 * RHO * 0.1 * np.abs(v) * v
+    expected = (60 + 8) * a + G * (60 - RHO * 0.01) - drag  # what pulls it up
+    assert np.ptp(expected) > 60.0
+    np.testing.assert_allclose(-found.reaction_end[2:-2, 2], expected, atol=0.02 * np.ptp(expected))
+
+
+def moored(cells: int, **more: Any) -> hybrid.Scene:
+    """A chain from an anchor on the seabed; its last 140 m hang."""
+    section = CHAIN | more.pop("section", {})
+    return hybrid.validate_scene(
+        {
+            "environment": {"fluid": {"density": RHO}, "seabed": {"z": BED, "stiffness": 1e4}},
+            "cable": {"sections": [section]},
+            "ends": {
+                "start": {"kind": "pinned", "position": [0, 0, BED]} | more.pop("start", {}),
+                "end": more.pop("end", {"kind": "pinned", "position": [286, 0, 0]}),
+            },
+            "initial": "equilibrium",
+            "model": "catenary",
+            "mesh": {"cells": cells},
+        }
+        | more
+    )
+
+
+@pytest.mark.parametrize("cells", [15, 60, 600])
+def test_an_anchor_bears_what_the_bed_does_not(cells: int) -> None:
+    """The line sinks to w/k over sqrt(T/k), and w sqrt(T/k) hangs on the anchor, not half a cell (20 m: 3.4 kN)."""
+    found = hybrid.static(moored(cells))
+    along, up = found.reaction_start[0, 0], -found.reaction_start[0, 2]
+    layer = WEIGHT * np.sqrt(-along / 1e4)
+    assert 200 < layer < 900
+    assert -up == pytest.approx(layer, abs=min(0.03 * WEIGHT * 300 / cells, 0.06 * layer))
+
+
+@pytest.mark.parametrize("clamped", [False, True])
+def test_an_anchor_of_a_rod_bears_what_its_layer_makes(clamped: bool) -> None:
+    """EI p'''' - T p'' + k p = w has the two lengths 1/r; of a pinned end w (q + p)/(p sqrt(q + 2p)), p = sqrt(k/EI),
+
+    q = T/EI, of a clamped one w sqrt(q + 2p)/p."""
+    EI = 2e4
+    section = {"bending_stiffness": EI}
+    start = {"kind": "clamped", "tangent": [1, 0, 0]} if clamped else {}
+    found = hybrid.static(moored(60, model="rod", section=section, start=start))
+    p, q = np.sqrt(1e4 / EI), -found.reaction_start[0, 0] / EI
+    length = np.sqrt(q + 2 * p) / p if clamped else (q + p) / (p * np.sqrt(q + 2 * p))
+    assert found.reaction_start[0, 2] == pytest.approx(WEIGHT * length, abs=0.1 * WEIGHT * 5)
+
+
+def test_an_anchor_beside_touchdown_and_above_the_bed() -> None:
+    """The force changes smoothly where touchdown comes to the anchor, and where this is raised."""
+    taut = [{"kind": "pinned", "position": [float(x), 0, 0]} for x in np.linspace(291, 296, 26)]
+    forces = [hybrid.static(moored(30, end=end)).reaction_start[0, 2] for end in taut]
+    assert np.abs(np.diff(forces, 2)).max() < 0.1 * np.ptp(forces)
+    heights = (-1e-6, 0.0, 1e-6, 0.1)
+    raised = [hybrid.static(moored(30, start={"position": [0, 0, BED + z]})).reaction_start[0, 2] for z in heights]
+    assert np.ptp(raised[:3]) < 1e-3 * raised[1] < raised[3] - raised[1]
+
+
+@pytest.mark.parametrize("shape", ["cylinder", "sphere"])
+def test_added_mass_acts_as_given_at_the_draught_of_a_body(shape: str) -> None:
+    """Heave of a float at its draught: 2 pi sqrt((m + a)/(rho g A)), A the slope of what it displaces there."""
+    mass, volume, height, added = 500.0, 0.8, 1.0, 300.0
+    wet = mass / (RHO * volume)
+    x = wet if shape == "cylinder" else float(np.roots([-2, 3, 0, -wet])[1].real)
+    slope = 1.0 if shape == "cylinder" else 6 * x * (1 - x)
+    stiffness = RHO * G * volume * slope / height
+    body = {"kind": "body", "mass": mass, "volume": volume, "height": height, "shape": shape, "added_mass": added}
+    up = (0.5 - x) * height
+    found = hybrid.run(
+        hybrid.validate_scene(
+            {
+                "environment": {"fluid": {"density": RHO, "surface": 0}},
+                "cable": {"sections": [{"length": 1, "mass": 0.01, "diameter": 1e-3, "axial_stiffness": 1e4}]},
+                "ends": {"start": body, "end": "free"},
+                "initial": {"kind": "straight", "origin": [0, 0, up + 0.01], "direction": [0, 0, -1]},
+                "model": "catenary",
+                "mesh": {"cells": 2},
+                "time": {"duration": 6, "step": 0.005, "rho_inf": 1},
+                "output": {"every": 0.01},
+            }
+        )
+    )
+    z = found.position[:, 0, 2] - up
+    turns = np.flatnonzero(np.diff(np.sign(z)))
+    times = found.times[turns] - z[turns] * np.diff(found.times)[turns] / np.diff(z)[turns]
+    period = 2 * float(np.mean(np.diff(times)))
+    assert period == pytest.approx(2 * np.pi * np.sqrt((mass + added) / stiffness), rel=5e-3)
