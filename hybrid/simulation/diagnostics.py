@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels.accept import LARGEST_TWIST
 from hybrid.kernels.bed import planes_under
+from hybrid.kernels.books import Books
 from hybrid.kernels.entry import sharpest
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, SELF_FRICTION
 from hybrid.kernels.report import BEND, TWIST_NODE
@@ -28,7 +29,6 @@ from hybrid.simulation.doubtful_outputs import Bounds, doubtful
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.hockling_watch import LOOP, note_hockling, note_loops
 from hybrid.simulation.section_layers import ASKEW, hidden_layer, layer_text
-from hybrid.solve.run import CompiledRun
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium
 
@@ -77,6 +77,28 @@ UNWATCHED = {"_loop": 1.0, "_writhe": np.nan, "_writhes": LOOP, "_section": Fals
 Stop = tuple[Outcome, int] | None
 
 
+class Watched(Protocol):
+    """What a run shows to the diagnostics after a step: one cable, or a line of several."""
+
+    @property
+    def t(self) -> float:
+        """Time of the state, s."""
+
+    @property
+    def state(self) -> State: ...
+
+    @property
+    def before(self) -> State:
+        """Before the last step."""
+
+    @property
+    def report(self) -> Floats:
+        """(REPORT_SIZE,) of the state (kernels.report)."""
+
+    @property
+    def books(self) -> Books: ...
+
+
 def borne_strain(model: Model) -> Floats:
     """Strain (N,) that each cell bears; infinite where it does not stretch."""
     s = model.line.s
@@ -117,26 +139,29 @@ class Diagnostics:
                 s_a, s_b = entry.s or (0.0, self._model.length)
                 self.events.event(0.0, s_a, s_b, entry.event, f"{entry.what}: {entry.why}")
 
-    def checkpoint(self, run: CompiledRun) -> dict[str, Any]:
+    def checkpoint(self, books: Books) -> dict[str, Any]:
         """What has been noted so far, and what `finish` will judge by."""
-        clock, count = run.clock, run.count
+        clock, count = books.clock, books.counts
         return {name: getattr(self, name) for name in REMEMBERED} | {
             "pulls": clock[[b.LEAST_PEAK, b.LARGEST_PEAK]].tolist(), "_rho": float(clock[b.RHO]),
             "_moved": float(clock[b.MOVED]), "_steps": int(count[b.MEASURED]),
-            "worst": run.books.worst[: min(int(count[b.MEASURED]), b.WORST)].copy(), "placed": run.books.placed,
+            "worst": books.worst[: min(int(count[b.MEASURED]), b.WORST)].copy(), "placed": books.placed,
         }  # fmt: skip
 
-    def restore(self, saved: Mapping[str, Any], run: CompiledRun) -> None:
-        """Go on as `checkpoint` has written; ValueError where that cannot be."""
+    def restore(self, saved: Mapping[str, Any], books: Books, r: Floats) -> Floats:
+        """Go on as `checkpoint` has written; ValueError where that cannot be.
+
+        r: (N+1, 3) m, where nodes are now.  Returns where base nodes were at the start, (n, 3) m.
+        """
         vars(self).update({name: saved[name] for name in REMEMBERED})
         placed, worst, steps = saved["placed"], saved["worst"], saved["_steps"]
-        if placed.shape not in (NOWHERE.shape, (run.books.base.size, 3)) or worst.shape != (min(steps, b.WORST), 4):
+        if placed.shape not in (NOWHERE.shape, (books.base.size, 3)) or worst.shape != (min(steps, b.WORST), 4):
             raise ValueError("places of another line")
-        run.books.worst[: len(worst)] = worst
-        run.clock[[b.LEAST_PEAK, b.LARGEST_PEAK]], run.clock[b.MOVED] = saved["pulls"], saved["_moved"]
-        run.count[b.MEASURED] = steps
-        run.place(placed if placed.size else run.state.r[run.books.base].copy())
-        self.watch(run)
+        books.worst[: len(worst)] = worst
+        books.clock[[b.LEAST_PEAK, b.LARGEST_PEAK]], books.clock[b.MOVED] = saved["pulls"], saved["_moved"]
+        books.counts[b.MEASURED] = steps
+        self.watch(books.clock)
+        return placed if placed.size else r[books.base].copy()
 
     def follow(self, model: Model) -> None:
         """Watch the same line with other zones."""
@@ -239,14 +264,14 @@ class Diagnostics:
             text = "rho_inf = 1 damps nothing: the tension of an inextensible cable grows a sawtooth; 0.9 keeps it away"
             self.events.event(0.0, 0.0, self._model.length, "undamped", text)
 
-    def watch(self, run: CompiledRun) -> None:
-        """Tell a run beyond which values there is something to look at."""
-        clock, model = run.clock, self._model
+    def watch(self, clock: Floats) -> None:
+        """Tell a run, by its clock, beyond which values there is something to look at."""
+        model = self._model
         warns = model.slack == "warn" or bool(model.line.bits & FRICTION)  # friction may hold a compressed line
         clock[b.BEND_LIMIT], clock[b.TWIST_LIMIT], clock[b.SCALED_JUMP] = self._bend, self._twist, self._jump
         clock[b.SLACK_LIMIT] = self._slack if warns else -np.inf
 
-    def look(self, run: CompiledRun, flags: int) -> Stop:
+    def look(self, run: Watched, flags: int) -> Stop:
         """Look at what a run has flagged in its last step (kernels.books)."""
         t, state, stop = run.t, run.state, None
         if flags & b.JUMPED:
@@ -263,17 +288,17 @@ class Diagnostics:
             stop = self.shape(t, run.report[BEND : TWIST_NODE + 1].tolist(), state)
         if flags & b.SLACKENED:
             self.tension(t, state)
-        self.watch(run)
+        self.watch(run.books.clock)
         return stop
 
-    def finish(self, run: CompiledRun) -> None:
+    def finish(self, books: Books) -> None:
         """After the last step: whether steps were too long for the motion.
 
         Of a x cos(w t) a step changes the acceleration by a w^3 dt; periods are too long by (beta - 1/6) (w dt)^2, with
         beta = 1/(1 + rho)^2 of generalized-alpha.
         """
-        low, high, moved = run.clock[[b.LEAST_PEAK, b.LARGEST_PEAK, b.MOVED]].tolist()
-        steps, rho, worst = int(run.count[b.MEASURED]), float(run.clock[b.RHO]), run.books.worst.tolist()
+        low, high, moved = books.clock[[b.LEAST_PEAK, b.LARGEST_PEAK, b.MOVED]].tolist()
+        steps, rho, worst = int(books.counts[b.MEASURED]), float(books.clock[b.RHO]), books.worst.tolist()
         hardly = moved <= HARDLY_MOVED * self._model.length and not high - low > HARDLY_MOVED * high
         if hardly or not steps or not moved > 0.0:
             return

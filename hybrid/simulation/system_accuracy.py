@@ -11,7 +11,7 @@ from __future__ import annotations
 import io
 import json
 import time as clock
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -118,9 +118,10 @@ class SystemPasses:
 
     def __init__(
         self, system: System, target: Path | io.BytesIO, moves: bool, reporter: ProgressReporter,
-        interrupted: Callable[[], bool],
+        interrupted: Callable[[], bool], notes: Sequence[tuple[str, str]] = (),
     ) -> None:  # fmt: skip
         """moves: whether its motion is computed, else its equilibrium; others as of `run_system`."""
+        self._of_results = notes
         self.system, self.target, self.moves = system, target, moves
         self._replacement = Replacement(target)
         self.reporter, self.interrupted = reporter, interrupted
@@ -193,7 +194,8 @@ class SystemPasses:
             asked = system_without_contact(asked)
         if self.moves:
             text, look = scene_text(asked), self.interrupted
-            run = run_system(asked, target, text, self.reporter, look, source, name, resolution, found, ERROR_ESTIMATE)
+            pending, notes = ERROR_ESTIMATE, self._of_results
+            run = run_system(asked, target, text, self.reporter, look, source, name, resolution, found, pending, notes)
         else:
             run = static_system(asked, target, scene_text(asked), resolution, ERROR_ESTIMATE)
         self._costs.append(clock.process_time() - begin)
@@ -448,7 +450,7 @@ def _tree(resolution: SystemResolution) -> Tree:
 
 def refine_system(
     system: System, target: Path | io.BytesIO, reporter: ProgressReporter, interrupted: Callable[[], bool],
-    source: Path | None = None, moves: bool = True,
+    source: Path | None = None, moves: bool = True, notes: Sequence[tuple[str, str]] = (),
 ) -> None:  # fmt: skip
     """Compute a system as finely as is asked, with its errors; arguments as of `SystemPasses` and `compute`."""
-    SystemPasses(system, target, moves, reporter, interrupted).compute(source)
+    SystemPasses(system, target, moves, reporter, interrupted, notes).compute(source)

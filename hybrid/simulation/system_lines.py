@@ -5,11 +5,24 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.books import CARRIED, LOG, STORED, Books
+from hybrid.errors import Outcome
+from hybrid.kernels.books import (
+    FLAGS,
+    JUMPED,
+    LEAST_PEAK,
+    LOG,
+    RELEASE_END,
+    RELEASE_START,
+    RHO,
+    STIFF,
+    STORED,
+    STRETCHED,
+    Books,
+)
 from hybrid.kernels.carried_frames import TURNS
 from hybrid.kernels.entry import sharpest
 from hybrid.kernels.forces import FRICTION, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
@@ -27,7 +40,7 @@ from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.deferred_recorder import DeferredRecorder
-from hybrid.simulation.diagnostics import REMEMBERED, Diagnostics, stretch_text
+from hybrid.simulation.diagnostics import Diagnostics, Stop, borne_strain, stretch_text
 from hybrid.simulation.envelope import Envelope, marks_of
 from hybrid.simulation.events import EventLog, energy_gains_text
 from hybrid.simulation.result_file import result_recorder
@@ -72,6 +85,16 @@ def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | N
     )  # fmt: skip
 
 
+class LineStep(NamedTuple):
+    """A line after a step, as its diagnostics look at it."""
+
+    t: float  # s
+    state: State
+    before: State
+    report: Floats
+    books: Books
+
+
 class LineResult:
     """What is recorded of one line."""
 
@@ -104,8 +127,6 @@ class LineResult:
             if isinstance(recorder, Recorder):
                 recorder.lay_by()
             self.recorder = recorder
-        loaded, bodies = model.loaded_ends, scene.ends.bodies()
-        self.carried = [k for k, end in enumerate(("start", "end")) if end in bodies and loaded[k]]
         self.books = self._own_books(state)
         self.contact: SelfContact | None = None
         self._touching = model  # for whose cells that is
@@ -125,11 +146,14 @@ class LineResult:
         nodes, marked = line.s.size, np.flatnonzero(marks)
         right = np.arange(nodes)
         right[marked] = nodes + np.arange(marked.size)
-        books = blank_books(line.h.size)
+        books, base = blank_books(line.h.size), self.model.always.astype(np.int64)
         books.loaded[:] = self.model.loaded_ends
-        books.loaded[self.carried] = CARRIED
+        books.clock[[LEAST_PEAK, RELEASE_START, RELEASE_END]] = np.inf
+        books.counts[STIFF] = self.model.inextensible
+        books.clock[RHO] = self.scene.time.rho_inf if self.scene.time is not None else 0.0
         return books._replace(
-            strains=np.zeros((nodes, 3)), marks=marks, right=right, start=begin.copy(),
+            strains=np.zeros((nodes, 3)), marks=marks, right=right, start=begin.copy(), base=base,
+            placed=begin[base], borne=1.0 + borne_strain(self.model),
             extremes=no_extremes(nodes + marked.size),
             touch=self._blank_touch(),
         )  # fmt: skip
@@ -218,9 +242,10 @@ class LineResult:
         if extremes:
             self.envelope.fold(self.model.line.s, before.extremes)
         self.follow(model)
-        same = {name: getattr(before, name) for name in ("asked", "reached", "path", "radii", "walls")}
+        names = ("asked", "reached", "path", "radii", "walls", "clock", "counts", "worst", "placed")
+        same = {name: getattr(before, name) for name in names}
         self.books = self._blank_books(self.envelope.start_of(model.line.s))._replace(**same)
-        self.books.work[:], self.books.power[:], self.books.clock[:] = before.work, before.power, before.clock
+        self.books.work[:], self.books.power[:] = before.work, before.power
         self.books.velocity[:] = before.velocity
 
     # --- steps and outputs --------------------------------------------------------------------------
@@ -235,6 +260,21 @@ class LineResult:
         pulls = float(np.linalg.norm(forces[:3])), float(np.linalg.norm(forces[3:]))
         error = float(work.report[LOCAL_ERROR])
         self._log.append((t, dt, taken.iterations, taken.correction, taken.residual, repeats, error, *pulls, cpu))
+
+    def watch(self, step: LineStep) -> None:
+        """Look at what a step has flagged; the stretch of a run to compare with is not its matter.
+
+        LineFailed where going on would make no sense.
+        """
+        flags, step.books.counts[FLAGS] = int(step.books.counts[FLAGS]), 0
+        if isinstance(self.recorder, ComparisonRecorder):
+            flags &= ~(STRETCHED | JUMPED)
+        self._stop_if(self.diagnostics.look(step, flags), step.t, step.state)
+
+    def _stop_if(self, stop: Stop, t: float | None, state: State) -> None:
+        if stop is not None:
+            detail = stretch_text(self.model, state) if stop[0] == Outcome.OVERSTRETCHED else ""
+            raise LineFailed(self.number, stop[0], t, float(self.model.line.s[stop[1]]), detail)
 
     def state_for_output(self, t: float, ends: Ends, state: State, work: Work) -> Batch:
         """A state at t (s) as outputs are made of it; both ends count as held, by their points."""
@@ -273,12 +313,7 @@ class LineResult:
 
     def judge(self, t: float | None, sharp: Sequence[float], state: State) -> None:
         """Look at a state for what its mesh does not resolve (an event) and for strain beyond what a section bears."""
-        at = t or 0.0
-        stretched = self.diagnostics.stretch(state)
-        stop = stretched or self.diagnostics.shape(at, sharp, state)
-        if stop is not None:
-            detail = stretch_text(self.model, state) if stretched else ""
-            raise LineFailed(self.number, stop[0], t, float(self.model.line.s[stop[1]]), detail)
+        self._stop_if(self.diagnostics.stretch(state) or self.diagnostics.shape(t or 0.0, sharp, state), t, state)
 
     def waiting(self) -> tuple[list[Batch], list[tuple[float, ...]], float | None]:
         """Outputs and steps that wait, and the energy that the balance counts from (J), to come back to."""
@@ -302,6 +337,8 @@ class LineResult:
 
     def close(self, t: float, status: str, message: str) -> list[tuple[float, float, float, str, str]]:
         """Record the envelope up to t (s) and the status; events as of `take_events`."""
+        if status == "complete" and self._moves and not isinstance(self.recorder, ComparisonRecorder):
+            self.diagnostics.finish(self.books)
         values = self.envelope.values(self.model.line.s, self.books.extremes, t)
         self.recorder.replace(values)
         self.envelope.note_broken(values, self.recorder.recorded(), self.events.event)
@@ -314,10 +351,11 @@ class LineResult:
 
     def checkpoint(self, work: Work, t: float) -> dict[str, Any]:
         """What the rest of the run depends on beside the state at t (s), between two steps, with no output waiting."""
-        books, noted = self.books, {name: getattr(self.diagnostics, name) for name in REMEMBERED}
+        books = self.books
         return {
             "work": books.work[0].copy(), "power": books.power[0].copy(), "stored": float(books.clock[STORED]),
-            "report": work.report.copy(), "envelope": self.envelope.checkpoint(books.extremes), "noted": noted,
+            "report": work.report.copy(), "envelope": self.envelope.checkpoint(books.extremes), 
+            "noted": self.diagnostics.checkpoint(books),
             "ends": self.model.ends.checkpoint(), "first_energy": self.observer.first_energy or 0.0,
             **({} if self.contact is None else {"self_contact": self.contact.checkpoint(t)}),
         }  # fmt: skip
@@ -329,7 +367,7 @@ class LineResult:
         work.report[:] = saved["report"]
         self.envelope.restore(saved["envelope"], books.extremes)
         books.start[:] = self.envelope.start_of(model.line.s)
-        vars(self.diagnostics).update(saved["noted"])
+        books.placed[:] = self.diagnostics.restore(saved["noted"], books, books.start)
         self.observer.first_energy = saved["first_energy"]
         if self.contact is not None:
             self.contact.restore(saved["self_contact"], t)

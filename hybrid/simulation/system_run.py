@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time as clock
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,7 +16,6 @@ from hybrid.kernels import books
 from hybrid.kernels.accept import MANY
 from hybrid.kernels.bodies import FRAME, PLACE, V
 from hybrid.kernels.cache import cache_folder
-from hybrid.kernels.report import BEND, TWIST_NODE
 from hybrid.kernels.state import Floats, state_for
 from hybrid.model.plan import output_times, parts
 from hybrid.model.system import SystemResolution, build_system
@@ -43,7 +42,7 @@ from hybrid.simulation.system_contact import (
     refuse_within_itself,
 )
 from hybrid.simulation.system_failures import Failures
-from hybrid.simulation.system_lines import LineResult
+from hybrid.simulation.system_lines import LineResult, LineStep
 from hybrid.simulation.system_points import Rotations, fields_of, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, named
@@ -64,7 +63,7 @@ from hybrid.store.writer import Recorder
 # A step that fails is repeated in halves, down to this part of it.
 SHORTEST = 2.0**-12
 _NO_ZONES: Mapping[int, DomainManager] = {}
-# Steps between two reports of the progress, and between two looks at what the mesh resolves.
+# Steps between two reports of the progress.
 LOOK = 16
 
 
@@ -74,16 +73,16 @@ class SystemRun:
     def __init__(
         self, system: System, target: Target | None, text: Text, moves: bool, kept: bool = False,
         source: Path | None = None, resolution: SystemResolution | None = None, found: Tree | None = None,
-        pending: str = "",
+        pending: str = "", notes: Sequence[tuple[str, str]] = (),
     ) -> None:  # fmt: skip
         """target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether
 
         its motion is wanted, else its equilibrium under full loads; kept: whether a file gets checkpoints; source: the
         result to go on with, from its checkpoint, in place of a start; resolution: how finely, None: as the scene asks
         for, or the checkpoint says; found: what was found before the run, for whoever goes on with its file; pending:
-        what is to come when it is complete (store.records).
+        what is to come when it is complete (store.records); notes: events (kind, text) of the whole of the run.
         """
-        self._before, self._pending = found or {}, pending
+        self._before, self._pending, self._notes = found or {}, pending, notes
         self.system, self.target, self.moves = system, target, moves
         self.kept = kept and isinstance(target, Path)
         if source is not None:
@@ -337,6 +336,8 @@ class SystemRun:
         assert self.found is not None
         refuse_within_itself(self.model, self.found, moves=True)
         begin_where_near(self)
+        for kind, text in self._notes:
+            self.recorder.event(0.0, 0.0, 0.0, kind, text)
         self._settle(self.solver)
         if self.zones is not None:
             self.zones.begin()
@@ -347,6 +348,7 @@ class SystemRun:
         for line, x, state in zip(self.lines, self.solver.lines, self.state.lines, strict=True):
             line.note_equilibrium(x, state, 0.0, self.found, self.turned)
             line.diagnostics.scheme(time.rho_inf)
+            line.diagnostics.watch(line.books.clock)
         self._output(self.solver)
         self.gather_events()
         self.other, self._between = self.state.copy(), True
@@ -370,8 +372,6 @@ class SystemRun:
             if self.failures.all and self.failures.due(step):
                 self._restart()
                 self.other = self.state.copy()
-            if self.steps % LOOK == 0:
-                self._look(self.solver)
             if self.t >= stop:
                 self._arrive(stop, step)
             self._between = True
@@ -404,7 +404,6 @@ class SystemRun:
                 model.ends.set_loads(self.t)
             self._restart()
         if any(abs(x - stop) <= SAME_STOP * step for x in self.times):
-            self._look(self.solver)
             self._output(self.solver)
 
     def finish(self, status: str = "complete", message: str = "") -> None:
@@ -490,6 +489,9 @@ class SystemRun:
             both = zip(self.state.lines, self.other.lines, strict=True)
             for line, states, work in zip(self.lines, both, solver.work, strict=True):
                 line.log(t, self.last_step, taken, repeats, *states, work, cpu)
+            for line, new, old, work in zip(self.lines, self.state.lines, self.other.lines, solver.work, strict=True):
+                if line.books.counts[books.FLAGS]:
+                    line.watch(LineStep(t, new, old, work.report, line.books))
             if zones is not None:
                 zones.accepted(self.last_step)
             if any(line.nears_itself for line in self.lines):
@@ -530,24 +532,29 @@ class SystemRun:
         if self.target is None and lengths.tiny >= GIVE_UP:
             raise LineFailed(k, Outcome.COLLAPSED, self.t, s, text)
 
-    def _look(self, solver: SystemSolver) -> None:
-        """Whether meshes resolve the lines, and sections bear them."""
-        for line, state, work in zip(self.lines, self.state.lines, solver.work, strict=True):
-            line.judge(self.t, work.report[BEND : TWIST_NODE + 1].tolist(), state)
-
 
 def run_system(
     system: System, target: Target | None, text: str, reporter: ProgressReporter,
     interrupted: Callable[[], bool], source: Path | None = None, name: str = RESULT,
     resolution: SystemResolution | None = None, found: Tree | None = None, pending: str = "",
+    notes: Sequence[tuple[str, str]] = (),
 ) -> SystemRun:  # fmt: skip
     """Compute the motion of a system into a file, into memory, or (target None) to be compared with.
 
     source: what to go on with; name: of the pass;
-    resolution: how finely, None: as the scene asks for; found, pending: as of `SystemRun`.
+    resolution: how finely, None: as the scene asks for; found, pending, notes: as of `SystemRun`.
     """
     run = SystemRun(
-        system, target, text, moves=True, kept=True, source=source, resolution=resolution, found=found, pending=pending
+        system,
+        target,
+        text,
+        moves=True,
+        kept=True,
+        source=source,
+        resolution=resolution,
+        found=found,
+        pending=pending,
+        notes=notes,
     )
     reporter.begin(name, run.resolution.one)
     run.record_motion(reporter, interrupted)

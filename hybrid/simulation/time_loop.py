@@ -115,7 +115,7 @@ class TimeLoop:
         self._stop_if(self.diagnostics.still(run.model.ends.values, run.state))
         self._vibration.begin(run.run.clock)
         self.diagnostics.scheme(run.rho)
-        self.diagnostics.watch(run.run)
+        self.diagnostics.watch(run.run.clock)
         self._settle()
         self._checkpoint()
 
@@ -149,7 +149,7 @@ class TimeLoop:
         """After the last step: the envelope, what is to be said of all of the run, and limits that are broken."""
         run = self.run
         self.write_envelope()
-        self.diagnostics.finish(run.run)
+        self.diagnostics.finish(run.run.books)
         if run.envelope is not None:
             run.envelope.note_broken(run.envelope_values(), self.recorder.recorded(), run.events.event)
         count_iterations(run)
@@ -438,12 +438,12 @@ class TimeLoop:
         """Forget what has been noted since `remembered`."""
         vars(self.diagnostics).update(noted["diagnostics"])
         vars(self.run).update(noted["run"])
-        self.diagnostics.watch(self.run.run)
+        self.diagnostics.watch(self.run.run.clock)
 
     def checkpoint(self) -> dict[str, Any]:
         """What the rest of the run depends on, between two steps."""
         return checkpoint(self.run) | {
-            "watch": self.diagnostics.checkpoint(self.run.run), "cpu": clock.process_time() - self._cpu,
+            "watch": self.diagnostics.checkpoint(self.run.run.books), "cpu": clock.process_time() - self._cpu,
             "first_energy": self.observer.first_energy or 0.0, "vibration": self._vibration.checkpoint(),
         } | self._first_places()  # fmt: skip
 
@@ -457,7 +457,7 @@ class TimeLoop:
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue as `checkpoint` has said; ValueError or ResultError where that cannot be."""
-        mine = {"watch": self.diagnostics.checkpoint(self.run.run), "cpu": 0.0, "first_energy": 0.0}
+        mine = {"watch": self.diagnostics.checkpoint(self.run.run.books), "cpu": 0.0, "first_energy": 0.0}
         mine |= {name: np.full_like(x, np.nan) for name, x in self._first_places().items()}
         restore(self.run, {name: x for name, x in saved.items() if name not in (*mine, "vibration")})
         self._vibration.restore(saved.get("vibration"), self.run.run.clock)
@@ -473,4 +473,5 @@ class TimeLoop:
             self.observer.quantities.first[:] = found["first_places"]
         if self.observer.quantities is not None and "first_turns" in found:
             self.observer.quantities.turns[:] = found["first_turns"]
-        self.diagnostics.restore(found["watch"], self.run.run)
+        run = self.run.run
+        run.place(self.diagnostics.restore(found["watch"], run.books, run.state.r))
