@@ -81,6 +81,21 @@ def test_what_needs_no_change_holds_as_it_is(tmp_path: Path) -> None:
 def test_every_proof_of_a_change_holds(copy: Path) -> None:
     cache = {"HYBRID_CACHE_DIR": str(copy / "cache"), "NUMBA_OPT": "1"}  # compiled once, run for a moment
     prove(blocks("python")[UNCHANGED:], copy, copy, **cache)
+    walk = [
+        "-m",
+        "pytest",
+        "-q",
+        "-n",
+        "0",
+        "-p",
+        "no:cacheprovider",
+        str(ROOT / "tests/model/test_fields_of_a_line.py"),
+    ]
+    done = subprocess.run(
+        [sys.executable, "-P", *walk], cwd=copy, env=os.environ | {"PYTHONPATH": str(copy)} | cache, capture_output=True,
+        text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, f"a field that is not carried: {done.stdout}"
 
 
 def test_there_is_a_proof_for_every_seam() -> None:
