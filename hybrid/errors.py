@@ -226,14 +226,16 @@ class ComputationError(HybridError):
     """The computation stopped.
 
     `t` is the time in s (None in statics), `s` the arc length in m where it showed
-    first, `snapshot` the file that holds the last good state (or None).
+    first, `snapshot` the file that holds the last good state (or None); `line_name` the
+    line of a system of several ("": one cable, or a point).
     """
 
     def __init__(
         self, outcome: Outcome, t: float | None, s: float | None, detail: str = "", snapshot: Path | None = None,
-        first: str = "",
+        first: str = "", line_name: str = "",
     ) -> None:  # fmt: skip
         """first: to try before the remedy of the outcome."""
+        self.line_name = line_name
         self.outcome, self.t, self.s, self.detail, self.snapshot = outcome, t, s, detail, snapshot
         place = [f"{name} = {x:.6g} {unit}" for name, x, unit in (("t", t, "s"), ("s", s, "m")) if x is not None]
         lines = [f"{outcome.cause} ({', '.join(place)})" if place else outcome.cause]

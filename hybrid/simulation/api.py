@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hybrid.adapt.user_criterion import UserCriterion
-from hybrid.errors import ResultError, SceneError
+from hybrid.errors import ComputationError, ResultError, SceneError
 from hybrid.model.model_costs import NAMED, REST, ModelChoice, with_model
 from hybrid.model.resolution import (
     Resolution,
@@ -38,7 +38,7 @@ from hybrid.simulation.first_use import OF_LINES, compile_beside, kernels_of
 from hybrid.simulation.interrupts import interrupts
 from hybrid.simulation.layer_mesh import layered
 from hybrid.simulation.model_choice import surveyed
-from hybrid.simulation.passes import Passes, free_in
+from hybrid.simulation.passes import Passes, emptied, free_in
 from hybrid.simulation.progress import (
     ESTIMATION,
     Listener,
@@ -47,6 +47,7 @@ from hybrid.simulation.progress import (
     tell_of_compiling,
 )
 from hybrid.simulation.restart import remaining_run, remaining_system
+from hybrid.simulation.rods_where_slack import CHOSEN, rods_instead_of_slack, rods_of_system
 from hybrid.simulation.static_case import StaticCase
 from hybrid.store.array_recorder import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target
@@ -99,7 +100,16 @@ def run(
     with locked(_path(output)), _supervised(case, progress):
         if isinstance(target, Path):
             beside(target).unlink(missing_ok=True)  # of a run that was cut off
-        Passes(case, target).compute()
+        try:
+            Passes(case, target).compute()
+        except ComputationError as error:
+            instead = rods_instead_of_slack(scene, error)
+            if instead is None:
+                raise
+            emptied(target, error)
+            case.scene, case.late_file = instead.scene, None
+            case.notes.append((CHOSEN, instead.text))
+            Passes(case, target).compute()
     return written_result(target, case.late_file)
 
 
@@ -211,12 +221,23 @@ def _move_lines(system: System, target: Target, progress: bool | Listener, sourc
     duration, listener = system.require_time().duration, listener_of(progress)
     tell_of_compiling(listener, OF_LINES)
     with interrupts() as stopped, ProgressReporter(listener, duration) as reporter:
-        if is_refined(system, moves=True):
-            assert not isinstance(target, MemoryTarget), "errors are written into a file"
-            refine_system(system, target, reporter, stopped, source)
-            return
+        notes: list[tuple[str, str]] = []
         pending = ERROR_ESTIMATE if system.output.errors else ""
-        run_system(system, target, scene_text(system), reporter, stopped, source, pending=pending)
+        while True:
+            try:
+                if is_refined(system, moves=True):
+                    assert not isinstance(target, MemoryTarget), "errors are written into a file"
+                    refine_system(system, target, reporter, stopped, source, notes=notes)
+                    return
+                run_system(system, target, scene_text(system), reporter, stopped, source, pending=pending, notes=notes)
+                break
+            except ComputationError as error:
+                instead = rods_of_system(system, error) if source is None else None
+                if instead is None:
+                    raise
+                emptied(target, error)
+                system = instead.system
+                notes.append((CHOSEN, instead.text))
         if system.output.errors:
             assert not isinstance(target, MemoryTarget), "errors are written into a file"
             from hybrid.simulation.system_errors import write_system_errors

@@ -110,6 +110,7 @@ class Case:
         # Whether contact with itself is computed in runs to compare with: where it is asked for, or the line has
         # touched itself in a result.  Before, coarse cells would meet where those of the result do not.
         self.touches_itself = bool(scene.contact.self)
+        self.notes: list[tuple[str, str]] = []  # events (kind, text) of the whole of every result
         self._unwanted = threading.Event()  # what runs to compare with still compute
 
     # --- results --------------------------------------------------------------------------------
@@ -148,6 +149,8 @@ class Case:
             len(output_times(self.scene)), kept, late, ERROR_ESTIMATE if kept else "", reasons_at_start(switching),
         )  # fmt: skip
         recorder.files = self._files
+        for kind, text in self.notes:
+            recorder.event(0.0, 0.0, model.length, kind, text)
         if switching is not None and switching.manager.held:
             recorder.event(0.0, 0.0, model.length, "zones fixed", ZONES_FIXED)
         return loop, recorder, equilibrium

@@ -114,7 +114,7 @@ class Passes:
             failed = str(error).splitlines()[0]
             if case.late_file is not None:
                 case.late_file.drop()
-            _emptied(target)
+            emptied(target, error)
             compute = FinerResult(target, self._anew, self._finer)
         if control.choice.kind != "catenary" or not failed:
             return result, errors
@@ -207,11 +207,11 @@ def free_in(scene: Scene) -> Free:
     return Free(mesh_is_free(scene), steps, zones_are_free(scene) and not follows, follows)
 
 
-def _emptied(target: Path | io.BytesIO) -> None:
+def emptied(target: Target, error: ComputationError) -> None:
     """Drop what a run has left that failed and is made again with another model."""
     if isinstance(target, io.BytesIO):
         target.seek(0)
         target.truncate()
-        return
-    for left in (target, target.with_suffix(".snapshot.npz")):
-        left.unlink(missing_ok=True)
+    left = [target, target.with_suffix(".snapshot.npz")] if isinstance(target, Path) else []
+    for path in [*left, *([] if error.snapshot is None else [error.snapshot])]:
+        path.unlink(missing_ok=True)

@@ -113,4 +113,5 @@ def named(failed: LineFailed, model: SystemModel, first: str = "") -> Computatio
     """The same with the name of the line in its detail; first: to try before the usual remedy."""
     where = f"line {model.names[failed.line]}" if failed.line >= 0 else "the points"
     detail = f"{where}; {failed.detail}" if failed.detail else where
-    return ComputationError(failed.outcome, failed.t, failed.s, detail, first=first)
+    name = model.names[failed.line] if failed.line >= 0 else ""
+    return ComputationError(failed.outcome, failed.t, failed.s, detail, first=first, line_name=name)

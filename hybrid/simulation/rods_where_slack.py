@@ -1,0 +1,85 @@
+"""Rods in place of a catenary that nobody asked for, where it goes into compression in a motion.
+
+A line without bending stiffness is a catenary where its scene names no model, and no catenary carries compression.  So
+that the choice of a model is never what a run stops for, such a run begins anew with rods, whose sections without
+bending stiffness get EI = w l^3, with the submerged weight w per length and a hundredth of the line l, as long as the
+cells of a mesh that is not given: under its weight the line then bends over one cell, which is as sharp as catenaries
+show a bend.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from hybrid.errors import ComputationError, Outcome
+from hybrid.model.payout import payout_of
+from hybrid.scene.analysis import RodModel
+from hybrid.scene.cable import Section
+from hybrid.scene.schema import Environment, Scene
+from hybrid.scene.system import System
+
+CHOSEN = "model chosen"  # of the event that says so
+CELLS = 100  # of a mesh that is not given
+# Of the weight in vacuum at the earth's surface: what a line that floats, or has no weight, counts as having.
+LEAST_WEIGHT = 1e-2
+GRAVITY = 9.81  # m/s2
+
+
+class Instead(NamedTuple):
+    """What is computed in place of a scene, and the text of the event."""
+
+    scene: Scene
+    text: str
+
+
+class SystemInstead(NamedTuple):
+    """The same of several lines."""
+
+    system: System
+    text: str
+
+
+def rods_instead_of_slack(scene: Scene, error: ComputationError) -> Instead | None:
+    """A scene with rods in place of catenaries that stood for no model; None: they did not, or did not go slack."""
+    named = "model" in scene.model_fields_set or scene.solver != "elimination" or payout_of(scene) is not None
+    if error.outcome != Outcome.SLACK or error.t is None or named or scene.model.kind != "catenary":
+        return None
+    sections, given = _stiffened(scene.cable.sections, scene.environment)
+    cable = scene.cable.model_copy(update={"sections": sections})
+    return Instead(scene.model_copy(update={"cable": cable, "model": RodModel()}), _text("the line", error, given))
+
+
+def rods_of_system(system: System, error: ComputationError) -> SystemInstead | None:
+    """The same of the line of a system that an error names."""
+    line = system.lines.get(error.line_name)
+    if error.outcome != Outcome.SLACK or error.t is None or line is None or line.model is not None:
+        return None
+    sections, given = _stiffened(line.sections, system.environment)
+    other = line.model_copy(update={"sections": sections, "model": RodModel()})
+    lines = {name: other if name == error.line_name else x for name, x in system.lines.items()}
+    return SystemInstead(system.model_copy(update={"lines": lines}), _text(f"line {error.line_name}", error, given))
+
+
+def _stiffened(sections: tuple[Section, ...], around: Environment) -> tuple[tuple[Section, ...], list[float]]:
+    """Sections that bend, and the bending stiffness of those that had none, N m2."""
+    length = sum(x.length for x in sections) / CELLS
+    density = around.fluid.density if around.fluid is not None else 0.0
+    found, given = [], []
+    for x in sections:
+        if not x.weakest_bending:
+            in_water = around.gravity * (x.mass - density * 0.25 * math.pi * (x.diameter or 0.0) ** 2)
+            given.append(max(abs(in_water), LEAST_WEIGHT * GRAVITY * x.mass) * length**3)
+            x = x.model_copy(update={"bending_stiffness": given[-1]})
+        found.append(x)
+    return tuple(found), given
+
+
+def _text(what: str, error: ComputationError, given: list[float]) -> str:
+    """What the event says."""
+    stiffness = " and ".join(f"{x:.3g}" for x in dict.fromkeys(given))
+    return (
+        f"rods: as a catenary, which stands for no model where sections have no bending stiffness, {what} went into "
+        f"compression at t = {error.t:.4g} s, s = {error.s or 0.0:.4g} m, and the run began anew; sections without "
+        f"bending_stiffness have {stiffness} N m^2, by which they bend over a hundredth of the line: give theirs"
+    )
