@@ -192,6 +192,6 @@ def test_far_from_the_origin():
 def _ends(offset):
     position = [float(x) for x in offset]
     return {
-        "start": {"kind": "clamped", "position": position, "tangent": [0.2, 0.1, -1]},
+        "start": {"kind": "clamped", "position": position, "tangent": [0.2, 0.1, -1], "normal": [0, 1, 0]},
         "end": {"kind": "free", "force": [6.0, 3.0, -4.0]},
     }

@@ -183,6 +183,9 @@ class Contact(Table):
 
 # Strain that a section bears which says nothing: beyond that of steel, chain and most ropes.
 USUAL_STRAIN = 0.05
+# Stress, Pa, over the cross-section of `diameter`, that no cable bears: wire ropes break at 1.1 to 1.3 GPa of it, ropes
+# of the strongest fibres at 1.2, the hardest drawn wire and carbon rods at 3.
+STRONGEST = 3e9
 
 
 # Young's modulus of steel, Pa.
@@ -236,7 +239,8 @@ class Section(Table):
     max_strain: Positive | None = Field(
         default=None,
         description="strain that the section bears, stretched or compressed; a computation that exceeds it stops; "
-        "absent: 0.05, or the last of tension_strain; an inextensible section has none [-]",
+        "absent: the last of tension_strain, or 0.05, or with a `diameter` what 3 GPa over its area make of it, if "
+        "that is less, because no wire, fibre rope or rod bears more; an inextensible section has none [-]",
     )
     bending_stiffness: OneOrTwo | None = Field(
         default=None,
@@ -309,10 +313,17 @@ class Section(Table):
 
     @property
     def strain_limit(self) -> float:
-        """Strain that is borne, where the section stretches: max_strain, or without one the last of a table."""
+        """Strain that is borne, where the section stretches: max_strain, or without one the last of a table, or what
+
+        STRONGEST over its cross-section makes of it, if that is less than usual.
+        """
         if self.max_strain is not None:
             return self.max_strain
-        return USUAL_STRAIN if self.tension_strain is None else rows_of(self.tension_strain)[-1][0]
+        if self.tension_strain is not None:
+            return rows_of(self.tension_strain)[-1][0]
+        if self.diameter is None or self.axial_stiffness is None:
+            return USUAL_STRAIN
+        return min(USUAL_STRAIN, STRONGEST * 0.25 * math.pi * self.diameter**2 / self.axial_stiffness)
 
     @property
     def borne(self) -> float:

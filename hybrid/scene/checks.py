@@ -343,6 +343,28 @@ def _turns_are_held(cable: Cable, ends: Ends, model: Model, solver: str) -> Iter
                 yield Finding(("cable", "sections", i, "torsional_stiffness"), expected, "add it")
 
 
+def _axes_are_given(cable: Cable, ends: Ends, model: Model, dimension: int | None) -> Iterator[Finding]:
+    """Where two bending stiffnesses differ and an end holds the twist, the scene says where their axes point.
+
+    A clamp alone says nothing of it, and an axis of the world in its place would bend the same cable otherwise when the
+    scene is turned.
+    """
+    if dimension == 2 or isinstance(model, CatenaryModel | CorrectedModel):
+        return
+    held = [name for name, end in ends.named().items() if end.holds_twist]
+    if not held or any(end.gives_axes for end in ends.both):
+        return
+    for i, section in enumerate(cable.sections):
+        if section.anisotropic:
+            expected = (
+                f"the direction of the material axis a1 at this clamp, because cable.sections[{i}].bending_stiffness "
+                "differs about a1 and a2, and nothing else says where these point"
+            )
+            fix = "add `normal: [x, y, z]` beside the tangent, or a `swivel` that lets it turn"
+            yield Finding(("ends", held[0], "normal"), expected, fix)
+            return
+
+
 def _mesh_spans(cable: Cable, mesh: Mesh | None) -> Iterator[Finding]:
     if mesh is None or mesh.nodes is None:
         return
@@ -426,6 +448,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _in_a_plane,
     _touches_itself,
     _turns_are_held,
+    _axes_are_given,
     _mesh_spans,
     _layers_are_meshed,
     _output_on_cable,

@@ -31,7 +31,10 @@ from hybrid.scene.motion_tables import TURNS, Motion
 from hybrid.scene.payout import Payout
 
 _TANGENT = "direction of increasing s at this end, inertial frame; any length [-]"
-_NORMAL = "direction of the material axis a1 at this end; only its part across the tangent counts; any length [-]"
+_NORMAL = (
+    "direction of the material axis a1 at this end; only its part across the tangent counts; any length; needed at one "
+    "end where two bending stiffnesses differ and a clamp holds their axes [-]"
+)
 _TURNS = (
     "turns about the tangent by which this end is twisted against the other, right-handed, counted from `normal`, or "
     "from where the shape carries the frame; may be a fraction; both ends must hold the twist [-]"
@@ -120,6 +123,11 @@ class EndTable(Table):
     def fixes_frame(self) -> bool:
         """Whether the scene gives the orientation of the material frame at the end, and the end holds it there."""
         return self.holds_twist and self.held_normal is not None
+
+    @property
+    def gives_axes(self) -> bool:
+        """Whether it is known from the end where the material axes point."""
+        return self.fixes_frame
 
     @property
     def prescribed_motion(self) -> Motion | None:

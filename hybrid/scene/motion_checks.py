@@ -149,7 +149,7 @@ def _too_fast(cable: Cable, motion: Motion, record: Record | None) -> Iterator[F
     """
     waves = [(math.sqrt(s.stiffness / s.mass) if s.stiffness else STEEL_WAVES, s) for s in cable.sections]
     c, most = max(((c, s.strain_limit) for c, s in waves), key=lambda pair: pair[0] * pair[1])
-    limit = f"at most {100 * most:g} % of stretch (max_strain)"
+    limit = f"at most {100 * most:.4g} % of stretch (max_strain)"
 
     def stretch(speed: float, acceleration: float) -> float:
         return min(speed / c, acceleration * cable.length / c**2)

@@ -52,6 +52,14 @@ class _JoinedPin(Pinned):
         return False
 
 
+class _CarriedPin(Pinned):
+    """A line that is clamped to a free point, before the axes of this are known: other lines may give them."""
+
+    @property
+    def gives_axes(self) -> bool:
+        return True
+
+
 class _JoinedClamp(Clamped):
     """The same of an end that is clamped there."""
 
@@ -377,7 +385,8 @@ class System(Table):
             if key in carrying and isinstance(point, FreePoint):
                 ends[key] = point.end.model_copy(update={"initial_guess": first[key]} if point.is_body else {})
             elif held is None:
-                kind = _JoinedPin if self.may_leave(name, key) else Pinned
+                carried = _CarriedPin if self.clamp(name, key) is not None else Pinned
+                kind = _JoinedPin if self.may_leave(name, key) else carried
                 ends[key] = kind(position=place, motion=motion)
             else:
                 clamp = getattr(line.connections, key)

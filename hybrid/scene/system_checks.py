@@ -143,6 +143,9 @@ def _of_system(system: System, name: str, found: Finding) -> Finding:
     elif at[:1] == ("ends",) and len(at) > 1:
         point = getattr(line, str(at[1]))
         rest = at[2:]
+        if rest[:1] == ("normal",):
+            at = ("lines", name, "connections", *at[1:])
+            return Finding(at, found.expected.replace("cable.", f"lines.{name}."), found.fix, found.given)
         if isinstance(system.points[point], FreePoint) and rest:
             rest = ({"position": "initial_guess", "thrust": "force"}.get(str(rest[0]), rest[0]), *rest[1:])
         at = ("points", point, *rest)

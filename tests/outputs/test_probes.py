@@ -54,7 +54,7 @@ def hanging(model: str, *loads: dict[str, Any]) -> dict[str, Any]:
                "torsional_stiffness": 1e-2, "damping": {"stiffness": 0.001}}  # fmt: skip
     if model != "rod":
         section["bending_stiffness"] = 1e-3
-    held = {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, -1]}
+    held = {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, -1], "normal": [1, 0, 0]}
     return {
         "cable": {"sections": [section], "attachments": list(loads)},
         "ends": {"start": held | {"motion": ACROSS | {"ramp": 16.0}}, "end": "free"},
