@@ -90,8 +90,8 @@ def _layers(model: Model, state: State, turns: Floats) -> Iterator[tuple[float, 
     near = 1e-9 * model.length
     last = line.s.size - 1
     places = [node for node, held in zip((0, last), cable.held_tangent, strict=True) if held]
-    inner = {int(np.argmin(np.abs(line.s - at))) for at in model.attached} - {0, last}
-    changes = {int(np.argmin(np.abs(line.s - at))) for at in cable.bounds[1:-1]}
+    inner = {*np.searchsorted(line.s, np.array(model.attached) - near).tolist()} - {0, last}
+    changes = {*np.searchsorted(line.s, cable.bounds[1:-1] - near).tolist()}
     for node in sorted(changes - {0, last}):
         EI = cable.weakest_bending[cable.piece(line.s[node] + np.array([-near, near]))]
         if EI.max() > MORE * EI.min() > 0.0:
