@@ -65,6 +65,7 @@ def test_cost_of_contact_that_is_not_there(name: str) -> None:
 def test_cost_while_nothing_is_near() -> None:
     """The watch of a tether that is bent, and never within 100 diameters of itself: 120 s in 600 equal steps."""
     fixed = ("model=rod", "mesh={cells: 1000}", "accuracy=null", "time={duration: 120, step: 0.2}")
-    both = [min(ran("long_s_tether", *fixed, *more, times=1)[0] for _ in range(3)) for more in ((), (ALONE,))]
+    each = [[ran("long_s_tether", *fixed, *more, times=1)[0] for more in ((), (ALONE,))] for _ in range(6)]
+    both = np.min(each, axis=0)  # in turn, so that what else the machine does counts for both
     print(f"\nwatched: {both[0]:.2f} s of CPU, without contact {both[1]:.2f}: {both[0] / both[1]:.3f}")
     assert both[0] < 1.02 * both[1]
