@@ -498,15 +498,16 @@ def sinker(what: str, steps: int, times: float) -> tuple[Scene, float, float, fl
 
 
 def heaving_body(added_mass: float) -> tuple[Scene, float, float]:
-    """A body half under water with a wire below it: small heave at omega^2 = rho g V (3/2)/height / (m + added/2).
+    """A body half under water with a wire below it: small heave at omega^2 = rho g V (3/2)/height / (m + added).
 
-    3/2 is the slope of the wetness law in the middle: the water-plane area is 3/2 V/height; half of the added mass is
-    wetted, and only that counts (docs/theory.md).  1e-5: the part of the wire that leaves the water.
-    rho_inf = 1, to be read with `problems.poles`.  Returns the scene, omega, the speed for 1e-4 of the height.
+    3/2 is the slope of the wetness law in the middle: the water-plane area is 3/2 V/height; at its draught the added mass
+    is the given one (docs/theory.md).  1e-5: the part of the wire that leaves the water.
+    rho_inf = 1, to be read with `problems.poles`.  Returns the scene, omega, the speed for 1e-5 of the height, above which
+    the added mass falls.
     """
     volume, extent = 1.0, 1.5
     mass = 0.5 * RHO * volume
-    omega = math.sqrt(RHO * G * volume * 1.5 / extent / (mass + 0.5 * added_mass + 4.0 * WIRE_M))
+    omega = math.sqrt(RHO * G * volume * 1.5 / extent / (mass + added_mass + 4.0 * WIRE_M))
     body = {"kind": "body", "mass": mass, "volume": volume, "height": extent, "added_mass": added_mass}
     step = 2 * math.pi / omega / 100
     what = sea_scene(
@@ -514,7 +515,7 @@ def heaving_body(added_mass: float) -> tuple[Scene, float, float]:
         initial={"kind": "straight", "direction": [0, 0, -1], "origin": ORIGIN},
         time={"duration": 400 * step, "step": step, "rho_inf": 1.0},
     )  # fmt: skip
-    return what, omega, 1e-4 * extent * omega
+    return what, omega, 1e-5 * extent * omega
 
 
 def riding_body(period: float) -> tuple[Scene, float]:

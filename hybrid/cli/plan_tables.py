@@ -206,7 +206,7 @@ def _cpu(plan: Plan | SystemPlan, touches: bool) -> str:
     most = plan.most_seconds
     notes = [f"up to {span(most)} if finer runs are needed"] if most is not None and most > 1.05 * plan.seconds else []
     notes += ["several times as much while it touches itself"] if touches else []
-    notes += [] if plan.measured else ["estimated from tables: the kernels are not compiled yet"]
+    notes += [] if plan.measured else ["estimated from tables: no step was tried"]
     return f"about {span(plan.seconds)} of CPU for all runs" + (f" ({'; '.join(notes)})" if notes else "")
 
 

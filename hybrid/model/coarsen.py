@@ -21,9 +21,10 @@ FOLDED = -1.0 + 1e-6  # cosine of the turn of a chord that is turned right back
 
 
 def coarser(model: Model) -> Model | None:
-    """The model with a quarter of its cells and with its own start; None: it has few already, or folds in that start.
+    """The model with a quarter of its cells and with its own start; None: there is none.
 
-    Zones, sections and point loads keep their nodes.
+    It has few cells already, all of its nodes must stay, or it folds in that start.  Zones, sections and point loads
+    keep their nodes.
     """
     line, cable = model.line, model.cable
     if model.cells <= FEWEST:
@@ -37,6 +38,8 @@ def coarser(model: Model) -> Model | None:
     at = np.flatnonzero(kept)
     rod = line.spin[at[:-1]] == 1
     bits, turns = line.bits & (SEABED | FRICTION), bool(line.bits & ROTARY)
+    if at.size == line.s.size:  # every node stays, as beside so many point loads
+        return None
     new = line_on(cable, line.s[at], rod, bits, sections_turn=turns)
     if line.bits & PLANAR:
         new = planar(new, line.plane)

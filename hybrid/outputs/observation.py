@@ -382,6 +382,16 @@ class Observation:
             return np.asarray(force)
         return np.where(held, force, b.force[:, k].T)
 
+    def line_force(self, k: int) -> Floats:
+        """(3, nb) N: the same, but that of an end with a body is from the tension and direction of the line.
+
+        What leaving bending out changes there follows from the line: the loads on the body are those of the run.
+        """
+        if not self.loaded(k):
+            return self.reaction(k)
+        pull = (2.0 * k - 1.0) * self._end_tension(k) * self.at_end(self.d, k)
+        return np.asarray(np.where(self.batch.held[:, k] != 0, self.reaction(k), pull))
+
     def loaded(self, k: int) -> bool:
         """Whether there is a point load at end k."""
         s = self.line.s

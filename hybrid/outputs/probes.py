@@ -156,7 +156,7 @@ def model_errors(plain: Observation, corrected: Observation) -> dict[str, Floats
         "bending_moment": np.abs(corrected.bending_moment - plain.bending_moment),
     }
     for k, name in enumerate(("end_force_start", "end_force_end")):
-        out[name] = size((corrected.reaction(k) - plain.reaction(k))[None])[0]
+        out[name] = size((corrected.line_force(k) - plain.line_force(k))[None])[0]
     return out
 
 

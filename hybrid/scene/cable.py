@@ -184,8 +184,9 @@ class Contact(Table):
 # Strain that a section bears which says nothing: beyond that of steel, chain and most ropes.
 USUAL_STRAIN = 0.05
 # Stress, Pa, over the cross-section of `diameter`, that no cable bears: wire ropes break at 1.1 to 1.3 GPa of it, ropes
-# of the strongest fibres at 1.2, the hardest drawn wire and carbon rods at 3.
-STRONGEST = 3e9
+# of the strongest fibres at 1.2, the hardest drawn wire and carbon rods at 3.  Where that is a strain below the second,
+# the diameter or the stiffness says nothing of the section: a line that is meant not to stretch.
+STRONGEST, LEAST_STRAIN = 3e9, 0.02
 
 
 # Young's modulus of steel, Pa.
@@ -240,7 +241,8 @@ class Section(Table):
         default=None,
         description="strain that the section bears, stretched or compressed; a computation that exceeds it stops; "
         "absent: the last of tension_strain, or 0.05, or with a `diameter` what 3 GPa over its area make of it, if "
-        "that is less, because no wire, fibre rope or rod bears more; an inextensible section has none [-]",
+        "that is between 0.02 and 0.05, because no wire, fibre rope or rod bears more; an inextensible section has "
+        "none [-]",
     )
     bending_stiffness: OneOrTwo | None = Field(
         default=None,
@@ -315,7 +317,7 @@ class Section(Table):
     def strain_limit(self) -> float:
         """Strain that is borne, where the section stretches: max_strain, or without one the last of a table, or what
 
-        STRONGEST over its cross-section makes of it, if that is less than usual.
+        STRONGEST over its cross-section makes of it, if that is less than usual and not below LEAST_STRAIN.
         """
         if self.max_strain is not None:
             return self.max_strain
@@ -323,7 +325,8 @@ class Section(Table):
             return rows_of(self.tension_strain)[-1][0]
         if self.diameter is None or self.axial_stiffness is None:
             return USUAL_STRAIN
-        return min(USUAL_STRAIN, STRONGEST * 0.25 * math.pi * self.diameter**2 / self.axial_stiffness)
+        by_stress = STRONGEST * 0.25 * math.pi * self.diameter**2 / self.axial_stiffness
+        return min(USUAL_STRAIN, max(LEAST_STRAIN, by_stress))
 
     @property
     def borne(self) -> float:

@@ -53,7 +53,7 @@ from hybrid.simulation.run_sample import (
     restored_outputs,
     restored_sample,
 )
-from hybrid.simulation.step_ratios import of_outputs, ratios_at, usual_ratio
+from hybrid.simulation.step_ratios import usual_ratio
 from hybrid.store.named_arrays import Tree, matched
 
 # Errors by mesh and time step add with their signs, as in the difference of two runs that they follow from; the sum is
@@ -151,14 +151,12 @@ class Estimate:
         """How many times as short the steps of a run mostly are as those of another."""
         return usual_ratio(fast, slow)
 
-    def _shorter_at(self, fast: RunSample, slow: RunSample, name: str) -> np.ndarray:
-        """The same around each output of the result (nt,).
+    def _shorter_for(self, fast: RunSample, slow: RunSample, name: str) -> float:
+        """The same for what steps make of an output.
 
-        What steps make of a vibration that lasts adds up: it goes by all steps, not by those around an output.
+        What they make of a vibration that lasts adds up: it goes by all steps.
         """
-        if name in self.shares_mixed:
-            return np.full(self._count, fast.steps / max(slow.steps, 1))
-        return ratios_at(fast, slow, self._count)
+        return fast.steps / max(slow.steps, 1) if name in self.shares_mixed else self._shorter(fast, slow)
 
     def show_steps(self, fast: RunSample) -> None:
         """Take a run on the cells of the coarser one in shorter steps, where that in longer steps shows nothing."""
@@ -191,8 +189,7 @@ class Estimate:
         (slow, fast), p = self._of_steps, self.order[name]
         known, own = around(every_of(len(self.run.values[name]), slow.every), a, b)
         faster = fast.some(name, every_of(len(fast.values[name]), slow.every // fast.every)[own])
-        both = self._shorter_at(fast, slow, name), self._shorter_at(self.run, fast, name)
-        shown, left = (of_outputs(x[known] ** p, faster) for x in both)
+        shown, left = (self._shorter_for(*x, name) ** p for x in ((fast, slow), (self.run, fast)))
         return at_all_outputs((faster - slow.values[name][own]) / (shown - 1.0) / left, known, a, b)
 
     def _mesh_error(
@@ -207,8 +204,7 @@ class Estimate:
         if self._mixes(name) and (shorter := self._shorter(self.run, before)) > LEAST_RATIO:
             finer = min(finer, shorter)
         if by_step is not None:
-            each = self._shorter_at(self.run, before, name)[a : a + len(change)]
-            change = change - by_step * (of_outputs(each**p, change) - 1.0)
+            change = change - by_step * (self._shorter_for(self.run, before, name) ** p - 1.0)
         error = np.asarray(change / (finer**p - 1.0))
         if not a and name in self.at_start:
             error[0] = change[0] / (finer ** self.at_start[name] - 1.0)
@@ -283,12 +279,12 @@ class Estimate:
         if more:  # what cells and steps make of all outputs is not what it was thought to be
             self.shares_mixed = set(self.order)
         for name, p in list(self.order.items()):
-            each = self._shorter_at(result, before, name)
+            each = self._shorter_for(result, before, name)
             self.changes[name] = np.nan, self.changes[name][0]
             if other_zones:  # what has changed is not by cells and steps alone
-                for found, ratio in ((by_step, each), (by_mesh, np.full(each.size, finer))):
+                for found, ratio in ((by_step, each), (by_mesh, finer)):
                     if name in found:
-                        found[name] = found[name] / of_outputs(ratio**p, found[name])
+                        found[name] = found[name] / ratio**p
                 continue
             change = np.asarray(result.values[name]) - np.asarray(before.values[name])
             if name in END_FORCES and self.cancels:
@@ -300,39 +296,39 @@ class Estimate:
             if finer > LEAST_RATIO and name in by_mesh:
                 self._renew_mesh_error(name, change, before, each, more and name == "position")
             elif shorter > LEAST_RATIO:
-                by_ratio = of_outputs(each**p, change)
+                by_ratio = each**p
                 shown = change / (by_ratio - 1.0)
                 by_step[name] = blended(shown, by_step[name] / by_ratio, shorter, p) if name in by_step else shown
 
-    def _foretold(self, name: str, change: np.ndarray, shorter: np.ndarray, finer: float) -> bool:
+    def _foretold(self, name: str, change: np.ndarray, shorter: float, finer: float) -> bool:
         """Let the errors of an output be as they were foretold, by as much less as its change was; False: it was more.
 
         Where cells and steps are refined together their change does not show which of the two has made it.  shorter,
-        finer: how many times as short steps are (nt,), and how many times as many cells there are.
+        finer: how many times as short steps are, and how many times as many cells there are.
         """
         by_step, by_mesh = self._keep()
         if not (self.cancels and name in by_step and name in by_mesh) or self._mixes(name):
             return False
-        p, steps = self.order[name], of_outputs(shorter, change)
-        times = times_foretold(name, p, change, [(by_step[name], steps), (by_mesh[name], finer)])
+        p = self.order[name]
+        times = times_foretold(name, p, change, [(by_step[name], shorter), (by_mesh[name], finer)])
         if times is None or max(times) > EXCEEDED:
             return False
         kept, part = by_mesh[name], max(*times, LEAST_PART)
-        by_step[name], by_mesh[name] = part * by_step[name] / steps**p, part * kept / finer**p
+        by_step[name], by_mesh[name] = part * by_step[name] / shorter**p, part * kept / finer**p
         self._renew_start(name, change, kept, finer)
         return True
 
     def _renew_mesh_error(
-        self, name: str, change: np.ndarray, before: RunSample, each: np.ndarray, shown_alone: bool
+        self, name: str, change: np.ndarray, before: RunSample, each: float, shown_alone: bool
     ) -> None:
         """The error by the mesh of an output that finer cells have changed.
 
-        each: how many times as short steps are (nt,); shown_alone: nothing of what was foretold counts.
+        each: how many times as short steps are; shown_alone: nothing of what was foretold counts.
         """
         by_step, by_mesh = self._keep()
         p, finer, shorter = self.order[name], self.run.cells / before.cells, self._shorter(self.run, before)
         if name in by_step:
-            by_step[name] = by_step[name] / of_outputs(each**p, change)
+            by_step[name] = by_step[name] / each**p
         shown, kept = self._mesh_error(name, change, by_step.get(name), before), by_mesh[name]
         both = min(finer, shorter) if name in self.shares_mixed and shorter > LEAST_RATIO else finer
         by_mesh[name] = shown if shown_alone else blended(shown, kept / both**p, both, p)

@@ -122,7 +122,7 @@ def order(found: float, bounds: tuple[float, float]) -> float:
 
 
 def times_foretold(
-    name: str, p: float, change: np.ndarray, errors: Sequence[tuple[np.ndarray, float | np.ndarray]]
+    name: str, p: float, change: np.ndarray, errors: Sequence[tuple[np.ndarray, float]]
 ) -> tuple[float, float] | None:
     """How many times what p has foretold a finer run changes an output, at most and on average; None: of nothing.
 

@@ -59,9 +59,6 @@ class StatisticEstimate(Estimate):
     def _shorter(self, fast: RunSample, slow: RunSample) -> float:
         return fast.steps / max(slow.steps, 1)  # of the whole run, as statistics are
 
-    def _shorter_at(self, fast: RunSample, slow: RunSample, name: str) -> np.ndarray:
-        return np.full(self._count, self._shorter(fast, slow))
-
     def update(self, result: RunSample) -> None:
         self.chance = _chance(result, self.run)
         super().update(result)

@@ -34,6 +34,8 @@ from hybrid.store.comparison_recorder import ComparisonRecorder
 
 # s of processor time that the pre-run, and the first steps of the result, may take.
 PRE_RUN, FIRST_STEPS = 0.2, 0.1
+# Cells of a line whose equilibrium, which comes before its first steps, takes no longer than these.
+MOST_CELLS = 4000
 # s of the file of a result, and of judging and writing errors (bench/test_bench_plan.py).
 FILE, JUDGING = 0.02, 0.1
 # Results that an accuracy takes at most over the first, where its budget allows them: finer ones may follow it.
@@ -90,8 +92,11 @@ class _Probe(Case):
 
 
 def _measured(scene: Scene, found: Plan) -> Plan:
-    """The same, with what the pre-run and the first steps show; as it is where kernels are to be compiled first."""
-    if not is_warm(kernels_of(scene)):
+    """The same, with what the pre-run and the first steps show.
+
+    As it is where kernels are to be compiled first, or the equilibrium would take longer to find than a plan may.
+    """
+    if sum(found.cells) > MOST_CELLS or not is_warm(kernels_of(scene)):
         return found
     case, first, choice, cut = _Probe(scene), first_resolution(scene), NAMED, False
     resolution, begin = first, clock.process_time()
@@ -107,8 +112,6 @@ def _measured(scene: Scene, found: Plan) -> Plan:
         loop, setup, spent = case.first_steps(resolution)
     except ComputationError:
         return found  # the run will say why
-    if coarse is not None and cut:
-        survey *= case._duration / max(coarse.run.t, 1e-6 * case._duration)
     duration = scene.require_time().duration
     if cut and coarse is not None:
         survey *= duration / max(coarse.run.t, 1e-6 * duration)
@@ -167,7 +170,7 @@ def _of_passes(scene: Scene, setup: float, motion: float, outputs: float, found:
 
 def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
     """The same of several lines: their first steps, as often as all runs would take them."""
-    if not is_warm(OF_LINES):
+    if found.cells > MOST_CELLS or not is_warm(OF_LINES):
         return found
     time, begin = system.require_time(), clock.process_time()
     try:

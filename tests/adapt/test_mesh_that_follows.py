@@ -6,7 +6,7 @@ import numpy as np
 
 import hybrid
 from hybrid.model.resolution import wants_survey
-from hybrid.simulation.api import _free
+from hybrid.simulation.passes import free_in
 from hybrid.store.records import MeshHistory, ZoneHistory, there
 from hybrid.store.records import Zone as ZoneRow
 
@@ -41,5 +41,5 @@ def test_no_pre_run_and_no_stricter_zones_where_cells_follow() -> None:
     """
     follows = hybrid.validate_scene(SCENE)
     stays = hybrid.validate_scene(SCENE | {"model": {"kind": "adaptive"}})
-    assert wants_survey(stays) and _free(stays).zones
-    assert not wants_survey(follows) and not _free(follows).zones and _free(follows).mesh
+    assert wants_survey(stays) and free_in(stays).zones
+    assert not wants_survey(follows) and not free_in(follows).zones and free_in(follows).mesh

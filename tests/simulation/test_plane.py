@@ -315,7 +315,8 @@ def test_what_leaves_the_plane_is_named(old: str, new: str, where: str, line: in
     if where != "dimension":
         assert "dimension is 2" in found[0].expected and "dimension" in found[0].fix
         # and without insisting it is computed in space, and the plan says why
-        asked = hybrid.parse_scene(BASE.replace(old, new).replace("dimension: 2\n", ""))
+        held = BASE.replace(old, new).replace("tangent: [1, 0, 0.5]", "tangent: [1, 0, 0.5], normal: [0.5, 1, -1]")
+        asked = hybrid.parse_scene(held.replace("dimension: 2\n", ""))
         assert not entry(asked).on and "leaves" in entry(asked).why
 
 

@@ -46,7 +46,8 @@ def test_a_bend_at_a_clamp_that_the_mesh_does_not_see():
     """10 km with cells of 100 m leave their clamp within sqrt(EI/T), half a metre: the moment is a thousandth."""
     riser = section(length=1e4, mass=20.0, bending_stiffness=1e3, axial_stiffness=1e9)
     ends = {"start": clamped([0, 0, -6000], [1, 0, 0]), "end": pinned(5000, 0, 0)}
-    assert "unresolved bend" in kinds(static(riser, {"ends": ends, "model": "rod"}))
+    assert "unresolved bend" in kinds(static(riser, {"ends": ends, "model": "rod", "mesh": {"cells": 100}}))
+    assert "unresolved bend" not in kinds(static(riser, {"ends": ends, "model": "rod"}))  # graded by itself
     fine = static(riser, {"ends": ends, "model": "rod", "mesh": {"cells": 4000, "ratio": 1000}})
     assert "unresolved bend" not in kinds(fine)
 

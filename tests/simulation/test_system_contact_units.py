@@ -42,11 +42,11 @@ def test_the_same_motion_in_every_unit() -> None:
     """Round-off grows to 1e-12 m by the end."""
     first, *others = (hybrid.run(scene(u, "rod"), progress=False) for u in UNITS)
     assert any(event.kind == "line touches itself" for event in first.events)
-    kinds = [(event.t, event.kind) for event in first.events]
+    kinds = [(event.t, event.kind) for event in first.events if event.kind != "implausible"]  # numbers of other units
     for u, other in zip(UNITS[1:], others, strict=True):
         for name, line in first.lines.items():
             assert np.abs(other.lines[name].position / u - line.position).max() < 1e-9
-        assert [(event.t, event.kind) for event in other.events] == kinds
+        assert [(event.t, event.kind) for event in other.events if event.kind != "implausible"] == kinds
 
 
 def test_a_tail_that_goes_slack_stops_at_the_same_time_in_every_unit() -> None:

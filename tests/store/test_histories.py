@@ -193,7 +193,13 @@ def test_axes_of_bends_are_of_second_order_at_ends_too() -> None:
     assert fine[0] < coarse[0] / 3.5 and fine[-1] < coarse[-1] / 3.5 and fine[1:-1].max() < 1e-9
 
 
-def test_the_command_prints_rows(result: hybrid.Result, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.fixture
+def wide(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A terminal in which no line is cut, whatever that of the tests is."""
+    monkeypatch.setenv("COLUMNS", "200")
+
+
+def test_the_command_prints_rows(result: hybrid.Result, wide: None, capsys: pytest.CaptureFixture[str]) -> None:
     """Every figure of the table is in the JSON; a run that is too short for extremes says so once."""
     with pytest.raises(SystemExit) as ended:
         main(
@@ -223,7 +229,9 @@ def test_the_command_prints_rows(result: hybrid.Result, capsys: pytest.CaptureFi
     assert head == ("standard MPM P90", "s (m) mean deviation skewness smallest largest period (s) in 3 h in 3 h")
 
 
-def test_damage_and_fatigue_life_at_chosen_places(result: hybrid.Result, capsys: pytest.CaptureFixture[str]) -> None:
+def test_damage_and_fatigue_life_at_chosen_places(
+    result: hybrid.Result, wide: None, capsys: pytest.CaptureFixture[str]
+) -> None:
     asked = ["--names", "tension", "--at", "12,48", "--curve", "studless chain T-N", "--strength", "1e6"]
     with pytest.raises(SystemExit) as ended:
         main(["stats", str(result.file), "--below", "100", *asked])

@@ -309,7 +309,7 @@ def test_heave_of_a_floating_body(added_mass, report):
     z = np.array([state.r[0, 2] for _, state in motion(scene, kick)])
     error = poles(z, scene.time.step).imag / omega - 1
     report(
-        f"Heave of a half-wet body, added mass {added_mass:g} kg: frequency", "sqrt(rho g Awp/(m + wetted added mass))",
+        f"Heave of a half-wet body, added mass {added_mass:g} kg: frequency", "sqrt(rho g Awp/(m + added mass))",
         f"{error:+.1e}", "a wire in the surface: 1e-5",
     )  # fmt: skip
     assert abs(error) <= 1e-5

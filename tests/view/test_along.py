@@ -109,7 +109,7 @@ def test_each_side_is_held_against_its_own_limit() -> None:
     assert good["right/min_bend_radius"].tolist() == [1000.0]
     assert good["min_bend_radius"][good.s == 0.6].tolist() == [1400.0]
     told = fact(good, "bend")
-    assert told.weight == "plain" and told.values["ratio"] == pytest.approx(1400 * good.curvature[0, 0])
+    assert told.weight == "note" and told.values["ratio"] is None  # its error is not estimated
     bad = fact(cantilever(stiff=1000.0, soft=1400.0), "bend")
     assert bad.weight == "alarm" and bad.values["ratio"] > 1.05 and bad.values["allowed"] == 1400.0
     assert cantilever()["right/bending_stiffness"].tolist() == [50.0]
