@@ -17,7 +17,7 @@ from problems import suspension
 from scipy.linalg import solve_banded
 
 import hybrid
-from hybrid.kernels import compile as compiled
+from hybrid.kernels import compiler
 from hybrid.kernels.block_elimination import SIZE, WIDTH, eliminate_wide, substitute
 from hybrid.kernels.entry import assembly, block_rows
 from hybrid.model.build import build
@@ -86,7 +86,7 @@ def test_cost_per_cell_and_iteration():
         assert growth <= 1.3
 
 
-@numba.njit(**compiled._OPTIONS)
+@numba.njit(**compiler._OPTIONS)
 def eliminate(rows, W, X):
     """What the march does with block rows once they are assembled."""
     for i in range(rows.shape[0]):

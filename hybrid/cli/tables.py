@@ -57,7 +57,7 @@ def extremes_facts(result: Result) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, low in (("tension_max", False), ("tension_min", True)):
         x = worst(result, "tension", lowest=low)
-        found[key] = {"value": x.value, "s": x.s, "t": x.t}
+        found[key] = {"value": x.value + 0.0, "s": x.s, "t": x.t}  # a tension of -0 is 0
     if "curvature" in result:
         x = worst(result, "curvature")
         straight = not x.value * float(result.s[-1] - result.s[0]) > 1e-6
