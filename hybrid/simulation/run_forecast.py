@@ -81,6 +81,7 @@ class _Probe(Case):
     def first_steps(self, resolution: Resolution) -> tuple[TimeLoop, float, float]:
         """The loop of a result after its first steps; s of processor time before them, and of them."""
         begin = clock.process_time()
+        self.allow(np.inf)  # the budget of the pre-run may be used up, and the equilibrium has none
         model, equilibrium, switching = self._start(resolution)
         loop = self._loop(self.scene, model, resolution, switching, None)
         begun = clock.process_time()
