@@ -43,6 +43,12 @@ def test_what_the_first_steps_show_is_in_the_plan() -> None:
     assert plan.most_seconds is not None and plan.most_seconds > plan.seconds > 0.0
 
 
+def test_a_pre_run_that_is_cut_leaves_a_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hybrid.simulation.run_forecast.PRE_RUN", 0.0)
+    plan = hybrid.plan(scene("3%"))
+    assert plan.measured and plan.steps > 0 and plan.seconds > 0.0
+
+
 def test_first_steps_of_lines_are_measured_too() -> None:
     section = {"length": 12, "mass": 2, "diameter": 0.03, "axial_stiffness": 1e6}
     points = {"low": {"position": [0, 0, 0]}, "high": {"position": [20, 0, 0]}}
