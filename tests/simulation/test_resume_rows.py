@@ -149,12 +149,14 @@ def test_nothing_is_left_where_there_is_no_result(tmp_path: Path, monkeypatch: p
 
 def test_killed_and_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """kill -9 in a finer result: the files beside the first are found by another process."""
+    Stopping(monkeypatch)
     code = f"""
         import os
         from dataclasses import replace
         import hybrid
-        from hybrid.simulation import case, passes
+        from hybrid.simulation import case, passes, refinement
         case.MOST_IN_MEMORY, passes.WORTH_WRITING = 0, -1.0
+        refinement.LITTLE = float("inf")  # an event that goes by clocks
         surveyed = passes.Passes._surveyed
         def rougher(self, resolution):
             choice, found = surveyed(self, resolution)
