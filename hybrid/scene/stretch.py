@@ -14,6 +14,8 @@ from hybrid.scene.base import Finding, NonNegative, Pair, Positive, Table, Text,
 
 Curve = tuple[tuple[float, float], ...]  # rows of strain and tension, N
 COLUMNS = ["strain", "tension"]
+# No rope bears more: nylon breaks at 0.5.
+LARGEST_STRAIN = 1.0
 
 
 def _findings(rows: Curve) -> list[Finding]:
@@ -33,6 +35,9 @@ def _findings(rows: Curve) -> list[Finding]:
         if not U > T:
             fix = "sort the rows, and smooth what was measured: a rope that slackens as it stretches has no answer"
             return [Finding((k, 1), f"a tension above that of the row before, {T:g} N", fix)]
+        if y > LARGEST_STRAIN:
+            fix = "strain comes first, then tension in N; a strain is a part: 2 % is 0.02"
+            return [Finding((k, 0), f"a strain of at most {LARGEST_STRAIN:g}", fix)]
     return []
 
 

@@ -40,6 +40,7 @@ CASES = {
     "table without zero": (SUSPENSION, MASS, f"{MASS}\n      tension_strain: [§[0.01, 100], [0.02, 300]]", "cable.sections[0].tension_strain[0]", "begin with [0, 0]"),
     "table that falls": (SUSPENSION, MASS, f"{MASS}\n      tension_strain: [[0, 0], [0.01, 300], [0.02, §200]]", "cable.sections[0].tension_strain[2][1]", "slackens"),
     "table the wrong way": (SUSPENSION, MASS, f"{MASS}\n      tension_strain: [[0, 0], [0.01, 300], [§0.005, 400]]", "cable.sections[0].tension_strain[2][0]", "strain comes first"),
+    "table of tension first": (SUSPENSION, MASS, f"{MASS}\n      tension_strain: [[0, 0], [§1.0e+5, 0.001], [4.0e+5, 0.003]]", "cable.sections[0].tension_strain[1][0]", "strain comes first, then tension"),
     "table file": (SUSPENSION, MASS, f"{MASS}\n      tension_strain: {{file: §none.csv}}", "cable.sections[0].tension_strain.file", "folder"),
     "dynamic alone": (SUSPENSION, MASS, f"{MASS}\n      dynamic_stiffness: §{{constant: 3.0e+5, relaxation_time: 60}}", "cable.sections[0].dynamic_stiffness", "axial_stiffness"),
     "dynamic below static": (SUSPENSION, MASS, f"{MASS}\n      axial_stiffness: 4.0e+5\n      dynamic_stiffness: {{constant: §3.0e+5, relaxation_time: 60}}", "cable.sections[0].dynamic_stiffness.constant", "exchanged"),
