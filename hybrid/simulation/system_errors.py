@@ -14,6 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from pydantic import ValidationError
 
 from hybrid.errors import ComputationError
 from hybrid.kernels.state import Floats
@@ -43,6 +44,11 @@ NOTHING = 1e-4
 FAILED = "no error figure"
 
 Compute = Callable[[System, io.BytesIO], None]
+# Why there is no coarser run to compare with, by its cause.
+TOO_COARSE = {
+    "mesh": "line {1} has too few cells for a run with half of them to compare with; mesh: at least 8 to a section",
+    "time": "too few steps for a run with longer ones to compare with; time.step: at most a quarter of the duration",
+}
 
 
 def coarser(system: System) -> System:
@@ -84,16 +90,18 @@ def write_system_errors(system: System, target: Path | io.BytesIO, compute: Comp
         for cause, make in (("mesh", coarser), ("time", longer_steps)):
             other = given
             for again in ("", " again"):
-                other, memory = make(other), io.BytesIO()
                 try:
+                    other, memory = make(other), io.BytesIO()
                     compute(other, memory)
-                except ComputationError:
+                except (ComputationError, ValidationError):
                     if not again:
                         raise
-                else:
-                    found[cause + again] = open_result(memory)
+                    break
+                found[cause + again] = open_result(memory)
     except ComputationError as error:
         failed = f"a coarser run to compare with stopped: {str(error).splitlines()[0]}"
+    except ValidationError as error:  # half of few cells, or twice a long step, is no scene
+        failed = TOO_COARSE[cause].format(*error.errors()[0]["loc"])
     errors, doubts = {}, dict[str, list[str]]()
     if not failed:
         with open_result(target) as result:

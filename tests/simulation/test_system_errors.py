@@ -85,3 +85,19 @@ def test_where_a_coarser_run_fails_an_event_says_so(monkeypatch: pytest.MonkeyPa
     found = hybrid.run(mooring(errors=True) | {"time": {"duration": 1.0, "step": 0.1}})
     assert [e.kind for e in found.events].count("no error figure") == 1
     assert found.status == "complete" and "error_total_position" not in found.attributes
+
+
+@pytest.mark.parametrize(
+    ("cells", "time", "said"),
+    [
+        (2, {"duration": 0.4, "step": 0.1}, "line west has too few cells"),
+        (8, {"duration": 0.1, "step": 0.1}, "too few steps"),
+    ],
+)
+def test_nothing_coarser_to_compare_with(cells: int, time: dict[str, float], said: str) -> None:
+    """The result stays, and an event says why it has no figure and what to do."""
+    scene = mooring(cells, errors=True, every=0.1)
+    result = hybrid.run(scene | {"time": time})
+    event = next(x for x in result.events if x.kind == "no error figure")
+    assert said in event.text and ("mesh:" in event.text or "time.step:" in event.text)
+    assert "error_total_position" not in result.attributes and result.status == "complete"
