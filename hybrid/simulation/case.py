@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -50,6 +51,8 @@ from hybrid.simulation.run_sample import (
     RunSample,
     catenary_share,
     compared_cells,
+    compared_places,
+    is_along,
     rows_key,
     split_outputs,
     usual_cells,
@@ -99,6 +102,7 @@ class Case:
         """
         self.scene, self.criterion, self.changes = scene, criterion, tuple(changes)
         self.points = points if points is not None else output_points(scene, longest_out(scene), not winch_side(scene))
+        self.places = compared_places(self.points)  # of these, where runs are compared
         self.progress = ProgressReporter(None, 1.0)
         self.interrupted: Callable[[], bool] = lambda: False
         self.beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
@@ -278,7 +282,10 @@ class Case:
             # they stay in the file, if they are many, that is one, and no finer result may replace it
             many = late is None and sum(x.size for x in stored.values()) > MOST_IN_MEMORY
             stay = target if many and isinstance(target, Path) and requested_accuracy(self.scene) is None else None
-            found = {name: StoredArray(stay, name) if stay is not None else x[()] for name, x in stored.items()}
+            found = {
+                name: StoredArray(stay, name, self._places_of(name)) if stay is not None else self._at_places(name, x)
+                for name, x in stored.items()
+            }
             kinds = data["events/kind"][()]
             unresolved, touches = b"unresolved bend" in kinds, b"line touches itself" in kinds
             if follows_curvature(self.scene):
@@ -299,8 +306,17 @@ class Case:
                     catenary = np.array([catenary_share(x) for x in result.zones])
         return RunSample(
             resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, bound, notes, forces=forces,
-            catenary=catenary, doubt=doubt_of(run), touches=touches,
+            catenary=catenary, doubt=doubt_of(run), touches=touches, places=self.places,
         )  # fmt: skip
+
+    def _places_of(self, name: str) -> np.ndarray | None:
+        """Of an output, or an error of one, the numbers of the points where runs are compared; None: all."""
+        return self.places if self.places.size and is_along(name.removeprefix(MODEL_ERRORS)) else None
+
+    def _at_places(self, name: str, values: Any) -> np.ndarray:
+        """The values (nt, ...) of a dataset where runs are compared."""
+        places, found = self._places_of(name), np.asarray(values[()])
+        return found if places is None else found[:, places]
 
     # --- runs to compare with -------------------------------------------------------------------
 
@@ -325,7 +341,8 @@ class Case:
         begin = clock.thread_time()
         self.progress.begin(ESTIMATION if points is None else PRE_RUN, resolution)
         model, equilibrium, switching = self._start(resolution)
-        loop = self._loop(self.scene, model, resolution, switching, None, points=points, until=until)
+        s = points if points is not None else self.points.s[self.places] if self.places.size else self.points.s
+        loop = self._loop(self.scene, model, resolution, switching, None, points=s, until=until)
         numbers = len(loop.run.run.books.outputs) * sum(math.prod(field.shape) for field in loop.observer.fields)
         if self.beside_result is not None and points is None and numbers > MOST_IN_MEMORY:
             loop.recorder = RowsRecorder(rows_path(self.beside_result, rows_key(resolution)), FORCE_COLUMNS)
@@ -357,6 +374,7 @@ class Case:
             found.catenary if switching is not None else np.zeros(0),
             doubt_of(loop.run),
             touches=loop.run.touches,
+            places=self.places,
         )
 
     def survey(self, resolution: Resolution) -> Survey | None:

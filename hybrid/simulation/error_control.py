@@ -58,7 +58,14 @@ from hybrid.simulation.refinement import (
     refined,
 )
 from hybrid.simulation.restore import resolution_from, resolution_tree
-from hybrid.simulation.run_sample import END_FORCES, RunSample, restored_notes, restored_sample
+from hybrid.simulation.run_sample import (
+    ALL,
+    END_FORCES,
+    RunSample,
+    compared_places,
+    restored_notes,
+    restored_sample,
+)
 from hybrid.simulation.snap_scatter import snap_excess
 from hybrid.store.named_arrays import Tree, matched
 from hybrid.store.stored_rows import MissingRows
@@ -279,6 +286,12 @@ class ErrorController:
     def _take_finer(self) -> None:
         self.settle(True)
         self.compared = None
+
+    @property
+    def places(self) -> np.ndarray | None:
+        """Of the output points those at which runs are compared, as of `RunSample`; None: there is none yet."""
+        run = self.estimate.run if self.estimate is not None else self.comparisons and self.comparisons[0]
+        return run.places if run else None
 
     def judged(self, of_statistics: bool) -> Judged:
         """The errors of the result; of_statistics: with those of extremes and standard deviations."""
@@ -536,7 +549,7 @@ class ErrorController:
             "scattered": list(self.scattered), "excess": self.excess, "choice": list(self.choice),
             "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": list(self._notes),
             "budget": self.budget.checkpoint() if self.budget is not None else [],
-            "slow": list(self._slow_from or ()),
+            "slow": list(self._slow_from or ()), "places": self.places if self.places is not None else ALL,
         }  # fmt: skip
 
     def restore(self, tree: Mapping[str, Any], scene: Scene, points: OutputPoints, source: Path | None = None) -> None:
@@ -553,12 +566,15 @@ class ErrorController:
             "every": 1,
             "irregular": False,
         }
-        template["excess"] = np.zeros(2)
+        template["excess"], template["places"] = np.zeros(2), ALL
         names = ("next", "first", "coarse", "estimate", "statistics", "scattered", "notes", "choice", "budget")
         # not in every checkpoint of 0.6
-        older = {"choice": ["", ""], "first": None, "excess": np.zeros(2), "budget": [], "slow": []}
+        older = {"choice": ["", ""], "first": None, "excess": np.zeros(2), "budget": [], "slow": [], "places": ALL}
         saved = matched(older | dict(tree), template | dict.fromkeys(names), "error control")
-        shape = len(output_times(scene)) + 1, points.s.size, points.jumps.size
+        places = saved["places"]
+        if places.size and not np.array_equal(places, compared_places(points)):
+            raise ValueError("runs are compared at other output points than those of this scene")
+        shape = len(output_times(scene)) + 1, places.size or points.s.size, points.jumps.size
         self.runs, self._ratio, self._judged = saved["runs"].tolist(), saved["ratio"], saved["finer"]
         self._every, self.irregular, self.excess = saved["every"], saved["irregular"], saved["excess"]
         self._slow_from = list(saved["slow"]) or None
@@ -570,12 +586,15 @@ class ErrorController:
             self.budget.restore(matched(saved["budget"], [0.0, 0.0], "budget"))
         if saved["coarse"] is not None:
             try:
-                first, second, third = (x and restored_sample(x, scene, shape, source) for x in saved["coarse"])
+                first, second, third = (
+                    x and replace(restored_sample(x, scene, shape, source), places=places) for x in saved["coarse"]
+                )
                 self.comparisons = first, second, third
             except MissingRows:
                 self._lost = True
         if saved["estimate"] is not None:
             self.estimate = Estimate.restored(saved["estimate"], scene, shape)
+            self.estimate.run = replace(self.estimate.run, places=places)
         if saved["statistics"]:
             trees = matched(saved["statistics"], dict.fromkeys(STATISTICS), "statistics")
             self.statistics = {name: StatisticEstimate.restored(x, scene, (1, *shape[1:])) for name, x in trees.items()}

@@ -149,7 +149,10 @@ class Estimate:
 
     def _shorter(self, fast: RunSample, slow: RunSample) -> float:
         """How many times as short the steps of a run mostly are as those of another."""
-        return usual_ratio(fast, slow)
+        pair = id(fast), id(slow)
+        if pair not in self._ratios:
+            self._ratios[pair] = usual_ratio(fast, slow)
+        return self._ratios[pair]
 
     def _shorter_for(self, fast: RunSample, slow: RunSample, name: str) -> float:
         """The same for what steps make of an output.
@@ -222,6 +225,7 @@ class Estimate:
     def _take(self, result: RunSample) -> Notes:
         """Take over a result, the model error that it knows of itself bounded if it is implausible: what to say."""
         self.run, self._errors = result, None
+        self._ratios: dict[tuple[int, int], float] = {}  # `usual_ratio` of runs that are compared from here on
         # Times as large as they were thought to be, by an order that is known now, are errors of the run before.
         self.revised: dict[str, float] = {}
         self._bound, doubt = bounded(result)
@@ -307,14 +311,17 @@ class Estimate:
         finer: how many times as short steps are, and how many times as many cells there are.
         """
         by_step, by_mesh = self._keep()
-        if not (self.cancels and name in by_step and name in by_mesh) or self._mixes(name):
+        if self.share_unknown or not (self.cancels and name in by_step and name in by_mesh):
             return False
-        p = self.order[name]
+        p, mixed = self.order[name], name in self.shares_mixed
         times = times_foretold(name, p, change, [(by_step[name], shorter), (by_mesh[name], finer)])
-        if times is None or max(times) > EXCEEDED:
+        if times is None or max(times) > (1.0 if mixed else EXCEEDED):
             return False
         kept, part = by_mesh[name], max(*times, LEAST_PART)
-        by_step[name], by_mesh[name] = part * by_step[name] / shorter**p, part * kept / finer**p
+        if mixed:  # large parts that take off what the other adds were made of runs too coarse to show either
+            by_step[name] = by_mesh[name] = 0.5 * change / (min(shorter, finer) ** p - 1.0)
+        else:
+            by_step[name], by_mesh[name] = part * by_step[name] / shorter**p, part * kept / finer**p
         self._renew_start(name, change, kept, finer)
         return True
 
@@ -428,26 +435,37 @@ class Estimate:
         return self._errors
 
     def _all_errors(self) -> Errors:
-        shapes: dict[str, dict[str, tuple[int, ...]]] = {}
-        for block in self._blocks(1):
-            shapes.setdefault(block.cause, {})[block.name] = (self._count, *block.values.shape[1:])
-        causes = ("mesh", "time", "model", "total")
-        return Errors({cause: shapes[cause] for cause in causes if cause in shapes}, self._blocks)
+        shapes: dict[str, dict[str, tuple[int, ...]]] = {cause: {} for cause in ("mesh", "time", "model", "total")}
+        for quantity, name, shape in self._quantities():
+            step, mesh = self._knows(name)
+            model = quantity in self.run.model_error or quantity in self._model
+            known = {"mesh": mesh, "time": mesh and step, "model": model, "total": mesh}
+            size = shape[: 0 if quantity in END_FORCES.values() else 1]  # of vectors their length
+            for cause in [cause for cause, there in known.items() if there]:
+                shapes[cause][quantity] = (self._count, *size)
+        return Errors({cause: found for cause, found in shapes.items() if found}, self._blocks)
 
-    def _blocks(self, most: int | None = None) -> Iterator[Block]:
-        """All errors, in blocks of so many outputs; most: of the first output alone."""
+    def _quantities(self) -> Iterator[tuple[str, str, tuple[int, ...]]]:
+        """All that have errors, the output that they are of (empty: it is not compared), and the shape of one of it."""
         names = {(END_FORCES | RIGHT).get(name, name): name for name in self.order}
         for quantity in dict.fromkeys([*names, *self._model, *self.run.model_error]):
             name = names.get(quantity, "")
-            shape = (
-                self.run.values[name].shape[1:] if name else (self.run.model_error or self._model)[quantity].shape[1:]
-            )
+            of = self.run.values[name] if name else (self.run.model_error or self._model)[quantity]
+            yield quantity, name, of.shape[1:]
+
+    def _knows(self, name: str) -> tuple[bool, bool]:
+        """Whether errors of an output by the time step, and by the mesh, are known."""
+        if self.by_step is not None and self.by_mesh is not None:
+            return name in self.by_step, name in self.by_mesh
+        return self._of_steps is not None and name in self._of_steps[0].values, bool(name) and self.has_mesh
+
+    def _blocks(self) -> Iterator[Block]:
+        """All errors, in blocks of so many outputs."""
+        for quantity, name, shape in self._quantities():
             rows = max(1, MOST // max(1, int(np.prod(shape))))
             for a in range(0, self._count, rows):
-                b = min(a + rows, self._count) if most is None else most
+                b = min(a + rows, self._count)
                 yield from (Block(cause, quantity, a, x) for cause, x in self._causes(name, quantity, a, b).items())
-                if most is not None:
-                    break
 
     def _causes(self, name: str, quantity: str, a: int, b: int) -> dict[str, np.ndarray]:
         """Magnitudes by cause of the outputs from number a to b; name: of the output, empty if it is not compared."""
@@ -500,7 +518,7 @@ class Estimate:
         """An estimate from a checkpoint; shape, errors: as of `restored_sample`."""
         self = cls.__new__(cls)
         self.run, self.notes = restored_sample(tree["run"], scene, shape), restored_notes(tree["notes"])
-        self.revised = {}
+        self.revised, self._ratios = {}, {}
         self.order = matched(tree["order"], dict.fromkeys(tree["order"], 1.0), "order")
         at_start = tree.get("at_start", {})  # of checkpoints that have it
         self.at_start = matched(at_start, dict.fromkeys(at_start, 1.0), "order at the start")

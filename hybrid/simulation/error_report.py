@@ -17,7 +17,7 @@ from hybrid.simulation.errors_by_cause import Errors, summary
 from hybrid.simulation.free_vibrations import uncertain_by_vibrations
 from hybrid.simulation.refinement import END_FORCE, bounds_of
 from hybrid.simulation.result_checks import damped_jolts, undersampled_end_forces
-from hybrid.simulation.run_sample import END_FORCES, RunSample
+from hybrid.simulation.run_sample import END_FORCES, RunSample, at_all_points, is_along
 from hybrid.store.amend import NOTHING_MORE, Happened, amend
 from hybrid.store.format import Field
 from hybrid.store.late_file import LateFile
@@ -50,7 +50,8 @@ def write_errors(
     def blocks() -> Iterator[tuple[str, int, np.ndarray]]:
         for cause, name, begin, values in errors.blocks() if errors is not None else ():
             if f"errors/{cause}/{name}" in names:
-                yield f"errors/{cause}/{name}", begin, values
+                along = result.places.size and is_along(name)
+                yield f"errors/{cause}/{name}", begin, at_all_points(values, result.places) if along else values
 
     def known_then(happened: Happened) -> tuple[Mapping[str, str | float | int], list[tuple[str, str]]]:
         found, notes = known(scene, control, result, errors, happened)
@@ -105,7 +106,8 @@ def error_fields(result: RunSample, errors: Errors) -> list[Field]:
     return [
         Field(
             f"errors/{cause}/{name}", UNITS[name], f"{CAUSES[cause]} of {_words(name)}, estimated",
-            shape[1:], ("right/s" if name.startswith("right_") else "s",) if len(shape) == 2 else (),
+            (result.places[-1] + 1,) if result.places.size and is_along(name) else shape[1:],
+            ("right/s" if name.startswith("right_") else "s",) if len(shape) == 2 else (),
         )
         for cause, quantities in errors.fields.items()
         if not (cause == "model" and written)

@@ -167,6 +167,7 @@ def _radius(scene: Scene) -> float:
 def linear_line(scene: Scene, result: RunSample) -> Line | None:
     """The line about its first output; None: too few output points show it."""
     s, n = output_points(scene).s, ELEMENTS
+    s = s[result.places] if result.places.size else s
     place, pull = (np.asarray(result.values[x][:1])[0] for x in ("position", "tension"))
     if not FEWEST_POINTS <= s.size == len(place):
         return None

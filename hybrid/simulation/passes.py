@@ -94,6 +94,8 @@ class Passes:
             control = self._controls(compute)
             with refused(self.source or Path()):
                 control.restore(remaining.before, case.scene, case.points, self.source)
+            if control.places is not None:
+                case.places = control.places
             go_on = control.proceed
         else:
             choice, resolution = self._surveyed(resolution) if remaining is None else (NAMED, resolution)

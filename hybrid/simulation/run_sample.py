@@ -13,6 +13,7 @@ import numpy as np
 from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
+from hybrid.model.output_points import OutputPoints
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.outputs.probes import SIDED_ERRORS
 from hybrid.scene.schema import Scene
@@ -30,6 +31,11 @@ END_FORCES = {"reaction_start": "end_force_start", "reaction_end": "end_force_en
 
 # What datasets of errors of neglected bending begin with, and the kind of events that say they are not known.
 MODEL_ERRORS, NOT_ESTIMATED = "errors/model/", "model error not estimated"
+
+# Output points at which runs are compared: more take time in every run, and hardly show more.  Of these, so many on
+# either side of ends and jumps, where errors change most from one point to the next.
+MOST_PLACES, BESIDE = 101, 2
+ALL = np.zeros(0, int)  # places that stand for all output points
 
 # What cells that follow the curvature count as at fineness 1; and the part of base cells that must have been halved.
 OF_FOLLOWING, FEWEST_HALVED = 1000, 0.1
@@ -58,6 +64,8 @@ class RunSample:
     catenary: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (nt,) part of the line, of zones that move
     doubt: np.ndarray = field(default_factory=lambda: np.array(NO_DOUBT))  # of the model error
     touches: bool = False  # of a result: whether the line touched itself; of others: whether contact was computed
+    # Numbers of the output points at which its values along the line are (`compared_places`); in no checkpoint.
+    places: np.ndarray = field(default_factory=lambda: ALL)
     # of an equilibrium: errors (ns,) by its cells beside edges of contact (outputs.edge_errors); in no checkpoint
     at_edges: Mapping[str, np.ndarray] = field(default_factory=dict)
 
@@ -74,11 +82,34 @@ class RunSample:
 
     def checkpoint(self) -> Tree:
         """All of it, as named arrays and plain values."""
-        kept_fields = [x.name for x in fields(self) if x.name != "at_edges"]
+        kept_fields = [x.name for x in fields(self) if x.name not in ("at_edges", "places")]
         out = {name: getattr(self, name) for name in kept_fields} | {"resolution": resolution_tree(self.resolution)}
         kept = {} if self.rows else {"values": self.values, "model_error": self.model_error}
         blank: Tree = {"values": {}, "model_error": {}}
         return out | blank | {x: {name: np.asarray(y) for name, y in found.items()} for x, found in kept.items()}
+
+
+def compared_places(points: OutputPoints) -> np.ndarray:
+    """Numbers of the output points at which runs are compared; ALL, where there are hardly more."""
+    count, jumps = points.s.size, np.searchsorted(points.s, points.jumps)
+    edges = np.concatenate([[0], jumps, [count - 1]])
+    beside = np.unique((edges[:, None] + np.arange(-BESIDE, BESIDE + 1)).clip(0, count - 1))
+    if count <= MOST_PLACES + beside.size:
+        return ALL
+    even = np.linspace(0, count - 1, max(MOST_PLACES - beside.size, 2)).round().astype(int)
+    return np.unique(np.concatenate([beside, even]))
+
+
+def is_along(name: str) -> bool:
+    """Whether a compared output, or an error of one, has a value at every output point."""
+    return not name.startswith("right") and name not in (*END_FORCES, *END_FORCES.values())
+
+
+def at_all_points(errors: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Errors (n, places) at all output points (n, ns): between two places the larger one of them."""
+    points = np.arange(places[-1] + 1)
+    after = np.searchsorted(places, points)
+    return np.maximum(errors[:, after], errors[:, after - (places[after] != points)])
 
 
 def compared_cells(model: Model, fineness: float = 0.0, cells: float = np.inf) -> int:
@@ -110,7 +141,9 @@ def catenary_share(zones: Sequence[Zone | ZoneRow]) -> float:
 
 def every_of(count: int, step: int) -> np.ndarray:
     """Numbers of every `step`-th of `count` outputs, and of the last."""
-    return np.unique(np.append(np.arange(0, count, step), count - 1))
+    found = np.arange(0, count + step - 1, step)
+    found[-1:] = count - 1
+    return found
 
 
 # --- from a checkpoint --------------------------------------------------------------------------

@@ -385,3 +385,32 @@ def test_a_finer_run_that_changes_more_than_was_foretold_takes_nothing_apart():
     more.update(finer)
     assert more.shares_mixed == {"position"}
     assert more.errors.largest("total", "position") > change
+
+
+def misled(by_cells, by_steps, cells, steps):
+    """Off by so much of a sine and of a cosine; of the runs to compare with, too coarse to show what steps do."""
+    t = np.linspace(0.0, 1.0, 33)
+    reaction = np.zeros((33, 3))
+    reaction[:, 0] = 100.0 + by_cells * np.sin(40.0 * t) + by_steps * np.cos(40.0 * t)
+    return RunSample(Resolution(cells / 100, 1.0 / steps, None, 1e-3), {"reaction_end": reaction}, cells, steps, 0.0)
+
+
+def test_a_finer_run_takes_back_what_steps_were_thought_to_do():
+    """A tether with a float pack, asked for 5 %: cells and steps three times as fine, figure 6.8 times the truth.
+
+    Errors by cells and by steps of opposite signs were kept, although together they changed less than was foretold.
+    """
+    runs = (1.0, 0.0, 100, 100), (4.0, 3.0, 50, 50), (4.0, 28.0, 50, 25), (9.0, 3.0, 25, 25)
+    estimate = Estimate(*(misled(*x) for x in runs))
+    assert estimate.shares_mixed == {"reaction_end"}
+    estimate.update(misled(1.0 / 9.0, 0.0, 300, 300))
+    assert 0.7 < 9.0 * estimate.errors.largest("total", "end_force_end") < 3.0
+    for block in estimate.errors.blocks():
+        assert estimate.errors.fields[block.cause][block.name] == block.values.shape
+
+
+def test_a_finer_run_that_changes_as_much_as_was_foretold_takes_nothing_back():
+    runs = (1.0, 0.0, 100, 100), (4.0, 3.0, 50, 50), (4.0, 28.0, 50, 25), (9.0, 3.0, 25, 25)
+    estimate = Estimate(*(misled(*x) for x in runs))
+    estimate.update(misled(-3.0, 0.0, 300, 300))
+    assert estimate.errors.largest("time", "end_force_end") > 1.0
