@@ -30,7 +30,8 @@ from typing import NamedTuple
 from hybrid.kernels.code_file import SUFFIX, digest, others_may_write
 
 KERNELS = ("kernels/*.py", "adapt/zone_rules.py")
-KEEPERS = ("cache.py", "code_file.py", "kept_code.py")  # they keep machine code, and make none
+# They keep machine code and call it, and make none.
+KEEPERS = ("argument_types.py", "cache.py", "code_file.py", "kept_code.py", "linked_code.py")
 KEPT_CACHES = 4  # older compilations are deleted; four let a few versions or branches live side by side
 SHIPPED = Path(__file__).with_name("compiled")
 
@@ -58,6 +59,11 @@ V2 = ("cx16", "popcnt", "sahf", "sse3", "sse4.1", "sse4.2", "ssse3")
 LEVELS = (Level("x86-64-v3", (*V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "xsave")),)
 
 
+# What numba reads of the processor, and processors on which it uses no AVX.
+_SETTINGS = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX"
+_WITHOUT_AVX = "corei7-avx", "core-avx-i", "sandybridge", "ivybridge", "nocona"
+
+
 @cache
 def kernel_hash(package: Path = Path(__file__).parents[1]) -> str:
     """Hash of all kernel sources, of the compiler's version and of the Python that calls them.
@@ -82,23 +88,20 @@ def _python() -> str:
 
 @cache
 def processor() -> Processor:
-    """The processor that kernels are compiled for, as numba's settings have it."""
+    """The processor that kernels are compiled for, as numba has it; it is asked only where its own rules count."""
     from llvmlite import binding as llvm
-    from numba.core.codegen import get_host_cpu_features
 
-    name, features = _settings()
-    return Processor(
-        llvm.get_process_triple(),
-        llvm.get_host_cpu_name() if name is None else name,
-        get_host_cpu_features() if features is None else features,
-    )
+    name, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    if is_set() or name in _WITHOUT_AVX or "+avx," not in features:
+        from numba.core.registry import cpu_target
+
+        return Processor(*cpu_target.target_context.codegen().magic_tuple())
+    return Processor(llvm.get_process_triple(), name, features)
 
 
-def _settings() -> tuple[str | None, str | None]:
-    """Name and features of the processor as the user has set them for numba (NUMBA_CPU_NAME, NUMBA_CPU_FEATURES)."""
-    from numba.core import config
-
-    return getattr(config, "CPU_NAME", None), getattr(config, "CPU_FEATURES", None)
+def is_set() -> bool:
+    """Whether the user tells numba of a processor, by its variables or in its file of settings."""
+    return any(os.environ.get(x) for x in _SETTINGS) or Path(".numba_config.yaml").exists()
 
 
 @cache
@@ -107,7 +110,7 @@ def shipped_for() -> Processor | None:
 
     Nor is there where the user's settings of numba name a processor.
     """
-    if _settings() != (None, None):
+    if is_set():
         return None
     host = processor()
     has = set(host.features.split(","))

@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-MAGIC, FORMAT = b"hybrid machine code\n", 1
+MAGIC, FORMAT = b"hybrid machine code\n", 2
 SUFFIX = ".kernel"
 _SIZES = struct.Struct("<II")  # number of the format, bytes of the header
 _LONGEST_HEADER = 1 << 20

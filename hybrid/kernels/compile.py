@@ -1,6 +1,6 @@
 """How functions become kernels: entries for Python, kept on disk, and functions that are inlined into them.
 
-numba is imported when a kernel is called, not here: what only makes a model or a plan never calls one.
+numba is imported where a kernel has to be compiled, not here and not where it is found on disk (kernels.kept_code).
 """
 
 from __future__ import annotations
@@ -51,11 +51,11 @@ class Entry(_Function):
     """A kernel that Python calls.  Called by another kernel it is compiled as a part of that one."""
 
     @cached_property
-    def made(self) -> Any:
-        """numba's own of it."""
-        from hybrid.kernels.compiler import entry_of
+    def _code(self) -> Any:
+        """Its machine code, for each signature."""
+        from hybrid.kernels.kept_code import KeptCode
 
-        return entry_of(self.py_func)
+        return KeptCode(self.py_func)
 
     @cached_property
     def part(self) -> Any:
@@ -68,26 +68,26 @@ class Entry(_Function):
         return self.part._numba_type_
 
     def __call__(self, *args: Any) -> Any:
-        return self.made(*args)
+        return self._code.taking(args).call(args)
 
     def address(self, *args: Any) -> int:
         """Where the machine code for arguments of the types of these is, for kernels.references.caller."""
-        found: int = self.made.address(*args)
+        found: int = self._code.taking(args).address
         return found
 
     def compile_unless_busy(self, *args: Any) -> None:
         """Compile for arguments of the types of these, unless another process is doing it."""
-        self.made.compile_unless_busy(*args)
+        self._code.make_unless_busy(args)
 
     @property
     def signatures(self) -> list[Any]:
-        """Types of the arguments for which it is compiled."""
-        return list(self.made.signatures)
+        """Of the machine code in this process: keys of the types of the arguments (kernels.argument_types)."""
+        return self._code.signatures
 
     @property
-    def stats(self) -> Any:
-        """How often it was found on disk, and compiled."""
-        return self.made.stats
+    def compilations(self) -> int:
+        """How often this process has compiled it."""
+        return self._code.compilations
 
 
 def named(function: Any, name: str) -> FunctionType:

@@ -1,24 +1,19 @@
-"""How numba compiles kernels: what it is told, and what is done in another way than its own.  Imported at the first call
-of a kernel (kernels.compile).  Tried with numba 0.62.0 and 0.68.1."""
+"""How numba compiles kernels: what it is told, and what is done in another way than its own.  Imported when the first kernel
+has to be compiled (kernels.kept_code).  Tried with numba 0.62.0 and 0.68.1."""
 
 from __future__ import annotations
 
 import gc
 from collections.abc import Callable
-from contextlib import nullcontext, suppress
-from functools import cached_property
-from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
-import numpy as np
-from filelock import FileLock, Timeout
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
 
 from hybrid.kernels import reference_types
-from hybrid.kernels.kept_code import KeptCode
+from hybrid.kernels.linked_code import Code
 
 # numba's "contract" lets a*b+c become one fused instruction; no other relaxation is
 # allowed: NaN must stay visible and the order of sums must stay as written.
@@ -34,15 +29,8 @@ class _Kernel(CPUDispatcher):
         """A constant counts as any other value of its type: f(x, 0) and f(x, 1) are compiled once."""
         return super().get_call_template([numba.types.unliteral(x) for x in args], kws)
 
-    def typeof_pyval(self, value: Any) -> Any:
-        if type(value) is not np.ndarray:
-            return super().typeof_pyval(value)
-        kind = reference_types.type_of(value)
-        self._types_active_call.add(kind)  # type: ignore[attr-defined]  # numba keeps it alive
-        return kind
-
     def compile(self, sig: Any) -> Any:
-        """Compile, or load from disk, without searches for garbage: a fifth of the time."""
+        """Without searches for garbage: a fifth of the time."""
         if not gc.isenabled():
             return super().compile(sig)
         gc.disable()
@@ -50,45 +38,6 @@ class _Kernel(CPUDispatcher):
             return super().compile(sig)
         finally:
             gc.enable()
-
-
-class _Entry(_Kernel):
-    """Of an entry, for calls from Python."""
-
-    _cache: KeptCode
-
-    def compile(self, sig: Any) -> Any:
-        """Load from disk, or compile; what another process is compiling is waited for."""
-        try:
-            held = nullcontext() if sig in self.overloads or self._cache.holds(sig) else self._lock.acquire()
-        except OSError:  # a file system without locks: at worst both compile it
-            return super().compile(sig)
-        with held:
-            return super().compile(sig)
-
-    def compile_unless_busy(self, *args: Any) -> None:
-        """Compile for arguments of the types of these, unless another process is doing it."""
-        with suppress(Timeout, OSError), self._lock.acquire(timeout=0):
-            self.compile(tuple(reference_types.type_of(x) for x in args))
-
-    @cached_property
-    def _lock(self) -> FileLock:
-        return FileLock(
-            Path(str(self.stats.cache_path)) / f"{self.py_func.__module__}.{self.py_func.__qualname__}.lock"
-        )
-
-    @cached_property
-    def _addresses(self) -> dict[Any, int]:
-        return {}
-
-    def address(self, *args: Any) -> int:
-        """Where the machine code for arguments of the types of these is, for kernels.references.caller."""
-        sig = tuple(reference_types.type_of(x) for x in args)
-        if sig not in self._addresses:
-            self.compile(sig)
-            made: Any = self.overloads[sig]
-            self._addresses[sig] = made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
-        return self._addresses[sig]
 
 
 class _NoEnvironment:
@@ -158,12 +107,49 @@ class _InnerCompiler(_EntryCompiler):
     made = _InlinedCode
 
 
-def entry_of(function: Callable[..., Any]) -> Any:
-    """Of an entry point."""
-    made = _njit(pipeline_class=_EntryCompiler, **_OPTIONS)(function)
-    made.__class__ = _Entry
-    made._cache = KeptCode(function)
-    return made
+class Made(NamedTuple):
+    """An entry as numba has compiled it."""
+
+    result: Any  # as numba calls it
+    processor: tuple[str, str, str]  # that it is for, as kernels.cache.Processor
+
+    @property
+    def code(self) -> bytes:
+        """The object, which kernels.linked_code.link takes."""
+        self.result.library._ensure_finalized()
+        code: bytes = self.result.library._get_compiled_object()
+        return code
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Of what is in the object."""
+        described = self.result.fndesc
+        return {
+            "symbol": described.mangled_name,
+            "wrapper": described.llvm_cpython_wrapper_name,
+            "environment": described.env_name,
+        }
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether it refers to something of this process: to Python's objects, or into numba's libraries."""
+        made = self.result
+        return bool(made.lifted or made.reload_init or made.environment.consts or made.library.has_dynamic_globals)
+
+    def code_here(self) -> Code:
+        """What numba has linked in this process."""
+        entry, symbol = self.result.entry_point, self.result.fndesc.llvm_func_name
+        return Code(lambda args: entry(*args), self.result.library.get_pointer_to_function(symbol))
+
+
+def compile_entry(function: Callable[..., Any], key: tuple[Any, ...]) -> Made:
+    """key: of the types of its arguments (kernels.argument_types)."""
+    entry = _njit(pipeline_class=_EntryCompiler, **_OPTIONS)(function)
+    entry.__class__ = _Kernel
+    sig = tuple(map(reference_types.type_for, key))
+    entry.compile(sig)
+    (result,) = entry.overloads.values()
+    return Made(result, result.library.codegen.magic_tuple())
 
 
 def inner_of(function: Callable[..., Any], options: dict[str, Any]) -> Any:

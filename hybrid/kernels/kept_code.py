@@ -1,8 +1,7 @@
-"""Machine code of entries on disk, as numba asks for it: looked up, loaded, kept.  Tried with numba 0.62.0 and 0.68.1.
+"""Machine code of an entry: of this process, on disk, or compiled and kept.
 
-numba's own cache unpickles what it finds, and with it executes whatever that says.  Here a file holds machine code and
-three names (kernels.code_file); all else that numba wants to know of a kernel follows from the function and the types
-of its arguments.
+numba is imported only to compile.  A file holds machine code and three names (kernels.code_file); nothing in it is
+unpickled, which would execute whatever it says.
 """
 
 from __future__ import annotations
@@ -11,77 +10,84 @@ import hashlib
 import inspect
 import re
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
-
-from numba import types
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import compile_result
-from numba.core.funcdesc import PythonFunctionDescriptor
-from numba.core.lowering import Environment
-from numba.core.serialize import dumps
-from numba.core.sigutils import normalize_signature
-from numba.core.typing import signature
+from typing import TYPE_CHECKING, Any
 
 from hybrid.kernels import cache as kept
+from hybrid.kernels.argument_types import key_of, text_of
 from hybrid.kernels.code_file import SUFFIX, Unusable, digest, read_code, write_code
+from hybrid.kernels.linked_code import Code, link
+
+if TYPE_CHECKING:
+    from filelock import FileLock
+
+    from hybrid.kernels.compiler import Made
 
 
 class KeptCode:
-    """In the place of numba's cache of a function."""
+    """Machine code of one entry, by the types of the arguments."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
-        self._enabled = True
+        self._known: dict[tuple[Any, ...], Code] = {}
+        self.compilations = 0
+
+    def taking(self, args: tuple[Any, ...]) -> Code:
+        """That takes these arguments: found, or compiled; what another process is compiling is waited for."""
+        key = tuple([key_of(x) for x in args])
+        known = self._known.get(key)
+        if known is None:
+            known = self._known[key] = self._read(key) or self._made(key)
+        return known
+
+    def make_unless_busy(self, args: tuple[Any, ...]) -> None:
+        """Compile for arguments of the types of these, unless another process is doing it."""
+        from filelock import Timeout
+
+        with suppress(Timeout, OSError), self._lock.acquire(timeout=0):
+            self.taking(args)
 
     @property
-    def cache_path(self) -> str:
-        return str(_own_place().folder)
+    def signatures(self) -> list[tuple[Any, ...]]:
+        """Keys of the types of arguments, one for each machine code."""
+        return list({_text(key): key for key in self._known}.values())
 
-    def enable(self) -> None:
-        self._enabled = True
-
-    def disable(self) -> None:
-        self._enabled = False
-
-    def flush(self) -> None:
-        """Delete the code of this function in the user's folder."""
-        for file in _own_place().folder.glob(f"{self._name}-*{SUFFIX}"):
-            file.unlink(missing_ok=True)
-
-    def holds(self, sig: Any) -> bool:
-        """Whether there is a file with the code for a signature."""
-        return any(self._file(place, sig).is_file() for place in _all_places())
-
-    def load_overload(self, sig: Any, target: Any) -> Any:
-        """What numba calls the result of a compilation, from disk; None where it has to be compiled.
-
-        The registries of numba are not asked for, which bring scipy.linalg: a compilation brings them itself.
-        """
-        if not self._enabled:
-            return None
+    def _read(self, key: tuple[Any, ...]) -> Code | None:
+        """From the package or the user's folder; None where it has to be compiled."""
         for place in _all_places():
-            file = self._file(place, sig)
+            file = self._file(place, key)
             try:
-                found = read_code(file, self._header(place, sig), trust=not place.ours or kept.shared())
+                found = read_code(file, self._header(place, key), trust=not place.ours or kept.shared())
             except Unusable as why:
                 self._mend(file, place, why)
                 continue
             if found:
-                return self._loaded(*found, normalize_signature(sig)[0], target)
+                header, code = found
+                return link(code, header)
         return None
 
-    def save_overload(self, sig: Any, result: Any) -> None:
-        if not self._enabled or not self._can_be_kept(result):
-            return
-        result.library._ensure_finalized()
-        place, described = _own_place(), result.fndesc
-        names = {"library": result.library.name, "symbol": described.mangled_name, "environment": described.env_name}
+    def _made(self, key: tuple[Any, ...]) -> Code:
+        with self._alone():
+            return self._read(key) or self._compiled(key)
+
+    def _compiled(self, key: tuple[Any, ...]) -> Code:
+        from hybrid.kernels.compiler import compile_entry
+
+        made = compile_entry(self._function, key)
+        self.compilations += 1
+        if not self._can_be_kept(made):
+            return made.code_here()
+        code = made.code
+        self._write(key, code, made.names)
+        return link(code, made.names)
+
+    def _write(self, key: tuple[Any, ...], code: bytes, names: dict[str, str]) -> None:
+        place = _own_place()
         try:
             kept.make_folder(place.folder)
-            write_code(self._file(place, sig), self._header(place, sig) | names, result.library._get_compiled_object())
+            write_code(self._file(place, key), self._header(place, key) | names, code)
         except OSError as error:
             kept.warn_once(
                 f"machine code cannot be kept in {place.folder} ({error.strerror}) and is compiled at every run: "
@@ -94,15 +100,30 @@ class KeptCode:
                 file.unlink()
         kept.warn_once(f"machine code {file} {why}: it is not used, and compiled again")
 
-    def _can_be_kept(self, result: Any) -> bool:
-        """Code that refers to nothing of this process; in Python's objects or numba's libraries it would."""
-        refers = result.lifted or result.reload_init or result.environment.consts or result.library.has_dynamic_globals
-        if refers:
-            kept.warn_once(
-                f"{self._function.__qualname__} is compiled at every run: it refers to objects of Python, to large "
-                "global arrays or to LAPACK, which machine code on disk cannot"
-            )
-        return not refers
+    def _can_be_kept(self, made: Made) -> bool:
+        """Code that refers to nothing of this process, and is for the processor that its file will say."""
+        why = None
+        if made.is_bound:
+            why = "refers to objects of Python, to large global arrays or to LAPACK, which machine code on disk cannot"
+        elif made.processor != _own_place().processor:
+            why = f"is for the processor {made.processor[1]} by settings of numba that were changed in this process"
+        if why:
+            kept.warn_once(f"{self._function.__qualname__} is compiled at every run: it {why}")
+        return why is None
+
+    def _alone(self) -> AbstractContextManager[Any]:
+        """While no other process compiles it; on a file system without locks at worst both do."""
+        try:
+            return self._lock.acquire()
+        except OSError:
+            return nullcontext()
+
+    @cached_property
+    def _lock(self) -> FileLock:
+        from filelock import FileLock
+
+        name = f"{self._function.__module__}.{self._function.__qualname__}.lock"
+        return FileLock(_own_place().folder / name)
 
     @cached_property
     def _name(self) -> str:
@@ -113,15 +134,14 @@ class KeptCode:
     @cached_property
     def _source(self) -> str:
         """Of what the hash of all kernels does not know: kernels of tests and users, and what a closure holds."""
-        cells = tuple(x.cell_contents for x in self._function.__closure__ or ())
-        code = self._function.__code__
-        return digest(code.co_code, str(code.co_firstlineno), dumps(cells), _content(inspect.getfile(self._function)))
+        code, content = self._function.__code__, _content(inspect.getfile(self._function))
+        return digest(code.co_code, str(code.co_firstlineno), _held(self._function), content)
 
-    def _header(self, place: kept.Place, sig: Any) -> dict[str, Any]:
+    def _header(self, place: kept.Place, key: tuple[Any, ...]) -> dict[str, Any]:
         """What the file for a signature says of what it is."""
         return {
             "kernel": f"{self._function.__module__}.{self._function.__qualname__}",
-            "signature": str(normalize_signature(sig)[0]),
+            "signature": _text(key),
             "triple": place.processor.triple,
             "processor": place.processor.name,
             "features": place.processor.features,
@@ -129,42 +149,25 @@ class KeptCode:
             "source": self._source,
         }
 
-    def _file(self, place: kept.Place, sig: Any) -> Path:
-        which = digest(*self._header(place, sig).values())[:16]
+    def _file(self, place: kept.Place, key: tuple[Any, ...]) -> Path:
+        which = digest(*self._header(place, key).values())[:16]
         return place.folder / f"{self._name}-{place.mark}-{which}{SUFFIX}"
 
-    def _loaded(self, header: dict[str, Any], code: bytes, args: Any, target: Any) -> Any:
-        function = self._function
-        described = PythonFunctionDescriptor(
-            native=True, modname=function.__module__, qualname=function.__qualname__,
-            unique_name=function.__qualname__, doc=function.__doc__ or "", typemap=None, calltypes=None,
-            restype=types.undefined,  # Python is given objects; kernels call `part`, or an address
-            args=tuple(inspect.signature(function).parameters), kws=(), argtypes=args,
-            mangler=lambda *_, **__: header["symbol"], env_name=header["environment"],
-        )  # fmt: skip
-        library = _LoadedCode(target.codegen(), header["library"], code)
-        environment = Environment.from_fndesc(described)
-        return compile_result(
-            target_context=target, typing_context=None, library=library, environment=environment,
-            entry_point=target.get_executable(library, described, environment), fndesc=described,
-            signature=signature(described.restype, *args), objectmode=False, lifted=(), reload_init=[],
-            referenced_envs=(), type_annotation="",
-        )  # fmt: skip
+
+def _text(key: tuple[Any, ...]) -> str:
+    """A signature as text."""
+    return ", ".join(map(text_of, key))
 
 
-class _LoadedCode(JITCodeLibrary):
-    """Machine code of an entry, from disk: numba would read its LLVM code as well, for the names in it."""
+def _held(function: Callable[..., Any]) -> bytes:
+    """What a closure holds, as bytes; of most kernels nothing."""
+    cells = tuple(x.cell_contents for x in function.__closure__ or ())
+    if not cells:
+        return b""
+    from numba.core.serialize import dumps
 
-    def __init__(self, codegen: Any, name: str, code: bytes) -> None:
-        super().__init__(codegen, name)
-        self.enable_object_caching()
-        self._set_compiled_object(code)
-        self._finalize_final_module()
-
-    def get_pointer_to_function(self, name: str) -> int:
-        """The address of the entry, or of its wrapper for Python; numba asks for no others."""
-        found: int = self._codegen._engine.get_function_address(name)
-        return found
+    found: bytes = dumps(cells)
+    return found
 
 
 @cache

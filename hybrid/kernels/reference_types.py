@@ -5,6 +5,7 @@ The layout of a table is that of kernels.binding.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,12 @@ from numba import from_dtype, typeof, types
 from numba.core import cgutils
 from numba.core.imputils import lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, make_intrinsic_template
-from numba.extending import NativeValue, infer_getattr, models, register_model, typeof_impl, unbox
+from numba.extending import NativeValue, infer_getattr, models, register_model, unbox
 
-from hybrid.kernels import references
+from hybrid.kernels.argument_types import is_array, key_of, layout_of
+from hybrid.kernels.references import examples
 
 _WORD = ir.IntType(64)
-_fields: dict[type, dict[str, tuple[int, Any]]] = {}  # of a class: where each field begins in its table, and its type
 
 
 class Reference(types.Type):
@@ -30,48 +31,45 @@ class Reference(types.Type):
 
 
 def type_of(value: Any) -> Any:
-    """As numba's typeof, which asks of an array whether it is a masked one, and imports numpy.ma for that."""
-    if type(value) is np.ndarray and value.flags.c_contiguous and value.flags.aligned and value.ndim:
-        return types.Array(from_dtype(value.dtype), value.ndim, "C", readonly=not value.flags.writeable)
-    return typeof(value)
+    """numba's type of a value, as an entry takes it."""
+    return type_for(key_of(value))
 
 
-def by_reference(example: Any) -> Reference:
-    """Keep NamedTuples of a class by reference; all of them have the types of the example."""
+def type_for(key: Any) -> Any:
+    """numba's type for a key of kernels.argument_types."""
+    if is_array(key):
+        dtype, dimensions, flags = key
+        layout, readonly, aligned = layout_of(flags)
+        made: Any = types.Array  # its type knows of fewer layouts than it takes
+        return made(from_dtype(dtype), dimensions, layout, readonly=readonly, aligned=aligned)
+    if isinstance(key, tuple):
+        return types.BaseTuple.from_types(tuple(map(type_for, key[1:])), key[0])
+    return Reference(key) if key in examples else from_dtype(np.dtype(key))
+
+
+@cache
+def _fields_of(of: type) -> dict[str, tuple[int, Any]]:
+    """Of a class: where each field begins in its table, and its type."""
     fields, at = {}, 0
-    for name, value in example._asdict().items():
-        kind = by_reference(value) if _has_arrays(value) else type_of(value)
+    for name, value in examples[of]._asdict().items():
+        kind = type_of(value)
         fields[name] = at, kind
         at += size(kind)
-    found = Reference(type(example))
-    _fields[found.of] = fields
-    typeof_impl.register(found.of)(lambda value, _: _checked(found, value))
-    return found
-
-
-def _has_arrays(value: Any) -> bool:
-    return isinstance(value, tuple) and any(isinstance(x, np.ndarray) or _has_arrays(x) for x in value)
+    return fields
 
 
 def size(kind: Any) -> int:
     """Numbers of a table that a value of a type takes."""
     if isinstance(kind, Reference):
-        return sum(size(x) for _, x in _fields[kind.of].values())
+        return sum(size(x) for _, x in _fields_of(kind.of).values())
     if isinstance(kind, types.NamedTuple):
         return sum(size(x) for x in kind.types)
     return 1 + kind.ndim if isinstance(kind, types.Array) else 1
 
 
-def _checked(kind: Reference, value: Any) -> Reference:
-    for (name, (_, expected)), each in zip(_fields[kind.of].items(), value, strict=True):
-        if isinstance(each, np.ndarray) and type_of(each) != expected:
-            raise TypeError(f"{kind.of.__name__}.{name}: {type_of(each)}, expected {expected}")
-    return kind
-
-
 def read_function(example: Any) -> Any:
     """What numba is told of kernels.references.reader."""
-    kind = by_reference(example)
+    kind = Reference(type(example))
 
     def read(typingctx: Any, table: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -125,12 +123,12 @@ class _Attributes(AttributeTemplate):
     key = Reference
 
     def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]
-        return _fields[kind.of].get(name, (0, None))[1]
+        return _fields_of(kind.of).get(name, (0, None))[1]
 
 
 @lower_getattr_generic(Reference)
 def _attribute(context: Any, builder: Any, kind: Any, table: Any, name: str) -> Any:
-    at, field = _fields[kind.of][name]
+    at, field = _fields_of(kind.of)[name]
     return _built(context, builder, field, table, at)[0]
 
 
@@ -174,7 +172,7 @@ def _unboxed(kind: Any, value: Any, c: Any) -> NativeValue:
     builder = c.builder
     table = cgutils.alloca_once(builder, _WORD, size=size(kind))
     failed = cgutils.alloca_once_value(builder, cgutils.false_bit)
-    for k, (at, field) in enumerate(_fields[kind.of].values()):
+    for k, (at, field) in enumerate(_fields_of(kind.of).values()):
         native = c.unbox(field, c.pyapi.tuple_getitem(value, k))
         with cgutils.if_unlikely(builder, native.is_error):
             builder.store(cgutils.true_bit, failed)
@@ -198,6 +196,3 @@ def _numbers(context: Any, builder: Any, kind: Any, value: Any) -> list[Any]:
     if isinstance(kind, types.Boolean):
         return [builder.zext(value, _WORD)]
     return [value]
-
-
-references.take_over(by_reference)

@@ -2,32 +2,35 @@
 
 numba hands such a tuple from function to function as hundreds of numbers, which is most of what it would compile.  A
 reference is one number; `line.h` reads address and shape of that array where they are needed.  numba hears of all this
-(kernels.reference_types) when the first kernel is called.
+(kernels.reference_types) when the first kernel is compiled.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from hybrid.kernels.state import blank_line, blank_state, no_ends, no_moves, no_sea, no_work
 
-_waiting: list[Any] = [blank_line(1), no_sea(1), no_ends(), no_moves(), blank_state(1), no_work()]
-_register: Callable[[Any], object] = _waiting.append
+examples: dict[type, Any] = {}  # of the classes that are kept by reference
 
 
 def by_reference(example: Any) -> None:
     """Keep NamedTuples of a class by reference; all of them have the types of the example."""
-    _register(example)
+    for value in example:
+        if _has_arrays(value):
+            by_reference(value)
+    examples[type(example)] = example
 
 
-def take_over(register: Callable[[Any], object]) -> None:
-    """Let numba know of the classes so far, and of each from now on."""
-    global _register
-    _register = register
-    while _waiting:
-        register(_waiting.pop(0))
+def _has_arrays(value: Any) -> bool:
+    return isinstance(value, tuple) and any(isinstance(x, np.ndarray) or _has_arrays(x) for x in value)
+
+
+for _each in (blank_line(1), no_sea(1), no_ends(), no_moves(), blank_state(1), no_work()):
+    by_reference(_each)
 
 
 class Intrinsic:

@@ -55,7 +55,7 @@ scene = hybrid.validate_scene({
 })
 hybrid.static(scene)
 assert in_space.signatures
-print(sum(in_space.stats.cache_misses.values()))
+print(in_space.compilations)
 """
 
 

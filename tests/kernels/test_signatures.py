@@ -19,6 +19,7 @@ SCRIPT = """
 import importlib, json, pkgutil, sys
 import hybrid, hybrid.kernels
 from hybrid.kernels.compile import Entry, Inner
+from hybrid.kernels.reference_types import type_for
 
 cable = {"length": 20.0, "diameter": 0.05, "mass": 4.0, "axial_stiffness": 1e7, "bending_stiffness": 50.0,
          "torsional_stiffness": 40.0, "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
@@ -50,10 +51,10 @@ named = [(room, *x) for room in rooms for x in vars(importlib.import_module(room
 if sys.argv[1:]:  # numba reads all that was called once more, with what it inlines; no machine code is made
     for room, name, f in named:
         for sig in f.signatures if isinstance(f, Entry) and f.__module__ == room else ():
-            f.part.compile(sig)
+            f.part.compile(tuple(map(type_for, sig)))
 for room, name, f in named:
     if isinstance(f, Entry | Inner) and f.__module__ == room:
-        found[f"{room}.{name}"] = [str(x) for x in f.made.signatures]
+        found[f"{room}.{name}"] = [str(x) for x in (f if isinstance(f, Entry) else f.made).signatures]
 print(json.dumps(found))
 """
 
