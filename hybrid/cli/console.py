@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import hybrid
+from hybrid.cli.grid import Grid
 from hybrid.cli.pipe import reader_has_gone
 from hybrid.cli.progress_line import LINE_EVERY, ProgressLine, span
 from hybrid.errors import EXPECTED, is_of_the_run, weight_of_event
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 JSON_EVERY = 1.0  # s of wall time between two progress lines for programs: a long run must not fill a log
 BAR_EVERY = 0.5  # s of wall time between two drawings of the bar of a study: below 1 % of what its runs cost
+AT_ONCE = 1.0  # s of wall time: a run that is over by then shows no line, and does without rich
 COLOURED = {"FORCE_COLOR", "TTY_COMPATIBLE"}  # of the environment: colours in files and pipes too
 KINDS_SHOWN = 3  # kinds of events named at the end of a run; the report has them all
 
@@ -107,10 +109,11 @@ class Console:
         if not (self.quiet or self.as_json):
             made = content()
             columns = min(80, shutil.get_terminal_size().columns)
-            if isinstance(made, str) and all(len(x) <= columns and x.isprintable() for x in made.splitlines()):
-                sys.stdout.write(f"{made}\n")  # rich, which takes long to import, has nothing to do
+            text = made.text() if isinstance(made, Grid) else made
+            if isinstance(text, str) and all(len(x) <= columns and x.isprintable() for x in text.splitlines()):
+                sys.stdout.write(f"{text}\n")  # rich, which takes long to import, has nothing to do
             else:
-                self._out.print(made)
+                self._out.print(made.table() if isinstance(made, Grid) else made)
 
     def _tell(self, text: str, style: str, wrap: bool = False) -> None:
         """A line of the error stream; in colour, and wrapped between words, where somebody reads it."""
@@ -133,11 +136,20 @@ class Console:
     @contextmanager
     def progress(self) -> Iterator[Callable[[Progress], None] | bool]:
         """What `hybrid.run` calls while it runs: a progress line, JSON lines, or nothing."""
-        line = ProgressLine(self._err)
+        line, begin = None, clock.perf_counter()
+
+        def show(progress: Progress) -> None:
+            nonlocal line
+            if line is None and clock.perf_counter() - begin > AT_ONCE:
+                line = ProgressLine(self._err)
+            if line is not None:
+                line(progress)
+
         try:
-            yield False if self.quiet else self._json_progress() if self.as_json else line
+            yield False if self.quiet else self._json_progress() if self.as_json else show
         finally:
-            line.close()
+            if line is not None:
+                line.close()
 
     @contextmanager
     def study(self) -> Iterator[Callable[[StudyProgress], None] | None]:

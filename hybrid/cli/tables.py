@@ -10,6 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hybrid.cli.grid import Grid
 from hybrid.errors import OMITTED, ZONE_EVENTS
 
 ANCHORED = 1.0  # m
@@ -114,13 +115,7 @@ def unknown_text(facts: dict[str, Any], unit: str) -> str:
 
 def extremes_table(facts: dict[str, Any]) -> Any:
     """What a run has reached, over all of its time."""
-    from rich.table import Table
-
-    table = Table.grid(padding=(0, 2))
-    for row in extremes_rows(facts, moves=True):
-        table.add_row(*row)
-    table.columns[0].style = "bold"
-    return table
+    return Grid(list(extremes_rows(facts, moves=True)))
 
 
 def _on_the_seabed(result: Result) -> dict[str, Any]:
@@ -148,33 +143,28 @@ def _is_anchor(result: Result, end: str) -> bool:
 
 
 def equilibrium_table(facts: dict[str, Any]) -> Any:
-    from rich.table import Table
-
     def vector(x: list[float]) -> str:
         zero = 1e-9 * max(abs(c) for c in x)
         return "[" + ", ".join(f"{c if abs(c) > zero else 0.0:.5g}" for c in x) + "]"
 
-    table = Table.grid(padding=(0, 2))
-    table.add_row("found by", facts["path"].replace("; ", "\n"))
+    rows: list[tuple[str, ...]] = [("found by", facts["path"].replace("; ", "\n"))]
     if facts["residual"] is not None:
-        table.add_row("residual force", f"{facts['residual']:.2g} N at most")
-    for row in extremes_rows(facts, moves=False):
-        table.add_row(*row)
+        rows.append(("residual force", f"{facts['residual']:.2g} N at most"))
+    rows += extremes_rows(facts, moves=False)
     for end, force in facts["force"].items():
-        table.add_row(f"force at {end}", f"{vector(force)} N on the cable")
+        rows.append((f"force at {end}", f"{vector(force)} N on the cable"))
     if facts.get("grounded_length"):
         a, b = facts["touchdown"]
-        table.add_row("on the seabed", f"{facts['grounded_length']:.5g} m between s = {a:.5g} and {b:.5g} m")
-        table.add_row("contact force", f"{facts['contact_force']:.5g} N")
+        rows.append(("on the seabed", f"{facts['grounded_length']:.5g} m between s = {a:.5g} and {b:.5g} m"))
+        rows.append(("contact force", f"{facts['contact_force']:.5g} N"))
     elif "grounded_length" in facts:
-        table.add_row("on the seabed", "nothing")
+        rows.append(("on the seabed", "nothing"))
     for end, lift in facts.get("uplift", {}).items():
-        table.add_row(f"uplift at {end}", f"{lift['force']:.5g} N, {lift['angle']:.3g} deg from the seabed")
+        rows.append((f"uplift at {end}", f"{lift['force']:.5g} N, {lift['angle']:.3g} deg from the seabed"))
     if len(facts["zones"]) > 1:
-        table.add_row("zones", "\n".join(f"{z['kind']} {z['s_a']:.5g} to {z['s_b']:.5g} m" for z in facts["zones"]))
-    table.add_row("lowest point", f"{vector(facts['lowest']['position'])} m at s = {facts['lowest']['s']:.5g} m")
-    table.columns[0].style = "bold"
-    return table
+        rows.append(("zones", "\n".join(f"{z['kind']} {z['s_a']:.5g} to {z['s_b']:.5g} m" for z in facts["zones"])))
+    rows.append(("lowest point", f"{vector(facts['lowest']['position'])} m at s = {facts['lowest']['s']:.5g} m"))
+    return Grid(rows)
 
 
 def zones_over_time(result: Result) -> dict[str, Any]:
@@ -221,21 +211,18 @@ def verdict_text(found: Mapping[str, Any]) -> str:
 
 def errors_table(errors: dict[str, Any], result: Result) -> Any:
     """The same for people: by cause, beside what was asked."""
-    from rich.table import Table
-
     from hybrid.store.records import not_converged_in
 
     forces = [result[name] for name in ("reaction_start", "reaction_end") if name in result]
     most = max((float((x**2).sum(axis=1).max()) ** 0.5 for x in forces), default=0.0)
-    table = Table.grid(padding=(0, 2))
     kinds = [kind for kind in ("mesh", "time", "model", "total") if f"{kind}_position" in errors]
     extremes = "extremes_total_position" in errors
     of, unknown = "extremes_" if extremes else "", not_converged_in(result.attributes)
     not_known = [*[""] * (len(kinds) - 1), "not known", "not converged"]
-    table.add_row("error by", *({"time": "step"}.get(kind, kind) for kind in kinds), "", style="bold")
+    rows: list[tuple[str, ...]] = [("error by", *({"time": "step"}.get(kind, kind) for kind in kinds), "")]
     for what, unit, whole in (("position", "m", float(result.s[-1])), ("end_force", "N", most)):
         if what in unknown:
-            table.add_row("position" if what == "position" else "end force", *not_known)
+            rows.append(("position" if what == "position" else "end force", *not_known))
             continue
         total = errors[f"{of}total_{what}"]
         share = (
@@ -245,23 +232,19 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
         )
         sizes = (f"{_short(errors[f'{of}{kind}_{what}'], total)} {unit}" for kind in kinds)
         name = "position" if what == "position" else "end force"
-        table.add_row(f"{name}, extremes" if extremes else name, *sizes, share)
+        rows.append((f"{name}, extremes" if extremes else name, *sizes, share))
         if extremes:
             now = errors[f"total_{what}"]
-            table.add_row(f"{name}, at an instant", *[""] * (len(kinds) - 1), f"{_short(now)} {unit}", "")
+            rows.append((f"{name}, at an instant", *[""] * (len(kinds) - 1), f"{_short(now)} {unit}", ""))
     if "errors/model/bending_moment" in result or "errors/total/bending_moment" in result:
         names = [f"errors/{kind}/bending_moment" for kind in kinds]
         found = {name: float(result[name].max()) for name in names if name in result}
         most = max(found.values())
         sizes = (f"{_short(found[name], most)} N m" if name in found else "" for name in names)
         name = "moment, at an instant" if extremes else "moment"
-        table.add_row(name, *(not_known if "bending_moment" in unknown else [*sizes, _largest_moment(result)]))
+        rows.append((name, *(not_known if "bending_moment" in unknown else [*sizes, _largest_moment(result)])))
     asked = result.attributes.get("accuracy_asked")
-    if not asked:
-        return table
-    from rich.console import Group
-
-    return Group(table, f"asked {asked}: {errors['verdict']}")
+    return Grid(rows, f"asked {asked}: {errors['verdict']}" if asked else "")
 
 
 def _largest_moment(result: Result) -> str:

@@ -32,9 +32,9 @@ def key_of(value: Any) -> Any:
         return kind
     if isinstance(value, tuple):
         return kind, *map(key_of, value)
-    if isinstance(value, _NUMBERS):
+    if value is None or isinstance(value, _NUMBERS):
         return kind
-    raise TypeError(f"a kernel takes numbers, arrays and tuples of them, not {kind.__qualname__}")
+    raise TypeError(f"a kernel takes numbers, arrays, None and tuples of them, not {kind.__qualname__}")
 
 
 @cache

@@ -6,6 +6,7 @@ The layout of a table is that of kernels.binding.
 from __future__ import annotations
 
 from functools import cache
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,9 @@ def type_for(key: Any) -> Any:
         return made(from_dtype(dtype), dimensions, layout, readonly=readonly, aligned=aligned)
     if isinstance(key, tuple):
         return types.BaseTuple.from_types(tuple(map(type_for, key[1:])), key[0])
-    return Reference(key) if key in examples else from_dtype(np.dtype(key))
+    if key in examples:
+        return Reference(key)
+    return types.none if key is NoneType else from_dtype(np.dtype(key))
 
 
 @cache

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state import Line
 from hybrid.scene.analysis import CorrectedZone
 from hybrid.scene.payout import Payout
 from hybrid.scene.schema import AdaptiveModel, CatenaryModel, CorrectedModel, Scene, ZonesModel
-from hybrid.scene.system import System
+
+if TYPE_CHECKING:  # its tables take long to make
+    from hybrid.scene.system import System
 
 # Diameters of slack of the smallest loop: WINDOW of kernels.self_contact_pairs less OUTER of kernels.self_contact_law,
 # which a plan does not import.

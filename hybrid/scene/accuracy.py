@@ -6,9 +6,9 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from hybrid.scene.base import Finding, Table, Words, refuse
+from hybrid.scene.base import After, Before, Finding, Table, Words, refuse
 from hybrid.scene.suggestions import decimal_comma
 
 # Units in which a size may be given, what they measure, and how much of the SI unit they are.
@@ -61,7 +61,7 @@ def _checked(text: str) -> str:
     return text.strip()
 
 
-Amount = Annotated[str, BeforeValidator(_is_text), AfterValidator(_checked), Words(_EXAMPLES)]
+Amount = Annotated[str, Before(_is_text), After(_checked), Words(_EXAMPLES)]
 
 
 class Accuracy(Table):
@@ -131,4 +131,4 @@ def _each(text: str) -> dict[str, str]:
     return {"position": text, "tension": text} if what == "part" else {what: text}
 
 
-AskedAccuracy = Annotated[Accuracy, BeforeValidator(expand)]
+AskedAccuracy = Annotated[Accuracy, Before(expand)]

@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import AliasChoices, BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.base import (
+    Before,
     Direction,
     Finding,
     Kinds,
@@ -180,7 +181,7 @@ Zone = Annotated[
     | Annotated[CatenaryZone, Tag("<catenary zone>")]
     | Annotated[CorrectedZone, Tag("<corrected zone>")],
     Discriminator(_zone_tag),
-    BeforeValidator(_one_zone_kind),
+    Before(_one_zone_kind),
 ]
 
 Slack = Literal["stop", "warn"]
@@ -225,7 +226,7 @@ def _are_stretches(value: Any) -> Any:
     return value
 
 
-Stretches = Annotated[tuple[NonNegativePair, ...], Field(min_length=1), BeforeValidator(_are_stretches)]
+Stretches = Annotated[tuple[NonNegativePair, ...], Field(min_length=1), Before(_are_stretches)]
 
 
 class AdaptiveModel(Table):

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, AliasChoices, Discriminator, Field, Tag, model_validator
+from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.base import (
+    After,
     Finding,
     Kinds,
     NonNegative,
@@ -41,7 +42,7 @@ def _lifts(value: float) -> float:
     return value
 
 
-Lift = Annotated[Number, AfterValidator(_lifts), Field(json_schema_extra={"minimum": 0})]
+Lift = Annotated[Number, After(_lifts), Field(json_schema_extra={"minimum": 0})]
 
 
 class Float(Table):

@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn, get_args
 from pydantic import (
     AliasChoices,
     BaseModel,
-    BeforeValidator,
     ConfigDict,
     Field,
     GetCoreSchemaHandler,
@@ -30,7 +29,6 @@ from pydantic import (
     Tag,
 )
 from pydantic.fields import ComputedFieldInfo, FieldInfo
-from pydantic.functional_validators import AfterValidator
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from hybrid.scene.suggestions import nearest
@@ -232,21 +230,44 @@ def _points_somewhere(value: tuple[float, float, float]) -> tuple[float, float, 
     return value
 
 
-Text = Annotated[str, Field(strict=True), AfterValidator(_one_line), Words("one line of text")]
-Number = Annotated[float, BeforeValidator(_a_number), Field(allow_inf_nan=False)]
-Positive = Annotated[Number, Field(gt=0), AfterValidator(_not_tiny)]
-NonNegative = Annotated[Number, Field(ge=0), AfterValidator(_not_tiny)]
-Whole = Annotated[int, BeforeValidator(_a_whole_number), BeforeValidator(_no_infinity)]
-Truth = Annotated[bool, BeforeValidator(_a_truth)]
-Vector = Annotated[tuple[Number, Number, Number], BeforeValidator(numbers(3)), Words("three numbers [x, y, z]")]
+@dataclass(frozen=True)
+class Before:
+    """What is done to a value before it is read: as pydantic's BeforeValidator, which looks at the function's signature
+
+    anew wherever such a value stands, a fifth of the time that it takes to build a scene's tables.
+    """
+
+    function: Callable[[Any], Any]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.function, handler(source))
+
+
+@dataclass(frozen=True)
+class After:
+    """The same, when it has been read."""
+
+    function: Callable[[Any], Any]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_after_validator_function(self.function, handler(source))
+
+
+Text = Annotated[str, Field(strict=True), After(_one_line), Words("one line of text")]
+Number = Annotated[float, Before(_a_number), Field(allow_inf_nan=False)]
+Positive = Annotated[Number, Field(gt=0), After(_not_tiny)]
+NonNegative = Annotated[Number, Field(ge=0), After(_not_tiny)]
+Whole = Annotated[int, Before(_a_whole_number), Before(_no_infinity)]
+Truth = Annotated[bool, Before(_a_truth)]
+Vector = Annotated[tuple[Number, Number, Number], Before(numbers(3)), Words("three numbers [x, y, z]")]
 Direction = Annotated[
     tuple[Number, Number, Number],
-    BeforeValidator(numbers(3)),
-    AfterValidator(_points_somewhere),
+    Before(numbers(3)),
+    After(_points_somewhere),
     Words("a direction [x, y, z], not all zero"),
 ]
-Pair = Annotated[tuple[Number, Number], BeforeValidator(numbers(2)), Words("two numbers")]
-NonNegativePair = Annotated[tuple[NonNegative, NonNegative], BeforeValidator(numbers(2)), Words("two numbers >= 0")]
+Pair = Annotated[tuple[Number, Number], Before(numbers(2)), Words("two numbers")]
+NonNegativePair = Annotated[tuple[NonNegative, NonNegative], Before(numbers(2)), Words("two numbers >= 0")]
 
 
 def parallel(a: tuple[float, float, float], b: tuple[float, float, float]) -> bool:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import (
-    BeforeValidator,
     Discriminator,
     Field,
     GetCoreSchemaHandler,
@@ -18,6 +17,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, core_schema
 
 from hybrid.scene.base import (
+    Before,
     Finding,
     Kinds,
     NonNegative,
@@ -57,10 +57,10 @@ class _Diagonal:
         return value
 
 
-_Row = Annotated[tuple[Number, Number, Number, Number, Number, Number], BeforeValidator(numbers(6))]
+_Row = Annotated[tuple[Number, Number, Number, Number, Number, Number], Before(numbers(6))]
 SixBySix = Annotated[
     tuple[_Row, _Row, _Row, _Row, _Row, _Row],
-    BeforeValidator(numbers(6)),
+    Before(numbers(6)),
     _Diagonal(),
     Words("six numbers (surge, sway, heave, roll, pitch, yaw), or six rows of six"),
 ]
@@ -168,8 +168,8 @@ class FreeBody(Table):
     centre: Vector = Field(
         default=(0.0, 0.0, 0.0), description="centre of mass, from the origin, in axes of the body [m]"
     )
-    inertia: Annotated[tuple[Positive, Positive, Positive], BeforeValidator(numbers(3)), Words("three numbers > 0")] = (
-        Field(description="moments of inertia about axes through the centre of mass along those of the body [kg m^2]")
+    inertia: Annotated[tuple[Positive, Positive, Positive], Before(numbers(3)), Words("three numbers > 0")] = Field(
+        description="moments of inertia about axes through the centre of mass along those of the body [kg m^2]"
     )
     added_mass: SixBySix | None = Field(
         default=None,

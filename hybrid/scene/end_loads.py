@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.base import (
+    Before,
     Finding,
     NonNegative,
     Number,
@@ -26,9 +27,7 @@ from hybrid.scene.base import (
 Triple = tuple[float, float, float]
 Row = tuple[float, float, float, float]  # s, N or N m (3)
 
-LoadRow = Annotated[
-    tuple[Number, Number, Number, Number], BeforeValidator(numbers(4)), Words("four numbers [t, x, y, z]")
-]
+LoadRow = Annotated[tuple[Number, Number, Number, Number], Before(numbers(4)), Words("four numbers [t, x, y, z]")]
 
 
 class Load(Table):

@@ -5,13 +5,13 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from hybrid.scene.base import Finding, NonNegative, Number, Positive, Table, Text, Words, numbers, refuse
+from hybrid.scene.base import Before, Finding, NonNegative, Number, Positive, Table, Text, Words, numbers, refuse
 from hybrid.scene.cable import Section
 
-RateRow = Annotated[tuple[NonNegative, Number], BeforeValidator(numbers(2)), Words("two numbers [t, rate]")]
-LengthRow = Annotated[tuple[NonNegative, Positive], BeforeValidator(numbers(2)), Words("two numbers [t, length]")]
+RateRow = Annotated[tuple[NonNegative, Number], Before(numbers(2)), Words("two numbers [t, rate]")]
+LengthRow = Annotated[tuple[NonNegative, Positive], Before(numbers(2)), Words("two numbers [t, length]")]
 
 # What says how long the line is.
 SOURCES = ("rate", "rates", "lengths", "file", "winch")

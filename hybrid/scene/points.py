@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape
-from hybrid.scene.base import Finding, Kinds, NonNegative, Positive, Table, Text, Vector, by_kind, refuse
+from hybrid.scene.base import After, Finding, Kinds, NonNegative, Positive, Table, Text, Vector, by_kind, refuse
 from hybrid.scene.end_loads import GivenLoad, Loading
 from hybrid.scene.ends import Body, Free
 from hybrid.scene.motion_tables import Motion
@@ -27,7 +27,7 @@ def _a_name(name: str) -> str:
     return name
 
 
-Name = Annotated[Text, AfterValidator(_a_name)]
+Name = Annotated[Text, After(_a_name)]
 
 
 class Failure(Table):

@@ -11,9 +11,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import (
-    AfterValidator,
     AliasChoices,
-    BeforeValidator,
     ConfigDict,
     Discriminator,
     Field,
@@ -22,6 +20,8 @@ from pydantic import (
 )
 
 from hybrid.scene.base import (
+    After,
+    Before,
     Finding,
     Kinds,
     NonNegative,
@@ -102,7 +102,7 @@ def _one_way(points: tuple[CurrentPoint, ...]) -> tuple[CurrentPoint, ...]:
     return points
 
 
-CurrentPoints = Annotated[tuple[CurrentPoint, ...], Field(min_length=2), AfterValidator(_one_way)]
+CurrentPoints = Annotated[tuple[CurrentPoint, ...], Field(min_length=2), After(_one_way)]
 
 
 class UniformCurrent(_Flow):
@@ -173,7 +173,7 @@ _FORMS = (
 )
 
 Current = Annotated[
-    Annotated[tuple[Number, Number, Number], BeforeValidator(numbers(3)), Words(_FORMS), Tag("<vector>")]
+    Annotated[tuple[Number, Number, Number], Before(numbers(3)), Words(_FORMS), Tag("<vector>")]
     | Annotated[CurrentPoints, Tag("<list>")]
     | Annotated[
         Annotated[UniformCurrent, Tag("<uniform>")]

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.scene.base import Finding, Number, Positive, Table, Text, Truth, Whole, Words, refuse, table_or_list
+from hybrid.scene.base import Before, Finding, Number, Positive, Table, Text, Truth, Whole, Words, refuse, table_or_list
 from hybrid.scene.read import complaint_of, in_order, text_of
 from hybrid.scene.schema_messages import explain
 from hybrid.scene.yaml_source import Node, Unreadable, from_data, from_text
@@ -32,7 +32,7 @@ def _is_value(value: Any) -> Any:
     raise AssertionError
 
 
-Value = Annotated[Any, BeforeValidator(_is_value), Words("a value that the key can have")]
+Value = Annotated[Any, Before(_is_value), Words("a value that the key can have")]
 Values = Annotated[tuple[Value, ...], Field(min_length=1)]
 Names = Annotated[tuple[Text, ...], Field(min_length=1)]
 

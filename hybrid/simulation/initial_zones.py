@@ -28,7 +28,6 @@ from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.contact_equilibrium import nearness, settled_from
 from hybrid.simulation.equilibrium import MANY, equilibrium_of, solve_model
-from hybrid.simulation.payout_zones import rods_at_winch
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
 from hybrid.solve.statics import Equilibrium
 
@@ -159,6 +158,8 @@ def _given(scene: Scene, model: Model, pace: float) -> np.ndarray:
     assert model.layout is not None
     if model.payout is None:
         return given_zones(scene, model.layout)
+    from hybrid.simulation.payout_zones import rods_at_winch
+
     paid = model.payout
     return rods_at_winch(scene, paid, model, paid.count(paid.first), pace, fastest(paid.law))
 

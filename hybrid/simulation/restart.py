@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,12 +22,14 @@ from hybrid.model.self_reach import self_reach
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import parse_either, parse_scene, scene_text
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 from hybrid.simulation.restore import refused, resolution_from, restored_points
 from hybrid.store.checkpoint import Checkpoint, read_before, read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
+
+if TYPE_CHECKING:  # its tables take long to make
+    from hybrid.scene.system import System
 
 # What may be other from some time on: it acts from outside, and nothing of the cable's state hangs on it.
 MAY_CHANGE = (

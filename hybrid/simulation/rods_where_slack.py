@@ -10,14 +10,16 @@ show a bend.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.payout import payout_of
 from hybrid.scene.analysis import RodModel
 from hybrid.scene.cable import Section
 from hybrid.scene.schema import Environment, Scene
-from hybrid.scene.system import System
+
+if TYPE_CHECKING:  # its tables take long to make
+    from hybrid.scene.system import System
 
 CHOSEN = "model chosen"  # of the event that says so
 CELLS = 100  # of a mesh that is not given

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time as clock
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
@@ -22,15 +22,15 @@ from hybrid.model.plan import Plan, SystemPlan, count_steps, output_interval
 from hybrid.model.resolution import Resolution, first_resolution, requested_accuracy, wants_errors
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
-from hybrid.scene.system import System
 from hybrid.simulation.budget import COMPARISONS, FINER, LEAST, MOST_TIMES, OUTPUT, POINT
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import OF_LINES, kernels_of
 from hybrid.simulation.model_choice import chosen_and_surveyed
-from hybrid.simulation.system_run import SystemRun
 from hybrid.simulation.time_loop import TimeLoop
-from hybrid.solve.system_statics import LineFailed
 from hybrid.store.comparison_recorder import ComparisonRecorder
+
+if TYPE_CHECKING:  # its tables take long to make
+    from hybrid.scene.system import System
 
 # s of processor time that the pre-run, and the first steps of the result, may take.
 PRE_RUN, FIRST_STEPS = 0.2, 0.1
@@ -173,6 +173,9 @@ def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
     """The same of several lines: their first steps, as often as all runs would take them."""
     if found.cells > MOST_CELLS or not is_warm(OF_LINES):
         return found
+    from hybrid.simulation.system_run import SystemRun
+    from hybrid.solve.system_statics import LineFailed
+
     time, begin = system.require_time(), clock.process_time()
     try:
         run = SystemRun(system, None, "", moves=True)

@@ -8,6 +8,7 @@ here, and nothing decides that a healthy step was the last: simulation.time_loop
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,9 +32,6 @@ from hybrid.simulation.contact_start import begin_contact, comes_near, end_conta
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog
-from hybrid.simulation.payout import PayingOut
-from hybrid.simulation.payout_nodes import NodeChanges, outputs_of_now
-from hybrid.simulation.payout_zones import PaidZones, moving_zones
 from hybrid.simulation.plane_monitor import PlaneMonitor
 from hybrid.simulation.releases import let_go, overloaded, watch_forces
 from hybrid.simulation.self_watch import SelfWatch, let_touch_itself, refuse_start_in_itself
@@ -49,6 +47,11 @@ from hybrid.simulation.zone_switching import ZoneSwitching, note_change
 from hybrid.solve.run import CompiledRun, Tried
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import Stepper
+
+if TYPE_CHECKING:  # a line that is not paid out does without, and starts sooner
+    from hybrid.simulation.payout import PayingOut
+    from hybrid.simulation.payout_nodes import NodeChanges
+    from hybrid.simulation.payout_zones import PaidZones
 
 WHOLE_STEPS = 1e-6  # of a step: a time so near to a number of steps is one
 SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
@@ -99,9 +102,13 @@ class Transient:
         self.parts_itself = False  # whether it has to end after this step
         self.touches, self.came_near_itself = touches, False
         self.marked = marked_places(scene, model)
-        self.payout = PayingOut(model) if model.payout is not None else None
-        self.paid_zones = None
-        if self.payout is not None:
+        self.payout: PayingOut | None = None
+        self.paid_zones: PaidZones | None = None
+        if model.payout is not None:
+            from hybrid.simulation.payout import PayingOut
+            from hybrid.simulation.payout_zones import PaidZones
+
+            self.payout = PayingOut(model)
             model = self.payout.on(model, model.length)
             self.paid_zones = PaidZones(scene, self.payout, switching) if switching is not None else None
         self._set_control(resolution)
@@ -199,6 +206,8 @@ class Transient:
     def outputs_of_now(self, batch: Batch) -> list[Output]:
         """The outputs of a batch of the line of now, copied."""
         if self.payout is not None:
+            from hybrid.simulation.payout_nodes import outputs_of_now
+
             return outputs_of_now(self, batch)
         return outputs_in(batch, self.model.line, self.model.zones)
 
@@ -400,7 +409,11 @@ class Transient:
 
     def _changes_of_nodes(self) -> NodeChanges | None:
         """What lets nodes enter and leave, with the line of now; None: no line is paid out, or Python is asked."""
-        if self.payout is None or not NodeChanges.applies(self):
+        if self.payout is None:
+            return None
+        from hybrid.simulation.payout_nodes import NodeChanges
+
+        if not NodeChanges.applies(self):
             return None
         if self._nodes is None or not self._nodes.still_fits() or not self._nodes.adopted:
             if self.run.count[b.SAMPLES] or (self._nodes is not None and self._nodes.waits):
@@ -615,6 +628,8 @@ class Transient:
         if self.itself is not None:
             self.itself.attach(model, self.run)
         if self.payout is not None:
+            from hybrid.simulation.payout_zones import moving_zones
+
             self.payout.attach(self.run, model, self.stepper, moving_zones(self.paid_zones))
         self.plane_monitor.attach(self.run, model.line)
         watch_forces(self.run, model)

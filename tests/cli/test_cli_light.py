@@ -59,12 +59,22 @@ def test_plan_draws_nothing_and_plot_needs_no_solver(tmp_path: Path, monkeypatch
     assert "hanging.png" in out and not modules & {"numba", "scipy", "hybrid.simulation.api"}
 
 
-def test_a_run_imports_no_special_functions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """They are needed where a line snaps alone, and f2py comes with them: 0.3 s of each start."""
+@pytest.mark.parametrize("command", ["run", "static", "plan"])
+def test_what_is_compiled_is_called_without_numba(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its import takes as long as a short run; so do together rich, tables of several lines, payout, and the special
+
+    functions of a line that snaps alone, with which f2py comes.
+    """
     monkeypatch.chdir(tmp_path)
     Path("hanging.yaml").write_text(json.dumps(HANGING))
-    _, modules = call("run", "hanging.yaml")
-    assert "hybrid.simulation.snap_scatter" in modules and not modules & {"scipy.special", "numpy.f2py", "matplotlib"}
+    call(command, "hanging.yaml")  # what has to be compiled is
+    _, modules = call(command, "hanging.yaml")
+    assert "hybrid.kernels.linked_code" in modules
+    assert not modules & {"numba", "scipy", "scipy.special", "numpy.f2py", "matplotlib"}
+    assert not modules & {"hybrid.scene.system", "hybrid.simulation.payout", "hybrid.kernels.payout"}
+    assert command == "run" or not any(x.partition(".")[0] == "rich" for x in modules), "a long run shows a line"
 
 
 @pytest.mark.parametrize("several", [False, True])
