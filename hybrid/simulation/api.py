@@ -107,7 +107,7 @@ def run(
             if instead is None:
                 raise
             emptied(target, error)
-            case.scene, case.late_file = instead.scene, None
+            case.scene, case.late_file, case.late_finer = instead.scene, None, None
             case.notes.append((CHOSEN, instead.text))
             Passes(case, target).compute()
     return written_result(target, case.late_file)

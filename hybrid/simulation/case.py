@@ -107,7 +107,9 @@ class Case:
         self.interrupted: Callable[[], bool] = lambda: False
         self.beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
         self.late_file: LateFile | None = None  # of a result that is complete, and may not be in its place yet
+        self.late_finer: LateFile | None = None  # of a finer one, which may take its place
         self._results = 0  # that were begun
+        self._told: tuple[Scene, str] | None = None  # a scene, and what it is as a text
         self._owner = threading.get_ident()  # the thread that puts files in their places
         self._begun: tuple[Resolution, tuple[Model, Equilibrium | None, ZoneSwitching | None]] | None = None
         self.came_near_itself = False  # whether the line did in a run to compare with
@@ -124,19 +126,41 @@ class Case:
 
         A file that errors will be added to, and that is complete before it had to be there, waits in `late_file`.
         """
-        begin = self._begin_result(resolution)
+        first = self._takes_its_place(target)
+        begin = self._begin_result(resolution, first)
         kept = before or {} if isinstance(target, Path) else None
         loop, recorder, equilibrium = self.prepare(resolution, target, kept, late=not self.progress.heard)
         loop.recorder = recorder
         if isinstance(recorder, Recorder):
-            recorder.amended = self.beside_result is not None and target == self.beside_result
+            recorder.amended = self.beside_result is not None
         with recorder:
             loop.begin(equilibrium)
             loop.to_the_end(self._duration, self._exact, self.changes)
             loop.close()
-        if isinstance(recorder, Recorder):
-            self.late_file = recorder.late_file
-        return self._compared(loop.run, target, clock.process_time() - begin)
+        late = recorder.late_file if isinstance(recorder, Recorder) else None
+        if first:
+            self.late_file = late
+        else:
+            self.late_finer = late
+        return self._compared(loop.run, target, clock.process_time() - begin, late)
+
+    def _takes_its_place(self, target: Target) -> bool:
+        """Whether a result is where it belongs, and not beside one that it may replace."""
+        return self.beside_result is None or target == self.beside_result
+
+    def settle(self, kept: bool) -> bool:
+        """Let a finer result take the place of the one before it, or drop it; False: it is a file that is there."""
+        late, self.late_finer = self.late_finer, None
+        waits = late is not None and not late.placed
+        if kept and self.late_file is not None:
+            self.late_file.drop()
+            self.late_file = None
+        if late is not None and waits and kept:
+            assert self.beside_result is not None
+            late.path, self.late_file = self.beside_result, late
+        elif late is not None and waits:
+            late.drop()
+        return waits
 
     def prepare(
         self, resolution: Resolution, target: Target, kept: Tree | None = None, late: bool = False
@@ -182,7 +206,7 @@ class Case:
             scenes = (self.scene, *(x.scene for x in self.changes))
             with refused(source):
                 resolution = resolution_from(point.resolution, self.scene)
-                self._begin_result(resolution)
+                self._begin_result(resolution, self._takes_its_place(target))
                 model, switching, correction = restored_parts(scenes, resolution, point.state, self.criterion)
                 loop = self._loop(scenes[point.state["changes"]], model, resolution, switching, target, correction)
                 loop.restore(point.state)
@@ -205,7 +229,7 @@ class Case:
                 recorder.event(point.t, 0.0, model.length, OTHER_PROGRAM, f"{text}: the last digits may be others")
             loop.to_the_end(self._duration, self._exact, self.changes)
             loop.close()
-        return self._compared(loop.run, target, loop.cpu)
+        return self._compared(loop.run, target, loop.cpu, None)
 
     def is_unfinished(self, source: Path, resolution: Resolution) -> bool:
         """Whether a file holds a run of this case, with this resolution, that was cut off."""
@@ -223,9 +247,9 @@ class Case:
             return False
         return pack(point.resolution) == pack(resolution_tree(resolution))
 
-    def _begin_result(self, resolution: Resolution) -> float:
-        """The pass of a result begins, and that before it is where it belongs; s of processor time."""
-        if self.late_file is not None:
+    def _begin_result(self, resolution: Resolution, first: bool) -> float:
+        """The pass of a result begins; s of processor time.  first: it takes the place of one that may be there."""
+        if first and self.late_file is not None:
             self.late_file.place()
             self.late_file = None
         self.progress.begin(REFINEMENT if self._results else RESULT, resolution)
@@ -245,7 +269,9 @@ class Case:
     @property
     def _texts(self) -> dict[str, str]:
         """What the file says of the scene, and of what changes."""
-        return {"scene": scene_text(self.scene), "changes": changes_text(self.changes)}
+        if self._told is None or self._told[0] is not self.scene:
+            self._told = self.scene, scene_text(self.scene)
+        return {"scene": self._told[1], "changes": changes_text(self.changes)}
 
     @property
     def _files(self) -> dict[str, str]:
@@ -268,13 +294,12 @@ class Case:
             detail = f"{', '.join(changed)}: other than when the run began"
             raise ResultError(f"{source} cannot go on\n    detail:   {detail}\n    try:      run its scene again")
 
-    def _compared(self, run: Transient, target: Target, cpu: float) -> RunSample:
-        """What is to be compared of a complete result."""
+    def _compared(self, run: Transient, target: Target, cpu: float, late: LateFile | None) -> RunSample:
+        """What is to be compared of a complete result; late: it has no file yet."""
         resolution, cells = run.resolution, compared_cells(run.model)
         if not wants_errors(self.scene):
             return RunSample(resolution, {}, cells, run.steps, 0.0)
         assert not isinstance(target, MemoryTarget), "errors are written into a file"
-        late = self.late_file
         with ExitStack() as stack:
             data = late.data if late is not None else stack.enter_context(open_file(target, summed=False))
             errors = [*(MODEL_ERRORS + x for x in data.get(MODEL_ERRORS, ())), *(x for x in data if MODEL_ERRORS in x)]
@@ -358,24 +383,13 @@ class Case:
         cpu = clock.thread_time() - begin
         bound = resolution.zones * model.length if switching is not None else 0.0
         notes = tuple({kind: (kind, text) for kind, text in reversed(found.events) if kind == NOT_ESTIMATED}.values())
+        fineness = resolution.fineness if follows_curvature(self.scene) else 0.0
+        rows = found.reference() if isinstance(found, RowsRecorder) else {}
+        catenary = found.catenary if switching is not None else np.zeros(0)
         return RunSample(
-            resolution,
-            values,
-            compared_cells(model, resolution.fineness if follows_curvature(self.scene) else 0.0),
-            loop.run.steps,
-            cpu,
-            resolution.every,
-            False,
-            errors,
-            bound,
-            notes,
-            found.reference() if isinstance(found, RowsRecorder) else {},
-            found.steps,
-            found.catenary if switching is not None else np.zeros(0),
-            doubt_of(loop.run),
-            touches=loop.run.touches,
-            places=self.places,
-        )
+            resolution, values, compared_cells(model, fineness), loop.run.steps, cpu, resolution.every, False, errors,
+            bound, notes, rows, found.steps, catenary, doubt_of(loop.run), loop.run.touches, self.places,
+        )  # fmt: skip
 
     def survey(self, resolution: Resolution) -> Survey | None:
         """A coarse run that shows where cells should be short; None: it failed.
@@ -385,13 +399,15 @@ class Case:
         coarse, until = survey_resolution(resolution), None if self.changes else survey_duration(self.scene)
         s = np.linspace(0.0, self.scene.length, POINTS)
         try:
+            model, _ = self.first_shape(coarse)
             found = self.sample(coarse, s, until).values
         except ComputationError:
             if self.scene.resolution is None:
                 return None
             coarse = coarse.coarser(steps=resolution.step / coarse.step)  # as short as those of the result
+            model, _ = self.first_shape(coarse)
             found = self.sample(coarse, s, until).values
-        return Survey.of(self.scene, resolution, build(self.scene, coarse), s, found)
+        return Survey.of(self.scene, resolution, model, s, found)
 
     # --- parts of a run -------------------------------------------------------------------------
 
@@ -441,14 +457,19 @@ class Case:
         if points is None:
             points = self.points.s
         observer = self.observer(model, switching is not None, points, None if target is not None else COMPARED)
-        interrupted = self.interrupted if target is not None else self._comparison_interrupted
+        interrupted = self._result_interrupted if target is not None else self._comparison_interrupted
         return TimeLoop(run, observer, target, self._report, interrupted)
 
+    def _result_interrupted(self) -> bool:
+        """Whether a result is to stop; one before it that has waited long enough is put in its place."""
+        for late in (self.late_file, self.late_finer):
+            if late is not None and threading.get_ident() == self._owner:
+                late.place_if_due()
+        return self.interrupted()
+
     def _comparison_interrupted(self) -> bool:
-        """Whether a run to compare with is to stop; a result that has waited long enough is put in its place."""
-        if self.late_file is not None and threading.get_ident() == self._owner:
-            self.late_file.place_if_due()
-        return self._unwanted.is_set() or self.interrupted()
+        """The same of a run to compare with."""
+        return self._unwanted.is_set() or self._result_interrupted()
 
     def observer(self, model: Model, zones_move: bool, s: Floats, only: Sequence[str] | None) -> Observer:
         """What records outputs at points s (m); only: names of quantities, None: all."""

@@ -134,8 +134,9 @@ class Replacement:
 
     goes_on = False  # whether one that was stopped stays beside, for whoever goes on with it
 
-    def __init__(self, target: Target) -> None:
-        self.target = target
+    def __init__(self, target: Target, waits: Callable[[bool], bool] = lambda kept: False) -> None:
+        """waits: settles one that waits in memory, so that it needs no file; False: none does."""
+        self.target, self._waits = target, waits
         self._new: Target | None = None  # complete, and not settled
 
     def finer(self, record: Callable[[Target], T]) -> T:
@@ -155,7 +156,7 @@ class Replacement:
     def settle(self, kept: bool) -> None:
         """Let what was recorded last count, or not; nothing where that is settled."""
         new, self._new = self._new, None
-        if new is None:
+        if new is None or self._waits(kept):
             return
         if isinstance(new, Path):
             assert isinstance(self.target, Path)
@@ -177,8 +178,10 @@ class FinerResult(Replacement):
 
     goes_on = True
 
-    def __init__(self, target: Target, first: Record, refinement: Record) -> None:
-        super().__init__(target)
+    def __init__(
+        self, target: Target, first: Record, refinement: Record, waits: Callable[[bool], bool] = lambda kept: False
+    ) -> None:
+        super().__init__(target, waits)
         self._first, self._refinement = first, refinement
         self._done = False
 

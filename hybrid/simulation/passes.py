@@ -76,20 +76,24 @@ class Passes:
             standing = self._standing()
             if standing is not None:
                 self._write(standing, *standing.without_refinement("a finer run was stopped from outside"), done=False)
-            if case.late_file is not None:
-                case.late_file.place()
+            self._place()
             kept = self.control is not None and isinstance(target, Path) and target.exists()  # it can be resumed
             raise
         finally:
-            if case.late_file is not None:
-                case.late_file.place()
+            self._place()
             if isinstance(target, Path) and not kept:
                 remove_rows(target)
+
+    def _place(self) -> None:
+        """What is complete is on the disk: a finer result too, beside the other one."""
+        for late in (self.case.late_file, self.case.late_finer):
+            if late is not None:
+                late.place()
 
     def _to_the_end(self, resolution: Resolution, target: Path | io.BytesIO) -> tuple[RunSample, Errors | None]:
         """The result, as fine as it takes, and its errors; with rods where catenaries that were chosen do not do."""
         case, remaining = self.case, self.remaining
-        compute = FinerResult(target, self._first, self._finer)
+        compute = FinerResult(target, self._first, self._finer, case.settle)
         if remaining is not None and remaining.before:
             control = self._controls(compute)
             with refused(self.source or Path()):
@@ -117,7 +121,7 @@ class Passes:
             if case.late_file is not None:
                 case.late_file.drop()
             emptied(target, error)
-            compute = FinerResult(target, self._anew, self._finer)
+            compute = FinerResult(target, self._anew, self._finer, case.settle)
         if control.choice.kind != "catenary" or not failed:
             return result, errors
         self._instead = self._standing()

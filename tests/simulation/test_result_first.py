@@ -20,10 +20,13 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.model.resolution import Resolution
 from hybrid.model.system import SystemResolution
 from hybrid.simulation import case as cases
-from hybrid.simulation import passes, system_accuracy, system_run
+from hybrid.simulation import error_control, passes, system_accuracy, system_run
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
+from hybrid.simulation.refinement import Verdict
 from hybrid.simulation.static_case import StaticCase
+from hybrid.store import late_file, writer
+from hybrid.store.late_file import LateFile
 from hybrid.view.headed_page import page_of
 from hybrid.view.notebook_card import card
 from hybrid.view.summary import facts_of
@@ -248,3 +251,36 @@ def test_a_stop_is_heard_while_the_equilibrium_is_searched(
     with pytest.raises(KeyboardInterrupt):
         hybrid.run(scene, tmp_path / "run.h5")
     assert not reached and not list(tmp_path.iterdir())
+
+
+@pytest.mark.usefixtures("rough")
+@pytest.mark.parametrize("kept", [True, False])
+def test_of_results_that_follow_each_other_the_last_is_written(
+    kept: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once, with its errors; before, a first result, a finer one and a copy with errors were.  None of them waits for
+    long: they are where they belong while others are computed."""
+    if not kept:
+        monkeypatch.setattr(error_control, "is_no_better", lambda *_: Verdict(2.0, 1.0, 1.0, 0.0, "no use"))
+    written: list[str] = []
+    monkeypatch.setattr(LateFile, "place", _noting(written, LateFile.place))
+    monkeypatch.setattr(writer, "_PAUSE", 100.0)
+    for waits, names in ((100.0, {"once.h5"}), (-1.0, {"each.h5", ".each.h5.finer"})):
+        monkeypatch.setattr(late_file, "WAITS", waits)
+        written.clear()
+        name = "once.h5" if waits > 0.0 else "each.h5"
+        with hybrid.run(asked(), tmp_path / name) as result:
+            assert result.attributes["effort_runs"] > 4 and result.done
+            assert ("finer run not kept" in {x.kind for x in result.events}) == (not kept)
+        assert set(written) <= names and (waits < 0.0 or written == ["once.h5"])
+    assert {x.name for x in tmp_path.iterdir()} == {"once.h5", "each.h5"}
+    assert differences(tmp_path / "once.h5", tmp_path / "each.h5") == []
+
+
+def _noting(written: list[str], place: Any) -> Any:
+    def noting(self: LateFile) -> None:
+        if not self.placed:
+            written.append(self.path.name)
+        place(self)
+
+    return noting
