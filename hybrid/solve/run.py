@@ -34,6 +34,8 @@ ROWS_OUTSIDE = 4096
 MOST_KEPT, ROWS_KEPT = 200_000, 512
 # Cells times steps of a call: about 0.1 s, after which interrupts are heard and progress is reported.
 CELL_STEPS = 200_000
+# Waves that cost a cell in a step what all else does.
+WAVES_OF_A_CELL = 10
 # Numbers that the buffer of samples may hold, 16 MB.
 MOST_SAMPLED = 2_000_000
 
@@ -64,6 +66,7 @@ class CompiledRun:
         self.clock[b.LEAST_PEAK] = self.clock[b.RELEASE_START] = self.clock[b.RELEASE_END] = np.inf
         self.count[b.VARIES] = varies
         self.states: tuple[State, State]
+        self.quota, self._waves = 0, 0  # steps of a call; waves of the sea
         self._zones_address = 0  # of what follows zones; 0: not known yet
         self._solver, self._address = in_space, 0
         self.pushes: tuple[Floats, Floats] = (NO_PUSH, NO_PUSH)
@@ -115,8 +118,10 @@ class CompiledRun:
         self.clock[b.PREVIOUS] = self.clock[b.NOW]
         solver = in_plane if line.bits & PLANAR else in_space
         self._solver, self._address = solver, self._address if solver is self._solver else 0
+        fresh, self._waves = not self.quota, len(sea.waves)
         self.set_quota(cells)
-        self.count[b.QUOTA] = self.quota
+        if fresh:  # zones that change every few steps would otherwise never let it be used up
+            self.count[b.QUOTA] = self.quota
         old, new = self.states
         was, now = self.pushes
         self.table.bind(
@@ -129,7 +134,7 @@ class CompiledRun:
 
     def set_quota(self, cells: int) -> None:
         """Steps of the calls to come, of a line of so many cells."""
-        self.quota = max(1, min(ROWS, CELL_STEPS // cells))
+        self.quota = max(1, min(ROWS, int(CELL_STEPS / (cells * (1.0 + self._waves / WAVES_OF_A_CELL)))))
 
     def place(self, placed: Floats) -> None:
         """Where base nodes were at the start (n, 3) m."""
