@@ -34,7 +34,8 @@ def scene(name: str, percent: float) -> dict[str, Any]:
     """Without its own step and model."""
     found: dict[str, Any] = yaml.safe_load(SCENES[name].read_text())
     found.pop("model", None)
-    return found | {"time": {"duration": found["time"]["duration"]}, "accuracy": f"{percent:g}%"}
+    accuracy = {"position": f"{percent:g}%", "tension": f"{percent:g}%"}
+    return found | {"time": {"duration": found["time"]["duration"]}, "accuracy": accuracy}
 
 
 @pytest.mark.parametrize("name", SCENES)
