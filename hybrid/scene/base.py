@@ -27,6 +27,7 @@ from pydantic import (
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     Tag,
+    ValidationError,
 )
 from pydantic.fields import ComputedFieldInfo, FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
@@ -34,6 +35,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from hybrid.scene.suggestions import nearest
 
 Place = tuple[str | int, ...]
+Invalid = ValidationError  # what is raised where values are no table
 
 # No length, time, mass, force or stiffness of a cable is larger in SI units; products of several such numbers, and
 # their squares, are still far from where a double overflows (1e308).

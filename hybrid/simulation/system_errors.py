@@ -14,7 +14,6 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from pydantic import ValidationError
 
 from hybrid.errors import ComputationError
 from hybrid.kernels.state import Floats
@@ -22,6 +21,7 @@ from hybrid.model.plan import output_interval
 from hybrid.model.sections import section_changes
 from hybrid.model.self_reach import system_without_contact
 from hybrid.model.system import build_system
+from hybrid.scene.base import Invalid
 from hybrid.scene.system import System
 from hybrid.simulation.error_report import CAUSES, UNITS
 from hybrid.simulation.system_samples import touch_unasked
@@ -93,14 +93,14 @@ def write_system_errors(system: System, target: Path | io.BytesIO, compute: Comp
                 try:
                     other, memory = make(other), io.BytesIO()
                     compute(other, memory)
-                except (ComputationError, ValidationError):
+                except (ComputationError, Invalid):
                     if not again:
                         raise
                     break
                 found[cause + again] = open_result(memory)
     except ComputationError as error:
         failed = f"a coarser run to compare with stopped: {str(error).splitlines()[0]}"
-    except ValidationError as error:  # half of few cells, or twice a long step, is no scene
+    except Invalid as error:  # half of few cells, or twice a long step, is no scene
         failed = TOO_COARSE[cause].format(*error.errors()[0]["loc"])
     errors, doubts = {}, dict[str, list[str]]()
     if not failed:
