@@ -143,6 +143,9 @@ def static(
         result = hybrid.static(asked, target, overwrite=not keep)
         wall = clock.perf_counter() - begin
         if picture:
+            from hybrid.view.matplotlib_import import import_matplotlib
+
+            import_matplotlib()
             hybrid.plot(result, picture)
         facts = equilibrium_facts(result)
         errors = errors_facts(result)
@@ -311,6 +314,9 @@ def _ended(
     )
 
     if picture:
+        from hybrid.view.matplotlib_import import import_matplotlib
+
+        import_matplotlib()
         hybrid.plot(result, picture)
     steps = len(result["steps/t"]) if "steps/t" in result else 0
     pace = "compilation included" if cold else f"computing alone, {speed(computed / wall)} x real time"

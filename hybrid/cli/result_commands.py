@@ -66,8 +66,10 @@ def plot(
     if zones and film:
         raise typer.BadParameter("--zones and --animate are two pictures: ask for one at a time")
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
+        from hybrid.view.matplotlib_import import import_matplotlib
         from hybrid.view.save import save_figure
 
+        import_matplotlib()
         if film:
             _film(console, opened, result, output, overwrite)
             return

@@ -70,6 +70,9 @@ def static_lines(console: Console, asked: System, target: Path, plot: bool, keep
 def ended(console: Console, result: Result, target: Path, picture: Path | None, text: str, **facts: Any) -> None:
     """Print what lines and points have reached, and draw them; picture: as of `_moved`."""
     if picture is not None:
+        from hybrid.view.matplotlib_import import import_matplotlib
+
+        import_matplotlib()
         hybrid.plot(result, picture)
     lines = {name: extremes_facts(line) | verdicts_of(line) for name, line in result.lines.items()}
     moves = len(result.times) > 1

@@ -7,11 +7,12 @@ without one, at the first key behind a bracket that was never closed, at the end
 from __future__ import annotations
 
 import re
+import warnings
 from contextlib import suppress
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError
+from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
 from ruamel.yaml.reader import ReaderError
 from ruamel.yaml.tokens import (
     FlowMappingEndToken,
@@ -22,14 +23,31 @@ from ruamel.yaml.tokens import (
 )
 
 from hybrid.errors import Complaint
+from hybrid.scene.yaml_nodes import READABLE, WRITE_OUT
 
 OPENING, CLOSING = (FlowMappingStartToken, FlowSequenceStartToken), (FlowMappingEndToken, FlowSequenceEndToken)
 BRACKETS = {"{": "}", "[": "]"}
 _COLON = "a key needs a colon and a space behind it"
-_READ = "a text that YAML can read"
 
 # Line and column, counted from 0; what is wrong there; the remedy.
 Fault = tuple[int, int, str, str]
+
+
+def compose(text: str) -> Any:
+    """The tree of a text as ruamel.yaml reads it, or a complaint that says what is wrong with it."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", ReusedAnchorWarning)
+            return YAML(typ="safe", pure=True).compose(text)
+    except MarkedYAMLError as error:
+        return not_yaml(text, error)
+    except ReusedAnchorWarning as warning:
+        return anchor_twice(str(warning))
+    except ReaderError as error:
+        return odd_character(text, error)
+    except (YAMLError, RecursionError, ValueError) as error:
+        why = "nested too deeply" if isinstance(error, RecursionError) else str(error).splitlines()[0]
+        return Complaint("YAML", why, READABLE, WRITE_OUT, 1, 1)
 
 
 def not_yaml(text: str, error: MarkedYAMLError) -> Complaint:
@@ -37,7 +55,7 @@ def not_yaml(text: str, error: MarkedYAMLError) -> Complaint:
     lines = re.split("\r\n|[\n\r\x85\u2028\u2029]", text)  # as ruamel.yaml counts them
     line, column, problem, fix = _fault(text, lines, error)
     given = lines[line].strip() if line < len(lines) else "the end of the text"
-    return Complaint("YAML", given or "nothing", f"{_READ}; {problem}", fix, line + 1, column + 1)
+    return Complaint("YAML", given or "nothing", f"{READABLE}; {problem}", fix, line + 1, column + 1)
 
 
 def anchor_twice(warning: str) -> Complaint:
@@ -52,7 +70,7 @@ def odd_character(text: str, error: ReaderError) -> Complaint:
     before = text[: error.position]
     line, column = before.count("\n") + 1, error.position - before.rfind("\n")
     given = f"the character U+{ord(text[error.position]):04X}"
-    return Complaint("YAML", given, f"{_READ}; it has no such characters", "take it out", line, column)
+    return Complaint("YAML", given, f"{READABLE}; it has no such characters", "take it out", line, column)
 
 
 def _fault(text: str, lines: list[str], error: MarkedYAMLError) -> Fault:

@@ -1,21 +1,25 @@
 """The nodes of a YAML text, by libyaml: twenty times as fast as ruamel.yaml, which says what is wrong with a text.
 
-Tags are those of YAML 1.2, by the rules of ruamel.yaml, so that both make the same tree.
+Tags are those of YAML 1.2, by the rules of ruamel.yaml, so that both make the same tree.  It takes long to import, and
+is asked only for a text that is odd or wrong.
 """
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import Any
 
 import yaml
-from ruamel.yaml.resolver import implicit_resolvers
 
 try:
     from yaml.cyaml import CParser
 except ImportError:  # PyYAML was built without libyaml
     CParser = None
 
+# What complaints about a whole text say.
+READABLE = "a text that YAML can read"
+WRITE_OUT = "begin anew from an example; every scene is a few tables within tables"
 # Levels of tables within tables: a scene has eight.
 DEEPEST = 100
 _TAG = "tag:yaml.org,2002:"
@@ -87,14 +91,31 @@ def _tree(parser: Any) -> yaml.Node:
     return top[0]
 
 
+_DIGITS = "0123456789"
+# What a word without quotes is: tag, characters that it may begin with ("": it is empty), and what it must match.
+RULES = (
+    ("bool", [*"tTfF"], r"^(?:true|True|TRUE|false|False|FALSE)$"),
+    ("float", [*"-+", *_DIGITS, "."],
+     r"^(?:[-+]?(?:[0-9][0-9_]*)\.[0-9_]*(?:[eE][-+]?[0-9]+)?|[-+]?(?:[0-9][0-9_]*)(?:[eE][-+]?[0-9]+)"
+     r"|[-+]?\.[0-9_]+(?:[eE][-+][0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$"),
+    ("int", [*"-+", *_DIGITS], r"^(?:[-+]?0b[0-1_]+|[-+]?0o?[0-7_]+|[-+]?[0-9_]+|[-+]?0x[0-9a-fA-F_]+)$"),
+    ("merge", ["<"], r"^(?:<<)$"),
+    ("null", ["~", "n", "N", ""], r"^(?:~|null|Null|NULL|)$"),
+    ("timestamp", [*_DIGITS],
+     r"^(?:[0-9][0-9][0-9][0-9]-[0-9][0-9]-[0-9][0-9]|[0-9][0-9][0-9][0-9]-[0-9][0-9]?-[0-9][0-9]?(?:[Tt]|[ \t]+)"
+     r"[0-9][0-9]?:[0-9][0-9]:[0-9][0-9](?:\.[0-9]*)?(?:[ \t]*(?:Z|[-+][0-9][0-9]?(?::[0-9][0-9])?))?)$"),
+    ("value", ["="], r"^(?:=)$"),
+    ("yaml", [*"!&*"], r"^(?:!|&|\*)$"),
+)  # fmt: skip
+
+
 @cache
-def _rules() -> dict[str, list[tuple[str, Any]]]:
+def _rules() -> dict[str, list[tuple[str, str]]]:
     """By the first character of a word, the tags that it may have, and what it must match."""
-    rules: dict[str, list[tuple[str, Any]]] = {}
-    for versions, tag, pattern, first in implicit_resolvers:
-        if (1, 2) in versions:
-            for character in first:
-                rules.setdefault(character, []).append((tag, pattern))
+    rules: dict[str, list[tuple[str, str]]] = {}
+    for tag, first, pattern in RULES:
+        for character in first:
+            rules.setdefault(character, []).append((tag, pattern))
     return rules
 
 
@@ -105,6 +126,6 @@ def _tag(event: Any) -> str:
     if event.implicit[0]:
         word = event.value
         for tag, pattern in _rules().get(word[:1], ()):
-            if pattern.match(word):
-                return tag
+            if re.match(pattern, word):
+                return _TAG + tag
     return _TAG + "str"

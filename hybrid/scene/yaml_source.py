@@ -7,21 +7,15 @@ YAML 1.2: `on`, `no` and `yes` are words, 1e-3 is a number.  The tree carries li
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
-
-from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
-from ruamel.yaml.reader import ReaderError
 
 from hybrid.errors import Complaint
 from hybrid.scene.base import Place, Table, dotted
 from hybrid.scene.schema_walk import keys_at, shorthand_keys, tables_at
 from hybrid.scene.suggestions import decimal_comma, did_you_mean
-from hybrid.scene.yaml_faults import anchor_twice, not_yaml, odd_character
-from hybrid.scene.yaml_nodes import TooDeep, composed
+from hybrid.scene.yaml_nodes import READABLE, WRITE_OUT, TooDeep, composed
 
 Spot = tuple[int, int]
 
@@ -36,7 +30,6 @@ MOST_VALUES = 500_000
 _PATH = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.\w[\w -]*(\[\d+\])*)*")
 # A key and its value that YAML takes for a key: any value behind a colon without a space, a number without a colon.
 _KEY_AND_VALUE = re.compile(r"([A-Za-z_]\w*)(?::| +(?=[-+.]?\d))([^\s:]+)")
-_WRITE_OUT = "begin anew from an example; every scene is a few tables within tables"
 _QUOTE = "write one word before the colon; close brackets and braces"
 _EXAMPLE = "key=value, such as time.step=0.005 or cable.sections[0].mass=2"
 
@@ -87,19 +80,7 @@ class Unreadable(Exception):
 
 def from_text(text: str) -> tuple[Node, list[Complaint]]:
     """The tree of a YAML text, and complaints about its keys; Unreadable if it is not YAML."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", ReusedAnchorWarning)
-            top = _composed(text)
-    except MarkedYAMLError as error:
-        raise Unreadable(not_yaml(text, error)) from None
-    except ReusedAnchorWarning as warning:
-        raise Unreadable(anchor_twice(str(warning))) from None
-    except ReaderError as error:
-        raise Unreadable(odd_character(text, error)) from None
-    except (YAMLError, RecursionError, ValueError) as error:
-        why = "nested too deeply" if isinstance(error, RecursionError) else str(error).splitlines()[0]
-        raise Unreadable(Complaint("YAML", why, "a text that YAML can read", _WRITE_OUT, 1, 1)) from None
+    top = _composed(text)
     if top is None:
         raise Unreadable(Complaint("scene", "nothing", "a scene", "begin with a table `cable:`", 1, 1))
     complaints: list[Complaint] = []
@@ -110,7 +91,7 @@ def from_text(text: str) -> tuple[Node, list[Complaint]]:
             raise Unreadable(Complaint("YAML", given, "a scene of fewer", fix, *_place(top)))
         return _build(top, (), complaints), complaints
     except RecursionError:
-        raise Unreadable(Complaint("YAML", "nested too deeply", "a scene", _WRITE_OUT, 1, 1)) from None
+        raise Unreadable(Complaint("YAML", "nested too deeply", "a scene", WRITE_OUT, 1, 1)) from None
 
 
 def _composed(text: str) -> Any:
@@ -118,8 +99,15 @@ def _composed(text: str) -> Any:
     try:
         found = composed(text)
     except TooDeep:
-        raise RecursionError from None
-    return found if found is not None else YAML(typ="safe", pure=True).compose(text)
+        raise Unreadable(Complaint("YAML", "nested too deeply", READABLE, WRITE_OUT, 1, 1)) from None
+    if found is not None:
+        return found
+    from hybrid.scene.yaml_faults import compose
+
+    found = compose(text)
+    if isinstance(found, Complaint):
+        raise Unreadable(found)
+    return found
 
 
 def _place(node: Any) -> Spot:

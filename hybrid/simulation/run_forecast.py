@@ -34,6 +34,8 @@ if TYPE_CHECKING:  # its tables take long to make
 
 # s of processor time that the pre-run, and the first steps of the result, may take.
 PRE_RUN, FIRST_STEPS = 0.2, 0.1
+# Of a run whose number of steps is known: so many show what one costs.
+ENOUGH_STEPS = 400
 # Cells of a line whose equilibrium, which comes before its first steps, takes no longer than these.
 MOST_CELLS = 4000
 # s of the file of a result, and of judging and writing errors (bench/test_bench_plan.py).
@@ -68,11 +70,16 @@ class _Probe(Case):
         super().__init__(scene, None)
         self.loop: TimeLoop | None = None  # the last
         self._end = np.inf
-        self.interrupted = lambda: clock.process_time() > self._end
+        self._most_steps = np.inf
+        self.interrupted = self._is_used_up
 
-    def allow(self, seconds: float) -> None:
-        """Processor time, s, for what follows."""
-        self._end = clock.process_time() + seconds
+    def _is_used_up(self) -> bool:
+        steps = self.loop.run.steps if self.loop is not None else 0
+        return steps >= self._most_steps or clock.process_time() > self._end
+
+    def allow(self, seconds: float, steps: float = np.inf) -> None:
+        """Processor time, s, and steps for what follows."""
+        self._end, self._most_steps = clock.process_time() + seconds, steps
 
     def _loop(self, *args: Any, **kwargs: Any) -> TimeLoop:
         self.loop = super()._loop(*args, **kwargs)
@@ -85,9 +92,11 @@ class _Probe(Case):
         model, equilibrium, switching = self._start(resolution)
         loop = self._loop(self.scene, model, resolution, switching, None)
         begun = clock.process_time()
-        self.allow(FIRST_STEPS)
+        known = resolution.local is None and model.payout is None
+        self.allow(FIRST_STEPS, ENOUGH_STEPS if known else np.inf)
         with suppress(KeyboardInterrupt):
             loop.begin(equilibrium)
+            begun = clock.process_time()  # the first state is made once, however many steps there are
             loop.to_the_end(self._duration, self._exact)
         return loop, begun - begin, clock.process_time() - begun
 

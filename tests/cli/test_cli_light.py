@@ -77,6 +77,18 @@ def test_what_is_compiled_is_called_without_numba(
     assert command == "run" or not any(x.partition(".")[0] == "rich" for x in modules), "a long run shows a line"
 
 
+def test_a_picture_of_a_command_is_that_of_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A command imports matplotlib without the help of its classes; its modules are those that drawing needs."""
+    monkeypatch.chdir(tmp_path)
+    with hybrid.run(hybrid.validate_scene(HANGING), "hanging.h5") as result:
+        hybrid.plot(result, "python.png")
+    code = CODE.replace("print(json", "from matplotlib.lines import Line2D; assert not Line2D.set.__doc__; print(json")
+    done = subprocess.run([sys.executable, "-c", code, "plot", "hanging.h5"], capture_output=True, text=True)
+    assert not done.returncode, done.stderr
+    assert "matplotlib.pyplot" not in json.loads(done.stderr.splitlines()[-1])
+    assert Path("hanging.png").read_bytes() == Path("python.png").read_bytes()
+
+
 @pytest.mark.parametrize("several", [False, True])
 def test_schema_is_valid_json_schema(several: bool) -> None:
     schema = json.loads(call("schema", *["--lines"] * several)[0])

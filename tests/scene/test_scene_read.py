@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -356,3 +358,15 @@ def test_a_mistake_in_a_long_scene_has_its_place() -> None:
     unknown, missing = sorted(complaints(text), key=lambda c: c.where, reverse=True)
     assert (missing.where, unknown.where) == tuple(f"cable.attachments[700].{key}" for key in ("mas", "mass"))
     assert {c.line for c in (unknown, missing)} == {704}
+
+
+def test_words_are_what_ruamel_takes_them_for() -> None:
+    """Its rules are copied, so that a command does without its import."""
+    from ruamel.yaml.resolver import implicit_resolvers
+
+    def plain(pattern: str) -> str:
+        return re.sub(r"\s+", "", pattern.replace(r"[ \t]", "<blank>"))
+
+    theirs = [(tag, first, plain(x.pattern)) for versions, tag, x, first in implicit_resolvers if (1, 2) in versions]
+    ours = [(f"tag:yaml.org,2002:{tag}", first, plain(pattern)) for tag, first, pattern in yaml_nodes.RULES]
+    assert ours == theirs
