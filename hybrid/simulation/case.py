@@ -129,7 +129,8 @@ class Case:
         first = self._takes_its_place(target)
         begin = self._begin_result(resolution, first)
         kept = before or {} if isinstance(target, Path) else None
-        loop, recorder, equilibrium = self.prepare(resolution, target, kept, late=not self.progress.heard)
+        late = not (first and self.progress.heard)
+        loop, recorder, equilibrium = self.prepare(resolution, target, kept, late, unseen=not first)
         loop.recorder = recorder
         if isinstance(recorder, Recorder):
             recorder.amended = self.beside_result is not None
@@ -137,12 +138,12 @@ class Case:
             loop.begin(equilibrium)
             loop.to_the_end(self._duration, self._exact, self.changes)
             loop.close()
-        late = recorder.late_file if isinstance(recorder, Recorder) else None
+        waits = recorder.late_file if isinstance(recorder, Recorder) else None
         if first:
-            self.late_file = late
+            self.late_file = waits
         else:
-            self.late_finer = late
-        return self._compared(loop.run, target, clock.process_time() - begin, late)
+            self.late_finer = waits
+        return self._compared(loop.run, target, clock.process_time() - begin, waits)
 
     def _takes_its_place(self, target: Target) -> bool:
         """Whether a result is where it belongs, and not beside one that it may replace."""
@@ -163,11 +164,11 @@ class Case:
         return waits
 
     def prepare(
-        self, resolution: Resolution, target: Target, kept: Tree | None = None, late: bool = False
+        self, resolution: Resolution, target: Target, kept: Tree | None = None, late: bool = False, unseen: bool = False
     ) -> tuple[TimeLoop, Recorder | ArrayRecorder, Equilibrium | None]:
         """The loop of a run, its result, and the equilibrium that it starts from.
 
-        kept, late: as `before` and `late` of `Recorder`.
+        kept, late, unseen: as `before`, `late` and `unseen` of `Recorder`.
         """
         model, equilibrium, switching = self._start(resolution)
         loop = self._loop(self.scene, model, resolution, switching, target)
@@ -175,6 +176,7 @@ class Case:
         recorder = result_recorder(
             self.scene, model, loop.observer, target, self._texts, equilibrium, loop.run.envelope,
             len(output_times(self.scene)), kept, late, ERROR_ESTIMATE if kept else "", reasons_at_start(switching),
+            unseen,
         )  # fmt: skip
         recorder.files = self._files
         for kind, text in self.notes:

@@ -319,7 +319,8 @@ class Estimate:
             return False
         kept, part = by_mesh[name], max(*times, LEAST_PART)
         if mixed:  # large parts that take off what the other adds were made of runs too coarse to show either
-            by_step[name] = by_mesh[name] = 0.5 * change / (min(shorter, finer) ** p - 1.0)
+            by_mesh[name] = 0.5 * change / (min(shorter, finer) ** p - 1.0)
+            by_step[name] = by_mesh[name].copy()  # the first output of the other may be renewed
         else:
             by_step[name], by_mesh[name] = part * by_step[name] / shorter**p, part * kept / finer**p
         self._renew_start(name, change, kept, finer)

@@ -59,12 +59,13 @@ def result_recorder(
     late: bool = False,
     pending: str = "",
     rods: str = "",
+    unseen: bool = False,
 ) -> Recorder | ArrayRecorder:
     """A new result, in a file or in memory; whether a file may be replaced was asked before anything was computed.
 
     found: the equilibrium at the start; envelope: of what is computed, its values not yet known; outputs: after the
-    first, 0 of an equilibrium; before, late: as of `Recorder`; pending: what is to come when it is complete; rods: why
-    the first ones are, as of `reasons_at_start`.
+    first, 0 of an equilibrium; before, late, unseen: as of `Recorder`; pending: what is to come when it is complete;
+    rods: why the first ones are, as of `reasons_at_start`.
     """
     attributes: dict[str, str | float | int] = {
         "title": scene.title, "cells": model.cells, "length": model.length, "tension_scale": model.tension_scale,
@@ -100,6 +101,7 @@ def result_recorder(
             target, grid_s=observer.s, fields=observer.fields, step_fields=steps, attributes=attributes, fixed=fixed,
             texts={name: x if isinstance(x, str) else x() for name, x in texts.items()}, outputs=outputs + 1,
             overwrite=True, before=before, templates=cache_folder().parent, late=late,
+            unseen=unseen,
         )  # fmt: skip
     if model.layout is not None:
         _note_neglected_bending(scene, model, recorder)

@@ -412,7 +412,7 @@ class TimeLoop:
             recorder.checkpoint(self._content)
             self._kept = here
         late = isinstance(recorder, Recorder) and recorder.is_late
-        if not last and (recorder.due or (new and not late)):
+        if not last and (recorder.due or (new and not (late and steps < 0))):
             self.write_envelope()
             recorder.flush()
 

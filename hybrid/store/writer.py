@@ -95,10 +95,12 @@ class Recorder(BaseRecorder):
     parts: results of lines, laid by in memory, that are groups of this file from now on and are written with it.
     late: whether there is no file before the first flush; without one it is written when this is closed, and if that
     is "complete" and `amended`, it waits in `late_file` for whoever puts it in its place.
+    unseen: whether nobody reads it before it is complete: outputs wait until they are many.
     """
 
     late_file: LateFile | None = None
     amended = False
+    _unseen = False
     _late: Late | None  # what there is instead of a file; None: the file is there
 
     def __init__(
@@ -117,6 +119,7 @@ class Recorder(BaseRecorder):
         templates: Path | None = None,
         parts: Mapping[str, Recorder] | None = None,
         late: bool = False,
+        unseen: bool = False,
     ) -> None:
         check_names(fields, step_fields, fixed)
         self._memory = target if isinstance(target, io.BytesIO) else None
@@ -135,6 +138,7 @@ class Recorder(BaseRecorder):
 
         if late and path is not None:
             self._write_to(None, path, tables_of(fields, step_fields))
+            self._unseen = unseen
             held = HeldValues(grid_s, fields, fixed, attributes, texts)
             self._late = Late(held, made, {} if before is not None else None, before, templates)
             self._flushed = monotonic()
@@ -292,7 +296,7 @@ class Recorder(BaseRecorder):
     @property
     def due(self) -> bool:
         """Whether outputs have been held back long enough, or are many."""
-        late = monotonic() - self._flushed > max(_PAUSE, _PART * self._took)
+        late = not self._unseen and monotonic() - self._flushed > max(_PAUSE, _PART * self._took)
         return late or sum(x._outputs.bytes_waiting for x in (self, *self._parts.values())) > _MOST_WAITING
 
     def _has_fixed(self, name: str) -> bool:
