@@ -284,3 +284,15 @@ def _noting(written: list[str], place: Any) -> Any:
         place(self)
 
     return noting
+
+
+@pytest.mark.usefixtures("rough")
+def test_a_finer_result_is_no_file_before_it_is_complete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first one grows, for those who read it; before, the finer one did too, and was copied to add its errors."""
+    written: list[str] = []
+    monkeypatch.setattr(LateFile, "place", _noting(written, LateFile.place))
+    monkeypatch.setattr(writer, "_PAUSE", -1.0)  # outputs are due at once
+    monkeypatch.setattr(late_file, "WAITS", 100.0)
+    with hybrid.run(asked(), tmp_path / "run.h5") as result:
+        assert result.attributes["effort_runs"] > 4 and result.done
+    assert written == ["run.h5"] and [x.name for x in tmp_path.iterdir()] == ["run.h5"]
