@@ -272,7 +272,9 @@ next is cut into the fewest equal steps that are no longer than `time.step`.
 The last output is at `duration`, also when `every` does not divide it.
 Without `time.step` steps follow the motion, cells are placed where the cable bends, and both as finely as `accuracy`
 asks (1 % if it is not there): `accuracy: 1%`, `3 cm`, `50 N`, or a table such as
-`accuracy: {position: 3 cm, tension: 1%, curvature: 5%}`, from 0.0001% to 10%.  In irregular waves extremes and standard
+`accuracy: {position: 3 cm, tension: 1%, curvature: 5%}` or `{all: 2%, curvature: 5%}`, from 0.0001% to 10%.  `1%` is
+`{all: 1%}`: of how far the line moves, of its tension, and of curvature where something rests on it; `plan` says what
+that comes to.  In irregular waves extremes and standard
 deviations are judged, unless `accuracy: {instant: 1%}` asks for every instant.  What the scene fixes (`time.step`,
 `mesh`, `model.tolerance`) stays; if it cannot meet what is asked, the event `accuracy missed` says so.
 [accuracy.md](accuracy.md) says where the figures of error come from and what they have been worth.

@@ -98,7 +98,7 @@ The ship heaves by 1 m every 8 s. `--set` changes a value for one run; you may a
     """## Go on
 
 - [Start here](index.md) asks for an accuracy, and gets an estimate of the error:
-  `accuracy: {position: 0.1 m, tension: 1%}`, or `accuracy: 2%`: of the length, and of the largest end force.
+  `accuracy: {position: 0.1 m, tension: 1%}`, or `accuracy: 2%`: of how far the line moves, and of its tensions.
 - [Examples](examples.md) and the [Gallery](gallery.md): copy the nearest scene.
 - `hybrid view tow.yaml` shows the equilibrium while you write ([Live view](view.md)).
 """,

@@ -14,7 +14,7 @@ from hybrid.kernels.state import Line
 from hybrid.model.mesh import Zone
 from hybrid.model.plausibility import implausible
 from hybrid.model.resolution import (
-    USUAL,
+    Reach,
     first_resolution,
     follows_curvature,
     mesh_is_free,
@@ -24,7 +24,11 @@ from hybrid.model.resolution import (
 )
 from hybrid.model.sections import swivels
 from hybrid.model.self_reach import self_reach
+from hybrid.scene.accuracy import USUAL
 from hybrid.scene.schema import AdaptiveModel, Scene
+
+# What the entry of the accuracy that is asked is called.
+ACCURACY = "accuracy"
 
 
 @dataclass(frozen=True)
@@ -71,13 +75,25 @@ def _moving(model: AdaptiveModel) -> Iterator[Entry]:
     yield Entry(f"joints that carry {carry}", True, "model.joint; where rod and catenary meet")
 
 
+def accuracy_entry(scene: Scene, reach: Reach | None = None) -> Entry:
+    """What is asked of the result; reach: how far the line moves, where that is known."""
+    want = requested_accuracy(scene)
+    if want is None:
+        return Entry(ACCURACY, False, "not asked for: `accuracy: 1%`, `3 cm` or `50 N`")
+    why = "accuracy" if scene.accuracy else f"no time.step, so {USUAL}"
+    return Entry(ACCURACY, True, f"{why}: {want.describe(reach, rests=scene.time is None)}")
+
+
+def with_accuracy(contents: Sequence[Entry], scene: Scene, reach: Reach | None = None) -> tuple[Entry, ...]:
+    """The same contents with what a scene itself asks, where they are those of a model that is chosen for it."""
+    asked = accuracy_entry(scene, reach)
+    return tuple(asked if x.what == asked.what else x for x in contents)
+
+
 def _accuracy(scene: Scene) -> Iterator[Entry]:
     """What is asked of the result, and what it sets."""
-    want, resolution, time = requested_accuracy(scene), first_resolution(scene), scene.time
-    if want is None:
-        yield Entry("accuracy", False, "not asked for: `accuracy: 1%`, `3 cm` or `50 N`")
-    else:
-        yield Entry("accuracy", True, f"{'accuracy' if scene.accuracy else f'no time.step, so {USUAL}'}: {want.text}")
+    resolution, time = first_resolution(scene), scene.time
+    yield accuracy_entry(scene)
     if time is not None and resolution.local is not None:
         why = (
             f"error of a step {resolution.local:.2g} m at most, by {'time.tolerance' if time.tolerance else 'accuracy'}"

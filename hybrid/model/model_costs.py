@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.material import Material, tension_floor
+from hybrid.model.resolution import accuracy_of, holds_stress
 from hybrid.model.run_time import step_time
+from hybrid.scene.accuracy import of_unnamed_model
 from hybrid.scene.schema import AdaptiveModel, CatenaryModel, RodModel, Scene
 
 MODELS = {"rod": RodModel, "catenary": CatenaryModel, "adaptive": AdaptiveModel}
@@ -70,8 +72,11 @@ class Demand(NamedTuple):
 
 
 def with_model(scene: Scene, kind: str) -> Scene:
-    """The same scene with one of MODELS."""
-    return scene.model_copy(update={"model": MODELS[kind]()})
+    """The same scene with one of MODELS; a rod that is chosen, not named, asks for no curvature."""
+    changed: dict[str, Any] = {"model": MODELS[kind]()}
+    if (accuracy := accuracy_of(scene)) is not None:
+        changed["accuracy"] = of_unnamed_model(accuracy, holds_stress(scene.cable.sections))
+    return scene.model_copy(update=changed)
 
 
 def structural(scene: Scene, cable: Material) -> str:
@@ -80,6 +85,8 @@ def structural(scene: Scene, cable: Material) -> str:
         return "an end is clamped"
     if any(load.what == "moment" for end in scene.ends.both for load in end.loads):
         return "a moment acts on an end"
+    if any(x.min_bend_radius for x in scene.cable.sections) or holds_stress(scene.cable.sections):
+        return "a limit of its bending is judged"
     if cable.at.size:
         return "point loads bend it"
     if np.ptp(cable.mean_bending) > 0.0 or np.ptp(cable.submerged_weight) > 0.0:

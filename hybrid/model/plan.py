@@ -11,7 +11,7 @@ import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.build import Model, build
-from hybrid.model.contents import Entry
+from hybrid.model.contents import Entry, with_accuracy
 from hybrid.model.first_state import HUNG
 from hybrid.model.initial_shape import hung
 from hybrid.model.material import material
@@ -173,7 +173,8 @@ def plan(scene: SceneLike | System) -> Plan | SystemPlan:
     why_not = structural(scene, material(scene))
     kinds = ["adaptive"] if why_not else ["catenary", "adaptive"]
     others = tuple((kind, _plan(with_model(scene, kind)).seconds) for kind in kinds)
-    return replace(rods, choice=(("rod", rods.seconds), *others), no_choice=why_not)
+    contents = with_accuracy(rods.contents, scene)
+    return replace(rods, contents=contents, choice=(("rod", rods.seconds), *others), no_choice=why_not)
 
 
 def _plan(scene: Scene) -> Plan:

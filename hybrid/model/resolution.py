@@ -5,17 +5,23 @@ A scene's own step, mesh and model.tolerance stand; what it leaves open follows 
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, sqrt
+from typing import NamedTuple
 
+import numpy as np
+
+from hybrid.kernels.state import Floats
 from hybrid.model.mesh_grading import Grading
+from hybrid.model.output_points import output_points
 from hybrid.model.scales import tension_scale
+from hybrid.model.sections import limits_along, weakest_bending
 from hybrid.model.start_vibration import start_vibrations
-from hybrid.scene.accuracy import Accuracy, amount
+from hybrid.scene.accuracy import NOT_ASKED, ROUGHEST, USUAL, Accuracy, amount
 from hybrid.scene.motion_checks import shortest_period
-from hybrid.scene.schema import AdaptiveModel, JonswapWaves, Scene, ZonesModel
+from hybrid.scene.schema import AdaptiveModel, CatenaryZone, JonswapWaves, RodModel, Scene, Section, ZonesModel
 
-USUAL = "1%"  # of a scene that requests nothing and leaves its steps open
 # Part of the requested error that neglecting bending in catenary zones may use; mesh and time step share the rest.
 OF_ZONES = 0.1
 ONE = 0.01  # the requested error that the guesses below are for
@@ -27,6 +33,8 @@ FOR_TENSION, FOR_POSITION = 1.5, 0.27
 COARSEST, FINEST = 0.5, 20.0
 # What a step may be wrong by, as a part of the length, for 1 % of tension and for 1 % of the length; of third order.
 STEP_FOR_TENSION, STEP_FOR_POSITION = 3e-5, 1.5e-3
+# What a step may be wrong by, as a part of the position that is asked where the line moves so far.
+STEP_OF_POSITION = 0.05
 # Steps to the shortest period that the scene names: fewer cannot show it, whatever the error control thinks.
 PER_PERIOD = 12
 # A vibration that a ramp sets off is shown where its force is more than this part of what is asked (ordinary ramps:
@@ -42,15 +50,51 @@ MOST_REFINEMENTS, IRREGULAR_REFINEMENTS, REFINEMENTS_AT_REST = 3, 1, 6
 # Part of the force, the moment and the curvature typical of a scene below which an error is one of round-off: parts of
 # a force that is nothing are not asked for.
 ROUND_OFF = 1e-12
+# Half the diameter of a line that gives none, as a part of its length: no position is asked finer by a part of motion.
+SLENDER = 1e-4
 # Least steps to a run, and the shortest step, as a part of the longest, before a step counts as failed.
 LEAST_STEPS, SHORTEST = 10, 1e-6
+
+
+class Limited(NamedTuple):
+    """Limits of sections whose verdict asks for an accuracy of its own: that which settles it.
+
+    allowed: (ns,) of the quantity at output points, just before them where it jumps, and (jumps,) just after; NaN:
+    none.  finest: part of a limit below which no error is asked for.
+    """
+
+    limit: str  # its key in the scene
+    quantity: str
+    allowed: Floats
+    allowed_right: Floats
+    finest: float
+
+    def at(self, places: np.ndarray) -> Limited:
+        """The same at some of the output points, by their numbers; none: at all of them."""
+        return self._replace(allowed=self.allowed[places]) if places.size else self
+
+    def part(self, used: float) -> float:
+        """Error, as a part of a limit of which so much is used, by which it is known whether it is broken."""
+        left = abs(1.0 - used)
+        return max(left if used > 1.0 else min(left, ROUGHEST), self.finest)
+
+
+class Reach(NamedTuple):
+    """How far the points of a line go from where they were first, and lie from the line between its ends, m."""
+
+    moved: float
+    sag: float
+
+    def size(self, least: float) -> tuple[float, str]:
+        """What a position is held against, m, and what that is: of a line that moves by less than `least` its sag."""
+        return (self.moved, "moved") if self.moved >= least else (self.sag, "of sag")
 
 
 @dataclass(frozen=True)
 class RequestedAccuracy:
     """Requested errors, in m and N or as parts (of the length; of the largest end force); None: not requested."""
 
-    position: float | None
+    position: float | None  # of a part of what moves: the most
     tension: float | None
     of_end_force: float | None
     of_curvature: float | None = None  # a part of the largest
@@ -59,6 +103,24 @@ class RequestedAccuracy:
     instant: bool = False  # at every output, also where a motion is irregular
     force: float = 0.0  # N, typical of the scene (`tension_scale`); 0: not known
     length: float = 0.0  # m, of the line
+    every: float | None = None  # the part that is asked of all that no name asks
+    of_motion: float | None = None  # a part of how far the line moves, at rest of its sag
+    least: float = 0.0  # m, the finest position that this part asks for
+    along: bool = False  # whether values along the line are asked by name, which cells and zones follow
+    why: str = ""  # why curvature is asked that is not named
+    limits: tuple[Limited, ...] = ()
+
+    def sized(self, reach: Reach) -> RequestedAccuracy:
+        """The same with the position in m, by how far the line moves."""
+        if self.of_motion is None or self.position is None:
+            return self
+        size, _ = reach.size(self.least)
+        return replace(self, position=min(max(self.of_motion * size, self.least), self.position), of_motion=None)
+
+    @property
+    def coarsest_part(self) -> float:
+        """The part beyond which an error that nobody asks for is worth a word."""
+        return self.every or ROUGHEST
 
     def round_off(self, unit: str) -> float:
         """Error of a quantity in N, N m or 1/m that numbers of this scene have by round-off alone."""
@@ -76,14 +138,47 @@ class RequestedAccuracy:
     @property
     def text(self) -> str:
         """In words."""
-        parts = [f"{self.position:.3g} m of position"] if self.position is not None else []
+        return self.describe()
+
+    def describe(self, reach: Reach | None = None, used: Mapping[str, float] | None = None, rests: bool = False) -> str:
+        """In words; reach: how far the line moves; used: how much of the limits, by name; None: not known.
+
+        rests: it is to be an equilibrium.
+        """
+        parts = [self._position(reach, rests)] if self.position is not None else []
         if self.tension is not None:
             parts.append(f"{self.tension:.3g} N of the end forces")
+        both = self.of_end_force is not None and self.of_tension == self.of_end_force
         if self.of_end_force is not None:
-            parts.append(f"{100 * self.of_end_force:.3g} % of the end forces")
-        along = (self.of_curvature, "curvature"), (self.of_moment, "bending moment"), (self.of_tension, "line tension")
+            what = "tension along the line and at the ends" if both else "end forces"
+            parts.append(f"{100 * self.of_end_force:.3g} % of the {what}")
+        because = f"curvature ({self.why})" if self.why else "curvature"
+        along = [(self.of_curvature, because), (self.of_moment, "bending moment")]
+        along += [] if both else [(self.of_tension, "line tension")]
         parts += [f"{100 * part:.3g} % of the {name}" for part, name in along if part is not None]
+        for x in self.limits:
+            size = f"{100 * x.finest:.3g} to {100 * ROUGHEST:.3g}" if used is None else ""
+            if used is not None and x.limit in used:
+                size = f"{100 * x.part(used[x.limit]):.2g}"
+            parts += [f"{size} % of {x.limit}, as its verdict needs"] if size else []
         return ", ".join(parts) + ", at every instant" * self.instant
+
+    def _position(self, reach: Reach | None, rests: bool) -> str:
+        assert self.position is not None
+        if self.of_motion is None:
+            return f"{self.position:.3g} m of position"
+        part = f"{100 * self.of_motion:.3g} % of"
+        if reach is None:
+            what = "the sag" if rests else "how far the line moves"
+            return f"{part} {what} ({min(self.least, self.position):.2g} to {self.position:.3g} m of position)"
+        size, what = reach.size(self.least)
+        found, wanted = self.sized(reach).position, self.of_motion * size
+        why = f"{part} {size:.3g} m {what}"
+        if wanted < self.least:
+            why = f"half the diameter; {why} is less"
+        if wanted > self.position or self.least > self.position:
+            why = f"{part} the length"
+        return f"{found:.2g} m of position ({why})"
 
 
 @dataclass(frozen=True)
@@ -128,7 +223,7 @@ class Resolution:
 def accuracy_of(scene: Scene) -> Accuracy | None:
     """The accuracy a scene requests; USUAL where it leaves its steps open."""
     if scene.accuracy is None and scene.time is not None and scene.time.controlled and scene.time.tolerance is None:
-        return Accuracy(position=USUAL, tension=USUAL)
+        return Accuracy(all=USUAL)
     return scene.accuracy
 
 
@@ -137,21 +232,77 @@ def requested_accuracy(scene: Scene) -> RequestedAccuracy | None:
     accuracy = accuracy_of(scene)
     if accuracy is None:
         return None
-    position = tension = of_end_force = None
+    every = _part(accuracy.all)
+    position, of_motion, least = (every and every * scene.length), every, 0.0
     if accuracy.position is not None:
         what, size = amount(accuracy.position)
-        position = size * scene.length if what == "part" else size
+        position, of_motion = size * scene.length if what == "part" else size, None
+    elif every is not None:
+        diameters = [x.diameter for x in scene.cable.sections if x.diameter is not None]
+        least = 0.5 * max(diameters, default=2.0 * SLENDER * scene.length)
+    tension, of_end_force = None, every
     if accuracy.tension is not None:
         what, size = amount(accuracy.tension)
         tension, of_end_force = (None, size) if what == "part" else (size, None)
-    curvature, moment, line_tension = (
-        amount(x)[1] if x is not None else None
-        for x in (accuracy.curvature, accuracy.bending_moment, accuracy.line_tension)
-    )
-    instant, force = accuracy.instant is not None, tension_scale(scene, scene.cable.sections, True)
+    named = [_part(x) for x in (accuracy.curvature, accuracy.bending_moment, accuracy.line_tension)]
+    curvature, moment, line_tension = named
+    why = "" if every is None or accuracy.curvature is not None else _why_curvature(scene, accuracy)
+    if why:
+        curvature = every
+    if accuracy.line_tension is None and accuracy.tension is None:
+        line_tension = every
+    along = why != "" or any(x is not None for x in named)
+    parts = [x for x in (every, of_end_force, *named) if x is not None]
     return RequestedAccuracy(
-        position, tension, of_end_force, curvature, moment, line_tension, instant, force, scene.length
-    )
+        position, tension, of_end_force, curvature, moment, line_tension, accuracy.instant is not None,
+        tension_scale(scene, scene.cable.sections, True), scene.length, every, of_motion, least, along, why,
+        _limits(scene, min(parts, default=ONE)),
+    )  # fmt: skip
+
+
+def _part(text: str | None) -> float | None:
+    return None if text in (None, NOT_ASKED) else amount(text)[1]
+
+
+def _why_curvature(scene: Scene, accuracy: Accuracy) -> str:
+    """Why an accuracy that names no quantity asks for curvature: something rests on it; empty: nothing does."""
+    bends = all(x.weakest_bending for x in scene.cable.sections)
+    if not bends or not shows_bends(scene):
+        return ""
+    if isinstance(scene.model, RodModel) and (accuracy.instant is not None or not _waves_are_irregular(scene)):
+        return "model: rod"  # in an irregular sea the largest curvature is that of one snap
+    return "pipe.max_stress" if holds_stress(scene.cable.sections) else ""
+
+
+def holds_stress(sections: Sequence[Section]) -> bool:
+    """Whether a stress that bending makes is held against a limit."""
+    return any(x.pipe is not None and x.pipe.max_stress is not None for x in sections)
+
+
+def shows_bends(scene: Scene) -> bool:
+    """Whether a line is, or may become, rod somewhere: what a catenary lacks at clamps never converges."""
+    if isinstance(scene.model, ZonesModel):
+        return not all(isinstance(zone, CatenaryZone) for zone in scene.model.zones)
+    return isinstance(scene.model, RodModel | AdaptiveModel)
+
+
+def _limits(scene: Scene, finest: float) -> tuple[Limited, ...]:
+    """The limits of sections that ask for an accuracy; finest: the finest part that the scene asks for."""
+    given = {name for name in ("min_bend_radius", "max_tension") for x in scene.cable.sections if getattr(x, name)}
+    if not given:
+        return ()
+    points, near = output_points(scene), 1e-6 * scene.length
+    sides = points.s - near, points.jumps + near  # what is just before a point belongs to the section before it
+    found = []
+    if "min_bend_radius" in given and shows_bends(scene):
+        radii = [limits_along(scene, s)["min_bend_radius"] for s in sides]
+        bends = [np.where(weakest_bending(scene, s) > 0.0, 1.0 / r, np.nan) for s, r in zip(sides, radii, strict=True)]
+        if any(np.isfinite(x).any() for x in bends):
+            found.append(Limited("min_bend_radius", "curvature", bends[0], bends[1], finest))
+    if "max_tension" in given:
+        most = [limits_along(scene, s)["max_tension"] for s in sides]
+        found.append(Limited("max_tension", "tension", most[0], most[1], finest))
+    return tuple(found)
 
 
 def is_irregular(scene: Scene) -> bool:
@@ -159,9 +310,13 @@ def is_irregular(scene: Scene) -> bool:
 
     It is not, where `accuracy: {instant: ...}` asks for that.
     """
-    fluid, asked = scene.environment.fluid, requested_accuracy(scene)
-    moves = scene.time is not None and fluid is not None and isinstance(fluid.waves, JonswapWaves)
-    return moves and not (asked is not None and asked.instant)
+    asked = requested_accuracy(scene)
+    return _waves_are_irregular(scene) and not (asked is not None and asked.instant)
+
+
+def _waves_are_irregular(scene: Scene) -> bool:
+    fluid = scene.environment.fluid
+    return scene.time is not None and fluid is not None and isinstance(fluid.waves, JonswapWaves)
 
 
 def wants_errors(scene: Scene) -> bool:
@@ -228,7 +383,7 @@ def first_resolution(scene: Scene) -> Resolution:
     if want is not None:
         tension, position = want.of_end_force or ONE, (want.position or ONE * scene.length) / scene.length
         which = [(tension, FOR_TENSION, STEP_FOR_TENSION)] if want.of_end_force or want.tension else []
-        along = (want.of_curvature, want.of_moment, want.of_tension)
+        along = (want.of_curvature, want.of_moment, want.of_tension)  # that of a bare part asks as end forces do
         which += [(x, FOR_TENSION, STEP_FOR_TENSION) for x in along if x]
         which += [(position, FOR_POSITION, STEP_FOR_POSITION)] if want.position else []
         part = min(x for x, _, _ in which)
@@ -247,6 +402,20 @@ def first_resolution(scene: Scene) -> Resolution:
     found = Resolution(fineness, step, time.tolerance or local, zones or part)
     shown, still = vibration_step(scene, want)
     return replace(found, step=shown, later=step, still=still) if shown < step else found
+
+
+def for_motion(resolution: Resolution, scene: Scene, reach: Reach) -> Resolution:
+    """As fine as a part of what moves asks for at first, where a pre-run has shown how far the line does."""
+    want = requested_accuracy(scene)
+    if want is None or want.of_motion is None:
+        return resolution
+    position, fineness, local = want.sized(reach).position, resolution.fineness, resolution.local
+    assert position is not None
+    if mesh_is_free(scene) and scene.resolution is None:  # which says what the first result has
+        fineness = max(fineness, min(FOR_POSITION * sqrt(ONE * scene.length / position), FINEST))
+    if local is not None and scene.time is not None and scene.time.tolerance is None:
+        local = min(local, STEP_OF_POSITION * position)
+    return replace(resolution, fineness=fineness, local=local)
 
 
 def vibration_step(scene: Scene, want: RequestedAccuracy | None) -> tuple[float, float]:

@@ -20,8 +20,11 @@ UNITS = {
 _AMOUNT = re.compile(r"\s*([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*(%|[a-zA-Z]+)\s*")
 # Beyond a tenth nothing is computed that deserves the name; below a millionth round-off of long runs begins to show.
 ROUGHEST, FINEST = 0.1, 1e-6
+USUAL = "1%"  # of a scene that requests nothing and leaves its steps open
 # What may be asked as a part of its largest alone.
 ALONG = "curvature", "bending_moment", "line_tension"
+# Of curvature and line_tension: that it is not asked, where `all` would ask for it.
+NOT_ASKED = "none"
 _EXAMPLES = "a part or a size, such as 1%, 3 cm or 50 N"
 
 
@@ -61,12 +64,24 @@ def _checked(text: str) -> str:
     return text.strip()
 
 
+def _checked_or_none(text: str) -> str:
+    return NOT_ASKED if text.strip() == NOT_ASKED else _checked(text)
+
+
 Amount = Annotated[str, Before(_is_text), After(_checked), Words(_EXAMPLES)]
+AmountOrNone = Annotated[str, Before(_is_text), After(_checked_or_none), Words(f"{_EXAMPLES}, or {NOT_ASKED}")]
 
 
 class Accuracy(Table):
     """How wrong a result may be; step, mesh and the thresholds of zones follow from it, unless the scene gives them."""
 
+    all: Amount | None = Field(
+        default=None,
+        description="what `accuracy: 2%` stands for, a part: of how far the line moves, for positions (at rest of its "
+        "sag; never finer than half its diameter, never coarser than that part of its length); of the largest tension, "
+        "for the tension along the line and the force at both ends; of the largest curvature where `model: rod` (but "
+        "in jonswap waves) or pipe.max_stress names bending; what is named beside it takes precedence",
+    )
     position: Amount | None = Field(
         default=None, description="of every output point: a part of the length of the cable, or mm, cm, m"
     )
@@ -75,14 +90,17 @@ class Accuracy(Table):
         description="of the force at both ends: a part of the largest, or N, kN",
     )
 
-    curvature: Amount | None = Field(
-        default=None, description="of every output point: a part of the largest curvature, such as 5%"
+    curvature: AmountOrNone | None = Field(
+        default=None,
+        description="of every output point: a part of the largest curvature, such as 5%; none: `all` does not ask it",
     )
     bending_moment: Amount | None = Field(
         default=None, description="of every output point: a part of the largest bending moment, such as 5%"
     )
-    line_tension: Amount | None = Field(
-        default=None, description="of the tension at every output point: a part of the largest, such as 2%"
+    line_tension: AmountOrNone | None = Field(
+        default=None,
+        description="of the tension at every output point: a part of the largest, such as 2%; none: `all` does not "
+        "ask it",
     )
     instant: Amount | None = Field(
         default=None,
@@ -98,15 +116,32 @@ class Accuracy(Table):
             if text is not None and amount(text)[0] not in ("part", name):
                 other = f"{amount(text)[0]}: {text}"
                 found.append(Finding((name,), f"a part (%) or a size in {_units(name)}", f"write {other}"))
-        for name in ALONG:
+        for name in ("all", *ALONG):
             text = getattr(self, name)
-            if text is not None and amount(text)[0] != "part":
-                found.append(Finding((name,), f"a part (%) of the largest {name.replace('_', ' ')}", "5%"))
-        if all(getattr(self, name) is None for name in ("position", "tension", *ALONG)):
-            names = f"position, tension, {', '.join(ALONG[:-1])} or {ALONG[-1]}"
-            found.append(Finding((), names, "accuracy: 1% stands for the first two"))
+            if text not in (None, NOT_ASKED) and amount(text)[0] != "part":
+                what = "of what moves, of tensions" if name == "all" else f"of the largest {name.replace('_', ' ')}"
+                found.append(Finding((name,), f"a part (%) {what}", "1%" if name == "all" else "5%"))
+        if {getattr(self, name) for name in ("all", "position", "tension", *ALONG)} <= {None, NOT_ASKED}:
+            names = f"all, position, tension, {', '.join(ALONG[:-1])} or {ALONG[-1]}"
+            found.append(Finding((), names, "accuracy: 1% stands for {all: 1%}"))
         refuse(found)
         return self
+
+
+def of_length(text: str) -> str | dict[str, str]:
+    """`1%` as a part of the length and of the end forces, by name; a size, and what is none, as it is."""
+    found = _AMOUNT.fullmatch(text)
+    return {"position": text, "tension": text} if found is not None and found[2] == "%" else text
+
+
+def of_unnamed_model(accuracy: Accuracy, stressed: bool) -> Accuracy:
+    """The same, of a line that is rod although nobody has named it so: `all` asks for curvature where that is held
+
+    against a stress, and else for none.
+    """
+    if accuracy.all is None or accuracy.curvature is not None:
+        return accuracy
+    return accuracy.model_copy(update={"curvature": accuracy.all if stressed else NOT_ASKED})
 
 
 def _units(name: str) -> str:
@@ -114,7 +149,7 @@ def _units(name: str) -> str:
 
 
 def expand(value: Any) -> Any:
-    """`1%` for {position: 1%, tension: 1%}; `3 cm` and `50 N` for one of them; `instant` likewise."""
+    """`1%` for {all: 1%}; `3 cm` for a position and `50 N` for a tension; `instant` likewise."""
     if isinstance(value, Mapping):
         instant = value.get("instant")
         if not isinstance(instant, str) or (found := _AMOUNT.fullmatch(instant)) is None or found[2] not in UNITS:
@@ -126,9 +161,9 @@ def expand(value: Any) -> Any:
 
 
 def _each(text: str) -> dict[str, str]:
-    """The quantities that an amount stands for."""
+    """The quantity that an amount stands for."""
     what, _ = amount(text)
-    return {"position": text, "tension": text} if what == "part" else {what: text}
+    return {"all" if what == "part" else what: text}
 
 
 AskedAccuracy = Annotated[Accuracy, Before(expand)]

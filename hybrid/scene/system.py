@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from hybrid.errors import SceneError
-from hybrid.scene.accuracy import AskedAccuracy
+from hybrid.scene.accuracy import USUAL, Accuracy, AskedAccuracy, of_unnamed_model
 from hybrid.scene.analysis import (
     AdaptiveModel,
     CatenaryModel,
@@ -218,7 +218,7 @@ class System(Table):
     accuracy: AskedAccuracy | None = Field(
         default=None,
         description="how wrong the result of each line may be: its cells and the time steps follow from it, unless "
-        "they are given; parts are of the length, and of the largest force at the ends, of each line",
+        "they are given; parts are of how far each line moves, and of its own tensions",
     )
     output: SystemOutput = Field(default=SystemOutput(), description="what is kept")
 
@@ -400,13 +400,22 @@ class System(Table):
         tables: dict[str, Any] = {
             "title": f"{self.title}, line {name}" if self.title else f"line {name}", "environment": self.environment,
             "cable": line.cable, "ends": Ends(**ends), "initial": initial, "model": line.chosen_model,
-            "mesh": line.mesh, "contact": line.contact, "accuracy": line.accuracy or self.accuracy,
+            "mesh": line.mesh, "contact": line.contact, "accuracy": self._accuracy_of(line),
         }  # fmt: skip
         if self.time is not None:
             tables["time"] = self.time
         given = {key: getattr(self.output, key) for key in ("points", "every", "errors")}
         tables["output"] = {key: value for key, value in given.items() if value is not None}
         return Scene.model_validate(tables)
+
+    def _accuracy_of(self, line: JoinedLine) -> Accuracy | None:
+        """What is asked of a line: of one that names no model no curvature, because nobody has asked for a rod."""
+        asked = line.accuracy or self.accuracy
+        if asked is None and self.time is not None and self.time.controlled and self.time.tolerance is None:
+            asked = Accuracy(all=USUAL)
+        if asked is None or line.model is not None:
+            return asked
+        return of_unnamed_model(asked, any(x.pipe is not None and x.pipe.max_stress for x in line.sections))
 
     def _places(self, line: JoinedLine) -> dict[str, Triple]:
         """Where the points of a line are first [m], a free one no farther from the other than the line is long."""

@@ -24,7 +24,14 @@ from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.plan import output_times
 from hybrid.model.release import check_releases
-from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, requested_accuracy, wants_errors
+from hybrid.model.resolution import (
+    Reach,
+    Resolution,
+    first_resolution,
+    follows_curvature,
+    requested_accuracy,
+    wants_errors,
+)
 from hybrid.model.sections import section_changes
 from hybrid.model.self_reach import self_reach, without_contact
 from hybrid.outputs.probes import Observer
@@ -112,6 +119,7 @@ class Case:
         self._told: tuple[Scene, str] | None = None  # a scene, and what it is as a text
         self._owner = threading.get_ident()  # the thread that puts files in their places
         self._begun: tuple[Resolution, tuple[Model, Equilibrium | None, ZoneSwitching | None]] | None = None
+        self.reach: Reach | None = None  # how far the line moves, by a pre-run
         self.came_near_itself = False  # whether the line did in a run to compare with
         # Whether contact with itself is computed in runs to compare with: where it is asked for, or the line has
         # touched itself in a result.  Before, coarse cells would meet where those of the result do not.
@@ -409,7 +417,9 @@ class Case:
             coarse = coarse.coarser(steps=resolution.step / coarse.step)  # as short as those of the result
             model, _ = self.first_shape(coarse)
             found = self.sample(coarse, s, until).values
-        return Survey.of(self.scene, resolution, model, s, found)
+        survey = Survey.of(self.scene, resolution, model, s, found)
+        self.reach = survey.reach
+        return survey
 
     # --- parts of a run -------------------------------------------------------------------------
 

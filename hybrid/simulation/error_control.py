@@ -51,11 +51,11 @@ from hybrid.simulation.refinement import (
     RAW,
     Free,
     Verdict,
-    bounds_of,
     costly,
     missed,
     not_converged,
     refined,
+    sizes_of,
 )
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.simulation.run_sample import (
@@ -165,9 +165,7 @@ class ErrorController:
         own = [*self.choice.notes, *self._notes, *self._irregular_note()]
         own += not_converged(self.diverging, self.asked)
         if found is not None:
-            asked = (
-                None if self.asked is None else {name: bound for name, _, bound, _ in bounds_of(self.asked, found.run)}
-            )
+            asked = None if self.asked is None else sizes_of(self.asked, found.run)
             own += doubtful(found.errors, found.doubt, asked)
         return (*own, *((*found.several_equilibria, *found.run.notes, *found.notes) if found is not None else ()))
 
@@ -467,7 +465,7 @@ class ErrorController:
         left = (IRREGULAR_REFINEMENTS if self.irregular else most) + 1 - self._judged
         stalls = falls > STALLED or (left > 0 and verdict.ratio * falls**left > 1.0)
         hopeless = left <= 0 or (stalls if self.moves else sum(self.runs) > CPU_AT_REST)
-        along = any(x is not None for x in (self.asked.of_curvature, self.asked.of_moment))
+        along = self.asked.asks("curvature") or self.asked.asks("bending_moment")
         sharp = run.unresolved and self.free.mesh and (along or not self.irregular)  # else at the instant of a snap
         met = verdict.ratio <= 1.0 and not sharp
         if met or hopeless or sum(self.runs) > MOST_CPU or self._by_chance(verdict):

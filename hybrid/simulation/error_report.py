@@ -15,7 +15,7 @@ from hybrid.simulation.bounded_model_errors import bounded
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.errors_by_cause import Errors, summary
 from hybrid.simulation.free_vibrations import uncertain_by_vibrations
-from hybrid.simulation.refinement import END_FORCE, bounds_of
+from hybrid.simulation.refinement import END_FORCE, asked_text, not_asked_text, sizes_of
 from hybrid.simulation.result_checks import damped_jolts, undersampled_end_forces
 from hybrid.simulation.run_sample import END_FORCES, RunSample, at_all_points, is_along
 from hybrid.store.amend import NOTHING_MORE, Happened, amend
@@ -72,7 +72,7 @@ def effort(scene: Scene, control: ErrorController, result: RunSample, cpu: float
     if isinstance(scene.model, AdaptiveModel):
         attributes["effort_zones"] = resolution.zones
     if control.asked is not None:
-        attributes["accuracy_asked"] = control.asked.text
+        attributes["accuracy_asked"] = asked_text(control.asked, result)
     return attributes
 
 
@@ -89,10 +89,13 @@ def known(
             error = max(largest.get(name, 0.0) for name in END_FORCES.values())
             undersampled += damped_jolts(scene, result, error, control.allowed_force)
         if not control.irregular:
-            bounds = None if control.asked is None else {x: y for x, _, y, _ in bounds_of(control.asked, result)}
+            bounds = None if control.asked is None else sizes_of(control.asked, result)
             undersampled += uncertain_by_vibrations(scene, result, largest, bounds)
     found: dict[str, float | str] = {**summary(errors)} if errors is not None else {}
     found |= not_converged_attribute([control.diverging])
+    if errors is not None and control.asked is not None:
+        beside = not_asked_text(control.asked, errors, result)
+        found |= {"accuracy_not_asked": beside} if beside else {}
     if control.irregular:
         each = [summary(estimate.errors) for estimate in control.statistics.values()]
         for name in each[0] if each else ():

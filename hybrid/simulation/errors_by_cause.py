@@ -27,7 +27,7 @@ class Errors:
     def __init__(self, fields: Mapping[str, Mapping[str, tuple[int, ...]]], blocks: Callable[[], Iterator[Block]]):
         """fields: shapes (nt, ...) of all errors, by cause and output; blocks: computes them."""
         self.fields, self._compute = fields, blocks
-        self._largest: dict[tuple[str, str], float] | None = None
+        self._largest: dict[tuple[str, str], np.ndarray] | None = None  # over time
         numbers = sum(prod(shape) for found in fields.values() for shape in found.values())
         self._kept: list[Block] | None = [] if numbers <= MOST else None  # once they are computed
 
@@ -43,11 +43,12 @@ class Errors:
         if self._kept:
             yield from self._kept
             return
-        largest: dict[tuple[str, str], float] = {}
+        largest: dict[tuple[str, str], np.ndarray] = {}
         kept = []
         for block in self._compute():
             key = block.cause, block.name
-            largest[key] = float(np.max(block.values, initial=largest.get(key, 0.0)))
+            most = np.max(block.values, axis=0, initial=0.0)
+            largest[key] = np.maximum(most, largest[key]) if key in largest else most
             if self._kept is not None:
                 kept.append(block)
             yield block
@@ -55,13 +56,16 @@ class Errors:
         if self._kept is not None:
             self._kept = kept
 
-    def largest(self, cause: str, name: str) -> float:
-        """Largest error of an output; 0 where it is not estimated."""
+    def largest(self, cause: str, name: str, allowed: np.ndarray | None = None) -> float:
+        """Largest error of an output, or of it over `allowed` (ns,), NaN where nothing is; 0 where not estimated."""
         if self._largest is None:
             for _ in self.blocks():
                 pass
         assert self._largest is not None
-        return self._largest.get((cause, name), 0.0)
+        found = self._largest.get((cause, name))
+        if found is None:
+            return 0.0
+        return float(np.max(found, initial=0.0) if allowed is None else np.nanmax(found / allowed, initial=0.0))
 
 
 def summary(errors: Errors) -> dict[str, float]:

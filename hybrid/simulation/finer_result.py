@@ -48,6 +48,8 @@ class Judged(NamedTuple):
         if not self.statistics:
             return judge(asked, self.estimate.errors, self.estimate.run)
         verdicts = []
+        if asked.of_motion is not None:
+            asked = asked.sized(self.estimate.run.reach)
         for statistic, estimate in self.statistics.items():
             found = judge(asked, estimate.errors, self.statistics[LARGEST].run, self._skipped(statistic))
             text = found.text.replace(": error", f", {STATISTICS[statistic]}: error")
@@ -119,7 +121,7 @@ def _copied(estimate: Any) -> Any:
 def _holds(asked: RequestedAccuracy, estimate: Estimate, other: RunSample, skip: tuple[str, ...]) -> bool:
     """Whether another run is nowhere further from that of an estimate than its errors; skip: what is not judged."""
     own, errors = estimate.run, estimate.errors
-    for name, _, _, _ in bounds_of(asked, own):
+    for name in dict.fromkeys(bound.name for bound in bounds_of(asked, own)):
         raw = RAW.get(name, name)
         if name in skip or raw not in own.values or raw not in other.values:
             continue

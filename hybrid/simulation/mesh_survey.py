@@ -12,10 +12,20 @@ from hybrid.kernels.state import Floats
 from hybrid.model.build import Model, rod_cells
 from hybrid.model.mesh_grading import AT_PLACE, LAYER, SAMPLES, Grading, grading, layers
 from hybrid.model.model_costs import Demand
-from hybrid.model.resolution import RequestedAccuracy, Resolution, is_irregular, requested_accuracy, zones_are_free
+from hybrid.model.resolution import (
+    Reach,
+    RequestedAccuracy,
+    Resolution,
+    for_motion,
+    is_irregular,
+    requested_accuracy,
+    zones_are_free,
+)
+from hybrid.model.sections import limits_along
+from hybrid.scene.accuracy import ROUGHEST
 from hybrid.scene.motion_checks import stationary_from
 from hybrid.scene.schema import AdaptiveModel, Scene
-from hybrid.simulation.run_sample import Outputs
+from hybrid.simulation.run_sample import Outputs, reach_of
 
 # Cells and steps so many times as long as those of the first result; places at which it is looked at.
 CELLS, STEPS, POINTS = 2.0, 4.0, 201
@@ -47,6 +57,7 @@ def with_survey(resolution: Resolution, scene: Scene, survey: Survey | None) -> 
     """With cells where a pre-run shows that they should be, and zones as it shows that curvature needs them."""
     if survey is None:
         return resolution
+    resolution = for_motion(resolution, scene, survey.reach)
     zones = resolution.zones
     if zones_are_free(scene):
         zones = min(zones, allowed(scene, survey) / scene.length)
@@ -62,7 +73,24 @@ def allowed(scene: Scene, survey: Survey) -> float:
 def asks_along(scene: Scene) -> bool:
     """Whether curvature, moment or tension along the line is asked."""
     asked = requested_accuracy(scene)
-    return asked is not None and any((asked.of_curvature, asked.of_moment, asked.of_tension))
+    return asked is not None and asked.along
+
+
+def bending_asked(scene: Scene, s: Floats, curvature: Floats) -> float:
+    """Error of curvature that is asked, as a part of the largest; infinite where none is.
+
+    curvature: (K,) 1/m, the largest at s (K,) m, which shows how much of min_bend_radius is used.
+    """
+    asked, largest = requested_accuracy(scene), float(curvature.max(initial=0.0))
+    if asked is None or not largest > 0.0:
+        return np.inf
+    parts = [x for x in (asked.of_curvature, asked.of_moment) if x]
+    for x in (x for x in asked.limits if x.quantity == "curvature"):
+        used = curvature * limits_along(scene, s)[x.limit]
+        if np.isfinite(used).any():
+            k = int(np.nanargmax(used))
+            parts.append(x.part(float(used[k])) * float(curvature[k] / max(used[k], 1e-300)) / largest)
+    return min(parts, default=np.inf)
 
 
 @dataclass(frozen=True)
@@ -72,11 +100,13 @@ class Survey:
     model: Model
     demand: Demand
     given: float | None  # cells to a length sqrt(EI/T), at fineness 1, where the scene says
-    along: bool  # whether curvature, moment or tension along the line is asked
+    along: bool  # whether cells follow what is asked of curvature, moment or tension along the line
+    reach: Reach  # how far the line moves
+    bends: float = np.inf  # error of curvature that is asked, as a part of the largest
 
     @classmethod
     def of(cls, scene: Scene, resolution: Resolution, model: Model, s: Floats, run: Mapping[str, Outputs]) -> Survey:
-        """From curvature and tension (nt, K) of a run at s (K,) m; resolution: of the result that comes first."""
+        """From positions, curvature and tension (nt, K) of a run at s (K,) m; resolution: of the first result."""
         curvature, tension = np.asarray(run["curvature"]), np.asarray(run["tension"])
         low = np.maximum(tension, 1e-9 * model.tension_scale)
         ends = tension.min(axis=0), tension.max(axis=0), tension.mean(axis=0)
@@ -87,7 +117,9 @@ class Survey:
         if is_irregular(scene):  # cells are for what statistics see, not for the instant of a snap
             sharp = np.quantile(curvature, OFTEN, axis=0)
         demand = Demand(s, sharp, (curvature / low).max(axis=0), *ends)
-        return cls(model, demand, given, asks_along(scene))
+        bends = bending_asked(scene, s, sharp)
+        reach = reach_of(run["position"])
+        return cls(model, demand, given, asks_along(scene) or bends <= ROUGHEST, reach, bends)
 
     def _layers(self, rod: np.ndarray, joints: Sequence[float]) -> Floats:
         """Cells (SAMPLES,) 1/m beside what disturbs rods; rod: (K,) where the line is one; joints: m."""
@@ -148,9 +180,8 @@ class Survey:
         sharpest = np.maximum(demand.curvature, np.maximum(*self._beside())) + self._jumps() * (
             1.0 - 1.0 / self._smeared
         )
-        parts = [x for x in (asked.of_curvature, asked.of_moment) if x]
-        if parts:
-            must |= self._jumps() > OF_ALONG * min(parts) * demand.curvature.max()
+        if np.isfinite(self.bends):
+            must |= self._jumps() > OF_ALONG * self.bends * demand.curvature.max()
         if asked.of_tension:
             less = 0.5 * self._square * demand.least * sharpest**2
             must |= less > OF_ALONG * asked.of_tension * demand.largest.max()

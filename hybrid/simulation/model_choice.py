@@ -24,7 +24,7 @@ from hybrid.model.model_costs import (
     structural,
     with_model,
 )
-from hybrid.model.resolution import Resolution, model_is_free, wants_survey
+from hybrid.model.resolution import Resolution, for_motion, model_is_free, wants_survey
 from hybrid.scene.schema import AdaptiveModel
 from hybrid.simulation.case import Case
 from hybrid.simulation.layer_mesh import layered
@@ -39,6 +39,7 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
     survey = case.survey(resolution)
     if survey is None:
         return ModelChoice("rod", "the pre-run that would show what others cost failed"), resolution
+    resolution = for_motion(resolution, scene, survey.reach)
     resolution = replace(resolution, zones=min(resolution.zones, allowed(scene, survey) / scene.length))
     model, demand = survey.model, survey.demand
     moving = with_model(scene, "adaptive")
@@ -87,6 +88,7 @@ def surveyed(case: Case | StaticCase, resolution: Resolution) -> Resolution:
 def rods_instead(case: Case, resolution: Resolution, why: str) -> tuple[ModelChoice, Resolution]:
     """Give the scene of a case rods, after what was chosen has failed; how finely it is computed then."""
     case.scene = with_model(case.scene, "rod")
-    survey = case.survey(resolution)
-    grading = survey.grading() if survey is not None else None
-    return ModelChoice("rod", f"catenaries, which cost less, were tried: {why}"), replace(resolution, grading=grading)
+    survey, choice = case.survey(resolution), ModelChoice("rod", f"catenaries, which cost less, were tried: {why}")
+    if survey is None:
+        return choice, resolution
+    return choice, replace(for_motion(resolution, case.scene, survey.reach), grading=survey.grading())

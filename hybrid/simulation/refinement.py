@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.model.resolution import RequestedAccuracy, Resolution
+from hybrid.model.resolution import Limited, RequestedAccuracy, Resolution
 from hybrid.outputs.probes import SIDED_ERRORS as RIGHT_OF
-from hybrid.scene.accuracy import ALONG, ROUGHEST
+from hybrid.scene.accuracy import ALONG, NOT_ASKED, ROUGHEST
 from hybrid.simulation.errors_by_cause import Errors
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 
@@ -61,43 +61,100 @@ def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample, skip: Collec
     skip: quantities that are not judged.
     """
     worst, reached = Verdict(0.0, 0.0, 0.0, 0.0, "nothing is asked"), dict[str, tuple[float, str]]()
-    for name, unit, bound, most in bounds_of(asked, run):
-        if bound <= 0.0 or name in skip:
+    for bound in bounds_of(asked, run):
+        name, size = bound.name, bound.size
+        if size <= 0.0 or name in skip:
             continue
-        total = _largest(errors, "total", name)
+        total = _largest(errors, "total", bound)
         key = "tension" if name in END_FORCES.values() else "line_tension" if name == "tension" else name
-        if total > max(bound, reached.get(key, (0.0, ""))[0]):
-            reached[key] = total, _reached(key, unit, total, most)
-        if total / bound >= worst.ratio:
-            model = _largest(errors, "model", name)
-            mesh, time = (_largest(errors, cause, name) / bound for cause in ("mesh", "time"))
-            share = (total - model) / bound / (mesh + time) if mesh + time > 0.0 else 0.0
+        if total > max(size, reached.get(key, (0.0, ""))[0]) and bound.limit is None:
+            reached[key] = total, _reached(key, bound.unit, total, bound.of)
+        if total / size >= worst.ratio:
+            model = _largest(errors, "model", bound)
+            mesh, time = (_largest(errors, cause, bound) / size for cause in ("mesh", "time"))
+            share = (total - model) / size / (mesh + time) if mesh + time > 0.0 else 0.0
             mesh, time = mesh * share, time * share  # of what they make together, where they cancel
-            quantity = name.replace("end_force_", "force at the ").replace("_", " ")
-            text = f"{quantity}: error {total:.3g} {unit}, asked {bound:.3g} {unit}"
-            worst = Verdict(total / bound, mesh, time, model / bound, text, name=name)
-    return replace(worst, reached=", ".join(text for _, text in reached.values()))
+            text = f"{bound.words}: error {total:.3g} {bound.unit}, asked {size:.3g} {bound.unit}"
+            worst = Verdict(total / size, mesh, time, model / size, text, name=name)
+    every = [f"all: {100.0 * asked.every:.3g}%"] if asked.every is not None and reached else []
+    return replace(worst, reached=", ".join([*every, *(text for _, text in reached.values())]))
 
 
-def bounds_of(asked: RequestedAccuracy, run: RunSample) -> list[tuple[str, str, float, float | None]]:
-    """What is asked of a run that has it: quantity, unit, bound; if a part is asked, of what."""
-    bounds: list[tuple[str, str, float, float | None]] = []
+class Bound(NamedTuple):
+    """An error that is asked of a quantity, in a unit: over all of the line, or as % of a limit of sections.
+
+    of: that of which a part is asked; used: how much of the limit is used.
+    """
+
+    name: str
+    unit: str
+    size: float
+    of: float | None = None
+    limit: Limited | None = None
+    used: float = 0.0
+
+    @property
+    def words(self) -> str:
+        """What the error is of."""
+        name = self.name.replace("end_force_", "force at the ").replace("_", " ")
+        return name if self.limit is None else f"{name} over its limit, {self.limit.limit}"
+
+
+def bounds_of(asked: RequestedAccuracy, run: RunSample) -> list[Bound]:
+    """What is asked of a run that has it."""
+    bounds: list[Bound] = []
     if asked.position is not None:
-        bounds.append(("position", "m", asked.position, None))
+        position = asked.sized(run.reach).position if asked.of_motion is not None else asked.position
+        assert position is not None
+        bounds.append(Bound("position", "m", position))
     for name in END_FORCES.values():
         if asked.tension is not None:
-            bounds.append((name, "N", asked.tension, None))
+            bounds.append(Bound(name, "N", asked.tension))
         if asked.of_end_force is not None:
-            bound = max(asked.of_end_force * run.largest_end_force, asked.round_off("N"))
-            bounds.append((name, "N", bound, run.largest_end_force))
+            size = max(asked.of_end_force * run.largest_end_force, asked.round_off("N"))
+            bounds.append(Bound(name, "N", size, run.largest_end_force))
     for name, unit, part in (
         ("curvature", "1/m", asked.of_curvature), ("bending_moment", "N m", asked.of_moment),
         ("tension", "N", asked.of_tension),
     ):  # fmt: skip
         if part is not None and name in run.values:
-            largest = float(np.asarray(run.values[name]).max())
-            bounds.append((name, unit, max(part * largest, asked.round_off(unit)), largest))
+            largest = run.largest(name)
+            bounds.append(Bound(name, unit, max(part * largest, asked.round_off(unit)), largest))
+    for x in (limit.at(run.places) for limit in asked.limits):
+        if x.quantity in run.values:
+            used = _used(x, run)
+            bounds.append(Bound(x.quantity, "%", 100.0 * x.part(used), limit=x, used=used))
     return bounds
+
+
+def sizes_of(asked: RequestedAccuracy, run: RunSample) -> dict[str, float]:
+    """The errors that are asked over all of the line, by quantity."""
+    return {x.name: x.size for x in bounds_of(asked, run) if x.limit is None}
+
+
+def _used(limit: Limited, run: RunSample) -> float:
+    """How much of a limit a run uses, 1: all of it."""
+    sides = (limit.quantity, limit.allowed), (f"right/{limit.quantity}", limit.allowed_right)
+    each = [np.nanmax(run.most(name) / allowed, initial=0.0) for name, allowed in sides if name in run.values]
+    return float(max(each))
+
+
+def asked_text(asked: RequestedAccuracy, run: RunSample) -> str:
+    """What is asked of a run, in words and numbers."""
+    used = {x.limit.limit: x.used for x in bounds_of(asked, run) if x.limit is not None}
+    return asked.describe(run.reach if asked.of_motion is not None else None, used)
+
+
+def not_asked_text(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> str:
+    """That curvature or bending moment are not asked, where the error of one is more than a part; else empty."""
+    for name in ("bending_moment", "curvature"):
+        largest = run.largest(name) if name in run.values else 0.0
+        error = max(errors.largest("total", side) for side in (name, f"right_{name}"))
+        if not asked.asks(name) and largest > 0.0 and error > asked.coarsest_part * largest:
+            if asked.asks("curvature"):
+                continue  # a moment goes with it
+            return f"{name.replace('_', ' ')} is not asked, its error is {100.0 * error / largest:.2g} % of its largest"
+    return ""
 
 
 def verdicts(
@@ -108,11 +165,12 @@ def verdicts(
     errors: empty where they are not known; certain: whether nothing makes them doubtful.
     """
     out: list[dict[str, str | float | bool | None]] = []
-    for name, unit, bound, _ in bounds_of(asked, run):
-        known = bool(errors) and all(name in x.fields.get("total", {}) for x in errors)
-        error = max(_largest(x, "total", name) for x in errors) if known else None
-        met = None if error is None else (certain or None) if error <= bound else False
-        out.append({"quantity": name, "unit": unit, "asked": bound, "error": error, "met": met})
+    for bound in bounds_of(asked, run):
+        known = bool(errors) and all(bound.name in x.fields.get("total", {}) for x in errors)
+        error = max(_largest(x, "total", bound) for x in errors) if known else None
+        met = None if error is None else (certain or None) if error <= bound.size else False
+        name = bound.name if bound.limit is None else bound.words
+        out.append({"quantity": name, "unit": bound.unit, "asked": bound.size, "error": error, "met": met})
     return out
 
 
@@ -174,13 +232,19 @@ def missed(verdict: Verdict, free: Free, runs: int, chance: bool, stopped: str =
         try_ = f"a longer run, several seeds, or accuracy: {{{verdict.reached}}}, which this run meets"
     if stopped:
         whose, try_ = stopped, f"accuracy: {{{verdict.reached}}}, which this run meets; or such a mesh and steps"
+    if not verdict.reached:  # a verdict on a limit, which no other accuracy settles
+        try_ = "mesh.cells and time.step finer than these"
     return f"{verdict.text}; {whose}, {runs} runs; try: {try_}"
 
 
-def _largest(errors: Errors, cause: str, name: str) -> float:
-    """Largest error of a quantity on either side of points where it has two values."""
+def _largest(errors: Errors, cause: str, bound: Bound) -> float:
+    """Largest error of what a bound is for, in its unit, on either side of points where it has two values."""
+    name, limit = bound.name, bound.limit
     sides = (name, f"right_{name}") if name in RIGHT_OF else (name,)
-    return max(errors.largest(cause, side) for side in sides)
+    if limit is None:
+        return max(errors.largest(cause, side) for side in sides)
+    each = zip(sides, (limit.allowed, limit.allowed_right), strict=True)
+    return 100.0 * max(errors.largest(cause, side, allowed) for side, allowed in each)
 
 
 def _reached(key: str, unit: str, total: float, most: float | None) -> str:
@@ -188,6 +252,8 @@ def _reached(key: str, unit: str, total: float, most: float | None) -> str:
     amount = 1.1 * total
     if most is not None and (amount <= ROUGHEST * most or key in ALONG):
         amount, unit = 100.0 * amount / most, "%"
+        if amount > 100.0 * ROUGHEST and key != "bending_moment":
+            return f"{key}: {NOT_ASKED}"
         if amount > 100.0 * ROUGHEST:
             return f"{key}: none, its error is {100.0 * total / most:.2g}%"
     digit = 10.0 ** (floor(log10(amount)) - 1) if amount > 0.0 else 1.0

@@ -17,6 +17,7 @@ from hybrid.errors import ComputationError
 from hybrid.kernels.cache import is_warm
 from hybrid.model import plan as tables
 from hybrid.model.build import build
+from hybrid.model.contents import with_accuracy
 from hybrid.model.model_costs import NAMED
 from hybrid.model.plan import Plan, SystemPlan, count_steps, output_interval
 from hybrid.model.resolution import Resolution, first_resolution, requested_accuracy, wants_errors
@@ -131,7 +132,8 @@ def _measured(scene: Scene, found: Plan) -> Plan:
     seconds, most = _of_passes(scene, setup, motion, duration / output_interval(scene), found)
     mesh = tables.mesh_of(build(case.scene, resolution))
     return replace(
-        found, **mesh, seconds=survey + seconds, most_seconds=survey + most, measured=True, steps=round(steps),
+        found, **mesh, contents=with_accuracy(found.contents, scene, case.reach),
+        seconds=survey + seconds, most_seconds=survey + most, measured=True, steps=round(steps),
         step=min(resolution.step, duration / steps), chosen=choice.kind,
     )  # fmt: skip
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import OutputPoints
-from hybrid.model.resolution import Resolution, first_resolution
+from hybrid.model.resolution import Reach, Resolution, first_resolution
 from hybrid.outputs.probes import SIDED_ERRORS
 from hybrid.scene.schema import Scene
 from hybrid.simulation.restore import resolution_from, resolution_tree
@@ -36,6 +37,8 @@ MODEL_ERRORS, NOT_ESTIMATED = "errors/model/", "model error not estimated"
 # either side of ends and jumps, where errors change most from one point to the next.
 MOST_PLACES, BESIDE = 101, 2
 ALL = np.zeros(0, int)  # places that stand for all output points
+# Outputs of which positions are looked at together.
+ROWS = 200
 
 # What cells that follow the curvature count as at fineness 1; and the part of base cells that must have been halved.
 OF_FOLLOWING, FEWEST_HALVED = 1000, 0.1
@@ -80,6 +83,19 @@ class RunSample:
         forces = [np.asarray(self.values[x]) for x in END_FORCES if x in self.values]
         return max((float(np.linalg.norm(x, axis=1).max()) for x in forces), default=0.0)
 
+    def most(self, name: str) -> np.ndarray:
+        """The largest values (ns,) of an output over time."""
+        return np.asarray(np.asarray(self.values[name]).max(axis=0))
+
+    def largest(self, name: str) -> float:
+        """The largest value of an output, on either side of places where it has two."""
+        return max(float(np.max(self.most(x), initial=0.0)) for x in (name, f"right/{name}") if x in self.values)
+
+    @cached_property
+    def reach(self) -> Reach:
+        """How far the line moves."""
+        return reach_of(self.values["position"])
+
     def checkpoint(self) -> Tree:
         """All of it, as named arrays and plain values."""
         kept_fields = [x.name for x in fields(self) if x.name not in ("at_edges", "places")]
@@ -110,6 +126,16 @@ def at_all_points(errors: np.ndarray, places: np.ndarray) -> np.ndarray:
     points = np.arange(places[-1] + 1)
     after = np.searchsorted(places, points)
     return np.maximum(errors[:, after], errors[:, after - (places[after] != points)])
+
+
+def reach_of(position: Outputs) -> Reach:
+    """How far places (nt, ns, 3) move, m, and lie at first from the straight line between the first and the last."""
+    first = np.asarray(position[0:1])
+    parts = (np.asarray(position[k : k + ROWS]) - first for k in range(0, position.shape[0], ROWS))
+    moved = max(float(np.linalg.norm(x, axis=-1).max()) for x in parts)
+    apart, along = first[0] - first[0, 0], first[0, -1] - first[0, 0]
+    part = np.clip(apart @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
+    return Reach(moved, float(np.linalg.norm(apart - part[:, None] * along, axis=1).max()))
 
 
 def compared_cells(model: Model, fineness: float = 0.0, cells: float = np.inf) -> int:

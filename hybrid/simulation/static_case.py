@@ -109,7 +109,7 @@ class StaticCase:
                 raise
             return None
         values, _, _ = _values(model, found, self.observer(model, COMPARED, s))
-        run = {name: np.asarray(values[name])[None] for name in ("curvature", "tension")}
+        run = {name: np.asarray(values[name])[None] for name in ("position", "curvature", "tension")}
         return Survey.of(self.scene, resolution, model, s, run)
 
     def first_shape(self, resolution: Resolution) -> tuple[Model, State]:

@@ -168,7 +168,8 @@ class TradeTable(_Renamed):
             nearest = f"; {near.name} comes nearest, with {self.score(near):.3g} times this error" if near else ""
             return f"No run met {self.target}{nearest}{left}."
         cpu = best.cpu or 0.0
-        text = f"For {self.target} use model {best.model} with accuracy {best.asked}: {cpu:.3g} s of CPU time"
+        asked = f"{{position: {best.asked}, tension: {best.asked}}}" if best.asked.endswith("%") else best.asked
+        text = f"For {self.target} use model {best.model} with accuracy {asked}: {cpu:.3g} s of CPU time"
         rods = [r for r in self.choices if (r.code, r.model) == (OURS, "rod") and self.score(r) <= 1.0]
         rod = min(rods, key=lambda row: row.cpu or 0.0, default=None)
         if rod is not None and rod != best:

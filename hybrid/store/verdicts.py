@@ -102,11 +102,13 @@ class Asked(NamedTuple):
     verdict: str
     why: str = ""
     remedy: str = ""
+    beside: str = ""  # what is not asked, although its error is large
 
     @property
     def text(self) -> str:
         """The verdict in words."""
-        return not_verified(self.why, self.remedy) if self.verdict == NOT_VERIFIED else self.verdict
+        found = not_verified(self.why, self.remedy) if self.verdict == NOT_VERIFIED else self.verdict
+        return f"{found}; {self.beside}" if self.beside else found
 
 
 class Verdicts(NamedTuple):
@@ -151,14 +153,16 @@ def quantity_limits(result: Result) -> list[Held]:
 def asked_accuracy(result: Result) -> list[Asked]:
     """The accuracy that was asked for, of a line of several by quantity; empty where none was."""
     each = json.loads(str(result.attributes.get("accuracy_verdicts", "[]")))
+    beside = str(result.attributes.get("accuracy_not_asked", ""))
     if each:
-        return [_asked(result, x["quantity"], x["unit"], x["asked"], x["error"], x["met"] is not False) for x in each]
+        of = [_asked(result, x["quantity"], x["unit"], x["asked"], x["error"], x["met"] is not False) for x in each]
+        return [*of[:-1], of[-1]._replace(beside=beside)]
     if "accuracy_asked" not in result.attributes:
         return []
     kinds = {event.kind for event in result.events}
     known = result.attributes.get("error_total_position")
     text = str(result.attributes["accuracy_asked"])
-    return [_asked(result, text, "", None, known, "accuracy missed" not in kinds)]
+    return [_asked(result, text, "", None, known, "accuracy missed" not in kinds)._replace(beside=beside)]
 
 
 def doubt_of(result: Result, *names: str, s: Iterable[float] = ()) -> Doubt | None:

@@ -16,6 +16,7 @@ from typing import Any, get_args
 import numpy as np
 
 from hybrid.errors import Complaint, ComputationError, ResultError, SceneError
+from hybrid.scene.accuracy import of_length
 from hybrid.scene.analysis import LEAST_DAMPED
 from hybrid.scene.base import Kinds
 from hybrid.scene.read import scene_text, validate_scene
@@ -70,7 +71,10 @@ def model_kinds() -> tuple[str, ...]:
 
 
 def scene_data(scene: Scene, kind: str, accuracy: str | Mapping[str, str]) -> dict[str, Any]:
-    """The scene with this model at this accuracy, and without keys that set the resolution; as data."""
+    """The scene with this model at this accuracy, and without keys that set the resolution; as data.
+
+    A part is one of the length and of the end forces, by which runs are compared.
+    """
     data = scene.model_dump(mode="json", exclude_none=True)
     for name in ("mesh", "solver"):
         data.pop(name, None)
@@ -87,7 +91,7 @@ def scene_data(scene: Scene, kind: str, accuracy: str | Mapping[str, str]) -> di
     kept = {name: value for name, value in given.items() if name not in FINENESS}
     if "zones" in kept:
         kept["zones"] = [{k: x for k, x in zone.items() if k not in ("cells", "ratio")} for zone in kept["zones"]]
-    asked = accuracy if isinstance(accuracy, str) else dict(accuracy)
+    asked = of_length(accuracy) if isinstance(accuracy, str) else dict(accuracy)
     return data | {"model": {"kind": kind} | kept, "accuracy": asked}
 
 

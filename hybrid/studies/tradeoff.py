@@ -174,7 +174,7 @@ def _asked(scene: Scene, accuracy: str, where: str) -> RequestedAccuracy:
         found = requested_accuracy(validate_scene(scene_data(scene, scene.model.kind, accuracy)))
     except SceneError as error:
         bad = [c for c in error.complaints if c.where.startswith("accuracy")] or error.complaints
-        raise SceneError([replace(c, where=where, line=None, column=None) for c in bad]) from None
+        raise SceneError([replace(c, where=where, line=None, column=None) for c in bad[:1]]) from None
     assert found is not None
     return found
 

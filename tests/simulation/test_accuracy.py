@@ -533,7 +533,7 @@ def test_what_the_file_holds():
     assert result.units["errors/total/position"] == "m"
     assert result.dims("errors/total/tension") == ("t", "s")
     assert result.errors["total/position"].max() == result.attributes["error_total_position"]
-    assert "0.06 m" in result.attributes["accuracy_asked"]
+    assert "0.01 m of position (half the diameter; 3 % of 0.2 m moved is less)" in result.attributes["accuracy_asked"]
     assert result.at(t=3.0, s=1.0)["errors/total/position"] > 0.0
 
 

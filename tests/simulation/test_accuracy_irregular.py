@@ -354,9 +354,9 @@ def test_an_irregular_sea(tmp_path):
 
 def test_instant_in_a_scene():
     asked = hybrid.validate_scene(SEA | {"accuracy": {"instant": "2%"}}).accuracy
-    assert (asked.position, asked.tension, asked.instant) == ("2%", "2%", "2%")
+    assert (asked.all, asked.position, asked.tension, asked.instant) == ("2%", None, None, "2%")
     asked = hybrid.validate_scene(SEA | {"accuracy": {"position": "3 cm", "instant": "2%"}}).accuracy
-    assert (asked.position, asked.tension) == ("3 cm", "2%")
+    assert (asked.all, asked.position, asked.tension) == ("2%", "3 cm", None)
     with pytest.raises(hybrid.SceneError, match="instant"):
         hybrid.validate_scene(SEA | {"accuracy": {"instant": 2}})
 

@@ -55,7 +55,7 @@ def tether(model, accuracy):
 def test_zones_of_a_coarser_run_do_not_hide_what_those_of_the_result_leave_out():
     """The runs to compare with are all rod, the result is not: 0.26 where their model error was believed."""
     truth = hybrid.run(tether("rod", "0.1%"))
-    result = hybrid.run(tether({"kind": "adaptive", "always_move": True}, "2%"))
+    result = hybrid.run(tether({"kind": "adaptive", "always_move": True}, {"position": "2%", "tension": "2%"}))
     kinds = {zone.kind for row in result.zones for zone in row}
     assert kinds == {"rod", "catenary"}
     assert SHARP[0] <= effectivity(result, truth) <= SHARP[1]
@@ -258,7 +258,7 @@ def test_cells_to_a_layer():
     }  # fmt: skip
     layer = np.sqrt(EI / T)
     for cells in (2.0, 8.0):
-        for more in ({}, {"accuracy": "1%"}):
+        for more in ({}, {"accuracy": {"all": "1%", "curvature": "none"}}):
             result = hybrid.static(scene | {"resolution": {"cells_per_layer": cells}} | more)
             first = int((result.mesh[0].s <= layer).sum()) - 1
             assert 0.7 * cells <= first <= 1.5 * cells + 1, (cells, more)

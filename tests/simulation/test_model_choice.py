@@ -52,9 +52,10 @@ def test_rods_where_catenaries_are_no_choice():
 
 @pytest.mark.parametrize("free", [{}, {"model": "adaptive"}], ids=["no model", "adaptive"])
 def test_rods_are_the_same_as_asked_for(tmp_path, free):
-    """The pre-run is that of rods: the result has the same bits."""
+    """The pre-run is that of rods: the result has the same bits; a rod that is named asks for curvature as well."""
     hybrid.run(CLAMPED | free, tmp_path / "free.h5").close()
-    hybrid.run(CLAMPED | {"model": "rod"}, tmp_path / "rod.h5").close()
+    asked = {"accuracy": {"all": "1%", "curvature": "none"}}
+    hybrid.run(CLAMPED | {"model": "rod"} | asked, tmp_path / "rod.h5").close()
     found = differences(tmp_path / "free.h5", tmp_path / "rod.h5")
     assert found and all("event" in x or "scene" in x for x in found), found
 
@@ -128,7 +129,7 @@ def test_zones_that_move_have_the_cells_of_rods_where_curvature_is_not_asked():
         case = Case(scene, None)
         return build(scene, model_choice.surveyed(case, first_resolution(scene)))
 
-    rods, moving = (layout(model, "1%") for model in ("rod", MOVING))
+    rods, moving = (layout(model, {"all": "1%", "curvature": "none"}) for model in ("rod", MOVING))
     assert moving.layout.parts.max() == 1 and moving.cells == rods.cells
     exact = layout(MOVING, {"position": "1%", "tension": "1%", "curvature": "5%"})
     assert exact.cells > 2 * rods.cells

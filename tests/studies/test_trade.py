@@ -95,7 +95,7 @@ def test_the_cheapest_that_meets_what_is_asked_is_recommended() -> None:
     assert found.recommended == cheap
     assert found.front() == [rough, cheap, dear]
     said = found.recommendation
-    assert said.startswith("For 1% use model catenary with accuracy 1%: 0.5 s of CPU time")
+    assert said.startswith("For 1% use model catenary with accuracy {position: 1%, tension: 1%}: 0.5 s of CPU time")
     assert "4 times less than a rod everywhere" in said and "0.9 m and 9 N" in said
 
 
