@@ -407,8 +407,8 @@ def first_resolution(scene: Scene) -> Resolution:
 def for_motion(resolution: Resolution, scene: Scene, reach: Reach) -> Resolution:
     """As fine as a part of what moves asks for at first, where a pre-run has shown how far the line does."""
     want = requested_accuracy(scene)
-    if want is None or want.of_motion is None:
-        return resolution
+    if want is None or want.of_motion is None or reach.size(want.least)[0] < want.least:
+        return resolution  # a line that lies straight and does not move shows its place on any cells
     position, fineness, local = want.sized(reach).position, resolution.fineness, resolution.local
     assert position is not None
     if mesh_is_free(scene) and scene.resolution is None:  # which says what the first result has

@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.cli.plan_tables import plan_lines
 from hybrid.model.model_costs import with_model
-from hybrid.model.resolution import Resolution, requested_accuracy
+from hybrid.model.resolution import Reach, Resolution, first_resolution, for_motion, requested_accuracy
 from hybrid.scene.read import as_scene_or_system, parse_scene, scene_text
 from hybrid.simulation.errors_by_cause import Errors
 from hybrid.simulation.refinement import asked_text, bounds_of, judge, not_asked_text
@@ -81,6 +81,16 @@ def test_position_of_an_equilibrium_is_a_part_of_its_sag() -> None:
         found.resolution, {**found.values, "position": np.asarray(found.values["position"])[..., [2, 1, 0]]}, 1, 1, 0.0
     )
     assert sizes(scene(), upright)["position"] == pytest.approx(0.02 * 5.0)
+
+
+def test_the_first_result_begins_as_fine_as_the_pre_run_shows() -> None:
+    """Where the line moves by a hundredth of its length; not where it lies straight, nor where a length is asked."""
+    bare, first = scene(), first_resolution(scene())
+    finer = for_motion(first, bare, Reach(1.1, 5.0))
+    assert first.local is not None and finer.local is not None
+    assert finer.fineness > first.fineness and finer.local <= 0.05 * 0.022
+    assert for_motion(first, bare, Reach(0.0, 0.4 * DIAMETER)) == first
+    assert for_motion(first, scene({"position": "1 m"}), Reach(5.0, 5.0)) == first
 
 
 def test_what_is_named_takes_precedence() -> None:
