@@ -1,0 +1,102 @@
+"""Equilibria of 123 power cables beside the catenaries between the same ends, and beside OrcaFlex.
+
+    pytest bench/test_bench_power_cables.py -m bench -s -n 0
+
+The cables are those of the statics matrix of CableDyn 0.3.0 (https://github.com/SMI-Lab-Inha/CableDyn, Apache-2.0):
+lazy, steep and lazy S waves, hung lines, slopes, rough beds, currents, friction, clamps.  `power_cables.json` holds
+their data.  Each is computed as an engineer would: the data, and nothing else given.  The tension at the start is
+compared with the nearest catenary between the ends without bending (15 %, where sqrt(EI/T) is below a twentieth of the
+length), or with the value of OrcaFlex (1 %).  Twins agree with what they are twins of: moved or turned to 1e-6, on a
+finer mesh to 0.5 %, at rest in time to 1e-5.  A line that is too long for its span, or compressed, is refused or said.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import ComputationError
+
+pytestmark = pytest.mark.bench
+DATA = Path(__file__).with_name("power_cables.json")
+ROOT, REFERENCE, SHORT = 0.15, 0.01, 0.05
+MOVED, FINER, AT_REST = 1e-6, 5e-3, 1e-5
+REST = {"duration": 1.0, "step": 0.05}
+PARENTS = ("twin_of", "mesh_of", "rest_of")
+
+
+class Answer(NamedTuple):
+    """Tension at the start (N; of a motion at all times), cells, events, refusal, CPU time (s)."""
+
+    tension: Any
+    cells: int
+    events: tuple[str, ...]
+    refused: str
+    cpu: float
+
+
+def rows() -> dict[str, dict[str, Any]]:
+    """The cases by id, each with all that it has from the case that it is a twin of."""
+    whole = dict[str, dict[str, Any]]()
+    given = {row["id"]: row for row in json.loads(DATA.read_text(encoding="utf-8"))["cases"]}
+
+    def of(name: str) -> dict[str, Any]:
+        row = given[name]
+        parent = next((row[key] for key in PARENTS if row.get(key)), None)
+        kept = {k: v for k, v in of(parent).items() if k not in (*PARENTS, "expect")} if parent else {}
+        return kept | row
+
+    for name in given:
+        whole[name] = of(name)
+    return whole
+
+
+def scene_of(row: dict[str, Any], cells: int | None = None) -> dict[str, Any]:
+    """The scene of a case; a bed of so many N/m per m^2 has that times the diameter per metre of cable."""
+    sections = []
+    for kind, length, _ in row["sections"]:
+        diameter, mass, EA, EI, drag_n, drag_t, added = row["types"][kind]
+        sections.append({
+            "length": length, "diameter": diameter, "mass": mass, "axial_stiffness": EA, "bending_stiffness": EI,
+            "drag": {"normal": drag_n, "tangential": drag_t}, "added_mass": {"normal": added},
+        })  # fmt: skip
+    ends = {}
+    for name, place, clamp in (("start", "start", "clamp_a"), ("end", "end", "clamp_b")):
+        ends[name] = {"kind": "pinned", "position": row[place]}
+        if row.get(clamp):
+            stiffness, tangent = row[clamp]
+            ends[name] |= {"kind": "clamped", "tangent": tangent}
+            ends[name] |= {} if stiffness is None else {"bend_stiffness": stiffness}
+    environment: dict[str, Any] = {
+        "gravity": 9.80665, "fluid": {"density": 1025.0, "surface": 0.0, "current": row.get("current", [0, 0, 0])},
+    }  # fmt: skip
+    bed = row["bed"]
+    if bed:
+        x, y, depth = bed.get("grid", (None, None, None))
+        environment["seabed"] = {
+            "z": 0.0 if x else -bed["depth"], "stiffness": bed["stiffness"] * sections[0]["diameter"],
+            **({"depths": {"x": x, "y": y, "depth": depth}} if x else {"slope": [bed.get("slope", 0.0), 0.0]}),
+            **({"friction": bed["friction"]} if bed.get("friction") else {}),
+        }  # fmt: skip
+    return {
+        "environment": environment, "cable": {"sections": sections}, "ends": ends, "initial": "equilibrium",
+        **({"mesh": {"cells": cells}} if cells else {}),
+        **({"time": REST} if row.get("rest_of") else {}),
+    }  # fmt: skip
+
+
+def answer_of(scene: dict[str, Any]) -> Answer:
+    begin = time.process_time()
+    try:
+        found = hybrid.run(scene, None) if "time" in scene else hybrid.static(scene)
+    except ComputationError as error:
+        return Answer(np.nan, 0, (), str(error).splitlines()[0], time.process_time() - begin)
+    cpu = time.process_time() - begin
+    tension = np.linalg.norm(found.reaction_start, axis=1)
+    return Answer(tension, found.mesh[0].s.size - 1, tuple(sorted({x.kind for x in found.events})), "", cpu)
