@@ -100,3 +100,60 @@ def answer_of(scene: dict[str, Any]) -> Answer:
     cpu = time.process_time() - begin
     tension = np.linalg.norm(found.reaction_start, axis=1)
     return Answer(tension, found.mesh[0].s.size - 1, tuple(sorted({x.kind for x in found.events})), "", cpu)
+
+
+def bound_of(row: dict[str, Any], tension: float) -> tuple[float, float]:
+    """How far a tension (N) is from what it is compared with, as a part of that, and how far it may be; nan: nothing."""
+    if row.get("reference"):
+        return abs(tension / row["reference"] - 1.0), REFERENCE
+    if row["roots"]:
+        off = min(abs(tension / root - 1.0) for root in row["roots"])
+        return off, ROOT if row["bending_length"] < SHORT else np.inf
+    return np.nan, np.inf
+
+
+def twin_bound(row: dict[str, Any]) -> tuple[str, float]:
+    """The case that a case is a twin of, and how far it may be from that; "": none.
+
+    A bed of depths may differ from a plane one, and friction is left out: they are as near.
+    """
+    for key, bound in zip(PARENTS, (MOVED, FINER, AT_REST), strict=True):
+        if row.get(key):
+            return row[key], bound
+    return "", np.inf
+
+
+def test_power_cables(capsys: pytest.CaptureFixture[str]) -> None:
+    cases, answers, lines, wrong = rows(), dict[str, Answer](), list[str](), list[str]()
+    admissible, solved, off_all, cpu, silent = 0, 0, list[float](), list[float](), list[str]()
+    for name, row in cases.items():
+        parent, bound = twin_bound(row)
+        cells = row["finer"] * answers[parent].cells if row.get("mesh_of") else None
+        if row.get("rest_of") and answers[parent].cells:
+            cells = answers[parent].cells
+        answer = answers[name] = answer_of(scene_of(row, cells))
+        tension = float(answer.tension[-1]) if answer.cells else np.nan
+        off, most = bound_of(row, tension)
+        apart = np.nan
+        if parent and answer.cells and answers[parent].cells:
+            apart = float(np.abs(answer.tension / answers[parent].tension[-1] - 1.0).max())
+        good = bool(answer.cells) and not off > most and not apart > bound
+        if row["expect"] in ("admissible", "fine_mesh"):  # the mesh of the deck is not that of ours
+            admissible, solved = admissible + 1, solved + good
+            if not good:
+                wrong.append(name)
+        elif answer.cells and not answer.events:
+            silent.append(name)
+        cpu.append(answer.cpu)
+        if row["roots"] and row["bending_length"] < SHORT and answer.cells:
+            off_all.append(off)
+        said = answer.refused or ", ".join(answer.events)
+        lines.append(f"{name:20s} {row['expect'][:12]:12s} {tension:12.1f} N {100 * off:7.2f} % "
+                     f"twin {apart:8.1e} {answer.cells:5d} cells {answer.cpu:6.2f} s  {said}")  # fmt: skip
+    with capsys.disabled():
+        print("\n" + "\n".join(lines))
+        print(f"{len(cases)} cases: {solved} of {admissible} admissible solved within the bounds; "
+              f"{np.median(off_all) * 100:.2f} % off in the median, {max(off_all) * 100:.1f} % at most; "
+              f"CPU {np.median(cpu):.2f} s in the median, {max(cpu):.1f} s at most")  # fmt: skip
+        print(f"not within: {', '.join(wrong) or 'none'}; in compression without a word: {', '.join(silent) or 'none'}")
+    assert solved >= 0.9 * admissible
