@@ -15,7 +15,7 @@ from hybrid.simulation.refinement import times_the_cost
 from hybrid.simulation.run_sample import RunSample
 
 # s of processor time of a cell in a step, and of an output and one of its points (bench/test_bench_plan.py).
-CELL, OUTPUT, POINT = 1e-6, 0.15e-3, 1.3e-6
+CELL, OUTPUT, POINT = 1e-6, 0.06e-3, 0.6e-6
 # Of the steps of the first result, what the runs to compare with take, and, on average, the finer results.
 COMPARISONS, FINER = 0.9, 0.5
 # All may take so many times what was foretold; less than so much, in s, is not worth a result that misses.

@@ -21,9 +21,10 @@ from hybrid.model.contents import with_accuracy
 from hybrid.model.model_costs import NAMED
 from hybrid.model.plan import Plan, SystemPlan, count_steps, output_interval
 from hybrid.model.resolution import Resolution, first_resolution, requested_accuracy, wants_errors
+from hybrid.model.run_time import COST_STEP
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
-from hybrid.simulation.budget import COMPARISONS, FINER, LEAST, MOST_TIMES, OUTPUT, POINT
+from hybrid.simulation.budget import CELL, COMPARISONS, FINER, LEAST, MOST_TIMES, OUTPUT, POINT
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import OF_LINES, kernels_of
 from hybrid.simulation.model_choice import chosen_and_surveyed
@@ -41,6 +42,8 @@ ENOUGH_STEPS = 400
 MOST_CELLS = 4000
 # s of the file of a result, and of judging and writing errors (bench/test_bench_plan.py).
 FILE, JUDGING = 0.02, 0.1
+# How much dearer steps are, over a whole run, of a line that is to touch itself: expected, and at most.
+TOUCHING, MOST_TOUCHING = 2.5, 6.0
 # Results that an accuracy takes at most over the first, where its budget allows them: finer ones may follow it.
 MOST_FINER = 9.0
 
@@ -127,9 +130,10 @@ def _measured(scene: Scene, found: Plan) -> Plan:
     if cut and coarse is not None:
         survey *= duration / max(coarse.run.t, 1e-6 * duration)
     steps = _steps(scene, resolution, loop, coarse)
-    grows = 1.0 if found.payout is None else _or_one(found.payout.mean_cells / sum(found.cells))
-    motion = steps * grows * spent / max(loop.run.steps, 1)
+    motion = steps * _dearer(found) * spent / max(loop.run.steps, 1)
     seconds, most = _of_passes(scene, setup, motion, duration / output_interval(scene), found)
+    if scene.contact.self:  # by name: the first steps show nothing of it
+        seconds, most = seconds + (TOUCHING - 1.0) * motion, most + (MOST_TOUCHING - 1.0) * motion
     mesh = tables.mesh_of(build(case.scene, resolution))
     return replace(
         found, **mesh, contents=with_accuracy(found.contents, scene, case.reach),
@@ -138,8 +142,12 @@ def _measured(scene: Scene, found: Plan) -> Plan:
     )  # fmt: skip
 
 
-def _or_one(ratio: float) -> float:
-    return ratio if np.isfinite(ratio) else 1.0
+def _dearer(found: Plan) -> float:
+    """How much dearer a step is on average than the first ones, of a line that is paid out."""
+    if found.payout is None or not np.isfinite(found.payout.mean_cells):
+        return 1.0
+    first, mean = (COST_STEP + CELL * x for x in (sum(found.cells), found.payout.mean_cells))
+    return mean / first
 
 
 def _steps(scene: Scene, resolution: Resolution, loop: TimeLoop, coarse: TimeLoop | None) -> float:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import hybrid
+from hybrid.simulation import run_forecast
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -65,3 +66,19 @@ def test_first_steps_of_lines_are_measured_too() -> None:
 
 def test_steps_of_fixed_length_are_counted() -> None:
     assert hybrid.plan(scene("1%", "time={duration: 30, step: 0.25}")).steps == 120
+
+
+def test_a_line_that_is_to_touch_itself_is_planned_dearer() -> None:
+    """The first steps show nothing of the contact: expected and at most are apart."""
+    hybrid.run(hybrid.load_scene(EXAMPLES / "plectoneme.yaml", ["time.duration=0.1"])).close()  # what is compiled
+    touching = hybrid.plan(EXAMPLES / "plectoneme.yaml")
+    assert touching.measured and touching.most_seconds > 1.5 * touching.seconds
+    alone = hybrid.plan(hybrid.load_scene(EXAMPLES / "plectoneme.yaml", ["contact.self=false"]))
+    assert alone.measured and alone.most_seconds == alone.seconds
+
+
+def test_a_line_that_is_paid_out_from_few_cells_on() -> None:
+    """A step of ten cells is mostly what any step costs, so steps of 250 are not 25 times as dear: 8.8 s were said."""
+    found = hybrid.plan(EXAMPLES / "rov_descent.yaml", measure=False)
+    assert found.payout is not None and found.payout.mean_cells > 10 * sum(found.cells)
+    assert run_forecast._dearer(found) < 0.6 * found.payout.mean_cells / sum(found.cells)

@@ -13,7 +13,7 @@ from bits import differences
 import hybrid
 from hybrid.model.resolution import Resolution
 from hybrid.simulation import budget as module
-from hybrid.simulation.budget import Budget
+from hybrid.simulation.budget import OUTPUT, POINT, Budget
 from hybrid.simulation.run_sample import RunSample
 
 FIRST = Resolution(1.0, 0.1, 1e-3, 1e-3)
@@ -46,7 +46,7 @@ def test_short_runs_are_refined_whatever_it_takes_and_outputs_count() -> None:
     assert budget.allows([run(steps=100)], [FIRST.coarser(0.1, 0.1)])  # 100 times 11 ms
     many = Budget(1000, 1000)
     many.spend([run(steps=100)])
-    assert many.foretold == pytest.approx(1000 * (0.15e-3 + 1.3e-6 * 1000), rel=0.03)
+    assert many.foretold == pytest.approx(1000 * (OUTPUT + POINT * 1000), rel=0.05)
 
 
 def test_what_is_beyond_is_not_computed_and_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
