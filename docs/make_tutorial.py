@@ -71,11 +71,13 @@ Every key is checked. A word that is not known is refused, with what was probabl
     ("hybrid static tow.yaml --set cable.sections[0].diametre=0.03",),
     """## 5. The motion
 
-The ship heaves by 1 m every 8 s. `--set` changes a value for one run; you may as well write it into the file.
+The ship heaves by 1 m every 8 s, and positions within 10 cm and forces at the ends within 1 % are asked for.
+`--set` changes a value for one run; you may as well write it into the file.
 """,
     (
         'hybrid run tow.yaml --set "ends.start={kind: pinned, position: [0, 0, 0], '
-        'motion: {heave: {amplitude: 1.0, period: 8}, ramp: 16}}" --set "time={duration: 60}" --plot',
+        'motion: {heave: {amplitude: 1.0, period: 8}, ramp: 16}}" --set "time={duration: 60}" '
+        '--set "accuracy={position: 10 cm, tension: 1%}" --plot',
         "tow.png",
     ),
     """The closing lines are the answer in short: extremes with place and time, and what was written.

@@ -106,8 +106,10 @@ def test_the_figure_of_a_swayed_line_with_a_clump_is_not_too_small():
         },
         "initial": "equilibrium", "time": {"duration": 8.0066}, "output": {"every": 0.40033, "points": 201},
     }  # fmt: skip
-    truth = hybrid.run(scene | {"model": "rod", "accuracy": "0.1%"})
-    result = hybrid.run(scene | {"model": {"kind": "adaptive", "always_move": True}, "accuracy": "1%"})
+    truth = hybrid.run(scene | {"model": "rod", "accuracy": {"position": "0.1%", "tension": "0.1%"}})
+    result = hybrid.run(
+        scene | {"model": {"kind": "adaptive", "always_move": True}, "accuracy": {"position": "1%", "tension": "1%"}}
+    )
     assert SHARP[0] <= effectivity(result, truth) <= SHARP[1]
     assert "model error not estimated" in {event.kind for event in result.events}
     changes = np.array([event.t for event in result.events if event.kind in ("grow", "split")])
