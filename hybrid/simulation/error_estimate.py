@@ -311,18 +311,14 @@ class Estimate:
         finer: how many times as short steps are, and how many times as many cells there are.
         """
         by_step, by_mesh = self._keep()
-        if self.share_unknown or not (self.cancels and name in by_step and name in by_mesh):
+        if not (self.cancels and name in by_step and name in by_mesh) or self._mixes(name):
             return False
-        p, mixed = self.order[name], name in self.shares_mixed
+        p = self.order[name]
         times = times_foretold(name, p, change, [(by_step[name], shorter), (by_mesh[name], finer)])
-        if times is None or max(times) > (1.0 if mixed else EXCEEDED):
+        if times is None or max(times) > EXCEEDED:
             return False
         kept, part = by_mesh[name], max(*times, LEAST_PART)
-        if mixed:  # large parts that take off what the other adds were made of runs too coarse to show either
-            by_mesh[name] = 0.5 * change / (min(shorter, finer) ** p - 1.0)
-            by_step[name] = by_mesh[name].copy()  # the first output of the other may be renewed
-        else:
-            by_step[name], by_mesh[name] = part * by_step[name] / shorter**p, part * kept / finer**p
+        by_step[name], by_mesh[name] = part * by_step[name] / shorter**p, part * kept / finer**p
         self._renew_start(name, change, kept, finer)
         return True
 
