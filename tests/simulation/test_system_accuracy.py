@@ -115,8 +115,8 @@ def fails(*_: Any, **__: Any) -> None:
 @pytest.mark.parametrize(
     ("bends", "asked"),
     [
-        ({"model": "adaptive"}, {"accuracy": "1%"}),
-        ({"model": "catenary"}, {"accuracy": "2%"}),
+        ({"model": "adaptive"}, {"accuracy": {"position": "1%", "tension": "1%"}}),
+        ({"model": "catenary"}, {"accuracy": {"position": "2%", "tension": "2%"}}),
         ({"model": {"kind": "adaptive", "tolerance": 2e-3}}, {"time": {"duration": 4.0, "step": 0.025}}),
     ],
 )
