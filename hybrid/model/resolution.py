@@ -286,6 +286,17 @@ def shows_bends(scene: Scene) -> bool:
     return isinstance(scene.model, RodModel | AdaptiveModel)
 
 
+def judges_bends(scene: Scene) -> bool:
+    """Whether errors of its bend count: they are asked for, or nothing is and all are estimated."""
+    if not any(x.weakest_bending for x in scene.cable.sections) or not shows_bends(scene):
+        return False
+    asked = requested_accuracy(scene)
+    if asked is None:
+        return True
+    named = asked.asks("curvature") or asked.asks("bending_moment")
+    return named or any(x.quantity == "curvature" for x in asked.limits)
+
+
 def _limits(scene: Scene, finest: float) -> tuple[Limited, ...]:
     """The limits of sections that ask for an accuracy; finest: the finest part that the scene asks for."""
     given = {name for name in ("min_bend_radius", "max_tension") for x in scene.cable.sections if getattr(x, name)}

@@ -29,6 +29,7 @@ from hybrid.model.resolution import (
     Resolution,
     first_resolution,
     follows_curvature,
+    judges_bends,
     requested_accuracy,
     wants_errors,
 )
@@ -51,6 +52,7 @@ from hybrid.simulation.restore import program, refused, resolution_from, resolut
 from hybrid.simulation.result_checks import damped_vibrations
 from hybrid.simulation.result_file import STEP_FIELDS, mesh_fields, result_recorder
 from hybrid.simulation.run_sample import (
+    ALL,
     COMPARED,
     MODEL_ERRORS,
     NOT_ESTIMATED,
@@ -109,7 +111,8 @@ class Case:
         """
         self.scene, self.criterion, self.changes = scene, criterion, tuple(changes)
         self.points = points if points is not None else output_points(scene, longest_out(scene), not winch_side(scene))
-        self.places = compared_places(self.points)  # of these, where runs are compared
+        # Of these, where runs are compared: a bend may be sharp between a hundred places.
+        self.places = ALL if judges_bends(scene) else compared_places(self.points)
         self.progress = ProgressReporter(None, 1.0)
         self.interrupted: Callable[[], bool] = lambda: False
         self.beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept

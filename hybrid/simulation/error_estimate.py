@@ -149,10 +149,12 @@ class Estimate:
 
     def _shorter(self, fast: RunSample, slow: RunSample) -> float:
         """How many times as short the steps of a run mostly are as those of another."""
-        pair = id(fast), id(slow)
-        if pair not in self._ratios:
-            self._ratios[pair] = usual_ratio(fast, slow)
-        return self._ratios[pair]
+        for known_fast, known_slow, ratio in self._ratios:
+            if known_fast is fast and known_slow is slow:
+                return ratio
+        ratio = usual_ratio(fast, slow)
+        self._ratios.append((fast, slow, ratio))
+        return ratio
 
     def _shorter_for(self, fast: RunSample, slow: RunSample, name: str) -> float:
         """The same for what steps make of an output.
@@ -225,7 +227,7 @@ class Estimate:
     def _take(self, result: RunSample) -> Notes:
         """Take over a result, the model error that it knows of itself bounded if it is implausible: what to say."""
         self.run, self._errors = result, None
-        self._ratios: dict[tuple[int, int], float] = {}  # `usual_ratio` of runs that are compared from here on
+        self._ratios: list[tuple[RunSample, RunSample, float]] = []  # `usual_ratio` of runs compared from here on
         # Times as large as they were thought to be, by an order that is known now, are errors of the run before.
         self.revised: dict[str, float] = {}
         self._bound, doubt = bounded(result)
@@ -515,7 +517,7 @@ class Estimate:
         """An estimate from a checkpoint; shape, errors: as of `restored_sample`."""
         self = cls.__new__(cls)
         self.run, self.notes = restored_sample(tree["run"], scene, shape), restored_notes(tree["notes"])
-        self.revised, self._ratios = {}, {}
+        self.revised, self._ratios = {}, []
         self.order = matched(tree["order"], dict.fromkeys(tree["order"], 1.0), "order")
         at_start = tree.get("at_start", {})  # of checkpoints that have it
         self.at_start = matched(at_start, dict.fromkeys(at_start, 1.0), "order at the start")

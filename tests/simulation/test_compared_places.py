@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -59,6 +60,26 @@ def test_errors_are_at_all_output_points(tmp_path: Path, monkeypatch: pytest.Mon
                     np.testing.assert_array_equal(mine[:, places], its[:, places])
                 assert mine.max() == pytest.approx(its.max(), rel=0.02)
             assert some.names == all_.names
+
+
+@pytest.mark.parametrize(
+    ("more", "section", "everywhere"),
+    [
+        ({"accuracy": {"tension": "1%"}}, {}, False),
+        ({"accuracy": {"tension": "1%"}}, {"min_bend_radius": 0.1}, True),
+        ({"accuracy": {"curvature": "5%"}}, {}, True),
+        ({"accuracy": "1%", "model": "rod"}, {}, True),
+        ({"output": {"points": POINTS, "errors": True}}, {}, True),
+        ({"output": {"points": POINTS, "errors": True}, "model": "catenary"}, {}, False),
+    ],
+)
+def test_where_bends_are_judged_it_is_everywhere(
+    more: dict[str, Any], section: dict[str, Any], everywhere: bool
+) -> None:
+    """A bend of a long line lies between a hundred places."""
+    scene = described() | {"model": "adaptive", "output": {"points": POINTS}} | more
+    scene["cable"] = {"sections": [scene["cable"]["sections"][0] | {"bending_stiffness": 1e-3} | section]}
+    assert (Case(hybrid.validate_scene(scene), None).places.size == 0) == everywhere
 
 
 @pytest.mark.parametrize("name", [ESTIMATION, REFINEMENT])
