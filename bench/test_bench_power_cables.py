@@ -156,4 +156,4 @@ def test_power_cables(capsys: pytest.CaptureFixture[str]) -> None:
               f"{np.median(off_all) * 100:.2f} % off in the median, {max(off_all) * 100:.1f} % at most; "
               f"CPU {np.median(cpu):.2f} s in the median, {max(cpu):.1f} s at most")  # fmt: skip
         print(f"not within: {', '.join(wrong) or 'none'}; in compression without a word: {', '.join(silent) or 'none'}")
-    assert solved >= 0.9 * admissible
+    assert solved >= 0.97 * admissible
