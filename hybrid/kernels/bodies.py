@@ -206,8 +206,9 @@ def own_change(body, new, work, dr, turn, cv, ca):
 
 
 @inner
-def add_own(bodies, old, new, work, A, at, m, cv, ca):
+def add_own(system, at, m, cv, ca):
     """Forces of the bodies themselves into the equations A (m rows) of their places, from row `at` on."""
+    bodies, old, new, work, A = system.bodies, system.old, system.new, system.work, system.A
     for b in range(bodies.shape[0]):
         own_force(bodies[b], old[b], new[b], work[b])
         first = at + 6 * b

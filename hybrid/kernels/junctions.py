@@ -61,8 +61,10 @@ def count_tensions(joints):
 
 
 @inner
-def place_ends(l, job, joints, fairleads, seats, arms, gaps, points, old, new, work, given):
+def place_ends(l, job, system, given):
     """Arms of the fairleads of a line, frames that are carried, and how far its ends have still to go; given: those are."""
+    joints, seats, arms, gaps, points = system.joints, system.seats, system.arms, system.gaps, system.net.shape[0]
+    old, new, work, fairleads = system.old, system.new, system.work, system.fairleads
     for k in range(2):
         joint, node = joints[l, k], k * job.line.h.shape[0]
         if joint >= points:
@@ -112,13 +114,17 @@ def put_functional(f, low, high, joined, S, e):
 
 
 @inner
-def hand_over(l, job, joints, seats, first, columns, functional, gaps, answers, new, work, points, S, cv):
+def hand_over(l, job, system, cv):
     """What a line hands over: its rows and columns of S; cv: of this step (that in the job is being written)."""
+    joints, seats, columns, gaps, answers, S = (
+        system.joints, system.seats, system.columns, system.gaps, system.answers, system.S,
+    )  # fmt: skip
+    new, work, points = system.new, system.work, system.net.shape[0]
     for r in range(RIGHT):
         for c in range(HANDED):
             S[r, c] = 0.0
     start, end = joints[l, START], joints[l, END]
-    n, X_, o, f = job.line.h.shape[0], job.work.X, first[l], functional
+    n, X_, o, f = job.line.h.shape[0], job.work.X, system.first[l], system.functional
     starts, ends = turns(seats, l, START), turns(seats, l, END)
     low, high = used_columns(start >= 0, starts, ends)
     for k in range(2):
@@ -202,8 +208,10 @@ def add_row(S, r, part, A, e, m, tension, at, rows, size, G):
 
 
 @inner
-def spread(l, joints, seats, job, arms, points, tensions, row, S, G, A, m):
+def spread(l, job, system, tensions, row, m):
     """S of a line into the equations A of all tensions, points and bodies; row: of its tension, -1: none."""
+    joints, seats, arms, points = system.joints, system.seats, system.arms, system.net.shape[0]
+    S, G, A = system.S, system.G, system.A
     start, end, report, kb = joints[l, START], joints[l, END], job.work.report, job.line.kb
     rows0, size0, rows1, size1 = 0, 0, 0, 0
     if start >= 0:
@@ -260,14 +268,13 @@ def twist_ends(l, seats, job, at, A):
 
 
 @inner
-def assemble_junctions(
-    tables, joints, seats, arms, gaps, first, columns, functional, answers, net, bodies, old, new, work, S, G, A, m,
-    cv, ca, own,
-):  # fmt: skip
+def assemble_junctions(system, m, cv, ca, own):
     """Equations (m, m+1) of the last tensions, the points and the bodies, from what the lines hand over.
 
-    own: whether what bodies are out of balance by themselves is in the right-hand side.
+    system: a kernels.system.SystemJob, or what has the same of it; own: whether what bodies are out of balance by
+    themselves is in the right-hand side.
     """
+    tables, joints, net, A = system.tables, system.joints, system.net, system.A
     for r in range(m):
         for c in range(m + 1):
             A[r, c] = 0.0
@@ -277,13 +284,13 @@ def assemble_junctions(
         if start < 0 and end < 0:
             continue
         job = read(tables[l])
-        hand_over(l, job, joints, seats, first, columns, functional, gaps, answers, new, work, points, S, cv)
-        spread(l, joints, seats, job, arms, points, tensions, row if end >= 0 else -1, S, G, A, m)
+        hand_over(l, job, system, cv)
+        spread(l, job, system, tensions, row if end >= 0 else -1, m)
         if end >= 0:
             row += 1
     for r in range(m):
         A[m, r] = A[r, m]
-    add_own(bodies, old, new, work, A, first_unknown(points, tensions, points), m, cv, ca)
+    add_own(system, first_unknown(points, tensions, points), m, cv, ca)
     if not own:
         for r in range(m):
             A[r, m] = A[m, r]
@@ -307,11 +314,10 @@ def shift_of(joint, tensions, points, arm, gap, clamped, A, m, q, o):
 
 
 @inner
-def correct_all(tables, joints, seats, arms, gaps, first, columns, points, work, A, m, q):
-    """Corrections of all lines and bodies from the solution; returns -1, or a line whose correction is not finite.
-
-    q: (COLUMNS,), worked in.
-    """
+def correct_all(system, points, m):
+    """Corrections of all lines and bodies from the solution; returns -1, or a line whose correction is not finite."""
+    tables, joints, seats, arms, gaps = system.tables, system.joints, system.seats, system.arms, system.gaps
+    columns, work, A, q = system.columns, system.work, system.A, system.q
     row, tensions = 0, count_tensions(joints)
     for b in range(work.shape[0]):
         at = first_unknown(points + b, tensions, points)
@@ -330,6 +336,6 @@ def correct_all(tables, joints, seats, arms, gaps, first, columns, points, work,
             row += 1
         if start >= 0:
             place = shift_of(start, tensions, points, arms[l, START], gaps[l, START], starts, A, m, q, SHIFT)
-        if not solve_back(job.work.X, columns, first[l], low, high, q, start >= 0, place, x, end >= 0):
+        if not solve_back(job.work.X, columns, system.first[l], low, high, q, start >= 0, place, x, end >= 0):
             return l
     return -1

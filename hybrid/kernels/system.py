@@ -9,6 +9,10 @@ Symbols and stopping rule as in kernels.newton.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.kernels.accept import watch
 from hybrid.kernels.bodies import (
@@ -64,6 +68,7 @@ from hybrid.kernels.newton import (
     STEP,
     TURNED_TOO_FAR,
     WHOLE,
+    Limits,
     Task,
     ask_contact,
     follow_law,
@@ -75,7 +80,7 @@ from hybrid.kernels.newton import (
 )
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.powers import book_work, find_powers
-from hybrid.kernels.references import caller
+from hybrid.kernels.references import caller, reader
 from hybrid.kernels.report import (
     LOCAL_ERROR,
     RESIDUAL,
@@ -87,6 +92,7 @@ from hybrid.kernels.report import (
 )
 from hybrid.kernels.run import call_quantities, read
 from hybrid.kernels.seabed import stored
+from hybrid.kernels.state import Floats
 from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
 from hybrid.kernels.step_law import REFUSED
 
@@ -97,11 +103,14 @@ TASK_CV, TASK_CA, TASK_DT = Task._fields.index("cv"), Task._fields.index("ca"), 
 
 
 @inner
-def march_lines(solver, tables, joints, fairleads, seats, arms, gaps, given, net, old, new, work):
-    """March all lines; net (P, 3): force on each point, N, that on bodies in `work`.
+def march_lines(system, given):
+    """March all lines: force on each point into `net`, N, that on bodies into `work`; given: what ends have to go is.
 
     Returns -1 or a line that failed, and its bad node.
     """
+    tables, joints, seats, arms, net, work = (
+        system.tables, system.joints, system.seats, system.arms, system.net, system.work,
+    )  # fmt: skip
     for p in range(net.shape[0]):
         net[p, 0], net[p, 1], net[p, 2] = 0.0, 0.0, 0.0
     for b in range(work.shape[0]):
@@ -110,8 +119,8 @@ def march_lines(solver, tables, joints, fairleads, seats, arms, gaps, given, net
     for l in range(tables.shape[0]):
         job = read(tables[l])
         n = job.line.h.shape[0]
-        place_ends(l, job, joints, fairleads, seats, arms, gaps, net.shape[0], old, new, work, given)
-        outcome, _, _, where = call_solver(solver, tables[l])
+        place_ends(l, job, system, given)
+        outcome, _, _, where = call_solver(system.solver, tables[l])
         # the last block is not solved yet
         if outcome != OK and not (outcome == SINGULAR and joints[l, END] >= 0 and where == n):
             return l, where
@@ -324,58 +333,107 @@ def error_ratio(tables, allowed):
     """Largest error of the step over what is allowed of it, of all lines; reports are those of the step."""
     ratio = 0.0
     for l in range(tables.shape[0]):
-        ratio = max(ratio, read(tables[l]).work.report[LOCAL_ERROR] / allowed[l])
+        ratio = max(ratio, read(tables[l]).work.report[LOCAL_ERROR] / abs(allowed[l]))
     return ratio
 
 
 @inner
-def end_system_step(tables, joints, floors, allowed, old, new, work, task, s, t, solved):
+def end_system_step(system, task, s, t, solved):
     """Rates and books of a step that is `solved`; OK or why it is refused, with its line (-1: a body) and cell.
 
     A step whose error is too large (kernels.step_law) is none for the books: whoever asked for it takes it back; where
     `allowed` is negative, whoever keeps it books it (book_system_step).
     """
-    line, turn, cell = end_lines(tables, joints, floors, s, task, solved)
-    turned = end_bodies(old, new, work, s)
+    tables, allowed, work = system.tables, system.allowed, system.work
+    line, turn, cell = end_lines(tables, system.joints, system.floors, s, task, solved)
+    turned = end_bodies(system.old, system.new, work, s)
     if line >= 0:
         return (TURNED_TOO_FAR if turn > 0.0 else SLACK), line, cell
     if solved and not turned < LARGEST_STEP_TURN:
         return TURNED_TOO_FAR, -1, -1
     if solved and allowed[0] >= 0.0 and not error_ratio(tables, allowed) > REFUSED:
-        keep_books(tables, joints, task.dt, t)
+        keep_books(tables, system.joints, task.dt, t)
         book_bodies(work, task.dt)
     return OK, -1, -1
 
 
-@kernel
-def book_system_step(tables, joints, work, dt, t):
-    """Books of a step of dt (s) to t (s) that was solved and is kept; arguments as of `solve_system`."""
-    keep_books(tables, joints, dt, t)
-    book_bodies(work, dt)
+class SystemJob(NamedTuple):
+    """Arguments of the entries: the lines, points and bodies of a system, and room.
+
+    P points, B bodies, L lines; m tensions of last cells and coordinates of points and bodies.
+    """
+
+    asked: Floats  # (ASKED,) the task: below
+    tables: NDArray[np.int64]  # (L, ..) jobs of the lines (kernels.run), their task ASSEMBLY
+    numbers: Floats  # the same memory
+    joints: NDArray[np.int64]  # (L, 2) points, then bodies, that start and end are joined to, -1 where they are held
+    fairleads: Floats  # (L, 2, 3) m of ends at bodies, in their axes
+    seats: Floats  # (L, 2, SEAT) frames of ends that turn with bodies (kernels.carried_frames)
+    arms: Floats  # (L, 2, 3) m, worked in
+    gaps: Floats  # (L, 2, 3) m that ends at bodies have still to go; given for a CORRECTION, else worked in
+    floors: Floats  # (L,) N, tension at or below which a catenary cell is slack
+    allowed: Floats  # (L,) m, error of a step, beyond REFUSED times of which it is not booked; negative: no step is
+    first: NDArray[np.int64]  # (L,) where columns of a line begin that carries some
+    columns: Floats  # (3, .., 5), or (COLUMNS, .., 5) where an end turns
+    functional: Floats  # (FUNCTIONAL,) worked in, as what follows
+    answers: Floats  # (2, ANSWER)
+    q: Floats  # (COLUMNS,)
+    net: Floats  # (P, 3) on return what does not balance at the points, N
+    bodies: Floats  # (B, NUMBERS ..) what bodies are (kernels.bodies)
+    old: Floats  # (B, STATE) of bodies
+    new: Floats  # (B, STATE)
+    work: Floats  # (B, WORK)
+    S: Floats  # (HANDED - 1, HANDED)
+    G: Floats  # (2, 6, 6)
+    A: Floats  # (m+3, m+1)
+    touch_table: NDArray[np.int64]  # of kernels.system_contact.touch_system
+    solver: int = 0  # address of the kernel that marches a line
+    touch: int = 0  # of touch_system; 0: no line touches itself
+
+
+# Numbers of `asked`: of the task (kernels.newton.Task), and the time of the new states, s.
+(WHAT, DT, BEFORE, RHO_OF_STEP, CV, CA, REACH, SCALE, MOST, RHO_OF_LAST, FIXED, TIME) = range(12)
+ASKED = 12
+
+
+def blank_system_job() -> SystemJob:
+    """A job with the types that every one has."""
+    z, one, two = np.zeros, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
+    return SystemJob(
+        z(ASKED), two, z((1, 1)), two, z((1, 2, 3)), z((1, 2, 1)), z((1, 2, 3)), z((1, 2, 3)), z(1), z(1), one,
+        z((1, 1, 1)), z(1), z((2, 1)), z(1), z((1, 3)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)),
+        z((2, 6, 6)), z((1, 1)), one,
+    )  # fmt: skip
+
+
+read_system = reader(blank_system_job())
 
 
 @kernel
-def solve_system(
-    task, t, solver, tables, numbers, joints, fairleads, seats, arms, gaps, floors, allowed, first, columns, functional,
-    answers, q, net, bodies, old, new, work, S, G, A, touch, touch_table,
-):  # fmt: skip
-    """Do a task (kernels.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a system.
+def book_system_step(table):
+    """Books of the step that was solved last, and is kept."""
+    system = read_system(table)
+    dt, t = system.asked[DT], system.asked[TIME]
+    keep_books(system.tables, system.joints, dt, t)
+    book_bodies(system.work, dt)
+
+
+@kernel
+def solve_system(table):
+    """Do a task (kernels.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a system (SystemJob).
 
     JUNCTIONS: leave in A the equations of the tensions, points and bodies, with all else eliminated.
-
-    t: s, of the new states, for the books; tables: (L, ..) jobs of the lines, their task ASSEMBLY; numbers: the same
-    memory as float64; joints: (L, 2) points, then bodies, that start and end are joined to, -1 where they are held;
-    fairleads: (L, 2, 3) m of ends at bodies, in their axes; seats: (L, 2, SEAT) frames of ends that turn with bodies
-    (kernels.carried_frames); gaps: (L, 2, 3) m that ends at bodies have still to go, given for a CORRECTION, else worked
-    in as arms (L, 2, 3); floors: (L,) N, tension at or below which a catenary cell is slack; allowed: (L,) m, error of a
-    step, beyond REFUSED times of which it is not booked, negative: no step is; first: (L,) where columns (3, .., 5), or
-    (COLUMNS, .., 5) where an end turns, of a line begin that carries some; bodies, old, new, work: rows of numbers of
-    each body (kernels.bodies); functional: (FUNCTIONAL,), answers: (2, ANSWER), q: (COLUMNS,), net: (P, 3),
-    S: (HANDED - 1, HANDED), G: (2, 6, 6) and A: (m+3, m+1), m tensions and coordinates, are worked in; touch: address
-    of kernels.system_contact.touch_system and its table, 0: no line touches itself.
-    On return `net` is what does not balance at the points, N.
     Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.
     """
+    system = read_system(table)
+    asked, tables, numbers, joints = system.asked, system.tables, system.numbers, system.joints
+    net, bodies, old, new, work, A = system.net, system.bodies, system.old, system.new, system.work, system.A
+    touch, t = system.touch, asked[TIME]
+    limits = Limits(asked[REACH], asked[SCALE], int(asked[MOST]))
+    task = Task(
+        int(asked[WHAT]), asked[DT], asked[BEFORE], asked[RHO_OF_STEP], asked[CV], asked[CA], False, limits, False,
+        asked[RHO_OF_LAST], asked[FIXED] != 0.0,
+    )  # fmt: skip
     m, most, count, points = A.shape[1] - 1, task.limits.most, tables.shape[0], net.shape[0]
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
@@ -405,7 +463,7 @@ def solve_system(
     while it < most and outcome == NOT_CONVERGED:
         it += 1
         given = task.what == CORRECTION
-        line, where = march_lines(solver, tables, joints, fairleads, seats, arms, gaps, given, net, old, new, work)
+        line, where = march_lines(system, given)
         if line >= 0:
             outcome = SINGULAR
             if not read(tables[line]).work.report[RESIDUAL] < math.inf:
@@ -416,10 +474,7 @@ def solve_system(
                 own_force(bodies[b], old[b], new[b], work[b])
             outcome = OK
             break
-        assemble_junctions(
-            tables, joints, seats, arms, gaps, first, columns, functional, answers, net, bodies, old, new, work, S, G,
-            A, m, s.cv, s.ca, True,
-        )  # fmt: skip
+        assemble_junctions(system, m, s.cv, s.ca, True)
         if task.what == JUNCTIONS:
             outcome = OK
             break
@@ -428,13 +483,13 @@ def solve_system(
         if m > 0 and not solve_dense(A, m):
             outcome = SINGULAR
             break
-        line = correct_all(tables, joints, seats, arms, gaps, first, columns, points, work, A, m, q)
+        line = correct_all(system, points, m)
         if line >= 0:
             bad = read(tables[line])
             outcome, where = NOT_FINITE, first_bad(bad.work.x, bad.new.e)
             break
         correct_torques(tables, s.cv)
-        if touch != 0 and call_touch(touch, touch_table) == 0:
+        if touch != 0 and call_touch(touch, system.touch_table) == 0:
             before = math.inf
             break
         if task.what == CORRECTION:
@@ -463,9 +518,7 @@ def solve_system(
     if task.what == STEP or task.what == EQUILIBRIUM:
         follow_laws(tables, s)
     if task.what == STEP:
-        bad, line_of_bad, cell = end_system_step(
-            tables, joints, floors, allowed, old, new, work, task, s, t, outcome == OK
-        )
+        bad, line_of_bad, cell = end_system_step(system, task, s, t, outcome == OK)
         if bad != OK:
             outcome, line, where = bad, line_of_bad, cell
     if task.what == ASSEMBLY and outcome == OK:

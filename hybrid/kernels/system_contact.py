@@ -122,19 +122,10 @@ def respond(job, cv, ca, with_gradient):
             if touches:
                 find_forces(line_job.line, contact, with_gradient)
         set_right_side(l, line_job, contact, job.joints, touches)
-    assemble_junctions(
-        job.tables, job.joints, job.seats, job.arms, job.gaps, job.first, job.columns, job.functional, job.answers,
-        job.net, job.bodies, job.old, job.new, job.work, job.S, job.G, job.A, m, cv, ca, False,
-    )  # fmt: skip
+    assemble_junctions(job, m, cv, ca, False)
     if m > 0 and not solve_dense(job.A, m):
         return False
-    return (
-        correct_all(
-            job.tables, job.joints, job.seats, job.arms, job.gaps, job.first, job.columns, job.net.shape[0], job.work,
-            job.A, m, job.q,
-        )
-        < 0
-    )  # fmt: skip
+    return correct_all(job, job.net.shape[0], m) < 0
 
 
 @inner

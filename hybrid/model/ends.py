@@ -234,6 +234,14 @@ class EndConditions:
             self._moves = self._as_moves()
         return self._moves
 
+    def moves_from_here(self) -> Moves:
+        """The same for ends whose frames have been settled since, as those of lines that are clamped at points are."""
+        moves, frame = self.moves(), self._given[0].copy()
+        for k in (0, 1):
+            if k not in self.motions and k not in self._turns:
+                frame[k] = self.values.frame[k]
+        return moves._replace(frame=frame)
+
     def drive(self, k: int) -> DrivenEnd:
         """From now on end k is set from outside; its motion, if it has one, is over."""
         values = self.values

@@ -27,7 +27,7 @@ OUTPUTS, ZONES = "observed_outputs.observe_outputs", "zone_step.follow_zones"
 MODEL_ERROR = "bending_error.advance_error"
 PAYOUT = "payout_run.go_on"
 STEPS = "run.run"  # around the solver of either kind
-OF_LINES = ("system.solve_system", SOLVER[1], OUTPUTS)  # of several lines
+OF_LINES = ("system.solve_system", SOLVER[1], "system_run.run_system", OUTPUTS)  # of several lines
 STABILITY = "out_of_plane.wrong_pivots_at_rest"
 
 # A cable for the second process to compile with; nothing is computed of it.

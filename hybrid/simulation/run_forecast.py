@@ -212,7 +212,7 @@ def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
         return found  # the run will say why
     spent, setup = clock.process_time() - begun, begun - begin
     steps = float(run.steps) if run.t >= time.duration else float(found.steps)
-    if run.control is not None:
+    if run.loop.controlled:
         steps = run.steps * time.duration / max(run.t, 1e-9 * time.duration)
     motion = steps * spent / max(run.steps, 1)
     scenes = {name: system.scene_of(name) for name in system.lines}

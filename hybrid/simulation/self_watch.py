@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -276,12 +277,14 @@ class SelfWatch:
 
 
 class LineWatch:
-    """Watches a line whose states are handed over one by one, as those of several lines are."""
+    """Watches one of several lines, in the steps of their run and in states that are handed over."""
 
     def __init__(self, watch: SelfWatch, model: Model) -> None:
         """watch: what is known of the line so far, which goes on on the cells of `model`."""
         self._watch, self._model = watch, model
         self._job: Table | None = None
+        self._running: Table | None = None  # of the steps of a run
+        self._address, self.is_bent = 0, False
         if watch.on:
             watch.renew(model)
 
@@ -296,19 +299,48 @@ class LineWatch:
         )  # fmt: skip
         return job
 
-    def look(self, t: float, dt: float, state: State, before: Floats, event: Callable[..., None]) -> int:
-        """An event if surfaces have met in the step of dt (s) to t (s), from positions (N+1, 3) m to a state, or a bend
+    def attach(self, states: tuple[State, State], clock: Floats, counts: np.ndarray) -> dict[str, Any]:
+        """What the job of a line is to have so that its steps, between two states in turn, look by themselves.
 
-        hides it; NEARS where the line is so near itself, in place of an event, that its contact has to begin, PARTS
-        where it may end.
+        clock, counts: of the run (kernels.books).
         """
         if not self._watch.on:
+            return {"itself": 0}
+        job = Table(blank_itself_job)
+        model = self._model
+        job.bind(
+            line=model.line, ends=model.ends.values, old=states[0], new=states[1], clock=clock, counts=counts,
+            itself=self._watch.itself,
+        )  # fmt: skip
+        self._running = job
+        if self.is_bent:
+            self._address = watch_itself.address(job.numbers)
+        return {"itself": self._address if self.is_bent else UNBENT, "itself_table": job.numbers}
+
+    def bends(self) -> tuple[int, dict[str, Any]]:
+        """A line of a run is bent, so that every step looks from now on: bits of the last, and its job."""
+        self.is_bent, job = True, self._running
+        assert job is not None
+        self._address = watch_itself.address(job.numbers)
+        return int(watch_itself(job.numbers)), {"itself": self._address}
+
+    def look(self, t: float, state: State, event: Callable[..., None]) -> int:
+        """As `tell`, of a state at t (s) from which no step has been made."""
+        watch = self._watch
+        if not watch.on:
             return 0
+        if not is_bent(state) and watch.itself.ahead[ASKED] != WIDER:
+            watch.itself.found[TOLD] = 0.0
+            return 0
+        return self.tell(self._look(t, state, state.r), t, 0.0, state, event)
+
+    def tell(self, found: int, t: float, dt: float, state: State, event: Callable[..., None]) -> int:
+        """An event if surfaces have met in the step of dt (s) to a state at t (s), or a bend hides it, by what a look
+
+        has `found`; NEARS where the line is so near itself, in place of an event, that its contact has to begin, PARTS
+        where it may end.
+        """
         told = self._watch.itself.found
-        if not is_bent(state) and self._watch.itself.ahead[ASKED] != WIDER:
-            told[TOLD] = 0.0
-            return 0
-        found = self._look(t, state, before)
         if found & HIDES:
             self._watch.tell_hidden(t, self._model, state, event)
         if found & NEARS:

@@ -36,7 +36,7 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
         "t": run.t, "steps": run.steps, "last": run.last_step, "rho": run.last_rho, "loaded": run.loaded,
         "leg": [*run.leg], "cpu": run.cpu, "dry": sorted(run.dry), "bodies": run.state.bodies, "body_work": body_work,
         "lines": lines, "broken": [*run.failures.broken], "rest": run.rest,
-        "control": run.control.checkpoint() if run.control is not None else [],
+        "control": run.loop.control(),
         "quantities": run.quantities.checkpoint(), "rotations": run.rotations.last.copy(),
         "zones": run.zones.checkpoint() if run.zones is not None else {},
     }  # fmt: skip
@@ -118,11 +118,10 @@ def zones_of_today(zones: Any) -> Any:
 
 def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
     """Be as when `checkpoint` was called, of a run with the same things broken, without a look at its form."""
-    run.t, run.steps, run.last_step, run.loaded = found["t"], found["steps"], found["last"], found["loaded"]
-    run.last_rho = found["rho"]
+    run.stand_at(found["t"], found["steps"], found["last"], found["rho"])
+    run.loaded = found["loaded"]
     run.leg, run.dry, run.cpu = (found["leg"][0], found["leg"][1]), set(found["dry"]), found["cpu"]
-    if run.control is not None:
-        run.control.restore(found["control"])
+    run.loop.take_control(found["control"])
     run.state.bodies[:], run.solver.body_work[:, :SPRING] = found["bodies"], found["body_work"]
     run.quantities.restore(found["quantities"])
     run.rotations.last[:] = found["rotations"]

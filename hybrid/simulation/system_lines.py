@@ -12,9 +12,13 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.kernels.books import (
     FLAGS,
+    HIDES_ITSELF,
+    IS_BENT,
     JUMPED,
     LEAST_PEAK,
-    LOG,
+    MEETS_ITSELF,
+    NEARS_ITSELF,
+    PARTS_ITSELF,
     RELEASE_END,
     RELEASE_START,
     RHO,
@@ -27,9 +31,8 @@ from hybrid.kernels.carried_frames import TURNS
 from hybrid.kernels.entry import sharpest
 from hybrid.kernels.forces import FRICTION, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.link import holds_twist
-from hybrid.kernels.report import FORCE_A, LOCAL_ERROR
 from hybrid.kernels.run import blank_books
-from hybrid.kernels.self_distance import NEARS, PARTS
+from hybrid.kernels.self_distance import HIDES, MEETS, NEARS, PARTS
 from hybrid.kernels.state import Batch, Ends, Floats, State, Work, batch_of_one
 from hybrid.kernels.zone_criteria import twist_of_rods
 from hybrid.model.build import Model
@@ -47,9 +50,10 @@ from hybrid.simulation.result_file import result_recorder
 from hybrid.simulation.run_sample import COMPARED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
 from hybrid.simulation.time_loop import FORCE_COLUMNS
-from hybrid.solve.joined import JoinedLine, SystemTaken
+from hybrid.solve.joined import JoinedLine
 from hybrid.solve.run import no_extremes
 from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_flaws import slack_cell
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
@@ -60,6 +64,8 @@ from hybrid.store.writer import Recorder
 WAITING = 64
 # Of the length: ends that are so near to where they were have not been moved.
 SAME_PLACE = 1e-9
+# Flags of a step (kernels.books), and bits of kernels.self_distance.
+WATCHED = {MEETS_ITSELF: MEETS, NEARS_ITSELF: NEARS, PARTS_ITSELF: PARTS, HIDES_ITSELF: HIDES}
 # Turns of twist at rest, made by no moment, from which on it is said: searches by way of upright shapes have left 0.4.
 WOUND = 0.25
 
@@ -131,7 +137,7 @@ class LineResult:
         self.contact: SelfContact | None = None
         self._touching = model  # for whose cells that is
         self._waiting: list[Batch] = []
-        self._log: list[tuple[float, ...]] = []
+        self._log: list[Floats] = []
         if found is not None:
             self.diagnostics.begin()
 
@@ -212,7 +218,7 @@ class LineResult:
             where = f"{text}: begin nearer to rest (initial_guess, initial_rotation), unless it is meant"
             self.events.event(0.0, 0.0, self.model.length, "several equilibria", where)
         self.judge(t, sharpest(x.line, x.ends, state), state)
-        if self._itself.look(t or 0.0, 0.0, state, state.r, self.events.event) & NEARS:
+        if self._itself.look(t or 0.0, state, self.events.event) & NEARS:
             self.meets_itself(t or 0.0, 0.0)
 
     def is_near_itself(self, t: float, state: State, step: float) -> bool:
@@ -250,16 +256,23 @@ class LineResult:
 
     # --- steps and outputs --------------------------------------------------------------------------
 
-    def log(
-        self, t: float, dt: float, taken: SystemTaken, repeats: int, state: State, before: State, work: Work, cpu: float
-    ) -> None:
-        """Log a step of dt (s) that ended at t (s) in a state, after the one `before`."""
-        found = self._itself.look(t, dt, state, before.r, self.events.event)
+    def attach(self, solver: SystemSolver, states: tuple[State, State], clock: Floats, counts: np.ndarray) -> None:
+        """Steps of a solver go on with the line, between two states in turn; clock, counts: of the run."""
+        solver.bind_line(self.number, **self._itself.attach(states, clock, counts))
+
+    def log(self, rows: Floats) -> None:
+        """Log steps (n, len(LOG) + 1), the last column the time of the processor, s."""
+        self._log.append(rows)
+
+    def look_at_itself(self, solver: SystemSolver, seen: int, t: float, dt: float, state: State) -> None:
+        """What the step of dt (s) to t (s) has seen (bits of kernels.books) of how near the line is to itself."""
+        if seen & IS_BENT:
+            found, bound = self._itself.bends()
+            solver.bind_line(self.number, **bound)
+        else:
+            found = sum(bit for flag, bit in WATCHED.items() if seen & flag)
+        found = self._itself.tell(found, t, dt, state, self.events.event)
         self.nears_itself, self.parts_itself = bool(found & NEARS), bool(found & PARTS)
-        forces = work.report[FORCE_A : FORCE_A + 6]
-        pulls = float(np.linalg.norm(forces[:3])), float(np.linalg.norm(forces[3:]))
-        error = float(work.report[LOCAL_ERROR])
-        self._log.append((t, dt, taken.iterations, taken.correction, taken.residual, repeats, error, *pulls, cpu))
 
     def watch(self, step: LineStep) -> None:
         """Look at what a step has flagged; the stretch of a run to compare with is not its matter.
@@ -292,8 +305,7 @@ class LineResult:
     def write_down(self) -> None:
         """Record the outputs that wait.  LineFailed where going on would make no sense."""
         if self._log:
-            assert len(self._log[0]) == len(LOG) + 1
-            self.recorder.log_rows(np.array(self._log))
+            self.recorder.log_rows(np.concatenate(self._log))
             self._log.clear()
         if not self._waiting:
             return
@@ -315,11 +327,11 @@ class LineResult:
         """Look at a state for what its mesh does not resolve (an event) and for strain beyond what a section bears."""
         self._stop_if(self.diagnostics.stretch(state) or self.diagnostics.shape(t or 0.0, sharp, state), t, state)
 
-    def waiting(self) -> tuple[list[Batch], list[tuple[float, ...]], float | None]:
+    def waiting(self) -> tuple[list[Batch], list[Floats], float | None]:
         """Outputs and steps that wait, and the energy that the balance counts from (J), to come back to."""
         return [*self._waiting], [*self._log], self.observer.first_energy
 
-    def wait_again(self, kept: tuple[Sequence[Batch], Sequence[tuple[float, ...]], float | None]) -> None:
+    def wait_again(self, kept: tuple[Sequence[Batch], Sequence[Floats], float | None]) -> None:
         """Let that wait which `waiting` has returned, and nothing else."""
         self._waiting, self._log, self.observer.first_energy = [*kept[0]], [*kept[1]], kept[2]
 

@@ -3,29 +3,32 @@
 from __future__ import annotations
 
 import json
-import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from time import process_time as clock_now
 
 import numpy as np
 
 from hybrid.adapt.manager import DomainManager
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
-from hybrid.kernels import books
+from hybrid.kernels import books as b
 from hybrid.kernels.accept import MANY
 from hybrid.kernels.bodies import FRAME, PLACE, V
 from hybrid.kernels.cache import cache_folder
-from hybrid.kernels.state import Floats, state_for
-from hybrid.model.plan import output_times, parts
+from hybrid.kernels.state import Floats, Moves, state_for
+from hybrid.model.bodies import FairleadMotion
+from hybrid.model.plan import output_times
+from hybrid.model.plan import parts as equal_parts
 from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
-from hybrid.simulation.collapse import COLLAPSE, CONTACT, ERROR, GIVE_UP, StepLengths, cause_of, collapse_text
+from hybrid.simulation.collapse import COLLAPSE, CONTACT, GIVE_UP, collapse_text
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restore import refused
+from hybrid.simulation.step_events import CUTS
 from hybrid.simulation.system_checkpoint import (
     check_files,
     content,
@@ -46,12 +49,12 @@ from hybrid.simulation.system_lines import LineResult, LineStep
 from hybrid.simulation.system_points import Rotations, fields_of, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, named
-from hybrid.simulation.system_steps import StepControl
 from hybrid.simulation.system_zones import SystemZones, managers_for, zones_at_rest
 from hybrid.simulation.time_loop import SAME_STOP, WORK, apart
 from hybrid.solve.joined import SystemState, SystemTaken
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_statics import LineFailed
+from hybrid.solve.system_steps import SystemSteps
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target, Text
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
@@ -60,8 +63,6 @@ from hybrid.store.named_arrays import Tree
 from hybrid.store.records import PENDING
 from hybrid.store.writer import Recorder
 
-# A step that fails is repeated in halves, down to this part of it.
-SHORTEST = 2.0**-12
 _NO_ZONES: Mapping[int, DomainManager] = {}
 # Steps between two reports of the progress.
 LOOK = 16
@@ -90,7 +91,8 @@ class SystemRun:
         self.model = build_system(system, resolution=resolution)
         self.resolution = self.model.resolution
         one = self.resolution.one
-        self.control = StepControl(one) if moves and one.local is not None else None
+        follow = (one.step, one.shortest) if moves and one.local is not None else ()
+        self.loop = SystemSteps(system.require_time().rho_inf if moves else 0.0, *follow)
         names = self.model.names
         guesses = system.guesses
         known = self.model.scenes
@@ -123,21 +125,53 @@ class SystemRun:
         self.quantities = SystemQuantities(system, dict(zip(names, self.scenes, strict=True)))
         if moves and target is not None:
             self.quantities.keep_ranges(self.lines)
-        self.t, self.steps, self.last_step, self.last_rho, self.cpu = 0.0, 0, 0.0, 0.0, 0.0
-        self._lengths = StepLengths()
+        self.cpu, self._logged = (
+            0.0,
+            0.0,
+        )  # s, of the processor: in earlier parts of the run; when steps were logged last
         self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
+        self._moved: list[Moves] = []  # by which ends move in compiled steps
         self.dry: set[str] = set()  # bodies that have been said to be out of the water
         self.failures = Failures(self)
         self.zones = SystemZones(self, managers) if managers and moves else None
         self.loaded = 0.0  # s, loads that have stopped by then act no more
         self._checked = -1  # steps at the last checkpoint
         self._between = False  # whether the state is that between two steps
-        self._begin = clock.process_time()
+        self._begin = clock_now()
         self.recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder = ComparisonRecorder()
         if source is not None:
             self.recorder = self._go_on(source, text if isinstance(text, str) else text())
         elif target is not None:
             self.recorder = self._new_recorder(text)
+
+    # --- where it is --------------------------------------------------------------------------------
+
+    @property
+    def t(self) -> float:
+        """Time of the state, s."""
+        return float(self.loop.clock[b.NOW])
+
+    @property
+    def steps(self) -> int:
+        """Steps so far."""
+        return int(self.loop.counts[b.STEPS])
+
+    @property
+    def last_step(self) -> float:
+        """Length, s, of the step that led to the state; 0: it is a start."""
+        return float(self.loop.clock[b.LAST_DT])
+
+    @property
+    def last_rho(self) -> float:
+        """Its spectral radius."""
+        return float(self.loop.clock[b.LAST_RHO])
+
+    def stand_at(self, t: float, steps: int, last_step: float, last_rho: float) -> None:
+        """Be between two steps, at t (s)."""
+        clock = self.loop.clock
+        clock[b.NOW], clock[b.LAST_DT], clock[b.LAST_RHO], self.loop.counts[b.STEPS] = t, last_step, last_rho, steps
+        self.loop.stand_between()
+        self._logged = clock_now() - self._begin
 
     # --- the file -----------------------------------------------------------------------------------
 
@@ -200,7 +234,7 @@ class SystemRun:
         recorder.files = files_of(self.system)
         if why := other_program(point):
             recorder.event(point.t, 0.0, 0.0, OTHER_PROGRAM, why)
-        self._begin, self._checked = clock.process_time() - self.cpu, self.steps
+        self._begin, self._checked = clock_now() - self.cpu, self.steps
         return recorder
 
     def keep(self, last: bool = False) -> None:
@@ -217,7 +251,7 @@ class SystemRun:
         self.recorder.replace(self.quantities.range_values())
         self.gather_events()
         if new and isinstance(self.recorder, Recorder):
-            self.cpu, self._checked = clock.process_time() - self._begin, self.steps
+            self.cpu, self._checked = clock_now() - self._begin, self.steps
             self.recorder.checkpoint(lambda: content(self))
         if not last:
             self.recorder.flush()
@@ -322,8 +356,14 @@ class SystemRun:
         self.solver.books_steps = self.zones is None
         if self.zones is not None:
             self.zones.look_ahead()
-        if self.control is not None:
+        if self.loop.controlled:
             self.solver.allowed[:] = self.resolution.allowed
+        moved = (motion for model in self.model.models for motion in model.ends.motions.values())
+        grow = (x for loads in (*(body.loads for body in self.model.bodies), *self.model.moments) for x in loads)
+        asks = any(isinstance(x, FairleadMotion) for x in moved) or any(x.ramp or len(x.history) for x in grow)
+        asks = asks or any(body.members is not None for body in self.model.bodies)
+        self._asks = b.ASK_BEFORE if asks else 0  # whether Python moves ends and loads bodies before every try
+        self._moved = []
 
     def take_other(self) -> None:
         """Room for the state after the next step, of lines as they are now."""
@@ -362,39 +402,129 @@ class SystemRun:
         return apart([*self.times, *self._breaks], self.t, self.resolution.one.step)
 
     def go_to(self, stop: float, look: Callable[[], None] = lambda: None) -> None:
-        """Steps to `stop` (s), with what is due there; look: called every LOOK steps."""
-        rho, step = self.system.require_time().rho_inf, self.resolution.one.step
+        """Steps to `stop` (s), with what is due there; look: called every so many steps."""
+        loop, step = self.loop, self.resolution.one.step
+        first, done = self.leg
+        parts = equal_parts(stop - first, step)
+        loop.begin_leg(stop, first, done, parts)
+        loop.set_quota()
         while self.t < stop:
             self._between = False
-            self._step(self._end_of_step(stop), rho)
-            if self.zones is not None:
-                self.zones.adapt()
-            if self.failures.all and self.failures.due(step):
-                self._restart()
-                self.other = self.state.copy()
-            if self.t >= stop:
-                self._arrive(stop, step)
-            self._between = True
-            if self.steps % LOOK == 0:
-                look()
+            self._attach()
+            code = loop.go()
+            self.state, self.other = loop.states
+            if code == b.TRYING:
+                self._prepare(float(loop.clock[b.TRY_END]))
+            elif code == b.TRIED:
+                self._judge_zones()
+            elif code == b.FAILED:
+                self._failed_step()
+            else:
+                self._write_log()
+                if not loop.counts[b.ASKS] & b.ASK_BEFORE:  # they are where compiled steps have moved them
+                    for model in self.model.models:
+                        model.ends.at(self.t)
+                        model.sea.at(self.t)
+                if code == b.STEPPED:
+                    self._after_step(step)
+                self._go_on_leg(stop, parts)
+                if self.t >= stop:
+                    self._arrive(stop, step)
+                self._between = bool(loop.counts[b.PHASE] in (b.BEGIN_STEP, b.END_STEP))
+                if code == b.PAUSED or self.steps % LOOK == 0:
+                    loop.set_quota()
+                    look()
 
-    def _end_of_step(self, stop: float) -> float:
-        """When the next step should end (s): after equal ones up to a stop, or as their errors are."""
-        if self.control is not None:
-            longest = self.zones.longest if self.zones is not None else np.inf
-            return self.control.end(self.t, stop, longest)
-        first, k = self.leg
-        count = parts(stop - first, self.resolution.one.step)
-        end = stop if k >= count - 1 else first + (k + 1) * (stop - first) / count
-        self.leg = (first, k + 1) if k + 1 < count else (stop, 0)
-        return end
+    def _go_on_leg(self, stop: float, parts: int) -> None:
+        """Where equal steps to a stop are."""
+        done = int(self.loop.counts[b.LEG_PART])
+        if self.loop.controlled or self.loop.clock[b.NOW] >= self.loop.clock[b.UNTIL]:
+            self.leg = (self.leg[0], done) if done < parts else (stop, 0)
+
+    def _attach(self) -> None:
+        """Steps lead from the state of now, with ends that move as they do now."""
+        loop, solver = self.loop, self.solver
+        loop.counts[b.ASKS] = self._asks
+        if self.zones is not None:
+            loop.counts[b.ASKS] = b.ASK_BEFORE | b.ASK_TRIES | b.ASK_STEPS
+            loop.clock[b.ALLOWED] = self.zones.longest
+        elif self.failures.all:
+            loop.counts[b.ASKS] |= b.ASK_STEPS
+        if loop.attach(solver, self.state, self.other):
+            for line, old, new in zip(self.lines, self.state.lines, self.other.lines, strict=True):
+                line.attach(solver, (old, new), loop.clock, loop.counts)
+        if loop.counts[b.ASKS] & b.ASK_BEFORE:
+            return
+        moves = [model.ends.moves() for model in self.model.models]
+        if len(moves) != len(self._moved) or any(x is not y for x, y in zip(moves, self._moved, strict=True)):
+            self._moved = moves
+            loop.move(solver, [model.ends.moves_from_here() for model in self.model.models])
+
+    def _prepare(self, t: float) -> None:
+        """Ends, loads and zones as they are at the end of a try, t (s)."""
+        if self.zones is not None:
+            self.zones.prepare(t)
+        for line, model in zip(self.lines, self.model.models, strict=True):
+            model.ends.at(t)
+            model.sea.at(t)
+            line.books.velocity[:] = model.ends.velocity
+        self.model.load_bodies(t, self.solver.bodies, self.loaded)
+        self.model.stir(t, self.state.bodies, t - self.t, self.solver.bodies)
+
+    def _judge_zones(self) -> None:
+        """After a try: lines may get more rod, with which it is made again."""
+        assert self.zones is not None
+        clock = self.loop.clock
+        last = bool(0.5 * clock[b.TRIED_DT] < clock[b.SHORTEST])
+        if self.zones.wants_more_rod(self.loop.tried, float(clock[b.TRY_END]), last):
+            self.loop.try_again()
+
+    def _failed_step(self) -> None:
+        """No shorter step is left to try: contact is given up, or the run ends.  LineFailed."""
+        dt = float(self.loop.clock[b.TRIED_DT])
+        if not gives_up_contact(self, dt):
+            raise self._stopped(self.solver, self.loop.tried, dt)
+        self.loop.try_whole()
+
+    def _write_log(self) -> None:
+        """Log the steps that have been made since this was called last."""
+        rows = self.loop.rows()
+        if not len(rows):
+            return
+        now = clock_now() - self._begin
+        cpu = np.linspace(self._logged, now, len(rows) + 1)[1:]
+        self._logged = now
+        for k, line in enumerate(self.lines):
+            line.log(np.column_stack([rows[:, k], cpu]))
+
+    def _after_step(self, step: float) -> None:
+        """What a step has flagged, zones, contact that begins or ends, and what breaks; step: s, the usual one."""
+        loop, t, solver = self.loop, self.t, self.solver
+        if self.zones is not None:
+            solver.book(1 - loop.parity)
+        for line, new, old, work in zip(self.lines, self.state.lines, self.other.lines, solver.work, strict=True):
+            if seen := int(loop.seen[line.number]):
+                line.look_at_itself(solver, seen, t, self.last_step, new)
+            if line.books.counts[b.FLAGS]:
+                line.watch(LineStep(t, new, old, work.report, line.books))
+        if self.zones is not None:
+            self.zones.accepted(self.last_step)
+        if any(line.nears_itself for line in self.lines):
+            begin_contact(self)
+        if parted := [line.number for line in self.lines if line.parts_itself]:
+            end_contact(self, parted)
+        if loop.counts[b.FLAGS] & b.COLLAPSES:
+            self._tell_collapse()
+        if self.zones is not None:
+            self.zones.adapt()
+        if self.failures.all and self.failures.due(step):
+            self._restart()
+            self.other = self.state.copy()
 
     def _restart(self) -> None:
         """Loads, or what holds the lines, are others now: accelerations jump."""
         self._settle(self.solver)
-        self.last_step = 0.0
-        if self.control is not None:
-            self.control.restart()
+        self.loop.restart()
 
     def _arrive(self, stop: float, step: float) -> None:
         """What is due at a stop (s): other loads, and an output."""
@@ -444,66 +574,6 @@ class SystemRun:
         if taken.outcome != Outcome.OK:
             raise self._stopped(solver, taken, 0.0)
 
-    def _step(self, end: float, rho: float) -> None:
-        """To `end` (s), in one step or in halves; where errors choose steps, one step, which may end earlier."""
-        control, zones = self.control, self.zones
-        shortest = SHORTEST * (end - self.t) if control is None else control.shortest
-        dt, repeats = end - self.t, 0
-        while self.t < end:
-            dt = min(dt, end - self.t)
-            t = end if end - self.t - dt < 0.5 * shortest else self.t + dt
-            solver = self.solver
-            if zones is not None:
-                zones.prepare(t)
-            for line, model in zip(self.lines, self.model.models, strict=True):
-                model.ends.at(t)
-                model.sea.at(t)
-                line.books.velocity[:] = model.ends.velocity
-                line.books.clock[books.SHORTEST] = shortest
-            self.model.load_bodies(t, solver.bodies, self.loaded)
-            self.model.stir(t, self.state.bodies, t - self.t, solver.bodies)
-            past = (self.last_step, self.last_rho)
-            taken = solver.step(self.state, self.other, t - self.t, rho, *past, t, fixed=control is None)
-            if zones is not None and zones.wants_more_rod(taken, t, 0.5 * dt < shortest):
-                repeats += 1
-                continue
-            if taken.outcome != Outcome.OK:
-                self._lengths.cut(cause_of(taken.outcome), taken.line, self._place(solver, taken) or 0.0)
-                if 0.5 * dt < shortest:
-                    if not gives_up_contact(self, dt):
-                        raise self._stopped(solver, taken, dt)
-                    dt, repeats = end - self.t, repeats + 1
-                    continue
-                dt, repeats = (0.5 * dt if control is None else control.failed(t - self.t)), repeats + 1
-                continue
-            if control is not None and (again := control.shorter(t - self.t, taken.ratio)):
-                self._lengths.cut(ERROR, taken.line, self._place(solver, taken) or 0.0)
-                dt, repeats = again, repeats + 1
-                continue
-            if zones is not None:
-                solver.book(t - self.t, t)
-            self.last_step, self.last_rho = t - self.t, taken.rho
-            self.t, self.state, self.other = t, self.other, self.state
-            self.steps += 1
-            cpu = clock.process_time() - self._begin
-            both = zip(self.state.lines, self.other.lines, strict=True)
-            for line, states, work in zip(self.lines, both, solver.work, strict=True):
-                line.log(t, self.last_step, taken, repeats, *states, work, cpu)
-            for line, new, old, work in zip(self.lines, self.state.lines, self.other.lines, solver.work, strict=True):
-                if line.books.counts[books.FLAGS]:
-                    line.watch(LineStep(t, new, old, work.report, line.books))
-            if zones is not None:
-                zones.accepted(self.last_step)
-            if any(line.nears_itself for line in self.lines):
-                begin_contact(self)
-            if parted := [line.number for line in self.lines if line.parts_itself]:
-                end_contact(self, parted)
-            if self._lengths.taken(self.last_step):
-                self._tell_collapse()
-            repeats = 0
-            if control is not None:
-                return
-
     def _stopped(self, solver: SystemSolver, taken: SystemTaken, dt: float) -> LineFailed:
         """Why no step leads on."""
         detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
@@ -522,15 +592,17 @@ class SystemRun:
 
     def _tell_collapse(self) -> None:
         """Steps have become so short that the run may not end: an event; one to be compared with stops."""
-        lengths = self._lengths
-        k, s = lengths.at
-        line = self.lines[k]
+        count, clock = self.loop.counts, self.loop.clock
+        number, where = self.loop.last_cut
+        line = self.lines[max(number, 0)]
+        s = float(line.model.line.s[min(max(where, 0), line.model.line.s.size - 1)]) if number >= 0 else 0.0
         touches = any(x.contact is not None and x.contact.touches for x in self.lines)
-        text = collapse_text(lengths.tiny, self.last_step, lengths.longest, lengths.cuts, s, touches)
-        if lengths.tiny == MANY:
+        cuts, tiny = {cause: int(count[k]) for cause, k in CUTS.items()}, int(count[b.TINY_STEPS])
+        text = collapse_text(tiny, self.last_step, float(clock[b.LONGEST]), cuts, s, touches)
+        if tiny == MANY:
             line.events.event(self.t, s, s, COLLAPSE, text, value=self.last_step)
-        if self.target is None and lengths.tiny >= GIVE_UP:
-            raise LineFailed(k, Outcome.COLLAPSED, self.t, s, text)
+        if self.target is None and tiny >= GIVE_UP:
+            raise LineFailed(line.number, Outcome.COLLAPSED, self.t, s, text)
 
 
 def run_system(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from operator import is_
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels.binding import Table
 from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
 from hybrid.kernels.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, VD, WA, WD, WORK, A, U, V, W, X
-from hybrid.kernels.books import NOW, Books
+from hybrid.kernels.books import NOW, PARITY, Books
 from hybrid.kernels.carried_frames import ANSWER, SEAT, TURNS
 from hybrid.kernels.entry import NO_PUSH
 from hybrid.kernels.forces import FRICTION, WAVES
@@ -30,7 +30,7 @@ from hybrid.kernels.report import LOCAL_ERROR, NET_A, RESIDUAL, USED_RHO
 from hybrid.kernels.run import blank_books, blank_job, in_space
 from hybrid.kernels.state import Floats, State, Work, state_for
 from hybrid.kernels.step import friction_axes
-from hybrid.kernels.system import JUNCTIONS, book_system_step, solve_system
+from hybrid.kernels.system import ASKED, JUNCTIONS, blank_system_job, book_system_step, solve_system
 from hybrid.kernels.system_contact import blank_touching_job, room_for_products, touch_system
 from hybrid.kernels.water import wave_kinematics
 from hybrid.solve.contact_statics import left_over
@@ -102,6 +102,7 @@ class SystemSolver:
         self._floors = np.array([-np.inf if x.slackens else x.floor for x in lines])
         self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
         self.blurred: set[int] = set()  # lines of the last equilibrium of which round-off hides whether they buckle
+        self.turns: tuple[SystemState, SystemState] | None = None  # states between which steps go back and forth
         self.books_steps = True  # whether steps are booked at once; else by `book`
         self._unbooked = np.full(len(lines), -1.0)
         carried = [x.line.h.size + 1 if _carries(x) else 0 for x in lines]
@@ -112,69 +113,100 @@ class SystemSolver:
         unknowns = int((self.joints[:, 1] >= 0).sum()) + 3 * points + 6 * len(bodies)
         self._matrix = np.zeros((unknowns + 3, unknowns + 1))
         blank = Table(blank_job())
-        self._numbers = np.zeros((len(lines), blank.numbers.size), np.int64)
-        self._tables = [blank.again(room) for room in self._numbers]
-        self._states: tuple[list[State], list[State]] = ([], [])  # of lines, that are bound
-        self._solver = in_space.address(self._numbers[0])
+        # of each line two tables, as of the system: states that take turns lead from the one to the other and back
+        self._numbers = np.zeros((2, len(lines), blank.numbers.size), np.int64)
+        self._tables = [tuple(blank.again(rows[k]) for rows in self._numbers) for k in range(len(lines))]
+        self._asked = np.zeros(ASKED)
+        self._jobs = Table(blank_system_job), Table(blank_system_job)
+        self._solver = in_space.address(self._numbers[0, 0])
         mass = sum(float(x.line.mass.sum()) for x in lines) + float(bodies[:, MASS].sum())
         self.scale = max(x.scale for x in lines)
         self.length = max(x.length for x in lines)
         self.anchor = ANCHOR * self.scale / (mass * self.length)  # 1/s2
-        for x, table, work, books in zip(lines, self._tables, self.work, self.books, strict=True):
+        for job, numbers in zip(self._jobs, self._numbers, strict=True):
+            job.bind(
+                asked=self._asked, tables=numbers, numbers=numbers.view(np.float64), joints=self.joints,
+                fairleads=self._fairleads, seats=self._seats, arms=self._arms, gaps=self._gaps, floors=self._floors,
+                allowed=self.allowed, first=self._first, columns=self._columns, functional=self._functional,
+                answers=self._answers, q=self._turned, net=self.net, bodies=self.bodies, work=self.body_work,
+                S=self._handed, G=self._follow, A=self._matrix, solver=self._solver,
+            )  # fmt: skip
+        for k, (x, work, books) in enumerate(zip(lines, self.work, self.books, strict=True)):
             limits = Limits(REACH * x.length, x.scale, 1)
-            table.bind(
-                task=Task(ASSEMBLY, limits=limits), line=x.line, sea=x.sea, ends=x.ends, work=work, books=books,
+            self.bind_line(
+                k, task=Task(ASSEMBLY, limits=limits), line=x.line, sea=x.sea, ends=x.ends, work=work, books=books,
                 was=NO_PUSH, now=NO_PUSH,
             )  # fmt: skip
-        self._touching, self._touch_address = Table(blank_touching_job()), 0
+        self._touching = Table(blank_touching_job()), Table(blank_touching_job())
         self._at_rest = np.zeros(1, np.int64)
+
+    def bind_line(self, number: int, **values: Any) -> None:
+        """Put values in their places in the jobs of a line."""
+        for table in self._tables[number]:
+            table.bind(**values)
 
     def _touch(self) -> None:
         """Lines that touch themselves do so from now on, with the books as they are."""
         states = [state_for(x.line) for x in self.lines]
         for k, contact in self._contacts.items():
-            table, both = self._tables[k], (states[k], states[k])
+            both = states[k], states[k]
             numbers = contact.attach(self.lines[k].line, self.lines[k].ends, both, self.work[k], self.books[k])
-            table.bind(contact=contact.call, contact_table=numbers)
+            self.bind_line(k, contact=contact.call, contact_table=numbers)
         nodes = sum(x.line.s.size for x in self.lines)
-        self._touching.bind(
-            tables=self._numbers, joints=self.joints, seats=self._seats, arms=self._arms,
-            gaps=np.zeros_like(self._gaps), first=self._first, columns=self._columns, functional=self._functional,
-            answers=self._answers, net=self.net, bodies=self.bodies, work=self.body_work, S=self._handed,
-            G=self._follow, A=self._matrix, q=self._turned, kept=np.zeros((nodes, SIZE)),
-            moved=np.zeros((len(self.bodies), 6)), hessenberg=room_for_products(), asked=self._at_rest,
-        )  # fmt: skip
-        self._touch_address = touch_system.address(self._touching.numbers)
+        room = {
+            "gaps": np.zeros_like(self._gaps), "kept": np.zeros((nodes, SIZE)), "asked": self._at_rest,
+            "moved": np.zeros((len(self.bodies), 6)), "hessenberg": room_for_products(),
+        }  # fmt: skip
+        for job, touching, numbers in zip(self._jobs, self._touching, self._numbers, strict=True):
+            touching.bind(
+                tables=numbers, joints=self.joints, seats=self._seats, arms=self._arms, first=self._first,
+                columns=self._columns, functional=self._functional, answers=self._answers, net=self.net,
+                bodies=self.bodies, work=self.body_work, S=self._handed, G=self._follow, A=self._matrix, q=self._turned,
+                **room,
+            )  # fmt: skip
+            job.bind(touch=touch_system.address(touching.numbers), touch_table=touching.numbers)
 
     def keep_books(self, books: Sequence[Books]) -> None:
         """Keep powers, work and extremes of the lines in these books from now on."""
         self.books = list(books)
-        for table, each in zip(self._tables, books, strict=True):
+        for k, each in enumerate(books):
             asks = each.asked.size or each.walls.size
-            table.bind(books=each, quantities=note_quantities.address(self._numbers[0]) if asks else 0)
+            self.bind_line(
+                k, books=each, quantities=note_quantities.address(self._numbers[0, 0]) if asks else 0
+            )  # fmt: skip
         if self._contacts:
             self._touch()
 
-    def _solve(self, task: Task, old: SystemState, new: SystemState, t: float = 0.0) -> SystemTaken:
-        both = [*new.lines, *old.lines]
-        turned = 2 * len(self._states[0]) == len(both) and all(map(is_, self._states[0] + self._states[1], both))
-        for table, a, b in zip(self._tables, old.lines, new.lines, strict=True):
-            if turned and a is not b:  # after a step the states take turns
-                table.exchange("old", "new")
-            else:
-                table.bind(old=a, new=b)
-        self._states = [*old.lines], [*new.lines]
+    def take_turns(self, states: tuple[SystemState, SystemState]) -> tuple[np.ndarray, np.ndarray]:
+        """Steps lead from the first state to the second and back from now on: tables of kernels.system.SystemJob."""
+        old, new = self.turns = states
+        for parity, (a, b) in enumerate((states, states[::-1])):
+            self._bind_states(parity, a, b)
+        for k, contact in self._contacts.items():
+            contact.follow(old.lines[k], new.lines[k])
+        return self._jobs[0].numbers, self._jobs[1].numbers
+
+    def _bind_states(self, parity: int, old: SystemState, new: SystemState) -> None:
+        for tables, a, b in zip(self._tables, old.lines, new.lines, strict=True):
+            tables[parity].bind(old=a, new=b)
+        self._jobs[parity].bind(
+            old=old.bodies, new=new.bodies, allowed=self.allowed if self.books_steps else self._unbooked
+        )
         if self._contacts:
-            self._touching.bind(old=old.bodies, new=new.bodies)
-            for k, contact in self._contacts.items():
-                contact.follow(old.lines[k], new.lines[k])
-        allowed = self.allowed if self.books_steps else self._unbooked
-        outcome, iterations, left, line, where = solve_system(
-            task, t, self._solver, self._numbers, self._numbers.view(np.float64), self.joints, self._fairleads,
-            self._seats, self._arms, self._gaps, self._floors, allowed, self._first, self._columns,
-            self._functional, self._answers, self._turned, self.net, self.bodies, old.bodies, new.bodies,
-            self.body_work, self._handed, self._follow, self._matrix, self._touch_address, self._touching.numbers,
+            self._touching[parity].bind(old=old.bodies, new=new.bodies)
+
+    def _solve(self, task: Task, old: SystemState, new: SystemState, t: float = 0.0) -> SystemTaken:
+        self.turns = None
+        self._bind_states(0, old, new)
+        for k, contact in self._contacts.items():
+            contact.follow(old.lines[k], new.lines[k])
+            self.books[k].counts[PARITY] = 0
+        limits = task.limits
+        self._asked[:] = (
+            task.what, task.dt, task.before, task.rho, task.cv, task.ca, limits.reach, limits.scale, limits.most,
+            task.rho_before, task.fixed, t,
         )  # fmt: skip
+        outcome, iterations, left, line, where = solve_system(self._jobs[0].numbers)
         return SystemTaken(Outcome(outcome), iterations, left, line, where, self.residual())
 
     def residual(self) -> float:
@@ -182,10 +214,14 @@ class SystemSolver:
         left = self.body_work[:, OWN : OWN + 6] + self.body_work[:, LINES : LINES + 6]
         return self._largest([float(work.report[RESIDUAL]) for work in self.work], self.net, left)
 
+    @property
+    def arm(self) -> float:
+        """Arm (m) by which moments on bodies are compared with forces."""
+        return max(LEAST_ARM * self.length, float(np.abs(self._fairleads).max()))
+
     def _largest(self, inside: Sequence[float], net: Floats, left: Floats) -> float:
         """The largest of what is left over inside lines, at points (P, 3) N, and at bodies (B, 6) N, N m."""
-        arm = max(LEAST_ARM * self.length, float(np.abs(self._fairleads).max()))  # m, moments against forces
-        turning = float(np.abs(left[:, 3:]).max(initial=0.0)) / arm
+        turning = float(np.abs(left[:, 3:]).max(initial=0.0)) / self.arm
         return max(*inside, turning, *(float(np.abs(x).max(initial=0.0)) for x in (net, left[:, :3])))
 
     def in_contact(self) -> list[int]:
@@ -241,9 +277,9 @@ class SystemSolver:
         used = float(self.work[0].report[USED_RHO])
         return replace(taken, error=float(errors.max()), ratio=float((errors / self.allowed).max()), rho=used)
 
-    def book(self, dt: float, t: float) -> None:
-        """Book the step of dt (s) to t (s) that was computed last, where `books_steps` is off."""
-        book_system_step(self._numbers, self.joints, self.body_work, dt, t)
+    def book(self, parity: int = 0) -> None:
+        """Book the step that was computed last, where `books_steps` is off; parity: of the states that it led from."""
+        book_system_step(self._jobs[parity].numbers)
 
     def consistent_accelerations(
         self, states: SystemState, accelerations: Sequence[Floats], t: float = 0.0
@@ -255,8 +291,8 @@ class SystemSolver:
         states.bodies[:, A:W] = 0.0
         states.bodies[:, WA:] = 0.0
         self._turning_gaps(states)
-        for k, (x, table, work, state, given) in enumerate(
-            zip(self.lines, self._tables, self.work, states.lines, accelerations, strict=True)
+        for k, (x, work, state, given) in enumerate(
+            zip(self.lines, self.work, states.lines, accelerations, strict=True)
         ):
             state.a[:], state.vd[:], state.wa[:], state.wd[:] = 0.0, 0.0, 0.0, 0.0
             l = np.linalg.norm(state.e, axis=1)
@@ -272,14 +308,14 @@ class SystemSolver:
                 work.u[0] = -self._gaps[k, 0]
             self._around(x, state, work)
             ends = x.ends._replace(position=state.r[[0, -1]])
-            table.bind(work=work._replace(gaps=gaps), ends=ends)
+            self.bind_line(k, work=work._replace(gaps=gaps), ends=ends)
         self._at_rest[0] = 1
         for k in self._contacts:
             self.books[k].clock[NOW] = t
         taken = self._solve(Task(CORRECTION, ca=HEAVY, limits=Limits(1.0, 1.0, 1)), states, states)
         self._at_rest[0] = 0
-        for x, table, work in zip(self.lines, self._tables, self.work, strict=True):
-            table.bind(work=work, ends=x.ends)
+        for k, (x, work) in enumerate(zip(self.lines, self.work, strict=True)):
+            self.bind_line(k, work=work, ends=x.ends)
         if taken.outcome != Outcome.OK:
             return taken
         for row, own, solved in zip(states.bodies, self.bodies, self.body_work[:, X : X + 6], strict=True):

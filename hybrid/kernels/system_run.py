@@ -1,0 +1,282 @@
+"""Steps of several lines that meet at points, many in a call: the compiled loop around kernels.system.
+
+Phases, lengths of steps, halvings and codes are those of one cable (kernels.books, kernels.step_control), with a clock
+and counts that all lines have in common.  The states of lines and bodies take turns: SystemJobs of both parities are
+bound once.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.accept import collapses
+from hybrid.kernels.bodies import LINES, OWN
+from hybrid.kernels.books import (
+    ASK_BEFORE,
+    ASK_STEPS,
+    ASK_TRIES,
+    ASKS,
+    AT_STOP,
+    BEGIN_STEP,
+    CLOCK_SIZE,
+    COLLAPSES,
+    CONTROLLED,
+    CORRECTION,
+    COUNT_SIZE,
+    CUT_AT,
+    CUT_BY_ERROR,
+    CUT_BY_NEWTON,
+    CUT_BY_TURN,
+    END_STEP,
+    FAILED,
+    FLAGS,
+    ITERATIONS,
+    JUDGE,
+    LAST_DT,
+    LAST_RHO,
+    LOG,
+    NOW,
+    OUTCOME,
+    PARITY,
+    PAUSED,
+    PHASE,
+    PREVIOUS,
+    QUOTA,
+    REPEATS,
+    RHO,
+    ROWS,
+    SHORTEST,
+    SOLVE,
+    STEPPED,
+    STEPS,
+    STOP,
+    TRIED,
+    TRIED_DT,
+    TRIES,
+    TRY,
+    TRY_END,
+    TRYING,
+    UNTIL,
+    WASTED,
+    WHERE,
+)
+from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.end_motion import ends_at, sea_at
+from hybrid.kernels.generalized_alpha import SAME
+from hybrid.kernels.newton import OK, STEP, TURNED_TOO_FAR
+from hybrid.kernels.powers import pull
+from hybrid.kernels.references import caller, reader
+from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL, USED_RHO
+from hybrid.kernels.run import read, watch_itself
+from hybrid.kernels.state import Floats
+from hybrid.kernels.step_control import begin_step, halve, passes
+from hybrid.kernels.step_law import REFUSED
+from hybrid.kernels.system import (
+    BEFORE,
+    CA,
+    CV,
+    DT,
+    FIXED,
+    MOST,
+    REACH,
+    RHO_OF_LAST,
+    RHO_OF_STEP,
+    SCALE,
+    TIME,
+    WHAT,
+    error_ratio,
+    read_system,
+)
+
+# Of `lines`: the line (-1: a body) where the last try was worst, and of the last try that was given up.
+LINE, CUT_LINE = 0, 1
+# Of `limits`: the reach of Newton's method, m; its iterations at most; the arm by which moments on bodies are compared
+# with forces, m.
+OF_REACH, OF_ITERATIONS, OF_ARM = 0, 1, 2
+
+
+class StepsJob(NamedTuple):
+    """Arguments of the entry."""
+
+    even: NDArray[
+        np.int64
+    ]  # table of a kernels.system.SystemJob that leads from the states of even parity to the others
+    odd: NDArray[np.int64]  # and of one that leads back
+    clock: Floats  # (CLOCK_SIZE,) of kernels.books, of all lines
+    counts: NDArray[np.int64]  # (COUNT_SIZE,)
+    limits: Floats  # (3,) above
+    lines: NDArray[np.int64]  # (2,) above
+    seen: NDArray[np.int64]  # (L,) bits of kernels.books: how near a line came to itself in the last step
+    log: Floats  # (rows, L, len(LOG))
+    solver: int = 0  # address of kernels.system.solve_system
+    book: int = 0  # of book_system_step
+
+
+def blank_steps_job() -> StepsJob:
+    """A job with the types that every one has."""
+    none = np.zeros(1, np.int64)
+    log = np.zeros((1, 1, len(LOG)))
+    return StepsJob(none, none, np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64), np.zeros(3), none, none, log)
+
+
+read_steps = reader(blank_steps_job())
+call_step, call_book = caller((0, 0, 0.0, 0, 0)), caller(0)
+
+
+@inner
+def end_of_try(clock):
+    """Time at which the present try ends."""
+    end = clock[NOW] + clock[TRIED_DT]
+    return clock[UNTIL] if clock[UNTIL] - end <= SAME * clock[TRIED_DT] else end
+
+
+@inner
+def move_lines(system, t):
+    """Ends and sea of all lines at t (s)."""
+    for l in range(system.tables.shape[0]):
+        job = read(system.tables[l])
+        ends_at(t, job.moves, job.sea, job.ends, job.books.velocity)
+        sea_at(t, job.sea)
+
+
+@inner
+def try_step(steps, table, system):
+    """Solve the step that is tried, and note how that ended."""
+    clock, counts, asked = steps.clock, steps.counts, system.asked
+    asked[WHAT], asked[DT], asked[TIME] = STEP, clock[TRY_END] - clock[NOW], clock[TRY_END]
+    asked[BEFORE], asked[RHO_OF_STEP], asked[RHO_OF_LAST] = clock[LAST_DT], clock[RHO], clock[LAST_RHO]
+    asked[CV], asked[CA], asked[SCALE], asked[FIXED] = 0.0, 0.0, 1.0, 1.0 - counts[CONTROLLED]
+    asked[REACH], asked[MOST] = steps.limits[OF_REACH], steps.limits[OF_ITERATIONS]
+    for l in range(system.tables.shape[0]):
+        books = read(system.tables[l]).books
+        books.counts[PARITY], books.clock[SHORTEST] = counts[PARITY], clock[SHORTEST]
+    outcome, it, left, line, where = call_step(steps.solver, table)
+    counts[OUTCOME], counts[TRIES], counts[WHERE], clock[CORRECTION] = outcome, it, where, left
+    steps.lines[LINE] = line
+
+
+@inner
+def give_up(steps, cause):
+    """A try is given up, and repeated in another length."""
+    counts = steps.counts
+    counts[cause] += 1
+    counts[CUT_AT], steps.lines[CUT_LINE] = counts[WHERE], steps.lines[LINE]
+    counts[WASTED] += counts[TRIES]
+    counts[REPEATS] += 1
+    counts[PHASE] = TRY
+
+
+@inner
+def judge(steps, system):
+    """Whether the try is the step (1), is to be repeated in another length (0), or has failed for good (-1)."""
+    clock, counts = steps.clock, steps.counts
+    dt, outcome = clock[TRY_END] - clock[NOW], counts[OUTCOME]
+    if outcome == OK:
+        ratio = error_ratio(system.tables, system.allowed)
+        if counts[CONTROLLED] and not passes(clock, counts, dt, ratio):
+            give_up(steps, CUT_BY_ERROR)
+            return 0
+        if ratio > REFUSED and system.allowed[0] >= 0.0:  # it cannot be shorter, and is in no books yet
+            call_book(steps.book, steps.odd if counts[PARITY] else steps.even)
+        return 1
+    if 0.5 * clock[TRIED_DT] < clock[SHORTEST]:
+        return -1
+    halve(clock, counts, dt)
+    give_up(steps, CUT_BY_TURN if outcome == TURNED_TOO_FAR else CUT_BY_NEWTON)
+    return 0
+
+
+@inner
+def largest_residual(system, arm):
+    """Largest force (N) that is left over at a node, a point or, moments by their arm (m), a body; without contact."""
+    most, net, work = 0.0, system.net, system.work
+    for l in range(system.tables.shape[0]):
+        most = max(most, read(system.tables[l]).work.report[RESIDUAL])
+    for p in range(net.shape[0]):
+        for k in range(3):
+            most = max(most, abs(net[p, k]))
+    for b in range(work.shape[0]):
+        for k in range(3):
+            most = max(most, abs(work[b, OWN + k] + work[b, LINES + k]))
+            most = max(most, abs(work[b, OWN + 3 + k] + work[b, LINES + 3 + k]) / arm)
+    return most
+
+
+@inner
+def accept(steps, system):
+    """The step that was tried is taken: clock, log, and what there is to look at."""
+    clock, counts = steps.clock, steps.counts
+    dt, residual = clock[TRY_END] - clock[NOW], largest_residual(system, steps.limits[OF_ARM])
+    clock[PREVIOUS], clock[NOW], clock[LAST_DT] = clock[NOW], clock[TRY_END], dt
+    counts[PARITY] = 1 - counts[PARITY]
+    counts[STEPS] += 1
+    counts[ITERATIONS] = counts[TRIES]
+    flags = COLLAPSES if collapses(clock, counts, dt) else 0
+    for l in range(system.tables.shape[0]):
+        job = read(system.tables[l])
+        report, row = job.work.report, steps.log[counts[ROWS], l]
+        if l == 0:
+            clock[LAST_RHO] = report[USED_RHO]
+        row[0], row[1], row[2], row[3] = clock[NOW], dt, counts[TRIES] + counts[WASTED], clock[CORRECTION]
+        row[4], row[5], row[6] = residual, counts[REPEATS], report[LOCAL_ERROR]
+        row[7], row[8] = pull(report, 0), pull(report, 1)
+        steps.seen[l] = watch_itself(job, job.new)
+        flags |= job.books.counts[FLAGS] | steps.seen[l]
+    counts[ROWS] += 1
+    counts[WASTED], counts[FLAGS], counts[PHASE] = 0, flags, END_STEP
+
+
+@inner
+def between_steps(steps):
+    """The phases before a try; -1 when one is to be made, else what to return."""
+    clock, counts = steps.clock, steps.counts
+    if counts[PHASE] == END_STEP:
+        counts[PHASE] = BEGIN_STEP if counts[CONTROLLED] or clock[NOW] >= clock[UNTIL] else TRY
+    if counts[PHASE] == BEGIN_STEP:
+        if not clock[NOW] < clock[STOP]:
+            return AT_STOP
+        if counts[QUOTA] <= 0 or counts[ROWS] == steps.log.shape[0]:
+            return PAUSED
+        counts[QUOTA] -= 1
+        begin_step(clock, counts)
+        counts[PHASE] = TRY
+    if counts[PHASE] == TRY:
+        if counts[ROWS] == steps.log.shape[0]:  # one step may be cut into many
+            return PAUSED
+        clock[TRY_END] = end_of_try(clock)
+        counts[PHASE] = SOLVE
+        if counts[ASKS] & ASK_BEFORE:
+            return TRYING
+    return -1
+
+
+@kernel
+def run_system(table):
+    """Steps of all lines until a code of kernels.books is returned."""
+    steps = read_steps(table)
+    counts = steps.counts
+    while True:
+        code = between_steps(steps)
+        if code >= 0:
+            return code
+        own = steps.even
+        if counts[PARITY]:
+            own = steps.odd
+        system = read_system(own)
+        if counts[PHASE] == SOLVE:
+            if not counts[ASKS] & ASK_BEFORE:
+                move_lines(system, steps.clock[TRY_END])
+            try_step(steps, own, system)
+            counts[PHASE] = JUDGE
+            if counts[ASKS] & ASK_TRIES:
+                return TRIED
+        verdict = judge(steps, system)
+        if verdict < 0:
+            return FAILED
+        if verdict > 0:
+            accept(steps, system)
+            if counts[FLAGS] != 0 or counts[ASKS] & ASK_STEPS:
+                return STEPPED

@@ -1,0 +1,163 @@
+"""Steps of several lines, many in a call: what kernels.system_run works with, and its clock for Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from hybrid.errors import Outcome
+from hybrid.kernels import books as b
+from hybrid.kernels.binding import Table
+from hybrid.kernels.state import Floats, Moves
+from hybrid.kernels.step_law import FIRST, WARY
+from hybrid.kernels.system import book_system_step, solve_system
+from hybrid.kernels.system_run import CUT_LINE, LINE, blank_steps_job, run_system
+from hybrid.solve.joined import SystemState, SystemTaken
+from hybrid.solve.run import CELL_STEPS, ROWS, WAVES_OF_A_CELL
+from hybrid.solve.stepper import MOST_ITERATIONS, REACH
+from hybrid.solve.system import SystemSolver
+
+# Numbers of the log of all lines, at most.
+MOST_LOGGED = 2_000_000
+
+
+class SystemSteps:
+    """Steps of all lines of a system. Lengths follow errors where a largest one is given, else they are equal."""
+
+    def __init__(self, rho: float, largest: float = 0.0, shortest: float = 0.0) -> None:
+        """rho: spectral radius of the scheme; largest, shortest: s, of steps that follow their errors; 0: none do."""
+        self.clock, self.counts = np.zeros(b.CLOCK_SIZE), np.zeros(b.COUNT_SIZE, np.int64)
+        self.lines = np.zeros(2, np.int64)
+        self._job, self._states, self._cells = Table(blank_steps_job), (SystemState([]), SystemState([])), 0
+        self._log, self.seen = np.zeros((0, 0, len(b.LOG))), np.zeros(0, np.int64)
+        self._solver: SystemSolver | None = None
+        self._waves = 0
+        clock = self.clock
+        clock[b.RHO], clock[b.ALLOWED], clock[b.TOLERANCE], clock[b.ERROR_RATIO] = rho, np.inf, 1.0, 1.0
+        self.controlled = largest > 0.0
+        self.counts[b.CONTROLLED], self.counts[b.PHASE] = self.controlled, b.BEGIN_STEP
+        clock[b.LARGEST], clock[b.SHORTEST] = largest, shortest
+        clock[b.NEXT_DT] = max(largest / FIRST, shortest)
+
+    # --- what steps lead from and to ----------------------------------------------------------------
+
+    def attach(self, solver: SystemSolver, state: SystemState, other: SystemState) -> bool:
+        """Steps of a solver go on from `state`, with room in `other` for the next; False: they do so already."""
+        counts = self.counts
+        now, then = self.states
+        if self._solver is solver and solver.turns is self._states and now is state and then is other:
+            return False
+        counts[b.PARITY], self._states, self._solver = 0, (state, other), solver
+        lines = len(solver.lines)
+        if len(self.seen) != lines:
+            rows = max(16, min(ROWS, MOST_LOGGED // (lines * len(b.LOG))))
+            self._log, self.seen = np.zeros((rows, lines, len(b.LOG))), np.zeros(lines, np.int64)
+            counts[b.ROWS] = 0
+        even, odd = solver.take_turns(self._states)
+        self._cells = sum(x.line.h.size for x in solver.lines)
+        self._waves = max((len(x.sea.waves) for x in solver.lines), default=0)
+        self._job.bind(
+            even=even, odd=odd, clock=self.clock, counts=counts, lines=self.lines, seen=self.seen, log=self._log,
+            limits=np.array([REACH * solver.length, MOST_ITERATIONS, solver.arm]), solver=solve_system.address(even),
+            book=book_system_step.address(even),
+        )  # fmt: skip
+        return True
+
+    def move(self, solver: SystemSolver, moves: Sequence[Moves]) -> None:
+        """The ends of the lines move so from now on, by their kernels."""
+        for k, each in enumerate(moves):
+            solver.bind_line(k, moves=each)
+
+    @property
+    def states(self) -> tuple[SystemState, SystemState]:
+        """The state now, and the other one, before the last step."""
+        parity = self.counts[b.PARITY]
+        return self._states[parity], self._states[1 - parity]
+
+    @property
+    def parity(self) -> int:
+        return int(self.counts[b.PARITY])
+
+    # --- steps ---------------------------------------------------------------------------------------
+
+    def begin_leg(self, stop: float, first: float, done: int, parts: int) -> None:
+        """Steps are to end at `stop` (s): in so many equal parts since `first` (s), of which some are done."""
+        clock, counts = self.clock, self.counts
+        clock[b.STOP], clock[b.LEG_BEGIN], clock[b.LEG_STEP] = stop, first, (stop - first) / max(parts, 1)
+        counts[b.LEG_PART], counts[b.LEG_PARTS] = done, parts
+
+    def set_quota(self) -> None:
+        """As many steps as interrupts and progress can wait for."""
+        cost = max(self._cells, 1) * (1.0 + self._waves / WAVES_OF_A_CELL)
+        self.counts[b.QUOTA] = max(1, min(ROWS, int(CELL_STEPS / cost)))
+
+    def go(self) -> int:
+        """Go on until a code of kernels.books."""
+        return int(run_system(self._job.numbers))
+
+    def try_again(self) -> None:
+        """The try is made once more: what it was made with has changed."""
+        self.counts[b.REPEATS] += 1
+        self.counts[b.PHASE] = b.TRY
+
+    def try_whole(self) -> None:
+        """The same with the whole of the step."""
+        self.clock[b.TRIED_DT] = self.clock[b.UNTIL] - self.clock[b.NOW]
+        self.try_again()
+
+    def restart(self) -> None:
+        """Accelerations jump now: of what comes nothing is known."""
+        self.clock[b.LAST_DT] = 0.0
+        if self.controlled:
+            self.clock[b.NEXT_DT] = max(self.clock[b.NEXT_DT] / FIRST, self.clock[b.SHORTEST])
+            self.clock[b.ERROR_RATIO] = 1.0
+
+    def stand_between(self) -> None:
+        """No step is under way, and none is to be written down."""
+        self.counts[b.PHASE], self.counts[b.ROWS] = b.BEGIN_STEP, 0
+
+    def rows(self) -> Floats:
+        """Rows (n, L, len(LOG)) of steps since the last call; the next steps overwrite them."""
+        count = int(self.counts[b.ROWS])
+        self.counts[b.ROWS] = 0
+        return self._log[:count]
+
+    # --- what is known --------------------------------------------------------------------------------
+
+    @property
+    def t(self) -> float:
+        """Time of the state, s."""
+        return float(self.clock[b.NOW])
+
+    @property
+    def tried(self) -> SystemTaken:
+        """How the last try ended."""
+        outcome, it, where = (int(self.counts[k]) for k in (b.OUTCOME, b.TRIES, b.WHERE))
+        correction = float(self.clock[b.CORRECTION])
+        return SystemTaken(Outcome(outcome), it, correction, int(self.lines[LINE]), where, np.nan)
+
+    @property
+    def last_cut(self) -> tuple[int, int]:
+        """Line (-1: a body) and cell or node of the last try that was given up."""
+        return int(self.lines[CUT_LINE]), int(self.counts[b.CUT_AT])
+
+    # --- checkpoints ----------------------------------------------------------------------------------
+
+    def control(self) -> list[float]:
+        """What the lengths of the next steps depend on."""
+        if not self.controlled:
+            return []
+        return [float(self.clock[b.NEXT_DT]), float(self.clock[b.ERROR_RATIO]), float(self.counts[b.WARY])]
+
+    def take_control(self, saved: Any) -> None:
+        """Go on as `control` has told.  ValueError: that cannot be."""
+        if not self.controlled:
+            return
+        shortest, largest = (float(self.clock[k]) for k in (b.SHORTEST, b.LARGEST))
+        numbers = isinstance(saved, list) and len(saved) == 3 and all(isinstance(x, int | float) for x in saved)
+        if not numbers or not (shortest <= saved[0] <= largest and saved[1] > 0.0 and 0 <= saved[2] <= WARY):
+            raise ValueError("control: length and error of the steps were expected")
+        self.clock[b.NEXT_DT], self.clock[b.ERROR_RATIO] = float(saved[0]), float(saved[1])
+        self.counts[b.WARY] = int(saved[2])
