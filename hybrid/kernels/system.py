@@ -94,7 +94,6 @@ from hybrid.kernels.run import call_quantities, read
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Floats
 from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
-from hybrid.kernels.step_law import REFUSED
 
 JUNCTIONS = 5
 call_solver, call_touch = caller((0, 0, 0.0, 0)), caller(0)
@@ -333,27 +332,22 @@ def error_ratio(tables, allowed):
     """Largest error of the step over what is allowed of it, of all lines; reports are those of the step."""
     ratio = 0.0
     for l in range(tables.shape[0]):
-        ratio = max(ratio, read(tables[l]).work.report[LOCAL_ERROR] / abs(allowed[l]))
+        ratio = max(ratio, read(tables[l]).work.report[LOCAL_ERROR] / allowed[l])
     return ratio
 
 
 @inner
-def end_system_step(system, task, s, t, solved):
-    """Rates and books of a step that is `solved`; OK or why it is refused, with its line (-1: a body) and cell.
+def end_system_step(system, task, s, solved):
+    """Rates and reports of a step that is `solved`; OK or why it is refused, with its line (-1: a body) and cell.
 
-    A step whose error is too large (kernels.step_law) is none for the books: whoever asked for it takes it back; where
-    `allowed` is negative, whoever keeps it books it (book_system_step).
+    Whoever keeps it books it (book_system_step).
     """
-    tables, allowed, work = system.tables, system.allowed, system.work
-    line, turn, cell = end_lines(tables, system.joints, system.floors, s, task, solved)
-    turned = end_bodies(system.old, system.new, work, s)
+    line, turn, cell = end_lines(system.tables, system.joints, system.floors, s, task, solved)
+    turned = end_bodies(system.old, system.new, system.work, s)
     if line >= 0:
         return (TURNED_TOO_FAR if turn > 0.0 else SLACK), line, cell
     if solved and not turned < LARGEST_STEP_TURN:
         return TURNED_TOO_FAR, -1, -1
-    if solved and allowed[0] >= 0.0 and not error_ratio(tables, allowed) > REFUSED:
-        keep_books(tables, system.joints, task.dt, t)
-        book_bodies(work, task.dt)
     return OK, -1, -1
 
 
@@ -372,7 +366,7 @@ class SystemJob(NamedTuple):
     arms: Floats  # (L, 2, 3) m, worked in
     gaps: Floats  # (L, 2, 3) m that ends at bodies have still to go; given for a CORRECTION, else worked in
     floors: Floats  # (L,) N, tension at or below which a catenary cell is slack
-    allowed: Floats  # (L,) m, error of a step, beyond REFUSED times of which it is not booked; negative: no step is
+    allowed: Floats  # (L,) m, error that a step may make
     first: NDArray[np.int64]  # (L,) where columns of a line begin that carries some
     columns: Floats  # (3, .., 5), or (COLUMNS, .., 5) where an end turns
     functional: Floats  # (FUNCTIONAL,) worked in, as what follows
@@ -518,7 +512,7 @@ def solve_system(table):
     if task.what == STEP or task.what == EQUILIBRIUM:
         follow_laws(tables, s)
     if task.what == STEP:
-        bad, line_of_bad, cell = end_system_step(system, task, s, t, outcome == OK)
+        bad, line_of_bad, cell = end_system_step(system, task, s, outcome == OK)
         if bad != OK:
             outcome, line, where = bad, line_of_bad, cell
     if task.what == ASSEMBLY and outcome == OK:

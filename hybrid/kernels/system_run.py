@@ -47,9 +47,11 @@ from hybrid.kernels.books import (
     QUOTA,
     REPEATS,
     RHO,
+    RHO_BEFORE,
     ROWS,
     SHORTEST,
     SOLVE,
+    STEP_BEFORE,
     STEPPED,
     STEPS,
     STOP,
@@ -66,14 +68,13 @@ from hybrid.kernels.books import (
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.end_motion import ends_at, sea_at
 from hybrid.kernels.generalized_alpha import SAME
-from hybrid.kernels.newton import OK, STEP, TURNED_TOO_FAR
+from hybrid.kernels.newton import OK, SLACK, STEP, TURNED_TOO_FAR
 from hybrid.kernels.powers import pull
 from hybrid.kernels.references import caller, reader
-from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL, USED_RHO
-from hybrid.kernels.run import read, watch_itself
+from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKEST_CELL, USED_RHO
+from hybrid.kernels.run import call_solver, read, watch_itself
 from hybrid.kernels.state import Floats
 from hybrid.kernels.step_control import begin_step, halve, passes
-from hybrid.kernels.step_law import REFUSED
 from hybrid.kernels.system import (
     BEFORE,
     CA,
@@ -101,10 +102,13 @@ OF_REACH, OF_ITERATIONS, OF_ARM = 0, 1, 2
 class StepsJob(NamedTuple):
     """Arguments of the entry."""
 
-    even: NDArray[
-        np.int64
-    ]  # table of a kernels.system.SystemJob that leads from the states of even parity to the others
+    even: NDArray[np.int64]  # of a kernels.system.SystemJob that leads from the states of even parity to the others
     odd: NDArray[np.int64]  # and of one that leads back
+    joined_even: NDArray[np.int64]  # the same of the lines that are joined to what moves with them
+    joined_odd: NDArray[np.int64]
+    joined: NDArray[np.int64]  # (J,) their numbers
+    lone: NDArray[np.int64]  # (L - J, ..) jobs of the others, their task RUN
+    lone_lines: NDArray[np.int64]  # (L - J,) and their numbers
     clock: Floats  # (CLOCK_SIZE,) of kernels.books, of all lines
     counts: NDArray[np.int64]  # (COUNT_SIZE,)
     limits: Floats  # (3,) above
@@ -112,14 +116,16 @@ class StepsJob(NamedTuple):
     seen: NDArray[np.int64]  # (L,) bits of kernels.books: how near a line came to itself in the last step
     log: Floats  # (rows, L, len(LOG))
     solver: int = 0  # address of kernels.system.solve_system
+    marcher: int = 0  # of the kernel that solves a step of one line
     book: int = 0  # of book_system_step
 
 
 def blank_steps_job() -> StepsJob:
     """A job with the types that every one has."""
-    none = np.zeros(1, np.int64)
-    log = np.zeros((1, 1, len(LOG)))
-    return StepsJob(none, none, np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64), np.zeros(3), none, none, log)
+    none, log = np.zeros(1, np.int64), np.zeros((1, 1, len(LOG)))
+    clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+    lone = np.zeros((1, 1), np.int64)
+    return StepsJob(none, none, none, none, none, lone, none, clock, counts, np.zeros(3), none, none, log)
 
 
 read_steps = reader(blank_steps_job())
@@ -143,9 +149,32 @@ def move_lines(system, t):
 
 
 @inner
-def try_step(steps, table, system):
+def try_lone(steps, system):
+    """Solve the step that is tried of every line that is joined to nothing that moves with it.
+
+    Returns outcome, line, iterations, predicted next correction, and node, of the first that fails, else the largest.
+    """
+    clock, most, worst = steps.clock, 0, 0.0
+    for j in range(steps.lone.shape[0]):
+        job, l = read(steps.lone[j]), steps.lone_lines[j]
+        own = job.books.clock
+        own[NOW], own[TRY_END], own[RHO] = clock[NOW], clock[TRY_END], clock[RHO]
+        own[STEP_BEFORE], own[RHO_BEFORE] = clock[LAST_DT], clock[LAST_RHO]
+        outcome, it, left, where = call_solver(steps.marcher, steps.lone[j])
+        if outcome == OK and not job.work.report[SLACKEST] > system.floors[l]:
+            outcome, where = SLACK, int(job.work.report[SLACKEST_CELL])
+        if outcome != OK:
+            return outcome, l, it, left, where
+        most, worst = max(most, it), max(worst, left)
+    return OK, -1, most, worst, -1
+
+
+@inner
+def try_step(steps, system):
     """Solve the step that is tried, and note how that ended."""
-    clock, counts, asked = steps.clock, steps.counts, system.asked
+    clock, counts, asked, table = steps.clock, steps.counts, system.asked, steps.joined_even
+    if counts[PARITY]:
+        table = steps.joined_odd
     asked[WHAT], asked[DT], asked[TIME] = STEP, clock[TRY_END] - clock[NOW], clock[TRY_END]
     asked[BEFORE], asked[RHO_OF_STEP], asked[RHO_OF_LAST] = clock[LAST_DT], clock[RHO], clock[LAST_RHO]
     asked[CV], asked[CA], asked[SCALE], asked[FIXED] = 0.0, 0.0, 1.0, 1.0 - counts[CONTROLLED]
@@ -153,7 +182,13 @@ def try_step(steps, table, system):
     for l in range(system.tables.shape[0]):
         books = read(system.tables[l]).books
         books.counts[PARITY], books.clock[SHORTEST] = counts[PARITY], clock[SHORTEST]
-    outcome, it, left, line, where = call_step(steps.solver, table)
+        books.counts[CONTROLLED] = counts[CONTROLLED]
+    outcome, line, it, left, where = try_lone(steps, system)
+    if outcome == OK and (steps.joined.shape[0] > 0 or system.work.shape[0] > 0):
+        result, more, worse, row, place = call_step(steps.solver, table)
+        outcome, it, left, where = result, max(it, more), max(left, worse), place
+        if row >= 0:
+            line = steps.joined[row]
     counts[OUTCOME], counts[TRIES], counts[WHERE], clock[CORRECTION] = outcome, it, where, left
     steps.lines[LINE] = line
 
@@ -175,12 +210,9 @@ def judge(steps, system):
     clock, counts = steps.clock, steps.counts
     dt, outcome = clock[TRY_END] - clock[NOW], counts[OUTCOME]
     if outcome == OK:
-        ratio = error_ratio(system.tables, system.allowed)
-        if counts[CONTROLLED] and not passes(clock, counts, dt, ratio):
+        if counts[CONTROLLED] and not passes(clock, counts, dt, error_ratio(system.tables, system.allowed)):
             give_up(steps, CUT_BY_ERROR)
             return 0
-        if ratio > REFUSED and system.allowed[0] >= 0.0:  # it cannot be shorter, and is in no books yet
-            call_book(steps.book, steps.odd if counts[PARITY] else steps.even)
         return 1
     if 0.5 * clock[TRIED_DT] < clock[SHORTEST]:
         return -1
@@ -269,7 +301,7 @@ def run_system(table):
         if counts[PHASE] == SOLVE:
             if not counts[ASKS] & ASK_BEFORE:
                 move_lines(system, steps.clock[TRY_END])
-            try_step(steps, own, system)
+            try_step(steps, system)
             counts[PHASE] = JUDGE
             if counts[ASKS] & ASK_TRIES:
                 return TRIED
@@ -277,6 +309,7 @@ def run_system(table):
         if verdict < 0:
             return FAILED
         if verdict > 0:
+            call_book(steps.book, own)
             accept(steps, system)
             if counts[FLAGS] != 0 or counts[ASKS] & ASK_STEPS:
                 return STEPPED

@@ -353,7 +353,6 @@ class SystemRun:
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts)
         self.solver.keep_books([line.books for line in self.lines])
-        self.solver.books_steps = self.zones is None
         if self.zones is not None:
             self.zones.look_ahead()
         if self.loop.controlled:
@@ -393,6 +392,7 @@ class SystemRun:
         self.gather_events()
         self.other, self._between = self.state.copy(), True
         self.keep()
+        self._logged = clock_now() - self._begin
 
     def stops(self) -> list[float]:
         """Times (s) at which a step ends: outputs, and where loads jump."""
@@ -500,8 +500,6 @@ class SystemRun:
     def _after_step(self, step: float) -> None:
         """What a step has flagged, zones, contact that begins or ends, and what breaks; step: s, the usual one."""
         loop, t, solver = self.loop, self.t, self.solver
-        if self.zones is not None:
-            solver.book(1 - loop.parity)
         for line, new, old, work in zip(self.lines, self.state.lines, self.other.lines, solver.work, strict=True):
             if seen := int(loop.seen[line.number]):
                 line.look_at_itself(solver, seen, t, self.last_step, new)

@@ -25,11 +25,12 @@ from hybrid.kernels.forces import FRICTION, WAVES
 from hybrid.kernels.joined_lines import COLUMNS, FUNCTIONAL
 from hybrid.kernels.junctions import HANDED
 from hybrid.kernels.named_quantities import note_quantities
-from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, Limits, Task
+from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, RUN, STEP, Limits, Task
 from hybrid.kernels.report import LOCAL_ERROR, NET_A, RESIDUAL, USED_RHO
 from hybrid.kernels.run import blank_books, blank_job, in_space
 from hybrid.kernels.state import Floats, State, Work, state_for
 from hybrid.kernels.step import friction_axes
+from hybrid.kernels.step_law import REFUSED
 from hybrid.kernels.system import ASKED, JUNCTIONS, blank_system_job, book_system_step, solve_system
 from hybrid.kernels.system_contact import blank_touching_job, room_for_products, touch_system
 from hybrid.kernels.water import wave_kinematics
@@ -103,8 +104,6 @@ class SystemSolver:
         self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
         self.blurred: set[int] = set()  # lines of the last equilibrium of which round-off hides whether they buckle
         self.turns: tuple[SystemState, SystemState] | None = None  # states between which steps go back and forth
-        self.books_steps = True  # whether steps are booked at once; else by `book`
-        self._unbooked = np.full(len(lines), -1.0)
         carried = [x.line.h.size + 1 if _carries(x) else 0 for x in lines]
         columns = COLUMNS if self._seats[:, :, TURNS].any() else 3
         self._first = np.concatenate([[0], np.cumsum(carried)[:-1]]).astype(np.int64)
@@ -113,9 +112,23 @@ class SystemSolver:
         unknowns = int((self.joints[:, 1] >= 0).sum()) + 3 * points + 6 * len(bodies)
         self._matrix = np.zeros((unknowns + 3, unknowns + 1))
         blank = Table(blank_job())
-        # of each line two tables, as of the system: states that take turns lead from the one to the other and back
-        self._numbers = np.zeros((2, len(lines), blank.numbers.size), np.int64)
-        self._tables = [tuple(blank.again(rows[k]) for rows in self._numbers) for k in range(len(lines))]
+        # Of each line two tables, as of the system: states that take turns lead from the one to the other and back.
+        # Lines that are joined to nothing that moves with them are solved one by one: in tables with the task RUN.
+        size, rows = blank.numbers.size, range(len(lines))
+        self.lone = [k for k in rows if not self._contacts and max(lines[k].joints) < 0]
+        self.joined = [k for k in rows if k not in self.lone]
+        self._numbers, self.lone_numbers = (
+            np.zeros((2, len(lines), size), np.int64),
+            np.zeros((len(self.lone), size), np.int64),
+        )
+        self._tables = [tuple(blank.again(x[k]) for x in self._numbers) for k in rows]
+        self._lone_tables = {k: blank.again(x) for k, x in zip(self.lone, self.lone_numbers, strict=True)}
+        self._joined_numbers, self._joined_tables = self._numbers, dict(enumerate(self._tables))
+        if self.lone:
+            self._joined_numbers = np.zeros((2, len(self.joined), size), np.int64)
+            self._joined_tables = {
+                k: tuple(blank.again(x[j]) for x in self._joined_numbers) for j, k in enumerate(self.joined)
+            }
         self._asked = np.zeros(ASKED)
         self._jobs = Table(blank_system_job), Table(blank_system_job)
         self._solver = in_space.address(self._numbers[0, 0])
@@ -123,20 +136,31 @@ class SystemSolver:
         self.scale = max(x.scale for x in lines)
         self.length = max(x.length for x in lines)
         self.anchor = ANCHOR * self.scale / (mass * self.length)  # 1/s2
+        room = {
+            "asked": self._asked, "columns": self._columns, "functional": self._functional, "answers": self._answers,
+            "q": self._turned, "net": self.net, "bodies": self.bodies, "work": self.body_work, "S": self._handed,
+            "G": self._follow, "A": self._matrix, "solver": self._solver,
+        }  # fmt: skip
+        of_lines = {
+            "joints": self.joints, "fairleads": self._fairleads, "seats": self._seats, "arms": self._arms,
+            "gaps": self._gaps, "floors": self._floors, "allowed": self.allowed, "first": self._first,
+        }  # fmt: skip
         for job, numbers in zip(self._jobs, self._numbers, strict=True):
-            job.bind(
-                asked=self._asked, tables=numbers, numbers=numbers.view(np.float64), joints=self.joints,
-                fairleads=self._fairleads, seats=self._seats, arms=self._arms, gaps=self._gaps, floors=self._floors,
-                allowed=self.allowed, first=self._first, columns=self._columns, functional=self._functional,
-                answers=self._answers, q=self._turned, net=self.net, bodies=self.bodies, work=self.body_work,
-                S=self._handed, G=self._follow, A=self._matrix, solver=self._solver,
-            )  # fmt: skip
+            job.bind(tables=numbers, numbers=numbers.view(np.float64), **of_lines, **room)
+        self._joined_jobs = self._jobs
+        if self.lone:
+            self._joined_jobs = Table(blank_system_job), Table(blank_system_job)
+            of_lines = {name: np.ascontiguousarray(x[self.joined]) for name, x in of_lines.items()}
+            for job, numbers in zip(self._joined_jobs, self._joined_numbers, strict=True):
+                job.bind(tables=numbers, numbers=numbers.view(np.float64), **of_lines, **room)
         for k, (x, work, books) in enumerate(zip(lines, self.work, self.books, strict=True)):
             limits = Limits(REACH * x.length, x.scale, 1)
             self.bind_line(
                 k, task=Task(ASSEMBLY, limits=limits), line=x.line, sea=x.sea, ends=x.ends, work=work, books=books,
                 was=NO_PUSH, now=NO_PUSH,
             )  # fmt: skip
+            if k in self._lone_tables:
+                self._lone_tables[k].bind(task=Task(RUN, limits=limits._replace(most=MOST_OF_STEP)))
         self._touching = Table(blank_touching_job()), Table(blank_touching_job())
         self._at_rest = np.zeros(1, np.int64)
 
@@ -144,6 +168,11 @@ class SystemSolver:
         """Put values in their places in the jobs of a line."""
         for table in self._tables[number]:
             table.bind(**values)
+        if number in self._lone_tables:
+            self._lone_tables[number].bind(**values)
+        elif self.lone:
+            for table in self._joined_tables[number]:
+                table.bind(**values)
 
     def _touch(self) -> None:
         """Lines that touch themselves do so from now on, with the books as they are."""
@@ -177,21 +206,30 @@ class SystemSolver:
         if self._contacts:
             self._touch()
 
-    def take_turns(self, states: tuple[SystemState, SystemState]) -> tuple[np.ndarray, np.ndarray]:
-        """Steps lead from the first state to the second and back from now on: tables of kernels.system.SystemJob."""
+    def take_turns(self, states: tuple[SystemState, SystemState]) -> dict[str, Any]:
+        """Steps lead from the first state to the second and back from now on: what kernels.system_run.StepsJob has."""
         old, new = self.turns = states
         for parity, (a, b) in enumerate((states, states[::-1])):
             self._bind_states(parity, a, b)
         for k, contact in self._contacts.items():
             contact.follow(old.lines[k], new.lines[k])
-        return self._jobs[0].numbers, self._jobs[1].numbers
+        for k, table in self._lone_tables.items():
+            table.bind(old=old.lines[k], new=new.lines[k])
+        return {
+            "even": self._jobs[0].numbers, "odd": self._jobs[1].numbers,
+            "joined_even": self._joined_jobs[0].numbers, "joined_odd": self._joined_jobs[1].numbers,
+            "joined": np.array(self.joined, np.int64), "lone": self.lone_numbers,
+            "lone_lines": np.array(self.lone, np.int64), "marcher": self._solver,
+        }  # fmt: skip
 
     def _bind_states(self, parity: int, old: SystemState, new: SystemState) -> None:
         for tables, a, b in zip(self._tables, old.lines, new.lines, strict=True):
             tables[parity].bind(old=a, new=b)
-        self._jobs[parity].bind(
-            old=old.bodies, new=new.bodies, allowed=self.allowed if self.books_steps else self._unbooked
-        )
+        if self.lone:
+            for k, tables in self._joined_tables.items():
+                tables[parity].bind(old=old.lines[k], new=new.lines[k])
+        for jobs in (self._jobs, self._joined_jobs):
+            jobs[parity].bind(old=old.bodies, new=new.bodies)
         if self._contacts:
             self._touching[parity].bind(old=old.bodies, new=new.bodies)
 
@@ -274,12 +312,10 @@ class SystemSolver:
         if taken.outcome != Outcome.OK:
             return taken
         errors = np.array([work.report[LOCAL_ERROR] for work in self.work])  # fairleads move as their bodies
-        used = float(self.work[0].report[USED_RHO])
-        return replace(taken, error=float(errors.max()), ratio=float((errors / self.allowed).max()), rho=used)
-
-    def book(self, parity: int = 0) -> None:
-        """Book the step that was computed last, where `books_steps` is off; parity: of the states that it led from."""
-        book_system_step(self._jobs[parity].numbers)
+        used, ratio = float(self.work[0].report[USED_RHO]), float((errors / self.allowed).max())
+        if not ratio > REFUSED:
+            book_system_step(self._jobs[0].numbers)
+        return replace(taken, error=float(errors.max()), ratio=ratio, rho=used)
 
     def consistent_accelerations(
         self, states: SystemState, accelerations: Sequence[Floats], t: float = 0.0

@@ -55,13 +55,13 @@ class SystemSteps:
             rows = max(16, min(ROWS, MOST_LOGGED // (lines * len(b.LOG))))
             self._log, self.seen = np.zeros((rows, lines, len(b.LOG))), np.zeros(lines, np.int64)
             counts[b.ROWS] = 0
-        even, odd = solver.take_turns(self._states)
+        jobs = solver.take_turns(self._states)
         self._cells = sum(x.line.h.size for x in solver.lines)
         self._waves = max((len(x.sea.waves) for x in solver.lines), default=0)
         self._job.bind(
-            even=even, odd=odd, clock=self.clock, counts=counts, lines=self.lines, seen=self.seen, log=self._log,
-            limits=np.array([REACH * solver.length, MOST_ITERATIONS, solver.arm]), solver=solve_system.address(even),
-            book=book_system_step.address(even),
+            clock=self.clock, counts=counts, lines=self.lines, seen=self.seen, log=self._log,
+            limits=np.array([REACH * solver.length, MOST_ITERATIONS, solver.arm]),
+            solver=solve_system.address(jobs["even"]), book=book_system_step.address(jobs["even"]), **jobs,
         )  # fmt: skip
         return True
 
