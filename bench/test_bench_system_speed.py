@@ -221,3 +221,56 @@ def test_cost_per_cell_of_a_hundred_lines() -> None:
         f"\nper step and line of 50 cells: 1 line {1e6 * one:.0f} us, 100 lines {1e6 * many:.0f} us: {many / one:.2f}"
     )
     assert many < 1.3 * one
+
+
+def leg(cells: int, model: str) -> dict[str, Any]:
+    """A line of 410 m in water."""
+    section = {"length": 410.0, "mass": 100.0, "diameter": 0.1, "axial_stiffness": 4e8, "drag": {"normal": 1.6}}
+    section |= {"bending_stiffness": 2e4} if model == "rod" else {}
+    return {"sections": [section], "mesh": {"cells": cells}, "model": model}
+
+
+def legs(cells: int, count: int, model: str, every: float, duration: float) -> dict[str, Any]:
+    """Lines from anchors on a seabed to fairleads that heave; count 0: the first of them as one cable."""
+    bed = {"fluid": {"density": 1025}, "seabed": {"z": -100, "stiffness": 1e4}}
+    heave = {"heave": {"amplitude": 1.0, "period": 8.0}, "ramp": 8}
+    tables = {"environment": bed, "time": {"duration": duration, "step": 0.1}, "output": {"every": every, "points": 11}}
+    if count == 0:
+        line = leg(cells, model)
+        ends = {"start": {"kind": "pinned", "position": [400, 0, -100]}}
+        ends["end"] = {"kind": "pinned", "position": [20, 0, 0], "motion": heave}
+        cable = {"cable": {"sections": line.pop("sections")}, "ends": ends, "initial": "equilibrium", "dimension": 3}
+        return tables | cable | line
+    points: dict[str, Any] = {}
+    for k in range(count):
+        out = np.array([np.cos(2 * np.pi * k / count), np.sin(2 * np.pi * k / count)])
+        points[f"a{k}"] = {"position": [*(400 * out).tolist(), -100.0]}
+        points[f"f{k}"] = {"position": [*(20 * out).tolist(), 0.0], "motion": heave}
+    lines = {f"l{k}": {"start": f"a{k}", "end": f"f{k}"} | leg(cells, model) for k in range(count)}
+    return tables | {"points": points, "lines": lines}
+
+
+def step_of(data: dict[str, Any]) -> tuple[float, float]:
+    """Processor time of a step, s, and of the whole run."""
+    begin = clock.process_time()
+    with hybrid.run(data) as result:
+        used = (result.lines["l0"] if "lines" in data else result)["steps/cpu"]
+        return float(used[-1] - used[0]) / (len(used) - 1), clock.process_time() - begin
+
+
+def test_a_step_of_lines_against_one_of_a_cable() -> None:
+    """Lines that are joined to nothing cost what a cable costs, each; one output, at the end."""
+    for cells, model in ((20, "catenary"), (100, "catenary"), (100, "rod")):
+        each = [[step_of(legs(cells, n, model, 60.0, 60.0))[0] for n in (0, 1, 3)] for _ in range(5)]
+        cable, one, three = 1e6 * np.median(each, axis=0)
+        print(f"\n{cells} cells, {model}: cable {cable:.1f}, one line {one:.1f}, three lines {three:.1f} us a step")
+        assert one < 1.2 * cable
+
+
+def test_many_lines() -> None:
+    for cells, count, every, duration in ((100, 100, 60.0, 60.0), (100, 100, 1.0, 60.0), (20, 1000, 6.0, 6.0)):
+        step, whole = step_of(legs(cells, count, "catenary", every, duration))
+        steps, outputs = round(duration / 0.1), round(duration / every)
+        print(
+            f"\n{count} x {cells} cells, {outputs} outputs: {steps} steps in {steps * step:.2f} s, whole {whole:.2f} s"
+        )
