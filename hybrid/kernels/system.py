@@ -9,10 +9,6 @@ Symbols and stopping rule as in kernels.newton.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from hybrid.kernels.accept import watch
 from hybrid.kernels.bodies import (
@@ -68,7 +64,6 @@ from hybrid.kernels.newton import (
     STEP,
     TURNED_TOO_FAR,
     WHOLE,
-    Limits,
     Task,
     ask_contact,
     follow_law,
@@ -80,7 +75,7 @@ from hybrid.kernels.newton import (
 )
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.powers import book_work, find_powers
-from hybrid.kernels.references import caller, reader
+from hybrid.kernels.references import caller
 from hybrid.kernels.report import (
     LOCAL_ERROR,
     RESIDUAL,
@@ -92,8 +87,8 @@ from hybrid.kernels.report import (
 )
 from hybrid.kernels.run import call_quantities, read
 from hybrid.kernels.seabed import stored
-from hybrid.kernels.state import Floats
 from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
+from hybrid.kernels.system_job import DT, TIME, read_system, task_of
 
 JUNCTIONS = 5
 call_solver, call_touch = caller((0, 0, 0.0, 0)), caller(0)
@@ -351,58 +346,6 @@ def end_system_step(system, task, s, solved):
     return OK, -1, -1
 
 
-class SystemJob(NamedTuple):
-    """Arguments of the entries: the lines, points and bodies of a system, and room.
-
-    P points, B bodies, L lines; m tensions of last cells and coordinates of points and bodies.
-    """
-
-    asked: Floats  # (ASKED,) the task: below
-    tables: NDArray[np.int64]  # (L, ..) jobs of the lines (kernels.run), their task ASSEMBLY
-    numbers: Floats  # the same memory
-    joints: NDArray[np.int64]  # (L, 2) points, then bodies, that start and end are joined to, -1 where they are held
-    fairleads: Floats  # (L, 2, 3) m of ends at bodies, in their axes
-    seats: Floats  # (L, 2, SEAT) frames of ends that turn with bodies (kernels.carried_frames)
-    arms: Floats  # (L, 2, 3) m, worked in
-    gaps: Floats  # (L, 2, 3) m that ends at bodies have still to go; given for a CORRECTION, else worked in
-    floors: Floats  # (L,) N, tension at or below which a catenary cell is slack
-    allowed: Floats  # (L,) m, error that a step may make
-    first: NDArray[np.int64]  # (L,) where columns of a line begin that carries some
-    columns: Floats  # (3, .., 5), or (COLUMNS, .., 5) where an end turns
-    functional: Floats  # (FUNCTIONAL,) worked in, as what follows
-    answers: Floats  # (2, ANSWER)
-    q: Floats  # (COLUMNS,)
-    net: Floats  # (P, 3) on return what does not balance at the points, N
-    bodies: Floats  # (B, NUMBERS ..) what bodies are (kernels.bodies)
-    old: Floats  # (B, STATE) of bodies
-    new: Floats  # (B, STATE)
-    work: Floats  # (B, WORK)
-    S: Floats  # (HANDED - 1, HANDED)
-    G: Floats  # (2, 6, 6)
-    A: Floats  # (m+3, m+1)
-    touch_table: NDArray[np.int64]  # of kernels.system_contact.touch_system
-    solver: int = 0  # address of the kernel that marches a line
-    touch: int = 0  # of touch_system; 0: no line touches itself
-
-
-# Numbers of `asked`: of the task (kernels.newton.Task), and the time of the new states, s.
-(WHAT, DT, BEFORE, RHO_OF_STEP, CV, CA, REACH, SCALE, MOST, RHO_OF_LAST, FIXED, TIME) = range(12)
-ASKED = 12
-
-
-def blank_system_job() -> SystemJob:
-    """A job with the types that every one has."""
-    z, one, two = np.zeros, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
-    return SystemJob(
-        z(ASKED), two, z((1, 1)), two, z((1, 2, 3)), z((1, 2, 1)), z((1, 2, 3)), z((1, 2, 3)), z(1), z(1), one,
-        z((1, 1, 1)), z(1), z((2, 1)), z(1), z((1, 3)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)),
-        z((2, 6, 6)), z((1, 1)), one,
-    )  # fmt: skip
-
-
-read_system = reader(blank_system_job())
-
-
 @kernel
 def book_system_step(table):
     """Books of the step that was solved last, and is kept."""
@@ -410,6 +353,37 @@ def book_system_step(table):
     dt, t = system.asked[DT], system.asked[TIME]
     keep_books(system.tables, system.joints, dt, t)
     book_bodies(system.work, dt)
+
+
+@inner
+def predict_step(system, task, t):
+    """Predict a step to t (s) of all lines and bodies: its task and scheme, whether something turns too far, and by how
+
+    much (rad), its line (-1: a body) and cell.
+    """
+    safe, rho = 1.0, task.rho
+    if system.touch != 0:
+        safe, rho = prepare_contact(system.tables, task, t)
+    task = with_radius(task, rho)
+    s = scheme(task.rho, task.before, task.rho_before, task.dt)
+    turn, _ = predict_bodies(system.old, system.new, system.work, s)
+    if not turn < LARGEST_STEP_TURN:
+        return task, s, True, turn, -1, -1
+    line, turn, cell = begin_lines(system.tables, s, safe)
+    return task, s, line >= 0, turn, line, cell
+
+
+@inner
+def give_scheme(system, task, s):
+    """Tell all lines of the scheme with which they are marched; whether anything rubs, as a number."""
+    rubs, tables, numbers = 0, system.tables, system.numbers
+    for l in range(tables.shape[0]):
+        numbers[l, TASK_CV], numbers[l, TASK_CA], numbers[l, TASK_DT] = s.cv, s.ca, task.dt
+        job = read(tables[l])
+        rubs |= job.line.bits & FRICTION
+        if system.touch != 0 and job.contact[ADDRESS] != 0:
+            rubs |= job.contact[NEAR]
+    return rubs
 
 
 @kernel
@@ -420,38 +394,19 @@ def solve_system(table):
     Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.
     """
     system = read_system(table)
-    asked, tables, numbers, joints = system.asked, system.tables, system.numbers, system.joints
+    asked, tables, joints = system.asked, system.tables, system.joints
     net, bodies, old, new, work, A = system.net, system.bodies, system.old, system.new, system.work, system.A
-    touch, t = system.touch, asked[TIME]
-    limits = Limits(asked[REACH], asked[SCALE], int(asked[MOST]))
-    task = Task(
-        int(asked[WHAT]), asked[DT], asked[BEFORE], asked[RHO_OF_STEP], asked[CV], asked[CA], False, limits, False,
-        asked[RHO_OF_LAST], asked[FIXED] != 0.0,
-    )  # fmt: skip
+    touch, t, task = system.touch, asked[TIME], task_of(asked)
     m, most, count, points = A.shape[1] - 1, task.limits.most, tables.shape[0], net.shape[0]
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
-        safe, rho = 1.0, task.rho
-        if touch != 0:
-            safe, rho = prepare_contact(tables, task, t)
-        task = with_radius(task, rho)
-        s = scheme(task.rho, task.before, task.rho_before, task.dt)
-        turn, line = predict_bodies(old, new, work, s)
-        if not turn < LARGEST_STEP_TURN:
-            return TURNED_TOO_FAR, 0, turn, -1, -1
-        line, turn, cell = begin_lines(tables, s, safe)
-        if line >= 0:
+        task, s, fails, turn, line, cell = predict_step(system, task, t)
+        if fails:
             return TURNED_TOO_FAR, 0, turn, line, cell
     else:
         start_here(old, work)
     forget_torques(tables)
-    rubs = 0
-    for l in range(count):
-        numbers[l, TASK_CV], numbers[l, TASK_CA], numbers[l, TASK_DT] = s.cv, s.ca, task.dt
-        job = read(tables[l])
-        rubs |= job.line.bits & FRICTION
-        if touch != 0 and job.contact[ADDRESS] != 0:
-            rubs |= job.contact[NEAR]
+    rubs = give_scheme(system, task, s)
     before, left, strength = math.inf, math.inf, 1.0
     outcome, it, line, where = NOT_CONVERGED, 0, -1, -1
     while it < most and outcome == NOT_CONVERGED:

@@ -75,7 +75,8 @@ from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKEST_CELL
 from hybrid.kernels.run import call_solver, read, watch_itself
 from hybrid.kernels.state import Floats
 from hybrid.kernels.step_control import begin_step, halve, passes
-from hybrid.kernels.system import (
+from hybrid.kernels.system import error_ratio
+from hybrid.kernels.system_job import (
     BEFORE,
     CA,
     CV,
@@ -88,7 +89,6 @@ from hybrid.kernels.system import (
     SCALE,
     TIME,
     WHAT,
-    error_ratio,
     read_system,
 )
 

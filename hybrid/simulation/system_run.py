@@ -52,6 +52,7 @@ from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, 
 from hybrid.simulation.system_zones import SystemZones, managers_for, zones_at_rest
 from hybrid.simulation.time_loop import SAME_STOP, WORK, apart
 from hybrid.solve.joined import SystemState, SystemTaken
+from hybrid.solve.run import ROWS
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_statics import LineFailed
 from hybrid.solve.system_steps import SystemSteps
@@ -64,7 +65,7 @@ from hybrid.store.records import PENDING
 from hybrid.store.writer import Recorder
 
 _NO_ZONES: Mapping[int, DomainManager] = {}
-# Steps between two reports of the progress.
+# Steps that Python has a part in, between two reports of the progress.
 LOOK = 16
 
 
@@ -125,10 +126,8 @@ class SystemRun:
         self.quantities = SystemQuantities(system, dict(zip(names, self.scenes, strict=True)))
         if moves and target is not None:
             self.quantities.keep_ranges(self.lines)
-        self.cpu, self._logged = (
-            0.0,
-            0.0,
-        )  # s, of the processor: in earlier parts of the run; when steps were logged last
+        self.cpu = 0.0  # s, of the processor, in earlier parts of the run
+        self._logged = 0.0  # s, likewise, when steps were logged last
         self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
         self._moved: list[Moves] = []  # by which ends move in compiled steps
         self.dry: set[str] = set()  # bodies that have been said to be out of the water
@@ -402,12 +401,11 @@ class SystemRun:
         return apart([*self.times, *self._breaks], self.t, self.resolution.one.step)
 
     def go_to(self, stop: float, look: Callable[[], None] = lambda: None) -> None:
-        """Steps to `stop` (s), with what is due there; look: called every so many steps."""
+        """Steps to `stop` (s), with what is due there; look: called there, and about ten times a second."""
         loop, step = self.loop, self.resolution.one.step
         first, done = self.leg
         parts = equal_parts(stop - first, step)
         loop.begin_leg(stop, first, done, parts)
-        loop.set_quota()
         while self.t < stop:
             self._between = False
             self._attach()
@@ -431,8 +429,7 @@ class SystemRun:
                 if self.t >= stop:
                     self._arrive(stop, step)
                 self._between = bool(loop.counts[b.PHASE] in (b.BEGIN_STEP, b.END_STEP))
-                if code == b.PAUSED or self.steps % LOOK == 0:
-                    loop.set_quota()
+                if code == b.PAUSED or self.t >= stop:
                     look()
 
     def _go_on_leg(self, stop: float, parts: int) -> None:
@@ -450,6 +447,8 @@ class SystemRun:
             loop.clock[b.ALLOWED] = self.zones.longest
         elif self.failures.all:
             loop.counts[b.ASKS] |= b.ASK_STEPS
+        if loop.counts[b.QUOTA] <= 0:
+            loop.set_quota(LOOK if loop.counts[b.ASKS] else ROWS)
         if loop.attach(solver, self.state, self.other):
             for line, old, new in zip(self.lines, self.state.lines, self.other.lines, strict=True):
                 line.attach(solver, (old, new), loop.clock, loop.counts)

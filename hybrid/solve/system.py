@@ -31,8 +31,9 @@ from hybrid.kernels.run import blank_books, blank_job, in_space
 from hybrid.kernels.state import Floats, State, Work, state_for
 from hybrid.kernels.step import friction_axes
 from hybrid.kernels.step_law import REFUSED
-from hybrid.kernels.system import ASKED, JUNCTIONS, blank_system_job, book_system_step, solve_system
+from hybrid.kernels.system import JUNCTIONS, book_system_step, solve_system
 from hybrid.kernels.system_contact import blank_touching_job, room_for_products, touch_system
+from hybrid.kernels.system_job import ASKED, blank_system_job
 from hybrid.kernels.water import wave_kinematics
 from hybrid.solve.contact_statics import left_over
 from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken

@@ -76,10 +76,6 @@ class SystemSteps:
         parity = self.counts[b.PARITY]
         return self._states[parity], self._states[1 - parity]
 
-    @property
-    def parity(self) -> int:
-        return int(self.counts[b.PARITY])
-
     # --- steps ---------------------------------------------------------------------------------------
 
     def begin_leg(self, stop: float, first: float, done: int, parts: int) -> None:
@@ -88,10 +84,10 @@ class SystemSteps:
         clock[b.STOP], clock[b.LEG_BEGIN], clock[b.LEG_STEP] = stop, first, (stop - first) / max(parts, 1)
         counts[b.LEG_PART], counts[b.LEG_PARTS] = done, parts
 
-    def set_quota(self) -> None:
-        """As many steps as interrupts and progress can wait for."""
+    def set_quota(self, most: int) -> None:
+        """As many steps as interrupts and progress can wait for; most: as far as Python knows what they cost."""
         cost = max(self._cells, 1) * (1.0 + self._waves / WAVES_OF_A_CELL)
-        self.counts[b.QUOTA] = max(1, min(ROWS, int(CELL_STEPS / cost)))
+        self.counts[b.QUOTA] = max(1, min(ROWS, most, int(CELL_STEPS / cost)))
 
     def go(self) -> int:
         """Go on until a code of kernels.books."""
@@ -125,11 +121,6 @@ class SystemSteps:
         return self._log[:count]
 
     # --- what is known --------------------------------------------------------------------------------
-
-    @property
-    def t(self) -> float:
-        """Time of the state, s."""
-        return float(self.clock[b.NOW])
 
     @property
     def tried(self) -> SystemTaken:

@@ -1,0 +1,81 @@
+"""Steps of several lines in compiled code: lines that meet nothing, and what is heard between calls."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.simulation import progress
+
+ROPE = {"mass": 20.0, "diameter": 0.06, "axial_stiffness": 2e7, "drag": {"normal": 1.2}}
+HEAVE = {"heave": {"amplitude": 1.0, "period": 4.0}, "ramp": 4}
+MEETING = {
+    "points": {
+        "west": {"position": [-60, 0, -50]},
+        "east": {"position": [60, 5, -50], "motion": HEAVE},
+        "float": {"initial_guess": [0, 0, -10], "mass": 300, "volume": 1.2},
+    },
+    "lines": {
+        "first": {"start": "west", "end": "float", "sections": [ROPE | {"length": 75}], "mesh": {"cells": 12}},
+        "last": {"start": "float", "end": "east", "sections": [ROPE | {"length": 75}], "mesh": {"cells": 12}},
+    },
+}
+# With a motion of its own that is gentler, and an anchor that moves too.
+ALONE = {
+    "points": {
+        "anchor": {"position": [0, 100, -50], "motion": {"sway": {"amplitude": 0.4, "period": 3.0}, "ramp": 3}},
+        "ship": {"position": [40, 100, 0], "motion": HEAVE},
+    },
+    "lines": {"middle": {"start": "anchor", "end": "ship", "sections": [ROPE | {"length": 70}], "mesh": {"cells": 15}}},
+}
+
+
+def scene(*parts: dict[str, Any], **tables: Any) -> dict[str, Any]:
+    """Systems side by side in water; lines stand in the order of their names' places in `MEETING` and `ALONE`."""
+    points = {name: point for part in parts for name, point in part["points"].items()}
+    lines = {name: line for part in parts for name, line in part["lines"].items()}
+    order = [name for name in ("first", "middle", "last") if name in lines]
+    water = {"fluid": {"density": 1025, "current": [0.3, 0.1, 0]}}
+    time = {"time": {"duration": 2.0, "step": 0.05}, "output": {"every": 0.1, "points": 7}}
+    return {"environment": water, "points": points, "lines": {name: lines[name] for name in order}, **time} | tables
+
+
+def test_lines_that_meet_nothing_are_as_in_a_system_of_their_own() -> None:
+    """Between two lines that are joined, in the order of the scene, with books, extremes and the log of steps."""
+    both, meeting, alone = (hybrid.run(x) for x in (scene(MEETING, ALONE), scene(MEETING), scene(ALONE)))
+    for name, line in both.lines.items():
+        other = (alone if name == "middle" else meeting).lines[name]
+        for key in ("position", "velocity", "tension", "energy/kinetic", "work/drag", "work/end", "steps/end_force_end"):
+            scale = np.abs(other[key]).max()
+            assert scale > 0.0 and np.abs(line[key] - other[key]).max() <= 1e-9 * scale, (name, key)
+        for key, values in other.envelope.items():
+            scale = np.nanmax(np.abs(values))
+            assert np.allclose(line.envelope[key], values, rtol=1e-9, atol=1e-9 * scale, equal_nan=True), (name, key)
+        assert [x.kind for x in line.events] == [x.kind for x in other.events]
+
+
+def test_a_line_that_meets_nothing_and_fails_is_named() -> None:
+    """A slack catenary between lines that go on: the line, the time and the place are those of it alone."""
+    slack = scene(ALONE)["lines"]["middle"] | {"model": "catenary", "sections": [ROPE | {"length": 52}]}
+    plunge = {"heave": {"amplitude": 12.0, "period": 1.5}, "ramp": 0.5}
+    points = ALONE["points"] | {"ship": {"position": [10, 100, 0], "motion": plunge}}
+    part = {"points": points, "lines": {"middle": slack}}
+    found = []
+    for given in (scene(part), scene(MEETING, part)):
+        with pytest.raises(hybrid.ComputationError) as failed:
+            hybrid.run(given)
+        assert "middle" in str(failed.value)
+        found.append((failed.value.outcome, failed.value.t, failed.value.s))
+    assert found[0] == pytest.approx(found[1], rel=1e-6)
+
+
+def test_progress_is_told_at_every_output(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However few steps there are between two outputs, which cost more than steps: Ctrl-C is heard there too."""
+    monkeypatch.setattr(progress, "REPORT_EVERY", 0.0)
+    told: list[float] = []
+    every = scene(MEETING, output={"every": 0.05, "points": 7})
+    hybrid.run(every, progress=lambda x: told.append(x.t)).close()
+    assert np.allclose(np.unique(told)[-40:], np.arange(1, 41) * 0.05)
