@@ -429,6 +429,8 @@ class SystemRun:
                 if self.t >= stop:
                     self._arrive(stop, step)
                 self._between = bool(loop.counts[b.PHASE] in (b.BEGIN_STEP, b.END_STEP))
+                if code == b.PAUSED:
+                    loop.set_quota(LOOK if loop.counts[b.ASKS] else ROWS)
                 if code == b.PAUSED or self.t >= stop:
                     look()
 
@@ -447,8 +449,6 @@ class SystemRun:
             loop.clock[b.ALLOWED] = self.zones.longest
         elif self.failures.all:
             loop.counts[b.ASKS] |= b.ASK_STEPS
-        if loop.counts[b.QUOTA] <= 0:
-            loop.set_quota(LOOK if loop.counts[b.ASKS] else ROWS)
         if loop.attach(solver, self.state, self.other):
             for line, old, new in zip(self.lines, self.state.lines, self.other.lines, strict=True):
                 line.attach(solver, (old, new), loop.clock, loop.counts)

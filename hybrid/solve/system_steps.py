@@ -14,8 +14,8 @@ from hybrid.kernels.state import Floats, Moves
 from hybrid.kernels.step_law import FIRST, WARY
 from hybrid.kernels.system import book_system_step, solve_system
 from hybrid.kernels.system_run import CUT_LINE, LINE, blank_steps_job, run_system
+from hybrid.solve import run as one_line
 from hybrid.solve.joined import SystemState, SystemTaken
-from hybrid.solve.run import CELL_STEPS, ROWS, WAVES_OF_A_CELL
 from hybrid.solve.stepper import MOST_ITERATIONS, REACH
 from hybrid.solve.system import SystemSolver
 
@@ -52,7 +52,7 @@ class SystemSteps:
         counts[b.PARITY], self._states, self._solver = 0, (state, other), solver
         lines = len(solver.lines)
         if len(self.seen) != lines:
-            rows = max(16, min(ROWS, MOST_LOGGED // (lines * len(b.LOG))))
+            rows = max(16, min(one_line.ROWS, MOST_LOGGED // (lines * len(b.LOG))))
             self._log, self.seen = np.zeros((rows, lines, len(b.LOG))), np.zeros(lines, np.int64)
             counts[b.ROWS] = 0
         jobs = solver.take_turns(self._states)
@@ -86,8 +86,8 @@ class SystemSteps:
 
     def set_quota(self, most: int) -> None:
         """As many steps as interrupts and progress can wait for; most: as far as Python knows what they cost."""
-        cost = max(self._cells, 1) * (1.0 + self._waves / WAVES_OF_A_CELL)
-        self.counts[b.QUOTA] = max(1, min(ROWS, most, int(CELL_STEPS / cost)))
+        cost = max(self._cells, 1) * (1.0 + self._waves / one_line.WAVES_OF_A_CELL)
+        self.counts[b.QUOTA] = max(1, min(one_line.ROWS, most, int(one_line.CELL_STEPS / cost)))
 
     def go(self) -> int:
         """Go on until a code of kernels.books."""

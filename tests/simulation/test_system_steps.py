@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.simulation import progress
+from hybrid.simulation import progress, system_run
 
 ROPE = {"mass": 20.0, "diameter": 0.06, "axial_stiffness": 2e7, "drag": {"normal": 1.2}}
 HEAVE = {"heave": {"amplitude": 1.0, "period": 4.0}, "ramp": 4}
@@ -48,7 +48,15 @@ def test_lines_that_meet_nothing_are_as_in_a_system_of_their_own() -> None:
     both, meeting, alone = (hybrid.run(x) for x in (scene(MEETING, ALONE), scene(MEETING), scene(ALONE)))
     for name, line in both.lines.items():
         other = (alone if name == "middle" else meeting).lines[name]
-        for key in ("position", "velocity", "tension", "energy/kinetic", "work/drag", "work/end", "steps/end_force_end"):
+        for key in (
+            "position",
+            "velocity",
+            "tension",
+            "energy/kinetic",
+            "work/drag",
+            "work/end",
+            "steps/end_force_end",
+        ):
             scale = np.abs(other[key]).max()
             assert scale > 0.0 and np.abs(line[key] - other[key]).max() <= 1e-9 * scale, (name, key)
         for key, values in other.envelope.items():
@@ -79,3 +87,13 @@ def test_progress_is_told_at_every_output(monkeypatch: pytest.MonkeyPatch) -> No
     every = scene(MEETING, output={"every": 0.05, "points": 7})
     hybrid.run(every, progress=lambda x: told.append(x.t)).close()
     assert np.allclose(np.unique(told)[-40:], np.arange(1, 41) * 0.05)
+
+
+def test_progress_is_told_between_outputs_where_python_looks_at_every_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where something may break: every so many steps, though each of them returns."""
+    monkeypatch.setattr(progress, "REPORT_EVERY", 0.0)
+    told: list[int] = []
+    part = MEETING | {"lines": {name: x | {"break_at": {"tension": 1e9}} for name, x in MEETING["lines"].items()}}
+    hybrid.run(scene(part, output={"every": 2.0, "points": 7}), progress=lambda x: told.append(x.step)).close()
+    inside = [x for x in np.unique(told) if 0 < x < 40]
+    assert inside and np.diff([0, *inside, 40]).max() <= system_run.LOOK
