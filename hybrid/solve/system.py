@@ -112,16 +112,14 @@ class SystemSolver:
         self._functional, self.net = np.zeros(FUNCTIONAL), np.zeros((points, 3))
         unknowns = int((self.joints[:, 1] >= 0).sum()) + 3 * points + 6 * len(bodies)
         self._matrix = np.zeros((unknowns + 3, unknowns + 1))
-        blank = Table(blank_job())
+        blank = Table(blank_job)
         # Of each line two tables, as of the system: states that take turns lead from the one to the other and back.
         # Lines that are joined to nothing that moves with them are solved one by one: in tables with the task RUN.
         size, rows = blank.numbers.size, range(len(lines))
         self.lone = [k for k in rows if not self._contacts and max(lines[k].joints) < 0]
         self.joined = [k for k in rows if k not in self.lone]
-        self._numbers, self.lone_numbers = (
-            np.zeros((2, len(lines), size), np.int64),
-            np.zeros((len(self.lone), size), np.int64),
-        )
+        self._numbers = np.zeros((2, len(lines), size), np.int64)
+        self.lone_numbers = np.zeros((len(self.lone), size), np.int64)
         self._tables = [tuple(blank.again(x[k]) for x in self._numbers) for k in rows]
         self._lone_tables = {k: blank.again(x) for k, x in zip(self.lone, self.lone_numbers, strict=True)}
         self._joined_numbers, self._joined_tables = self._numbers, dict(enumerate(self._tables))
@@ -162,7 +160,7 @@ class SystemSolver:
             )  # fmt: skip
             if k in self._lone_tables:
                 self._lone_tables[k].bind(task=Task(RUN, limits=limits._replace(most=MOST_OF_STEP)))
-        self._touching = Table(blank_touching_job()), Table(blank_touching_job())
+        self._touching = Table(blank_touching_job), Table(blank_touching_job)
         self._at_rest = np.zeros(1, np.int64)
 
     def bind_line(self, number: int, **values: Any) -> None:
