@@ -23,6 +23,7 @@ def reported(
     energy: bool = True,
     errors: bool = False,
     not_converged: str = "",
+    asked: str = "",
     steps: bool = True,
     allowed: float | None = None,
     torque: float = 0.0,
@@ -39,7 +40,8 @@ def reported(
 
     Tension 10 kN (1 + s/100 + 0.1 sin(2 pi t / 10)): largest at the end, t = 2.5 s; dip: N taken away in the middle at
     t = 5 s; span: where output points are, m; curvature 0.02 1/m at s = 50 m, t = 2.5 s; rod from 40 to 60 m after half the time, with EI 2000 N m^2
-    and a diameter of 0.05 m; through: whether catenaries carry the torque as well.
+    and a diameter of 0.05 m; through: whether catenaries carry the torque as well; asked: quantities of which
+    an accuracy was asked.
     """
     s = np.linspace(*span, points)
     scalar: dict[str, str] = {"tension": "N", "curvature": "1/m"}
@@ -73,6 +75,7 @@ def reported(
         causes = {"mesh": 0.03, "time": 0.01, "model": 0.002, "total": 0.042}
         attributes |= {f"error_{k}_position": x for k, x in causes.items()}
         attributes |= {"errors_not_converged": not_converged} if not_converged else {}
+        attributes |= {"accuracy_asked": "5 %", "accuracy_quantities": asked} if asked else {}
         attributes |= {f"error_{k}_end_force": 1e3 * x for k, x in causes.items()}
     log = [
         Field("t", "s", "d"),

@@ -15,7 +15,7 @@ from hybrid.simulation.bounded_model_errors import bounded
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.errors_by_cause import Errors, summary
 from hybrid.simulation.free_vibrations import uncertain_by_vibrations
-from hybrid.simulation.refinement import END_FORCE, asked_text, not_asked_text, sizes_of
+from hybrid.simulation.refinement import END_FORCE, asked_quantities, asked_text, not_asked_text, sizes_of
 from hybrid.simulation.result_checks import damped_jolts, undersampled_end_forces
 from hybrid.simulation.run_sample import END_FORCES, RunSample, at_all_points, is_along
 from hybrid.store.amend import NOTHING_MORE, Happened, amend
@@ -73,6 +73,7 @@ def effort(scene: Scene, control: ErrorController, result: RunSample, cpu: float
         attributes["effort_zones"] = resolution.zones
     if control.asked is not None:
         attributes["accuracy_asked"] = asked_text(control.asked, result)
+        attributes["accuracy_quantities"] = asked_quantities(control.asked, result)
     return attributes
 
 

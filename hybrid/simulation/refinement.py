@@ -145,6 +145,11 @@ def asked_text(asked: RequestedAccuracy, run: RunSample) -> str:
     return asked.describe(run.reach if asked.of_motion is not None else None, used)
 
 
+def asked_quantities(asked: RequestedAccuracy, run: RunSample) -> str:
+    """Names of the quantities of which something is asked of a run, with commas between."""
+    return ",".join(dict.fromkeys(bound.name for bound in bounds_of(asked, run)))
+
+
 def not_asked_text(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> str:
     """That curvature or bending moment are not asked, where the error of one is more than a part; else empty."""
     for name in ("bending_moment", "curvature"):
@@ -157,20 +162,14 @@ def not_asked_text(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> 
     return ""
 
 
-def verdicts(
-    asked: RequestedAccuracy, errors: Sequence[Errors], run: RunSample, certain: bool
-) -> list[dict[str, str | float | bool | None]]:
-    """What is asked of each quantity, its error, the largest of several, and whether that is met; None: not verified.
-
-    errors: empty where they are not known; certain: whether nothing makes them doubtful.
-    """
-    out: list[dict[str, str | float | bool | None]] = []
+def figures(asked: RequestedAccuracy, errors: Sequence[Errors], run: RunSample) -> list[dict[str, str | float | None]]:
+    """What is asked of each quantity, and its error, the largest of several; errors: empty where they are not known."""
+    out: list[dict[str, str | float | None]] = []
     for bound in bounds_of(asked, run):
         known = bool(errors) and all(bound.name in x.fields.get("total", {}) for x in errors)
         error = max(_largest(x, "total", bound) for x in errors) if known else None
-        met = None if error is None else (certain or None) if error <= bound.size else False
         name = bound.name if bound.limit is None else bound.words
-        out.append({"quantity": name, "unit": bound.unit, "asked": bound.size, "error": error, "met": met})
+        out.append({"quantity": name, "of": bound.name, "unit": bound.unit, "asked": bound.size, "error": error})
     return out
 
 

@@ -48,14 +48,11 @@ from hybrid.simulation.refinement import (
     WORTH_WRITING,
     Free,
     costly,
+    figures,
     times_the_cost,
-    verdicts,
 )
 from hybrid.simulation.restore import refused, resolution_from, resolution_tree
-from hybrid.simulation.run_sample import (
-    NOT_ESTIMATED,
-    RunSample,
-)
+from hybrid.simulation.run_sample import RunSample
 from hybrid.simulation.system_checkpoint import kept_resolution
 from hybrid.simulation.system_model_errors import Stretches, as_rods, leaves_bending_out, rods_of, with_model_errors
 from hybrid.simulation.system_run import run_system, static_system
@@ -69,11 +66,6 @@ from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
 from hybrid.store.records import ERROR_ESTIMATE, not_converged_attribute
 
-# Events that make it uncertain whether an accuracy is met.
-DOUBTS = (
-    "error uncertain", "largest force uncertain", "windows uncertain", "several equilibria", "implausible",
-    NOT_ESTIMATED,
-)  # fmt: skip
 Samples = dict[str, RunSample]  # of the lines, by name
 
 
@@ -425,10 +417,8 @@ class SystemPasses:
             largest, notes[name] = known(scene, control, run, errors, happened[name])
             attributes[name] = {**effort(scene, control, run, cpu), **largest}
             if control.asked is not None:
-                kinds = {kind for kind, _ in (*notes[name], *((k, t) for t, k in happened[name]))}
                 of = [x.errors for x in control.statistics.values()] if control.irregular else [errors]
-                certain = not kinds & set(DOUBTS)
-                each = verdicts(control.asked, [x for x in of if x is not None], run, certain)
+                each = figures(control.asked, [x for x in of if x is not None], run)
                 attributes[name]["accuracy_verdicts"] = json.dumps(each)
         keys = {x for each in attributes.values() for x in each if x.startswith("error_")}
         of_all: dict[str, float | str] = {

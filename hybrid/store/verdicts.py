@@ -11,7 +11,8 @@ bends too mild.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -30,11 +31,13 @@ MET, MISSED = "met", "missed"
 BENDING = frozenset({"curvature", "bending_moment", "von_mises"})
 PULL = frozenset({"tension", "wall_tension", "von_mises", "end_force"})
 TORQUE = frozenset({"torque", "von_mises"})
+EVERY = frozenset({"position", "tension", "end_force", "curvature"})  # asked, by files that do not say of what
 ALL: frozenset[str] = frozenset()
 NOTE = "do what its note says"
 SHORTER = "a shorter time.step"
 # Kinds of events that make values doubtful: which of them (ALL: every one), and what to do.
-DOUBTS: dict[str, tuple[frozenset[str], str]] = {
+Doubtful = Mapping[str, tuple[frozenset[str], str]]
+DOUBTS: Doubtful = {
     "gains energy": (ALL, SHORTER),
     "implausible": (ALL, "check the units that the note names"),
     "error uncertain": (ALL, NOTE),
@@ -64,14 +67,11 @@ DOUBTS: dict[str, tuple[frozenset[str], str]] = {
     "envelope incomplete": (ALL, "compute it anew"),
 }
 # Of an equilibrium alone: a motion forgets it.
-AT_REST: dict[str, tuple[frozenset[str], str]] = {
+AT_REST: Doubtful = {
     "static friction neglected": (PULL, "initial: {kind: equilibrium, friction: settled}"),
 }
-# Of these an accuracy is not verified.
-UNCERTAIN = (
-    "error uncertain", "largest force uncertain", "windows uncertain", "several equilibria", "implausible",
-    "model error not estimated",
-)  # fmt: skip
+# Of an accuracy alone: nobody estimates a limit by windows.
+OF_ACCURACY: Doubtful = {"windows uncertain": (ALL, NOTE)}
 ESTIMATE = "`accuracy: 5%`, or `output: {errors: true}`, in the scene"
 FINER = "compare with a run of half the time.step and twice the mesh.cells"
 RESUME = "hybrid resume"
@@ -155,14 +155,14 @@ def asked_accuracy(result: Result) -> list[Asked]:
     each = json.loads(str(result.attributes.get("accuracy_verdicts", "[]")))
     beside = str(result.attributes.get("accuracy_not_asked", ""))
     if each:
-        of = [_asked(result, x["quantity"], x["unit"], x["asked"], x["error"], x["met"] is not False) for x in each]
+        keys = "quantity", "unit", "asked", "error"
+        of = [_asked(result, *(x[key] for key in keys), names={x.get("of", x["quantity"])}) for x in each]
         return [*of[:-1], of[-1]._replace(beside=beside)]
     if "accuracy_asked" not in result.attributes:
         return []
-    kinds = {event.kind for event in result.events}
     known = result.attributes.get("error_total_position")
-    text = str(result.attributes["accuracy_asked"])
-    return [_asked(result, text, "", None, known, "accuracy missed" not in kinds)._replace(beside=beside)]
+    text, names = (str(result.attributes.get(x, "")) for x in ("accuracy_asked", "accuracy_quantities"))
+    return [_asked(result, text, "", None, known, set(names.split(",")) - {""})._replace(beside=beside)]
 
 
 def doubt_of(result: Result, *names: str, s: Iterable[float] = ()) -> Doubt | None:
@@ -190,11 +190,14 @@ def _pending(result: Result) -> Doubt | None:
 # ---- doubts ---------------------------------------------------------------------------------------
 
 
-def _doubts(result: Result, names: frozenset[str], s: Floats) -> Iterator[Doubt]:
-    """What makes quantities doubtful, the worst first: events, errors that are not known."""
+def _doubts(result: Result, names: frozenset[str], s: Floats, more: Doubtful = MappingProxyType({})) -> Iterator[Doubt]:
+    """What makes quantities doubtful, the worst first: events, errors that are not known; more: kinds beside DOUBTS."""
+    kinds = {**DOUBTS, **more, **(AT_REST if len(result.times) == 1 else {})}
     rank = {kind: k for k, kind in enumerate(EVENTS_BY_WEIGHT)}
     for event in sorted(result.events, key=lambda e: (rank.get(e.kind, len(rank)), e.t)):
-        if (found := _of_event(result, event, names, s)) is not None:
+        if event.kind not in kinds or _is_harmless(event):
+            continue
+        if (found := _of_event(result, event, kinds[event.kind], names, s)) is not None:
             yield found
     unknown = not_converged_in(result.attributes)
     for name in sorted(names - {"torque", "von_mises", "wall_tension"}):
@@ -205,12 +208,11 @@ def _doubts(result: Result, names: frozenset[str], s: Floats) -> Iterator[Doubt]
             yield _pending(result) or Doubt(why, ESTIMATE)
 
 
-def _of_event(result: Result, event: Event, names: frozenset[str], s: Floats) -> Doubt | None:
-    """The doubt that an event casts on quantities at places s (n,) m; None: none."""
-    table = DOUBTS if len(result.times) > 1 or event.kind not in AT_REST else AT_REST
-    if event.kind not in table or _is_harmless(event):
-        return None
-    which, remedy = table[event.kind]
+def _of_event(
+    result: Result, event: Event, kind: tuple[frozenset[str], str], names: frozenset[str], s: Floats
+) -> Doubt | None:
+    """The doubt that an event of a kind (as in DOUBTS) casts on quantities at places s (n,) m; None: none."""
+    which, remedy = kind
     if event.kind == "unresolved bend" and _is_catenary(result, event):
         which = which | PULL  # what a catenary cuts off of a bend is missing in its tension
     if which and not which & names:
@@ -359,19 +361,19 @@ def _error_of_held(result: Result, x: Held, clearance: bool) -> float | None:
 # ---- accuracy -------------------------------------------------------------------------------------
 
 
-def _asked(result: Result, quantity: str, unit: str, asked: float | None, error: float | None, met: bool) -> Asked:
-    """The verdict on an accuracy; met: by its figure."""
+def _asked(
+    result: Result, quantity: str, unit: str, asked: float | None, error: float | None, names: set[str]
+) -> Asked:
+    """The verdict on an accuracy; names: the quantities that it is of, none: not known, and every doubt counts."""
 
     def of(verdict: str, why: str = "", remedy: str = "") -> Asked:
         return Asked(quantity, unit, asked, error, verdict, why, remedy)
 
     if error is None:
         return of(NOT_VERIFIED, *(unfinished(result) or _pending(result) or Doubt("its error is not estimated", NOTE)))
-    if not met:
+    if error > asked if asked is not None else any(event.kind == "accuracy missed" for event in result.events):
         return of(MISSED)
-    if (open_ := unfinished(result)) is not None:
-        return of(NOT_VERIFIED, *open_)
-    kinds = {event.kind for event in result.events}
-    for kind in (x for x in EVENTS_BY_WEIGHT if x in kinds and x in UNCERTAIN):
-        return of(NOT_VERIFIED, kind, DOUBTS.get(kind, (ALL, NOTE))[1])
-    return of(MET)
+    of_ends = {x for x in names if x.startswith("end_force")}
+    doubted = frozenset(names - of_ends | ({"end_force"} if of_ends else set()) or EVERY)
+    doubt = unfinished(result) or next(_doubts(result, doubted, np.zeros(0), OF_ACCURACY), None)
+    return of(MET) if doubt is None else of(NOT_VERIFIED, *doubt)

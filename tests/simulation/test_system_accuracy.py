@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +56,8 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
 
 
 def verdicts(line: hybrid.Result) -> dict[str, dict[str, Any]]:
-    return {x["quantity"]: x for x in json.loads(str(line.attributes["accuracy_verdicts"]))}
+    met = {"met": True, "missed": False, "not verified": None}
+    return {x.quantity: x._asdict() | {"met": met[x.verdict]} for x in line.verdicts().accuracy}
 
 
 def test_what_is_asked_is_judged_by_line_and_quantity(result: hybrid.Result) -> None:

@@ -17,7 +17,7 @@ from hybrid.cli.tables import errors_facts, extremes_facts, extremes_rows
 from hybrid.errors import EVENTS_BY_WEIGHT
 from hybrid.scene.study import Kept
 from hybrid.store.reader import Result
-from hybrid.store.verdicts import AT_REST, DOUBTS, UNCERTAIN, doubt_of
+from hybrid.store.verdicts import AT_REST, DOUBTS, OF_ACCURACY, doubt_of
 from hybrid.studies.collect import collected
 from hybrid.view.report_parts import verdict_html
 from hybrid.view.summary import facts_of
@@ -202,7 +202,7 @@ def test_verdicts_of_thirty_results(results: dict[tuple[str, str], Path]) -> Non
 
 
 def test_doubts_are_kinds_of_events() -> None:
-    assert {*DOUBTS, *AT_REST, *UNCERTAIN} <= set(EVENTS_BY_WEIGHT)
+    assert {*DOUBTS, *AT_REST, *OF_ACCURACY} <= set(EVENTS_BY_WEIGHT)
 
 
 def judged(**more: Any) -> Iterator[Any]:
@@ -222,6 +222,35 @@ def test_an_event_that_casts_doubts_leaves_a_limit_open(kind: str) -> None:
         return
     assert found.verdict == "not verified" and kind in found.why and found.remedy and found.used is None
     assert np.isnan(found.margin)
+
+
+@pytest.mark.parametrize("kind", sorted({**DOUBTS, **OF_ACCURACY}))
+def test_no_accuracy_is_met_of_what_an_event_makes_doubtful(kind: str) -> None:
+    """Of each quantity asked that the event is of, and of no other; said alike in Python, terminal and report."""
+    text = "moment and tangent at ends.end: no" if kind == "ignored" else "it is so"
+    for name in ("position", "tension", "end_force_end", "curvature"):
+        result = reported(errors=True, rod=True, asked=name, events=[(8.0, 50.0, 50.0, kind, text)])
+        (found,) = result.verdicts().accuracy
+        which = {**DOUBTS, **OF_ACCURACY}[kind][0]
+        doubted = not which or name.removesuffix("_end") in which
+        assert found.verdict == ("not verified" if doubted else "met"), (name, found)
+        assert errors_facts(result)["met"] is (None if doubted else True)
+        assert (kind in found.why) == bool(found.remedy) == doubted
+        (fact,) = [x for x in facts_of(result) if x.key == "errors"]
+        assert fact.text.endswith(f": {found.text}.")
+
+
+def test_no_accuracy_is_met_of_what_nobody_estimated() -> None:
+    """The bending moment has no error here, curvature one that does not converge; a file that does not say of what."""
+    (found,) = reported(errors=True, asked="position,bending_moment").verdicts().accuracy
+    assert found.verdict == "not verified" and found.why == "the error of bending moment is not estimated"
+    (found,) = reported(errors=True, asked="curvature", not_converged="curvature").verdicts().accuracy
+    assert found.verdict == "not verified" and "does not converge" in found.why
+    (found,) = reported(errors=True, asked="position", not_converged="curvature").verdicts().accuracy
+    assert found.verdict == "met"
+    jumps = [(2.0, 50.0, 50.0, "snap", "it is so")]
+    (found,) = reported(errors=True, asked=",", events=jumps).verdicts().accuracy
+    assert found.verdict == "not verified" and "snap" in found.why
 
 
 def test_what_bends_where_no_radius_is_allowed_casts_no_doubt() -> None:
