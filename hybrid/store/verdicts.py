@@ -156,13 +156,13 @@ def asked_accuracy(result: Result) -> list[Asked]:
     beside = str(result.attributes.get("accuracy_not_asked", ""))
     if each:
         keys = "quantity", "unit", "asked", "error"
-        of = [_asked(result, *(x[key] for key in keys), names={x.get("of", x["quantity"])}) for x in each]
+        of = [_asked(result, {x.get("of", x["quantity"])}, *(x[key] for key in keys)) for x in each]
         return [*of[:-1], of[-1]._replace(beside=beside)]
     if "accuracy_asked" not in result.attributes:
         return []
     known = result.attributes.get("error_total_position")
     text, names = (str(result.attributes.get(x, "")) for x in ("accuracy_asked", "accuracy_quantities"))
-    return [_asked(result, text, "", None, known, set(names.split(",")) - {""})._replace(beside=beside)]
+    return [_asked(result, set(names.split(",")) - {""}, text, "", None, known)._replace(beside=beside)]
 
 
 def doubt_of(result: Result, *names: str, s: Iterable[float] = ()) -> Doubt | None:
@@ -362,7 +362,7 @@ def _error_of_held(result: Result, x: Held, clearance: bool) -> float | None:
 
 
 def _asked(
-    result: Result, quantity: str, unit: str, asked: float | None, error: float | None, names: set[str]
+    result: Result, names: set[str], quantity: str, unit: str, asked: float | None, error: float | None
 ) -> Asked:
     """The verdict on an accuracy; names: the quantities that it is of, none: not known, and every doubt counts."""
 
