@@ -75,6 +75,8 @@ def history_of(result: Result, name: str, times: Window | None = None, at: Any =
     if not dims or dims[0] not in ("t", "steps/t") or not np.issubdtype(np.asarray(values).dtype, np.number):
         raise ResultError(f"'{name}' is no history: its dimensions are ({', '.join(dims)})\n    try:      tension")
     t, s = np.asarray(result[dims[0]]), None
+    if t.size < 2 and result.status != "complete":
+        raise ResultError(_nothing_yet(result))
     if dims[1:] == ("s",):
         s, values = result.both_sides(stored)
         if at is not None:
@@ -88,6 +90,16 @@ def history_of(result: Result, name: str, times: Window | None = None, at: Any =
         raise ResultError(f"no value of '{name}' lies between t = {a:g} and {b:g} s\n    expected: a window in {over}")
     basis = "every step" if dims[0] == "steps/t" else "every output"
     return History(name, result.units[stored], t[inside], np.asarray(values)[inside], s, basis)
+
+
+def _nothing_yet(result: Result) -> str:
+    """That a run was stopped before there was a history, and what to do."""
+    name = result.file.name if result.file else "the file"
+    fix = f"`hybrid resume {name}` goes on" if len(result.times) else "`hybrid run` of its scene, from its start"
+    return (
+        f"the run was stopped before its first output, or still runs: there is no history yet ({result.status_text})\n"
+        f"    try:      {fix}; a shorter output.every keeps more of a run that is stopped"
+    )
 
 
 def summary_of(history: History) -> moments.Summary:

@@ -348,19 +348,22 @@ class Result(Histories):
 
     @property
     def pending(self) -> str:
-        """What is still to come of a complete result, and the one thing to do, in words; empty: nothing is.
+        """What is still to come of a result, and the one thing to do, in words; empty: nothing is.
 
-        The result comes first, and its errors and finer results after it, unless the run is stopped in between.
+        The result comes first, and its errors and finer results after it, unless the run is stopped in between, or
+        before.
         """
         pending = str(self.attributes.get(PENDING, ""))
-        if not pending or self.status != "complete":
+        if not pending:
             return ""
         what = "its errors are not estimated yet"
         if pending == FINER_RESULT:
             what = "the finer result that its accuracy asks for is not computed yet"
+        if self.status == "failed":  # what to do stands in the message
+            return what
         name = self._source.name if isinstance(self._source, Path) else "the file"
-        fix = f"`hybrid resume {name}` makes up for it"
-        if len(self.times) < 2:
+        fix = f"`hybrid resume {name}` {'makes' if self.status == 'complete' else 'goes on, and makes'} up for it"
+        if self.status == "complete" and len(self.times) < 2:
             fix = "`hybrid static` of its scene, which is computed anew, makes up for it"
         return f"{what}; {fix}"
 

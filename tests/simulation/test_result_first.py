@@ -163,11 +163,28 @@ def test_stopped_before_the_result_nothing_is_there(tmp_path: Path, monkeypatch:
     assert not list(tmp_path.iterdir())
 
 
-def test_stopped_in_the_result_what_there_is_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stopped_in_the_result_what_there_is_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It says that the run has not come to its end, and that its errors are to come, wherever one looks."""
+    monkeypatch.chdir(tmp_path)
     Stopping(monkeypatch)
     stopped_in(RESULT, asked(), tmp_path / "run.h5")
     with hybrid.open(tmp_path / "run.h5") as result:
-        assert result.status == "interrupted" and not result.pending
+        assert result.status == "interrupted" and ERRORS in result.pending and not result.done
+        assert "`hybrid resume run.h5` goes on" in result.pending and result.pending in result.status_text
+        assert result.pending in " ".join(hybrid.export(result, "run.csv").notes)
+    told = CliRunner().invoke(app, ["stats", "run.h5"])  # it was stopped in its first step
+    assert told.exit_code == 1 and "window" not in told.output
+    assert "stopped before its first output" in told.output and ERRORS in told.output
+    assert "`hybrid resume run.h5` goes on; a shorter output.every" in " ".join(told.output.split())
+    console = Console(False, False)
+    console.will_write(tmp_path / "no.h5")
+    console._file = tmp_path / "run.h5"
+    capsys.readouterr()
+    console.interrupted()
+    text = capsys.readouterr().err
+    assert "complete up to t" in text and f"{ERRORS}; `hybrid resume {tmp_path / 'run.h5'}` goes on" in text
     hybrid.resume(tmp_path / "run.h5").close()
     hybrid.run(asked(), tmp_path / "whole.h5").close()
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from reported import reported
 
 import hybrid
 from hybrid.cli.commands import main
@@ -138,6 +139,18 @@ def test_damage_along_the_line(result: hybrid.Result) -> None:
 def test_what_cannot_be_is_refused_in_words(result: hybrid.Result, ask: object, text: str) -> None:
     with pytest.raises((ResultError, KeyError, AttributeError), match=text):
         ask(result)  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("outputs", [0, 1])
+def test_a_run_that_was_stopped_before_its_first_output_has_no_history(outputs: int) -> None:
+    stopped = reported(outputs=outputs, status="running", steps=False)
+    fix = "hybrid resume the file` goes on" if outputs else "`hybrid run` of its scene"
+    with pytest.raises(ResultError, match=rf"(?s)stopped before its first output.*{fix}.*output\.every"):
+        stopped.statistics(["tension"])
+    with pytest.raises(ResultError, match="stopped before its first output"):
+        stopped.damage("D sea", strength=1e6)
+    with pytest.raises(ResultError, match="one value is too few"):
+        reported(outputs=1).statistics(["tension"])
 
 
 def test_both_sides_of_a_jump_are_counted() -> None:
