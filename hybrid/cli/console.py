@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import hybrid
-from hybrid.cli.grid import Grid
+from hybrid.cli.grid import Grid, Trimmed
 from hybrid.cli.pipe import reader_has_gone
 from hybrid.cli.progress_line import LINE_EVERY, ProgressLine, span
 from hybrid.errors import EXPECTED, is_of_the_run, weight_of_event
@@ -113,7 +113,7 @@ class Console:
             if isinstance(text, str) and all(len(x) <= columns and x.isprintable() for x in text.splitlines()):
                 sys.stdout.write(f"{text}\n")  # rich, which takes long to import, has nothing to do
             else:
-                self._out.print(made.table() if isinstance(made, Grid) else made)
+                self._out.print(Trimmed(made.table() if isinstance(made, Grid) else made))
 
     def _tell(self, text: str, style: str, wrap: bool = False) -> None:
         """A line of the error stream; in colour, and wrapped between words, where somebody reads it."""

@@ -339,7 +339,10 @@ class Kinds:
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         tables = handler(schema)
         descriptions = [handler.resolve_ref_schema(arm) for arm in tables.get("oneOf") or tables.get("anyOf") or []]
-        bare = [table for table in descriptions if not {"required", "anyOf"} & table.keys()]
+        for table in descriptions:  # a kind that no other key tells has to be given
+            if table["properties"]["kind"]["const"] not in {kind for _, kind in self.implied}:
+                table["required"] = ["kind", *(x for x in table.get("required", ()) if x != "kind")]
+        bare = [x for x in descriptions if not {*x.get("required", ())} - {"kind"} and "anyOf" not in x]
         alone = [table["properties"]["kind"]["const"] for table in bare]
         if not alone:  # every kind needs more than its name
             return tables

@@ -1,6 +1,11 @@
 """Rows of the closing tables: what stands beside the error of the bending moment."""
 
+import pytest
+from rich.table import Table
+
 import hybrid
+from hybrid.cli.console import Console
+from hybrid.cli.grid import Grid
 from hybrid.cli.tables import _largest_moment
 
 CABLE = {"sections": [{"length": 2.2, "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 0.5}]}
@@ -31,3 +36,19 @@ def test_a_rod_without_that_output_says_so() -> None:
     )
     said = _largest_moment(Lacking(result))  # type: ignore[arg-type]
     assert said == "the moment is not among the outputs"
+
+
+def test_lines_of_tables_end_without_blanks(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those that rich wraps too, whose cells it fills up, and tables of its own."""
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("name")
+    table.add_column("value")
+    table.add_row("a", "1")
+    table.add_row("b", "")
+    monkeypatch.setenv("COLUMNS", "40")
+    for content in (Grid([("short", "a text that has to be wrapped here", "x"), ("name", "y", "")], "below"), table):
+        Console(False, False).show(lambda content=content: content)
+        lines = capsys.readouterr().out.splitlines()
+        assert len(lines) >= 3 and lines == [x.rstrip() for x in lines]

@@ -149,6 +149,19 @@ def test_json_schema_describes_every_field() -> None:
     assert len(tables) > 25 and lacking == []
 
 
+def test_a_kind_that_no_other_key_tells_is_required() -> None:
+    """In the schema, by which editors check and docs/scene.md is made, as by the program; and no other is."""
+    tables = Scene.model_json_schema()["$defs"]
+    given = {
+        name: "kind" in table.get("required", ()) for name, table in tables.items() if "kind" in table["properties"]
+    }
+    assert given["RegularWaves"] and given["JonswapWaves"] and given["Float"] and given["Pinned"]
+    assert not given["PowerLawCurrent"] and not given["AdaptiveModel"]
+    sea = "environment: {fluid: {density: 1025, surface: 0, waves: {height: 1, period: 8}}}\n"
+    with pytest.raises(SceneError, match="one of: regular, jonswap"):
+        parse_scene(sea + AT_REST)
+
+
 # --- text that is not a scene ------------------------------------------------------------------
 
 NOT_YAML = {
