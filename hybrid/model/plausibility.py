@@ -13,9 +13,11 @@ from typing import NamedTuple
 
 from hybrid.model.sea import current_table
 from hybrid.model.sections import bending_stiffness, weight
+from hybrid.scene.attachments import Float
 from hybrid.scene.motion_tables import SHIFTS
 from hybrid.scene.schema import Scene, Section
 
+G = 9.81  # m/s^2
 # Mean densities of real cables, kg/m^3, with room: from hollow and foamed to solid heavy metal.
 DENSITIES = (50.0, 25_000.0)
 # Fluids, kg/m^3: gases, and liquids from oil to heavy brine.
@@ -33,8 +35,18 @@ STIFFEST, FASTEST_WAVE = 1.2e13, 1e5
 # Of metal all through, by mean density, kg/m^3, and speed of tension waves in it, m/s: in wire ropes, spiral strands
 # and chains it is 2000 to 4000 m/s and in solid steel 5000, so that with a stiffness in kN it is 60 to 160.
 METAL, SLOWEST_IN_METAL = 4000.0, 180.0
-# Speed of tension waves in the softest rubber cord, m/s: 1 MPa and 1000 kg/m^3 are 32 m/s.
-SLOWEST_WAVE = 10.0
+# Speed of tension waves in the softest rubber cord, m/s: 1 MPa and 1000 kg/m^3 are 32 m/s.  In the softest line that
+# is meant for the strains of fibres and metal, as every section without a max_strain is: 130 m/s in hoses of rubber,
+# 300 m/s and more in nylon.
+SLOWEST_WAVE, SLOWEST_UNSAID = 10.0, 60.0
+# Own length, m, whose weight in air a line bears at least: hoses bear some 100 m, umbilicals and chains 400 to 3000 m,
+# ropes 5 km and more, and a thousandth of that where it is in kN.
+SHORTEST_BORNE = 5.0
+# Diameters of the smallest bend: a line is bent by no less than half of one about itself; steel pipes bear 250 without
+# yielding, cables and umbilicals 5 to 60, and 5000 where it is in mm.
+SHARPEST, MILDEST = 0.5, 2000.0
+# Of a float: part of its weight that lifts at least, and how many times the mass of its line it has at most.
+LEAST_LIFT, HEAVIEST_FLOAT = 0.01, 1000.0
 # EI over EA d^2: a thin-walled tube of diameter d has 1/8, and no section more; spiral strands and umbilicals have
 # 0.001 to 0.06, and a thousand times that where EA is in kN.
 STIFFEST_BENDING = 1.0
@@ -60,9 +72,16 @@ def implausible(scene: Scene) -> Iterator[Note]:
     whole = (0.0, scene.length)
     for what, why in (*_water(scene), *_bed(scene), *_motions(scene)):
         yield Note(what, why, whole)
+    for at, what, why in _floats(scene):
+        yield Note(what, why, (at, at))
     begins = accumulate((x.length for x in scene.cable.sections), initial=0.0)
     for i, (section, begin) in enumerate(zip(scene.cable.sections, begins, strict=False)):
-        for what, key, why in (*_material(section), *_stiffness(section), *_use(section, scene)):
+        for what, key, why in (
+            *_material(section),
+            *_stiffness(section),
+            *_limits(section),
+            *_use(section, scene),
+        ):
             yield Note(what, f"cable.sections[{i}].{key}: {why}", (begin, begin + section.length))
 
 
@@ -157,10 +176,12 @@ def _stiffness(section: Section) -> Iterator[Wrong]:
         return
     wave = math.sqrt(axial / section.mass)  # m/s
     metal = section.diameter is not None and section.mass / _area(section) > METAL
-    slowest = SLOWEST_IN_METAL if metal else SLOWEST_WAVE
+    unsaid = section.max_strain is None and section.tension_strain is None
+    slowest = SLOWEST_IN_METAL if metal else SLOWEST_UNSAID if unsaid else SLOWEST_WAVE
     if wave < slowest:
-        least, made = section.mass * slowest**2, "metal" if metal else "any rubber or fibre"
+        least, made = section.mass * slowest**2, "metal" if metal else "hose or fibre" if unsaid else "any rubber"
         why = f"expected more than {least:.3g} N of {section.mass:g} kg/m of {made}: is it in kN? then {1e3 * axial:g}"
+        why += "; rubber that stretches so has a max_strain" if unsaid and not metal else ""
         yield f"an axial stiffness of {axial:.3g} N, soft for its mass", key, why
     modulus = axial / _area(section) if section.diameter else 0.0
     if modulus > STIFFEST or wave > FASTEST_WAVE:
@@ -197,6 +218,38 @@ def _of_a_pipe(section: Section) -> Iterator[Wrong]:
                 f"expected {low:.3g} to {high:.3g} {unit}: is it in k{unit}? or check pipe.wall (m), pipe.modulus (Pa)"
             )
             yield what, key, why
+
+
+def _limits(section: Section) -> Iterator[Wrong]:
+    """Limits that no line has: less tension than a few metres of it weigh, bends for which it is too thick or thin."""
+    least = SHORTEST_BORNE * section.mass * G
+    if section.max_tension is not None and section.max_tension < least:
+        why = f"expected more than {least:.3g} N, the weight of {SHORTEST_BORNE:g} m of it in air: is it in kN? then "
+        yield f"a largest tension of {section.max_tension:g} N", "max_tension", f"{why}{1e3 * section.max_tension:g}"
+    radius = section.min_bend_radius
+    if radius is not None and section.diameter:
+        low, high = (x * section.diameter for x in (SHARPEST, MILDEST))
+        if not low <= radius <= high:
+            unit = f"mm? then {1e-3 * radius:g}" if radius > high else f"km? then {1e3 * radius:g}"
+            why = f"expected {low:.3g} to {high:.3g} m with a diameter of {section.diameter:g} m: is it in {unit}"
+            yield f"a smallest bend radius of {radius:g} m", "min_bend_radius", why
+
+
+def _floats(scene: Scene) -> Iterator[tuple[float, str, str]]:
+    """Floats that weigh far more than they lift, or than their line does: where, what, and why."""
+    fluid, gravity = scene.environment.fluid, scene.environment.gravity
+    line = sum(x.mass * x.length for x in scene.cable.sections)
+    for i, x in enumerate(scene.cable.attachments):
+        if not isinstance(x, Float) or fluid is None or not x.mass:
+            continue
+        lift = (x.volume_in(fluid.density, gravity) * fluid.density - x.mass) * gravity
+        most = HEAVIEST_FLOAT * line
+        if x.mass > most or (gravity > 0.0 and lift < LEAST_LIFT * x.mass * gravity):
+            if gravity > 0.0:
+                most = min(most, max(lift, 0.0) / (LEAST_LIFT * gravity))
+            why = f"expected at most {most:.3g} kg of what lifts {lift:.3g} N on a line of {line:.3g} kg: is it in g?"
+            fix = f" then {1e-3 * x.mass:g}; or is buoyancy in N, volume in m^3?"
+            yield x.at, f"a float of {x.mass:g} kg", f"cable.attachments[{i}].mass: {why}{fix}"
 
 
 def _use(section: Section, scene: Scene) -> Iterator[Wrong]:

@@ -66,6 +66,11 @@ SECTIONS = {
     "EA in mN": (CHAIN | {"axial_stiffness": 8.5e10 * 10}, "axial_stiffness", "is it in N?"),
     "EA of a light rope in N, its weight in kN": (
         {"mass": 0.5, "diameter": 0.025, "axial_stiffness": 20.0}, "axial_stiffness", "in kN? then 20000"),
+    "EA of a light rope in kN, at rest in water": (
+        {"mass": 0.1, "diameter": 0.012, "axial_stiffness": 200.0}, "axial_stiffness", "in kN? then 200000"),
+    "largest tension in kN": (CHAIN | {"max_tension": 900.0}, "max_tension", "in kN? then 900000"),
+    "bend radius in mm": (CHAIN | {"min_bend_radius": 5000.0}, "min_bend_radius", "in mm? then 5"),
+    "bend radius in km": (CHAIN | {"min_bend_radius": 0.005}, "min_bend_radius", "in km? then 5"),
     "EI in N mm2": (CHAIN | {"bending_stiffness": 50e6}, "bending_stiffness", "in N mm^2"),
     "EI of a pipe in kN m2": (PIPE | {"bending_stiffness": 9e4}, "bending_stiffness", "kN m^2"),
     "EA of a pipe in kN": (PIPE | {"axial_stiffness": 5e6}, "axial_stiffness", "kN"),
@@ -82,6 +87,26 @@ def test_a_section_in_a_wrong_unit_is_noted_at_its_place(name: str) -> None:
     assert len(notes) >= 1, list(implausible(scene(section)))
     assert any(words in x.why for x in notes), notes
     assert all(x.s == (50.0, 250.0) for x in notes)
+
+
+FLOATS = {
+    "mass in g": ({"buoyancy": 2000.0, "mass": 1e6}, "at most 2.04e+04 kg"),
+    "mass of a heavy one in g": ({"volume": 1e4, "mass": 6e6}, "at most 5e+06 kg"),
+    "buoyancy in kN": ({"buoyancy": 2.0, "mass": 150.0}, "is buoyancy in N"),
+}
+
+
+@pytest.mark.parametrize("name", FLOATS)
+def test_a_float_in_a_wrong_unit_is_noted_at_its_place(name: str) -> None:
+    given, words = FLOATS[name]
+    sections = {"sections": [{"length": 50.0} | CHAIN, {"length": 200.0} | CHAIN]}
+    for x, expected in ((given, 1), ({"buoyancy": 2000.0, "mass": 150.0}, 0), ({"buoyancy": 50.0, "mass": 150.0}, 0)):
+        cable = sections | {"attachments": [{"kind": "float", "at": 120.0} | x]}
+        notes = list(implausible(scene(cable=cable)))
+        assert len(notes) == expected, notes
+        for note in notes:
+            assert words in note.why and note.why.startswith("cable.attachments[0].mass: expected")
+            assert note.s == (120.0, 120.0)
 
 
 SURROUNDINGS = {
@@ -184,6 +209,11 @@ REAL = {
     "steel riser": {"mass": 160.0, "diameter": 0.4, "axial_stiffness": 5e9, "bending_stiffness": 9e7},
     "tether": {"mass": 0.6, "diameter": 0.025, "axial_stiffness": 1e6, "bending_stiffness": 1.0},
     "carbon rod": {"mass": 0.8, "diameter": 0.025, "axial_stiffness": 8e7, "bending_stiffness": 3e3},
+    "power cable": {"mass": 40.0, "diameter": 0.13, "axial_stiffness": 3e8, "max_tension": 6e4, "min_bend_radius": 2.5},
+    "pipe on a reel": {"mass": 70.0, "diameter": 0.2, "axial_stiffness": 1.5e9, "bending_stiffness": 7e6,
+                       "max_tension": 2e6, "min_bend_radius": 49.0},
+    "fibre optic cable": {"mass": 8e-3, "diameter": 3e-3, "axial_stiffness": 5e4, "max_tension": 100.0,
+                          "min_bend_radius": 0.03},
     "fishing line": {"mass": 4e-4, "diameter": 7e-4, "axial_stiffness": 800.0},
 }  # fmt: skip
 
