@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybrid.cli.progress_line import span
 from hybrid.kernels.forces import FORCES
+from hybrid.model.self_reach import WHERE_NEAR
 from hybrid.store.hockling import kink_torque
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def plan_lines(scene: Scene, plan: Plan) -> list[str]:
         "mesh": _mesh(plan),
         "payout": _payout(plan),
         "forces": _forces(on),
+        "contact": _contact(on),
         "hockling": _hockling(plan),
         "time": _steps(scene.time, plan, bool(scene.contact.self)),
         "runs": _runs(plan),
@@ -80,6 +82,7 @@ def system_plan_lines(system: System, plan: SystemPlan) -> list[str]:
         "bodies": ", ".join(f"{name} ({body.kind})" for name, body in system.bodies.items()),
         "mesh": f"{_count(plan.cells, 'cell')}, {plan.unknowns} unknowns",
         "forces": _forces(on),
+        "contact": _contact(on),
         "time": _steps(system.time, plan),
         "runs": _runs(max(every, key=lambda x: x.most_runs)),
         "accuracy": _accuracy(on),
@@ -113,6 +116,12 @@ def _table(rows: Mapping[str, str]) -> list[str]:
 
 def _forces(on: Mapping[str, str]) -> str:
     return ", ".join(SHORT.get(name, name) for name in ("gravity", "buoyancy", *FORCES) if name in on)
+
+
+def _contact(on: Mapping[str, str]) -> str:
+    """Why a line may touch itself where nobody asks for it, and what that costs."""
+    why = on.get("contact of the line with itself", "")
+    return f"of the line with itself, {why}" if why.startswith(WHERE_NEAR) else ""
 
 
 def _accuracy(on: Mapping[str, str]) -> str:

@@ -116,13 +116,15 @@ class ProgressLine:
         time = f"{p.t:{widest}.{places}f} / {p.duration:.8g} s"
         step, rate, left = f"step {p.step:<5d}", self._speed(p), _left(p.seconds_left)
         which = [f"run {p.run} of {p.runs}: {p.name}"] if p.runs > 1 else []
+        touches = ["contact with itself"] if p.touches else []
         for zones, newton, real in (
             (40, " Newton", " x real time"),
             (18, " Newton", " x real time"),
             (18, " it", " x"),
         ):
-            yield [*which, time, step, f"{p.iterations:2d}{newton}", zones_in_short(p.zones, zones), rate + real, left]
-        yield [*which, time, step, rate + " x", left]
+            kinds = zones_in_short(p.zones, zones)
+            yield [*which, time, *touches, step, f"{p.iterations:2d}{newton}", kinds, rate + real, left]
+        yield [*which, time, *touches, step, rate + " x", left]
         yield [*which, time, left]
         yield [time, left]
         yield [time]

@@ -17,6 +17,7 @@ from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, ResultError
 from hybrid.kernels.books import OUTPUT
 from hybrid.kernels.criteria import CRITERIA
+from hybrid.kernels.forces import SELF_CONTACT
 from hybrid.kernels.state import Floats, State
 from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model, build
@@ -503,7 +504,8 @@ class Case:
 
     def _report(self, run: Transient, finished: bool) -> None:
         if self.progress.heard:
-            self.progress(run.t, run.steps, run.iterations, run.model.zones, finished)
+            touches = bool(run.model.line.bits & SELF_CONTACT)
+            self.progress(run.t, run.steps, run.iterations, run.model.zones, finished, touches)
 
 
 def doubt_of(run: Transient) -> Floats:

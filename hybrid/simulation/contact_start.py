@@ -41,9 +41,10 @@ def begin_contact(moving: Transient) -> None:
     model = replace(model, line=touching(model.line, moving.scene.contact.friction))
     moving.set_model(model, state)
     moving.stepper.work.u[:] = 0.0
-    watch.begins()
     assert moving.run.contact is not None
-    if within_itself(moving.run.contact, model):
+    within = within_itself(moving.run.contact, model)
+    watch.begins(moving.t, model, None if within or moving.envelope is None else moving.events.event)
+    if within:
         end_contact(moving)
         watch.waits()
         if moving.envelope is not None and moving.steps:

@@ -23,6 +23,7 @@ from hybrid.simulation.notebook_progress import NotebookBar, in_notebook, notebo
 
 PRE_RUN, ESTIMATION, RESULT, REFINEMENT = "mesh pre-run", "error estimation", "result", "refinement"
 
+CONTACT = "contact with itself"
 COMPILING = "compiling the kernels for this machine (first use only, 5 to 40 s) ..."
 REPORT_EVERY = 0.1  # s of wall time between two calls of a listener
 # The speed of the last so many reports (about 5 s) gives the time left: the compilation of the first step, or a slow
@@ -37,7 +38,8 @@ class Progress:
     t, duration: s, of the present pass; step: its number; iterations: of Newton's method in the last step; zones;
     wall: s since the first report.  run, runs: number of the present pass, from 1, and of all that are expected; name:
     what it is for, one of PRE_RUN, ESTIMATION, RESULT, REFINEMENT.  fraction: part that is done of all passes, 0 to 1;
-    seconds_left: s of wall time that all of them still take, None while that is not known.
+    seconds_left: s of wall time that all of them still take, None while that is not known.  touches: whether contact of
+    a line with itself is computed, which makes steps dear.
     """
 
     t: float
@@ -51,13 +53,15 @@ class Progress:
     name: str = RESULT
     fraction: float = 0.0
     seconds_left: float | None = None
+    touches: bool = False
 
     @property
     def text(self) -> str:
         """One line for people."""
         which = f"run {self.run} of {self.runs}: {self.name}, " if self.runs > 1 else ""
         left = f", {self.seconds_left:.2g} s left" if self.seconds_left is not None else ""
-        return f"{which}t = {self.t:.4g} of {self.duration:g} s, {100 * self.fraction:.0f} % done{left}"
+        contact = f", {CONTACT}" if self.touches else ""
+        return f"{which}t = {self.t:.4g} of {self.duration:g} s, {100 * self.fraction:.0f} % done{contact}{left}"
 
 
 Listener = Callable[[Progress], None]
@@ -95,7 +99,7 @@ class ProgressReporter:
         self._name, self._run, self._begun = RESULT, 0, 0  # the present pass, its number, and passes that have begun
         self._owner, self._lock = threading.get_ident(), threading.Lock()
         self._beside: dict[int, tuple[float, float]] = {}  # last passes of other threads: cost, and how much is done
-        self._where: tuple[float, int, int, tuple[Zone, ...]] = (0.0, 0, 0, ())  # in the present pass
+        self._where: tuple[float, int, int, tuple[Zone, ...], bool] = (0.0, 0, 0, (), False)  # in the present pass
         self._done, self._cost = 0.0, 0.0  # of passes that have ended, of the present one
         self._begin: float | None = None  # s of the clock, at the first report
         self._last = -REPORT_EVERY  # s of wall time, of the last report
@@ -130,15 +134,23 @@ class ProgressReporter:
                 self._done += sum(whole for whole, _ in self._beside.values())
                 self._beside.clear()
             self._done, self._cost = self._done + self._cost, cost
-            self._name, self._run, self._where = name, self._begun, (0.0, 0, 0, ())
+            self._name, self._run, self._where = name, self._begun, (0.0, 0, 0, (), False)
 
-    def __call__(self, t: float, step: int, iterations: int, zones: tuple[Zone, ...], finished: bool = False) -> None:
-        """A step has ended at t (s); finished: the last of its pass."""
+    def __call__(
+        self,
+        t: float,
+        step: int,
+        iterations: int,
+        zones: tuple[Zone, ...],
+        finished: bool = False,
+        touches: bool = False,
+    ) -> None:
+        """A step has ended at t (s); finished: the last of its pass; touches: as of `Progress`."""
         if self._listener is None:
             return
         here = threading.get_ident()
         if here == self._owner:
-            self._where = t, step, iterations, zones
+            self._where = t, step, iterations, zones, touches
             self._report(finished)
         else:
             with self._lock:
@@ -159,7 +171,7 @@ class ProgressReporter:
         if not finished and wall - self._last < REPORT_EVERY:
             return
         self._last = wall
-        t, step, iterations, zones = self._where
+        t, step, iterations, zones, touches = self._where
         with self._lock:
             costs, parts = (sum(x) for x in zip((0.0, 0.0), *self._beside.values(), strict=True))
             total = self._done + self._cost + costs + sum(cost for _, cost in self._expected)
@@ -172,7 +184,9 @@ class ProgressReporter:
         rate = (fraction - earlier) / (wall - before) if wall > before else 0.0
         left = (1.0 - fraction) / rate if rate > 0.0 else None
         self._listener(
-            Progress(t, self._duration, step, iterations, zones, wall, self._run, runs, self._name, fraction, left)
+            Progress(
+                t, self._duration, step, iterations, zones, wall, self._run, runs, self._name, fraction, left, touches
+            )
         )
 
 

@@ -50,6 +50,7 @@ from hybrid.kernels.self_distance import (
 )
 from hybrid.kernels.state import Floats, State, Work, state_for
 from hybrid.model.build import Model
+from hybrid.model.self_reach import COST
 from hybrid.scene.schema import Scene
 from hybrid.solve.run import CompiledRun
 from hybrid.solve.self_contact import SelfContact
@@ -98,6 +99,7 @@ def meeting_text(
     )
 
 
+BEGINS = f"contact of the line with itself is computed from here on, until they are apart; {COST}"
 GIVEN_UP = "contact there let no step lead on, and begins again where parts are apart"
 HIDDEN_BY_BEND = "a bend between them is sharper than its cells show, and contact is not judged there"
 
@@ -201,9 +203,17 @@ class SelfWatch:
         self.itself.ahead[SECONDS], self.itself.found[TOLD], self.itself.found[HIDDEN] = 0.0, 0.0, ENDS
         return bool(found & NEARS)
 
-    def begins(self) -> None:
-        """Contact is computed from now on."""
-        self.itself.found[AWAY] = 0.0
+    def begins(self, t: float, model: Model, event: Callable[..., None] | None) -> None:
+        """Contact is computed from now on; event: as of `tell`, None where nobody is told."""
+        found = self.itself.found
+        found[AWAY] = 0.0
+        if event is None:
+            return
+        s, other, where = float(model.line.s[0]), float(model.line.s[-1]), "parts of the line"
+        if math.isfinite(found[DISTANCE]):
+            s, other = sorted((float(found[S]), float(found[OTHER_S])))
+            where = f"s = {s:.6g} m and s = {other:.6g} m, whose surfaces are {found[CLEARANCE]:.3g} m apart,"
+        event(t, s, other, "contact begins", f"{where} come near each other: {BEGINS}")
 
     def waits(self) -> None:
         """Contact is not computed again before parts have come apart; where they meet until then, that is told."""

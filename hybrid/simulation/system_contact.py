@@ -67,7 +67,7 @@ def begin_contact(run: SystemRun) -> None:
         watch = line.envelope.itself
         if math.isfinite(energy):
             begun.append(line.number)
-            watch.begins()
+            watch.begins(run.t, model, line.events.event)
             continue
         watch.waits()
         if run.steps:  # what is so at the start is told with the equilibrium

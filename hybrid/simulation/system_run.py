@@ -16,6 +16,7 @@ from hybrid.kernels import books as b
 from hybrid.kernels.accept import MANY
 from hybrid.kernels.bodies import FRAME, PLACE, V
 from hybrid.kernels.cache import cache_folder
+from hybrid.kernels.forces import SELF_CONTACT
 from hybrid.kernels.state import Floats, Moves, state_for
 from hybrid.model.bodies import FairleadMotion
 from hybrid.model.plan import output_times
@@ -317,6 +318,11 @@ class SystemRun:
         except LineFailed as failed:
             raise self.failed(failed) from None
 
+    @property
+    def touches(self) -> bool:
+        """Whether contact of a line with itself is computed."""
+        return any(model.line.bits & SELF_CONTACT for model in self.model.models)
+
     def record_motion(self, reporter: ProgressReporter, interrupted: Callable[[], bool]) -> None:
         """Compute the motion and record it; KeyboardInterrupt after `interrupted`, with the file complete till then."""
         try:
@@ -324,14 +330,14 @@ class SystemRun:
                 self.begin_motion()
 
             def look() -> None:
-                reporter(self.t, self.steps, 0, self.model.models[0].zones)
+                reporter(self.t, self.steps, 0, self.model.models[0].zones, touches=self.touches)
                 self.keep()
                 if interrupted():
                     raise KeyboardInterrupt
 
             for stop in self.stops():
                 self.go_to(stop, look)
-            reporter(self.t, self.steps, 0, self.model.models[0].zones, True)
+            reporter(self.t, self.steps, 0, self.model.models[0].zones, True, self.touches)
             self.finish()
         except LineFailed as failed:
             raise self.failed(failed) from None

@@ -31,6 +31,7 @@ NEWS = (
     "bending at clamp neglected",
     "bending at point load neglected",
     "zones fixed",
+    "contact begins",
 )  # no warnings
 
 

@@ -11,6 +11,7 @@ from bits import Stopping, differences, went_on
 
 import hybrid
 import hybrid.model.build
+from hybrid.cli.plan_tables import plan_lines
 from hybrid.kernels.self_contact_law import INNER, OUTER
 from hybrid.kernels.self_contact_pairs import WINDOW
 from hybrid.kernels.self_distance import INSIDE
@@ -61,6 +62,39 @@ def test_a_line_in_a_plane_touches_itself_without_being_asked(led: hybrid.Result
     assert any(event.kind == "out of plane" and "itself" in event.text for event in led.events)
     put_in = sum(np.abs(led[name]).max() for name in led.names if name.startswith("work/") and name != "work/scheme")
     assert led["work/scheme"].max() < 1e-3 * put_in  # what steps in contact dissipate is theirs
+
+
+def test_contact_that_begins_by_itself_is_told(led: hybrid.Result) -> None:
+    """Where and when, by an event, by a word of the progress, and before the run by its plan, with what it costs."""
+    begun = [event for event in led.events if event.kind == "contact begins"]
+    touched = next(event for event in led.events if event.kind == "line touches itself")
+    assert begun and 0.0 < begun[0].t < touched.t
+    assert abs(begun[0].s_a - touched.s_a) < 0.5 and abs(begun[0].s_b - touched.s_b) < 0.5
+    assert "surfaces are" in begun[0].text and "contact: {self: false}" in begun[0].text
+    said = list[tuple[float, bool, str]]()
+    hybrid.run(led_through(), progress=lambda x: said.append((x.t, x.touches, x.text))).close()
+    assert all(("contact with itself" in text) == on for _, on, text in said) and said[-1][1]
+    assert all(t >= begun[0].t for t, on, _ in said if on)
+    for more, told in (({}, True), ({"contact": {"self": False}}, False), ({"contact": {"self": True}}, False)):
+        scene = hybrid.validate_scene(led_through(**more))
+        lines = " ".join(" ".join(plan_lines(scene, hybrid.plan(scene))).split())
+        assert ("whatever its ends do; its steps take 2 to 20 times as long" in lines) == told
+
+
+def test_contact_that_begins_at_a_line_of_several_is_told() -> None:
+    led = led_through()
+    line = {"start": "a", "end": "b", "sections": led["cable"]["sections"], "model": "rod", "mesh": {"cells": 40}}
+    points = {"a": led["ends"]["start"], "b": led["ends"]["end"]}
+    points = {name: {k: x for k, x in end.items() if k != "kind"} for name, end in points.items()}
+    scene = {
+        "points": points,
+        "lines": {"one": line},
+        "time": {"duration": 2.0, "step": 0.02},
+        "output": {"every": 0.5},
+    }
+    with hybrid.run(scene) as found:
+        events = [event for event in found.lines["one"].events if event.kind == "contact begins"]
+    assert events and events[0].t > 0.0 and "surfaces are" in events[0].text
 
 
 @pytest.mark.slow
