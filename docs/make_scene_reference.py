@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from hybrid.scene.combinations import REFUSALS
 from hybrid.scene.schema import Scene, Table
 from hybrid.scene.system import System
 
@@ -416,6 +417,23 @@ def former_names() -> Iterator[str]:
     yield ""
 
 
+def combinations() -> Iterator[str]:
+    """What is refused together, by the table that the checks read."""
+    yield "## What does not combine"
+    yield ""
+    yield (
+        "Pairs that are refused, each with what to do instead.  *Physics* cannot be otherwise; *several lines* is what "
+        "one cable can and several cannot yet; the rest is not worked out."
+    )
+    yield ""
+    yield "| this | beside this | because |  |"
+    yield "|---|---|---|---|"
+    for x in REFUSALS:
+        a, b = (f"{y.name} (`{y.key}`)" for y in (x.feature, x.beside))
+        yield f"| {a} | {b} | {x.reason} | {x.kind} |"
+    yield ""
+
+
 def page() -> str:
     """The whole page."""
     order: list[str] = []
@@ -436,7 +454,7 @@ def page() -> str:
         for name in order[known:]:
             text = " ".join(tables[name]["description"].split())
             lines += [f"### {name}", "", text, "", *folded(tables[name]), ""]
-    return "\n".join([*lines, *former_names(), TAIL])
+    return "\n".join([*lines, *former_names(), *combinations(), TAIL])
 
 
 def main(arguments: list[str]) -> int:

@@ -18,7 +18,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -70,6 +71,21 @@ def scene(
         {"environment": environment, "cable": {"sections": [section]}, "ends": {"start": start, "end": end},
          "model": kind} | tables
     )  # fmt: skip
+
+
+def tables_with(tables: Any, changes: Mapping[str, Any]) -> Any:
+    """A copy of nested tables with other values by dotted keys; None: without the key."""
+    found = deepcopy(tables)
+    for path, value in changes.items():
+        *way, key = path.split(".")
+        at = found
+        for part in way:
+            at = at[int(part)] if isinstance(at, list) else at.setdefault(part, {})
+        if value is None:
+            del at[key]
+        else:
+            at[key] = deepcopy(value)
+    return found
 
 
 def pinned(*position: float, **more: Any) -> dict[str, Any]:

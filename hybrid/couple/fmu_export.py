@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.scene.read import SceneLike, as_scene, scene_text
+from hybrid.scene.combinations import refuse_use
+from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.stepped_ends import ENDS
 from hybrid.simulation.stepping import Simulation
@@ -47,14 +48,16 @@ def export_fmu(scene: SceneLike, path: str | Path, *, name: str | None = None, o
     except ImportError:
         advice = 'pip install "hybrid-cable[fmu]"'
         raise ResultError(f"an FMU is made by pythonfmu3, which is not installed\n    try:      {advice}") from None
-    scene = as_scene(scene)
+    found = as_scene_or_system(scene)
+    refuse_use(found, "fmu", given="several lines")
+    assert isinstance(found, Scene)
     model = re.sub(r"\W", "_", name or target.stem)
     if not model[:1].isalpha():
         model = f"cable_{model}"
     with tempfile.TemporaryDirectory(prefix="hybrid-fmu-") as room:
         folder = Path(room)
-        files = _write_scene(scene, folder)
-        interface = _interface(scene) | {"name": model}
+        files = _write_scene(found, folder)
+        interface = _interface(found) | {"name": model}
         text = json.dumps(interface, indent=1)
         (folder / INTERFACE).write_text(text, encoding="utf-8")
         # a module of its own for each unit: several may run in one interpreter

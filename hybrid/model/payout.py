@@ -278,8 +278,6 @@ def payout_plan(
             nodes += np.linspace(nodes[-1], end, max(round((end - nodes[-1]) / h), 1) + 1)[1:].tolist()
     while nodes[-3 - ride] < longest:
         nodes.append(nodes[-1] + h)
-    if any(x.intrinsic_curvature and any(x.intrinsic_curvature) for x in sections) and line.spin[-side]:
-        refuse(where, "intrinsic_curvature", "straight sections, because a rod is paid out", "take a catenary there")
     winch = winch_of(payout, length)
     winch[w.LEAST], winch[w.MOST] = shortest, longest
     cable, far, places = _whole_material(scene), 0.0 if side else length, np.array(nodes)

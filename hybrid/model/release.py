@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state import Line
 from hybrid.model.build import Model
 from hybrid.model.line import with_spin_inertia
 from hybrid.model.line_on_base import LineOnBase
+from hybrid.scene.combinations import RELEASED_TWIST
 from hybrid.scene.schema import Scene
 
 NAMES = ("start", "end")
@@ -50,6 +50,4 @@ def check_releases(scene: Scene, model: Model) -> None:
     """SceneError: an end is to be let go through which a torque passes into a catenary zone."""
     for name, end in scene.ends.named().items():
         if end.release is not None and len(model.line.torsion):
-            expected = "an end through which no torque passes into catenary zones"
-            fix = f"ends.{name}.swivel: true, or model: rod"
-            raise SceneError([Complaint(f"ends.{name}.release_at", "the end of a twisted catenary", expected, fix)])
+            raise RELEASED_TWIST.error(f"ends.{name}.release_at", "the end of a twisted catenary")

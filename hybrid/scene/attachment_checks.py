@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import accumulate
 
-from hybrid.scene.analysis import Model
 from hybrid.scene.attachments import Clump, Float, Modules, Swivel, sphere_diameter
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.cable import USUAL_DENSITIES, Cable, Environment
@@ -41,9 +39,8 @@ def attachments_on_cable(cable: Cable) -> Iterator[Finding]:
             yield Finding(("cable", "attachments", i, *place), expected, fix)
 
 
-def swivels_turn(cable: Cable, ends: Ends, model: Model, dimension: int | None) -> Iterator[Finding]:
-    """Swivels where nothing turns about the cable, or where the material axes of both sides would matter."""
-    bounds = list(accumulate(section.length for section in cable.sections))
+def swivels_turn(cable: Cable) -> Iterator[Finding]:
+    """Swivels where nothing turns about the cable."""
     near = SAME_LENGTH * cable.length
     for i, item in enumerate(cable.attachments):
         if not isinstance(item, Swivel):
@@ -52,20 +49,6 @@ def swivels_turn(cable: Cable, ends: Ends, model: Model, dimension: int | None) 
         if abs(item.at - cable.length) <= near:
             expected = f"an arc length inside the cable, less than {cable.length:.8g} m"
             yield Finding((*here, "at"), expected, "at an end write ends.end.swivel: true (kind clamped)")
-        if dimension == 2:
-            expected = "no swivel, because in a plane (dimension: 2) nothing turns about the cable"
-            yield Finding((*here, "kind"), expected, "leave it out, or leave dimension out", "swivel")
-        for k, section in enumerate(cable.sections):
-            begin = bounds[k] - section.length
-            curled = section.intrinsic_curvature is not None and any(section.intrinsic_curvature[:2])
-            if begin - near <= item.at <= bounds[k] + near and (section.anisotropic or curled):
-                why = "bending_stiffness of two numbers" if section.anisotropic else "intrinsic_curvature"
-                expected = f"sections alike in all directions beside a swivel; cable.sections[{k}] has {why}"
-                yield Finding((*here, "at"), expected, "put a short section with one bending_stiffness around it")
-        for name, end in ends.named().items():
-            if end.held_turns:
-                expected = f"no swivel, because ends.{name}.turns twists the cable, and a swivel lets it turn back"
-                yield Finding((*here, "kind"), expected, f"leave it out, or leave ends.{name}.turns out", "swivel")
 
 
 def attachments_in_fluid(environment: Environment, cable: Cable) -> Iterator[Finding]:

@@ -429,9 +429,6 @@ class Section(Table):
         if 2.0 * self.pipe.wall >= outer:
             expected = f"less than half the outer diameter, {0.5 * outer:g} m"
             refuse([Finding(("pipe", "wall"), expected, "wall is in m, one wall alone")])
-        if self.intrinsic_curvature is not None and any(self.intrinsic_curvature):
-            expected = "nothing, because the stress of a pipe is that of its curvature from straight (pipe)"
-            refuse([Finding(("intrinsic_curvature",), expected, "leave it out, or leave pipe out")])
         return self
 
     @model_validator(mode="after")

@@ -12,7 +12,15 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import Any
 
-from hybrid.scene import attachment_checks, magnitude_checks, payout_checks, sea_checks, start_checks, torque_checks
+from hybrid.scene import (
+    attachment_checks,
+    combinations,
+    magnitude_checks,
+    payout_checks,
+    sea_checks,
+    start_checks,
+    torque_checks,
+)
 from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.analysis import (
     AdaptiveModel,
@@ -48,7 +56,7 @@ def contradictions(tables: Mapping[str, Any]) -> list[Finding]:
         needs = _needs(check)
         if all(name in tables for name in needs):
             found += check(**{name: tables[name] for name in needs})
-    return found
+    return list(dict.fromkeys([*found, *combinations.refused(tables)]))
 
 
 @cache
@@ -71,19 +79,6 @@ def _fluid_and_diameter(environment: Environment, cable: Cable) -> Iterator[Find
         if reasons and section.diameter is None:
             expected = f"a number > 0, in m, needed for {' and '.join(reasons)}"
             yield Finding((*here, "diameter"), expected, "add `diameter: ...` (m)")
-
-
-def _sections_that_come_and_go(cable: Cable, model: Model) -> Iterator[Finding]:
-    if not isinstance(model, AdaptiveModel):
-        return
-    for i, section in enumerate(cable.sections):
-        here: Place = ("cable", "sections", i)
-        if section.turns:
-            expected = "nothing or 0, because zones move (model), and rods that come and go have no rotary inertia"
-            yield Finding((*here, "rotary_inertia"), expected, "leave it out, or write `model: rod`")
-        if section.anisotropic:
-            expected = "one number, because zones move (model), and a catenary does not know which way its sections lie"
-            yield Finding((*here, "bending_stiffness"), expected, "give one number, or write `model: rod`")
 
 
 def _zones_fill(cable: Cable, model: Model) -> Iterator[Finding]:
@@ -239,10 +234,8 @@ def _in_a_plane(
     yield from plane_of(environment, cable, ends, initial, TYPED)[1]
 
 
-def _touches_itself(
-    cable: Cable, contact: Contact, model: Model, solver: str, dimension: int | None
-) -> Iterator[Finding]:
-    """Contact of the cable with itself is computed in space, of lines that are not corrected for bending."""
+def _touches_itself(cable: Cable, contact: Contact, model: Model, solver: str) -> Iterator[Finding]:
+    """Contact of the cable with itself is computed of lines that are not corrected for bending."""
     if contact.self is False and contact.friction > 0.0:
         expected = "0 or nothing, because parts of the cable do not touch each other without contact.self"
         yield Finding(("contact", "friction"), expected, "leave `self: false` out, or leave friction out")
@@ -262,9 +255,6 @@ def _touches_itself(
         yield Finding(here, expected, "write catenary in place of corrected, or leave contact out")
     if solver == "shooting":
         yield Finding(here, "false, because shooting knows no contact", "leave it out, or leave solver out")
-    if dimension == 2:
-        expected = "3 or nothing, because contact of the cable with itself leads out of a plane"
-        yield Finding(("dimension",), expected, "or leave contact.self out")
 
 
 def _accuracy_has_errors(accuracy: Accuracy | None, output: Output) -> Iterator[Finding]:
@@ -390,8 +380,6 @@ def _layers_are_meshed(
         why = f"{'mesh' if mesh is not None else 'model.zones'} already says where the cells are"
     elif isinstance(model, AdaptiveModel) and model.rod_cell is not None:
         why = "model.rod_cell already says how long the cells of rods are"
-    elif isinstance(model, AdaptiveModel) and model.curvature_error is not None:
-        why = "cells follow the curvature, as model.curvature_error has it"
     elif not rods:
         why = "no part of the cable is a rod (model), and bending fades in rods alone"
     if why:
@@ -444,7 +432,6 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _quantities,
     _pressure_of_pipes,
     _moment_is_there,
-    _sections_that_come_and_go,
     _in_a_plane,
     _touches_itself,
     _turns_are_held,
@@ -452,8 +439,6 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _mesh_spans,
     _layers_are_meshed,
     _output_on_cable,
-    payout_checks.payout_at_an_end,
     payout_checks.payout_stands_alone,
-    payout_checks.payout_has_fixed_steps,
-    torque_checks.tension_twists,
+    torque_checks.shooting_knows_no_torque,
 )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Literal
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.base import Direction, Finding, Kinds, NonNegative, Table, Truth, by_kind, parallel, refuse
+from hybrid.scene.combinations import instead
 from hybrid.scene.ends import BEND_STIFFNESS
 from hybrid.scene.motion_tables import TURNS
 from hybrid.scene.points import FixedPoint, FreePoint
@@ -30,6 +31,8 @@ class PinnedConnection(Table):
 
 class ClampedConnection(Table):
     """The line holds its direction at its point, and its moment acts there.  It needs a rod at that end."""
+
+    instead: ClassVar[Mapping[str, str]] = instead("ClampedConnection")
 
     kind: Literal["clamped"] = Field(default="clamped", description="direction held: moment and torque pass")
     tangent: Direction | None = Field(
@@ -103,12 +106,6 @@ def _clamp_findings(system: System, name: str, key: str, held: ClampedConnection
         yield Finding(at, expected, "give `bending_stiffness` to all sections, and `model: rod`", "clamped")
     if held.tangent is None and not isinstance(system.points[point], FreePoint):
         yield Finding((*at, "tangent"), "the direction of the line at this end", "add `tangent: [0, 0, 1]`", "nothing")
-    if system.breaks(name, key) and isinstance(system.points[point], FreePoint):
-        expected = f"an end that turns freely; the line is clamped at the free point {point}"
-        yield Finding(("lines", name, "break_at"), expected, "let it break at its other end, or leave the clamp out")
-    if getattr(system.points[point], "break_at", None) is not None:
-        expected = f"a point at which lines turn freely; line {name} is clamped there"
-        yield Finding(("points", point, "break_at"), expected, "leave it out, or the clamp")
 
 
 def _rigid_point_findings(system: System, name: str) -> Iterator[Finding]:

@@ -15,6 +15,7 @@ from typing import Literal
 from hybrid.scene.analysis import Initial, Points, Straight
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
+from hybrid.scene.combinations import PLANE, refused
 from hybrid.scene.ends import End, Ends, Triple
 from hybrid.scene.motion_tables import SHIFTS, TURNS, Motion
 from hybrid.scene.sea import CurrentPoint, CurrentProfile, PowerLawCurrent, UniformCurrent
@@ -73,6 +74,7 @@ def plane_of(
         *_leaves(witnesses, plane, origin, cable.length, tolerance),
         *_sections(cable, ends, plane),
         *_twisted(ends, plane),
+        *refused({"cable": cable, "ends": ends, "dimension": 2}, beside=PLANE),
     ]
 
 
@@ -123,11 +125,6 @@ def _leaves(
 def _sections(cable: Cable, ends: Ends, plane: Plane) -> Iterator[Finding]:
     """Sections whose own axes would take the cable out of the plane."""
     for i, x in enumerate(cable.sections):
-        if x.tension_torque:
-            expected = "nothing or 0, because dimension is 2 and there is no torsion"
-            yield Finding(
-                ("cable", "sections", i, "tension_torque"), expected, "write `dimension: 3`, or leave dimension out"
-            )
         kappa = x.intrinsic_curvature if x.intrinsic_curvature is not None and any(x.intrinsic_curvature) else None
         if not x.anisotropic and kappa is None:
             continue
@@ -151,10 +148,6 @@ def _twisted(ends: Ends, plane: Plane) -> Iterator[Finding]:
     if start is not None and end is not None and math.dist(start, end) > TYPED:
         expected = "the material axis as at ends.start, carried along, because dimension is 2 and there is no torsion"
         yield Finding(("ends", "end", "normal"), expected, "leave it out, or write `dimension: 3`")
-    for name, held in ends.named().items():
-        if held.held_turns:
-            expected = "0, because dimension is 2 and there is no torsion"
-            yield Finding(("ends", name, "turns"), expected, "leave it out, or write `dimension: 3`")
 
 
 def _director(end: End, plane: Plane) -> tuple[float, float] | None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape
 from hybrid.scene.base import After, Finding, Kinds, NonNegative, Positive, Table, Text, Vector, by_kind, refuse
+from hybrid.scene.combinations import instead
 from hybrid.scene.end_loads import GivenLoad, Loading
 from hybrid.scene.ends import Body, Free
 from hybrid.scene.motion_tables import Motion
@@ -47,6 +49,8 @@ class Failure(Table):
 class FixedPoint(Table):
     """A point that is held or moved: an anchor, a fairlead of a vessel whose motion is known."""
 
+    instead: ClassVar[Mapping[str, str]] = instead("FixedPoint")
+
     kind: Literal["fixed"] = Field(default="fixed", description="held where it is, or moved as `motion` says")
     position: Vector = Field(description="position, inertial frame [m]")
     motion: Motion | None = Field(default=None, description="how the point moves; absent: not at all")
@@ -55,6 +59,8 @@ class FixedPoint(Table):
 
 class FreePoint(Table):
     """A point that lines alone hold: a knot, a buoy, a clump.  It has no moment of inertia."""
+
+    instead: ClassVar[Mapping[str, str]] = instead("FreePoint")
 
     kind: Literal["free"] = Field(default="free", description="moves with the lines that meet there")
     initial_guess: Vector = Field(
@@ -100,6 +106,8 @@ class FreePoint(Table):
 
 class Fairlead(Table):
     """A point of a body: a fairlead, a padeye, a hang-off.  It moves with the body."""
+
+    instead: ClassVar[Mapping[str, str]] = instead("Fairlead")
 
     kind: Literal["fairlead"] = Field(default="fairlead", description="a point of a body, and moves with it")
     body: Name = Field(description="name of the body")

@@ -29,6 +29,7 @@ from hybrid.scene.attachments import Attachment
 from hybrid.scene.base import Finding, Positive, Table, Text, Truth, Whole, refuse
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, turned, without_turns
 from hybrid.scene.cable import Cable, Contact, Environment, Section
+from hybrid.scene.combinations import instead
 from hybrid.scene.connections import ClampedConnection, Connections
 from hybrid.scene.end_loads import GivenLoad
 from hybrid.scene.ends import Clamped, End, Ends, Pinned, Triple
@@ -76,6 +77,8 @@ class LineFailure(Failure):
 
 class JoinedLine(Table):
     """A line from one point to another, with s = 0 at `start`."""
+
+    instead: ClassVar[Mapping[str, str]] = instead("JoinedLine")
 
     start: Name = Field(description="name of the point at s = 0")
     end: Name = Field(description="name of the point at s = length")
@@ -127,14 +130,6 @@ class JoinedLine(Table):
             refuse([Finding(("model",), expected, "write `model: rod`", f"kind: {self.model.kind}")])
         if isinstance(self.model, AdaptiveModel):
             refuse(self._of_moving_zones(self.model))
-        if self.initial.friction != "neglected":
-            expected = "neglected, as in every equilibrium of several lines"
-            refuse([Finding(("initial", "friction"), expected, "leave it out", self.initial.friction)])
-        for i, section in enumerate(self.sections):
-            if section.tension_torque:
-                expected = "nothing or 0, because several lines are computed together, which know no torque of tension"
-                fix = "leave it out, or compute this line alone, with `cable` and `ends`"
-                refuse([Finding(("sections", i, "tension_torque"), expected, fix)])
         if self.start == self.end:
             refuse([Finding(("end",), f"a point other than {self.start}, where the line starts", "name another point")])
         return self
@@ -143,15 +138,10 @@ class JoinedLine(Table):
         """What zones that move do not do in a line of several."""
         alone = "leave it out, or compute this line alone, with `cable` and `ends`"
         expected = "nothing, because zones move in a line of several"
-        for name, usual in (("curvature_error", None), ("force_catenary", None), ("correct", False)):
-            if (found := getattr(model, name)) != usual:
-                yield Finding(("model", name), expected, alone, str(found))
+        if model.correct:
+            yield Finding(("model", "correct"), expected, alone, str(model.correct))
         if model.joint != "spherical":
             yield Finding(("model", "joint"), "spherical, because zones move in a line of several", alone, model.joint)
-        for end in ("start", "end"):
-            if isinstance(getattr(self.connections, end), ClampedConnection):
-                expected = "pinned, because zones of this line move"
-                yield Finding(("connections", end), expected, "write `model: rod`, or leave the clamp out", "clamped")
 
 
 def _between(initial: Equilibrium, ends: Mapping[str, End]) -> Equilibrium:
@@ -177,6 +167,8 @@ def _between(initial: Equilibrium, ends: Mapping[str, End]) -> Equilibrium:
 class SystemOutput(Table):
     """What is kept."""
 
+    instead: ClassVar[Mapping[str, str]] = instead("SystemOutput")
+
     every: Positive | None = Field(
         default=None, description="time between two outputs; absent: a hundredth of the duration, or one a step [s]"
     )
@@ -196,15 +188,12 @@ class SystemOutput(Table):
 class System(Table):
     """Several lines, the points where they meet, what acts on them, and what is asked."""
 
-    instead: ClassVar[Mapping[str, str]] = {
+    instead: ClassVar[Mapping[str, str]] = instead("System") | {
         "ends": "a scene of several lines has points, at which its lines end",
-        "initial": "several lines start in equilibrium, found from initial_guess of points and bodies",
         "model": "each line has its own: lines.NAME.model",
         "mesh": "each line has its own: lines.NAME.mesh",
-        "resolution": "cells of several lines are given: lines.NAME.mesh",
         "contact": "each line has its own, for itself: lines.NAME.contact; lines do not touch each other",
         "solver": "leave it out: several lines are solved by elimination",
-        "dimension": "leave it out: several lines are computed in space",
     }
 
     title: Text = Field(default="", description="a line for people; it heads plots and reports")

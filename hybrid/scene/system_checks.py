@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.bodies import FixedBody, FreeBody
+from hybrid.scene.combinations import refused, tables_of
 from hybrid.scene.connections import connection_findings
 from hybrid.scene.ends import Clamped, Ends, Free
 from hybrid.scene.motion_checks import motion_findings
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 def system_findings(system: System) -> Iterator[Iterator[Finding]]:
     """What contradicts in a system, in groups: of the first one with findings no later one makes sense."""
-    yield _unknown_names(system)
+    yield chain(_unknown_names(system), _refused_combinations(system))
     yield chain(_lonely_points(system), _floating_groups(system))
     yield connection_findings(system)
     yield chain.from_iterable(_body_findings(system, name) for name in system.bodies)
@@ -33,6 +34,10 @@ def system_findings(system: System) -> Iterator[Iterator[Finding]]:
     yield chain.from_iterable(_line_findings(system, name) for name in system.lines)
     yield travel_findings(system)
     yield of_several_lines(system.output.quantities, system.lines, system.environment.seabed is not None)
+
+
+def _refused_combinations(system: System) -> Iterator[Finding]:
+    yield from dict.fromkeys(x for tables in tables_of(system) for x in refused(tables))
 
 
 def _unknown_names(system: System) -> Iterator[Finding]:

@@ -26,8 +26,8 @@ from hybrid.model.resolution import (
     wants_errors,
     wants_survey,
 )
+from hybrid.scene.combinations import refuse_use
 from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.payout_checks import check_fixed_step
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.simulation.case import Case
@@ -83,10 +83,10 @@ def run(
         raise SceneError([missing_time(scene)])
     if not isinstance(scene, Scene):
         if criterion is not None:
-            raise TypeError("a criterion is for zones that move: several lines have none")
+            refuse_use(scene, "criterion", given="a criterion")
         return _several_lines(scene, output, overwrite, progress)
     check_motions(scene)
-    check_fixed_step(scene.ends, scene.time)
+    refuse_use(scene, "motion")
     if scene.solver == "shooting":
         from hybrid.simulation.arbiter import run_shooting
 
@@ -180,7 +180,7 @@ def resume(
         system = remaining_system(path, until, settings, start)
         if system is not None:
             if criterion is not None:
-                raise TypeError("a criterion is for zones that move: several lines have none")
+                refuse_use(system, "criterion", given="a criterion")
             _move_lines(system, target, progress, path)
             return open_result(target)
         remaining = remaining_run(path, until, settings, start)

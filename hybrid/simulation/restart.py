@@ -15,10 +15,11 @@ from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.model.build import build
 from hybrid.model.ends import EndConditions
 from hybrid.model.output_points import OutputPoints
-from hybrid.model.payout import longest_out, payout_of, winch_at, winch_side
+from hybrid.model.payout import longest_out, winch_at, winch_side
 from hybrid.model.plan import output_interval
 from hybrid.model.resolution import Resolution
 from hybrid.model.self_reach import self_reach
+from hybrid.scene.combinations import refuse_use
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import parse_either, parse_scene, scene_text
 from hybrid.scene.schema import Scene
@@ -116,9 +117,7 @@ def remaining_system(
         found = as_begun(found, result)
         done, reached = result.done, float(result.times[-1]) if len(result.times) else 0.0
     if settings or start is not None:
-        given = ", ".join(settings) or f"from {start:g} s"
-        expected = "nothing to change, because the result is of several lines: they go on with the loads they have"
-        raise _refused("settings", given, expected, "run the changed scene from its start")
+        refuse_use(found, "changed loads", given=", ".join(settings) or f"from {start:g} s")
     if until is None:
         if done:
             fix = "--until T goes on beyond its end"
@@ -206,9 +205,7 @@ def _check(last: LoadChange, changed: Scene, resolution: Resolution, begin: floa
         if not any(where == x or where.startswith((f"{x}.", f"{x}[")) for x in MAY_CHANGE):
             fix = "run the changed scene from its start"
             raise _refused(where, value, f"one of {', '.join(MAY_CHANGE)}: a run in progress keeps the rest", fix)
-    if payout_of(changed) is not None:
-        expected = "nothing to change, because the line is paid out"
-        raise _refused("settings", "a change in mid-run", expected, "run the changed scene from its start")
+    refuse_use(changed, "changed loads", given="a change in mid-run")
     check_motions(changed)
     model = build(changed, resolution)
     before, after = build(last.scene, resolution).ends, model.ends

@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 
 from hybrid.adapt.user_criterion import UserCriterion
-from hybrid.errors import Complaint, ComputationError, SceneError
+from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels import books as b
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.driven_end import DrivenEnd
 from hybrid.model.resolution import first_resolution
+from hybrid.scene.combinations import refuse_use
 from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.payout_checks import check_fixed_step
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import missing_time
 from hybrid.simulation.case import Case
@@ -71,11 +71,7 @@ class Simulation(SteppedEnds):
         if self.scene.time is None:
             raise SceneError([missing_time(self.scene)])
         check_motions(self.scene)
-        check_fixed_step(self.scene.ends, self.scene.time)
-        if self.scene.resolution is not None:
-            expected = "nothing, because a cable that is stepped from outside has no coarse run that shows its layers"
-            given = f"{self.scene.resolution.cells_per_layer:g}"
-            raise SceneError([Complaint("resolution.cells_per_layer", given, expected, "place cells by `mesh`")])
+        refuse_use(self.scene, "stepped")
         self._target: Path | io.BytesIO = io.BytesIO()
         if output is not None:
             self._target = Path(output).expanduser().resolve()

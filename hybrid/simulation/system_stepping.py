@@ -12,10 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import Complaint, ComputationError, SceneError
+from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.report import FORCE_A
 from hybrid.kernels.state import Floats
 from hybrid.model.driven_end import FRAME, TURN, DrivenEnd
+from hybrid.scene.combinations import refuse_use
 from hybrid.scene.points import FreePoint
 from hybrid.scene.read import as_scene_or_system, scene_text
 from hybrid.scene.schema import missing_time
@@ -58,10 +59,7 @@ class SystemSimulation:
             raise TypeError("scene: expected several lines; hybrid.Simulation steps one cable")
         if found.time is None:
             raise SceneError([missing_time(found)])
-        if found.adaptive:
-            where = f"lines.{found.adaptive[0]}.model"
-            expected = "rod, catenary or zones that stay, in steps from outside"
-            raise SceneError([Complaint(where, "adaptive", expected, "write `model: rod`")])
+        refuse_use(found, "stepped")
         lines = {
             name: line.model_copy(update={"contact": line.contact.of_ends_that_are_set()})
             for name, line in found.lines.items()

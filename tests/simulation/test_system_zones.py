@@ -148,7 +148,7 @@ def test_what_is_not_computed_is_refused(line: dict[str, Any], scene: dict[str, 
 
 
 def test_steps_from_outside_refuse_zones_that_move() -> None:
-    with pytest.raises(SceneError, match="steps from outside"):
+    with pytest.raises(SceneError, match="stepped from outside"):
         hybrid.SystemSimulation(mooring())
 
 

@@ -1,0 +1,525 @@
+"""What does not combine, and why: the one table of it, read by the checks of a scene, the manual and the tests.
+
+A feature is found in the tables of a scene by a function, which tells the keys that ask for it.  A refusal is a pair
+of features with its reason; no other place refuses a combination of what can be computed each by itself.  Beside its
+tables a scene may be looked at with the use that is to be made of it (`USE`): some pairs are of a scene and a use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Any, Literal
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.scene.analysis import AdaptiveModel, RodModel, RodZone, ZonesModel
+from hybrid.scene.base import Finding, Place, Table, dotted
+from hybrid.scene.cable import Cable, Section
+from hybrid.scene.ends import Clamped, Ends, Pinned
+from hybrid.scene.payout import Payout
+from hybrid.scene.start_checks import SAME_LENGTH
+
+Tables = Mapping[str, Any]
+# Why a pair is refused: it cannot be; nobody has worked it out; or the code of several lines has not got what that of
+# one cable has.
+Kind = Literal["physics", "not worked out", "several lines"]
+# Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
+USE, SYSTEM, LINE = "use", "system", "line"
+Use = Literal["", "motion", "stepped", "changed loads", "criterion", "fmu"]
+LEAVE_OUT = "leave it out"
+ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
+IN_SPACE = "write `dimension: 3`, or leave dimension out"
+UNTWISTED = f"{LEAVE_OUT}, for a line that tension does not twist"
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """Something that a scene may have, or that may be done with it."""
+
+    name: str  # for people
+    key: str  # where a scene asks for it, for people
+    places: Callable[[Tables], Iterable[Place]]  # where these tables ask for it; none: they do not
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A feature that is refused beside another one."""
+
+    feature: Feature
+    beside: Feature
+    kind: Kind
+    why: str  # after "because"; {key} is where the other one is asked for
+    expected: str = "nothing"
+    fix: str = LEAVE_OUT
+
+    def finding(self, at: Place, beside: Place) -> Finding:
+        expected = f"{self.expected}, because {self.why.format(key=dotted(beside))}"
+        return Finding(at, expected, self.fix.format(key=dotted(beside)))
+
+    def error(self, where: str, given: str) -> SceneError:
+        """Where only the arrays of a line tell that a scene has both."""
+        return SceneError([Complaint(where, given, f"{self.expected}, because {self.reason}", self.fix)])
+
+    @property
+    def reason(self) -> str:
+        """Why, for people that have no scene before them."""
+        return self.why.format(key=self.beside.key)
+
+
+def refused(tables: Tables, beside: Feature | None = None) -> list[Finding]:
+    """What is refused of what these tables have together; beside: in pairs with this feature alone."""
+    found: list[Finding] = []
+    for x in REFUSALS:
+        if beside in (None, x.feature, x.beside) and (others := list(x.beside.places(tables))):
+            other = _placed(tables, others[0])
+            found += [x.finding(_placed(tables, at), other) for at in x.feature.places(tables)]
+    return found
+
+
+def refuse_use(scene: Table, use: Use, given: str = "") -> None:
+    """SceneError where that cannot be done with a scene; given: what asks for it, if no key of the scene does."""
+    found = dict.fromkeys(x for tables in tables_of(scene, use) for x in refused(tables))
+    complaints = []
+    for x in found:
+        value = x.given or (given if x.at[0] not in type(scene).model_fields or x.at == ("lines",) else "")
+        complaints.append(Complaint(dotted(x.at), value or _value(scene, x.at), x.expected, x.fix))
+    if complaints:
+        raise SceneError(complaints)
+
+
+def tables_of(scene: Table, use: Use = "") -> Iterator[dict[str, Any]]:
+    """The tables of a cable, or of each line of several, with what is to be done with them."""
+    tables = {name: getattr(scene, name) for name in type(scene).model_fields} | {USE: use}
+    if "lines" not in tables:
+        yield tables
+        return
+    for name, line in tables["lines"].items():
+        own = {key: getattr(line, key) for key in ("connections", "mesh", "contact", "initial")}
+        yield tables | own | {"model": line.chosen_model, "cable": line.cable, SYSTEM: scene, LINE: name}
+
+
+# What the tables of a line have, whose keys are below the line in a scene of several.
+_OF_LINE = ("connections", "mesh", "contact", "initial", "model")
+
+
+def _placed(tables: Tables, at: Place) -> Place:
+    """Where a key of the tables of a line is in the scene of several."""
+    name = tables.get(LINE)
+    if name is not None and at[:1] == ("cable",):
+        return "lines", name, *at[1:]
+    return ("lines", name, *at) if name is not None and at[0] in _OF_LINE else at
+
+
+def _value(scene: Table, at: Place) -> str:
+    """What a scene has there, for people."""
+    value: Any = scene
+    for part in at:
+        value = getattr(value, part, None) if isinstance(value, Table) and isinstance(part, str) else value[part]
+    if isinstance(value, Table):
+        value = getattr(value, "kind", "a table")
+    return "nothing" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def instead(table: str) -> dict[str, str]:
+    """What to do in place of keys that a table of several lines does not have, as one cable has them."""
+    absent = [x.feature.places for x in REFUSALS if isinstance(x.feature.places, Absent)]
+    return {key: x.fix for x in absent for key in x.keys.get(table, ())}
+
+
+@dataclass(frozen=True)
+class Absent:
+    """Where a feature is asked for by keys that tables of several lines do not have: the schema refuses them."""
+
+    keys: Mapping[str, tuple[str, ...]]  # by name of the table
+    fix: str
+
+    def __call__(self, tables: Tables) -> Iterator[Place]:
+        return iter(())
+
+
+# --- where features are asked for ---------------------------------------------------------------
+
+
+def _sections(tables: Tables) -> Iterator[tuple[Place, Section]]:
+    """Sections of a cable, and those on a reel from which line is paid out, each with its place."""
+    cable: Cable | None = tables.get("cable")
+    for i, section in enumerate(cable.sections if cable is not None else ()):
+        yield ("cable", "sections", i), section
+    for at, payout in _winches(tables):
+        for i, section in enumerate(payout.reel or ()):
+            yield (*at, "reel", i), section
+
+
+def _in_sections(*key: str, of: Callable[[Section], Any]) -> Callable[[Tables], Iterator[Place]]:
+    """Keys of the sections of which `of` is true."""
+    return lambda tables: ((*at, *key) for at, section in _sections(tables) if of(section))
+
+
+def _stretch_laws(tables: Tables) -> Iterator[Place]:
+    for at, section in _sections(tables):
+        if section.curve is not None:
+            yield (*at, "dynamic_stiffness" if section.dynamic_stiffness is not None else "tension_strain")
+
+
+def _curls(section: Section) -> bool:
+    return section.intrinsic_curvature is not None and any(section.intrinsic_curvature)
+
+
+def _winches(tables: Tables) -> Iterator[tuple[Place, Payout]]:
+    ends: Ends | None = tables.get("ends")
+    for name, end in ends.named().items() if ends is not None else ():
+        if isinstance(end, Pinned | Clamped) and end.payout is not None:
+            yield ("ends", name, "payout"), end.payout
+
+
+def _paid_out(tables: Tables) -> Iterator[Place]:
+    return (at for at, _ in _winches(tables))
+
+
+def _paid_out_at(name: str) -> Callable[[Tables], Iterator[Place]]:
+    return lambda tables: (at for at, _ in _winches(tables) if at[1] == name)
+
+
+def _release_at_winch(tables: Tables) -> Iterator[Place]:
+    for at, _ in _winches(tables):
+        if tables["ends"].named()[at[1]].release_at is not None:
+            yield (*at[:-1], "release_at")
+
+
+def _rod_at_winch(tables: Tables) -> Iterator[Place]:
+    """Winches that a rod leaves, or may leave."""
+    model, cable = tables.get("model"), tables.get("cable")
+    for at, _ in _winches(tables):
+        k = -int(at[1] == "end")
+        rod = isinstance(model, RodModel) or (isinstance(model, ZonesModel) and isinstance(model.zones[k], RodZone))
+        if isinstance(model, AdaptiveModel) and cable is not None:
+            s, far = cable.length * -k, SAME_LENGTH * cable.length
+            rod = not any(a - far <= s <= b + far for a, b in model.force_catenary or ())
+        if rod:
+            yield at
+
+
+def _turns(tables: Tables) -> Iterator[Place]:
+    ends: Ends | None = tables.get("ends")
+    return (("ends", name, "turns") for name, end in (ends.named().items() if ends else ()) if end.held_turns)
+
+
+def _swivels(tables: Tables) -> Iterator[Place]:
+    cable: Cable | None = tables.get("cable")
+    items = cable.attachments if cable is not None else ()
+    return (("cable", "attachments", i, "kind") for i, x in enumerate(items) if x.kind == "swivel")
+
+
+def _swivels_beside(of: Callable[[Section], Any]) -> Callable[[Tables], Iterator[Place]]:
+    """Swivels in or beside a section of which `of` is true."""
+
+    def find(tables: Tables) -> Iterator[Place]:
+        for at in _swivels(tables):
+            cable: Cable = tables["cable"]
+            near, s = SAME_LENGTH * cable.length, cable.attachments[int(at[2])].at  # type: ignore[union-attr]
+            for end, section in zip(accumulate(x.length for x in cable.sections), cable.sections, strict=True):
+                if end - section.length - near <= s <= end + near and of(section):
+                    yield (*at[:-1], "at")
+
+    return find
+
+
+def _moving(tables: Tables) -> Iterator[Place]:
+    return iter([("model",)] if isinstance(tables.get("model"), AdaptiveModel) else [])
+
+
+def _of_moving(key: str) -> Callable[[Tables], Iterator[Place]]:
+    return lambda tables: ((*at, key) for at in _moving(tables) if getattr(tables["model"], key))
+
+
+def _asks(table: str, key: str, when: Callable[[Any], Any]) -> Callable[[Tables], Iterator[Place]]:
+    """A key of a table that is there, when `when` is true of the table."""
+    return lambda tables: iter([(table, key)] if tables.get(table) is not None and when(tables[table]) else [])
+
+
+def _plane(tables: Tables) -> Iterator[Place]:
+    return iter([("dimension",)] if tables.get("dimension") == 2 else [])
+
+
+def _self_contact(tables: Tables) -> Iterator[Place]:
+    return iter([("contact", "self")] if "contact" in tables and tables["contact"].self else [])
+
+
+def _accuracy(tables: Tables) -> Iterator[Place]:
+    moves = tables.get("accuracy") is not None and tables.get("time") is not None
+    return iter([("accuracy",)] if moves else [])
+
+
+def _errors(tables: Tables) -> Iterator[Place]:
+    moves = "output" in tables and tables["output"].errors and tables.get("time") is not None
+    return iter([("output", "errors")] if moves else [])
+
+
+def _chosen_steps(tables: Tables) -> Iterator[Place]:
+    """Steps of which no length is given matter once a motion is computed: an equilibrium and a plan have none."""
+    time = tables.get("time")
+    if time is not None and time.tolerance is not None:
+        yield "time", "tolerance"
+    elif time is not None and time.step is None and tables.get(USE) in ("motion", "stepped"):
+        yield "time", "step"
+
+
+def _clamped(tables: Tables) -> Iterator[Place]:
+    held = tables.get("connections")
+    for end in ("start", "end"):
+        if held is not None and getattr(held, end).kind == "clamped":
+            yield "connections", end
+
+
+def _breaks_off_clamp(tables: Tables) -> Iterator[Place]:
+    """A line that breaks at the end at which it is clamped to a free point, or a point that gives way with a clamp."""
+    for _, end in _clamped(tables):
+        system, name = tables[SYSTEM], tables[LINE]
+        point = getattr(system.lines[name], str(end))
+        there = system.points.get(point)
+        if system.breaks(name, end) and there is not None and there.kind == "free":
+            yield "lines", name, "break_at"
+        if getattr(there, "break_at", None) is not None:
+            yield "points", point, "break_at"
+
+
+def _several(tables: Tables) -> Iterator[Place]:
+    return iter([("lines",)] if SYSTEM in tables else [])
+
+
+def _used(use: Use, at: str = "") -> Callable[[Tables], Iterator[Place]]:
+    return lambda tables: iter([(at or use,)] if tables.get(USE) == use else [])
+
+
+# --- features -----------------------------------------------------------------------------------
+
+MOVING_ZONES = Feature("zones that move", "model: adaptive", _moving)
+FOLLOWING_CELLS = Feature("cells that follow the curvature", "model.curvature_error", _of_moving("curvature_error"))
+FORCED_CATENARY = Feature("stretches that stay catenary", "model.force_catenary", _of_moving("force_catenary"))
+ROTARY_INERTIA = Feature("rotary inertia", "rotary_inertia", _in_sections("rotary_inertia", of=lambda x: x.turns))
+TWO_STIFFNESSES = Feature(
+    "two bending stiffnesses", "bending_stiffness: [EI_1, EI_2]",
+    _in_sections("bending_stiffness", of=lambda x: x.anisotropic),
+)  # fmt: skip
+CURLED = Feature("sections that are curved without load", "intrinsic_curvature",
+                 _in_sections("intrinsic_curvature", of=_curls))  # fmt: skip
+TORQUE_OF_TENSION = Feature("torque of tension", "tension_torque",
+                            _in_sections("tension_torque", of=lambda x: x.tension_torque))  # fmt: skip
+STRETCH_LAW = Feature("tension over strain by a table or a rope's law", "tension_strain, dynamic_stiffness",
+                      _stretch_laws)  # fmt: skip
+STIFFNESS_DAMPING = Feature("damping proportional to stiffness", "damping.stiffness",
+                            _in_sections("damping", "stiffness",
+                                         of=lambda x: x.damping is not None and x.damping.stiffness))  # fmt: skip
+SWIVEL = Feature("swivels on the line", "attachments: kind: swivel", _swivels)
+SWIVEL_IN_BEAM = Feature("swivels beside sections of two bending stiffnesses", "attachments: kind: swivel",
+                         _swivels_beside(lambda x: x.anisotropic))  # fmt: skip
+SWIVEL_IN_CURL = Feature("swivels beside curved sections", "attachments: kind: swivel",
+                         _swivels_beside(lambda x: _curls(x) and any(x.intrinsic_curvature[:2])))  # type: ignore[index]  # fmt: skip
+PIPE_CURLED = Feature("stress of a pipe", "pipe",
+                      _in_sections("pipe", of=lambda x: x.pipe is not None and _curls(x)))  # fmt: skip
+TURNS = Feature("turns at an end", "ends.end.turns", _turns)
+PLANE = Feature("a plane", "dimension: 2", _plane)
+SELF_CONTACT = Feature("contact of a line with itself", "contact.self", _self_contact)
+PAYOUT = Feature("line that is paid out", "ends.end.payout", _paid_out)
+PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout", _paid_out_at("start"))
+PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out_at("end"))
+PAID_OUT_ROD = Feature("a rod that is paid out", "ends.end.payout", _rod_at_winch)
+RELEASE_AT_WINCH = Feature("release of the end at the winch", "ends.end.release_at", _release_at_winch)
+TWISTED_RELEASE = Feature("release of an end", "ends.end.release_at", lambda tables: ())
+TWISTED_CATENARY = Feature("a catenary zone that carries torque there", "model", lambda tables: ())
+LAYERS = Feature("cells to a boundary layer", "resolution.cells_per_layer",
+                 _asks("resolution", "cells_per_layer", lambda x: True))  # fmt: skip
+ACCURACY = Feature("accuracy", "accuracy", _accuracy)
+ERRORS = Feature("estimated errors", "output.errors", _errors)
+CHOSEN_STEPS = Feature("steps that follow the motion", "time.tolerance, or no time.step", _chosen_steps)
+SETTLED_FRICTION = Feature("friction that has settled in the equilibrium", "initial.friction",
+                           _asks("initial", "friction",
+                                 lambda x: getattr(x, "friction", "neglected") != "neglected"))  # fmt: skip
+CLAMPED_CONNECTION = Feature("a clamped connection", "lines.NAME.connections", _clamped)
+BREAKS_OFF_CLAMP = Feature("a break at a clamp", "break_at", _breaks_off_clamp)
+SEVERAL_LINES = Feature("several lines", "lines", _several)
+MOVING_ZONES_OF_SEVERAL = Feature("zones that move in a line of several", "lines.NAME.model: adaptive",
+                                  lambda tables: _moving(tables) if SYSTEM in tables else ())  # fmt: skip
+
+STEPPED = Feature("steps from outside", "hybrid.Simulation", _used("stepped"))
+CHANGED_LOADS = Feature("loads that change in mid-run", "hybrid resume --set", _used("changed loads", "settings"))
+CRITERION = Feature("a criterion of one's own", "hybrid.run(criterion=...)", _used("criterion", "criterion"))
+FMU = Feature("co-simulation (FMU)", "hybrid.export_fmu", _used("fmu", "lines"))
+
+# Of one cable alone, by keys that several lines do not have.
+ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
+    {"System": ("dimension",)}, "leave it out: several lines are computed in space"
+))  # fmt: skip
+LAYERS_OF_ONE = Feature("cells to a boundary layer", "resolution", Absent(
+    {"System": ("resolution",)}, "cells of several lines are given: lines.NAME.mesh"
+))  # fmt: skip
+OTHER_STARTS = Feature("starts other than equilibrium", "initial", Absent(
+    {"System": ("initial",)}, "several lines start in equilibrium, found from initial_guess of points and bodies"
+))  # fmt: skip
+WINCH = Feature("line that is paid out", "payout", Absent(
+    {x: ("payout",) for x in ("FixedPoint", "FreePoint", "Fairlead", "JoinedLine")},
+    "leave it out: lines of several keep their lengths; one cable, with `cable` and `ends`, can be paid out",
+))  # fmt: skip
+TURNS_OF_ONE = Feature("turns at an end", "turns", Absent(
+    {"ClampedConnection": ("turns",)},
+    "leave it out, or compute this line alone; a rotation over time is the motion of its point or body",
+))  # fmt: skip
+HISTORY = Feature("places of histories", "output.history", Absent(
+    {"SystemOutput": ("history",)}, "leave it out: fields over time hold every output point of a line"
+))  # fmt: skip
+ELEVATION = Feature("elevation of the sea", "output.elevation", Absent(
+    {"SystemOutput": ("elevation",)}, "leave it out: it is recorded of one cable"
+))  # fmt: skip
+CRITERIA = Feature("criteria as outputs", "output.criteria", Absent(
+    {"SystemOutput": ("criteria",)}, "leave it out: they are recorded of one cable"
+))  # fmt: skip
+EXACT = Feature("steps that end at outputs", "output.exact", Absent(
+    {"SystemOutput": ("exact",)}, "leave it out, or give a fixed time.step of which output.every is a multiple"
+))  # fmt: skip
+
+RELEASED_TWIST = Refusal(
+    TWISTED_RELEASE, TWISTED_CATENARY, "not worked out", "a torque passes through it into catenary zones",
+    fix="give the end swivel: true, or write model: rod",
+)  # fmt: skip
+PAID = "line is paid out ({key})"
+REFUSALS: tuple[Refusal, ...] = (
+    Refusal(
+        TWO_STIFFNESSES, MOVING_ZONES, "physics",
+        "zones move (model), and a catenary does not know which way its sections lie",
+        "one number", "give one number, or write `model: rod`",
+    ),
+    Refusal(
+        ROTARY_INERTIA, MOVING_ZONES, "not worked out",
+        "zones move (model), and rods that come and go have no rotary inertia",
+        "nothing or 0", "leave it out, or write `model: rod`",
+    ),
+    Refusal(
+        TORQUE_OF_TENSION, PLANE, "physics", "dimension is 2 and there is no torsion", "nothing or 0", IN_SPACE
+    ),
+    Refusal(TURNS, PLANE, "physics", "dimension is 2 and there is no torsion", "0", f"leave it out, or {IN_SPACE}"),
+    Refusal(
+        PLANE, SELF_CONTACT, "physics", "contact of the cable with itself leads out of a plane", "3 or nothing",
+        "or leave contact.self out",
+    ),
+    Refusal(
+        SWIVEL, TURNS, "physics", "{key} twists the cable, and a swivel lets it turn back", "no swivel",
+        "leave it out, or leave {key} out",
+    ),
+    Refusal(
+        SWIVEL_IN_BEAM, TWO_STIFFNESSES, "not worked out",
+        "a section beside it has a bending_stiffness of two numbers, and its two sides turn against each other",
+        "a place between sections of one bending_stiffness", "put a short section with one bending_stiffness around it",
+    ),
+    Refusal(
+        SWIVEL_IN_CURL, CURLED, "not worked out",
+        "a section beside it has an intrinsic_curvature, and its two sides turn against each other",
+        "a place between straight sections", "put a short section without intrinsic_curvature around it",
+    ),
+    Refusal(
+        CURLED, PIPE_CURLED, "not worked out", "the stress of a pipe is that of its curvature from straight (pipe)",
+        fix="leave it out, or leave pipe out",
+    ),
+    RELEASED_TWIST,
+    Refusal(
+        STRETCH_LAW, TORQUE_OF_TENSION, "not worked out", "tension makes a torque in this line (tension_torque)",
+        "axial_stiffness alone", "give axial_stiffness alone",
+    ),
+    Refusal(
+        TORQUE_OF_TENSION, FOLLOWING_CELLS, "not worked out", "cells follow the curvature (model.curvature_error)",
+        "nothing or 0", "leave curvature_error out",
+    ),
+    Refusal(
+        LAYERS, FOLLOWING_CELLS, "not worked out", "cells follow the curvature, as model.curvature_error has it",
+        fix="leave out the one or the other",
+    ),
+    Refusal(
+        LAYERS, STEPPED, "not worked out",
+        "a cable that is stepped from outside has no coarse run that shows its layers", fix="place cells by `mesh`",
+    ),
+    # --- line that is paid out ---
+    Refusal(
+        PAYOUT_AT_START, PAYOUT_AT_END, "not worked out", "line is paid out at ends.end", fix="leave one out"
+    ),
+    Refusal(
+        RELEASE_AT_WINCH, PAYOUT, "not worked out", "line is paid out there", fix="leave it out, or {key}"
+    ),
+    Refusal(
+        STIFFNESS_DAMPING, PAYOUT, "not worked out",
+        "a line that is paid out ({key}) has no stiffness-proportional damping",
+        fix="leave it out; damping.mass can stay",
+    ),
+    Refusal(
+        SWIVEL, PAYOUT, "not worked out", PAID, "no swivel", "leave it out: a pinned end turns freely"
+    ),
+    Refusal(
+        CURLED, PAID_OUT_ROD, "not worked out", "a rod is paid out ({key}), which is straight there",
+        fix="leave it out, or take a catenary there",
+    ),
+    Refusal(
+        TORQUE_OF_TENSION, PAYOUT, "not worked out", f"{PAID} and its twist is not known then", "nothing or 0",
+        UNTWISTED,
+    ),
+    Refusal(LAYERS, PAYOUT, "not worked out", f"{PAID}, and its cells are given", fix="place cells by `mesh`"),
+    Refusal(
+        CHOSEN_STEPS, PAYOUT, "not worked out", f"{PAID}: no error is estimated",
+        "a fixed step, in s, and no tolerance",
+        "give `step: ...` (s) in time, without a tolerance, and halve it to see its error; the equilibrium alone: "
+        "hybrid static FILE",
+    ),
+    Refusal(
+        ACCURACY, PAYOUT, "not worked out", f"{PAID}, of which no error is estimated",
+        fix="leave it out; halve time.step to see its error",
+    ),
+    Refusal(ERRORS, PAYOUT, "not worked out", f"{PAID}, of which no error is estimated", "false"),
+    Refusal(
+        CHANGED_LOADS, PAYOUT, "not worked out", "the line is paid out", "nothing to change",
+        "run the changed scene from its start",
+    ),
+    # --- several lines ---
+    Refusal(
+        BREAKS_OFF_CLAMP, CLAMPED_CONNECTION, "not worked out",
+        "what breaks turns freely, and a line is clamped there",
+        fix="leave it out, or the clamp; a line may break at its other end",
+    ),
+    Refusal(
+        CLAMPED_CONNECTION, MOVING_ZONES_OF_SEVERAL, "several lines", "zones of this line move", "pinned",
+        "write `model: rod`, or leave the clamp out",
+    ),
+    Refusal(
+        MOVING_ZONES_OF_SEVERAL, STEPPED, "several lines", "several lines are stepped from outside",
+        "rod, catenary or zones that stay", "write `model: rod`",
+    ),
+    Refusal(
+        TORQUE_OF_TENSION, SEVERAL_LINES, "several lines",
+        "several lines are computed together, which know no torque of tension", "nothing or 0", ALONE,
+    ),
+    Refusal(
+        FOLLOWING_CELLS, SEVERAL_LINES, "several lines", "cells of several lines have lengths that stay", fix=ALONE
+    ),
+    Refusal(FORCED_CATENARY, SEVERAL_LINES, "several lines", "zones of several lines move everywhere", fix=ALONE),
+    Refusal(
+        SETTLED_FRICTION, SEVERAL_LINES, "several lines", "friction is neglected in every equilibrium of several lines",
+        "neglected",
+    ),
+    Refusal(
+        CHANGED_LOADS, SEVERAL_LINES, "several lines",
+        "the result is of several lines: they go on with the loads they have", "nothing to change",
+        "run the changed scene from its start",
+    ),
+    Refusal(
+        CRITERION, SEVERAL_LINES, "several lines", "zones of several lines move by the criteria of the program",
+        fix="leave criterion out",
+    ),
+    Refusal(
+        FMU, SEVERAL_LINES, "several lines", "a unit is of one cable, whose ends are set from outside",
+        "one cable, with `cable` and `ends`", "hybrid.SystemSimulation steps several lines in Python",
+    ),
+    *(
+        Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)
+        for x in (
+            ONE_PLANE, LAYERS_OF_ONE, OTHER_STARTS, WINCH, TURNS_OF_ONE, HISTORY, ELEVATION, CRITERIA, EXACT
+        )
+        if isinstance(x.places, Absent)
+    ),
+)  # fmt: skip

@@ -1,0 +1,159 @@
+"""Every pair of features that is refused is refused with the reason of the table, where the scene asks for it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+import hybrid
+from hybrid.errors import SceneError
+from hybrid.model.build import build
+from hybrid.model.release import check_releases
+from hybrid.scene import combinations as c
+from hybrid.scene.combinations import REFUSALS, Absent, Refusal, Use, refuse_use
+from hybrid.scene.read import parse_either
+from hybrid.scene.schema import Scene
+from hybrid.scene.system import System
+from tests.problems import tables_with
+
+CABLE: dict[str, Any] = {
+    "environment": {"gravity": 9.81},
+    "cable": {"sections": [
+        {"length": 10, "mass": 2, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 10,
+         "torsional_stiffness": 10},
+    ]},
+    "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]},
+             "end": {"kind": "clamped", "position": [8, 0, 0], "tangent": [1, 0, 0]}},
+    "initial": "equilibrium", "model": "rod", "time": {"duration": 3.0, "step": 0.1},
+}  # fmt: skip
+LINES: dict[str, Any] = {
+    "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [8, 0, 0]}},
+    "lines": {"one": {"start": "a", "end": "b", "sections": CABLE["cable"]["sections"]}},
+    "time": {"duration": 3.0, "step": 0.1},
+}  # fmt: skip
+
+SECTION, END, ONE = "cable.sections.0.", "ends.end.", "lines.one."
+TORQUE = {SECTION + "tension_torque": 1e-3}
+SWIVEL = {"cable.attachments": [{"kind": "swivel", "at": 5}], END + "normal": [0, 1, 0]}
+PAID: dict[str, Any] = {END + "payout": {"rate": 0.1, "ramp": 1.0}}
+MOVING = {"model": {"kind": "adaptive"}}
+FOLLOWING = {"model": {"kind": "adaptive", "curvature_error": 0.05}}
+TWO = {SECTION + "bending_stiffness": [10, 20], END + "normal": [0, 1, 0]}
+CURVED = {SECTION + "intrinsic_curvature": [0.01, 0, 0]}
+ROPE = {SECTION + "dynamic_stiffness": {"constant": 2e6, "relaxation_time": 100}}
+CLAMPED = {ONE + "connections": {"end": {"kind": "clamped", "tangent": [1, 0, 0]}}}
+
+# By the pair: what makes a scene of CABLE, or of LINES, that has both, and what is done with it.
+EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
+    (c.TWO_STIFFNESSES, c.MOVING_ZONES): (TWO | MOVING, ""),
+    (c.ROTARY_INERTIA, c.MOVING_ZONES): ({SECTION + "rotary_inertia": 1e-3} | MOVING, ""),
+    (c.TORQUE_OF_TENSION, c.PLANE): (TORQUE | {"dimension": 2}, ""),
+    (c.TURNS, c.PLANE): ({END + "turns": 2, "dimension": 2}, ""),
+    (c.PLANE, c.SELF_CONTACT): ({"dimension": 2, "contact": {"self": True}}, ""),
+    (c.SWIVEL, c.TURNS): (SWIVEL | {END + "turns": 2}, ""),
+    (c.SWIVEL_IN_BEAM, c.TWO_STIFFNESSES): (SWIVEL | TWO, ""),
+    (c.SWIVEL_IN_CURL, c.CURLED): (SWIVEL | CURVED, ""),
+    (c.CURLED, c.PIPE_CURLED): (CURVED | {SECTION + "pipe": {"wall": 0.002, "modulus": 2e11}}, ""),
+    (c.STRETCH_LAW, c.TORQUE_OF_TENSION): (ROPE | TORQUE, ""),
+    (c.TORQUE_OF_TENSION, c.FOLLOWING_CELLS): (TORQUE | FOLLOWING, ""),
+    (c.LAYERS, c.FOLLOWING_CELLS): ({"resolution": {"cells_per_layer": 2}} | FOLLOWING, ""),
+    (c.LAYERS, c.STEPPED): ({"resolution": {"cells_per_layer": 2}}, "stepped"),
+    (c.PAYOUT_AT_START, c.PAYOUT_AT_END): (PAID | {"ends.start.payout": {"rate": 0.1, "ramp": 1.0}}, ""),
+    (c.RELEASE_AT_WINCH, c.PAYOUT): (PAID | {END + "release_at": {"time": 2}}, ""),
+    (c.STIFFNESS_DAMPING, c.PAYOUT): (PAID | {SECTION + "damping": {"stiffness": 0.01}}, ""),
+    (c.SWIVEL, c.PAYOUT): (SWIVEL | PAID, ""),
+    (c.CURLED, c.PAID_OUT_ROD): (CURVED | PAID, ""),
+    (c.TORQUE_OF_TENSION, c.PAYOUT): (TORQUE | PAID, ""),
+    (c.LAYERS, c.PAYOUT): (PAID | {"resolution": {"cells_per_layer": 2}}, ""),
+    (c.CHOSEN_STEPS, c.PAYOUT): (PAID | {"time.step": None}, "motion"),
+    (c.ACCURACY, c.PAYOUT): (PAID | {"accuracy": "1%"}, ""),
+    (c.ERRORS, c.PAYOUT): (PAID | {"output": {"errors": True}}, ""),
+    (c.CHANGED_LOADS, c.PAYOUT): (PAID, "changed loads"),
+    (c.BREAKS_OFF_CLAMP, c.CLAMPED_CONNECTION): (CLAMPED | {"points.b.break_at": {"time": 2}}, ""),
+    (c.CLAMPED_CONNECTION, c.MOVING_ZONES_OF_SEVERAL): (CLAMPED | {ONE + "model": {"kind": "adaptive"}}, ""),
+    (c.MOVING_ZONES_OF_SEVERAL, c.STEPPED): ({ONE + "model": {"kind": "adaptive"}}, "stepped"),
+    (c.TORQUE_OF_TENSION, c.SEVERAL_LINES): ({ONE + "sections.0.tension_torque": 1e-3}, ""),
+    (c.FOLLOWING_CELLS, c.SEVERAL_LINES): ({ONE + "model": FOLLOWING["model"]}, ""),
+    (c.FORCED_CATENARY, c.SEVERAL_LINES): (
+        {ONE + "model": {"kind": "adaptive", "force_catenary": [[2, 4]]}}, ""
+    ),
+    (c.SETTLED_FRICTION, c.SEVERAL_LINES): ({ONE + "initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
+    (c.CHANGED_LOADS, c.SEVERAL_LINES): ({}, "changed loads"),
+    (c.CRITERION, c.SEVERAL_LINES): ({}, "criterion"),
+    (c.FMU, c.SEVERAL_LINES): ({}, "fmu"),
+}  # fmt: skip
+BY_SCHEMA = [x for x in REFUSALS if isinstance(x.feature.places, Absent)]
+OF_ARRAYS = [c.RELEASED_TWIST]
+
+
+def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
+    return parse_either(yaml.safe_dump(tables_with(LINES if several else CABLE, changes), sort_keys=False))[0]
+
+
+def _of_several(pair: tuple[c.Feature, c.Feature]) -> bool:
+    names = (c.SEVERAL_LINES, c.MOVING_ZONES_OF_SEVERAL, c.CLAMPED_CONNECTION)
+    return any(x in names for x in pair)
+
+
+def _id(x: object) -> str:
+    return f"{x[0].name} x {x[1].name}" if isinstance(x, tuple) else ""
+
+
+def test_every_refusal_has_an_example() -> None:
+    pairs = [(x.feature, x.beside) for x in REFUSALS]
+    assert len(set(pairs)) == len(pairs)
+    assert set(pairs) == {*EXAMPLES, *((x.feature, x.beside) for x in (*BY_SCHEMA, *OF_ARRAYS))}
+
+
+@pytest.mark.parametrize("pair", EXAMPLES, ids=_id)
+def test_it_is_refused_with_its_reason_and_remedy(pair: tuple[c.Feature, c.Feature]) -> None:
+    """With the reason, what to do and, where the scene alone asks for both, the line of the file."""
+    changes, use = EXAMPLES[pair]
+    refusal = next(x for x in REFUSALS if (x.feature, x.beside) == pair)
+    with pytest.raises(SceneError) as told:
+        refuse_use(_scene(changes, _of_several(pair)), use, "asked")
+    pattern = re.escape(f"{refusal.expected}, because {refusal.why}").replace(r"\{key\}", r"[\w.\[\]]+")
+    mine = [x for x in told.value.complaints if re.fullmatch(pattern, x.expected)]
+    assert mine, told.value
+    for x in mine:
+        assert x.fix and (x.line or use) and (x.value or not use), told.value
+
+
+@pytest.mark.parametrize("refusal", BY_SCHEMA, ids=lambda x: x.feature.name)
+def test_keys_that_several_lines_do_not_have_say_what_to_do(refusal: Refusal) -> None:
+    assert isinstance(refusal.feature.places, Absent)
+    at = {"System": "", "SystemOutput": "output.", "FixedPoint": "points.b.", "JoinedLine": ONE,
+          "FreePoint": "points.free.", "Fairlead": "points.on.", "ClampedConnection": ONE + "connections.end."}  # fmt: skip
+    more: dict[str, Any] = {
+        "output": {}, "points.free": {"kind": "free", "initial_guess": [4, 0, -1]},
+        "points.on": {"kind": "fairlead", "body": "x", "place": [0, 0, 0]}, **CLAMPED,
+    }  # fmt: skip
+    for table, keys in refusal.feature.places.keys.items():
+        for key in keys:
+            with pytest.raises(SceneError) as told:
+                _scene(more | {at[table] + key: {}}, True)
+            assert refusal.fix in [x.fix for x in told.value.complaints if x.where.endswith(key)], told.value
+
+
+def test_an_end_through_which_torque_passes_into_catenaries_is_not_let_go() -> None:
+    zones = {"kind": "zones", "zones": [{"rod": 2, "cells": 4}, {"catenary": 6}, {"rod": 2, "cells": 4}]}
+    changes = {"model": zones, "mesh": {"cells": 14}, END + "release_at": {"time": 2}, END + "turns": 1}
+    scene = _scene(changes, False)
+    assert isinstance(scene, Scene)
+    with pytest.raises(SceneError, match=c.RELEASED_TWIST.reason):
+        check_releases(scene, build(scene))
+
+
+def test_nothing_else_refuses_a_combination() -> None:
+    """Reasons of the table stand in no other file of the package."""
+    root = Path(hybrid.__file__).parent
+    reasons = [x.why.partition("{key}")[0].strip(" (,") for x in REFUSALS if x not in BY_SCHEMA]
+    words = {x for x in reasons if len(x) > 20}
+    for path in root.rglob("*.py"):
+        if path.name not in ("combinations.py", "plane.py"):  # this one: what does not lie in a plane
+            text = path.read_text(encoding="utf-8")
+            assert not [x for x in words if f"because {x}" in text], path
