@@ -7,6 +7,7 @@ every process of the tests.
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from importlib import import_module
@@ -55,6 +56,7 @@ BY_TABLE = {
 
 
 def main(half: str) -> None:
+    gc.disable()  # numba leaves a hundred MB of garbage per large kernel: cheaper left than searched for
     os.cpu_count = lambda: 1  # or each run below would start a process that compiles beside it
     table = np.zeros(0, np.int64)
     for name in BY_TABLE[half].split():
@@ -71,3 +73,4 @@ def main(half: str) -> None:
 
 if __name__ == "__main__":
     main(sys.argv[1])
+    os._exit(0)  # nor is it searched for at the end

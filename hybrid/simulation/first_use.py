@@ -94,11 +94,12 @@ def compile_beside(scene: Scene, static: bool = False) -> None:
 def command_to_compile(names: Sequence[str]) -> list[str]:
     """Command of a process that compiles kernels with this package, wherever it is started.
 
-    -P: a file of the present folder that is called as a module of this package or of Python is not run.
+    -P: a file of the present folder that is called as a module of this package or of Python is not run.  Its end
+    searches for no garbage, of which numba leaves much.
     """
     package = str(Path(__file__).parents[2])
-    call = f"from hybrid.simulation.first_use import compile_all; compile_all({list(names)})"
-    return [sys.executable, "-P", "-c", f"import sys; sys.path.insert(0, {package!r}); {call}"]
+    call = f"from hybrid.simulation.first_use import compile_all; compile_all({list(names)}); os._exit(0)"
+    return [sys.executable, "-P", "-c", f"import os, sys; sys.path.insert(0, {package!r}); {call}"]
 
 
 def compile_all(names: Sequence[str]) -> None:
