@@ -25,7 +25,8 @@ _OPTIONS: dict[str, Any] = {
 }  # fmt: skip
 _njit: Any = numba.njit  # its type knows of fewer options than it takes
 
-_asked: Any = BaseFunction.get_call_type
+_rules: Any = BaseFunction  # whose type lets no method be replaced
+_asked: Any = _rules.get_call_type
 _signatures: dict[tuple[BaseFunction, tuple[Any, ...]], Any] = {}
 
 
@@ -47,15 +48,15 @@ class _Kernel(CPUDispatcher):
 
     def compile(self, sig: Any) -> Any:
         """Without searches for garbage, a fifth of the time, and with signatures that are kept, another sixth."""
-        if BaseFunction.get_call_type is _signature_once:
+        if _rules.get_call_type is _signature_once:
             return super().compile(sig)
         collects = gc.isenabled()
         gc.disable()
-        BaseFunction.get_call_type = _signature_once
+        _rules.get_call_type = _signature_once
         try:
             return super().compile(sig)
         finally:
-            BaseFunction.get_call_type = _asked
+            _rules.get_call_type = _asked
             if collects:
                 gc.enable()
 
