@@ -61,10 +61,10 @@ class DeferredRecorder:
         """As of `Recorder.due`."""
         return self._recorder.due
 
-    def flush(self) -> None:
-        """Hand on all that waits, and write it."""
+    def flush(self, made: float = 0.0) -> None:
+        """Hand on all that waits, and write it; made: as of `Recorder.flush`."""
         self.commit()
-        self._recorder.flush()
+        self._recorder.flush(made)
 
     # --- what a Simulation asks of it -----------------------------------------------------------
 

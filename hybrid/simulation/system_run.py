@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from time import monotonic
 from time import process_time as clock_now
 
 import numpy as np
@@ -245,16 +246,18 @@ class SystemRun:
         new = self.kept and self._between and due and self.steps != self._checked
         if not (new or self.recorder.due):
             return
+        begin = monotonic()
         for line in self.lines:
             line.write_down()
             line.write_envelope(self.t)
         self.recorder.replace(self.quantities.range_values())
         self.gather_events()
+        made = monotonic() - begin
         if new and isinstance(self.recorder, Recorder):
             self.cpu, self._checked = clock_now() - self._begin, self.steps
             self.recorder.checkpoint(lambda: content(self))
         if not last:
-            self.recorder.flush()
+            self.recorder.flush(made)
 
     def gather_events(self) -> None:
         """Record the events of the lines, in the result of the system with their names, as they happened."""

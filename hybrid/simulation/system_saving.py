@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from time import monotonic
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,17 +56,18 @@ def commit(run: SystemRun) -> None:
     LineFailed where an output says that going on would make no sense.
     """
     assert isinstance(run.recorder, DeferredRecorder)
-    due = run.recorder.due
+    due, begin = run.recorder.due, monotonic()
     if due:
         for line in run.lines:
             line.write_down()
             line.write_envelope(run.t)
         run.recorder.replace(run.quantities.range_values())
     run.gather_events()
+    made = monotonic() - begin
     for recorder in recorders(run):
         recorder.commit()
     if due:
-        run.recorder.flush()
+        run.recorder.flush(made)
 
 
 def kept(run: SystemRun) -> dict[str, Any]:

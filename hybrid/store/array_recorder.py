@@ -15,9 +15,7 @@ import numpy as np
 
 from hybrid.store.array_contents import ArrayContents, HeldValues, Text
 from hybrid.store.format import Field, check_names, tables_of
-from hybrid.store.recorder import STATUS, BaseRecorder
-
-_PAUSE = 0.2  # s: outputs wait in the run no longer than in one that writes a file
+from hybrid.store.recorder import STATUS, BaseRecorder, pause
 
 
 class MemoryTarget:
@@ -45,12 +43,12 @@ class ArrayRecorder(BaseRecorder):
         check_names(fields, step_fields, fixed)
         self._target, self._held = target, HeldValues(grid_s, fields, fixed, attributes, texts)
         self._begin(None, tables_of(fields, step_fields))
-        self._flushed, self.closed = -np.inf, False
+        self._flushed, self._pause, self.closed = -np.inf, pause(0.0), False
 
     @property
     def due(self) -> bool:
         """Whether a run should hand over what it has."""
-        return monotonic() - self._flushed > _PAUSE
+        return monotonic() - self._flushed > self._pause
 
     def _has_fixed(self, name: str) -> bool:
         return name in self._held.fixed
@@ -61,9 +59,9 @@ class ArrayRecorder(BaseRecorder):
     def checkpoint(self, content: Callable[[], Mapping[str, Any]]) -> None:
         """Nobody goes on with a result in memory."""
 
-    def flush(self) -> None:
-        """Nobody else reads it."""
-        self._flushed = monotonic()
+    def flush(self, made: float = 0.0) -> None:
+        """Nobody else reads it; made: s that it took to make what is handed over."""
+        self._flushed, self._pause = monotonic(), pause(made)
 
     def close(self, status: str = "complete", message: str = "") -> None:
         """Note the status, and give the result to its target; a second call does nothing."""

@@ -21,6 +21,15 @@ from hybrid.store.table import Table
 MOST_OF_A_KIND = 10_000
 STATUS = ("running", "complete", "interrupted", "failed")
 
+# A run hands over what it has after this long (s), or so many times as long as making that takes: ten outputs of a line
+# made together cost little more than one, and one output of each of 100 lines costs more than the steps before it.
+_PAUSE, _PART = 0.2, 10.0
+
+
+def pause(made: float) -> float:
+    """How long (s) a run keeps to itself what it has, after a hand-over of which the making took `made` (s)."""
+    return max(_PAUSE, _PART * made)
+
 
 class BaseRecorder:
     """Tables of one result whose rows wait; a context manager that closes it with the right status."""

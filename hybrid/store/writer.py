@@ -58,14 +58,14 @@ from hybrid.store.integrity import sign
 from hybrid.store.late_file import LateFile
 from hybrid.store.lines import GROUP, add_parts, in_turn, of_all, of_part
 from hybrid.store.named_arrays import Tree, pack
-from hybrid.store.recorder import STATUS, BaseRecorder
+from hybrid.store.recorder import STATUS, BaseRecorder, pause
 from hybrid.store.records import PENDING
 from hybrid.store.table import Table
 from hybrid.store.template import template
 
-# Outputs are held back at most this long (s), and so many times as long as writing takes: a reader hardly notices, a
-# kill loses no more, and a run that saves a thousand times a second spends 2 % of its time here instead of half.
-_PAUSE, _PART = 0.2, 50.0
+# Outputs are held back at most so many times as long as writing takes: a reader hardly notices, a kill loses no more,
+# and a run that saves a thousand times a second spends 2 % of its time here instead of half.
+_PART = 50.0
 # Bytes of outputs that wait at most, so that the memory of a long run stays flat: it computes 30 MB a second.
 _MOST_WAITING = 16_000_000
 
@@ -221,7 +221,7 @@ class Recorder(BaseRecorder):
         self._slots = _slots_of(file) if file is not None else []
         self._fixed: dict[str, h5d.DatasetID] = {}  # their datasets
         self._packed = b""  # a checkpoint that waits
-        self._flushed, self._took = -np.inf, 0.0  # when the file was last brought up to date, and how long it took, s
+        self._flushed, self._pause = -np.inf, pause(0.0)  # when the file was last written; how long that holds, s
         self.closed = self._broken = False
 
     def _go_on(self, rows: Mapping[str, int], happened: Mapping[str, int]) -> None:
@@ -296,7 +296,7 @@ class Recorder(BaseRecorder):
     @property
     def due(self) -> bool:
         """Whether outputs have been held back long enough, or are many."""
-        late = not self._unseen and monotonic() - self._flushed > max(_PAUSE, _PART * self._took)
+        late = not self._unseen and monotonic() - self._flushed > self._pause
         return late or sum(x._outputs.bytes_waiting for x in (self, *self._parts.values())) > _MOST_WAITING
 
     def _has_fixed(self, name: str) -> bool:
@@ -322,8 +322,8 @@ class Recorder(BaseRecorder):
         here = {"number": self._number, "t": self.last, "files": self.files, "rows": rows}
         self._packed = pack({**here, "happened": happened, "zones": self._zones or [], **content()})
 
-    def flush(self) -> None:
-        """Write what is held back, for readers to see."""
+    def flush(self, made: float = 0.0) -> None:
+        """Write what is held back, for readers to see; made: s that it took to make it, beyond what waited made."""
         begin = monotonic()
         late = self.is_late
         self._end_lateness()
@@ -337,7 +337,7 @@ class Recorder(BaseRecorder):
         self._number += bool(self._packed)
         self._packed = b""
         self._flushed = monotonic()
-        self._took = self._flushed - begin
+        self._pause = max(pause(made), _PART * (self._flushed - begin))
 
     def _write_many_steps(self) -> None:
         if self._steps.waiting >= BLOCK and self._late is None:

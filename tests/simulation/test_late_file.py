@@ -60,7 +60,7 @@ def test_a_file_that_is_late_is_as_one_that_grew(errors: bool, tmp_path: Path, m
     hybrid.run(described(errors), tmp_path / "late.h5").close()
     assert tmp_path / "late.h5" in made
     made.clear()
-    monkeypatch.setattr(writer, "_PAUSE", -1.0)  # outputs are due at once
+    monkeypatch.setattr(writer, "pause", lambda _: -1.0)  # outputs are due at once
     hybrid.run(described(errors), tmp_path / "grew.h5").close()
     assert not made
     assert contents(tmp_path / "late.h5") == contents(tmp_path / "grew.h5")

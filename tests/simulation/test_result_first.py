@@ -281,7 +281,7 @@ def test_of_results_that_follow_each_other_the_last_is_written(
         monkeypatch.setattr(error_control, "is_no_better", lambda *_: Verdict(2.0, 1.0, 1.0, 0.0, "no use"))
     written: list[str] = []
     monkeypatch.setattr(LateFile, "place", _noting(written, LateFile.place))
-    monkeypatch.setattr(writer, "_PAUSE", 100.0)
+    monkeypatch.setattr(writer, "pause", lambda _: 100.0)
     for waits, names in ((100.0, {"once.h5"}), (-1.0, {"each.h5", ".each.h5.finer"})):
         monkeypatch.setattr(late_file, "WAITS", waits)
         written.clear()
@@ -308,7 +308,7 @@ def test_a_finer_result_is_no_file_before_it_is_complete(tmp_path: Path, monkeyp
     """The first one grows, for those who read it; before, the finer one did too, and was copied to add its errors."""
     written: list[str] = []
     monkeypatch.setattr(LateFile, "place", _noting(written, LateFile.place))
-    monkeypatch.setattr(writer, "_PAUSE", -1.0)  # outputs are due at once
+    monkeypatch.setattr(writer, "pause", lambda _: -1.0)  # outputs are due at once
     monkeypatch.setattr(late_file, "WAITS", 100.0)
     with hybrid.run(asked(), tmp_path / "run.h5") as result:
         assert result.attributes["effort_runs"] > 4 and result.done

@@ -281,7 +281,8 @@ def test_a_full_disk_loses_nothing(part, tmp_path):
         import hybrid.simulation.time_loop
         import hybrid.solve.run
         hybrid.simulation.time_loop.WORK = 0
-        record._PAUSE = record._PART = 0.0
+        record._PART = 0.0
+        record.pause = lambda made: 0.0
         hybrid.solve.run.CELL_STEPS = 1
         resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most}))
         main(["run", "-q", {str(tmp_path / "scene.yaml")!r}, "-o", {str(tmp_path / "run.h5")!r}])
@@ -472,7 +473,7 @@ def test_checkpoints_are_at_the_same_places_whatever_the_clock(tmp_path, monkeyp
 
     monkeypatch.setattr(record.Recorder, "checkpoint", noted)
     for k, pause in enumerate((0.0, 1e9)):
-        monkeypatch.setattr(record, "_PAUSE", pause)
+        monkeypatch.setattr(record, "pause", lambda _, pause=pause: pause)
         monkeypatch.setattr(record, "_PART", 0.0)
         places.append([])
         hybrid.run(swinging(), tmp_path / f"{k}.h5").close()

@@ -59,7 +59,7 @@ def plain(data: dict[str, Any], steps: int = 20) -> hybrid.Result:
 
 
 def test_a_file_grows_while_it_is_stepped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hybrid.store.writer, "_PAUSE", 0.0)
+    monkeypatch.setattr(hybrid.store.writer, "pause", lambda _: 0.0)
     monkeypatch.setattr(hybrid.store.writer, "_PART", 0.0)
     with hybrid.SystemSimulation(scene(), tmp_path / "run.h5") as lines:
         for _ in range(6):
