@@ -134,7 +134,7 @@ def test_a_reference_that_fails_is_exit_2(call: Call, monkeypatch: pytest.Monkey
 
 
 def test_ctrl_c_leaves_what_is_done_and_the_same_command_goes_on(call: Call) -> None:
-    Path("long.yaml").write_text(SAG.replace("duration: 1.0", "duration: 500.0"))  # runs of about a second
+    Path("long.yaml").write_text(SAG.replace("duration: 1.0", "duration: 200.0"))  # runs of about half a second
     arguments = ["trade", "long.yaml", *SHORT, "--json"]
     command = [sys.executable, "-c", "import sys; from hybrid.cli.commands import main; main(sys.argv[1:])", *arguments]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)

@@ -143,7 +143,8 @@ def test_hand_written_derivatives(name: str, moving: bool) -> None:
     """Every block of Newton's matrix against differences of order six; 1e-10: round-off over the step 1e-3."""
     rng = np.random.default_rng(7)
     start, end, zones = LINES[name]
-    line = line_of(scene([SECTION, STIFFER], start, end, zones, 6, 9.0, fluid=WATER, initial=STRAIGHT))
+    cells = 2 * len(zones)
+    line = line_of(scene([SECTION, STIFFER], start, end, zones, cells, 9.0, fluid=WATER, initial=STRAIGHT))
     y = random_fields(line, rng)
     problem = random_problem(line, y, rng) if moving else Problem(line)
     if moving:  # frames and positions follow from spins and velocities

@@ -181,7 +181,9 @@ def test_zones_that_change_are_those_of_the_result():
         },
         "initial": "equilibrium", "time": {"duration": 25.7335}, "output": {"every": 0.643336, "points": 51},
     }  # fmt: skip
-    truth = hybrid.run(scene | {"model": "rod", "accuracy": "0.1%"})
+    # One of 1142 cells and half the step, which an accuracy of 0.1 % comes to, changes no ratio below by 0.04.
+    fine = {"model": "rod", "mesh": {"cells": 400}, "time": scene["time"] | {"step": 0.012}}
+    truth = hybrid.run(scene | fine | {"output": scene["output"] | {"errors": False}})
     result = hybrid.run(scene | {"model": {"kind": "adaptive", "always_move": True}, "accuracy": "1%"})
     for name in ("position", "tension", "curvature", "bending_moment"):
         assert SHARP[0] <= effectivity(result, truth, name) <= SHARP[1], name

@@ -93,8 +93,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     return make
 
 
-@pytest.mark.parametrize("harm", [None, Path.unlink, spoil, shorten])
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    ("name", "harm"), [("model left open", None), *(("rods", harm) for harm in (None, Path.unlink, spoil, shorten))]
+)
 def test_a_stopped_run_goes_on_bit_for_bit(
     name: str,
     harm: Callable[[Path], None] | None,

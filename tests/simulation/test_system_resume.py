@@ -72,7 +72,7 @@ def spar() -> dict[str, Any]:
             }
         },
         "lines": {name: {"start": name, "end": f"to_{name}"} | line for name in places},
-        "time": {"duration": 12, "step": 0.1},
+        "time": {"duration": 7, "step": 0.1},
     }  # fmt: skip
 
 
@@ -99,7 +99,7 @@ def clamped() -> dict[str, Any]:
             "branch": {"start": "tee", "end": "eye", "connections": {"start": {"tangent": [1, 0, 0]}, "end": up},
                        "mesh": {"cells": 20}, "sections": [pipe | {"length": 12}]},
         },
-        "time": {"duration": 4.0, "step": 0.05},
+        "time": {"duration": 2.0, "step": 0.05},
     }  # fmt: skip
 
 
