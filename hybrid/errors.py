@@ -120,6 +120,7 @@ EVENTS_BY_WEIGHT = (
     "out of plane",
     "unresolved twist",
     "unresolved change of section",
+    "kink at joint",
     "deep in the seabed",
     "numerical dissipation",
     "vibrations damped",
@@ -197,7 +198,8 @@ _CAUSE = {
     Outcome.BURIED: "the only equilibrium found lies deep in the seabed",
     Outcome.TURNS_LOST: "the equilibrium found is not twisted by the turns asked for",
     Outcome.WINCH_AT_END: "the winch has no more line to pay out, or none to take in",
-    Outcome.FOLDED: "the only equilibrium found has a fold: a rod turns by more than 90 deg from one cell to the next",
+    Outcome.FOLDED: "the only equilibrium found has a fold: a rod turns by more than 90 deg from one cell to the next, "
+    "and stands on it",
     Outcome.COLLAPSED: "steps have become so short that the run would not end",
     Outcome.OVERSTRETCHED: "the cable is stretched, or compressed, beyond what a section bears",
 }

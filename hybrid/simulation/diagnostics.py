@@ -25,7 +25,7 @@ from hybrid.kernels.state import Batch, Ends, Floats, State, ends_in, state_in
 from hybrid.model.build import Model
 from hybrid.outputs.joined_lines import JoinedObservation, Output
 from hybrid.outputs.observation import Observation
-from hybrid.simulation.doubtful_outputs import Bounds, doubtful
+from hybrid.simulation.doubtful_outputs import Bounds, doubtful, kinks_at
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.hockling_watch import LOOP, note_hockling, note_loops
 from hybrid.simulation.section_layers import ASKEW, hidden_layer, layer_text
@@ -36,6 +36,9 @@ from hybrid.solve.statics import Equilibrium
 UNRESOLVED = 1.0
 # What a catenary sags below the chord of a cell, as a part of the line's length, beyond which its shape is poor.
 OFF = 0.02
+# A turn at the joint of a rod and a catenary beyond the bend on its sides, rad: 20 deg, which a picture shows.  Zones
+# that move stay below, because they take a catenary where bending would move the line little.
+KINK = 0.35
 # Depth in the seabed, as a part of the line's length, that no bed of real soil allows.
 SUNK = 0.01
 # Energy that the scheme creates, as a part of what work, fall and start have put in: beyond the first it is
@@ -69,10 +72,10 @@ NOWHERE: Floats = np.zeros((0, 3))
 # What a checkpoint holds of it as plain values.
 REMEMBERED = (
     "_bend", "_twist", "_slack", "_fold", "_sunk", "_off", "_gain", "_loss", "_rested", "_left_out", "_jump",
-    "_put_in", "_potential", "_alive", "_loop", "_writhe", "_writhes", "_section",
+    "_put_in", "_potential", "_alive", "_loop", "_writhe", "_writhes", "_section", "_kink",
 )  # fmt: skip
-# What checkpoints of 0.6 files may lack of it: loops, and changes of section, were not watched.
-UNWATCHED = {"_loop": 1.0, "_writhe": np.nan, "_writhes": LOOP, "_section": False}
+# What checkpoints of 0.6 files may lack of it: loops, changes of section, and kinks at joints, were not watched.
+UNWATCHED = {"_loop": 1.0, "_writhe": np.nan, "_writhes": LOOP, "_section": False, "_kink": KINK}
 
 Stop = tuple[Outcome, int] | None
 
@@ -130,6 +133,7 @@ class Diagnostics:
         self._rested = self._left_out = self._section = False
         self._jump = SNAP * model.tension_scale  # N
         self._put_in = self._potential = self._alive = 0.0  # J
+        self._kink = KINK
         self._loop, self._writhe, self._writhes = UNWATCHED["_loop"], UNWATCHED["_writhe"], UNWATCHED["_writhes"]
 
     def begin(self) -> None:
@@ -355,8 +359,8 @@ class Diagnostics:
     def _bounds(self) -> Bounds:
         model = self._model
         return Bounds(
-            self._fold, self._off, self._sunk, self._bend <= UNRESOLVED, np.inf if self._rested else PRESSED,
-            model.length, tuple(model.attached),
+            self._fold, self._off, self._kink, self._sunk, self._bend <= UNRESOLVED,
+            np.inf if self._rested else PRESSED, model.length, tuple(model.attached),
         )  # fmt: skip
 
     def loops(self, t: Floats, values: Mapping[str, Floats], s: Floats) -> None:
@@ -366,7 +370,7 @@ class Diagnostics:
         self._writhe, self._writhes = note_loops(t, values, s, known, self.events.event)
 
     def mesh(self, seen: Observation) -> None:
-        """Folds that a catenary's cells do not resolve, and a line deep in the seabed."""
+        """Folds that a catenary's cells do not resolve, kinks at joints of zones, and a line deep in the seabed."""
         line, batch = self._model.line, seen.batch
         flexible = (line.spin[:-1] == 0) & (line.spin[1:] == 0) & ~np.isin(line.s[1:-1], self._model.attached)
         if flexible.any():
@@ -378,6 +382,7 @@ class Diagnostics:
                 sag = 2.0 * np.arctan(half[k]) * length / 8.0
                 if sag.max() > self._off:
                     self._note_sag(float(batch.t[k]), sag)
+        self._kinks(seen)
         self._layers(batch)
         layer = None if self._section else hidden_layer(self._model, seen)
         if layer is not None:
@@ -410,6 +415,28 @@ class Diagnostics:
             text = f"at s = {self._model.line.s[node]:g} m the catenary sags by {sag[node - 1]:.2g} m below its chords"
             self.note(t, node, "unresolved bend", f"{text}: so far off is its shape; add cells")
             self._off = 3.0 * float(sag[node - 1])
+
+    def _kinks(self, seen: Observation) -> None:
+        """Turns at joints of a rod and a catenary, where no moment passes, beyond the bends at the next nodes."""
+        line, batch = self._model.line, seen.batch
+        joints = np.flatnonzero(line.spin[1:] != line.spin[:-1]) + 1
+        joints = joints[~np.isin(line.s[joints], self._model.attached)]
+        if not joints.size:
+            return
+        kinks = kinks_at(joints, seen.bends, line.hn)
+        for k in np.flatnonzero(kinks.max(axis=0) > self._kink):
+            node = int(joints[np.argmax(kinks[:, k])])
+            kink = float(kinks[:, k].max())
+            if kink <= self._kink:
+                continue
+            keys = "model.zones" if self._model.layout is None else "model.tolerance, model.force_catenary"
+            text = (
+                f"the rod and the catenary that meet at s = {line.s[node]:g} m form a kink of {np.degrees(kink):.0f} "
+                f"deg, because their joint passes no moment: curvature and moment of the bend are missing; move this "
+                f"border of the zones to where the line is straight ({keys}), or take model: rod"
+            )
+            self.note(float(batch.t[k]), node, "kink at joint", text)
+            self._kink = 1.5 * kink
 
     def _layers(self, batch: Batch) -> None:
         """Clamps and point loads that bend a rod within less than a cell, however little: their moment is too small."""

@@ -21,11 +21,20 @@ class Bounds(NamedTuple):
 
     fold: float  # rad, of a catenary from cell to cell
     sag: float  # m, of a catenary below its chords
+    kink: float  # rad, of a joint of a rod and a catenary beyond the bend beside it
     sunk: float  # m, depth in the seabed
     layers: bool  # whether clamps and point loads are watched for bends within less than a cell
     pressed: float  # of EI/L, N m: what a rod carries that may buckle; infinite: that is not watched
     length: float  # m
     attached: tuple[float, ...]  # m, where point loads are
+
+
+def kinks_at(joints: NDArray[np.int64], bends: Floats, lengths: Floats) -> Floats:
+    """Angles (J, nb), rad, of joints beyond the larger bend on their sides; bends: (N+1, nb) 1/m at nodes, 2 tan(x/2)
+    over lengths (N+1,) m for an angle x.
+    """
+    turn = 2.0 * np.arctan(0.5 * bends[joints] * lengths[joints, None])
+    return np.asarray(turn - np.maximum(bends[joints - 1], bends[joints + 1]) * lengths[joints, None])
 
 
 def doubtful(seen: JoinedObservation, values: Mapping[str, Floats], bounds: Bounds) -> NDArray[np.bool_]:
@@ -40,6 +49,12 @@ def doubtful(seen: JoinedObservation, values: Mapping[str, Floats], bounds: Boun
         half = np.where(inside, 0.5 * seen.bends[:, 0] * line.hn, 0.0)
         found |= np.maximum.reduceat(half, begin) > np.tan(0.5 * min(bounds.fold, np.pi))
         found |= np.maximum.reduceat(half * line.hn, begin) > 4.0 * bounds.sag
+    joints = np.flatnonzero(line.spin[1:] != line.spin[:-1]) + 1
+    joints = joints[~np.isin(joints, seen.end_nodes)]
+    joints = joints[~np.isin(line.s[joints], bounds.attached)]
+    if joints.size:
+        kinked = kinks_at(joints, seen.bends, line.hn)[:, 0] > bounds.kink
+        found[np.searchsorted(seen.begin, joints[kinked], side="right") - 1] = True
     if bounds.layers:
         found |= bool(bounds.attached) | seen.has_element(0) | seen.has_element(1)
     if line.bits & SEABED:

@@ -12,6 +12,12 @@ from hybrid.kernels.state import Floats, Line, Sea, State
 
 # A line that lies this part of its length, and this many onsets of contact, under the bed has gone through it.
 BURIED, BURIED_ONSETS = 0.02, 100.0
+# Chords that turn by more than this from one cell to the next, rad, are a fold, whose bend is within the cells.  Where
+# both cells pull, the line hangs in the fold as in a tight sag: each pulls by less than the load of one cell, and the
+# shape is right to a cell, as the diagnostics say.  A rod that presses on the fold by more than that load, and than the
+# EI/h^2 that its bend there bears, stands on it, which no bend of its true size lets it.
+FOLDED = 0.5 * np.pi
+RESOLVED = 0.3  # rad from one cell to the next, of a bend that cells show
 
 
 def lowest_tension(line: Line, sea: Sea, state: State) -> tuple[float, int]:
@@ -22,7 +28,10 @@ def lowest_tension(line: Line, sea: Sea, state: State) -> tuple[float, int]:
 
 
 def flaw_of_line(line: Line, sea: Sea, state: State, length: float, floor: float) -> tuple[Outcome, int]:
-    """SLACK: a catenary is not under a tension of more than `floor` (N); BURIED; OK; and the cell or node."""
+    """SLACK: a catenary is not under a tension of more than `floor` (N); BURIED; FOLDED: a rod stands on a fold; OK;
+
+    and the cell or node.
+    """
     tension, cell = lowest_tension(line, sea, state)
     if not tension > floor:
         return Outcome.SLACK, int(cell)
@@ -30,7 +39,16 @@ def flaw_of_line(line: Line, sea: Sea, state: State, length: float, floor: float
         deep = planes_under(sea, state.r)[1] - 0.5 * sea.onset
         if deep.max() > max(BURIED * length, BURIED_ONSETS * sea.onset):
             return Outcome.BURIED, int(np.argmax(deep))
+    turns = np.where(_pressed(line, state), folds(line, state), 0.0)
+    if turns.max() > FOLDED:
+        return Outcome.FOLDED, int(np.argmax(turns))
     return Outcome.OK, -1
+
+
+def _pressed(line: Line, state: State) -> np.ndarray:
+    """Nodes (N+1,) of rods that a cell presses on by more than their load and their stiffness, EI/h^2, bear."""
+    low = np.minimum(np.append(state.T, np.inf), np.append(np.inf, state.T))
+    return np.asarray(-low > np.linalg.norm(line.force, axis=1) + line.kb[:, :2].max(axis=1) / line.hn)
 
 
 def folds(line: Line, state: State) -> Floats:
@@ -39,6 +57,15 @@ def folds(line: Line, state: State) -> Floats:
     turn = np.zeros(line.s.size)
     turn[1:-1] = np.arctan2(np.linalg.norm(np.cross(d[:-1], d[1:]), axis=1), np.einsum("ij,ij->i", d[:-1], d[1:]))
     turn[line.element == 0] = 0.0
-    if line.bits & BODIES:  # beside a point load a line bends within sqrt(EI/T), however long its cells are
-        turn[(line.point_mass > 0.0) | (line.point_buoy != 0.0)] = 0.0
+    # beside a point load a line bends within sqrt(EI/T), however long its cells are
+    turn[(line.point_mass > 0.0) | (line.point_lift != 0.0)] = 0.0
+    if line.bits & BODIES:
+        turn[line.point_buoy != 0.0] = 0.0
     return turn
+
+
+def fold_text(line: Line, state: State, node: int) -> str:
+    """How sharp the fold at a node is, and the cells that show a bend in its place."""
+    turn = float(folds(line, state)[node])
+    cell = RESOLVED * line.hn[node] / turn
+    return f"{np.degrees(turn):.0f} deg from one cell to the next; cells of {cell:.2g} m would show the bend"

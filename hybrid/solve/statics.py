@@ -15,7 +15,7 @@ from hybrid.kernels.forces import AXIAL_LAW, FLOW, FRICTION, MASS_DAMPING, PLANA
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
 from hybrid.kernels.step import friction_axes
-from hybrid.solve.flaws import flaw_of_line, lowest_tension
+from hybrid.solve.flaws import flaw_of_line, fold_text, lowest_tension
 from hybrid.solve.laid import laid_on_bed
 from hybrid.solve.stability import Stability, is_judged
 from hybrid.solve.stepper import Stepper
@@ -85,7 +85,8 @@ class _Solver:
         """Static Newton from `start`; a new state is returned, the old one is left as it was.
 
         An equilibrium with a catenary cell that is not under tension is no equilibrium of a cable: SLACK.
-        One out of which a rod would buckle is none that anybody will see: UNSTABLE.
+        One out of which a rod would buckle is none that anybody will see: UNSTABLE.  One with a rod that stands on a
+        fold between two cells is none of a rod: FOLDED.
         """
         new = start.copy()
         for still in (new.v, new.a, new.vd, new.w, new.wa, new.wd):
@@ -143,7 +144,7 @@ def _loaded(solver: _Solver, ends: Ends, start: State) -> Iterator[tuple[str, Ou
         for k in range(1, steps + 1):
             part = ends._replace(force=k / steps * ends.force, moment=k / steps * ends.moment)
             outcome, where, state = solver.newton(solver.line, part, state, turning=True)
-            if outcome not in (Outcome.OK, Outcome.SLACK):
+            if outcome not in (Outcome.OK, Outcome.SLACK, Outcome.FOLDED):
                 break
         yield f"turning chords, end loads in {steps} step{'s' * (steps > 1)}", outcome, where, state
 
@@ -286,13 +287,14 @@ def _attempts(
     solver: _Solver, ends: Ends, start: State, shape: str, others: Sequence[tuple[str, State]]
 ) -> Iterator[tuple[str, Outcome, int, State]]:
     """Ways to an equilibrium, the quickest first; each is tried only when those before it failed."""
-    unstable: list[State] = []
+    flawed: list[State] = []
 
     def noted(way: tuple[str, Outcome, int, State]) -> tuple[str, Outcome, int, State]:
         _, outcome, _, state = way
         same = SAME * solver.length
-        if outcome == Outcome.UNSTABLE and all(np.abs(state.r - x.r).max() > same for x in unstable):
-            unstable.append(state)
+        flaw = outcome in (Outcome.UNSTABLE, Outcome.FOLDED)
+        if flaw and all(np.abs(state.r - x.r).max() > same for x in flawed):
+            flawed.append(state)
         return way
 
     def relaxed(other: State) -> State:
@@ -314,8 +316,8 @@ def _attempts(
     pushed = 0
     for name, other in (("", start), *((f" from {name}", other) for name, other in others)):
         yield noted((f"damped motion to rest{name}, then Newton", *solver.newton(solver.line, ends, relaxed(other))))
-        while pushed < min(len(unstable), MOST_PUSHES):
-            fallen = relaxed(nudged(solver.line, unstable[pushed], solver.length, time_scale))
+        while pushed < min(len(flawed), MOST_PUSHES):
+            fallen = relaxed(nudged(solver.line, flawed[pushed], solver.length, time_scale))
             pushed += 1
             yield noted((PUSHED, *solver.newton(solver.line, ends, fallen)))
 
@@ -378,6 +380,7 @@ def solve_statics(
     for worst in (
         Outcome.SLACK,
         Outcome.UNSTABLE,
+        Outcome.FOLDED,
         Outcome.BURIED,
         failed[0][0],
     ):  # what says most about the line comes first
@@ -385,10 +388,11 @@ def solve_statics(
             # what a continuation has left on its way is not balanced
             if outcome == worst == Outcome.SLACK and take_slack and smooth.is_balanced(ends, state):
                 return _found(smooth, ends, state, path)
-        for outcome, where, _ in failed:
+        for outcome, where, state in failed:
             if outcome == worst:
-                s = float(line.s[min(max(where, 0), line.s.size - 1)])
-                raise ComputationError(outcome, None, s, "\n              ".join(path))
+                node = min(max(where, 0), line.s.size - 1)
+                said = [fold_text(line, state, node), *path] if outcome == Outcome.FOLDED else path
+                raise ComputationError(outcome, None, float(line.s[node]), "\n              ".join(said))
     raise AssertionError("one of the roads has failed with the first road's outcome")
 
 

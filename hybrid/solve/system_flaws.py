@@ -8,13 +8,10 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.state import State
-from hybrid.solve.flaws import flaw_of_line, folds, lowest_tension
+from hybrid.solve.flaws import flaw_of_line, lowest_tension
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.stability import Stability, is_judged
 from hybrid.solve.statics import LEAST_TENSION
-
-# A rod whose chords turn by more than this from one cell to the next, rad, has a shape that its cells know nothing of.
-FOLDED = 0.5 * np.pi
 
 
 def at_rest(x: JoinedLine) -> float:
@@ -29,17 +26,11 @@ def slack_cell(x: JoinedLine, state: State) -> int:
 
 
 def flaw_of_lines(lines: Sequence[JoinedLine], states: SystemState) -> tuple[Outcome, int, int]:
-    """The outcome (OK: there is none), the line, and its node or cell: of slack catenaries, of what lies under the bed,
-
-    and of rods that fold.
-    """
+    """The outcome (OK: there is none), the line, and its node or cell, as `flaw_of_line` finds them."""
     for k, (x, state) in enumerate(zip(lines, states.lines, strict=True)):
         outcome, where = flaw_of_line(x.line, x.sea, state, x.length, at_rest(x))
         if outcome != Outcome.OK:
             return outcome, k, where
-        turns = folds(x.line, state)
-        if turns.max() > FOLDED:
-            return Outcome.FOLDED, k, int(np.argmax(turns))
     return Outcome.OK, -1, -1
 
 

@@ -12,12 +12,10 @@ from hybrid.kernels.bodies import DAMPING, MASS, V
 from hybrid.kernels.forces import AXIAL_LAW, FLOW, FRICTION, SEABED, WAVES
 from hybrid.kernels.state import NO_ADDRESS, Floats
 from hybrid.solve.contact_statics import damped, stop
-from hybrid.solve.flaws import folds, lowest_tension
+from hybrid.solve.flaws import fold_text, lowest_tension
 from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
 from hybrid.solve.statics import CALM, HARDENING, LIMP, NEARLY_STIFF, PUSHED, RELAXING_STEPS, SOFT_BED, nudged
 from hybrid.solve.system import SystemSolver
-
-RESOLVED = 0.3  # rad from one cell to the next, of a bend that cells show
 
 
 @dataclass(frozen=True)
@@ -96,9 +94,7 @@ def _failed(
     line = lines[worst.line].line
     node = min(max(worst.where, 0), line.s.size - 1)
     if worst.outcome == Outcome.FOLDED:
-        turn = float(folds(line, states.lines[worst.line])[node])
-        text = f"{np.degrees(turn):.0f} deg from one cell to the next; cells of {RESOLVED * line.hn[node] / turn:.2g} m"
-        path = [f"{text} would show the bend", *path]
+        path = [fold_text(line, states.lines[worst.line], node), *path]
     return LineFailed(worst.line, worst.outcome, None, float(line.s[node]), "\n              ".join(path))
 
 
