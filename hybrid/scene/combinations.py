@@ -187,17 +187,21 @@ def _release_at_winch(tables: Tables) -> Iterator[Place]:
             yield (*at[:-1], "release_at")
 
 
+def holds_rod(model: Any, end: str, length: float) -> bool:
+    """Whether a line of this length (m) is a rod at an end, or may become one there."""
+    if isinstance(model, AdaptiveModel):
+        s, near = length * (end == "end"), SAME_LENGTH * length
+        return not any(a - near <= s <= b + near for a, b in model.force_catenary or ())
+    zone = model.zones[0 if end == "start" else -1] if isinstance(model, ZonesModel) else None
+    return isinstance(model, RodModel) or isinstance(zone, RodZone)
+
+
 def _rod_at_winch(tables: Tables) -> Iterator[Place]:
     """Winches that a rod leaves, or may leave."""
-    model, cable = tables.get("model"), tables.get("cable")
-    for at, _ in _winches(tables):
-        k = -int(at[1] == "end")
-        rod = isinstance(model, RodModel) or (isinstance(model, ZonesModel) and isinstance(model.zones[k], RodZone))
-        if isinstance(model, AdaptiveModel) and cable is not None:
-            s, far = cable.length * -k, SAME_LENGTH * cable.length
-            rod = not any(a - far <= s <= b + far for a, b in model.force_catenary or ())
-        if rod:
-            yield at
+    if "model" in tables and "cable" in tables:
+        for at, _ in _winches(tables):
+            if holds_rod(tables["model"], str(at[1]), tables["cable"].length):
+                yield at
 
 
 def _turns(tables: Tables) -> Iterator[Place]:
@@ -272,15 +276,21 @@ def _clamped(tables: Tables) -> Iterator[Place]:
             yield "connections", end
 
 
+def _clamped_to_free(tables: Tables) -> Iterator[Place]:
+    """Clamps to free points and free bodies, which turn by the moments of their lines."""
+    for at in _clamped(tables):
+        if tables[SYSTEM].is_joined(getattr(tables["lines"][tables[LINE]], str(at[1]))):
+            yield at
+
+
 def _breaks_off_clamp(tables: Tables) -> Iterator[Place]:
     """A line that breaks at the end at which it is clamped to a free point, or a point that gives way with a clamp."""
     for _, end in _clamped(tables):
         system, name = tables[SYSTEM], tables[LINE]
         point = getattr(system.lines[name], str(end))
-        there = system.points.get(point)
-        if system.breaks(name, end) and there is not None and there.kind == "free":
+        if system.breaks(name, end) and system.points[point].kind == "free":
             yield "lines", name, "break_at"
-        if getattr(there, "break_at", None) is not None:
+        if getattr(system.points[point], "break_at", None) is not None:
             yield "points", point, "break_at"
 
 
@@ -296,7 +306,6 @@ def _used(use: Use, at: str = "") -> Callable[[Tables], Iterator[Place]]:
 
 MOVING_ZONES = Feature("zones that move", "model: adaptive", _moving)
 FOLLOWING_CELLS = Feature("cells that follow the curvature", "model.curvature_error", _of_moving("curvature_error"))
-FORCED_CATENARY = Feature("stretches that stay catenary", "model.force_catenary", _of_moving("force_catenary"))
 ROTARY_INERTIA = Feature("rotary inertia", "rotary_inertia", _in_sections("rotary_inertia", of=lambda x: x.turns))
 TWO_STIFFNESSES = Feature(
     "two bending stiffnesses", "bending_stiffness: [EI_1, EI_2]",
@@ -339,8 +348,7 @@ SETTLED_FRICTION = Feature("friction that has settled in the equilibrium", "init
 CLAMPED_CONNECTION = Feature("a clamped connection", "lines.NAME.connections", _clamped)
 BREAKS_OFF_CLAMP = Feature("a break at a clamp", "break_at", _breaks_off_clamp)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
-MOVING_ZONES_OF_SEVERAL = Feature("zones that move in a line of several", "lines.NAME.model: adaptive",
-                                  lambda tables: _moving(tables) if SYSTEM in tables else ())  # fmt: skip
+CLAMPED_TO_FREE = Feature("a line that is clamped to a free point or body", "lines.NAME.connections", _clamped_to_free)
 
 STEPPED = Feature("steps from outside", "hybrid.Simulation", _used("stepped"))
 CHANGED_LOADS = Feature("loads that change in mid-run", "hybrid resume --set", _used("changed loads", "settings"))
@@ -483,12 +491,10 @@ REFUSALS: tuple[Refusal, ...] = (
         fix="leave it out, or the clamp; a line may break at its other end",
     ),
     Refusal(
-        CLAMPED_CONNECTION, MOVING_ZONES_OF_SEVERAL, "several lines", "zones of this line move", "pinned",
+        CLAMPED_TO_FREE, MOVING_ZONES, "not worked out",
+        "zones move ({key}), and what a rod holds is loose once that is a catenary",
+        "pinned",
         "write `model: rod`, or leave the clamp out",
-    ),
-    Refusal(
-        MOVING_ZONES_OF_SEVERAL, STEPPED, "several lines", "several lines are stepped from outside",
-        "rod, catenary or zones that stay", "write `model: rod`",
     ),
     Refusal(
         TORQUE_OF_TENSION, SEVERAL_LINES, "several lines",
@@ -497,7 +503,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         FOLLOWING_CELLS, SEVERAL_LINES, "several lines", "cells of several lines have lengths that stay", fix=ALONE
     ),
-    Refusal(FORCED_CATENARY, SEVERAL_LINES, "several lines", "zones of several lines move everywhere", fix=ALONE),
     Refusal(
         SETTLED_FRICTION, SEVERAL_LINES, "several lines", "friction is neglected in every equilibrium of several lines",
         "neglected",

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.base import Direction, Finding, Kinds, NonNegative, Table, Truth, by_kind, parallel, refuse
-from hybrid.scene.combinations import instead
+from hybrid.scene.combinations import holds_rod, instead
 from hybrid.scene.ends import BEND_STIFFNESS
 from hybrid.scene.motion_tables import TURNS
 from hybrid.scene.points import FixedPoint, FreePoint
@@ -99,9 +98,7 @@ def connection_findings(system: System) -> Iterator[Finding]:
 def _clamp_findings(system: System, name: str, key: str, held: ClampedConnection) -> Iterator[Finding]:
     line, point = system.lines[name], getattr(system.lines[name], key)
     at = ("lines", name, "connections", key)
-    model = line.chosen_model
-    zone = model.zones[0 if key == "start" else -1] if isinstance(model, ZonesModel) else None
-    if not (isinstance(model, RodModel) or isinstance(zone, RodZone)):
+    if not holds_rod(line.chosen_model, key, line.cable.length):
         expected = "pinned, because this end of the line is a catenary, which has no moment"
         yield Finding(at, expected, "give `bending_stiffness` to all sections, and `model: rod`", "clamped")
     if held.tangent is None and not isinstance(system.points[point], FreePoint):

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 def system_findings(system: System) -> Iterator[Iterator[Finding]]:
     """What contradicts in a system, in groups: of the first one with findings no later one makes sense."""
-    yield chain(_unknown_names(system), _refused_combinations(system))
+    yield _unknown_names(system)
+    yield _refused_combinations(system)
     yield chain(_lonely_points(system), _floating_groups(system))
     yield connection_findings(system)
     yield chain.from_iterable(_body_findings(system, name) for name in system.bodies)

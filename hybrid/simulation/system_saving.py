@@ -84,11 +84,17 @@ def bring_back(run: SystemRun, saved: SavedSystem) -> None:
     run.gather_events()
     for recorder, mark in zip(recorders(run), saved.marks, strict=True):
         recorder.back_to(mark)
-    if run.model is not saved.model:  # something has broken since, or contact has begun
+    # Something has broken since, or contact has begun, or zones have changed, or what changes in them is under way.
+    if run.model is not saved.model or run.zones is not None:
         run.model, run.failures.broken = saved.model, [*saved.run["broken"]]
-        for line, model, rows in zip(run.lines, saved.model.models, saved.waiting, strict=True):
+        moving = run.zones.numbers if run.zones is not None else []
+        for k, (line, model, rows) in enumerate(zip(run.lines, saved.model.models, saved.waiting, strict=True)):
             line.wait_again(((), (), rows[2]))
-            line.follow(model)
+            if k not in moving:
+                line.follow(model)
+        if run.zones is not None:
+            run.zones.take_rods(saved.run["zones"])
+            run.take_other()
         run.make_solver()
     set_state(run, saved.run)
     for line, rows in zip(run.lines, saved.waiting, strict=True):

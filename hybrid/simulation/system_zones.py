@@ -222,17 +222,21 @@ class SystemZones:
         }  # fmt: skip
 
     def take_rods(self, saved: Any) -> None:
-        """Give lines, that are all rod as yet, the zones of a checkpoint.  ValueError: they are none of them."""
+        """Give lines the zones of a checkpoint, in which nothing is under way yet.  ValueError: they are none of them.
+
+        Contact with itself is that of the model of the run.
+        """
         run = self._run
         models, states = [*run.model.models], [*run.state.lines]
         for x in self.lines:
             k, layout, manager = x.number, x.full.layout, x.switching.manager
             assert layout is not None
             mine = matched(saved[run.lines[k].name], {"rod": layout.rod, "switching": None}, "zones")
-            model = on_layout(x.full, layout._replace(rod=mine["rod"]))
+            model = on_layout(models[k], layout._replace(rod=mine["rod"]))
             assert model.layout is not None
             manager.set_layout(model.layout)
-            x.switching = ZoneSwitching(model, manager)
+            x.switching, x.pending = ZoneSwitching(model, manager), None
+            x.full = replace(x.full, line=x.full.line._replace(bits=model.line.bits))
             models[k], states[k] = model, state_for(model.line)
             run.lines[k].take_zones(model, extremes=False)
         run.model, run.state = replace(run.model, models=tuple(models)), run.state._replace(lines=states)

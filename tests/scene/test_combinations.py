@@ -74,13 +74,12 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.ERRORS, c.PAYOUT): (PAID | {"output": {"errors": True}}, ""),
     (c.CHANGED_LOADS, c.PAYOUT): (PAID, "changed loads"),
     (c.BREAKS_OFF_CLAMP, c.CLAMPED_CONNECTION): (CLAMPED | {"points.b.break_at": {"time": 2}}, ""),
-    (c.CLAMPED_CONNECTION, c.MOVING_ZONES_OF_SEVERAL): (CLAMPED | {ONE + "model": {"kind": "adaptive"}}, ""),
-    (c.MOVING_ZONES_OF_SEVERAL, c.STEPPED): ({ONE + "model": {"kind": "adaptive"}}, "stepped"),
+    (c.CLAMPED_TO_FREE, c.MOVING_ZONES): (
+        CLAMPED | {ONE + "model": {"kind": "adaptive"}, "points.b": {"body": "buoy", "place": [0, 0, 0]},
+                   "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0]}}, ""
+    ),
     (c.TORQUE_OF_TENSION, c.SEVERAL_LINES): ({ONE + "sections.0.tension_torque": 1e-3}, ""),
     (c.FOLLOWING_CELLS, c.SEVERAL_LINES): ({ONE + "model": FOLLOWING["model"]}, ""),
-    (c.FORCED_CATENARY, c.SEVERAL_LINES): (
-        {ONE + "model": {"kind": "adaptive", "force_catenary": [[2, 4]]}}, ""
-    ),
     (c.SETTLED_FRICTION, c.SEVERAL_LINES): ({ONE + "initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
     (c.CHANGED_LOADS, c.SEVERAL_LINES): ({}, "changed loads"),
     (c.CRITERION, c.SEVERAL_LINES): ({}, "criterion"),
@@ -95,7 +94,7 @@ def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
 
 
 def _of_several(pair: tuple[c.Feature, c.Feature]) -> bool:
-    names = (c.SEVERAL_LINES, c.MOVING_ZONES_OF_SEVERAL, c.CLAMPED_CONNECTION)
+    names = (c.SEVERAL_LINES, c.CLAMPED_TO_FREE, c.CLAMPED_CONNECTION)
     return any(x in names for x in pair)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -65,8 +66,20 @@ def changes(result: hybrid.Result) -> list[tuple[float, float, float, str]]:
     return [(round(e.t, 9), e.s_a, e.s_b, e.kind) for e in result.events if e.kind in hybrid.errors.ZONE_EVENTS]
 
 
-def test_a_system_of_one_line_has_the_zones_of_the_cable_at_the_same_times() -> None:
-    cable, system = (hybrid.run(x) for x in slackening())
+@pytest.mark.parametrize(
+    ("model", "held"),
+    [({}, {}), ({"force_catenary": [[10, 20]], "force_rod": [[30, 40]]}, {}), ({}, {"tangent": [1, 0, 0]})],
+    ids=["pinned", "forced", "clamped"],
+)
+def test_a_system_of_one_line_has_the_zones_of_the_cable_at_the_same_times(
+    model: dict[str, Any], held: dict[str, Any]
+) -> None:
+    one, several = (deepcopy(x) for x in slackening(duration=2.4 if model or held else 3.2))
+    one["model"] = several["lines"]["rope"]["model"] = MODEL | model
+    if held:
+        one["ends"]["start"] |= {"kind": "clamped"} | held
+        several["lines"]["rope"]["connections"] = {"start": held}
+    cable, system = (hybrid.run(x) for x in (one, several))
     rope = system.lines["rope"]
     assert changes(rope) == changes(cable) and len(changes(cable)) > 5
     assert [*rope.zones] == [*cable.zones]
@@ -136,7 +149,12 @@ def test_a_line_breaks_while_zones_move() -> None:
     ("line", "scene", "where"),
     [
         ({"model": MODEL | {"correct": True}}, {}, "correct"),
-        ({"connections": {"start": {"tangent": [0, 0, 1]}}}, {}, "connections"),
+        ({"connections": {"end": {"tangent": [0, 0, 1]}}}, {}, "connections"),
+        (
+            {"connections": {"start": {"tangent": [0, 0, 1]}}, "model": MODEL | {"force_catenary": [[0, 5]]}},
+            {},
+            "start",
+        ),
     ],
 )
 def test_what_is_not_computed_is_refused(line: dict[str, Any], scene: dict[str, Any], where: str) -> None:
@@ -147,9 +165,23 @@ def test_what_is_not_computed_is_refused(line: dict[str, Any], scene: dict[str, 
     assert where in refused.value.complaints[0].where
 
 
-def test_steps_from_outside_refuse_zones_that_move() -> None:
-    with pytest.raises(SceneError, match="stepped from outside"):
-        hybrid.SystemSimulation(mooring())
+def test_steps_from_outside_are_those_of_a_run(three: hybrid.Result) -> None:
+    """Bit for bit, also where each is computed twice, and several again, across changes of zones."""
+    with hybrid.SystemSimulation(mooring()) as simulation:
+        times, saved = three.times[1:26], simulation.save()
+        for k, t in enumerate(times):
+            simulation.advance(float(t))
+            if k % 6 == 5:
+                simulation.restore(saved)
+                for again in times[k - 5 : k + 1]:
+                    simulation.advance(float(again))
+                saved = simulation.save()
+        result = simulation.result()
+    for name, line in result.lines.items():
+        run = three.lines[name]
+        assert np.array_equal(line.position, run.position[:26]) and np.array_equal(line.tension, run.tension[:26])
+        assert [*line.zones] == [*run.zones][:26] and len(changes(line)) > 2
+        assert line["work/zones"][-1] == run["work/zones"][25]
 
 
 def test_an_equilibrium_has_zones_too() -> None:
