@@ -288,6 +288,15 @@ class Room:
         return made[0]
 
 
+def places(example: Any) -> dict[str, int]:
+    """Where the fields of a NamedTuple begin among the numbers of its table."""
+    found, at = {}, 0
+    for name, value in example._asdict().items():
+        found[name] = at
+        at += _size(_pattern(value))
+    return found
+
+
 def _bits(value: float) -> int:
     """The bits of a number as an integer."""
     found: int = unpack("q", pack("d", value))[0]

@@ -15,35 +15,19 @@ import numpy as np
 from hybrid.kernels.axial_law import has_law
 from hybrid.kernels.compile import inner
 from hybrid.kernels.element import put_spring
+from hybrid.kernels.fill_line import B_1, COLUMNS, fill_cell, fill_element, fill_node
 from hybrid.kernels.reel import (
     ACCELERATION,
-    ADDED_N,
-    ADDED_T,
     BALANCE_ON,
-    BEND_1,
-    BUOY,
     CHANGED,
-    DAMP,
-    DIAMETER,
-    DISPLACED,
-    DRAG_N,
-    DRAG_T,
     EASING,
     FAR,
-    KAPPA_1,
     LENGTH,
-    MASS,
-    PER_LENGTH,
     PLACE,
-    POLAR,
     RATE,
     RIDING_ON,
-    ROTARY,
     SIDE,
     SPRING,
-    STRETCH,
-    TAU,
-    WEIGHT,
 )
 from hybrid.kernels.winch import (
     LENGTH_NOW,
@@ -69,16 +53,28 @@ def length_at(law, t):
 
 
 @inner
-def amount_between(pieces, begin, end, out):
-    """What the material between two arc lengths has of all that it has per length."""
-    for j in range(PER_LENGTH):
-        out[j] = 0.0
+def made_between(pieces, begin, end, out, row):
+    """The row of the material between two arc lengths: the mean of its pieces; of stiffness that of their compliances."""
+    for j in range(COLUMNS):
+        out[row, j] = 0.0
     for k in range(pieces.shape[0]):
         a = max(pieces[k, 0], begin) if k > 0 else begin
         z = min(pieces[k + 1, 0], end) if k + 1 < pieces.shape[0] else end
-        if z > a:
-            for j in range(PER_LENGTH):
-                out[j] += (z - a) * pieces[k, 1 + j]
+        if not z > a:
+            continue
+        part = (z - a) / (end - begin)
+        for j in range(COLUMNS):
+            x = pieces[k, 1 + j]
+            if part == 1.0:
+                out[row, j] = x
+            elif B_1 <= j < B_1 + 3:
+                out[row, j] += part / x
+            else:
+                out[row, j] += part * x
+        if part == 1.0:
+            return
+    for j in range(B_1, B_1 + 3):
+        out[row, j] = 1.0 / out[row, j]
 
 
 @inner
@@ -100,45 +96,34 @@ def growing(line, reel):
 
 
 @inner
-def fill_node(line, i, first, q, share):
-    """Mass, loads and stiffness of node i between a cell that has `first` and one that has q; share: 1, or 0 of no cell."""
-    line.mass[i] = 0.5 * (first[MASS] + share * q[MASS]) + line.point_mass[i]
-    line.force[i, 2] = -0.5 * (first[WEIGHT] + share * q[WEIGHT]) + line.point_lift[i]
-    line.damp[i] = 0.5 * (first[DAMP] + share * q[DAMP])
-    line.hn[i] = 0.5 * (first[PER_LENGTH] + share * q[PER_LENGTH])
+def fill_between(line, reel, i, a, ha, b, hb):
+    """Node i between cells of rows a and b of `reel.made`; lengths: as of kernels.fill_line.fill_node."""
+    fill_node(line, i, reel.made, a, ha, b, hb)
     if line.element[i]:
-        for k in range(3):
-            soft = first[BEND_1 + k] + share * q[BEND_1 + k]
-            line.kb[i, k] = 2.0 / soft if line.kb[i, k] > 0.0 else 0.0
-            line.k0[i, k] = 0.5 * (first[KAPPA_1 + k] + share * q[KAPPA_1 + k])
+        fill_element(line, i, reel.made, a, ha, b, hb, line.kb[i, 2] == 0.0)
 
 
 @inner
 def fill_cells(line, reel):
     """Mass, loads and stiffness of the cell that grows, of those behind it and of their nodes, for the length that is out."""
-    n, layer, before, q = line.h.shape[0], reel.layer, reel.amount[0], reel.amount[1]
-    length, begin, g = reel.numbers[LENGTH], reel.numbers[PLACE], n - reel.layer.shape[0]
-    for j in range(1 + PER_LENGTH):
-        before[j] = reel.rest[j]
+    n, layer, made, a, b = line.h.shape[0], reel.layer, reel.made, 0, 1
+    length, begin, g, before = reel.numbers[LENGTH], reel.numbers[PLACE], n - reel.layer.shape[0], reel.rest_length[0]
+    for j in range(COLUMNS):
+        made[a, j] = reel.rest[0, j]
     for k in range(g, n):
         end = length - layer[k - g]
         h, c, i = end - begin, cell(line, reel, k), node(line, reel, k)
-        amount_between(reel.pieces, begin, end, q)
-        q[PER_LENGTH], reel.true[k] = h, h
+        made_between(reel.pieces, begin, end, made, b)
+        reel.true[k] = h
         line.s[node(line, reel, k + 1)] = reel.numbers[FAR] + reel.numbers[SIDE] * end
-        fill_node(line, i, before, q, 1.0)
-        if not has_law(line, c):  # which is linearised anew in every iteration, and is one for all that is on the reel
-            line.ck[c] = q[STRETCH] / h
-        line.tau[c], line.diameter[c] = q[TAU] / h, q[DIAMETER] / h
-        line.drag_n[c], line.drag_t[c] = 0.5 * q[DRAG_N], 0.5 * q[DRAG_T]
-        line.added_n[c], line.added_t[c] = 0.5 * q[ADDED_N], 0.5 * q[ADDED_T]
-        line.buoy[c], line.displaced[c] = 0.5 * q[BUOY], 0.5 * q[DISPLACED]
-        line.rotary[c], line.polar[c] = q[ROTARY], q[POLAR]
-        for j in range(1 + PER_LENGTH):
-            before[j] = q[j]
-        begin = end
+        fill_between(line, reel, i, a, before, b, h)
+        ck = line.ck[c]
+        fill_cell(line, c, made, b, h)
+        if has_law(line, c):  # which is linearised anew in every iteration, and is one for all that is on the reel
+            line.ck[c] = ck
+        a, b, before, begin = b, a, h, end
     i = node(line, reel, n)
-    fill_node(line, i, before, q, 0.0)
+    fill_between(line, reel, i, a, before, b, 0.0)
     if line.element[i] and reel.numbers[SPRING] < np.inf:
         put_spring(reel.numbers[SPRING], line, i)
 

@@ -19,7 +19,7 @@ from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.generalized_alpha import lead
 from hybrid.kernels.node_forces import get3
-from hybrid.kernels.paid_length import amount_between, cell, length_at, node
+from hybrid.kernels.paid_length import cell, length_at, made_between, node
 from hybrid.kernels.payout import slope_at, velocity_at
 from hybrid.kernels.reel import (
     CHANGED,
@@ -28,7 +28,6 @@ from hybrid.kernels.reel import (
     FAR,
     LEAVES,
     LONGEST,
-    PER_LENGTH,
     PLACE,
     SHORTEST,
     SIDE,
@@ -90,8 +89,8 @@ def place_reel(reel, nodes, count):
     numbers[PLACE] = place
     numbers[LONGEST] = next_ - place + ENTERS * (nodes[count + 1] - next_)
     numbers[SHORTEST] = LEAVES * (next_ - place)
-    amount_between(reel.pieces, before, place, reel.rest)
-    reel.rest[PER_LENGTH] = place - before
+    made_between(reel.pieces, before, place, reel.rest, 0)
+    reel.rest_length[0] = place - before
     for c in range(reel.true.shape[0]):
         reel.lack[c], reel.rate[c], reel.since[c], reel.span[c] = 0.0, 0.0, -np.inf, 1.0
     for c in range(count - 1):

@@ -17,10 +17,11 @@ from hybrid.kernels.books import Books, sample_size
 from hybrid.kernels.cell_changes import clear, copy_state, wave_step
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.energies import observe
+from hybrid.kernels.fill_line import copy_cell, copy_node, move_line
 from hybrid.kernels.following_run import call, call_count, call_solver, put, put_at
 from hybrid.kernels.newton import ASSEMBLY, RUN
 from hybrid.kernels.paid_length import cell, node, prepare
-from hybrid.kernels.payout_nodes import CarryJob, blank_carry_job, move_row, move_rows, place_reel
+from hybrid.kernels.payout_nodes import CarryJob, blank_carry_job, move_row, place_reel
 from hybrid.kernels.reel import BALANCE_ON, DUE, FAR, LONGEST, RIDING_ON, SIDE, Reel, blank_reel
 from hybrid.kernels.references import reader
 from hybrid.kernels.run import blank_books
@@ -87,67 +88,10 @@ read_node = reader(blank_node_job())
 
 
 @inner
-def move_line(line, out, forward, cut, step):
-    """Cells and nodes of a line that stay; those that are new have the values of their neighbours."""
-    move_row(line.s, out.s, forward, cut, step)
-    move_row(line.mass, out.mass, forward, cut, step)
-    move_row(line.hn, out.hn, forward, cut, step)
-    move_row(line.damp, out.damp, forward, cut, step)
-    move_row(line.point_mass, out.point_mass, forward, cut, step)
-    move_row(line.point_lift, out.point_lift, forward, cut, step)
-    move_row(line.point_drag, out.point_drag, forward, cut, step)
-    move_row(line.point_added, out.point_added, forward, cut, step)
-    move_row(line.point_buoy, out.point_buoy, forward, cut, step)
-    move_row(line.point_displaced, out.point_displaced, forward, cut, step)
-    move_row(line.point_floats, out.point_floats, forward, cut, step)
-    move_row(line.point_height, out.point_height, forward, cut, step)
-    move_row(line.point_upright, out.point_upright, forward, cut, step)
-    move_row(line.footing, out.footing, forward, cut, step)
-    move_row(line.element, out.element, forward, cut, step)
-    move_rows(line.force, out.force, forward, cut, step)
-    move_rows(line.kb, out.kb, forward, cut, step)
-    move_rows(line.k0, out.k0, forward, cut, step)
-    move_row(line.spin, out.spin, forward, cut, step)
-    move_row(line.h, out.h, forward, cut, step)
-    move_row(line.ck, out.ck, forward, cut, step)
-    move_row(line.rotary, out.rotary, forward, cut, step)
-    move_row(line.polar, out.polar, forward, cut, step)
-    move_row(line.drag_n, out.drag_n, forward, cut, step)
-    move_row(line.drag_t, out.drag_t, forward, cut, step)
-    move_row(line.added_n, out.added_n, forward, cut, step)
-    move_row(line.added_t, out.added_t, forward, cut, step)
-    move_row(line.tau, out.tau, forward, cut, step)
-    move_row(line.buoy, out.buoy, forward, cut, step)
-    move_row(line.displaced, out.displaced, forward, cut, step)
-    move_row(line.diameter, out.diameter, forward, cut, step)
-
-
-@inner
 def complete(whole, line, reel, k):
     """Node and cell k have all their material."""
-    i, c, of, in_ = node(line, reel, k), cell(line, reel, k), node(whole, reel, k), cell(whole, reel, k)
-    line.s[i], line.mass[i], line.hn[i], line.damp[i] = whole.s[of], whole.mass[of], whole.hn[of], whole.damp[of]
-    line.element[i], line.spin[c], line.footing[i] = whole.element[of], whole.spin[in_], whole.footing[of]
-    line.point_mass[i], line.point_drag[i], line.point_added[i] = (
-        whole.point_mass[of],
-        whole.point_drag[of],
-        whole.point_added[of],
-    )
-    line.point_lift[i], line.point_floats[i] = whole.point_lift[of], whole.point_floats[of]
-    line.point_buoy[i], line.point_displaced[i] = whole.point_buoy[of], whole.point_displaced[of]
-    line.point_height[i], line.point_upright[i] = whole.point_height[of], whole.point_upright[of]
-    for j in range(3):
-        line.force[i, j], line.kb[i, j], line.k0[i, j] = whole.force[of, j], whole.kb[of, j], whole.k0[of, j]
-    line.h[c], line.ck[c], line.tau[c], line.diameter[c] = (
-        whole.h[in_],
-        whole.ck[in_],
-        whole.tau[in_],
-        whole.diameter[in_],
-    )
-    line.drag_n[c], line.drag_t[c] = whole.drag_n[in_], whole.drag_t[in_]
-    line.added_n[c], line.added_t[c] = whole.added_n[in_], whole.added_t[in_]
-    line.buoy[c], line.displaced[c] = whole.buoy[in_], whole.displaced[in_]
-    line.rotary[c], line.polar[c] = whole.rotary[in_], whole.polar[in_]
+    copy_node(whole, node(whole, reel, k), line, node(line, reel, k))
+    copy_cell(whole, cell(whole, reel, k), line, cell(line, reel, k))
 
 
 @inner

@@ -16,17 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, WORKS
+from hybrid.kernels.fill_line import COLUMNS
 from hybrid.kernels.references import reader
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
 from hybrid.kernels.winch import WINCH
 
-# What a piece of the material has per length; of stiffness one over it.
-(
-    MASS, WEIGHT, DAMP, STRETCH, TAU, DRAG_N, DRAG_T, ADDED_N, ADDED_T, BUOY, DISPLACED, DIAMETER, ROTARY, POLAR,
-    BEND_1, BEND_2, TWIST, KAPPA_1, KAPPA_2, KAPPA_3,
-) = range(20)  # fmt: skip
-PER_LENGTH = 20
 # Parts of a cell: a node enters when that much of the cell after it is out, and leaves when only that much is left.
 ENTERS, LEAVES = 0.85, 0.35
 # Numbers of a reel.
@@ -53,8 +48,9 @@ class Reel(NamedTuple):
 
     numbers: Floats  # (NUMBERS,)
     law: Floats  # (K, 8) s, from which on a row holds; coefficients of L in the time since then, highest power first
-    pieces: Floats  # (P, 1 + PER_LENGTH) m, where a piece of the material begins; what it has per length
-    rest: Floats  # (1 + PER_LENGTH,) what the cell before the last brings to the node between; its length, as hn
+    pieces: Floats  # (P, 1 + COLUMNS) m, where a piece of the material begins; its row (kernels.fill_line)
+    rest: Floats  # (1, COLUMNS) of the cell before the last material node
+    rest_length: Floats  # (1,) m, its length
     true: Floats  # (N,) m, lengths of cells
     lack: Floats  # (N,) m, that cells lacked when they were made
     rate: Floats  # (N,) m/s, its rate then
@@ -62,7 +58,7 @@ class Reel(NamedTuple):
     span: Floats  # (N,) s, over which they get it
     before: Floats  # (N+1, 6) before the last step, of cells or nodes: length; mass, weight, stiffness of the element
     report: Floats  # (REPORT_SIZE,) this and the next: work arrays
-    amount: Floats  # (2, 1 + PER_LENGTH)
+    made: Floats  # (2, COLUMNS)
     layer: Floats  # (m+1,) m, how far before the fairlead the nodes that ride with it are; that is the last, 0
     riding: Floats  # (m+1, 3) N, by which the forces on them are more because they do not move as the material does
     stage: Floats  # (3,) 1 while these, or `balance`, are among the forces on the line; while `balance` is to be found
@@ -81,9 +77,9 @@ def blank_reel(
     numbers = z(NUMBERS)
     numbers[CHANGED] = -np.inf
     return Reel(
-        numbers, z((1, 8)) if law is None else law, z((1, 1 + PER_LENGTH)) if pieces is None else pieces,
-        z(1 + PER_LENGTH), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 1, 6)),
-        z(REPORT_SIZE), z((2, 1 + PER_LENGTH)), z(1) if layer is None else layer,
+        numbers, z((1, 8)) if law is None else law, z((1, 1 + COLUMNS)) if pieces is None else pieces,
+        z((1, COLUMNS)), z(1), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 1, 6)),
+        z(REPORT_SIZE), z((2, COLUMNS)), z(1) if layer is None else layer,
         z((1 if layer is None else layer.size, 3)), z(3), z((cells + 1, 3)), z((cells + 1, 3)), z(WINCH) if winch is None else winch,
         z((3, cells + 1, 5) if columns else (3, 0, 5)),
     )  # fmt: skip

@@ -83,6 +83,19 @@ def read_function(example: Any) -> Any:
     return read
 
 
+def rows_function(example: Any) -> Any:
+    """What numba is told of kernels.references.rows."""
+    kind, of = types.Array(types.float64, 2, "C"), Reference(type(example))
+
+    def rows(typingctx: Any, value: Any, at: Any, columns: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            return _array(context, builder, kind, cgutils.gep_inbounds(builder, args[0], args[1]), 0, args[2])
+
+        return kind(of, types.int64, types.int64), generate
+
+    return rows
+
+
 def call_function(returned: Any) -> Any:
     """What numba is told of kernels.references.caller."""
     result = typeof(returned)
@@ -138,11 +151,6 @@ def _attribute(context: Any, builder: Any, kind: Any, table: Any, name: str) -> 
 def _built(context: Any, builder: Any, kind: Any, table: Any, at: int) -> tuple[Any, int]:
     """The value of a type from the table's numbers at `at` on, and where the next begins."""
 
-    def number(k: int) -> Any:
-        found = builder.load(cgutils.gep_inbounds(builder, table, k))
-        found.set_metadata("invariant.load", builder.module.add_metadata([]))  # no kernel writes to a table
-        return found
-
     if isinstance(kind, Reference):
         return cgutils.gep_inbounds(builder, table, at), at + size(kind)
     if isinstance(kind, types.NamedTuple):
@@ -152,21 +160,35 @@ def _built(context: Any, builder: Any, kind: Any, table: Any, at: int) -> tuple[
             values.append(value)
         return context.make_tuple(builder, kind, values), at
     if isinstance(kind, types.Array):
-        array = context.make_array(kind)(context, builder)
-        item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
-        shape = [number(at + 1 + k) for k in range(kind.ndim)]
-        strides = [context.get_constant(types.intp, item)]
-        for length in shape[:0:-1]:
-            strides.insert(0, builder.mul(strides[0], length))
-        data = builder.inttoptr(number(at), array.data.type)
-        context.populate_array(array, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
-        return array._getvalue(), at + 1 + kind.ndim
-    value = number(at)
+        return _array(context, builder, kind, table, at), at + 1 + kind.ndim
+    value = _number(builder, table, at)
     if isinstance(kind, types.Float):
         value = builder.bitcast(value, context.get_data_type(types.float64))
     elif isinstance(kind, types.Boolean):
         value = builder.icmp_signed("!=", value, value.type(0))
     return value, at + 1
+
+
+def _number(builder: Any, table: Any, k: int) -> Any:
+    """Number k of a table."""
+    found = builder.load(cgutils.gep_inbounds(builder, table, k))
+    found.set_metadata("invariant.load", builder.module.add_metadata([]))  # no kernel writes to a table
+    return found
+
+
+def _array(context: Any, builder: Any, kind: Any, table: Any, at: int, columns: Any = None) -> Any:
+    """The array whose address stands at `at`, before its shape; columns: of one whose shape may be without them."""
+    array = context.make_array(kind)(context, builder)
+    item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+    given = kind.ndim if columns is None else 1
+    shape = [_number(builder, table, at + 1 + k) for k in range(given)]
+    shape += [] if columns is None else [columns]
+    strides = [context.get_constant(types.intp, item)]
+    for length in shape[:0:-1]:
+        strides.insert(0, builder.mul(strides[0], length))
+    data = builder.inttoptr(_number(builder, table, at), array.data.type)
+    context.populate_array(array, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
+    return array._getvalue()
 
 
 @unbox(Reference)

@@ -64,3 +64,11 @@ def caller(returned: Any) -> Any:
 def caller_of_six(returned: Any) -> Any:
     """The same with six arguments, call(address, a, b, c, d, e, f)."""
     return Intrinsic("call_function_of_six", returned)
+
+
+def rows(example: Any) -> Any:
+    """A function for kernels, rows(value, at, columns) -> the array of float64 (n, columns) of a NamedTuple with the
+
+    types of `example` that begins at number `at` of its table (kernels.binding.places).
+    """
+    return Intrinsic("rows_function", example)

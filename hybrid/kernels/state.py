@@ -5,11 +5,12 @@ All are NamedTuples of contiguous arrays with fixed types, so that one compiled 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.fields import HALF, MEAN, POINT, ROD, SHARED, blank, cell, fields_of, node
 from hybrid.kernels.report import REPORT_SIZE
 
 Floats = NDArray[np.float64]
@@ -30,69 +31,70 @@ NO_SLOW: Floats = np.zeros(0)
 NO_ADDRESS: NDArray[np.int64] = np.zeros(0, np.int64)
 
 
-TENSION_TORQUE = ("tension_torque", "tension_twist")  # arrays of Line that are empty where there is none
-
-
 class Line(NamedTuple):
     """What the plan says: mesh, stiffness, mass and load parameters.
 
     A parameter of a force that is off (see `bits`) is NaN: used by mistake, it shows at once.
     """
 
-    s: Floats  # (N+1,) m, unstretched arc length of the nodes
-    h: Floats  # (N,) m, unstretched cell length
-    ck: Floats  # (N,) 1/N, axial compliance; 0 when inextensible
-    mass: Floats  # (N+1,) kg, of the half cells that meet at the node
-    force: Floats  # (N+1, 3) N, weight and buoyancy
-    element: NDArray[np.int8]  # (N+1,) 1 where a rod element sits
-    spin: NDArray[np.int8]  # (N,) 1 where the cell has a frame and a spin
-    kb: Floats  # (N+1, 3) N m, stiffness of the element (two bending, torsion)
-    k0: Floats  # (N+1, 3) rad, its strain without stress
-    hn: Floats  # (N+1,) m, length an element stands for
-    rotary: Floats  # (N,) kg m2, transverse rotary inertia of the cell
-    polar: Floats  # (N,) kg m2, polar inertia of the cell
-    drag_n: Floats  # (N,) kg/m, of half the cell
-    drag_t: Floats  # (N,) kg/m
-    added_n: Floats  # (N,) kg, of half the cell
-    added_t: Floats  # (N,) kg
-    damp: Floats  # (N+1,) kg/s, mass-proportional damping of the node
-    tau: Floats  # (N,) s, stiffness-proportional damping time
-    buoy: Floats  # (N,) N, buoyancy of half the cell where it depends on the surface (else part of `force`)
-    displaced: Floats  # (N,) kg, water displaced by half the cell, on which the pressure of waves acts
-    diameter: Floats  # (N,) m, over which a cell passes through the surface
-    point_mass: Floats  # (N+1,) kg, of a body at the node (part of `mass`)
-    point_lift: Floats  # (N+1,) N, buoyancy less weight of a body at the node (part of `force`)
-    point_drag: Floats  # (N+1,) kg/m, rho CdA/2 of a body at the node
-    point_added: Floats  # (N+1,) kg, added mass of a body at the node
-    point_buoy: Floats  # (N+1,) N, buoyancy of a body at the node where it depends on the surface (else in `force`)
-    point_displaced: Floats  # (N+1,) kg, water displaced by a body at the node
-    point_floats: Floats  # (N+1,) wetted part from which on a body has its added mass; less of it at a smaller one
-    point_height: Floats  # (N+1,) m, over which a body passes through the surface
-    point_upright: Floats  # (N+1,) 1 where a body is a cylinder that stands upright, 0 where it is a sphere
-    footing: Floats  # (N+1,) m, length of cable that presses on the seabed as much as the body at the node
+    s: Annotated[Floats, node()]  # (N+1,) m, unstretched arc length of the nodes
+    h: Annotated[Floats, cell()]  # (N,) m, unstretched cell length
+    ck: Annotated[Floats, cell(MEAN)]  # (N,) 1/N, axial compliance; 0 when inextensible
+    mass: Annotated[Floats, node(SHARED)]  # (N+1,) kg, of the half cells that meet at the node
+    force: Annotated[Floats, node(columns=3)]  # (N+1, 3) N, weight and buoyancy
+    element: Annotated[NDArray[np.int8], node(kind=np.int8)]  # (N+1,) 1 where a rod element sits
+    spin: Annotated[NDArray[np.int8], cell(kind=np.int8)]  # (N,) 1 where the cell has a frame and a spin
+    kb: Annotated[Floats, node(columns=3)]  # (N+1, 3) N m, stiffness of the element (two bending, torsion)
+    k0: Annotated[Floats, node(columns=3)]  # (N+1, 3) rad, its strain without stress
+    hn: Annotated[Floats, node()]  # (N+1,) m, length an element stands for
+    rotary: Annotated[Floats, cell(ROD)]  # (N,) kg m2, transverse rotary inertia of the cell
+    polar: Annotated[Floats, cell(ROD)]  # (N,) kg m2, polar inertia of the cell
+    drag_n: Annotated[Floats, cell(HALF)]  # (N,) kg/m, of half the cell
+    drag_t: Annotated[Floats, cell(HALF)]  # (N,) kg/m
+    added_n: Annotated[Floats, cell(HALF)]  # (N,) kg, of half the cell
+    added_t: Annotated[Floats, cell(HALF)]  # (N,) kg
+    damp: Annotated[Floats, node(SHARED)]  # (N+1,) kg/s, mass-proportional damping of the node
+    tau: Annotated[Floats, cell(MEAN)]  # (N,) s, stiffness-proportional damping time
+    # (N,) N, buoyancy of half the cell where it depends on the surface (else part of `force`)
+    buoy: Annotated[Floats, cell(HALF)]
+    displaced: Annotated[
+        Floats, cell(HALF)
+    ]  # (N,) kg, water displaced by half the cell, on which the pressure of waves acts
+    diameter: Annotated[Floats, cell(MEAN)]  # (N,) m, over which a cell passes through the surface
+    point_mass: Annotated[Floats, node(POINT)]  # (N+1,) kg, of a body at the node (part of `mass`)
+    point_lift: Annotated[Floats, node(POINT)]  # (N+1,) N, buoyancy less weight of a body at the node (part of `force`)
+    point_drag: Annotated[Floats, node(POINT)]  # (N+1,) kg/m, rho CdA/2 of a body at the node
+    point_added: Annotated[Floats, node(POINT)]  # (N+1,) kg, added mass of a body at the node
+    # (N+1,) N, buoyancy of a body at the node where it depends on the surface (else in `force`)
+    point_buoy: Annotated[Floats, node(POINT)]
+    point_displaced: Annotated[Floats, node(POINT)]  # (N+1,) kg, water displaced by a body at the node
+    # (N+1,) wetted part from which on a body has its added mass; less of it at a smaller one
+    point_floats: Annotated[Floats, node(POINT)]
+    point_height: Annotated[Floats, node(POINT)]  # (N+1,) m, over which a body passes through the surface
+    # (N+1,) 1 where a body is a cylinder that stands upright, 0 where it is a sphere
+    point_upright: Annotated[Floats, node(POINT)]
+    # (N+1,) m, length of cable that presses on the seabed as much as the body at the node
+    footing: Annotated[Floats, node(POINT)]
     bits: int  # which optional forces are on (kernels.forces)
     plane: Floats = NO_PLANE  # (3, 3) rows p, q and the normal p x q of the plane that a planar line lies in
     # (K, 5) catenary zones that a torque passes through: first cell, cell after the last, compliance (rad per N m),
     # turn without torque (rad), stiffness-proportional damping time (s)
     torsion: Floats = NO_TORSION
-    law: Floats = (
-        NO_LAW  # (N, 7) of cells whose tension is no multiple of strain (kernels.axial_law); empty: there are none
-    )
+    # (N, 7) of cells whose tension is no multiple of strain (kernels.axial_law); empty: there are none
+    law: Annotated[Floats, cell(columns=7, optional=True)] = NO_LAW
     law_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: strain, tension (N), energy per length (J/m)
     law_at: NDArray[np.int64] = NO_ADDRESS  # (1,) address of kernels.axial_law.follow_law; empty: there is no such cell
     # (N,) of sections in which tension makes a torque (kernels.tension_torque): torque by tension, N m per N; twist of half
     # a cell by tension, rad/N; empty: there are none
-    tension_torque: Floats = NO_TENSION_TORQUE
-    tension_twist: Floats = NO_TENSION_TORQUE
+    tension_torque: Annotated[Floats, cell(optional=True)] = NO_TENSION_TORQUE
+    tension_twist: Annotated[Floats, cell(optional=True)] = NO_TENSION_TORQUE
 
 
-# Of these there is one for every node; of all but what belongs to the whole line, one for every node or cell.
-NODES_OF_LINE = (
-    "s", "mass", "force", "element", "kb", "k0", "hn", "damp", "point_mass", "point_lift", "point_drag", "point_added",
-    "point_buoy", "point_displaced", "point_floats", "point_height", "point_upright", "footing",
-)  # fmt: skip
-OF_WHOLE_LINE = ("bits", "plane", "torsion", "law", "law_table", "law_at", *TENSION_TORQUE)
-ALONG_LINE = tuple(name for name in Line._fields if name not in OF_WHOLE_LINE)
+FIELDS = fields_of(Line)
+# Of these there is one for every node; of all but what belongs to the whole line or to few, one for every node or cell.
+NODES_OF_LINE = tuple(name for name, x in FIELDS.items() if x.of_node)
+ALONG_LINE = tuple(name for name, x in FIELDS.items() if not x.optional)
+TENSION_TORQUE = ("tension_torque", "tension_twist")
 
 
 class Ends(NamedTuple):
@@ -347,13 +349,8 @@ def with_waves(sea: Sea, waves: Floats, depth: float) -> Sea:
 
 def blank_line(n_cells: int) -> Line:
     """A line of `n_cells` cells without length, mass or load."""
-    node = dict.fromkeys(NODES_OF_LINE, np.zeros(n_cells + 1))
-    node |= dict.fromkeys(("force", "kb", "k0"), np.zeros((n_cells + 1, 3)))
-    cell = {name: np.zeros(n_cells) for name in ALONG_LINE if name not in NODES_OF_LINE}
-    kinds = {"element": np.zeros(n_cells + 1, np.int8), "spin": np.zeros(n_cells, np.int8), "bits": 0}
-    values: dict[str, Any] = node | cell | kinds
-    absent = {"plane": NO_PLANE, "torsion": NO_TORSION, "law": NO_LAW, "law_table": NO_TABLE, "law_at": NO_ADDRESS}
-    return Line(**values | absent | {name: np.zeros(0) for name in TENSION_TORQUE})
+    along: dict[str, Any] = {name: blank(field, n_cells) for name, field in FIELDS.items()}
+    return Line(**along, bits=0)
 
 
 def no_ends() -> Ends:

@@ -1,50 +1,41 @@
-"""The line and what criteria know of it for other cells on the same base cells: as hybrid.model.line has it.
+"""The line of a material on cells, and what criteria know of it, for any cells on the same base cells.
 
 Sections, modules and points begin and end at base nodes, so a base cell has one of everything per length.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import put_spring
+from hybrid.kernels.fill_line import (
+    B_1,
+    COLUMNS,
+    KAPPA_1,
+    OF_POINTS,
+    fill_cell,
+    fill_element,
+    fill_node,
+    fill_point,
+    no_element,
+)  # fmt: skip
 from hybrid.kernels.references import reader
 from hybrid.kernels.state import Floats, Line, blank_line
 from hybrid.kernels.zone_criteria import LOAD, SMOOTH, STEP, NodeKinds, blank_kinds
 
-# Rows of `points`: what a body has; then its lift (N) and the cable that presses on the seabed as much (m).
-(
-    POINT_MASS, POINT_DRAG, POINT_ADDED, POINT_BUOY, POINT_DISPLACED, POINT_HEIGHT, POINT_UPRIGHT, POINT_FLOATS, LIFT,
-    FOOTING,
-) = range(10)  # fmt: skip
-
 
 class Cable(NamedTuple):
-    """A material on n base cells: per length as hybrid.model.material has it; points at the n+1 base nodes."""
+    """A material on n base cells, and points at the n+1 base nodes."""
 
-    mass: Floats
-    weight: Floats
-    ck: Floats
-    damp: Floats
-    tau: Floats
-    drag_n: Floats
-    drag_t: Floats
-    added_n: Floats
-    added_t: Floats
-    buoy: Floats
-    displaced: Floats
-    diameter: Floats
-    polar: Floats  # kg m; not a number: rods have none
-    B: Floats  # (n, 3)
-    kappa: Floats  # (n, 3)
+    made: Floats  # (n, COLUMNS) as of kernels.fill_line
     EI: Floats  # N m2, mean of both axes
     w: Floats  # N/m, weight in water
-    points: Floats  # (10, n+1)
-    blank: Floats  # (10,) of nodes without a point
+    points: Floats  # (P, n+1) of bodies, as OF_POINTS has them
+    blank: Floats  # (P,) of nodes without a body
     load: NDArray[np.int8]  # (n+1,) 1 where there is one
     turns: NDArray[np.int8]  # (n+1,) 1 where there is a swivel
     held: NDArray[np.int8]  # (2, 2) whether an element sits at the ends of a rod, and resists twist
@@ -53,12 +44,11 @@ class Cable(NamedTuple):
 
 def blank_cable(n: int) -> Cable:
     """A cable of nothing on n base cells."""
-    z = np.zeros
-    other: dict[str, Any] = {
-        "B": z((n, 3)), "kappa": z((n, 3)), "points": z((10, n + 1)), "blank": z(10), "load": z(n + 1, np.int8),
-        "turns": z(n + 1, np.int8), "held": z((2, 2), np.int8), "springs": np.full(2, np.inf),
-    }  # fmt: skip
-    return Cable(**{name: z(n) for name in Cable._fields} | other)
+    z, points = np.zeros, len(OF_POINTS)
+    return Cable(
+        z((n, COLUMNS)), z(n), z(n), z((points, n + 1)), z(points), z(n + 1, np.int8), z(n + 1, np.int8),
+        z((2, 2), np.int8), np.full(2, np.inf),
+    )  # fmt: skip
 
 
 class LineJob(NamedTuple):
@@ -93,100 +83,52 @@ read_line, read_kinds = reader(blank_line_job()), reader(blank_kinds_job())
 
 
 @inner
-def fill_cells(cable, s, of, rod, line):
-    """What cells have, and half of it to each of their nodes."""
-    for i in range(line.s.shape[0]):
-        line.s[i] = s[i]
-        line.mass[i], line.damp[i], line.hn[i] = 0.0, 0.0, 0.0
-        line.force[i, 0], line.force[i, 1], line.force[i, 2] = 0.0, 0.0, 0.0
-    for c in range(line.h.shape[0]):
-        j, h = of[c], s[c + 1] - s[c]
-        half = 0.5 * h
-        line.h[c], line.ck[c], line.tau[c], line.diameter[c] = h, cable.ck[j], cable.tau[j], cable.diameter[j]
-        line.spin[c], line.rotary[c], line.polar[c] = rod[c], 0.0 * cable.polar[j], h * rod[c] * cable.polar[j]
-        line.drag_n[c], line.drag_t[c] = half * cable.drag_n[j], half * cable.drag_t[j]
-        line.added_n[c], line.added_t[c] = half * cable.added_n[j], half * cable.added_t[j]
-        line.buoy[c], line.displaced[c] = half * cable.buoy[j], half * cable.displaced[j]
-        for i in (c, c + 1):
-            line.mass[i] += 0.5 * (h * cable.mass[j])
-            line.damp[i] += 0.5 * (h * cable.damp[j])
-            line.force[i, 2] -= 0.5 * (h * cable.weight[j])
-            line.hn[i] += half
-
-
-@inner
-def point(cable, row, j):
-    """What is at base node j; -1: between base nodes."""
-    return cable.points[row, j] if j >= 0 else cable.blank[row]
-
-
-@inner
-def fill_points(cable, of, line):
-    """What bodies at base nodes add."""
-    n = line.h.shape[0]
-    for i in range(n + 1):
-        j = of[min(i, n - 1)] if i == 0 or i == n or of[i] != of[i - 1] else -1
-        if i == n:
-            j += 1
-        line.point_mass[i] = point(cable, POINT_MASS, j)
-        line.mass[i] += line.point_mass[i]
-        line.point_lift[i], line.point_floats[i] = point(cable, LIFT, j), point(cable, POINT_FLOATS, j)
-        line.force[i, 2] += line.point_lift[i]
-        line.point_drag[i], line.point_added[i] = point(cable, POINT_DRAG, j), point(cable, POINT_ADDED, j)
-        line.point_buoy[i], line.point_displaced[i] = point(cable, POINT_BUOY, j), point(cable, POINT_DISPLACED, j)
-        line.point_height[i], line.point_upright[i] = point(cable, POINT_HEIGHT, j), point(cable, POINT_UPRIGHT, j)
-        line.footing[i] = point(cable, FOOTING, j)
-
-
-@inner
-def fill_elements(cable, of, line):
-    """Elements between rod cells, two halves in series, and at ends that hold a rod."""
-    n = line.h.shape[0]
-    for i in range(n + 1):
-        inside = 0 < i < n and line.spin[max(i - 1, 0)] and line.spin[min(i, n - 1)]
-        line.element[i] = 1 if inside else 0
-        for k in range(3):
-            line.kb[i, k], line.k0[i, k] = 0.0, 0.0
-            if inside:
-                a, b = 0.5 * line.h[i - 1], 0.5 * line.h[i]
-                ja, jb = of[i - 1], of[i]
-                line.kb[i, k] = 1.0 / (a / cable.B[ja, k] + b / cable.B[jb, k])
-                line.k0[i, k] = a * cable.kappa[ja, k] + b * cable.kappa[jb, k]
-        if inside and of[i] != of[i - 1] and cable.turns[of[i]]:
-            line.kb[i, 2] = 0.0
-    for end in range(2):
-        node, cell = (n, n - 1) if end else (0, 0)
-        if line.spin[cell] and cable.held[end, 0]:
-            half, j = 0.5 * line.h[cell], of[cell]
-            line.element[node] = 1
-            for k in range(3):
-                line.kb[node, k], line.k0[node, k] = cable.B[j, k] / half, half * cable.kappa[j, k]
-            if cable.springs[end] < np.inf:
-                put_spring(cable.springs[end], line, node)
-            if not cable.held[end, 1]:
-                line.kb[node, 2] = 0.0
+def base_node(of, i):
+    """The base node that node i is; -1: it lies between two."""
+    n = of.shape[0]
+    if i == n:
+        return of[n - 1] + 1
+    return of[i] if i == 0 or of[i] != of[i - 1] else -1
 
 
 @kernel
 def fill_line(table):
     """The line of a LineJob."""
     job = read_line(table)
-    fill_cells(job.cable, job.nodes, job.base_of_cell, job.rod, job.line)
-    fill_points(job.cable, job.base_of_cell, job.line)
-    fill_elements(job.cable, job.base_of_cell, job.line)
+    cable, of, line, s, rod = job.cable, job.base_of_cell, job.line, job.nodes, job.rod
+    made, n = cable.made, job.line.h.shape[0]
+    for c in range(n):
+        line.h[c], line.spin[c] = s[c + 1] - s[c], rod[c]
+        fill_cell(line, c, made, of[c], line.h[c])
+    for i in range(n + 1):
+        b, e, j = max(i - 1, 0), min(i, n - 1), base_node(of, i)
+        hb = line.h[b] if i > 0 else 0.0
+        he = line.h[e] if i < n else 0.0
+        line.s[i] = s[i]
+        fill_point(line, i, cable.points, j, cable.blank)
+        fill_node(line, i, made, of[b], hb, of[e], he)
+        no_element(line, i)
+        inside = 0 < i < n
+        end = 1 if i == n else 0
+        line.element[i] = line.spin[b] and line.spin[e] and (inside or cable.held[end, 0])
+        if line.element[i]:
+            turns = (j >= 0 and cable.turns[j]) if inside else not cable.held[end, 1]
+            fill_element(line, i, made, of[b], hb, of[e], he, turns)
+            if not inside and cable.springs[end] < np.inf:
+                put_spring(cable.springs[end], line, i)
 
 
 @kernel
 def fill_kinds(table):
     """What the criteria know of the nodes of a KindsJob."""
     job = read_kinds(table)
-    cable, of, kinds = job.cable, job.base_of_cell, job.kinds
-    n = of.shape[0]
+    cable, of, kinds, made = job.cable, job.base_of_cell, job.kinds, job.cable.made
+    n, X, Y = of.shape[0], KAPPA_1, KAPPA_1 + 1
     for i in range(n + 1):
         a, b = of[max(i - 1, 0)], of[min(i, n - 1)]
         kinds.EI[i], kinds.w[i] = max(cable.EI[a], cable.EI[b]), max(cable.w[a], cable.w[b])
-        kinds.GJ[i] = min(cable.B[a, 2], cable.B[b, 2])
-        bent = max(cable.kappa[a, 0] ** 2 + cable.kappa[a, 1] ** 2, cable.kappa[b, 0] ** 2 + cable.kappa[b, 1] ** 2)
+        kinds.GJ[i] = min(made[a, B_1 + 2], made[b, B_1 + 2])
+        bent = max(made[a, X] ** 2 + made[a, Y] ** 2, made[b, X] ** 2 + made[b, Y] ** 2)
         kinds.bent[i] = bent**0.5
         kinds.node[i] = STEP if cable.EI[a] != cable.EI[b] else SMOOTH
         at_base = i == 0 or i == n or a != b

@@ -6,10 +6,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.axial_law import SHIFT, follow_law
-from hybrid.kernels.element import NO_SPRING
-from hybrid.kernels.forces import AXIAL_LAW, BODIES, ROTARY, STIFFNESS_DAMPING
-from hybrid.kernels.state import NO_ADDRESS, NO_LAW, NO_TABLE, NO_TORSION, Floats, Line, blank_line, no_work, state_for
+from hybrid.kernels.binding import Packed, Table
+from hybrid.kernels.fill_line import OF_POINTS, PER_LENGTH
+from hybrid.kernels.forces import AXIAL_LAW, BODIES, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING
+from hybrid.kernels.state import (
+    NO_ADDRESS,
+    NO_LAW,
+    NO_PLANE,
+    NO_TABLE,
+    NO_TORSION,
+    TENSION_TORQUE,
+    Floats,
+    Line,
+    blank_line,
+    no_work,
+    state_for,
+)
+from hybrid.kernels.zone_line import Cable, blank_line_job, fill_line
 from hybrid.model.material import Material
+
+lines = Packed(blank_line, given=("bits", "plane", "torsion", *TENSION_TORQUE))
 
 
 def line_on(
@@ -21,47 +37,75 @@ def line_on(
     more_bits: forces that the surroundings ask for; sections_turn: whether cross-sections of rods have inertia.
     comes_and_goes: its rods do; they have inertia about their chords alone, where nothing else holds their spin.
     """
-    h = np.diff(s)
-    n = h.size
-    middle = 0.5 * (s[:-1] + s[1:])
-    of = material.piece(middle)
-    bits = material.bits | more_bits
-    rotary = polar = np.full(n, np.nan)
-    if sections_turn and rod.any() and (material.polar[of] > 0.0).any():
+    bits, inertia = material.bits | more_bits, NO_INERTIA
+    if sections_turn and rod.any() and (material.polar[material.piece(0.5 * (s[:-1] + s[1:]))] > 0.0).any():
         bits |= ROTARY
-        rotary, polar = h * rod * material.rotary[of], h * rod * material.polar[of]
-        if comes_and_goes:
-            rotary = 0.0 * polar
-    point = {name: np.full(n + 1, 0.0 if name == "point_mass" or bits & BODIES else np.nan) for name in material.points}
-    place = material.point_nodes(s)
-    for name, values in material.points.items():
-        if name == "point_mass" or bits & BODIES:
-            point[name][place] = values
-    force = np.zeros((n + 1, 3))
-    force[:, 2] = -_to_nodes(h * material.weight[of])
-    lift = np.zeros(n + 1)
-    lift[place] = material.lift
-    force[:, 2] += lift
-    footing = np.full(n + 1, np.nan)
-    if material.footing.size or more_bits:
-        footing[:] = 0.0
-        footing[place[: material.footing.size]] = material.footing
-    element, kb, k0, hn = _elements(material, h, rod, of)
-    kb[material.swivel_nodes(s), 2] = 0.0
-    half = 0.5 * h
-    torsion = torsion_zones(material, h, rod, of)
-    law, law_table, law_at = axial_law(material, h, of)
+        inertia = ABOUT_CHORDS if comes_and_goes else WITH_SECTIONS
+    if material.curves is not None:
+        bits |= AXIAL_LAW
+    return on_base(material, cable_on(material, s, bits, inertia), s, np.arange(rod.size), rod, bits)
+
+
+def on_base(
+    material: Material, cable: Cable, s: Floats, of_cell: NDArray[np.int64], rod: np.ndarray, bits: int,
+    plane: Floats = NO_PLANE, job: Table | None = None,
+) -> Line:  # fmt: skip
+    """The line of a material with nodes s (N+1,) m; of_cell, rod: (N,) base cells of its cells, whether they are rod.
+
+    cable: that on the base cells; job: a table of kernels.zone_line.LineJob, None: a new one.
+    """
+    h, of = np.diff(s), material.piece(0.5 * (s[:-1] + s[1:]))
     torque, twist = material.torque_by_tension(h, of)
-    return Line(
-        s=s, h=h, ck=material.ck[of], mass=_to_nodes(h * material.mass[of]) + point["point_mass"], force=force,
-        element=element, spin=rod.astype(np.int8), kb=kb, k0=k0, hn=hn, rotary=rotary, polar=polar,
-        drag_n=half * material.drag_n[of], drag_t=half * material.drag_t[of],
-        added_n=half * material.added_n[of], added_t=half * material.added_t[of],
-        damp=_to_nodes(h * material.damp[of]), tau=material.tau[of],
-        buoy=half * material.buoy[of], displaced=half * material.displaced[of], diameter=material.diameter[of],
-        point_lift=lift, footing=footing, bits=bits | (AXIAL_LAW if law_at.size else 0), torsion=torsion,
-        law=law, law_table=law_table, law_at=law_at, tension_torque=torque, tension_twist=twist, **point,
+    torsion = torsion_zones(material, h, rod, of)
+    line: Line = lines(h.size, bits=bits, plane=plane, torsion=torsion, tension_torque=torque, tension_twist=twist)
+    job = job or Table(blank_line_job)
+    job.bind(cable=cable, nodes=s, base_of_cell=of_cell, rod=rod, line=line)
+    fill_line(job.numbers)
+    if material.curves is not None:
+        law, law_table, law_at = axial_law(material, h, of)
+        line = line._replace(law=law, law_table=law_table, law_at=law_at)
+    return line
+
+
+# What inertia the sections of rods have.
+NO_INERTIA, ABOUT_CHORDS, WITH_SECTIONS = range(3)
+
+
+def made_of(material: Material, inertia: int = WITH_SECTIONS) -> Floats:
+    """(K, COLUMNS) of each piece of a material what cells of it are made of (kernels.fill_line)."""
+    of = {name: getattr(material, name) for name in PER_LENGTH}
+    if inertia == NO_INERTIA:
+        of["rotary"] = of["polar"] = np.full(material.polar.size, np.nan)
+    elif inertia == ABOUT_CHORDS:
+        of["rotary"] = 0.0 * material.polar
+    return np.column_stack([material.weight, material.B, material.kappa, *of.values()])
+
+
+def cable_on(material: Material, base: Floats, bits: int, inertia: int) -> Cable:
+    """A material on base cells (n+1,) m; bits: forces that are on; inertia: as of `made_of`."""
+    of, place = material.piece(0.5 * (base[:-1] + base[1:])), material.point_nodes(base)
+    load, turns = np.zeros(base.size, np.int8), np.zeros(base.size, np.int8)
+    load[place], turns[material.swivel_nodes(base)] = 1, 1
+    points = np.zeros((len(OF_POINTS), base.size))
+    cable = Cable(
+        made=made_of(material, inertia)[of], EI=material.mean_bending[of], w=np.abs(material.submerged_weight[of]),
+        points=points, blank=np.zeros(len(points)), load=load, turns=turns,
+        held=np.array([material.held_tangent, material.held_twist], np.int8).T.copy(),
+        springs=np.array(material.springs),
     )  # fmt: skip
+    put_points(material, place, cable, bits)
+    return cable
+
+
+def put_points(material: Material, place: np.ndarray, cable: Cable, bits: int) -> None:
+    """Bodies at the base nodes `place`; what is off is not a number."""
+    on = {"point_mass": True, "point_lift": True, "footing": material.footing.size > 0 or bits & (SEABED | FRICTION)}
+    of = {"point_lift": material.lift, "footing": material.footing, **material.points}
+    for row, name in enumerate(OF_POINTS):
+        cable.blank[row] = 0.0 if on.get(name, bits & BODIES) else np.nan
+        cable.points[row] = cable.blank[row]
+        if of[name].size:
+            cable.points[row, place] += of[name]
 
 
 def spins_freely(material: Material) -> bool:
@@ -79,51 +123,6 @@ def with_spin_inertia(line: Line, material: Material) -> Line:
         return line
     polar = line.h * line.spin * material.polar[material.piece(0.5 * (line.s[:-1] + line.s[1:]))]
     return line._replace(bits=line.bits | ROTARY, polar=polar, rotary=0.0 * polar)
-
-
-def _to_nodes(x: Floats) -> Floats:
-    y = np.zeros(x.size + 1)
-    y[:-1] += 0.5 * x
-    y[1:] += 0.5 * x
-    return y
-
-
-def _elements(
-    material: Material, h: Floats, rod: np.ndarray, of: np.ndarray
-) -> tuple[np.ndarray, Floats, Floats, Floats]:
-    """Where elements sit, their stiffness B/hn, their strain without stress, and the length each stands for."""
-    n = h.size
-    B, kappa, half = material.B[of], material.kappa[of], 0.5 * h[:, None]
-    element = np.zeros(n + 1, np.int8)
-    kb, k0, hn = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(n + 1)
-    hn[:-1] += 0.5 * h
-    hn[1:] += 0.5 * h
-    element[1:-1] = rod[:-1] & rod[1:]
-    inner = np.flatnonzero(element)
-    a, b = inner - 1, inner
-    kb[inner] = 1.0 / (half[a] / B[a] + half[b] / B[b])  # two halves in series
-    k0[inner] = half[a] * kappa[a] + half[b] * kappa[b]
-    for k, node, cell in ((0, 0, 0), (1, n, n - 1)):
-        if rod[cell] and material.held_tangent[k]:
-            element[node] = 1
-            kb[node] = B[cell] / half[cell]
-            k0[node] = half[cell] * kappa[cell]
-            if material.springs[k] < np.inf:
-                kb[node], hn[node] = in_series(kb[node], hn[node], material.springs[k])
-            if not material.held_twist[k]:
-                kb[node, 2] = 0.0
-    return element, kb, k0, hn
-
-
-def in_series(kb: Floats, hn: float, spring: float) -> tuple[Floats, float]:
-    """Stiffness (3,) N m of the element at a clamp, and the length, m, that it stands for, with an angular spring
-
-    (N m/rad) between the clamp and the half cell, whose are kb and hn: the length of line that would bend as much, so
-    that kb hn stays the bending stiffness.  (The same: kernels.element.put_spring.)
-    """
-    out = kb.copy()
-    out[:2] = 1.0 / (1.0 / kb[:2] + 1.0 / max(spring, NO_SPRING * kb[:2].max()))
-    return out, float(hn * kb[:2].mean() / out[:2].mean())
 
 
 def torsion_zones(material: Material, h: Floats, rod: np.ndarray, of: np.ndarray) -> Floats:

@@ -7,10 +7,11 @@ and end bodies sit at points.  `hybrid.model.line` puts a Material on nodes.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybrid.kernels.fill_line import OF_POINTS, PER_LENGTH
 from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, MASS_DAMPING, STIFFNESS_DAMPING, SURFACE, WAVES
 from hybrid.kernels.state import Floats
 from hybrid.model.scales import pressing
@@ -34,10 +35,8 @@ TENSION_FLOOR, LEAST_TENSION = 0.2, 1e-6
 # Of its height, from which on the added mass of a body without mass counts in full.
 LEAST_DRAUGHT = 0.05
 SMALLEST_BODY = 0.01  # m, over which a body without volume and drag passes through the surface
-POINT = (
-    "point_mass", "point_drag", "point_added", "point_buoy", "point_displaced", "point_height", "point_upright",
-    "point_floats",
-)  # fmt: skip
+OF_SECTIONS = ("mass", "ck", "rotary", "polar")  # per length, whatever else a scene asks for
+POINT = tuple(name for name in OF_POINTS if name not in ("point_lift", "footing"))
 
 
 class StretchLaw(NamedTuple):
@@ -179,7 +178,7 @@ def stretch_law(section: Section) -> StretchLaw | None:
 def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
     """The cable without its water and its attachments."""
     k, gravity = len(of), scene.environment.gravity
-    nothing = np.full(k, np.nan)
+    unasked: dict[str, Any] = {name: np.full(k, np.nan) for name in PER_LENGTH if name not in OF_SECTIONS}
     start, end = scene.ends.both
     out = Material(
         bounds=bounds,
@@ -191,8 +190,7 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         kappa=np.array([x.intrinsic_curvature or (0.0, 0.0, 0.0) for x in of], float),
         rotary=np.array([rotary_inertia(x)[0] for x in of]),
         polar=np.array([rotary_inertia(x)[1] for x in of]),
-        damp=nothing, tau=nothing, drag_n=nothing, drag_t=nothing, added_n=nothing, added_t=nothing,
-        buoy=nothing, displaced=nothing, diameter=nothing, bits=0,
+        **unasked, bits=0,
         swivels=np.array(swivels(scene), float),
         outer_diameter=np.array([x.diameter or 0.0 for x in of]),
         held_tangent=(start.held_tangent is not None, end.held_tangent is not None),

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.kernels import winch as w
-from hybrid.kernels.reel import LEAVES, PER_LENGTH
+from hybrid.kernels.reel import LEAVES
 from hybrid.kernels.state import Floats, Line
 from hybrid.model.layout import Layout
-from hybrid.model.line import line_on
+from hybrid.model.line import line_on, made_of
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import MOST_CELLS, Zone
@@ -78,7 +78,7 @@ class PayoutPlan:
     shortest: float  # m, below which nothing can be taken in
     zones: tuple[Zone, ...]  # at t = 0
     cable: Material  # what is out and what is on the reel
-    pieces: Floats  # (P, 1 + PER_LENGTH) as of kernels.payout.Reel
+    pieces: Floats  # (P, 1 + COLUMNS) as of kernels.reel.Reel
     from_outside: bool  # whether the length is set from Python
     winch: Floats  # (WINCH,) as of kernels.winch, before its brake opens; of zeros where none holds a tension
     layer: Floats  # (m+1,) m, how far before the fairlead the nodes are that ride with it; 0 is the last
@@ -392,15 +392,6 @@ def _whole_material(scene: Scene) -> Material:
 
 
 def _pieces(cable: Material, side: int, far: float) -> Floats:
-    """What every piece of the material has per length; of stiffness one over it."""
-    with np.errstate(divide="ignore"):
-        soft = 1.0 / cable.B
-    columns = [
-        cable.bounds[:-1] if side else far - cable.bounds[1:],
-        cable.mass, cable.weight, cable.damp, cable.ck, cable.tau, cable.drag_n, cable.drag_t,
-        cable.added_n, cable.added_t, cable.buoy, cable.displaced, cable.diameter, cable.rotary, cable.polar,
-        *soft.T, *cable.kappa.T,
-    ]  # fmt: skip
-    pieces = np.ascontiguousarray(np.stack(columns, axis=1)[:: 1 if side else -1])
-    assert pieces.shape[1] == 1 + PER_LENGTH
-    return pieces
+    """Where every piece of the material begins, and its row, as of Reel.pieces."""
+    begins = cable.bounds[:-1] if side else far - cable.bounds[1:]
+    return np.ascontiguousarray(np.column_stack([begins, made_of(cable)])[:: 1 if side else -1])

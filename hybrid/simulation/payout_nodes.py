@@ -41,7 +41,7 @@ from hybrid.kernels.state import (
     State,
     Work,
 )
-from hybrid.model.line_on_base import lines
+from hybrid.model.line import lines
 from hybrid.model.sea import Surroundings
 from hybrid.outputs.joined_lines import Output
 from hybrid.simulation.cell_arrays import REST_OF_SEA, Kept, Shaped, blank_kept, seas
