@@ -351,7 +351,9 @@ SEVERAL_LINES = Feature("several lines", "lines", _several)
 CLAMPED_TO_FREE = Feature("a line that is clamped to a free point or body", "lines.NAME.connections", _clamped_to_free)
 
 STEPPED = Feature("steps from outside", "hybrid.Simulation", _used("stepped"))
-CHANGED_LOADS = Feature("loads that change in mid-run", "hybrid resume --set", _used("changed loads", "settings"))
+CHANGED_LOADS = Feature(
+    "loads that change in mid-run", "hybrid resume --set KEY=VALUE", _used("changed loads", "settings")
+)
 CRITERION = Feature("a criterion of one's own", "hybrid.run(criterion=...)", _used("criterion", "criterion"))
 FMU = Feature("co-simulation (FMU)", "hybrid.export_fmu", _used("fmu", "lines"))
 
