@@ -1,0 +1,184 @@
+"""Features of a scene as fragments of a tiny one, and the same scene said in other ways."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import deepcopy
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests.problems import tables_with
+
+LENGTH, OUTPUTS = 12.0, 5
+Tables = dict[str, Any]
+Matrix = NDArray[np.float64]
+
+SECTION = {
+    "length": LENGTH, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5, "bending_stiffness": 20.0,
+    "torsional_stiffness": 15.0, "damping": {"mass": 0.5},
+}  # fmt: skip
+BASE: Tables = {
+    "environment": {"gravity": 9.81},
+    "cable": {"sections": [SECTION]},
+    "ends": {
+        "start": {"kind": "pinned", "position": [0, 0, 0]},
+        "end": {"kind": "pinned", "position": [10, 0, 3], "motion": {"travel": {"by": [0.05, 0, 0.1], "over": 0.5}}},
+    },
+    "initial": "equilibrium",
+    "contact": {"self": False}, "model": "rod", "mesh": {"cells": 12},
+    "time": {"duration": 0.1 * OUTPUTS, "step": 0.02}, "output": {"every": 0.1, "points": 13},
+}  # fmt: skip
+
+S, START, END = "cable.sections.0.", "ends.start", "ends.end"
+WATER = {"density": 1025, "current": [0.3, 0.2, 0]}
+DRAG = {S + "drag": {"normal": 1.2, "tangential": 0.05}, S + "added_mass": {"normal": 1.0}}
+CLAMP = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -0.5], "normal": [0, 1, 0]}
+FAR = {"kind": "clamped", "position": [10, 0, 3], "tangent": [1, 0, 0.8], "normal": [0, 1, 0]}
+ZONES = {"kind": "zones", "zones": [{"rod": 4, "cells": 4}, {"catenary": 4, "cells": 4}, {"rod": 4, "cells": 4}]}
+ADAPTIVE = {"kind": "adaptive", "hold_time": 0.1, "force_rod": [[4, 8]]}
+PAYOUT = {"rate": 0.2, "ramp": 0.2}
+TABLE = [[0.0, 0.0], [0.002, 100.0], [0.01, 1000.0], [0.1, 20000.0]]
+# By name: what the scene gets, and which keys it decides: two features that decide the same are no pair.
+FEATURES: dict[str, tuple[Tables, str]] = {
+    "catenary": ({"model": "catenary"}, "model"),
+    "zones": ({"model": ZONES, "mesh": None}, "model"),
+    "zones that move": ({"model": ADAPTIVE}, "model"),
+    "cells that follow": ({"model": {"kind": "adaptive", "curvature_error": 0.1}}, "model"),
+    "clamp": ({START: CLAMP}, "start"),
+    "sprung clamp": ({START: CLAMP | {"bend_stiffness": 30.0}}, "start"),
+    "swivel at a clamp": ({START: CLAMP | {"swivel": True}}, "start"),
+    "turns": ({START: CLAMP, END: FAR | {"turns": 0.7}}, "start end"),
+    "free end": ({END: {"kind": "free", "force": [40, 3, 30]}}, "end"),
+    "body": ({END: {"kind": "body", "mass": 3.0, "initial_guess": [4, 0, -10], "thrust": [8, 2, 0]}}, "end bed"),
+    "payout": ({END + ".payout": PAYOUT, END + ".motion": None}, "end"),
+    "release": ({END + ".release_at": {"time": 0.25}}, "end"),
+    "water": ({"environment.fluid": WATER} | DRAG, "sea"),
+    "waves": (
+        {"environment.fluid": WATER | {"surface": 5, "waves": {
+            "kind": "regular", "height": 1.0, "period": 4.0, "direction": 30, "ramp": 0.5}}} | DRAG, "sea",
+    ),
+    "seabed": (
+        {"environment.seabed": {"z": -0.5, "stiffness": 2e3, "damping": 20, "friction": {"axial": 0.3, "lateral": 0.5},
+                                "slope": [0.02, 0.01]}}, "bed",
+    ),
+    "clump": ({"cable.attachments": [{"kind": "clump", "at": 5.0, "mass": 2.0}]}, "items"),
+    "swivel": ({"cable.attachments": [{"kind": "swivel", "at": 5.0}]}, "items"),
+    "stiffness damping": ({S + "damping": {"mass": 0.5, "stiffness": 0.01}}, "damping"),
+    "two stiffnesses": ({S + "bending_stiffness": [20.0, 8.0]}, "bending"),
+    "rotary inertia": ({S + "rotary_inertia": 2e-3}, "rotary"),
+    "curved": ({S + "intrinsic_curvature": [0.05, 0.03, 0.02]}, "curved"),
+    "torque of tension": ({S + "tension_torque": 2e-3}, "torque"),
+    "table": ({S + "tension_strain": TABLE, S + "axial_stiffness": None}, "stretch"),
+    "rope": (
+        {S + "dynamic_stiffness": {"constant": 2e5, "per_tension": 10.0, "relaxation_time": 100}}, "stretch",
+    ),
+    "contact": ({"contact.self": True}, "contact"),
+    "chosen steps": ({"time.tolerance": 1e-4, "time.step": None}, "time"),
+}  # fmt: skip
+
+
+def pairs() -> Iterator[tuple[str, str]]:
+    """Two features each that do not decide the same."""
+    for a, b in combinations(FEATURES, 2):
+        if not {*FEATURES[a][1].split()} & {*FEATURES[b][1].split()}:
+            yield a, b
+
+
+def scene_of(*names: str) -> Tables:
+    """The tiny scene with these features."""
+    changes: Tables = {}
+    for name in names:
+        changes |= FEATURES[name][0]
+    found: Tables = tables_with(BASE, changes)
+    return found
+
+
+# --- the same said otherwise --------------------------------------------------------------------
+
+POLAR = ("position", "tangent", "normal", "current", "force", "thrust", "by", "initial_guess", "direction")
+
+
+def seen_by(M: Matrix, tables: Tables) -> Tables:
+    """The scene, rotated about the vertical or mirrored in a plane that holds it by M (3, 3)."""
+    odd = float(np.linalg.det(M))
+
+    def walk(key: str, x: Any) -> Any:
+        if isinstance(x, dict):
+            return {k: walk(k, y) for k, y in x.items()}
+        if key in POLAR and isinstance(x, list):
+            return (M @ np.array(x, float)).tolist()
+        if key == "direction":  # of waves, deg
+            way = M @ [np.cos(np.radians(x)), np.sin(np.radians(x)), 0.0]
+            return float(np.degrees(np.arctan2(way[1], way[0])))
+        if key == "slope":
+            return (M[:2, :2] @ np.array(x, float)).tolist()
+        if key == "intrinsic_curvature":
+            return [odd * x[0], x[1], odd * x[2]]
+        if key in ("turns", "tension_torque"):
+            return odd * x
+        return [walk(key, y) for y in x] if isinstance(x, list) else x
+
+    found: Tables = walk("", tables)
+    return found
+
+
+def exchanged(tables: Tables) -> Tables:
+    """The scene with its two ends exchanged."""
+    found = deepcopy(tables)
+    ends = {"start": found["ends"]["end"], "end": found["ends"]["start"]}
+    for end in ends.values():
+        if "tangent" in end:
+            end["tangent"] = [-x for x in end["tangent"]]
+        if "turns" in end:
+            end["turns"] = -end["turns"]
+    found["ends"] = ends
+    found["cable"]["sections"].reverse()
+    for section in found["cable"]["sections"]:
+        if "intrinsic_curvature" in section:
+            a, b, c = section["intrinsic_curvature"]
+            section["intrinsic_curvature"] = [-a, b, c]
+    for item in found["cable"].get("attachments", ()):
+        item["at"] = LENGTH - item["at"]
+    model = found["model"]
+    if isinstance(model, dict):
+        model.get("zones", []).reverse()
+        for key in {"force_rod", "force_catenary"} & {*model}:
+            model[key] = [[LENGTH - b, LENGTH - a] for a, b in reversed(model[key])]
+    return found
+
+
+def as_system(tables: Tables) -> Tables | None:
+    """The scene as a system of one line; None: several lines have no key for what it has."""
+    found = deepcopy(tables)
+    cable, ends = found.pop("cable"), found.pop("ends")
+    found.pop("initial")
+    line: Tables = {"start": "a", "end": "b", "model": found.pop("model"), "contact": found.pop("contact")} | cable
+    if "mesh" in found:
+        line["mesh"] = found.pop("mesh")
+    found["points"] = points = {}
+    for name, (key, end) in zip("ab", ends.items(), strict=True):
+        end = dict(end)
+        kind = end.pop("kind")
+        if kind == "guided" or {"payout", "turns", "moment"} & {*end}:
+            return None
+        if kind == "clamped":
+            keys = {"tangent", "normal", "swivel", "bend_stiffness"} & {*end}
+            line.setdefault("connections", {})[key] = {"kind": kind} | {x: end.pop(x) for x in sorted(keys)}
+        if "release_at" in end:
+            line["break_at"] = end.pop("release_at") | {"end": key}
+        if "thrust" in end:
+            end["force"] = end.pop("thrust")
+        held = kind in ("pinned", "clamped")
+        points[name] = {"kind": "fixed" if held else "free"} | end
+        if not held:
+            points[name].setdefault("initial_guess", [10, 0, 3])
+    found["lines"] = {"one": line}
+    return found
+
+
+def turned_and_mirrored() -> Matrix:
+    c, s = np.cos(0.7), np.sin(0.7)
+    return np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, 1.0]])
