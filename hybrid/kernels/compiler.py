@@ -11,8 +11,6 @@ import numba
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
-from numba.core.types import Boolean, Number
-from numba.core.types.functions import BaseFunction
 
 from hybrid.kernels import reference_types
 from hybrid.kernels.linked_code import Code
@@ -25,21 +23,6 @@ _OPTIONS: dict[str, Any] = {
 }  # fmt: skip
 _njit: Any = numba.njit  # its type knows of fewer options than it takes
 
-_rules: Any = BaseFunction  # whose type lets no method be replaced
-_asked: Any = _rules.get_call_type
-_signatures: dict[tuple[BaseFunction, tuple[Any, ...]], Any] = {}
-
-
-def _signature_once(function: BaseFunction, context: Any, args: tuple[Any, ...], names: dict[str, Any]) -> Any:
-    """The signature of an operation on numbers: numba tries its rules, those of arrays first, at every place anew."""
-    if names or not all(isinstance(x, (Number, Boolean)) for x in args):
-        return _asked(function, context, args, names)
-    key = function, tuple(args)
-    known = _signatures.get(key)
-    if known is None:
-        known = _signatures[key] = _asked(function, context, args, names)
-    return known
-
 
 class _Kernel(CPUDispatcher):
     def get_call_template(self, args: Any, kws: Any) -> Any:
@@ -47,18 +30,14 @@ class _Kernel(CPUDispatcher):
         return super().get_call_template([numba.types.unliteral(x) for x in args], kws)
 
     def compile(self, sig: Any) -> Any:
-        """Without searches for garbage, a fifth of the time, and with signatures that are kept, another sixth."""
-        if _rules.get_call_type is _signature_once:
+        """Without searches for garbage: a fifth of the time."""
+        if not gc.isenabled():
             return super().compile(sig)
-        collects = gc.isenabled()
         gc.disable()
-        _rules.get_call_type = _signature_once
         try:
             return super().compile(sig)
         finally:
-            _rules.get_call_type = _asked
-            if collects:
-                gc.enable()
+            gc.enable()
 
 
 class _NoEnvironment:

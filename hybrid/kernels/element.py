@@ -51,9 +51,10 @@ NO_SPRING = 1e-12
 
 @inner
 def put_spring(spring, line, node):
-    """An angular spring in series with the half cell at a clamp: the length it stands for is that of line which
+    """An angular spring in series with the half cell at a clamp.
 
-    would bend as much, so that kb hn stays the bending stiffness."""
+    The node gets the length of line that would bend as much, so that kb hn stays the bending stiffness.
+    """
     rigid = 0.5 * (line.kb[node, 0] + line.kb[node, 1])
     spring = max(spring, NO_SPRING * max(line.kb[node, 0], line.kb[node, 1]))
     for k in range(2):

@@ -67,8 +67,8 @@ def caller_of_six(returned: Any) -> Any:
 
 
 def rows(example: Any) -> Any:
-    """A function for kernels, rows(value, at, columns) -> the array of float64 (n, columns) of a NamedTuple with the
+    """A function for kernels: rows(value, at, columns) -> an array of float64, (n, columns), of a NamedTuple.
 
-    types of `example` that begins at number `at` of its table (kernels.binding.places).
+    example: has the types of the NamedTuple; at: where the array begins in its table (kernels.binding.places).
     """
     return Intrinsic("rows_function", example)

@@ -57,9 +57,8 @@ class Line(NamedTuple):
     tau: Annotated[Floats, cell(MEAN)]  # (N,) s, stiffness-proportional damping time
     # (N,) N, buoyancy of half the cell where it depends on the surface (else part of `force`)
     buoy: Annotated[Floats, cell(HALF)]
-    displaced: Annotated[
-        Floats, cell(HALF)
-    ]  # (N,) kg, water displaced by half the cell, on which the pressure of waves acts
+    # (N,) kg, water displaced by half the cell, on which the pressure of waves acts
+    displaced: Annotated[Floats, cell(HALF)]
     diameter: Annotated[Floats, cell(MEAN)]  # (N,) m, over which a cell passes through the surface
     point_mass: Annotated[Floats, node(POINT)]  # (N+1,) kg, of a body at the node (part of `mass`)
     point_lift: Annotated[Floats, node(POINT)]  # (N+1,) N, buoyancy less weight of a body at the node (part of `force`)

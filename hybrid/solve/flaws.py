@@ -28,9 +28,10 @@ def lowest_tension(line: Line, sea: Sea, state: State) -> tuple[float, int]:
 
 
 def flaw_of_line(line: Line, sea: Sea, state: State, length: float, floor: float) -> tuple[Outcome, int]:
-    """SLACK: a catenary is not under a tension of more than `floor` (N); BURIED; FOLDED: a rod stands on a fold; OK;
+    """What makes a state no equilibrium of a line, or OK, and the cell or node.
 
-    and the cell or node.
+    SLACK: a catenary is not under a tension of more than `floor` (N).  BURIED: deep in the bed.  FOLDED: a rod
+    stands on a fold.
     """
     tension, cell = lowest_tension(line, sea, state)
     if not tension > floor:

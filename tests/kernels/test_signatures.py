@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import operator
 import subprocess
 import sys
 from importlib import import_module
@@ -11,10 +10,7 @@ from inspect import signature
 
 import numba
 import pytest
-from numba.core.types.functions import BaseFunction
 
-from hybrid.kernels import compiler
-from hybrid.kernels.argument_types import key_of
 from hybrid.kernels.compile import inner
 
 # A line in a plane with a zone of each kind; in space; its equilibrium; zones that move over a seabed with friction;
@@ -106,24 +102,3 @@ def test_what_kernels_inline_cannot_be_called_from_python() -> None:
     assert numba.njit(lambda x: half(half(x)))(3.0) == 0.75
     with pytest.raises(TypeError, match=r"half.*@kernel"):
         half(3.0)
-
-
-def test_rules_of_an_operation_are_tried_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And only while a kernel is compiled: numba's own functions are typed as numba does."""
-    own, tried = BaseFunction.get_call_type, []
-
-    def noted(function, context, args, names):
-        tried.append(function.typing_key)
-        return own(function, context, args, names)
-
-    def polynomial(x, n):
-        return (x * x * x + x * n) * x * n
-
-    monkeypatch.setattr(BaseFunction, "get_call_type", noted)
-    monkeypatch.setattr(compiler, "_asked", noted)
-    monkeypatch.setattr(compiler, "_signatures", {})
-    made = compiler.compile_entry(polynomial, (key_of(1.5), key_of(2)))
-    assert made.result.entry_point(1.5, 2) == 19.125
-    assert tried.count(operator.mul) == 2, "of two numbers that are real, and of one that is an integer"
-    assert tried.count(operator.add) == 1
-    assert BaseFunction.get_call_type is noted
