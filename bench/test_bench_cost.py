@@ -17,9 +17,9 @@ from problems import suspension
 from scipy.linalg import solve_banded
 
 import hybrid
-from hybrid.kernels import compiler
-from hybrid.kernels.block_elimination import SIZE, WIDTH, eliminate_wide, substitute
-from hybrid.kernels.entry import assembly, block_rows
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH, eliminate_wide, substitute
+from hybrid.kernels.machine import compiler
+from hybrid.kernels.run.entry import assembly, block_rows
 from hybrid.model.build import build
 from hybrid.solve.statics import solve_statics
 from hybrid.solve.stepper import Stepper

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.accuracy.error_statistics import STATISTICS, statistics_of
 from hybrid.model.resolution import first_resolution
-from hybrid.simulation.error_statistics import STATISTICS, statistics_of
 from hybrid.simulation.run_sample import RunSample
 
 pytestmark = pytest.mark.bench

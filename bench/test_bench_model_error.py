@@ -16,8 +16,8 @@ import pytest
 from ruamel.yaml import YAML
 
 import hybrid
-from hybrid.kernels.bending_error import advance_error
-from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, LAST_DT, PARITY, RHO
+from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE, LAST_DT, PARITY, RHO
+from hybrid.kernels.watch.bending_error import advance_error
 from hybrid.model.build import build
 from hybrid.simulation.bending_correction import corrector_for
 from hybrid.simulation.equilibrium import equilibrium_of

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels import books
+from hybrid.kernels.state import books
 from hybrid.model.build import build
 from hybrid.model.plane import planar, untwist
 from hybrid.solve.plane_stability import seed

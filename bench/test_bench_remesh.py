@@ -18,8 +18,8 @@ from test_bench_cells import CASES, TOUCHDOWN, from_file, scene_of
 
 import hybrid
 from hybrid.adapt.state_transfer import transfer_to
-from hybrid.kernels import books as b
-from hybrid.kernels.zone_step import SHARE, Zones
+from hybrid.kernels.mesh.zone_step import SHARE, Zones
+from hybrid.kernels.state import books as b
 from hybrid.simulation import zone_switching
 from hybrid.simulation.cell_changes import CellChanges
 

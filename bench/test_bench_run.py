@@ -19,8 +19,9 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels import entry, observed_outputs
-from hybrid.kernels.entry import NO_PUSH
+from hybrid.kernels.run import entry
+from hybrid.kernels.run.entry import NO_PUSH
+from hybrid.kernels.watch import observed_outputs
 from hybrid.model.build import build
 from hybrid.model.plane import planar, untwist
 from hybrid.outputs import output_grid

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.energies import observe
-from hybrid.kernels.newton import ASKED, FINISH, GAIN, LIMIT, PREPARE, TOUCH
-from hybrid.kernels.self_contact import contact_task
-from hybrid.kernels.self_contact_pairs import ENERGY, NODES, POINTS, TRIED
-from hybrid.kernels.self_distance import LEAST_DISTANCE
+from hybrid.kernels.contact.self_contact import contact_task
+from hybrid.kernels.contact.self_contact_pairs import ENERGY, NODES, POINTS, TRIED
+from hybrid.kernels.contact.self_distance import LEAST_DISTANCE
+from hybrid.kernels.march.energies import observe
+from hybrid.kernels.step.newton import ASKED, FINISH, GAIN, LIMIT, PREPARE, TOUCH
 from hybrid.simulation.transient import Transient
 
 pytestmark = pytest.mark.bench

@@ -16,7 +16,7 @@ from statistics import median
 import pytest
 
 import hybrid
-from hybrid.kernels.cache import LEVELS, processor
+from hybrid.kernels.machine.cache import LEVELS, processor
 
 pytestmark = pytest.mark.bench
 SCENE = Path(__file__).parents[1] / "examples" / "02_suspension.yaml"

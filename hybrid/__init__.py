@@ -16,6 +16,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from hybrid.accuracy.api import resume, run, static
+    from hybrid.accuracy.run_forecast import plan
     from hybrid.adapt.user_criterion import NodeState
     from hybrid.couple.fmu_export import export_fmu
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
@@ -24,9 +26,7 @@ if TYPE_CHECKING:
     from hybrid.scene.read import load_scene, load_system, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
     from hybrid.scene.system import System
-    from hybrid.simulation.api import resume, run, static
     from hybrid.simulation.listed_outputs import kinds_of_quantities, listed_outputs
-    from hybrid.simulation.run_forecast import plan
     from hybrid.simulation.stepping import Simulation
     from hybrid.simulation.system_stepping import SystemSimulation
     from hybrid.simulation.system_stiffness import offsets, stiffness
@@ -67,7 +67,7 @@ _HOME = {
     "offsets": ("hybrid.simulation.system_stiffness", "offsets"),
     "open": ("hybrid.store.reader", "open_result"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
-    "plan": ("hybrid.simulation.run_forecast", "plan"),
+    "plan": ("hybrid.accuracy.run_forecast", "plan"),
     "listed_outputs": ("hybrid.simulation.listed_outputs", "listed_outputs"),
     "kinds_of_quantities": ("hybrid.simulation.listed_outputs", "kinds_of_quantities"),
     "plot": ("hybrid.view.plots", "plot_summary"),
@@ -78,11 +78,11 @@ _HOME = {
     "plot_zone_map": ("hybrid.view.quantities", "plot_zone_map"),
     "plot_zones": ("hybrid.view.plots", "plot_zones"),
     "report": ("hybrid.view.report", "write_report"),
-    "resume": ("hybrid.simulation.api", "resume"),
-    "run": ("hybrid.simulation.api", "run"),
+    "resume": ("hybrid.accuracy.api", "resume"),
+    "run": ("hybrid.accuracy.api", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
     "sensitivity": ("hybrid.studies.sensitivity", "sensitivity"),
-    "static": ("hybrid.simulation.api", "static"),
+    "static": ("hybrid.accuracy.api", "static"),
     "stiffness": ("hybrid.simulation.system_stiffness", "stiffness"),
     "study": ("hybrid.studies.study", "study"),
     "study_case": ("hybrid.studies.study", "case_of"),

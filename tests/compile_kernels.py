@@ -46,12 +46,13 @@ LINES = {
 
 # Those of the plane first where both halves need one: who comes second loads it, or waits.
 BY_TABLE = {
-    "plane": """run.in_plane run.run zone_step.follow_zones zone_switch.begin_switch zone_switch.end_switch
-        zone_step.plan_nodes zone_step.take_arcs zone_transfer.transfer cell_changes.lay_out cell_changes.clear_state
-        cell_changes.renew following_run.put_cells following_run.begin_cells following_run.end_cells
-        following_run.cells_may_change""",
-    "space": """run.in_space bending_error.advance_error self_contact.contact_task self_distance.watch_itself
-        system_contact.touch_system named_quantities.note_quantities""",
+    "plane": """run.run.in_plane run.run.run mesh.zone_step.follow_zones mesh.zone_switch.begin_switch
+        mesh.zone_switch.end_switch mesh.zone_step.plan_nodes mesh.zone_step.take_arcs mesh.zone_transfer.transfer
+        mesh.cell_changes.lay_out mesh.cell_changes.clear_state mesh.cell_changes.renew run.following_run.put_cells
+        run.following_run.begin_cells run.following_run.end_cells run.following_run.cells_may_change""",
+    "space": """run.run.in_space watch.bending_error.advance_error contact.self_contact.contact_task
+        contact.self_distance.watch_itself junctions.system_contact.touch_system
+        watch.named_quantities.note_quantities""",
 }
 
 
@@ -60,7 +61,7 @@ def main(half: str) -> None:
     os.cpu_count = lambda: 1  # or each run below would start a process that compiles beside it
     table = np.zeros(0, np.int64)
     for name in BY_TABLE[half].split():
-        file, function = name.split(".")
+        file, function = name.rsplit(".", 1)
         getattr(import_module(f"hybrid.kernels.{file}"), function).compile_unless_busy(table)
     if half == "plane":
         hybrid.run({**SCENE, "dimension": 2}, progress=False)

@@ -34,10 +34,10 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc, j0
 
 from hybrid import Scene
 from hybrid.errors import Outcome
-from hybrid.kernels.block_elimination import SIZE, WIDTH
-from hybrid.kernels.entry import assembly, block_rows, workspace
-from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.state import Ends, State
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
+from hybrid.kernels.run.entry import assembly, block_rows, workspace
+from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.state import Ends, State
 from hybrid.model.build import Model, build
 from hybrid.solve.statics import solve_statics
 from hybrid.solve.stepper import Stepper

@@ -19,7 +19,7 @@ from scipy.optimize import brentq, root
 
 import hybrid
 from hybrid import Scene
-from hybrid.kernels.seabed import contact
+from hybrid.kernels.laws.seabed import contact
 from hybrid.scene.sea import wavenumber
 
 Floats = NDArray[np.float64]

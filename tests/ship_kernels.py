@@ -1,6 +1,6 @@
 """Put machine code of the kernels into the package, as a release does: `python tests/ship_kernels.py [--few]`.
 
-For each level of processors (kernels.cache) that this one can execute: what tests/compile_kernels.py lists, and what
+For each level of processors (kernels.machine.cache) that this one can execute: what tests/compile_kernels.py lists, and what
 the examples call, compiled from an empty cache and copied to hybrid/kernels/compiled/.  Everything takes about eight
 minutes of processor time; --few: only what the suspension of the examples calls, in one.
 """
@@ -14,8 +14,8 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from hybrid.kernels import cache
-from hybrid.kernels.code_file import SUFFIX
+from hybrid.kernels.machine import cache
+from hybrid.kernels.machine.code_file import SUFFIX
 
 ROOT = Path(__file__).parents[1]
 SUSPENSION = ROOT / "examples" / "02_suspension.yaml"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.forces import (
+from hybrid.kernels.state.forces import (
     ADDED_MASS,
     BODIES,
     DRAG,

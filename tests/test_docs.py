@@ -156,7 +156,7 @@ def test_trade_page_begins_as_its_script_says() -> None:
 
 
 def test_cited_files_exist() -> None:
-    """Paths in backticks or code, such as `hybrid/kernels/loads.py`."""
+    """Paths in backticks or code, such as `hybrid/kernels/laws/loads.py`."""
     for page in PAGES:
         text = re.sub(r"^```diff\n.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
         for name in re.findall(r"\b((?:hybrid|tests|docs|examples)/[\w/]+\.(?:py|md|yaml|png))", text):
@@ -175,11 +175,11 @@ def test_cited_equations_exist() -> None:
 
 # Every constant of docs/theory.md section 12 that stands alone in the code: module, name, value, as on the page.
 CONSTANTS = (
-    ("kernels.newton", "TOLERANCE", 1e-9, "10⁻⁹"),
-    ("kernels.newton", "ROUND_OFF", 1e-6, "10⁻⁶"),
-    ("kernels.newton", "LOW_TENSION", 1e-3, "10⁻³ of the scale"),
-    ("kernels.newton", "LARGEST_TURN", 0.7, "0.7 rad"),
-    ("kernels.step", "LARGEST_STEP_TURN", 1.0, "1 rad"),
+    ("kernels.step.newton", "TOLERANCE", 1e-9, "10⁻⁹"),
+    ("kernels.step.newton", "ROUND_OFF", 1e-6, "10⁻⁶"),
+    ("kernels.step.newton", "LOW_TENSION", 1e-3, "10⁻³ of the scale"),
+    ("kernels.step.newton", "LARGEST_TURN", 0.7, "0.7 rad"),
+    ("kernels.step.step", "LARGEST_STEP_TURN", 1.0, "1 rad"),
     ("solve.stepper", "REACH", 0.1, "0.1 L"),
     ("solve.statics", "REACH", 0.1, "0.1 L"),
     ("solve.stepper", "MOST_ITERATIONS", 20, "20 in motion"),
@@ -188,7 +188,7 @@ CONSTANTS = (
     ("model.build", "SLACK_FLOOR", -1e-6, "−10⁻⁶ of the scale"),
     ("simulation.diagnostics", "UNRESOLVED", 1.0, "1 rad per cell"),
     ("solve.stepper", "HEAVY", 1e36, "10³⁶ 1/s²"),
-    ("kernels.step_control", "HALVINGS", 10, "| halvings of a step | 10 |"),
+    ("kernels.step.step_control", "HALVINGS", 10, "| halvings of a step | 10 |"),
     ("model.mesh", "DEFAULT_CELLS", 100, "| cells of a silent scene | 100 |"),
 )
 

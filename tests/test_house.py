@@ -31,20 +31,32 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "outputs": ("errors", "kernels", "model", "solve", "store"),
     "shooting": ("errors", "scene"),  # the second solver shares nothing with the first but the scene
     "simulation": (*COMPUTING, "shooting"),
+    "accuracy": (*COMPUTING, "shooting", "simulation"),
     "view": ("errors", "statistics", "store"),
     "exports": ("errors", "store"),
     "interop": ("errors", "scene"),
-    "studies": (*COMPUTING, "simulation", "view"),
-    "couple": (*COMPUTING, "simulation", "interop"),
-    "live": (*COMPUTING, "simulation", "view"),
-    "cli": (*COMPUTING, "simulation", "view", "exports", "interop", "studies", "couple", "live", "__init__"),
-    "__init__": (*COMPUTING, "simulation", "view", "exports", "interop", "studies", "couple"),
+    "studies": (*COMPUTING, "simulation", "accuracy", "view"),
+    "couple": (*COMPUTING, "simulation", "accuracy", "interop"),
+    "live": (*COMPUTING, "simulation", "accuracy", "view"),
+    "cli": (
+        *COMPUTING,
+        "simulation",
+        "accuracy",
+        "view",
+        "exports",
+        "interop",
+        "studies",
+        "couple",
+        "live",
+        "__init__",
+    ),
+    "__init__": (*COMPUTING, "simulation", "accuracy", "view", "exports", "interop", "studies", "couple"),
     "__main__": ("cli",),
 }
 
 # Packages from outside that only these rooms may import.
 ONLY = {
-    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "shooting", "simulation", "view", "exports", "studies"),
+    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "shooting", "simulation", "accuracy", "view", "exports", "studies"),
     "numba": ("kernels",),
     "h5py": ("store", "exports"),
     "matplotlib": ("view",),
@@ -67,6 +79,12 @@ ONLY = {
     "websockets": (),
     "filelock": ("kernels", "store"),
 }  # fmt: skip
+
+
+# Rooms of the kernels, each of which imports from those before it alone.
+KERNEL_ROOMS = (
+    "machine", "state", "algebra", "laws", "march", "step", "contact", "watch", "mesh", "reel", "junctions", "run",
+)  # fmt: skip
 
 
 def room(file: Path) -> str:
@@ -110,6 +128,16 @@ def test_imports_run_one_way(file: Path) -> None:
         elif head in ONLY and here not in ONLY[head]:
             wrong.append(f"line {line} imports {name}; that is for {', '.join(ONLY[head])}")
     assert not wrong, f"{file.relative_to(PACKAGE)}: " + "; ".join(wrong)
+
+
+def test_imports_of_kernels_run_one_way() -> None:
+    kernels = PACKAGE / "kernels"
+    assert {x.parent.name for x in kernels.rglob("*.py")} == {"kernels", *KERNEL_ROOMS}
+    for file in kernels.rglob("*.py"):
+        if file.parent != kernels:
+            below = KERNEL_ROOMS[: KERNEL_ROOMS.index(file.parent.name) + 1]
+            rooms = {name.split(".")[2] for name, _ in imports(file) if name.startswith("hybrid.kernels.")}
+            assert rooms <= set(below), f"{file.relative_to(PACKAGE)} imports from {rooms - set(below)}"
 
 
 def test_every_room_has_a_rule_and_every_rule_a_room() -> None:

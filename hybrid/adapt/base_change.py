@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.adapt.manager import OF_BASE, DomainManager
-from hybrid.kernels import zone_step as z
-from hybrid.kernels.zone_step import blank_zones
+from hybrid.kernels.mesh import zone_step as z
+from hybrid.kernels.mesh.zone_step import blank_zones
 from hybrid.model.layout import Layout, on_other_parts
 from hybrid.model.line_on_base import LineOnBase
 

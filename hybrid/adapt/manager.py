@@ -17,12 +17,12 @@ import numpy as np
 
 from hybrid.adapt.user_criterion import FORCED_RATIO, NodeState, UserCriterion, cell_ratios
 from hybrid.adapt.zone_rules import OFF, ROUND_TIME, Rules, planned, reach, spread, tidied, wanted
-from hybrid.kernels import zone_step as z
-from hybrid.kernels.binding import Packed, Table
-from hybrid.kernels.criteria import CRITERIA, GIVEN, SLACK, TORSION
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State
-from hybrid.kernels.stiffness_ramp import shares
-from hybrid.kernels.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, evaluate_criteria
+from hybrid.kernels.machine.binding import Packed, Table
+from hybrid.kernels.mesh import zone_step as z
+from hybrid.kernels.mesh.criteria import CRITERIA, GIVEN, SLACK, TORSION
+from hybrid.kernels.mesh.stiffness_ramp import shares
+from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, evaluate_criteria
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 from hybrid.model.layout import Layout, edges
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, tension_floor
@@ -119,7 +119,7 @@ class DomainManager:
         dwell: hold time, s; pace: ramp time of bending stiffness, s (None: dwell); on_base: of the model.
         curvature_error: part of the largest curvature that the length of cells, which follow it, may make it wrong by;
         None: they stay as they are.  asked: parts of the largest tension, curvature and moment (numbers of
-        kernels.cell_errors) that leaving bending out may make, where one is asked.  fineness: cells that follow the
+        mesh.cell_errors) that leaving bending out may make, where one is asked.  fineness: cells that follow the
         curvature are so many times as short as that asks for.
         """
         n = layout.rod.size

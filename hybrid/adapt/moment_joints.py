@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.state import Floats, Line, State
+from hybrid.kernels.state.state import Floats, Line, State
 
 
 class Joints:

@@ -1,4 +1,4 @@
-"""From the old zones to the new ones: the state on their nodes (kernels.zone_transfer)."""
+"""From the old zones to the new ones: the state on their nodes (kernels.mesh.zone_transfer)."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.binding import Packed, Table
-from hybrid.kernels.state import Floats, Line, State, blank_state
-from hybrid.kernels.zone_transfer import Transfer, blank_match, blank_transfer, transfer
+from hybrid.kernels.machine.binding import Packed, Table
+from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match, blank_transfer, transfer
+from hybrid.kernels.state.state import Floats, Line, State, blank_state
 from hybrid.model.layout import Layout
 
 Clamp = tuple[Floats, Floats]  # first director and tangent

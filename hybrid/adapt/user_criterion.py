@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 
 FORCED_RATIO = 2.0  # ratio of cells that the scene, or a mask of the user, forces to be rod
 

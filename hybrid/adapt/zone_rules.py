@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels import books as b
-from hybrid.kernels import zone_step as z
-from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.criteria import CRITERIA, GIVEN
-from hybrid.kernels.references import reader
-from hybrid.kernels.state import Floats
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.references import reader
+from hybrid.kernels.mesh import zone_step as z
+from hybrid.kernels.mesh.criteria import CRITERIA, GIVEN
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.state import Floats
 
 
 class Rules(NamedTuple):
@@ -213,7 +213,7 @@ def _plan(ratios, off, rod, calm, t, base, buffer, shortest, wait, flags):
 class ReviewJob(NamedTuple):
     """What a review of n base cells knows, as the domain manager has it."""
 
-    zone_table: NDArray[np.int64]  # of a kernels.zone_step.ZoneJob
+    zone_table: NDArray[np.int64]  # of a kernels.mesh.zone_step.ZoneJob
     base: Floats  # (n+1,) m
     given: NDArray[np.int64]  # (n,)
     calm_since: Floats  # (n,) s

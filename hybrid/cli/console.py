@@ -95,7 +95,7 @@ class Console:
 
     def compiling_kernels(self, names: Sequence[str]) -> bool:
         """The same of kernels by name, as file.function."""
-        from hybrid.kernels.cache import is_warm
+        from hybrid.kernels.machine.cache import is_warm
         from hybrid.simulation.progress import COMPILING
 
         if is_warm(list(names)):

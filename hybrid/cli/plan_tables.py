@@ -8,7 +8,7 @@ from textwrap import shorten, wrap
 from typing import TYPE_CHECKING, Any
 
 from hybrid.cli.progress_line import span
-from hybrid.kernels.forces import FORCES
+from hybrid.kernels.state.forces import FORCES
 from hybrid.model.self_reach import WHERE_NEAR
 from hybrid.store.hockling import kink_torque
 

@@ -26,7 +26,7 @@ from pythonfmu3 import (
 
 from hybrid.couple.fmu_export import INTERFACE, SCENE
 from hybrid.errors import ComputationError, HybridError
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.model.driven_end import rotation
 from hybrid.scene.read import load_scene
 from hybrid.simulation.stepped_ends import ENDS

@@ -19,7 +19,7 @@ from hybrid.interop.moordyn.cables import chain_of
 from hybrid.interop.moordyn.deck import Deck, read_deck
 from hybrid.interop.moordyn.rows import read_source
 from hybrid.interop.moordyn.systems import JOINTS, system_of
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.scene.analysis import CatenaryModel
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import parse_either

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.interop.moordyn.bodies import rotation_of
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.model.bodies import frame_of
 from hybrid.simulation.stepped import CableState
 from hybrid.simulation.system_stepping import PointState

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from hybrid.accuracy.api import static
 from hybrid.errors import Complaint, ComputationError, HybridError, SceneError
-from hybrid.kernels.cache import is_warm
+from hybrid.kernels.machine.cache import is_warm
 from hybrid.live import drawing
 from hybrid.model.model_costs import with_model
 from hybrid.model.plan import Plan, SystemPlan, plan
@@ -15,7 +16,6 @@ from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import located_in, parse_either, scene_text
 from hybrid.scene.schema import Scene
-from hybrid.simulation.api import static
 from hybrid.simulation.first_use import compile_beside, kernels_of
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.system_run import static_system

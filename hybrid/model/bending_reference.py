@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.model.material import Material, tension_floor
 
 # Part of the error that a corrected result still has: a quarter, because correction has left 2 to 18 % of it, and 26 %

@@ -8,7 +8,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid.kernels.bodies import (
+from hybrid.kernels.junctions.bodies import (
     ARM,
     DAMPING,
     FORCE,
@@ -24,7 +24,7 @@ from hybrid.kernels.bodies import (
     STIFFNESS,
     V,
 )
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.model.ends import EndLoad, end_load
 from hybrid.model.members import Members, pieces_of
 from hybrid.model.sea import Surroundings
@@ -55,7 +55,7 @@ class BodyModel:
     """A free body made ready to compute."""
 
     name: str
-    numbers: Floats  # (NUMBERS,) of kernels.bodies, without what is given to act on it
+    numbers: Floats  # (NUMBERS,) of kernels.junctions.bodies, without what is given to act on it
     start: Floats  # (STATE,) where it is first looked for
     loads: tuple[EndLoad, ...]  # forces and moments that are given
     members: Members | None = None  # on which the water acts

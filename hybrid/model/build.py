@@ -15,8 +15,8 @@ from typing import Literal
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.forces import FRICTION, SEABED
-from hybrid.kernels.state import Floats, Line, State
+from hybrid.kernels.state.forces import FRICTION, SEABED
+from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.model.catenary_guess import Hanging
 from hybrid.model.contents import Entry, contents_of, followed
 from hybrid.model.ends import EndConditions

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybrid.kernels.carried_frames import SEAT, TURNS, WITH_BODY
-from hybrid.kernels.state import Floats, Line
+from hybrid.kernels.junctions.carried_frames import SEAT, TURNS, WITH_BODY
+from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.build import Model
 from hybrid.model.ends import first_director, transported
 from hybrid.scene.ends import Triple

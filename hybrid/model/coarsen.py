@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from hybrid.kernels.forces import FRICTION, PLANAR, ROTARY, SEABED
-from hybrid.kernels.state import Floats, Line, State, state_for
-from hybrid.kernels.zone_torque import COMPLIANCE, FREE
+from hybrid.kernels.march.zone_torque import COMPLIANCE, FREE
+from hybrid.kernels.state.forces import FRICTION, PLANAR, ROTARY, SEABED
+from hybrid.kernels.state.state import Floats, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.ends import first_director
 from hybrid.model.line import line_on

@@ -8,9 +8,9 @@ from itertools import pairwise
 from math import inf
 
 from hybrid.errors import OF_AN_END
-from hybrid.kernels.criteria import CRITERIA
-from hybrid.kernels.forces import DRAG, FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.state import Line
+from hybrid.kernels.mesh.criteria import CRITERIA
+from hybrid.kernels.state.forces import DRAG, FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state.state import Line
 from hybrid.model.mesh import Zone
 from hybrid.model.plausibility import implausible
 from hybrid.model.resolution import (

@@ -1,6 +1,6 @@
 """An end that is set from outside, step by step: where it is to be at the end of the next step, and the way there.
 
-The laws are those of kernels.end_motion.driven_position and driven_frame, which move the end within compiled steps.
+The laws are those of laws.end_motion.driven_position and driven_frame, which move the end within compiled steps.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 
 # Columns of a path: begin and end (s), position and velocity at both (m, m/s), frame at the begin, rotation vector.
 FROM, TO, AT, SPEED, THERE, SPEED_THERE, FRAME, TURN = 0, 1, 2, 5, 8, 11, 14, 23

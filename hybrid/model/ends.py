@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from hybrid.kernels.state import Ends, Floats, Moves
+from hybrid.kernels.state.state import Ends, Floats, Moves
 from hybrid.model.driven_end import PATH, DrivenEnd
 from hybrid.scene.motion import MotionTerms
 
@@ -229,7 +229,7 @@ class EndConditions:
         return self.values
 
     def moves(self) -> Moves:
-        """The same as arrays for kernels.end_motion: loads that act now, frames and motions as they are now."""
+        """The same as arrays for kernels.laws.end_motion: loads that act now, frames and motions as they are now."""
         if self._moves is None:
             self._moves = self._as_moves()
         return self._moves

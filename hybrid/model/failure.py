@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.state import NO_TORSION
+from hybrid.kernels.state.state import NO_TORSION
 from hybrid.model.release import without_clamp
 from hybrid.model.system import SystemModel
 from hybrid.scene.points import Failure, FreePoint

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.state import Floats, Line, State, state_for
+from hybrid.kernels.state.state import Floats, Line, State, state_for
 from hybrid.model.catenary_guess import Hanging
 from hybrid.model.ends import EndConditions
 from hybrid.model.initial_shape import end_conditions, frames, initial_nodes, twist_by_tension

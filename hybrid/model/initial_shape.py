@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from hybrid.errors import SceneError
-from hybrid.kernels.drag_law import body, half_cell, split
-from hybrid.kernels.forces import BODIES, DRAG, FLOW, SURFACE
-from hybrid.kernels.state import Floats, Line, Sea, State
+from hybrid.kernels.laws.drag_law import body, half_cell, split
+from hybrid.kernels.state.forces import BODIES, DRAG, FLOW, SURFACE
+from hybrid.kernels.state.state import Floats, Line, Sea, State
 from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
 from hybrid.model.ends import EndConditions, EndLoad, Motion, end_load, first_director, transported
 from hybrid.model.material import Material

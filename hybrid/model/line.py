@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.axial_law import SHIFT, follow_law
-from hybrid.kernels.binding import Packed, Table
-from hybrid.kernels.fill_line import OF_POINTS, PER_LENGTH
-from hybrid.kernels.forces import AXIAL_LAW, BODIES, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING
-from hybrid.kernels.state import (
+from hybrid.kernels.laws.axial_law import SHIFT, follow_law
+from hybrid.kernels.machine.binding import Packed, Table
+from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH
+from hybrid.kernels.mesh.zone_line import Cable, blank_line_job, fill_line
+from hybrid.kernels.state.forces import AXIAL_LAW, BODIES, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING
+from hybrid.kernels.state.state import (
     NO_ADDRESS,
     NO_LAW,
     NO_PLANE,
@@ -22,7 +23,6 @@ from hybrid.kernels.state import (
     no_work,
     state_for,
 )
-from hybrid.kernels.zone_line import Cable, blank_line_job, fill_line
 from hybrid.model.material import Material
 
 lines = Packed(blank_line, given=("bits", "plane", "torsion", *TENSION_TORQUE))
@@ -52,7 +52,7 @@ def on_base(
 ) -> Line:  # fmt: skip
     """The line of a material with nodes s (N+1,) m; of_cell, rod: (N,) base cells of its cells, whether they are rod.
 
-    cable: that on the base cells; job: a table of kernels.zone_line.LineJob, None: a new one.
+    cable: that on the base cells; job: a table of kernels.mesh.zone_line.LineJob, None: a new one.
     """
     h, of = np.diff(s), material.piece(0.5 * (s[:-1] + s[1:]))
     torque, twist = material.torque_by_tension(h, of)
@@ -72,7 +72,7 @@ NO_INERTIA, ABOUT_CHORDS, WITH_SECTIONS = range(3)
 
 
 def made_of(material: Material, inertia: int = WITH_SECTIONS) -> Floats:
-    """(K, COLUMNS) of each piece of a material what cells of it are made of (kernels.fill_line)."""
+    """(K, COLUMNS) of each piece of a material what cells of it are made of (kernels.mesh.fill_line)."""
     of = {name: getattr(material, name) for name in PER_LENGTH}
     if inertia == NO_INERTIA:
         of["rotary"] = of["polar"] = np.full(material.polar.size, np.nan)

@@ -1,13 +1,13 @@
-"""A material on base cells whose rods come and go: lines on any cells of them, compiled (kernels.zone_line)."""
+"""A material on base cells whose rods come and go: lines on any cells of them, compiled (kernels.mesh.zone_line)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from hybrid.kernels.binding import Packed, Table
-from hybrid.kernels.state import NO_PLANE, Floats, Line
-from hybrid.kernels.zone_criteria import NodeKinds, blank_kinds
-from hybrid.kernels.zone_line import Cable, blank_kinds_job, blank_line_job, fill_kinds
+from hybrid.kernels.machine.binding import Packed, Table
+from hybrid.kernels.mesh.zone_criteria import NodeKinds, blank_kinds
+from hybrid.kernels.mesh.zone_line import Cable, blank_kinds_job, blank_line_job, fill_kinds
+from hybrid.kernels.state.state import NO_PLANE, Floats, Line
 from hybrid.model.layout import Layout
 from hybrid.model.line import ABOUT_CHORDS, NO_INERTIA, cable_on, on_base, put_points, spins_freely
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR, Material

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.fill_line import OF_POINTS, PER_LENGTH
-from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, MASS_DAMPING, STIFFNESS_DAMPING, SURFACE, WAVES
-from hybrid.kernels.state import Floats
+from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH
+from hybrid.kernels.state.forces import ADDED_MASS, BODIES, DRAG, FLOW, MASS_DAMPING, STIFFNESS_DAMPING, SURFACE, WAVES
+from hybrid.kernels.state.state import Floats
 from hybrid.model.scales import pressing
 from hybrid.model.sections import (
     attachments_at,
@@ -40,7 +40,7 @@ POINT = tuple(name for name in OF_POINTS if name not in ("point_lift", "footing"
 
 
 class StretchLaw(NamedTuple):
-    """How a piece stretches whose tension is no multiple of strain (kernels.axial_law)."""
+    """How a piece stretches whose tension is no multiple of strain (kernels.laws.axial_law)."""
 
     rows: tuple[tuple[float, float], ...]  # strain and tension, N, at rest
     dynamic: tuple[float, float, float]  # dynamic stiffness, N, what it gains by mean tension, relaxation time, s; or 0

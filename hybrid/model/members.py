@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.bodies import FRAME, PLACE, A, V, W
-from hybrid.kernels.members import ALONG, CM, CN, CT, MIDDLE, PIECE, PUSH, WATER, WET
-from hybrid.kernels.state import Floats
-from hybrid.kernels.water import wave_kinematics
+from hybrid.kernels.junctions.bodies import FRAME, PLACE, A, V, W
+from hybrid.kernels.laws.members import ALONG, CM, CN, CT, MIDDLE, PIECE, PUSH, WATER, WET
+from hybrid.kernels.laws.water import wave_kinematics
+from hybrid.kernels.state.state import Floats
 from hybrid.model.sea import Surroundings
 from hybrid.scene.bodies import FreeBody
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 
 MOST_CELLS = 1_000_000
 DEFAULT_CELLS = 100  # of a line whose scene gives none: errors of a smooth sag near 1e-4 of the length

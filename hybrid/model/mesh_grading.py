@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 
 TURN = 0.1  # rad that a cell turns through, at fineness 1
 FEWEST = 12.0  # cells of a straight cable, at fineness 1

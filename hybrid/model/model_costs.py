@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.material import Material, tension_floor
 from hybrid.model.resolution import accuracy_of, holds_stress

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.model.sections import section_changes
 from hybrid.scene.schema import Modules, RodZone, Scene, ZonesModel
 

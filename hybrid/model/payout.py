@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels import winch as w
-from hybrid.kernels.reel import LEAVES
-from hybrid.kernels.state import Floats, Line
+from hybrid.kernels.reel import winch as w
+from hybrid.kernels.reel.reel import LEAVES
+from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on, made_of
 from hybrid.model.line_on_base import LineOnBase
@@ -70,7 +70,7 @@ class PayoutPlan:
     side: int  # which end is at the winch
     far: float  # m, arc length of the other end
 
-    law: Floats  # (K, 8) as of kernels.payout.Reel
+    law: Floats  # (K, 8) as of kernels.reel.payout.Reel
     nodes: Floats  # (M,) m, nodes that there may be; that of the fairlead is none of them
     parts: np.ndarray  # (M-1,) cells between two of them, where cells follow the curvature and are shortest; else 1
     first: float  # m, length at t = 0
@@ -78,9 +78,9 @@ class PayoutPlan:
     shortest: float  # m, below which nothing can be taken in
     zones: tuple[Zone, ...]  # at t = 0
     cable: Material  # what is out and what is on the reel
-    pieces: Floats  # (P, 1 + COLUMNS) as of kernels.reel.Reel
+    pieces: Floats  # (P, 1 + COLUMNS) as of kernels.reel.reel.Reel
     from_outside: bool  # whether the length is set from Python
-    winch: Floats  # (WINCH,) as of kernels.winch, before its brake opens; of zeros where none holds a tension
+    winch: Floats  # (WINCH,) as of kernels.reel.winch, before its brake opens; of zeros where none holds a tension
     layer: Floats  # (m+1,) m, how far before the fairlead the nodes are that ride with it; 0 is the last
     begun: Floats  # (N+1,) m, nodes at t = 0
 
@@ -333,7 +333,7 @@ def shorter_behind_clamp(scene: Scene, cable: Material, base: Floats, share: flo
 
 
 def winch_of(payout: Payout, length: float) -> Floats:
-    """Numbers of a winch that holds a tension (kernels.winch), at rest with a length, m, that is out."""
+    """Numbers of a winch that holds a tension (kernels.reel.winch), at rest with a length, m, that is out."""
     out, winch = np.zeros(w.WINCH), payout.winch
     if winch is not None:
         out[w.TENSION], out[w.BEGIN], out[w.RAMP] = winch.tension, winch.begin, winch.ramp

@@ -8,7 +8,7 @@ from typing import NoReturn
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.scene.payout import Payout
 
 # Of the length of the cable: as much may the first one given differ from it, by round-off.
@@ -29,7 +29,7 @@ def _rows(rows: list[tuple[float, list[float]]]) -> Floats:
 
 
 def law_of(payout: Payout, length: float, duration: float, where: str = "payout") -> Floats:
-    """The length, m, that is out over time, as polynomials: (K, 8) as of kernels.payout.Reel.
+    """The length, m, that is out over time, as polynomials: (K, 8) as of kernels.reel.payout.Reel.
 
     length: m, at t = 0; duration: s, of the motion; where: the key in the scene, for messages.
     """

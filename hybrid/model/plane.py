@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.state import Ends, Floats, Line, State
+from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.state import Ends, Floats, Line, State
 from hybrid.model.contents import Entry
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.schema import Scene

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybrid.kernels.state import Line
+from hybrid.kernels.state.state import Line
 from hybrid.model.build import Model
 from hybrid.model.line import with_spin_inertia
 from hybrid.model.line_on_base import LineOnBase

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.output_points import output_points
 from hybrid.model.scales import tension_scale

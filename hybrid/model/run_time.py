@@ -9,9 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hybrid.kernels.forces import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING, SURFACE
-from hybrid.kernels.generalized_alpha import weights
-from hybrid.kernels.step_law import SAFETY
+from hybrid.kernels.state.forces import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING, SURFACE
+from hybrid.kernels.step.generalized_alpha import weights
+from hybrid.kernels.step.step_law import SAFETY
 from hybrid.model.build import Model
 from hybrid.model.resolution import Resolution, requested_accuracy, wants_errors
 from hybrid.scene.schema import JonswapWaves, Scene

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hybrid.kernels.state import Line
+from hybrid.kernels.state.state import Line
 from hybrid.model.sections import attached_weights, attachments_at, bending_stiffness, weight
 from hybrid.scene.motion_tables import SHIFTS
 from hybrid.scene.schema import Scene, Section, Straight

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.bed import HEIGHTS
-from hybrid.kernels.state import Floats, Sea, no_sea, with_waves
+from hybrid.kernels.laws.bed import HEIGHTS
+from hybrid.kernels.state.state import Floats, Sea, no_sea, with_waves
 from hybrid.model.ends import rise
 from hybrid.model.scales import pressing
 from hybrid.scene.schema import (

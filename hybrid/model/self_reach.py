@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.state import Line
+from hybrid.kernels.state.forces import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state.state import Line
 from hybrid.scene.analysis import CorrectedZone
 from hybrid.scene.payout import Payout
 from hybrid.scene.schema import AdaptiveModel, CatenaryModel, CorrectedModel, Scene, ZonesModel
@@ -14,7 +14,7 @@ from hybrid.scene.schema import AdaptiveModel, CatenaryModel, CorrectedModel, Sc
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.scene.system import System
 
-# Diameters of slack of the smallest loop: WINDOW of kernels.self_contact_pairs less OUTER of kernels.self_contact_law,
+# Diameters of slack of the smallest loop: WINDOW of contact.self_contact_pairs less OUTER of contact.self_contact_law,
 # which a plan does not import.
 LOOP = 2.7 - 1.05
 
@@ -95,7 +95,7 @@ def least_slack(scene: Scene) -> float:
 
 
 def contact_bits(scene: Scene) -> int:
-    """Bits of kernels.forces for the start of a run."""
+    """Bits of kernels.state.forces for the start of a run."""
     reach = self_reach(scene)
     if reach.asked:
         return SELF_CONTACT | (SELF_FRICTION if scene.contact.friction else 0)

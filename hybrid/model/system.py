@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.bodies import FORCE, FRAME, LEVEL, LIFT, MOMENT, NUMBERS, PLACE, STATE, STIFFNESS, V
-from hybrid.kernels.carried_frames import SEAT, TURNS, WITH_BODY, WITH_POINT
-from hybrid.kernels.members import PIECE
-from hybrid.kernels.state import Floats, State
+from hybrid.kernels.junctions.bodies import FORCE, FRAME, LEVEL, LIFT, MOMENT, NUMBERS, PLACE, STATE, STIFFNESS, V
+from hybrid.kernels.junctions.carried_frames import SEAT, TURNS, WITH_BODY, WITH_POINT
+from hybrid.kernels.laws.members import PIECE
+from hybrid.kernels.state.state import Floats, State
 from hybrid.model.bodies import BodyModel, FairleadMotion, KnownMotion, body_model, frame_of, loads_of
 from hybrid.model.build import Model, build
 from hybrid.model.catenary_guess import pulls
@@ -76,7 +76,7 @@ class SystemModel:
     bodies: tuple[BodyModel, ...]  # that are free; they are numbered behind the free points
     body_places: Floats  # (B, STATE) where they, and the points behind them, are first
     fairleads: Floats  # (L, 2, 3) m, of ends at free bodies, in axes of the body
-    seats: Floats  # (L, 2, SEAT) frames of ends that turn with a free body or point (kernels.carried_frames)
+    seats: Floats  # (L, 2, SEAT) frames of ends that turn with a free body or point (kernels.junctions.carried_frames)
     known: Mapping[str, KnownMotion]  # of bodies that are held or moved
     scenes: Mapping[str, Scene]  # of the lines by name, with their points where the system has them
     resolution: SystemResolution

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 
 # Pairs of chords that are looked at one and all; of more only those that can be nearest.
 FEW = 4096

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.vectors import size
 

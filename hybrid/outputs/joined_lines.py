@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.observed_outputs import observed_joined
-from hybrid.kernels.state import ALONG_LINE, NODES_OF_LINE, Batch, Floats, Line, Sea
+from hybrid.kernels.state.state import ALONG_LINE, NODES_OF_LINE, Batch, Floats, Line, Sea
+from hybrid.kernels.watch.observed_outputs import observed_joined
 from hybrid.model.mesh import Zone
 from hybrid.outputs.observation import Observation, links
 from hybrid.outputs.output_grid import Grid, Rows, linear

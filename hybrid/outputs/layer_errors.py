@@ -20,7 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.outputs.observation import Observation
 
 # Lengths of two cells over which bending fades at most: longer, it is a parabola over them but for round-off.

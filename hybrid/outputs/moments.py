@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
-from hybrid.kernels.zone_torque import TORQUE
+from hybrid.kernels.march.zone_torque import TORQUE
+from hybrid.kernels.state.state import Floats
 from hybrid.outputs.vectors import dot, size
 
 if TYPE_CHECKING:

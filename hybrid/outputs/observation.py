@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.link import link_of
-from hybrid.kernels.observed_outputs import observed
-from hybrid.kernels.report import (
+from hybrid.kernels.march.link import link_of
+from hybrid.kernels.march.zone_torque import TORQUE, TURN, torsion_energy
+from hybrid.kernels.state.report import (
     CONTACT_FORCE,
     FORCE_A,
     LENGTH_OUT,
@@ -30,8 +30,8 @@ from hybrid.kernels.report import (
     SELF_CONTACT_ENERGY,
     STRETCH_ENERGY,
 )
-from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, Sea
-from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
+from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line, Sea
+from hybrid.kernels.watch.observed_outputs import observed
 from hybrid.outputs.local_means import means_beside, means_on_line
 from hybrid.outputs.moments import across, node_tangents, node_torques, passed_torques
 from hybrid.outputs.output_grid import Grid
@@ -193,12 +193,12 @@ class Observation:
 
     @property
     def element_strains(self) -> Floats:
-        """(N+1, 3, nb) rad, of the elements at nodes, as of kernels.observed_outputs."""
+        """(N+1, 3, nb) rad, of the elements at nodes, as of kernels.watch.observed_outputs."""
         return self._observed[1]
 
     @property
     def bends(self) -> Floats:
-        """(N+1, nb) 1/m, from cell to cell, of what was computed, as of kernels.observed_outputs."""
+        """(N+1, nb) 1/m, from cell to cell, of what was computed, as of kernels.watch.observed_outputs."""
         return self._observed[3]
 
     # ---- along the line -----------------------------------------------------------------------
@@ -223,7 +223,7 @@ class Observation:
         return found if self.shift is None else found - self.grid.sides @ self._borne_by_bending(self.shift)
 
     def _held_tangent(self, k: int) -> Floats:
-        """Tangent (3, nb) of the line at the clamp at end k, not normalized; as `kernels.extremes.beyond_spring`."""
+        """Tangent (3, nb) of the line at the clamp at end k, not normalized; as `watch.extremes.beyond_spring`."""
         t, d = self.batch.frame[:, k, 2::3].T, self.at_end(self.d, k)
         part = 0.5 * self.at_end(self.cell_lengths, k) / self.at_end(self.of_line("hn", slice(None)), k)
         if part.min() > 1.0 - 1e-9:

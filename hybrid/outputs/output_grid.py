@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.sparse_rows import add_rows, cubic_rows, linear_rows
-from hybrid.kernels.state import Floats
+from hybrid.kernels.algebra.sparse_rows import add_rows, cubic_rows, linear_rows
+from hybrid.kernels.state.state import Floats
 from hybrid.model.mesh import Zone
 
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hybrid.kernels import pipes as wall_of
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
+from hybrid.kernels.watch import pipes as wall_of
 from hybrid.model.payout import whole_scene
 from hybrid.outputs.probes import Probe
 
@@ -75,7 +75,7 @@ class Pipes:
         return by_tension, 0.5 * walls.modulus * walls.outer
 
     def rows(self) -> Floats:
-        """(sections, WALL) of kernels.pipes."""
+        """(sections, WALL) of kernels.watch.pipes."""
         found, walls = np.zeros((len(self.whole), wall_of.WALL)), self._walls
         columns: dict[int, Any] = {
             wall_of.SECTION_END: self.whole, wall_of.OUTER: walls.outer, wall_of.INNER: walls.inner,

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid.kernels.forces import MAY_TOUCH, PLANAR, SEABED, SELF_CONTACT
-from hybrid.kernels.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twist
-from hybrid.kernels.state import Batch, Floats, Line, Sea
+from hybrid.kernels.march.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twist
+from hybrid.kernels.state.forces import MAY_TOUCH, PLANAR, SEABED, SELF_CONTACT
+from hybrid.kernels.state.state import Batch, Floats, Line, Sea
 from hybrid.model.bending_reference import LEFT, left_by_correction
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import NEAR

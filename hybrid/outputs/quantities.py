@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid.kernels.bed import planes_under
-from hybrid.kernels.named_quantities import LEAST_AZIMUTH
-from hybrid.kernels.state import Floats
+from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.state.state import Floats
+from hybrid.kernels.watch.named_quantities import LEAST_AZIMUTH
 from hybrid.model.payout import whole_scene
 from hybrid.model.sections import outer_diameter
 from hybrid.outputs.distance import nearest

@@ -1,6 +1,6 @@
 """Lowest and highest values, over every step, of the quantities that a scene asks for by name.
 
-The compiled run keeps them (kernels.named_quantities); here is what it is told, and what the file gets of them.
+The compiled run keeps them (kernels.watch.named_quantities); here is what it is told, and what the file gets of them.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.kernels import named_quantities as k
-from hybrid.kernels.books import Books
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.books import Books
+from hybrid.kernels.state.state import Floats
+from hybrid.kernels.watch import named_quantities as k
 from hybrid.model.payout import whole_scene
 from hybrid.model.sections import outer_diameter
 from hybrid.store.format import Field

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.state import Floats, Line
-from hybrid.kernels.zone_torque import TORQUE
+from hybrid.kernels.march.zone_torque import TORQUE
+from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.state import Floats, Line
 from hybrid.outputs.moments import across
 from hybrid.outputs.vectors import cross, dot, size
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.bed import planes_under
-from hybrid.kernels.state import Floats, Sea
+from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.state.state import Floats, Sea
 
 
 class Touchdown(NamedTuple):

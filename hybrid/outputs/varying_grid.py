@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.model.mesh import Zone
 from hybrid.outputs.output_grid import Grid, Rows
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 
 
 def cross(a: Floats, b: Floats) -> Floats:

@@ -90,7 +90,7 @@ class Surface(NamedTuple):
     values: NDArray[np.float64]
 
     def at(self, x: float, y: float) -> tuple[float, float, float]:
-        """Depth (m) and its slopes along x and y, as kernels.bed has them."""
+        """Depth (m) and its slopes along x and y, as kernels.laws.bed has them."""
         import numpy as np
 
         i = int(np.clip(np.searchsorted(self.x, x, "right") - 1, 0, len(self.x) - 2))

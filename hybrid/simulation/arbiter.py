@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.model.output_points import output_points
 from hybrid.model.plan import output_times
 from hybrid.model.sections import borne_tension

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.kernels.state import State
+from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
 from hybrid.scene.schema import Scene
 from hybrid.scene.vessel_record import motion_record

@@ -10,7 +10,7 @@ import numpy as np
 from hybrid.simulation.run_sample import NOT_ESTIMATED, Notes, RunSample
 
 if TYPE_CHECKING:
-    from hybrid.simulation.errors_by_cause import Errors
+    from hybrid.accuracy.errors_by_cause import Errors
 
 # Model errors beyond so many times what the criteria of zones let pass are not believed: a loose line drifts for ever.
 BELIEVED = 30.0

@@ -15,10 +15,10 @@ import numpy as np
 
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, ResultError
-from hybrid.kernels.books import OUTPUT
-from hybrid.kernels.criteria import CRITERIA
-from hybrid.kernels.forces import SELF_CONTACT
-from hybrid.kernels.state import Floats, State
+from hybrid.kernels.mesh.criteria import CRITERIA
+from hybrid.kernels.state.books import OUTPUT
+from hybrid.kernels.state.forces import SELF_CONTACT
+from hybrid.kernels.state.state import Floats, State
 from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model, build
 from hybrid.model.output_points import OutputPoints, output_points

@@ -9,10 +9,10 @@ import numpy as np
 
 from hybrid.adapt.manager import all_zones
 from hybrid.adapt.state_transfer import states
-from hybrid.kernels import books as b
-from hybrid.kernels.binding import Packed, Room, Table
-from hybrid.kernels.entry import workspace
-from hybrid.kernels.state import Floats, Sea, no_sea
+from hybrid.kernels.machine.binding import Packed, Room, Table
+from hybrid.kernels.run.entry import workspace
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.state import Floats, Sea, no_sea
 from hybrid.model.line import lines
 from hybrid.model.line_on_base import kinds_of
 
@@ -35,7 +35,7 @@ class Kept(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """A layout, as kernels.cell_changes.LayoutJob has it; a push out of the plane, and room for the next."""
+    """A layout, as kernels.mesh.cell_changes.LayoutJob has it; a push out of the plane, and room for the next."""
 
     place: np.ndarray
     s: Floats
@@ -104,7 +104,7 @@ def blank_kept(n: int, extra: int, some: bool) -> Kept:
 
 
 class Joined(NamedTuple):
-    """Of kernels.zone_transfer.Match what new cells have."""
+    """Of kernels.mesh.zone_transfer.Match what new cells have."""
 
     same: np.ndarray
     left: np.ndarray

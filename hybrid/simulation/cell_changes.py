@@ -1,6 +1,6 @@
 """Cells that change between two steps of a run without Python's help: on arrays with room for the most there can be.
 
-Two sets of arrays take turns: a change goes from one to the other (kernels.cell_changes), and the tables of the run get
+Two sets of arrays take turns: a change goes from one to the other (mesh.cell_changes), and the tables of the run get
 the numbers of the other one.  What Python has of the line is made anew when the run comes back to it (`sync`).
 """
 
@@ -16,12 +16,10 @@ import numpy as np
 from hybrid.adapt.manager import BUFFER, OF_BASE, REVIEWS, Change
 from hybrid.adapt.user_criterion import FORCED_RATIO
 from hybrid.adapt.zone_rules import OFF, blank_review_job, quiet_review
-from hybrid.kernels import books as b
-from hybrid.kernels import following_run as f
-from hybrid.kernels import zone_step as z
-from hybrid.kernels.binding import Packed, Room, Table
-from hybrid.kernels.books import Books, sample_size
-from hybrid.kernels.cell_changes import (
+from hybrid.kernels.contact.self_distance import blank_itself_job, boxes_of
+from hybrid.kernels.machine.binding import Packed, Room, Table
+from hybrid.kernels.mesh import zone_step as z
+from hybrid.kernels.mesh.cell_changes import (
     after_forces,
     before_forces,
     blank_layout_job,
@@ -30,16 +28,18 @@ from hybrid.kernels.cell_changes import (
     lay_out,
     renew,
 )
-from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.newton import RUN, Task
-from hybrid.kernels.run import blank_job
-from hybrid.kernels.run import run as steps
-from hybrid.kernels.self_distance import blank_itself_job, boxes_of
-from hybrid.kernels.state import Batch, Line
-from hybrid.kernels.zone_line import blank_kinds_job, blank_line_job, fill_kinds, fill_line
-from hybrid.kernels.zone_step import blank_zone_job
-from hybrid.kernels.zone_switch import AFTER, BEFORE, NUMBERS, begin_switch, blank_switch_job, end_switch
-from hybrid.kernels.zone_transfer import Match, Transfer
+from hybrid.kernels.mesh.zone_line import blank_kinds_job, blank_line_job, fill_kinds, fill_line
+from hybrid.kernels.mesh.zone_step import blank_zone_job
+from hybrid.kernels.mesh.zone_switch import AFTER, BEFORE, NUMBERS, begin_switch, blank_switch_job, end_switch
+from hybrid.kernels.mesh.zone_transfer import Match, Transfer
+from hybrid.kernels.run import following_run as f
+from hybrid.kernels.run.run import run as steps
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Books, sample_size
+from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.state import Batch, Line
+from hybrid.kernels.step.job import blank_job
+from hybrid.kernels.step.newton import RUN, Task
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
 from hybrid.model.mesh import Zone
 from hybrid.model.sea import Surroundings
@@ -328,7 +328,7 @@ class CellChanges:
         self.sync()
 
     def go(self, reviewed: bool = False) -> int:
-        """Steps, and changes of cells that need nothing else; a code of kernels.books.
+        """Steps, and changes of cells that need nothing else; a code of kernels.state.books.
 
         reviewed: the criteria have just been reviewed after a step, and zones stay as they are.
         """

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.adapt.manager import OF_BASE
-from hybrid.kernels import following_run as f
-from hybrid.kernels.binding import Packed, Room
-from hybrid.kernels.books import Books, sample_size
-from hybrid.kernels.entry import NO_PUSH
-from hybrid.kernels.self_distance import Itself, blank_itself
-from hybrid.kernels.state import NO_TENSION_TORQUE, NO_TORSION, TENSION_TORQUE, Floats, Line, Sea, State, Work
-from hybrid.kernels.zone_step import Zones
+from hybrid.kernels.contact.self_distance import Itself, blank_itself
+from hybrid.kernels.machine.binding import Packed, Room
+from hybrid.kernels.mesh.zone_step import Zones
+from hybrid.kernels.run import following_run as f
+from hybrid.kernels.run.entry import NO_PUSH
+from hybrid.kernels.state.books import Books, sample_size
+from hybrid.kernels.state.state import NO_TENSION_TORQUE, NO_TORSION, TENSION_TORQUE, Floats, Line, Sea, State, Work
 from hybrid.simulation.cell_arrays import REST_OF_SEA, Cells, Side, blank_kept, seas, works
 from hybrid.solve.run import MOST_SAMPLED, ROWS
 
@@ -28,7 +28,7 @@ class CellViews:
 
     def __init__(self, owner: Transient, most: int, marked: int, at: np.ndarray) -> None:
         """most: cells at most; marked: nodes of them beside which extremes are kept on both sides; at: numbers of the
-        run (kernels.following_run)."""
+        run (kernels.run.following_run)."""
         assert owner.switching is not None and owner.model.layout is not None
         self._owner, self._run, self._switching, self._at = owner, owner.run, owner.switching, at
         base, some = int(owner.model.layout.rod.size), owner.envelope is not None

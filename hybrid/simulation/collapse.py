@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from hybrid.kernels.accept import MANY, TINY
+from hybrid.kernels.step.accept import MANY, TINY
 
 # Kind of the event.
 COLLAPSE = "steps collapse"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.forces import SELF_CONTACT
-from hybrid.kernels.link import holds_twist, link_of
-from hybrid.kernels.state import Floats, State
+from hybrid.kernels.march.link import holds_twist, link_of
+from hybrid.kernels.state.forces import SELF_CONTACT
+from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.simulation.self_watch import deepest_text, diameters, least_bending
 from hybrid.solve.contact_statics import contact_energy, settled

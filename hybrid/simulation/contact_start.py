@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from hybrid.errors import IN_SPACE, Outcome
-from hybrid.kernels import books as b
-from hybrid.kernels.forces import MAY_TOUCH
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.forces import MAY_TOUCH
 from hybrid.model.self_reach import touching, touching_no_more
 from hybrid.simulation.self_watch import deepest_text, within_itself
 from hybrid.solve.self_contact import SelfContact

@@ -13,15 +13,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels import books as b
-from hybrid.kernels.accept import LARGEST_TWIST
-from hybrid.kernels.bed import planes_under
-from hybrid.kernels.books import Books
-from hybrid.kernels.entry import sharpest
-from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, SELF_FRICTION
-from hybrid.kernels.report import BEND, TWIST_NODE
-from hybrid.kernels.resolution_checks import lowest
-from hybrid.kernels.state import Batch, Ends, Floats, State, ends_in, state_in
+from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.march.resolution_checks import lowest
+from hybrid.kernels.run.entry import sharpest
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Books
+from hybrid.kernels.state.forces import FRICTION, PLANAR, SEABED, SELF_FRICTION
+from hybrid.kernels.state.report import BEND, TWIST_NODE
+from hybrid.kernels.state.state import Batch, Ends, Floats, State, ends_in, state_in
+from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.model.build import Model
 from hybrid.outputs.joined_lines import JoinedObservation, Output
 from hybrid.outputs.observation import Observation
@@ -96,7 +96,7 @@ class Watched(Protocol):
 
     @property
     def report(self) -> Floats:
-        """(REPORT_SIZE,) of the state (kernels.report)."""
+        """(REPORT_SIZE,) of the state (kernels.state.report)."""
 
     @property
     def books(self) -> Books: ...
@@ -221,7 +221,7 @@ class Diagnostics:
         return self.shape(0.0, sharpest(self._model.line, ends, state), state)
 
     def shape(self, t: float, sharp: Sequence[float], state: State) -> Stop:
-        """Bends and twists that the mesh does not resolve; `sharp`: what kernels.entry.sharpest has found."""
+        """Bends and twists that the mesh does not resolve; `sharp`: what kernels.run.entry.sharpest has found."""
         bend, twist = sharp[0], sharp[2]
         if bend <= self._bend and twist <= min(self._twist, LARGEST_TWIST):
             return None
@@ -276,7 +276,7 @@ class Diagnostics:
         clock[b.SLACK_LIMIT] = self._slack if warns else -np.inf
 
     def look(self, run: Watched, flags: int) -> Stop:
-        """Look at what a run has flagged in its last step (kernels.books)."""
+        """Look at what a run has flagged in its last step (kernels.state.books)."""
         t, state, stop = run.t, run.state, None
         if flags & b.JUMPED:
             jump = float(state.T.max() - run.before.T.max())

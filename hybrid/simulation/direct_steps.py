@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels import books as b
+from hybrid.kernels.state import books as b
 from hybrid.simulation.time_loop import TimeLoop
 
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.forces import SEABED
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.forces import SEABED
+from hybrid.kernels.state.state import Floats
 from hybrid.outputs.joined_lines import JoinedObservation
 
 

@@ -1,9 +1,9 @@
 """Extremes of a run over all accepted steps, on the finest mesh that its zones may have.
 
-The compiled run keeps them on the mesh of the moment (kernels.extremes).  Every node of any layout is a node of the
+The compiled run keeps them on the mesh of the moment (watch.extremes).  Every node of any layout is a node of the
 layout that is all rod, so when cells change, the extremes of those that go are folded into those on its nodes: inside
 a cell the extremes of its two nodes are interpolated, with the time of the nearer one.  Nodes whose cells stay go on
-with theirs (kernels.carried_extremes).
+with theirs (kernels.watch.carried_extremes).
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import LIMIT_EVENTS
-from hybrid.kernels import books as b
-from hybrid.kernels.books import Books
-from hybrid.kernels.carried_extremes import pass_on
-from hybrid.kernels.extremes import fold_extremes
-from hybrid.kernels.forces import MAY_TOUCH, PLANAR, SEABED, SELF_CONTACT
-from hybrid.kernels.self_distance import OF_0_6, blank_itself
-from hybrid.kernels.state import Floats
+from hybrid.kernels.contact.self_distance import OF_0_6, blank_itself
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Books
+from hybrid.kernels.state.forces import MAY_TOUCH, PLANAR, SEABED, SELF_CONTACT
+from hybrid.kernels.state.state import Floats
+from hybrid.kernels.watch.carried_extremes import pass_on
+from hybrid.kernels.watch.extremes import fold_extremes
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
 from hybrid.model.payout import whole_scene
@@ -58,14 +58,14 @@ _S_TEXT = (
 
 
 def marked_places(scene: Scene, model: Model) -> tuple[tuple[float, int], ...]:
-    """Arc lengths, m, of point loads, ends of modules and changes of section, with their bits of kernels.books."""
+    """Arc lengths, m, of point loads, ends of modules and changes of section, with their bits of state.books."""
     edges = [x for modules in modules_of(scene) for x in modules.range]
     loads = tuple((float(x), b.LOADED) for x in (*model.attached, *edges))
     return loads + tuple((float(x), b.SEAM) for x in section_changes(scene))
 
 
 def marks_on(s: Floats, places: Sequence[tuple[float, int]]) -> np.ndarray:
-    """Bits (N+1,) of kernels.books for nodes s (N+1,) m; those of the ends are left out."""
+    """Bits (N+1,) of kernels.state.books for nodes s (N+1,) m; those of the ends are left out."""
     marks = np.zeros(s.size, np.int8)
     for x, bit in places:
         marks[np.argmin(np.abs(s - x))] |= bit

@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.forces import FRICTION, MAY_TOUCH, PLANAR
-from hybrid.kernels.link import LINK, holds_twist, link_of
-from hybrid.kernels.state import Line, State
-from hybrid.kernels.zone_criteria import twist_of_rods
+from hybrid.kernels.march.link import LINK, holds_twist, link_of
+from hybrid.kernels.mesh.zone_criteria import twist_of_rods
+from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, PLANAR
+from hybrid.kernels.state.state import Line, State
 from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
 from hybrid.model.equilibrium_hints import reasons_against

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels import books as b
+from hybrid.kernels.state import books as b
 from hybrid.scene.read import scene_text
 from hybrid.simulation.diagnostics import stretch_text
 from hybrid.simulation.transient import Transient

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.cache import is_warm
+from hybrid.kernels.machine.cache import is_warm
 from hybrid.model.build import Model, build
 from hybrid.model.payout import payout_of
 from hybrid.model.resolution import first_resolution, wants_errors
@@ -76,7 +76,7 @@ def _beside_solver(scene: Scene, static: bool) -> list[str]:
 def compile_beside(scene: Scene, static: bool = False) -> None:
     """Let a second process compile what a scene calls besides the solver, which this one compiles meanwhile.
 
-    Each waits for what the other is compiling (kernels.compile).  Does nothing where all is compiled, or where there is
+    Each waits for what the other is compiling (machine.compile).  Does nothing where all is compiled, or where there is
     one core.  static: for its equilibrium alone.
     """
     needed = _beside_solver(scene, static)
@@ -104,7 +104,7 @@ def command_to_compile(names: Sequence[str]) -> list[str]:
 
 def compile_all(names: Sequence[str]) -> None:
     """Compile kernels in this process, but for what another one is compiling."""
-    from hybrid.kernels.run import in_space, run
+    from hybrid.kernels.run.run import in_space, run
 
     table = np.zeros(0, np.int64)  # of which only the type counts
     if STEPS in names:
@@ -126,7 +126,9 @@ def compile_all(names: Sequence[str]) -> None:
 
 def payout_kernels() -> tuple[Any, ...]:
     """All that a line calls that is paid out, in the order in which a run asks for it; each takes one table."""
-    from hybrid.kernels import cell_changes, payout, payout_nodes, payout_run
+    from hybrid.kernels.mesh import cell_changes
+    from hybrid.kernels.reel import payout, payout_nodes
+    from hybrid.kernels.run import payout_run
 
     first = (
         payout.pay_out,
@@ -142,15 +144,15 @@ def payout_kernels() -> tuple[Any, ...]:
 
 
 def _compile_outputs(model: Model) -> None:
-    from hybrid.kernels.observed_outputs import observe_outputs
-    from hybrid.kernels.seabed import stored
+    from hybrid.kernels.laws.seabed import stored
+    from hybrid.kernels.watch.observed_outputs import observe_outputs
 
     observe_outputs(np.zeros((0, 0), np.int64))
     stored(model.line, model.sea.values, model.start.r)
 
 
 def _compile_zones(scene: Scene, model: Model) -> None:
-    from hybrid.kernels.zone_step import follow_zones
+    from hybrid.kernels.mesh.zone_step import follow_zones
     from hybrid.simulation.initial_zones import manager_for
 
     manager = manager_for(scene, model, first_resolution(scene), None)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.store.hockling import formation_ratio, formation_tension, pop_out
 

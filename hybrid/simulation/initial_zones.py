@@ -12,12 +12,12 @@ import numpy as np
 from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.cell_errors import CURVATURE, MOMENT, TENSION
-from hybrid.kernels.cell_lengths import CALM_STEPS
-from hybrid.kernels.criteria import CRITERIA
-from hybrid.kernels.forces import PLANAR, SELF_CONTACT
-from hybrid.kernels.state import Ends, Line, State
-from hybrid.kernels.torque_transfer import carry_torque
+from hybrid.kernels.march.torque_transfer import carry_torque
+from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
+from hybrid.kernels.mesh.cell_lengths import CALM_STEPS
+from hybrid.kernels.mesh.criteria import CRITERIA
+from hybrid.kernels.state.forces import PLANAR, SELF_CONTACT
+from hybrid.kernels.state.state import Ends, Line, State
 from hybrid.model.bending_reference import LEFT
 from hybrid.model.build import Model, given_zones
 from hybrid.model.coarsen import FEWER, picked, refined

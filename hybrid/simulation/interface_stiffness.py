@@ -2,7 +2,7 @@
 
 With the balance of the end in place of its condition, the equations of the step are A x = b, where a force f on the
 end is b = -f in its rows; the end then gives way by the inverse of what it takes to shift it.  Inertia and damping of
-the step (dv'/dr' = cv, dvd'/dr' = ca, kernels.generalized_alpha) are in A, so that it is what an iteration over the
+the step (dv'/dr' = cv, dvd'/dr' = ca, step.generalized_alpha) are in A, so that it is what an iteration over the
 same step needs, not the static stiffness.
 """
 
@@ -11,12 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels import books as b
-from hybrid.kernels import entry
-from hybrid.kernels.block_elimination import SIZE, solve_again
-from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.generalized_alpha import weights
-from hybrid.kernels.state import Floats
+from hybrid.kernels.algebra.block_elimination import SIZE, solve_again
+from hybrid.kernels.run import entry
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.state import Floats
+from hybrid.kernels.step.generalized_alpha import weights
 from hybrid.simulation.transient import Transient
 from hybrid.solve.workspaces import workspace_of
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid.errors import ComputationError
-from hybrid.kernels.state import Floats, State
+from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model, twist_rate
 from hybrid.model.mesh import DEFAULT_CELLS
 from hybrid.model.mesh_grading import GROWTH, SAMPLES, Grading, layers

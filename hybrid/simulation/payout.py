@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels import books as b
-from hybrid.kernels import reel as p
-from hybrid.kernels import winch as w
-from hybrid.kernels.axial_law import SHIFT, stretch_energy
-from hybrid.kernels.binding import Table
-from hybrid.kernels.books import CLOCK_SIZE
-from hybrid.kernels.payout import fit_line, iterate, lengthen, pay_out, stand_still
-from hybrid.kernels.payout_nodes import blank_carry_job, carry_node, put_places
-from hybrid.kernels.payout_run import energy_of
-from hybrid.kernels.reel import MovingZones, Reel, blank_reel, blank_reel_job
-from hybrid.kernels.report import LENGTH_OUT, PAYOUT_RATE
-from hybrid.kernels.state import ALONG_LINE, Batch, Ends, Floats, Line, State, state_for
+from hybrid.kernels.laws.axial_law import SHIFT, stretch_energy
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.reel import reel as p
+from hybrid.kernels.reel import winch as w
+from hybrid.kernels.reel.payout import fit_line, iterate, lengthen, pay_out, stand_still
+from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, put_places
+from hybrid.kernels.reel.reel import MovingZones, Reel, blank_reel, blank_reel_job
+from hybrid.kernels.run.payout_run import energy_of
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import CLOCK_SIZE
+from hybrid.kernels.state.report import LENGTH_OUT, PAYOUT_RATE
+from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout, on_other_parts
 from hybrid.model.line_on_base import LineOnBase

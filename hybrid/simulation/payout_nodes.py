@@ -1,6 +1,6 @@
 """Nodes that enter and leave at a winch without Python's help: on arrays with room for the longest line.
 
-Two sets of arrays take turns: a change goes from one to the other (kernels.payout_run), and the tables of the run get
+Two sets of arrays take turns: a change goes from one to the other (run.payout_run), and the tables of the run get
 the numbers of the other one.  What Python has of the line is made anew when the run comes back to it (`sync`).
 """
 
@@ -14,21 +14,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hybrid.adapt.state_transfer import states
-from hybrid.kernels import books as b
-from hybrid.kernels import payout_run as f
-from hybrid.kernels.binding import Packed, Room, Table
-from hybrid.kernels.books import Books, sample_size
-from hybrid.kernels.cell_changes import after_forces, before_forces
-from hybrid.kernels.entry import NO_PUSH, workspace
-from hybrid.kernels.newton import RUN, Task
-from hybrid.kernels.payout import stand_still
-from hybrid.kernels.payout_nodes import CarryJob, blank_carry_job, carry_node
-from hybrid.kernels.payout_run import NodeJob, blank_line_job, blank_node_job, blank_paid_run_job, make_line
-from hybrid.kernels.reel import Reel, blank_reel, blank_reel_job
-from hybrid.kernels.run import blank_job
-from hybrid.kernels.run import run as steps
-from hybrid.kernels.self_distance import blank_itself, blank_itself_job, boxes_of
-from hybrid.kernels.state import (
+from hybrid.kernels.contact.self_distance import blank_itself, blank_itself_job, boxes_of
+from hybrid.kernels.machine.binding import Packed, Room, Table
+from hybrid.kernels.mesh.cell_changes import after_forces, before_forces
+from hybrid.kernels.reel.payout import stand_still
+from hybrid.kernels.reel.payout_nodes import CarryJob, blank_carry_job, carry_node
+from hybrid.kernels.reel.reel import Reel, blank_reel, blank_reel_job
+from hybrid.kernels.run import payout_run as f
+from hybrid.kernels.run.entry import NO_PUSH, workspace
+from hybrid.kernels.run.payout_run import NodeJob, blank_line_job, blank_node_job, blank_paid_run_job, make_line
+from hybrid.kernels.run.run import run as steps
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Books, sample_size
+from hybrid.kernels.state.state import (
     ALONG_LINE,
     NO_TENSION_TORQUE,
     NO_TORSION,
@@ -41,6 +39,8 @@ from hybrid.kernels.state import (
     State,
     Work,
 )
+from hybrid.kernels.step.job import blank_job
+from hybrid.kernels.step.newton import RUN, Task
 from hybrid.model.line import lines
 from hybrid.model.sea import Surroundings
 from hybrid.outputs.joined_lines import Output
@@ -304,7 +304,7 @@ class NodeChanges:
         self.sync()
 
     def go(self) -> int:
-        """Steps, and nodes that enter and leave; a code of kernels.books."""
+        """Steps, and nodes that enter and leave; a code of kernels.state.books."""
         self._at[f.MAY_WAIT] = self._owner.outputs_may_wait
         code = self._run.go(lambda: int(f.go_on(self._following.numbers)))
         self.sync()

@@ -6,9 +6,9 @@ import numpy as np
 
 from hybrid.adapt.base_change import change_base
 from hybrid.adapt.manager import Change, DomainManager, Reason
-from hybrid.kernels import zone_step as z
-from hybrid.kernels.reel import MovingZones, zones_that_stay
-from hybrid.kernels.stiffness_ramp import soften
+from hybrid.kernels.mesh import zone_step as z
+from hybrid.kernels.mesh.stiffness_ramp import soften
+from hybrid.kernels.reel.reel import MovingZones, zones_that_stay
 from hybrid.model.build import Model, given_zones
 from hybrid.model.layout import Layout
 from hybrid.model.payout import FEWEST_CELLS, PayoutPlan

@@ -1,7 +1,7 @@
 """A motion in a plane: when it begins, what is watched, and how it goes on in space.
 
 Everything in a plane that could leave it does so by itself in space, if something pushes it; in a plane nothing can.
-So a small push is carried along with the motion (kernels.out_of_plane).  When it grows, an event says so, and a motion
+So a small push is carried along with the motion (laws.out_of_plane).  When it grows, an event says so, and a motion
 that nobody wants in a plane whatever comes goes on in space, with that push.  A line that has come back goes on in the
 plane, and what it is still off it becomes the push.
 """
@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import IN_SPACE
-from hybrid.kernels.accept import GROWN
-from hybrid.kernels.books import NEAR_PLANE, PUSH_GROWN, PUSH_START
-from hybrid.kernels.entry import NO_PUSH
-from hybrid.kernels.state import Floats, Line, State
+from hybrid.kernels.run.entry import NO_PUSH
+from hybrid.kernels.state.books import NEAR_PLANE, PUSH_GROWN, PUSH_START
+from hybrid.kernels.state.state import Floats, Line, State
+from hybrid.kernels.step.accept import GROWN
 from hybrid.model.build import Model
 from hybrid.model.plane import in_space, leaves_plane, planar, untwist
 from hybrid.scene.schema import Scene

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid.kernels import books as b
-from hybrid.kernels.energies import observe
-from hybrid.kernels.state import State
+from hybrid.kernels.march.energies import observe
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
 from hybrid.model.release import NAMES, without_hold
 from hybrid.solve.run import CompiledRun

@@ -20,7 +20,7 @@ import numpy as np
 
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ResultError
-from hybrid.kernels.cache import kernel_hash
+from hybrid.kernels.machine.cache import kernel_hash
 from hybrid.model.build import MOST_FOLLOWING, MOST_PARTS, Model, build
 from hybrid.model.layout import Layout
 from hybrid.model.mesh import MOST_CELLS, Zone
@@ -38,7 +38,7 @@ from hybrid.store.named_arrays import Tree, matched
 from hybrid.store.reader import Result
 
 # Rooms that have a part in the numbers of a file.
-COMPUTES = ("adapt", "errors", "kernels", "model", "outputs", "scene", "simulation", "solve", "store")
+COMPUTES = ("accuracy", "adapt", "errors", "kernels", "model", "outputs", "scene", "simulation", "solve", "store")
 # Times as fine or as coarse as the scene asks for that a run may be: far beyond what error control chooses.
 FARTHEST = 1e4
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.model.resolution import OF_VIBRATION
 from hybrid.model.start_vibration import Vibration, start_vibrations, strain_travel
 from hybrid.scene.schema import Scene

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid.kernels.bed import planes_under
-from hybrid.kernels.cache import cache_folder
-from hybrid.kernels.forces import SEABED, SURFACE
-from hybrid.kernels.state import Sea
+from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.machine.cache import cache_folder
+from hybrid.kernels.state.forces import SEABED, SURFACE
+from hybrid.kernels.state.state import Sea
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
 from hybrid.model.payout import whole_scene

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.outputs.observation import Observation
 

@@ -10,12 +10,9 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.binding import Table
-from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, NOW
-from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT
-from hybrid.kernels.self_contact_law import INNER, OUTER
-from hybrid.kernels.self_contact_pairs import WINDOW
-from hybrid.kernels.self_distance import (
+from hybrid.kernels.contact.self_contact_law import INNER, OUTER
+from hybrid.kernels.contact.self_contact_pairs import WINDOW
+from hybrid.kernels.contact.self_distance import (
     ASKED,
     AWAY,
     CLEARANCE,
@@ -48,7 +45,10 @@ from hybrid.kernels.self_distance import (
     blank_itself_job,
     watch_itself,
 )
-from hybrid.kernels.state import Floats, State, Work, state_for
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE, NOW
+from hybrid.kernels.state.forces import MAY_TOUCH, SELF_CONTACT
+from hybrid.kernels.state.state import Floats, State, Work, state_for
 from hybrid.model.build import Model
 from hybrid.model.self_reach import COST
 from hybrid.scene.schema import Scene
@@ -79,7 +79,7 @@ def least_bending(model: Model) -> Floats:
     return np.asarray(model.cable.B[model.cable.piece(0.5 * (s[:-1] + s[1:])), :2].min(axis=1))
 
 
-# Diameters and cells, of both ends together, within which held ends are neighbours (kernels.self_contact_pairs).
+# Diameters and cells, of both ends together, within which held ends are neighbours (contact.self_contact_pairs).
 BESIDE, BESIDE_CELLS = WINDOW, NEIGHBOURS + 1
 REMEDY = "contact: {self: true} does, of catenaries that are not corrected for bending too"
 
@@ -183,7 +183,7 @@ class SelfWatch:
     def look(self, run: CompiledRun) -> int:
         """Look at the last step of a line that is so bent that it could come near itself, and let every step do so from
 
-        now on; MEETS and NEARS of kernels.self_distance.
+        now on; MEETS and NEARS of kernels.contact.self_distance.
         """
         if self._address == UNBENT:
             self._address = watch_itself.address(self._job.numbers)
@@ -312,7 +312,7 @@ class LineWatch:
     def attach(self, states: tuple[State, State], clock: Floats, counts: np.ndarray) -> dict[str, Any]:
         """What the job of a line is to have so that its steps, between two states in turn, look by themselves.
 
-        clock, counts: of the run (kernels.books).
+        clock, counts: of the run (kernels.state.books).
         """
         if not self._watch.on:
             return {"itself": 0}
@@ -367,7 +367,7 @@ class LineWatch:
         return watch.foresees(state, step, lambda: self._look(t, state, state.r))
 
     def _look(self, t: float, state: State, before: Floats) -> int:
-        """MEETS and NEARS of kernels.self_distance."""
+        """MEETS and NEARS of kernels.contact.self_distance."""
         if self._job is None:
             self._job = self._bind()
         self._now.r[:], self._now.e[:], self._now.v[:], self._before.r[:] = state.r, state.e, state.v, before
@@ -376,7 +376,7 @@ class LineWatch:
 
 
 def is_bent(state: State) -> bool:
-    """As kernels.self_distance.is_bent, which only kernels can call."""
+    """As kernels.contact.self_distance.is_bent, which only kernels can call."""
     c = state.r[-1] - state.r[0]
     along, size = state.e @ c, TURNED * TURNED * (c @ c) * np.einsum("ij,ij->i", state.e, state.e)
     return not bool(((along > 0.0) & (along * along > size)).all())

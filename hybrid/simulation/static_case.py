@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from hybrid.errors import Complaint, ComputationError, SceneError
-from hybrid.kernels.forces import SEABED, SELF_CONTACT
-from hybrid.kernels.report import REPORT_SIZE, SEABED_ENERGY
-from hybrid.kernels.seabed import stored
-from hybrid.kernels.state import Floats, State, batch_of_one
+from hybrid.kernels.laws.seabed import stored
+from hybrid.kernels.state.forces import SEABED, SELF_CONTACT
+from hybrid.kernels.state.report import REPORT_SIZE, SEABED_ENERGY
+from hybrid.kernels.state.state import Floats, State, batch_of_one
 from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model, build
 from hybrid.model.output_points import output_points

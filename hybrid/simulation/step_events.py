@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from hybrid.kernels import books as b
-from hybrid.kernels.accept import MANY
-from hybrid.kernels.self_distance import HIDES, MEETS, NEARS, PARTS, TOLD
+from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS, TOLD
+from hybrid.kernels.state import books as b
+from hybrid.kernels.step.accept import MANY
 from hybrid.model.resolution import ZONES, wants_errors
 from hybrid.simulation.bounded_model_errors import doubt_text
 from hybrid.simulation.collapse import COLLAPSE, ERROR, GAIN, GIVE_UP, NEWTON, TURN, collapse_text
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # What cuts steps, and where the tries are counted.
 CUTS = {GAIN: b.CUT_BY_GAIN, TURN: b.CUT_BY_TURN, NEWTON: b.CUT_BY_NEWTON, ERROR: b.CUT_BY_ERROR}
-# What a look at the line finds (kernels.self_distance), as flags of a step.
+# What a look at the line finds (kernels.contact.self_distance), as flags of a step.
 ITSELF = {MEETS: b.MEETS_ITSELF, NEARS: b.NEARS_ITSELF, PARTS: b.PARTS_ITSELF, HIDES: b.HIDES_ITSELF}
 
 
@@ -93,7 +93,7 @@ def note_unknown_correction(moving: Transient) -> None:
 def look_at_itself(moving: Transient, flags: int) -> None:
     """The line has become so bent that it could come near itself, is near, or meets itself: an event.
 
-    flags: of kernels.books.
+    flags: of kernels.state.books.
     """
     watch = moving.itself
     assert watch is not None

@@ -9,7 +9,7 @@ from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 
-from hybrid.kernels.state import Floats, batch_of_one
+from hybrid.kernels.state.state import Floats, batch_of_one
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.scene.schema import Scene

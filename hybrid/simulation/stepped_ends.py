@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B
+from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.driven_end import DrivenEnd, rotation_vector
 from hybrid.scene.schema import Scene

@@ -17,8 +17,8 @@ import numpy as np
 
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, SceneError
-from hybrid.kernels import books as b
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.driven_end import DrivenEnd
 from hybrid.model.resolution import first_resolution

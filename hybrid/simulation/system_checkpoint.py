@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.kernels.bodies import SPRING
-from hybrid.kernels.report import REPORT_SIZE
+from hybrid.kernels.junctions.bodies import SPRING
+from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.model.system import SystemResolution
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.system import System

@@ -9,9 +9,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from hybrid.errors import Complaint, Outcome, SceneError
-from hybrid.kernels.books import ZONES
-from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT
-from hybrid.kernels.report import SELF_CONTACT_ENERGY
+from hybrid.kernels.state.books import ZONES
+from hybrid.kernels.state.forces import MAY_TOUCH, SELF_CONTACT
+from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.model.self_reach import touching, touching_no_more
 from hybrid.model.system import SystemModel
 from hybrid.simulation.contact_equilibrium import contact_of

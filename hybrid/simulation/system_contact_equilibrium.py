@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
 
-from hybrid.kernels.carried_frames import TURNS
-from hybrid.kernels.forces import SELF_CONTACT
-from hybrid.kernels.link import LINK, holds_twist, link_of
-from hybrid.kernels.state import Floats, State
+from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.march.link import LINK, holds_twist, link_of
+from hybrid.kernels.state.forces import SELF_CONTACT
+from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.system import SystemModel
 from hybrid.simulation.contact_equilibrium import KEPT, contact_of

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid.kernels.bodies import DONE, SPRING
-from hybrid.kernels.report import FORCE_A
-from hybrid.kernels.state import NO_TURN, State
-from hybrid.kernels.zone_torque import TURN, torsion_energy
+from hybrid.kernels.junctions.bodies import DONE, SPRING
+from hybrid.kernels.march.zone_torque import TURN, torsion_energy
+from hybrid.kernels.state.report import FORCE_A
+from hybrid.kernels.state.state import NO_TURN, State
 from hybrid.model.build import Model
 from hybrid.model.failure import Weakness, after_failure, weaknesses
 from hybrid.simulation.releases import elastic

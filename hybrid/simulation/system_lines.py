@@ -10,7 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.books import (
+from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS
+from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.march.link import holds_twist
+from hybrid.kernels.mesh.zone_criteria import twist_of_rods
+from hybrid.kernels.run.entry import sharpest
+from hybrid.kernels.state.books import (
     FLAGS,
     HIDES_ITSELF,
     IS_BENT,
@@ -26,15 +31,10 @@ from hybrid.kernels.books import (
     STORED,
     STRETCHED,
     Books,
+    blank_books,
 )
-from hybrid.kernels.carried_frames import TURNS
-from hybrid.kernels.entry import sharpest
-from hybrid.kernels.forces import FRICTION, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.link import holds_twist
-from hybrid.kernels.run import blank_books
-from hybrid.kernels.self_distance import HIDES, MEETS, NEARS, PARTS
-from hybrid.kernels.state import Batch, Ends, Floats, State, Work, batch_of_one
-from hybrid.kernels.zone_criteria import twist_of_rods
+from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one
 from hybrid.model.build import Model
 from hybrid.model.output_points import output_points
 from hybrid.model.sections import section_changes
@@ -64,7 +64,7 @@ from hybrid.store.writer import Recorder
 WAITING = 64
 # Of the length: ends that are so near to where they were have not been moved.
 SAME_PLACE = 1e-9
-# Flags of a step (kernels.books), and bits of kernels.self_distance.
+# Flags of a step (kernels.state.books), and bits of kernels.contact.self_distance.
 WATCHED = {MEETS_ITSELF: MEETS, NEARS_ITSELF: NEARS, PARTS_ITSELF: PARTS, HIDES_ITSELF: HIDES}
 # Turns of twist at rest, made by no moment, from which on it is said: searches by way of upright shapes have left 0.4.
 WOUND = 0.25
@@ -265,7 +265,7 @@ class LineResult:
         self._log.append(rows)
 
     def look_at_itself(self, solver: SystemSolver, seen: int, t: float, dt: float, state: State) -> None:
-        """What the step of dt (s) to t (s) has seen (bits of kernels.books) of how near the line is to itself."""
+        """What the step of dt (s) to t (s) has seen (bits of kernels.state.books) of how near the line is to itself."""
         if seen & IS_BENT:
             found, bound = self._itself.bends()
             solver.bind_line(self.number, **bound)

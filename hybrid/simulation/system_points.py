@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.bodies import DONE, FRAME, KINETIC, LINES, PLACE, POTENTIAL, V, W
-from hybrid.kernels.report import FORCE_A, MOMENT_A
-from hybrid.kernels.state import Floats
+from hybrid.kernels.junctions.bodies import DONE, FRAME, KINETIC, LINES, PLACE, POTENTIAL, V, W
+from hybrid.kernels.state.report import FORCE_A, MOMENT_A
+from hybrid.kernels.state.state import Floats
 from hybrid.model.bodies import angles_of
 from hybrid.model.system import SystemModel
 from hybrid.scene.bodies import FreeBody

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hybrid.kernels.state import Batch, Floats
+from hybrid.kernels.state.state import Batch, Floats
 from hybrid.model.system import SystemModel
 from hybrid.outputs.probes import Probe
 from hybrid.outputs.quantities import Quantities

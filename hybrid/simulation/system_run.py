@@ -13,12 +13,12 @@ import numpy as np
 
 from hybrid.adapt.manager import DomainManager
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
-from hybrid.kernels import books as b
-from hybrid.kernels.accept import MANY
-from hybrid.kernels.bodies import FRAME, PLACE, V
-from hybrid.kernels.cache import cache_folder
-from hybrid.kernels.forces import SELF_CONTACT
-from hybrid.kernels.state import Floats, Moves, state_for
+from hybrid.kernels.junctions.bodies import FRAME, PLACE, V
+from hybrid.kernels.machine.cache import cache_folder
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.forces import SELF_CONTACT
+from hybrid.kernels.state.state import Floats, Moves, state_for
+from hybrid.kernels.step.accept import MANY
 from hybrid.model.bodies import FairleadMotion
 from hybrid.model.plan import output_times
 from hybrid.model.plan import parts as equal_parts

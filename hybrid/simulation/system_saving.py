@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.state import Floats
 from hybrid.model.system import SystemModel
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.system_checkpoint import checkpoint, set_state

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.bodies import NUMBERS
-from hybrid.kernels.members import PIECE, PUSH, WATER, WET
-from hybrid.kernels.state import Floats
+from hybrid.kernels.junctions.bodies import NUMBERS
+from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
+from hybrid.kernels.state.state import Floats
 from hybrid.model.system import SystemModel, balanced_places, starts_between
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System

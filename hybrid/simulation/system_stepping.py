@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import ComputationError, SceneError
-from hybrid.kernels.report import FORCE_A
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state.report import FORCE_A
+from hybrid.kernels.state.state import Floats
 from hybrid.model.driven_end import FRAME, TURN, DrivenEnd
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.points import FreePoint

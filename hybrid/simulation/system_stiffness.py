@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
-from hybrid.kernels.assembly import JOINED
-from hybrid.kernels.bodies import ARM, FORCE, FRAME, MASS, PLACE, STATE, STIFFNESS, V
-from hybrid.kernels.report import FORCE_A, MOMENT_A
-from hybrid.kernels.state import Floats
+from hybrid.kernels.junctions.bodies import ARM, FORCE, FRAME, MASS, PLACE, STATE, STIFFNESS, V
+from hybrid.kernels.march.assembly import JOINED
+from hybrid.kernels.state.report import FORCE_A, MOMENT_A
+from hybrid.kernels.state.state import Floats
 from hybrid.model.bodies import angles_of, frame_of
 from hybrid.model.clamps import seat_of, seated
 from hybrid.model.system import SystemModel, build_system

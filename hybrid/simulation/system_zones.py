@@ -15,13 +15,13 @@ import numpy as np
 
 from hybrid.adapt.manager import Change, DomainManager
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels import books as b
-from hybrid.kernels import zone_step as z
-from hybrid.kernels.books import COUNT_SIZE
-from hybrid.kernels.forces import SELF_CONTACT
-from hybrid.kernels.report import SELF_CONTACT_ENERGY
-from hybrid.kernels.state import Ends, Line, State, state_for
-from hybrid.kernels.zone_step import LOOKAHEAD, follow_zones
+from hybrid.kernels.mesh import zone_step as z
+from hybrid.kernels.mesh.zone_step import LOOKAHEAD, follow_zones
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import COUNT_SIZE
+from hybrid.kernels.state.forces import SELF_CONTACT
+from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
+from hybrid.kernels.state.state import Ends, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.coarsen import picked
 from hybrid.model.system import SystemModel
@@ -147,7 +147,7 @@ def _apart(
 
 
 class _LineZones:
-    """What moves the zones of one line, with the numbers of a compiled run (kernels.zone_step)."""
+    """What moves the zones of one line, with the numbers of a compiled run (kernels.mesh.zone_step)."""
 
     def __init__(self, number: int, model: Model, manager: DomainManager, every: int) -> None:
         self.number, self.full, self.switching = number, model, ZoneSwitching(model, manager)

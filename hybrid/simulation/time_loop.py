@@ -10,8 +10,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from hybrid.errors import ComputationError
-from hybrid.kernels.books import AT_STOP, FAILED, FLAGS, JUMPED, LOG, PAUSED, ROWS, SAMPLES, STEPPED, STRETCHED
-from hybrid.kernels.state import Batch, batch_of_one
+from hybrid.kernels.state.books import AT_STOP, FAILED, FLAGS, JUMPED, LOG, PAUSED, ROWS, SAMPLES, STEPPED, STRETCHED
+from hybrid.kernels.state.state import Batch, batch_of_one
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.outputs.joined_lines import Output

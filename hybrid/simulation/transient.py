@@ -14,11 +14,11 @@ import numpy as np
 
 from hybrid.adapt.manager import Change
 from hybrid.errors import Outcome
-from hybrid.kernels import books as b
-from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT
-from hybrid.kernels.report import SEABED_ENERGY, SELF_CONTACT_ENERGY
-from hybrid.kernels.state import Batch, State, Work, state_for
-from hybrid.kernels.step_law import FIRST
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.forces import MAY_TOUCH, SELF_CONTACT
+from hybrid.kernels.state.report import SEABED_ENERGY, SELF_CONTACT_ENERGY
+from hybrid.kernels.state.state import Batch, State, Work, state_for
+from hybrid.kernels.step.step_law import FIRST
 from hybrid.model.build import Model
 from hybrid.model.plan import parts
 from hybrid.model.resolution import Resolution
@@ -329,7 +329,7 @@ class Transient:
             clock[b.LEG_STEP] = step if abs(n * step - whole) <= WHOLE_STEPS * step else whole / n
 
     def advance(self, stop: float, begun: int | None = None) -> Iterator[int]:
-        """To `stop` (s), where a step ends; yields codes of kernels.books: STEPPED where there is something to look at.
+        """To `stop` (s), where a step ends; yields codes of state.books: STEPPED where there is something to look at.
 
         Between two yields steps are logged and outputs sampled in the books of `run`, which whoever asks empties.
         begun: code with which the compiled run has come back on its way there; None: it has not been called yet.
@@ -372,7 +372,7 @@ class Transient:
                     return
 
     def _go(self) -> int:
-        """Let the compiled run go on, through changes of cells that need nothing else; a code of kernels.books."""
+        """Let the compiled run go on, through changes of cells that need nothing else; a code of state.books."""
         nodes = self._changes_of_nodes()
         if nodes is not None:
             return nodes.go()
@@ -543,7 +543,7 @@ class Transient:
             zones.hand_over(self.run)
         carry = (zones.carry,) if zones is not None else ()
         model, state, booked = self.payout.change(self.run, self.model, *carry)
-        if self.run.contact is not None:  # whose forces kernels.payout_balance does not know
+        if self.run.contact is not None:  # whose forces kernels.reel.payout_balance does not know
             self.payout.leave_unbalanced()
         self.run.books.work[0, b.ZONES] += booked
         self.set_model(model, state)

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels import books as b
-from hybrid.kernels.cell_errors import CURVATURE, QUANTITIES
-from hybrid.kernels.report import REPORT_SIZE
-from hybrid.kernels.sampling import SAME_TIME
-from hybrid.kernels.state import state_for
-from hybrid.kernels.step_law import WARY
+from hybrid.kernels.mesh.cell_errors import CURVATURE, QUANTITIES
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.state.state import state_for
+from hybrid.kernels.step.sampling import SAME_TIME
+from hybrid.kernels.step.step_law import WARY
 from hybrid.simulation.restore import mesh_tree
 from hybrid.simulation.transient import Transient
 from hybrid.store.named_arrays import matched
@@ -22,7 +22,7 @@ FIRST_REPORT = 34  # numbers that a report had once; later ones have more behind
 SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
 
 
-# Of steps that have become short: kernels.books.
+# Of steps that have become short: kernels.state.books.
 LENGTHS = (b.TINY_STEPS, b.CUT_BY_GAIN, b.CUT_BY_TURN, b.CUT_BY_NEWTON, b.CUT_BY_ERROR, b.CUT_AT)
 
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels import books as b
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.state import Floats
 from hybrid.model.resolution import Resolution
 from hybrid.model.start_vibration import start_vibrations
 from hybrid.scene.motion_checks import stationary_from
@@ -40,7 +40,7 @@ class VibrationSteps:
         self._counts_from = 0.0  # s, from when on little has been seen
 
     def begin(self, clock: Floats) -> None:
-        """Steps are short from here on if a vibration begins here; clock: of kernels.books."""
+        """Steps are short from here on if a vibration begins here; clock: of kernels.state.books."""
         now = float(clock[b.NOW])
         if any(abs(now - t) <= 1e-9 * self._period for t in self.begins):
             self.look, self._rows = now + SEEN * self._period, self._rows[:0]

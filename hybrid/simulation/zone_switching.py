@@ -12,14 +12,19 @@ from hybrid.adapt.manager import Change, DomainManager
 from hybrid.adapt.moment_joints import Joints
 from hybrid.adapt.state_transfer import Clamp, transfer_to
 from hybrid.errors import Outcome
-from hybrid.kernels import books as b
-from hybrid.kernels import zone_step as z
-from hybrid.kernels.binding import Table
-from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State
-from hybrid.kernels.torque_transfer import carry_torque
-from hybrid.kernels.zone_step import LOOKAHEAD, REJECT_RATIO, Zones, blank_zone_job, follow_zones, plan_nodes, take_arcs
-from hybrid.kernels.zone_switch import (
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.march.torque_transfer import carry_torque
+from hybrid.kernels.mesh import zone_step as z
+from hybrid.kernels.mesh.zone_step import (
+    LOOKAHEAD,
+    REJECT_RATIO,
+    Zones,
+    blank_zone_job,
+    follow_zones,
+    plan_nodes,
+    take_arcs,
+)
+from hybrid.kernels.mesh.zone_switch import (
     AFTER,
     BEFORE,
     NUMBERS,
@@ -29,7 +34,10 @@ from hybrid.kernels.zone_switch import (
     blank_switch_job,
     end_switch,
 )
-from hybrid.kernels.zone_transfer import Transfer
+from hybrid.kernels.mesh.zone_transfer import Transfer
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout
 from hybrid.simulation.events import EventLog

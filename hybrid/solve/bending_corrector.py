@@ -1,6 +1,6 @@
 """The model error of a line along its run: what neglecting bending in its catenaries shifts it by.
 
-One way only: nothing of it goes back into the line.  docs/theory.md, 14; the kernels are in kernels.bending_error.
+One way only: nothing of it goes back into the line.  docs/theory.md, 14; the kernels are in watch.bending_error.
 """
 
 from __future__ import annotations
@@ -9,9 +9,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels import entry
-from hybrid.kernels.bed import planes_under
-from hybrid.kernels.bending_error import (
+from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.laws.seabed import contact
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.march.energies import observe
+from hybrid.kernels.run import entry
+from hybrid.kernels.run.entry import workspace
+from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE
+from hybrid.kernels.state.forces import FRICTION, SEABED, WAVES
+from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line, Sea, State, Work, ends_in, no_sea
+from hybrid.kernels.step.step import friction_axes
+from hybrid.kernels.watch.bending_error import (
     CLIPPED,
     CURRENT,
     FINITE,
@@ -21,15 +29,7 @@ from hybrid.kernels.bending_error import (
     error_arrays,
     sampled_size,
 )
-from hybrid.kernels.binding import Table
-from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE
-from hybrid.kernels.energies import observe
-from hybrid.kernels.entry import workspace
-from hybrid.kernels.forces import FRICTION, SEABED, WAVES
-from hybrid.kernels.neglected_moments import Bending
-from hybrid.kernels.seabed import contact
-from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, Sea, State, Work, ends_in, no_sea
-from hybrid.kernels.step import friction_axes
+from hybrid.kernels.watch.neglected_moments import Bending
 
 # Part of the line's length beyond which an error is none that a linear estimate could know: it is clipped there.
 MOST = 0.1
@@ -67,7 +67,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
 class Corrector:
     """The error of one line: its arrays, which the compiled run advances (`bind`), and what it makes of outputs.
 
-    arrays, errors: as kernels.bending_error has them; sampled: (2, K) what an output takes of the error after the last
+    arrays, errors: as watch.bending_error has them; sampled: (2, K) what an output takes of the error after the last
     step and before it; torque: (4,) of the whole line, as named there.
     """
 

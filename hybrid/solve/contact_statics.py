@@ -15,17 +15,18 @@ from typing import Protocol
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels import entry
-from hybrid.kernels.accept import LARGEST_TWIST
-from hybrid.kernels.binding import Table
-from hybrid.kernels.books import CONTROLLED, NOW, PARITY, STEP_BEFORE, TRY_END
-from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance
-from hybrid.kernels.forces import FRICTION, MASS_DAMPING, ROTARY, SELF_FRICTION, WAVES
-from hybrid.kernels.newton import EQUILIBRIUM, STEP, Task
-from hybrid.kernels.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY, TWIST
-from hybrid.kernels.resolution_checks import lowest
-from hybrid.kernels.run import blank_books, blank_job, in_space
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.march.resolution_checks import lowest
+from hybrid.kernels.run import entry
+from hybrid.kernels.run.entry import NO_PUSH, Limits, block_rows, out_of_balance
+from hybrid.kernels.run.run import in_space
+from hybrid.kernels.state.books import CONTROLLED, NOW, PARITY, STEP_BEFORE, TRY_END, blank_books
+from hybrid.kernels.state.forces import FRICTION, MASS_DAMPING, ROTARY, SELF_FRICTION, WAVES
+from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY, TWIST
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work
+from hybrid.kernels.step.accept import LARGEST_TWIST
+from hybrid.kernels.step.job import blank_job
+from hybrid.kernels.step.newton import EQUILIBRIUM, STEP, Task
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.stability import Stability
 from hybrid.solve.statics import BALANCED, BALANCING, CALM, GYRATION, MOST_ITERATIONS, REACH, Equilibrium, nudged

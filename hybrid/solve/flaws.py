@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.bed import planes_under
-from hybrid.kernels.forces import BODIES, FRICTION, SEABED
-from hybrid.kernels.resolution_checks import lowest, lowest_not_held
-from hybrid.kernels.state import Floats, Line, Sea, State
+from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held
+from hybrid.kernels.state.forces import BODIES, FRICTION, SEABED
+from hybrid.kernels.state.state import Floats, Line, Sea, State
 
 # A line that lies this part of its length, and this many onsets of contact, under the bed has gone through it.
 BURIED, BURIED_ONSETS = 0.02, 100.0

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.assembly import JOINED
-from hybrid.kernels.bodies import STATE
-from hybrid.kernels.carried_frames import SEAT
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State
+from hybrid.kernels.junctions.bodies import STATE
+from hybrid.kernels.junctions.carried_frames import SEAT
+from hybrid.kernels.march.assembly import JOINED
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
 
 
 class JoinedLine(NamedTuple):
@@ -28,7 +28,7 @@ class JoinedLine(NamedTuple):
     fairleads: Floats = np.zeros((2, 3))  # m, of ends that are joined to bodies, in axes of the body
     seats: Floats = np.zeros(
         (2, SEAT)
-    )  # frames of ends that turn with these (kernels.carried_frames); zeros: none does
+    )  # frames of ends that turn with these (kernels.junctions.carried_frames); zeros: none does
     slackens: bool = False  # whether a motion goes on with slack catenaries, and rest is taken with them if need be
 
 
@@ -47,7 +47,7 @@ class SystemState(NamedTuple):
 class SystemTaken:
     """How a solution went: outcome, Newton iterations, predicted next correction, line and cell or node where it was
     worst, the largest residual force at a node or point (N), the local error of a step (m), the largest of a line over
-    what is allowed of it: a step of more than REFUSED (kernels.step_law) is in no books, and is to be repeated; and its
+    what is allowed of it: a step of more than REFUSED (step.step_law) is in no books, and is to be repeated; and its
     spectral radius at infinity."""
 
     outcome: Outcome

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.bed import planes_under
-from hybrid.kernels.state import Ends, Line, Sea, State
+from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.state.state import Ends, Line, Sea, State
 
 
 def laid_on_bed(line: Line, sea: Sea, ends: Ends, state: State) -> State:

@@ -1,11 +1,11 @@
-"""A small push out of the plane that is carried along with a motion in it (kernels.out_of_plane)."""
+"""A small push out of the plane that is carried along with a motion in it (kernels.laws.out_of_plane)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
-from hybrid.kernels.zone_transfer import carry_push
+from hybrid.kernels.mesh.zone_transfer import carry_push
+from hybrid.kernels.state.state import Floats
 
 # Sines over the length whose sum is the push: enough that no mode of a line that could grow is left out.
 SINES = 6

@@ -1,6 +1,6 @@
 """A run in compiled steps: the books of a line, the table of the kernel, and a call that goes on with it.
 
-The loop over time is compiled (kernels.run).  Here are its arrays, and what they are called outside.
+The loop over time is compiled (kernels.run.run).  Here are its arrays, and what they are called outside.
 """
 
 from __future__ import annotations
@@ -12,17 +12,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels import books as b
-from hybrid.kernels.binding import Table
-from hybrid.kernels.books import sample_size
-from hybrid.kernels.entry import NO_PUSH, check_turns
-from hybrid.kernels.forces import PLANAR, SELF_CONTACT
-from hybrid.kernels.named_quantities import note_quantities
-from hybrid.kernels.newton import RUN, Limits, Task
-from hybrid.kernels.report import REPORT_SIZE
-from hybrid.kernels.run import blank_books, blank_job, in_plane, in_space, run
-from hybrid.kernels.state import NOT_VARYING, Batch, Ends, Floats, Line, Moves, Sea, State, Work, no_torsion
-from hybrid.kernels.zone_step import follow_zones
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.mesh.zone_step import follow_zones
+from hybrid.kernels.run.entry import NO_PUSH, check_turns
+from hybrid.kernels.run.run import in_plane, in_space, run
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import blank_books, sample_size
+from hybrid.kernels.state.forces import PLANAR, SELF_CONTACT
+from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.state.state import NOT_VARYING, Batch, Ends, Floats, Line, Moves, Sea, State, Work, no_torsion
+from hybrid.kernels.step.job import blank_job
+from hybrid.kernels.step.newton import RUN, Limits, Task
+from hybrid.kernels.watch.named_quantities import note_quantities
 from hybrid.solve.bending_corrector import Corrector
 from hybrid.solve.self_contact import SelfContact
 
@@ -83,7 +84,7 @@ class CompiledRun:
         """Go on with a line (as at the start, after a change of zones, in space after a plane) from `state`.
 
         borne: (N,) length over unstretched length that cells bear; first: nodes of the base mesh; marks: (N+1,) of
-        kernels.books, what nodes have; corrector: of the model error, if it is followed.  Extremes are kept anew;
+        kernels.state.books, what nodes have; corrector: of the model error, if it is followed.  Extremes are kept anew;
         displacements count from `books.start`, which the caller fills.
         """
         check_turns(line, state)
@@ -148,21 +149,21 @@ class CompiledRun:
         self.clock[b.PUSH_START] = 0.0
 
     def follow(self, zones: Table, compiled: bool) -> None:
-        """Zones move from now on (kernels.zone_step); compiled: every step asks them, not Python."""
+        """Zones move from now on (kernels.mesh.zone_step); compiled: every step asks them, not Python."""
         if compiled and not self._zones_address:
             self._zones_address = follow_zones.address(zones.numbers)
         self.table.bind(zones=self._zones_address if compiled else 0, zone_table=zones.numbers)
 
     def pay_out(self, table: Table, address: int, iterated: int) -> None:
-        """The length of the line changes from now on; addresses of kernels.payout.pay_out, and of `iterate` or 0."""
+        """The length of the line changes from now on; addresses of reel.payout.pay_out, and of `iterate` or 0."""
         self.table.bind(reel=address, iterated=iterated, reel_table=table.numbers)
 
     def watch_itself(self, table: np.ndarray, address: int) -> None:
-        """From now on steps look how near the line comes to itself (kernels.self_distance)."""
+        """From now on steps look how near the line comes to itself (kernels.contact.self_distance)."""
         self.table.bind(itself=address, itself_table=table)
 
     def touch_itself(self, contact: SelfContact, line: Line, ends: Ends, work: Work) -> None:
-        """The line touches itself from now on (kernels.self_contact)."""
+        """The line touches itself from now on (kernels.contact.self_contact)."""
         table = contact.attach(line, ends, self.states, work, self.books)
         self.table.bind(contact=contact.call, contact_table=table)
         self.contact = contact
@@ -191,7 +192,7 @@ class CompiledRun:
         return self._address
 
     def go(self, by: Callable[[], int] | None = None) -> int:
-        """Go on until a code of kernels.books; by: what is called instead of the kernel of steps alone."""
+        """Go on until a code of kernels.state.books; by: what is called instead of the kernel of steps alone."""
         self.solver_address()
         code: int = run(self.table.numbers) if by is None else by()
         if code in (b.PAUSED, b.AT_STOP):
@@ -254,7 +255,7 @@ class CompiledRun:
 
     @property
     def answers(self) -> dict[str, Floats]:
-        """How the line answers to torques through its zones, which serves for several steps (kernels.zone_torque)."""
+        """How the line answers to torques through its zones, which serves for several steps (march.zone_torque)."""
         torsion = self._torsion
         if not torsion.known.size:
             return {}
@@ -272,7 +273,7 @@ class CompiledRun:
 
     @property
     def report(self) -> Floats:
-        """(REPORT_SIZE,) of the state (kernels.report)."""
+        """(REPORT_SIZE,) of the state (kernels.state.report)."""
         return np.asarray(self.books.report[0])
 
     @property

@@ -7,15 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.binding import Table
-from hybrid.kernels.books import Books
-from hybrid.kernels.forces import ROTARY
-from hybrid.kernels.newton import ADDRESS, ASKED, NEAR, REST
-from hybrid.kernels.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY
-from hybrid.kernels.self_contact import blank_contact_job, contact_task
-from hybrid.kernels.self_contact_friction import AT, GRIP, HELD, PIECE
-from hybrid.kernels.self_contact_law import DISTANCE, FORCE, NORMAL, WX, WY, P, Q
-from hybrid.kernels.self_contact_pairs import (
+from hybrid.kernels.contact.self_contact import blank_contact_job, contact_task
+from hybrid.kernels.contact.self_contact_friction import AT, GRIP, HELD, PIECE
+from hybrid.kernels.contact.self_contact_law import DISTANCE, FORCE, NORMAL, WX, WY, P, Q
+from hybrid.kernels.contact.self_contact_pairs import (
     BALANCE,
     BEGUN,
     FADED,
@@ -42,7 +37,12 @@ from hybrid.kernels.self_contact_pairs import (
     WIDEST,
     blank_contact,
 )
-from hybrid.kernels.state import Ends, Floats, Line, State, Work
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.state.books import Books
+from hybrid.kernels.state.forces import ROTARY
+from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY
+from hybrid.kernels.state.state import Ends, Floats, Line, State, Work
+from hybrid.kernels.step.newton import ADDRESS, ASKED, NEAR, REST
 
 # Sample points of a piece lie at most this part of a diameter apart, but for round-off, which must not decide how many
 # there are: pieces of the same length, in whatever unit, have as many.

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.kernels import entry
-from hybrid.kernels.block_elimination import SIZE, WIDTH
-from hybrid.kernels.block_elimination_plane import WIDE
-from hybrid.kernels.entry import block_rows, workspace
-from hybrid.kernels.forces import AXIAL_LAW, DRAG, PLANAR
-from hybrid.kernels.out_of_plane import BAND, REACH, wrong_pivots_at_rest
-from hybrid.kernels.sparse_rows import is_definite
-from hybrid.kernels.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
+from hybrid.kernels.algebra.block_elimination_plane import WIDE
+from hybrid.kernels.algebra.sparse_rows import is_definite
+from hybrid.kernels.laws.out_of_plane import BAND, REACH, wrong_pivots_at_rest
+from hybrid.kernels.run import entry
+from hybrid.kernels.run.entry import block_rows, workspace
+from hybrid.kernels.state.forces import AXIAL_LAW, DRAG, PLANAR
+from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
 
 # What drifts freely (a line between two buoys) is held where it starts by springs of this part of tension scale over
 # length in all: an error far below Newton's tolerance.  The check of stability lets modes as soft as NEUTRAL pass.

@@ -9,12 +9,12 @@ from itertools import islice
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels import entry
-from hybrid.kernels.entry import Limits
-from hybrid.kernels.forces import AXIAL_LAW, FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
-from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
-from hybrid.kernels.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
-from hybrid.kernels.step import friction_axes
+from hybrid.kernels.run import entry
+from hybrid.kernels.run.entry import Limits
+from hybrid.kernels.state.forces import AXIAL_LAW, FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
+from hybrid.kernels.state.report import RESIDUAL, RESIDUAL_NODE
+from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
+from hybrid.kernels.step.step import friction_axes
 from hybrid.solve.flaws import flaw_of_line, fold_text, lowest_tension
 from hybrid.solve.laid import laid_on_bed
 from hybrid.solve.stability import Stability, is_judged

@@ -10,12 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels import entry
-from hybrid.kernels.bed import planes_under
-from hybrid.kernels.block_elimination import solve_again
-from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance
-from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, WAVES
-from hybrid.kernels.report import (
+from hybrid.kernels.algebra.block_elimination import solve_again
+from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.laws.seabed import normal_forces, stored
+from hybrid.kernels.laws.water import wave_kinematics
+from hybrid.kernels.run import entry
+from hybrid.kernels.run.entry import NO_PUSH, Limits, block_rows, out_of_balance
+from hybrid.kernels.state.forces import FRICTION, PLANAR, SEABED, WAVES
+from hybrid.kernels.state.report import (
     FORCE_A,
     LOCAL_ERROR,
     NET_A,
@@ -25,10 +27,8 @@ from hybrid.kernels.report import (
     SLACKEST_CELL,
     USED_RHO,
 )
-from hybrid.kernels.seabed import normal_forces, stored
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State
-from hybrid.kernels.step import friction_axes
-from hybrid.kernels.water import wave_kinematics
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
+from hybrid.kernels.step.step import friction_axes
 from hybrid.solve.workspaces import workspace_of
 
 MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper

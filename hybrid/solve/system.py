@@ -1,8 +1,8 @@
 """Lines that meet at points: their equilibrium, their consistent accelerations, and their steps in time.
 
-One Newton for all of them (kernels.system).  States go in and come out as of a single line (solve.stepper); a free
+One Newton for all of them (kernels.run.system).  States go in and come out as of a single line (solve.stepper); a free
 point has none of its own, it is the last or first node of every line that is joined to it.  A body has a row of numbers
-(kernels.bodies).
+(kernels.junctions.bodies).
 """
 
 from __future__ import annotations
@@ -15,26 +15,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.errors import Outcome
-from hybrid.kernels.binding import Table
-from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
-from hybrid.kernels.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, VD, WA, WD, WORK, A, U, V, W, X
-from hybrid.kernels.books import NOW, PARITY, Books
-from hybrid.kernels.carried_frames import ANSWER, SEAT, TURNS
-from hybrid.kernels.entry import NO_PUSH
-from hybrid.kernels.forces import FRICTION, WAVES
-from hybrid.kernels.joined_lines import COLUMNS, FUNCTIONAL
-from hybrid.kernels.junctions import HANDED
-from hybrid.kernels.named_quantities import note_quantities
-from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, RUN, STEP, Limits, Task
-from hybrid.kernels.report import LOCAL_ERROR, NET_A, RESIDUAL, USED_RHO
-from hybrid.kernels.run import blank_books, blank_job, in_space
-from hybrid.kernels.state import Floats, State, Work, state_for
-from hybrid.kernels.step import friction_axes
-from hybrid.kernels.step_law import REFUSED
-from hybrid.kernels.system import JUNCTIONS, book_system_step, solve_system
-from hybrid.kernels.system_contact import blank_touching_job, room_for_products, touch_system
-from hybrid.kernels.system_job import ASKED, blank_system_job
-from hybrid.kernels.water import wave_kinematics
+from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, WIDTH
+from hybrid.kernels.junctions.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, VD, WA, WD, WORK, A, U, V, W, X
+from hybrid.kernels.junctions.carried_frames import ANSWER, SEAT, TURNS
+from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL
+from hybrid.kernels.junctions.junctions import HANDED
+from hybrid.kernels.junctions.system_contact import blank_touching_job, room_for_products, touch_system
+from hybrid.kernels.junctions.system_job import ASKED, blank_system_job
+from hybrid.kernels.laws.water import wave_kinematics
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.run.entry import NO_PUSH
+from hybrid.kernels.run.run import in_space
+from hybrid.kernels.run.system import JUNCTIONS, book_system_step, solve_system
+from hybrid.kernels.state.books import NOW, PARITY, Books, blank_books
+from hybrid.kernels.state.forces import FRICTION, WAVES
+from hybrid.kernels.state.report import LOCAL_ERROR, NET_A, RESIDUAL, USED_RHO
+from hybrid.kernels.state.state import Floats, State, Work, state_for
+from hybrid.kernels.step.job import blank_job
+from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, RUN, STEP, Limits, Task
+from hybrid.kernels.step.step import friction_axes
+from hybrid.kernels.step.step_law import REFUSED
+from hybrid.kernels.watch.named_quantities import note_quantities
 from hybrid.solve.contact_statics import left_over
 from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
 from hybrid.solve.self_contact import SelfContact
@@ -206,7 +207,7 @@ class SystemSolver:
             self._touch()
 
     def take_turns(self, states: tuple[SystemState, SystemState]) -> dict[str, Any]:
-        """Steps lead from the first state to the second and back from now on: what kernels.system_run.StepsJob has."""
+        """Steps lead from the first state to the second and back from now on: what run.system_run.StepsJob has."""
         old, new = self.turns = states
         for parity, (a, b) in enumerate((states, states[::-1])):
             self._bind_states(parity, a, b)

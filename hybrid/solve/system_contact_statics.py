@@ -11,13 +11,12 @@ from itertools import chain
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.accept import LARGEST_TWIST
-from hybrid.kernels.bodies import MASS, V
-from hybrid.kernels.books import SHORTEST
-from hybrid.kernels.forces import FRICTION, SELF_FRICTION, WAVES
-from hybrid.kernels.report import TWIST
-from hybrid.kernels.run import blank_books
-from hybrid.kernels.state import Floats, State
+from hybrid.kernels.junctions.bodies import MASS, V
+from hybrid.kernels.state.books import SHORTEST, blank_books
+from hybrid.kernels.state.forces import FRICTION, SELF_FRICTION, WAVES
+from hybrid.kernels.state.report import TWIST
+from hybrid.kernels.state.state import Floats, State
+from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.solve.contact_statics import MOST_SPIN, ROAD, calming, damped, stop
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.self_contact import SelfContact

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.state import State
+from hybrid.kernels.state.state import State
 from hybrid.solve.flaws import flaw_of_line, lowest_tension
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.stability import Stability, is_judged

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.bodies import DAMPING, MASS, V
-from hybrid.kernels.forces import AXIAL_LAW, FLOW, FRICTION, SEABED, WAVES
-from hybrid.kernels.state import NO_ADDRESS, Floats
+from hybrid.kernels.junctions.bodies import DAMPING, MASS, V
+from hybrid.kernels.state.forces import AXIAL_LAW, FLOW, FRICTION, SEABED, WAVES
+from hybrid.kernels.state.state import NO_ADDRESS, Floats
 from hybrid.solve.contact_statics import damped, stop
 from hybrid.solve.flaws import fold_text, lowest_tension
 from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken

@@ -1,4 +1,4 @@
-"""Steps of several lines, many in a call: what kernels.system_run works with, and its clock for Python."""
+"""Steps of several lines, many in a call: what kernels.run.system_run works with, and its clock for Python."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels import books as b
-from hybrid.kernels.binding import Table
-from hybrid.kernels.state import Floats, Moves
-from hybrid.kernels.step_law import FIRST, WARY
-from hybrid.kernels.system import book_system_step, solve_system
-from hybrid.kernels.system_run import CUT_LINE, LINE, blank_steps_job, run_system
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.run.system import book_system_step, solve_system
+from hybrid.kernels.run.system_run import CUT_LINE, LINE, blank_steps_job, run_system
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.state import Floats, Moves
+from hybrid.kernels.step.step_law import FIRST, WARY
 from hybrid.solve import run as one_line
 from hybrid.solve.joined import SystemState, SystemTaken
 from hybrid.solve.stepper import MOST_ITERATIONS, REACH
@@ -90,7 +90,7 @@ class SystemSteps:
         self.counts[b.QUOTA] = max(1, min(one_line.ROWS, most, int(one_line.CELL_STEPS / cost)))
 
     def go(self) -> int:
-        """Go on until a code of kernels.books."""
+        """Go on until a code of kernels.state.books."""
         return int(run_system(self._job.numbers))
 
     def try_again(self) -> None:

@@ -15,13 +15,13 @@ from typing import Any, get_args
 
 import numpy as np
 
+from hybrid.accuracy.api import run
 from hybrid.errors import Complaint, ComputationError, ResultError, SceneError
 from hybrid.scene.accuracy import of_length
 from hybrid.scene.analysis import LEAST_DAMPED
 from hybrid.scene.base import Kinds
 from hybrid.scene.read import scene_text, validate_scene
 from hybrid.scene.schema import Model, Scene
-from hybrid.simulation.api import run
 from hybrid.simulation.progress import Progress
 from hybrid.store.reader import Result
 from hybrid.store.tradeoff_table import DONE, FAILED, MISSED, OURS, Row

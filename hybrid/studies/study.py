@@ -23,11 +23,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybrid.accuracy.api import run, static
 from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.model.plan import plan
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.study import LIMIT_OF, Kept, Study, read_study, study_from
-from hybrid.simulation.api import run, static
 from hybrid.store.lock import locked
 from hybrid.store.names import ALIASES
 from hybrid.store.study_file import OPEN, OWN, Column, StudyFile, open_study

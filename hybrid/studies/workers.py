@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybrid.accuracy.api import run, static
 from hybrid.errors import EVENTS_BY_WEIGHT, HybridError, SceneError
 from hybrid.scene.study import Kept
-from hybrid.simulation.api import run, static
 from hybrid.store.study_file import DONE, FAILED
 from hybrid.studies.cases import scene_of
 from hybrid.studies.collect import Variable, collected

@@ -15,7 +15,7 @@ from problems import Scene, free, pinned, scene, straight
 
 from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.state_transfer import Remapped, remap
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material

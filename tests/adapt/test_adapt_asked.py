@@ -26,10 +26,10 @@ from problems import Scene, clamped, pinned, scene
 import hybrid
 from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.moment_joints import Joints
-from hybrid.kernels.criteria import BEND, CRITERIA
-from hybrid.kernels.state import no_sea
-from hybrid.kernels.stiffness_ramp import advance
-from hybrid.kernels.zone_step import REJECT_RATIO
+from hybrid.kernels.mesh.criteria import BEND, CRITERIA
+from hybrid.kernels.mesh.stiffness_ramp import advance
+from hybrid.kernels.mesh.zone_step import REJECT_RATIO
+from hybrid.kernels.state.state import no_sea
 
 STEP = 0.02
 

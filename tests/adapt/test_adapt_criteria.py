@@ -17,11 +17,11 @@ from adapt_cases import GRAVITY, X, Y, Z, along, cable, even, layout, on, polygo
 
 from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.zone_rules import wanted
-from hybrid.kernels.criteria import BEND, CLAMP, CONTACT, CRITERIA, EDGE, GIVEN, POINT, SLACK, TORSION
-from hybrid.kernels.forces import SEABED
-from hybrid.kernels.state import no_sea
-from hybrid.kernels.zone_criteria import FORESEEN
-from hybrid.kernels.zone_step import LONGEST_LOOKAHEAD, LOOKAHEAD, REJECT_RATIO
+from hybrid.kernels.mesh.criteria import BEND, CLAMP, CONTACT, CRITERIA, EDGE, GIVEN, POINT, SLACK, TORSION
+from hybrid.kernels.mesh.zone_criteria import FORESEEN
+from hybrid.kernels.mesh.zone_step import LONGEST_LOOKAHEAD, LOOKAHEAD, REJECT_RATIO
+from hybrid.kernels.state.forces import SEABED
+from hybrid.kernels.state.state import no_sea
 from hybrid.model.material import TENSION_FLOOR
 
 EI, GJ, W = 2.0, 1.5, 1.0 * GRAVITY  # of `cable()`

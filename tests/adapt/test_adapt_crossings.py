@@ -48,7 +48,7 @@ from problems import Scene
 import hybrid
 from hybrid.adapt.manager import BUFFER
 from hybrid.adapt.zone_rules import spread
-from hybrid.kernels.zone_step import LOOKAHEAD
+from hybrid.kernels.mesh.zone_step import LOOKAHEAD
 
 Floats = np.ndarray
 DT = 0.02

@@ -14,13 +14,13 @@ from problems import order
 import hybrid
 from hybrid.adapt.manager import Change, DomainManager
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels import binding
-from hybrid.kernels import books as b
-from hybrid.kernels import zone_step as z
-from hybrid.kernels.binding import Table
-from hybrid.kernels.cell_errors import CURVATURE, MOMENT, TENSION
-from hybrid.kernels.state import no_sea
-from hybrid.kernels.zone_step import blank_zone_job, plan_nodes, take_arcs
+from hybrid.kernels.machine import binding
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.mesh import zone_step as z
+from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
+from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, take_arcs
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.state import no_sea
 from hybrid.outputs.probes import Observer
 from hybrid.simulation import initial_zones
 from hybrid.simulation.cell_changes import CellChanges

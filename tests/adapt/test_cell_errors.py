@@ -1,4 +1,4 @@
-"""e_k and e_h of kernels.cell_errors against errors measured: equilibria of a catenary, or of long cells, and a fine rod."""
+"""e_k and e_h of kernels.mesh.cell_errors against errors measured: equilibria of a catenary, or of long cells, and a fine rod."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels import cell_errors as e
-from hybrid.kernels.cell_errors import CURVATURE, MOMENT, POSITION, TENSION
-from hybrid.kernels.compile import kernel
+from hybrid.kernels.machine.compile import kernel
+from hybrid.kernels.mesh import cell_errors as e
+from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, POSITION, TENSION
 
 LENGTH, W, GRAVITY = 100.0, 10.0 * 9.80665, 9.80665  # m, N/m
 LOW, HIGH = 0.5, 3.0  # measured error over predicted

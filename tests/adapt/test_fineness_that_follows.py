@@ -10,12 +10,12 @@ from adapt_cases import Z, cable, hanging, layout, on, state_on, still
 
 from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.state_transfer import transfer_to
-from hybrid.kernels.binding import Table
-from hybrid.kernels.criteria import EDGE
-from hybrid.kernels.forces import SEABED
-from hybrid.kernels.state import Floats, no_sea
-from hybrid.kernels.zone_step import blank_zone_job, plan_nodes
-from hybrid.kernels.zone_transfer import blank_transfer, transfer
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.mesh.criteria import EDGE
+from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes
+from hybrid.kernels.mesh.zone_transfer import blank_transfer, transfer
+from hybrid.kernels.state.forces import SEABED
+from hybrid.kernels.state.state import Floats, no_sea
 from hybrid.simulation.run_sample import compared_cells, usual_cells
 from hybrid.store.records import there
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import hybrid
+from hybrid.accuracy.passes import free_in
 from hybrid.model.resolution import wants_survey
-from hybrid.simulation.passes import free_in
 from hybrid.store.records import MeshHistory, ZoneHistory, there
 from hybrid.store.records import Zone as ZoneRow
 

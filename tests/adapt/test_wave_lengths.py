@@ -11,13 +11,13 @@ from test_cell_errors import pinned, scene
 
 import hybrid
 from hybrid.adapt.manager import DomainManager
-from hybrid.kernels import cell_errors as e
-from hybrid.kernels import zone_step as z
-from hybrid.kernels.binding import Table
-from hybrid.kernels.compile import kernel
-from hybrid.kernels.state import no_sea
-from hybrid.kernels.wave_lengths import TAU, WAVES, know_new_nodes
-from hybrid.kernels.zone_step import blank_zone_job, plan_nodes, read, watch_waves
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.machine.compile import kernel
+from hybrid.kernels.mesh import cell_errors as e
+from hybrid.kernels.mesh import zone_step as z
+from hybrid.kernels.mesh.wave_lengths import TAU, WAVES, know_new_nodes
+from hybrid.kernels.mesh.zone_step import blank_zone_job, plan_nodes, read, watch_waves
+from hybrid.kernels.state.state import no_sea
 from hybrid.simulation.transient_checkpoint import zoning_of_today
 from hybrid.store.named_arrays import Tree
 

@@ -13,7 +13,7 @@ import pytest
 
 import hybrid
 from hybrid.cli.app import session
-from hybrid.kernels.cache import CacheWarning
+from hybrid.kernels.machine.cache import CacheWarning
 
 HEAVY = {"numba", "h5py", "matplotlib", "scipy"}
 HANGING = {
@@ -56,7 +56,7 @@ def test_plan_draws_nothing_and_plot_needs_no_solver(tmp_path: Path, monkeypatch
     assert "4 cells" in out and "matplotlib" not in modules
     hybrid.run(hybrid.validate_scene(HANGING), "hanging.h5").close()
     out, modules = call("plot", "hanging.h5")
-    assert "hanging.png" in out and not modules & {"numba", "scipy", "hybrid.simulation.api"}
+    assert "hanging.png" in out and not modules & {"numba", "scipy", "hybrid.accuracy.api"}
 
 
 @pytest.mark.parametrize("command", ["run", "static", "plan"])
@@ -71,9 +71,9 @@ def test_what_is_compiled_is_called_without_numba(
     Path("hanging.yaml").write_text(json.dumps(HANGING))
     call(command, "hanging.yaml")  # what has to be compiled is
     _, modules = call(command, "hanging.yaml")
-    assert "hybrid.kernels.linked_code" in modules
+    assert "hybrid.kernels.machine.linked_code" in modules
     assert not modules & {"numba", "scipy", "scipy.special", "numpy.f2py", "matplotlib"}
-    assert not modules & {"hybrid.scene.system", "hybrid.simulation.payout", "hybrid.kernels.payout"}
+    assert not modules & {"hybrid.scene.system", "hybrid.simulation.payout", "hybrid.kernels.reel.payout"}
     assert command == "run" or not any(x.partition(".")[0] == "rich" for x in modules), "a long run shows a line"
 
 

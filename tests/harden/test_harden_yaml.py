@@ -67,7 +67,7 @@ SOON = 10.0  # s of processor time: a reader that takes longer hangs
 @pytest.fixture(autouse=True)
 def nothing_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is the reader that is attacked: plans without their first steps."""
-    monkeypatch.setattr("hybrid.simulation.run_forecast.is_warm", lambda *_: False)
+    monkeypatch.setattr("hybrid.accuracy.run_forecast.is_warm", lambda *_: False)
 
 
 def _read(content: bytes, name: str = "fuzz.yaml") -> tuple[Said, list[str]]:

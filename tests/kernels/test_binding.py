@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from hybrid.kernels.binding import Table
-from hybrid.kernels.state import Floats
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.state.state import Floats
 
 
 class Pair(NamedTuple):

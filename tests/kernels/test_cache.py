@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.cache import LEVELS, kernel_hash, processor, temporary_folder
+from hybrid.kernels.machine.cache import LEVELS, kernel_hash, processor, temporary_folder
 
 PACKAGE = Path(hybrid.__file__).parent
 
@@ -24,8 +24,8 @@ LAW, TWICE = "    l = math.sqrt(dot(e, e))\n", "    l = 2.0 * math.sqrt(dot(e, e
 SPIN = """
 import numpy as np
 from hybrid.model.material import POINT
-from hybrid.kernels.state import Ends, Line, blank_state
-from hybrid.kernels.energies import observe
+from hybrid.kernels.state.state import Ends, Line, blank_state
+from hybrid.kernels.march.energies import observe
 
 WET = ("drag_n", "drag_t", "added_n", "added_t", "buoy", "displaced", "diameter")
 # one cell of a rod, 1 m long, whose two ends swing against each other: rotary energy ~ (turn rate)^2 ~ 1/l^2
@@ -46,7 +46,7 @@ print(energy[0])
 
 SCENE = """
 import hybrid
-from hybrid.kernels.run import in_space
+from hybrid.kernels.run.run import in_space
 section = {"length": 1.0, "mass": 2.0, "bending_stiffness": 300.0, "torsional_stiffness": 1.0}
 scene = hybrid.validate_scene({
     "cable": {"sections": [section]},
@@ -105,7 +105,7 @@ def test_a_copy_elsewhere_compiles_nothing_and_an_edit_in_another_file_anew(
     assert answer(elsewhere, SPIN) == pytest.approx(2.0)
     moved = {copy / x.relative_to(elsewhere): x.stat().st_mtime_ns for x in compiled(elsewhere)}
     assert moved == kept
-    edit(elsewhere, "kernels/cell.py", LAW, TWICE)
+    edit(elsewhere, "kernels/laws/cell.py", LAW, TWICE)
     assert answer(elsewhere, SPIN) == pytest.approx(0.5)
     assert len(compiled(elsewhere)) > len(kept)
 
@@ -159,7 +159,7 @@ def test_own_numba_functions_keep_their_own_cache(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("import numba\n@numba.njit(cache=True)\ndef twice(x):\n    return 2.0 * x\n")
     script = (
         "import numba.core.config as config\nbefore = config.CACHE_DIR\n"
-        "import hybrid.kernels.energies\nassert config.CACHE_DIR == before\n"
+        "import hybrid.kernels.march.energies\nassert config.CACHE_DIR == before\n"
         "import mine\nprint(mine.twice(1.5))"
     )
     own, ours = tmp_path / "own", tmp_path / "ours"
@@ -175,7 +175,7 @@ def test_own_numba_functions_keep_their_own_cache(tmp_path: Path) -> None:
 
 
 def test_the_cache_folder_is_where_the_user_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from hybrid.kernels.cache import cache_folder, kernel_hash
+    from hybrid.kernels.machine.cache import cache_folder, kernel_hash
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
     monkeypatch.delenv("HYBRID_CACHE_DIR", raising=False)

@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 from numba.core.registry import cpu_target
 
-from hybrid.kernels import cache, kept_code
-from hybrid.kernels.cache import CacheWarning, Place, cache_folder, is_warm, processor, temporary_folder
-from hybrid.kernels.code_file import FORMAT, MAGIC, Unusable, read_code, write_code
-from hybrid.kernels.compile import kernel
+from hybrid.kernels.machine import cache, kept_code
+from hybrid.kernels.machine.cache import CacheWarning, Place, cache_folder, is_warm, processor, temporary_folder
+from hybrid.kernels.machine.code_file import FORMAT, MAGIC, Unusable, read_code, write_code
+from hybrid.kernels.machine.compile import kernel
 
 HEAD = len(MAGIC) + 8
 

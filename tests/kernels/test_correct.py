@@ -9,13 +9,13 @@ import pytest
 from test_jacobian import BITS, CA, CV, ZONES, N, assembled, random_case
 
 import hybrid
-from hybrid.kernels.bending_error import History, right_hand_side
-from hybrid.kernels.block_elimination import KEPT, ROW, solve_again
-from hybrid.kernels.entry import assembly, workspace
-from hybrid.kernels.forces import ROTARY, SEABED, STIFFNESS_DAMPING
-from hybrid.kernels.neglected_moments import Bending, neglected_moments, tabulate_chords
-from hybrid.kernels.report import REPORT_SIZE
-from hybrid.kernels.state import no_sea
+from hybrid.kernels.algebra.block_elimination import KEPT, ROW, solve_again
+from hybrid.kernels.run.entry import assembly, workspace
+from hybrid.kernels.state.forces import ROTARY, SEABED, STIFFNESS_DAMPING
+from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.state.state import no_sea
+from hybrid.kernels.watch.bending_error import History, right_hand_side
+from hybrid.kernels.watch.neglected_moments import Bending, neglected_moments, tabulate_chords
 from hybrid.model.bending_reference import full_bending
 from hybrid.model.build import build
 from hybrid.solve.stepper import Stepper

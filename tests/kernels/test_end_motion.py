@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels import end_motion
-from hybrid.kernels.compile import kernel
-from hybrid.kernels.state import Ends, no_sea
+from hybrid.kernels.laws import end_motion
+from hybrid.kernels.machine.compile import kernel
+from hybrid.kernels.state.state import Ends, no_sea
 from hybrid.model.ends import EndConditions, EndLoad
 from hybrid.model.sea import Surroundings
 from hybrid.scene.motion import EndMotion

@@ -10,11 +10,11 @@ import itertools
 import numpy as np
 import pytest
 
-from hybrid.kernels.block_elimination import SIZE, WIDTH
-from hybrid.kernels.configuration import update
-from hybrid.kernels.energies import observe
-from hybrid.kernels.entry import assembly, block_rows, correction, workspace
-from hybrid.kernels.forces import (
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
+from hybrid.kernels.march.configuration import update
+from hybrid.kernels.march.energies import observe
+from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace
+from hybrid.kernels.state.forces import (
     ADDED_MASS,
     BODIES,
     DRAG,
@@ -27,7 +27,7 @@ from hybrid.kernels.forces import (
     SURFACE,
     WAVES,
 )
-from hybrid.kernels.state import Ends, Line, Sea, blank_state
+from hybrid.kernels.state.state import Ends, Line, Sea, blank_state
 
 N = 7
 CV, CA = 3.0, 7.0

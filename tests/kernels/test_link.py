@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybrid.kernels.link import link_of
-from hybrid.kernels.state import Ends, Floats, Line, blank_line, no_ends
+from hybrid.kernels.march.link import link_of
+from hybrid.kernels.state.state import Ends, Floats, Line, blank_line, no_ends
 
 FAR = 300.0  # lengths of the line, at which the closed polygon of the tests turns back
 

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from test_jacobian import BITS, CA, CV, ZONES, random_case
 
-from hybrid.kernels import forces
-from hybrid.kernels.block_elimination import SIZE, WIDTH, solve_again
-from hybrid.kernels.block_elimination_plane import KEPT, TRIPLE, WIDE, solve_again_planar
-from hybrid.kernels.configuration import update
-from hybrid.kernels.entry import assembly, block_rows, correction, workspace
-from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.generalized_alpha import Scheme
-from hybrid.kernels.out_of_plane import BAND, REACH, step_out_of_plane, wrong_pivots_at_rest
-from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
-from hybrid.kernels.state import State
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH, solve_again
+from hybrid.kernels.algebra.block_elimination_plane import KEPT, TRIPLE, WIDE, solve_again_planar
+from hybrid.kernels.laws.out_of_plane import BAND, REACH, step_out_of_plane, wrong_pivots_at_rest
+from hybrid.kernels.march.configuration import update
+from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace
+from hybrid.kernels.state import forces
+from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.report import RESIDUAL, RESIDUAL_NODE
+from hybrid.kernels.state.state import State
+from hybrid.kernels.step.generalized_alpha import Scheme
 
 N = 7
 

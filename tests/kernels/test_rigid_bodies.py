@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybrid.kernels import bodies as k
-from hybrid.kernels.compile import kernel
-from hybrid.kernels.generalized_alpha import scheme as k_scheme
+from hybrid.kernels.junctions import bodies as k
+from hybrid.kernels.machine.compile import kernel
+from hybrid.kernels.step.generalized_alpha import scheme as k_scheme
 
 
 @kernel

@@ -17,10 +17,10 @@ import pytest
 from scipy.integrate import quad
 
 import hybrid
-from hybrid.kernels import seabed, water
-from hybrid.kernels.seabed import contact
-from hybrid.kernels.state import no_sea, with_waves
-from hybrid.kernels.water import FADED, SAME_WETNESS, wave_kinematics
+from hybrid.kernels.laws import seabed, water
+from hybrid.kernels.laws.seabed import contact
+from hybrid.kernels.laws.water import FADED, SAME_WETNESS, wave_kinematics
+from hybrid.kernels.state.state import no_sea, with_waves
 from hybrid.model.sea import Surroundings, components, current_table, frequencies, jonswap, surroundings
 from hybrid.scene.sea import JonswapWaves, RegularWaves
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from test_self_contact_kernels import SHAPES, WIDTH, Tangle
 
-from hybrid.kernels.compile import kernel
-from hybrid.kernels.self_contact import hold_points
-from hybrid.kernels.self_contact_friction import (
+from hybrid.kernels.contact.self_contact import hold_points
+from hybrid.kernels.contact.self_contact_friction import (
     GIVES,
     HELD,
     SLIDES,
@@ -18,8 +17,9 @@ from hybrid.kernels.self_contact_friction import (
     keep_grips,
     link_grips,
 )
-from hybrid.kernels.self_contact_law import ALONG, FORCE, NORMAL, SPRING
-from hybrid.kernels.self_contact_pairs import FRESH, FRICTION, GRIPS, POINTS, SLIP_WORK, TRIED
+from hybrid.kernels.contact.self_contact_law import ALONG, FORCE, NORMAL, SPRING
+from hybrid.kernels.contact.self_contact_pairs import FRESH, FRICTION, GRIPS, POINTS, SLIP_WORK, TRIED
+from hybrid.kernels.machine.compile import kernel
 
 MU = 0.3
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybrid.kernels import self_contact as k
-from hybrid.kernels.books import TRY_END
-from hybrid.kernels.compile import kernel
-from hybrid.kernels.entry import workspace
-from hybrid.kernels.newton import ASKED, LIMIT, PREPARE, REST
-from hybrid.kernels.run import blank_books
-from hybrid.kernels.self_contact_law import INNER, OUTER, add_gradient, add_product
-from hybrid.kernels.self_contact_pairs import POINTS, SPEED
-from hybrid.kernels.state import blank_line, blank_state, no_ends
+from hybrid.kernels.contact import self_contact as k
+from hybrid.kernels.contact.self_contact_law import INNER, OUTER, add_gradient, add_product
+from hybrid.kernels.contact.self_contact_pairs import POINTS, SPEED
+from hybrid.kernels.machine.compile import kernel
+from hybrid.kernels.run.entry import workspace
+from hybrid.kernels.state.books import TRY_END, blank_books
+from hybrid.kernels.state.state import blank_line, blank_state, no_ends
+from hybrid.kernels.step.newton import ASKED, LIMIT, PREPARE, REST
 from hybrid.solve.self_contact import SelfContact
 
 WIDTH = 0.1

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybrid.kernels import self_distance as k
-from hybrid.kernels.binding import Table
-from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE
-from hybrid.kernels.state import State, blank_line, blank_state, no_ends
+from hybrid.kernels.contact import self_distance as k
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE
+from hybrid.kernels.state.state import State, blank_line, blank_state, no_ends
 
 WIDTH = 0.05
 

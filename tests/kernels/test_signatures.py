@@ -11,15 +11,15 @@ from inspect import signature
 import numba
 import pytest
 
-from hybrid.kernels.compile import inner
+from hybrid.kernels.machine.compile import inner
 
 # A line in a plane with a zone of each kind; in space; its equilibrium; zones that move over a seabed with friction;
 # the effect of bending followed along.  Prints the signatures of all that was compiled or loaded.
 SCRIPT = """
 import importlib, json, pkgutil, sys
 import hybrid, hybrid.kernels
-from hybrid.kernels.compile import Entry, Inner
-from hybrid.kernels.reference_types import type_for
+from hybrid.kernels.machine.compile import Entry, Inner
+from hybrid.kernels.machine.reference_types import type_for
 
 cable = {"length": 20.0, "diameter": 0.05, "mass": 4.0, "axial_stiffness": 1e7, "bending_stiffness": 50.0,
          "torsional_stiffness": 40.0, "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
@@ -46,7 +46,7 @@ hybrid.run(scene(environment=bed, model="adaptive"))
 hybrid.run(scene(environment=bed, model={"kind": "zones", "zones": [{"corrected": 20.0}]}))
 
 found = {}
-rooms = [f"hybrid.kernels.{x.name}" for x in pkgutil.iter_modules(hybrid.kernels.__path__)] + ["hybrid.adapt.zone_rules"]
+rooms = [x.name for x in pkgutil.walk_packages(hybrid.kernels.__path__, "hybrid.kernels.")] + ["hybrid.adapt.zone_rules"]
 named = [(room, *x) for room in rooms for x in vars(importlib.import_module(room)).items()]
 if sys.argv[1:]:  # numba reads all that was called once more, with what it inlines; no machine code is made
     for room, name, f in named:

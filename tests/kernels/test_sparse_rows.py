@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybrid.kernels.sparse_rows import add_rows, is_definite
+from hybrid.kernels.algebra.sparse_rows import add_rows, is_definite
 from hybrid.model.mesh import Zone
 from hybrid.outputs.output_grid import Grid
 

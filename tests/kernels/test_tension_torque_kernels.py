@@ -6,12 +6,12 @@ from kernels.test_jacobian import CA, CV, ZONES, N, random_case
 from kernels.test_zone_torque import LINES, differences, twisted_case
 from kernels.test_zone_torque import residual as zone_residual
 
-from hybrid.kernels.block_elimination import SIZE, WIDTH, solve_again
-from hybrid.kernels.configuration import update
-from hybrid.kernels.energies import observe
-from hybrid.kernels.entry import assembly, block_rows, correction, workspace_of
-from hybrid.kernels.forces import ROTARY, STIFFNESS_DAMPING
-from hybrid.kernels.state import blank_state
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH, solve_again
+from hybrid.kernels.march.configuration import update
+from hybrid.kernels.march.energies import observe
+from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace_of
+from hybrid.kernels.state.forces import ROTARY, STIFFNESS_DAMPING
+from hybrid.kernels.state.state import blank_state
 
 LAST = [5 * i + 4 for i in range(N + 1)]
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from kernels.test_jacobian import CA, CV, N, random_case
 
-from hybrid.kernels.block_elimination import SIZE, WIDTH
-from hybrid.kernels.configuration import update
-from hybrid.kernels.entry import assembly, block_rows, correction, workspace, workspace_of
-from hybrid.kernels.forces import MASS_DAMPING, ROTARY, STIFFNESS_DAMPING
-from hybrid.kernels.zone_torque import AFTER_STEP, BEFORE_MARCH, pass_torque
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
+from hybrid.kernels.march.configuration import update
+from hybrid.kernels.march.zone_torque import AFTER_STEP, BEFORE_MARCH, pass_torque
+from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace, workspace_of
+from hybrid.kernels.state.forces import MASS_DAMPING, ROTARY, STIFFNESS_DAMPING
 
 # Elements at nodes 0 to N, and the zones that follow.
 LINES = {

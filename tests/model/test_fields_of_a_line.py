@@ -16,7 +16,7 @@ import pytest
 import hybrid
 import hybrid.model.build
 import hybrid.model.payout
-from hybrid.kernels.state import ALONG_LINE, NODES_OF_LINE, Line
+from hybrid.kernels.state.state import ALONG_LINE, NODES_OF_LINE, Line
 from hybrid.model.build import Model, build
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material

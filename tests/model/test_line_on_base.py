@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.forces import FRICTION, SEABED
+from hybrid.kernels.state.forces import FRICTION, SEABED
 from hybrid.model.build import build
 from hybrid.model.line import line_on
 from hybrid.model.release import without_hold

@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from hybrid.kernels.energies import observe
-from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SELF_CONTACT_ENERGY
-from hybrid.kernels.seabed import stored
-from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea, State, blank_state
+from hybrid.kernels.laws.seabed import stored
+from hybrid.kernels.march.energies import observe
+from hybrid.kernels.state.report import CONTACT_FORCE, FORCE_A, SELF_CONTACT_ENERGY
+from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.mesh import Zone
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.probes import Observer

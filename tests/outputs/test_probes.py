@@ -10,7 +10,7 @@ import pytest
 from plain_probes import plain_values
 
 import hybrid
-from hybrid.kernels.state import Batch, Floats
+from hybrid.kernels.state.state import Batch, Floats
 from hybrid.model.bending_reference import LEFT
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer

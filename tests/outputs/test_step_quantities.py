@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels import named_quantities
+from hybrid.kernels.watch import named_quantities
 from hybrid.scene.quantities import KINDS
 from hybrid.scene.read import parse_either
 from hybrid.scene.study import Kept

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hybrid.kernels.bodies import FORCE, MOMENT, NUMBERS
+from hybrid.kernels.junctions.bodies import FORCE, MOMENT, NUMBERS
 from hybrid.model.bodies import body_model
 from hybrid.scene.read import load_system
 

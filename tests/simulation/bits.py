@@ -8,10 +8,10 @@ import h5py
 import numpy as np
 
 import hybrid
-import hybrid.simulation.refinement
+import hybrid.accuracy.refinement
 import hybrid.simulation.time_loop
 import hybrid.solve.run
-from hybrid.kernels.cache import cache_folder
+from hybrid.kernels.machine.cache import cache_folder
 from hybrid.simulation import progress as reports
 from hybrid.store.hdf5_file import opened
 
@@ -52,7 +52,7 @@ class Stopping:
 
     def __init__(self, monkeypatch, checkpoints: bool = True) -> None:
         monkeypatch.setattr(reports, "REPORT_EVERY", -1.0)
-        monkeypatch.setattr(hybrid.simulation.refinement, "LITTLE", np.inf)  # an event that goes by clocks
+        monkeypatch.setattr(hybrid.accuracy.refinement, "LITTLE", np.inf)  # an event that goes by clocks
         monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 1)  # a step a call
         if checkpoints:  # every few steps; they are otherwise some seconds apart
             monkeypatch.setattr(hybrid.simulation.time_loop, "WORK", FEW_STEPS)

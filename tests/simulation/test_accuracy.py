@@ -10,6 +10,15 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 import hybrid
+from hybrid.accuracy import error_control, error_estimate
+from hybrid.accuracy.error_control import ErrorController
+from hybrid.accuracy.error_estimate import OF_SIZES, SAFETY, Estimate
+from hybrid.accuracy.error_order import LEAST_FORCE_ORDER, ORDER, ORDERS, START_ORDERS, confirmed_order
+from hybrid.accuracy.error_report import error_fields
+from hybrid.accuracy.error_statistics import statistics_of
+from hybrid.accuracy.errors_by_cause import Errors
+from hybrid.accuracy.finer_result import Judged
+from hybrid.accuracy.refinement import OF_MODEL, Free, Verdict, costly, judge, not_converged, refined
 from hybrid.cli.console import Console
 from hybrid.cli.tables import errors_facts, errors_table, extremes_facts, extremes_table
 from hybrid.errors import SceneError
@@ -17,15 +26,6 @@ from hybrid.model.build import build
 from hybrid.model.mesh_grading import GROWTH, SAMPLES, grading, layers
 from hybrid.model.resolution import RequestedAccuracy, Resolution, first_resolution, wants_errors
 from hybrid.scene.accuracy import amount
-from hybrid.simulation import error_control, error_estimate
-from hybrid.simulation.error_control import ErrorController
-from hybrid.simulation.error_estimate import OF_SIZES, SAFETY, Estimate
-from hybrid.simulation.error_order import LEAST_FORCE_ORDER, ORDER, ORDERS, START_ORDERS, confirmed_order
-from hybrid.simulation.error_report import error_fields
-from hybrid.simulation.error_statistics import statistics_of
-from hybrid.simulation.errors_by_cause import Errors
-from hybrid.simulation.finer_result import Judged
-from hybrid.simulation.refinement import OF_MODEL, Free, Verdict, costly, judge, not_converged, refined
 from hybrid.simulation.result_checks import cubic_spline
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store.named_arrays import pack, unpack
@@ -550,8 +550,8 @@ def test_what_is_missed_is_named_with_what_is_met():
     """The accuracy that the text proposes has its tenth to spare: 1.1 times the error, rounded up to two digits."""
     from types import SimpleNamespace
 
+    from hybrid.accuracy.refinement import judge
     from hybrid.model.resolution import RequestedAccuracy
-    from hybrid.simulation.refinement import judge
 
     largest = {"position": 0.013, "end_force_start": 7.0, "end_force_end": 9.4}
     errors = SimpleNamespace(largest=lambda cause, name: largest[name] if cause == "total" else 0.0)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.accuracy.error_estimate import Estimate
 from hybrid.model.resolution import Resolution
-from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.mesh_survey import PERIODS, survey_duration
 from hybrid.simulation.run_sample import RunSample
 

@@ -9,13 +9,13 @@ import pytest
 from bits import Stopping, differences, went_on
 
 import hybrid
+from hybrid.accuracy.error_control import ErrorController
+from hybrid.accuracy.error_statistics import STATISTICS, WINDOWS, StatisticEstimate, snaps, statistics_of
+from hybrid.accuracy.refinement import Free
+from hybrid.accuracy.snap_scatter import snap_excess, snap_times
 from hybrid.model.output_points import output_points
 from hybrid.model.resolution import RequestedAccuracy, Resolution
-from hybrid.simulation.error_control import ErrorController
-from hybrid.simulation.error_statistics import STATISTICS, WINDOWS, StatisticEstimate, snaps, statistics_of
-from hybrid.simulation.refinement import Free
 from hybrid.simulation.run_sample import RunSample
-from hybrid.simulation.snap_scatter import snap_excess, snap_times
 from hybrid.store.named_arrays import pack, unpack
 
 SCENE = hybrid.validate_scene({

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.accuracy.errors_by_cause import Errors
+from hybrid.accuracy.refinement import asked_text, bounds_of, judge, not_asked_text
 from hybrid.cli.plan_tables import plan_lines
 from hybrid.model.model_costs import with_model
 from hybrid.model.resolution import Reach, Resolution, first_resolution, for_motion, requested_accuracy
 from hybrid.scene.read import as_scene_or_system, parse_scene, scene_text
-from hybrid.simulation.errors_by_cause import Errors
-from hybrid.simulation.refinement import asked_text, bounds_of, judge, not_asked_text
 from hybrid.simulation.run_sample import RunSample
 
 LENGTH, DIAMETER = 100.0, 0.04

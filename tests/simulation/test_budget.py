@@ -11,9 +11,9 @@ import pytest
 from bits import differences
 
 import hybrid
+from hybrid.accuracy import budget as module
+from hybrid.accuracy.budget import OUTPUT, POINT, Budget
 from hybrid.model.resolution import Resolution
-from hybrid.simulation import budget as module
-from hybrid.simulation.budget import OUTPUT, POINT, Budget
 from hybrid.simulation.run_sample import RunSample
 
 FIRST = Resolution(1.0, 0.1, 1e-3, 1e-3)
@@ -60,7 +60,7 @@ def test_what_is_beyond_is_not_computed_and_said(tmp_path: Path, monkeypatch: py
         "initial": "equilibrium", "model": "catenary", "time": {"duration": 2.0}, "accuracy": "0.3%",
         "output": {"every": 0.1, "points": 11},
     }  # fmt: skip
-    from hybrid.simulation import passes
+    from hybrid.accuracy import passes
 
     surveyed = passes.Passes._surveyed
 

@@ -12,9 +12,9 @@ from test_system_contact import RUBS, system
 import hybrid
 import hybrid.simulation.transient
 import hybrid.solve.self_contact
-from hybrid.kernels import books as b
-from hybrid.kernels.accept import MANY, collapses
-from hybrid.kernels.run import blank_books
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import blank_books
+from hybrid.kernels.step.accept import MANY, collapses
 from hybrid.simulation import contact_start
 from hybrid.simulation.transient import Transient
 

@@ -10,10 +10,10 @@ from bits import Stopping, differences, went_on
 from test_self_contact_default import WIDTH, led_through
 
 import hybrid
-from hybrid.kernels.self_contact_friction import AT, NEAREST, TRAVEL
-from hybrid.kernels.self_contact_law import WX, P
-from hybrid.kernels.self_contact_pairs import GRIPS, POINTS
-from hybrid.kernels.state import Line
+from hybrid.kernels.contact.self_contact_friction import AT, NEAREST, TRAVEL
+from hybrid.kernels.contact.self_contact_law import WX, P
+from hybrid.kernels.contact.self_contact_pairs import GRIPS, POINTS
+from hybrid.kernels.state.state import Line
 from hybrid.solve.self_contact import SelfContact
 
 FOLLOWING = {"kind": "adaptive", "curvature_error": 0.05, "hold_time": 0.4}  # so that zones change as well

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.accuracy.error_estimate import Estimate
 from hybrid.model.build import twist_rate
 from hybrid.model.material import material
 from hybrid.model.resolution import Resolution
-from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.run_sample import RunSample
 
 # Estimated over true error, as asked of the project; where it is below, an event must say that it is uncertain.

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.accuracy import error_control
+from hybrid.accuracy.error_control import ErrorController
+from hybrid.accuracy.error_estimate import Estimate
+from hybrid.accuracy.error_statistics import STATISTICS, estimates
+from hybrid.accuracy.finer_result import NOT_KEPT, Judged, is_no_better
+from hybrid.accuracy.refinement import Free, Verdict
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.resolution import RequestedAccuracy, Resolution
-from hybrid.simulation import error_control
 from hybrid.simulation.case import Case
-from hybrid.simulation.error_control import ErrorController
-from hybrid.simulation.error_estimate import Estimate
-from hybrid.simulation.error_statistics import STATISTICS, estimates
-from hybrid.simulation.finer_result import NOT_KEPT, Judged, is_no_better
-from hybrid.simulation.refinement import Free, Verdict
 from hybrid.simulation.run_sample import RunSample
 
 ASKED = RequestedAccuracy(0.005, None, None)

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 import hybrid
-from hybrid.kernels import payout, payout_nodes, payout_run
+from hybrid.kernels.reel import payout, payout_nodes
+from hybrid.kernels.run import payout_run
 from hybrid.simulation import first_use
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.accuracy import free_vibrations as f
 from hybrid.model.resolution import first_resolution
-from hybrid.simulation import free_vibrations as f
 from hybrid.simulation.run_sample import RunSample
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.report import FORCE_A
+from hybrid.kernels.state.report import FORCE_A
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHIFT = 1e-5  # m

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.accuracy.error_estimate import Estimate
 from hybrid.model.resolution import Resolution, requested_accuracy
-from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.run_sample import RunSample
 
 

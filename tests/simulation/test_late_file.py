@@ -12,7 +12,7 @@ import pytest
 from bits import Stopping, differences
 
 import hybrid
-from hybrid.simulation import api
+from hybrid.accuracy import api
 from hybrid.simulation.progress import RESULT, Progress
 from hybrid.store import late_file, writer
 from hybrid.store.array_contents import ArrayContents

@@ -8,10 +8,10 @@ import pytest
 from bits import Stopping, differences, went_on
 
 import hybrid
+from hybrid.accuracy import model_choice
 from hybrid.model.build import build
 from hybrid.model.model_costs import CHOSEN, Cost, cheapest
 from hybrid.model.resolution import first_resolution, model_is_free
-from hybrid.simulation import model_choice
 from hybrid.simulation.case import Case
 
 TAUT = {

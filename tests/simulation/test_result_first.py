@@ -14,16 +14,17 @@ from test_late_file import described
 from typer.testing import CliRunner
 
 import hybrid
+from hybrid.accuracy import error_control, passes, system_accuracy
+from hybrid.accuracy.refinement import Verdict
 from hybrid.cli.commands import app
 from hybrid.cli.console import Console
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.resolution import Resolution
 from hybrid.model.system import SystemResolution
 from hybrid.simulation import case as cases
-from hybrid.simulation import error_control, passes, system_accuracy, system_run
+from hybrid.simulation import system_run
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
-from hybrid.simulation.refinement import Verdict
 from hybrid.simulation.static_case import StaticCase
 from hybrid.store import late_file, writer
 from hybrid.store.late_file import LateFile

@@ -13,9 +13,9 @@ from bits import FEW_STEPS, Stopping, differences
 
 import hybrid
 import hybrid.simulation.time_loop
+from hybrid.accuracy.error_estimate import Estimate
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.simulation import case, restore
-from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.progress import ESTIMATION, RESULT
 from hybrid.store import checkpoint, lock
 from hybrid.store import writer as record

@@ -16,9 +16,9 @@ import pytest
 from bits import Stopping, differences
 
 import hybrid
+from hybrid.accuracy.passes import Passes
 from hybrid.model.resolution import Resolution
 from hybrid.simulation import case as cases
-from hybrid.simulation.passes import Passes
 from hybrid.simulation.progress import PRE_RUN, REFINEMENT, Progress
 from hybrid.store.checkpoint import read_before
 from hybrid.store.hdf5_file import opened
@@ -155,7 +155,8 @@ def test_killed_and_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
         import os
         from dataclasses import replace
         import hybrid
-        from hybrid.simulation import case, passes, refinement
+        from hybrid.accuracy import passes, refinement
+        from hybrid.simulation import case
         case.MOST_IN_MEMORY, passes.WORTH_WRITING = 0, -1.0
         refinement.LITTLE = float("inf")  # an event that goes by clocks
         surveyed = passes.Passes._surveyed

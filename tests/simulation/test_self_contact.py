@@ -11,11 +11,11 @@ from bits import Stopping, differences, went_on
 from random_scenes import random_scene
 
 import hybrid
-from hybrid.kernels.books import FRICTION
-from hybrid.kernels.energies import observe
-from hybrid.kernels.newton import NEAR
-from hybrid.kernels.self_contact_pairs import ENERGY, POINTS, SPEED
-from hybrid.kernels.self_distance import LEAST_DISTANCE
+from hybrid.kernels.contact.self_contact_pairs import ENERGY, POINTS, SPEED
+from hybrid.kernels.contact.self_distance import LEAST_DISTANCE
+from hybrid.kernels.march.energies import observe
+from hybrid.kernels.state.books import FRICTION
+from hybrid.kernels.step.newton import NEAR
 from hybrid.simulation.step_events import count_energy_gains
 from hybrid.simulation.transient import Transient
 from hybrid.view.summary import facts_of

@@ -12,9 +12,9 @@ from bits import Stopping, differences, went_on
 import hybrid
 import hybrid.model.build
 from hybrid.cli.plan_tables import plan_lines
-from hybrid.kernels.self_contact_law import INNER, OUTER
-from hybrid.kernels.self_contact_pairs import WINDOW
-from hybrid.kernels.self_distance import INSIDE
+from hybrid.kernels.contact.self_contact_law import INNER, OUTER
+from hybrid.kernels.contact.self_contact_pairs import WINDOW
+from hybrid.kernels.contact.self_distance import INSIDE
 from hybrid.model.build import build
 from hybrid.model.self_reach import LOOP, self_reach
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hybrid.accuracy.error_estimate import Estimate
+from hybrid.accuracy.step_ratios import usual_ratio
 from hybrid.model.resolution import Resolution
-from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.run_sample import RunSample
-from hybrid.simulation.step_ratios import usual_ratio
 
 DURATION, OUTPUTS = 100.0, 401
 FIRST = Resolution(1.0, 0.5, 1e-3, 1e-3)

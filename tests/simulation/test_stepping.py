@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.compile import kernel
-from hybrid.kernels.end_motion import driven_frame, driven_position
-from hybrid.kernels.state import no_moves
+from hybrid.kernels.laws.end_motion import driven_frame, driven_position
+from hybrid.kernels.machine.compile import kernel
+from hybrid.kernels.state.state import no_moves
 from hybrid.model.driven_end import PATH, DrivenEnd, rotation, rotation_vector
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

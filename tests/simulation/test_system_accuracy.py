@@ -11,13 +11,13 @@ from bits import differences
 
 import hybrid
 import hybrid.simulation.system_run
+from hybrid.accuracy import system_accuracy, system_errors
+from hybrid.accuracy.finer_result import NOT_KEPT, Replacement
+from hybrid.accuracy.refinement import Verdict
 from hybrid.errors import ComputationError
 from hybrid.scene.analysis import RodModel
 from hybrid.scene.system import System
 from hybrid.simulation import progress as reports
-from hybrid.simulation import system_accuracy, system_errors
-from hybrid.simulation.finer_result import NOT_KEPT, Replacement
-from hybrid.simulation.refinement import Verdict
 
 LEG = {"length": 70, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.accuracy import system_errors
 from hybrid.errors import ComputationError
-from hybrid.simulation import system_errors
 
 LEG = {"length": 140, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
 HOSE = {"length": 100, "mass": 6, "diameter": 0.08, "axial_stiffness": 5e6, "bending_stiffness": 3000}

@@ -7,7 +7,7 @@ import pytest
 from bits import Stopping, differences, went_on
 
 import hybrid
-from hybrid.kernels import books as b
+from hybrid.kernels.state import books as b
 from hybrid.model.resolution import first_resolution
 from hybrid.simulation.vibration_steps import VibrationSteps
 

@@ -11,8 +11,8 @@ from scipy.interpolate import PchipInterpolator
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.kernels.bed import HEIGHTS, planes_under
-from hybrid.kernels.state import Sea, no_sea
+from hybrid.kernels.laws.bed import HEIGHTS, planes_under
+from hybrid.kernels.state.state import Sea, no_sea
 from hybrid.scene.depths import Depths
 
 SLOPE = (0.06, 0.03)

@@ -12,7 +12,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import Outcome, SceneError
-from hybrid.kernels import bodies as k
+from hybrid.kernels.junctions import bodies as k
 from hybrid.model.bodies import angles_of, body_model, frame_of
 from hybrid.scene.bodies import FreeBody
 from hybrid.simulation.system_run import SystemRun

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.kernels.newton import TOLERANCE
+from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.bodies import frame_of
 from hybrid.model.build import build
 from hybrid.simulation.system_run import SystemRun

@@ -14,8 +14,8 @@ import pytest
 from scipy.linalg import solve_banded
 
 import hybrid
-from hybrid.kernels.block_elimination import SIZE, WIDTH
-from hybrid.kernels.entry import block_rows, correction
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
+from hybrid.kernels.run.entry import block_rows, correction
 from hybrid.model.build import build
 from hybrid.solve.statics import solve_statics
 from hybrid.solve.stepper import Stepper

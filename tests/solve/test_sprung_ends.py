@@ -9,7 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.kernels.newton import TOLERANCE
+from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.build import build
 from hybrid.model.line import line_on
 

@@ -11,7 +11,7 @@ from scipy.optimize import root
 
 import hybrid
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.newton import TOLERANCE
+from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.build import Model, build
 from hybrid.simulation.system_run import SystemRun
 from hybrid.solve.joined import JoinedLine, SystemState, joined_ends

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.newton import TOLERANCE
+from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.simulation import system_stiffness
 
 LENGTH, CELLS, GJ = 40.0, 40, 150.0

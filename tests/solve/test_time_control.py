@@ -8,12 +8,12 @@ from test_time_order import scene
 
 import hybrid
 from hybrid.errors import Outcome
-from hybrid.kernels import books as b
-from hybrid.kernels.compile import kernel
-from hybrid.kernels.generalized_alpha import before_fixed, radius_of_step, weights
-from hybrid.kernels.state import no_moves
-from hybrid.kernels.step_control import end_of_try, halve, passes, take_past
-from hybrid.kernels.step_law import FIRST, LEAST, MOST, REFUSED, step_end
+from hybrid.kernels.machine.compile import kernel
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.state import no_moves
+from hybrid.kernels.step.generalized_alpha import before_fixed, radius_of_step, weights
+from hybrid.kernels.step.step_control import end_of_try, halve, passes, take_past
+from hybrid.kernels.step.step_law import FIRST, LEAST, MOST, REFUSED, step_end
 from hybrid.model.build import build
 from hybrid.solve.statics import solve_statics
 from hybrid.solve.stepper import Stepper

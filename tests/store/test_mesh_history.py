@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.accuracy import api
 from hybrid.errors import ResultError
-from hybrid.simulation import api
 from hybrid.simulation.case import Case
 
 

@@ -1,0 +1,1 @@
+"""How wrong a result may be: passes, estimates of error, pre-runs, the choice of model and fineness."""

@@ -1,0 +1,292 @@
+"""The functions of this package that compute: each leaves one result, in a file or in memory.
+
+run      integrate a scene over its duration
+static   find its equilibrium
+resume   continue a run
+"""
+
+from __future__ import annotations
+
+import io
+import time as clock
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hybrid.accuracy.error_control import ErrorController
+from hybrid.accuracy.error_report import write_errors
+from hybrid.accuracy.finer_result import FinerResult, beside
+from hybrid.accuracy.model_choice import surveyed
+from hybrid.accuracy.passes import Passes, emptied, free_in
+from hybrid.accuracy.rods_where_slack import CHOSEN, rods_instead_of_slack, rods_of_system
+from hybrid.adapt.user_criterion import UserCriterion
+from hybrid.errors import ComputationError, ResultError, SceneError
+from hybrid.model.model_costs import NAMED, REST, ModelChoice, with_model
+from hybrid.model.resolution import (
+    Resolution,
+    first_resolution,
+    model_is_free,
+    requested_accuracy,
+    wants_errors,
+    wants_survey,
+)
+from hybrid.scene.combinations import refuse_use
+from hybrid.scene.motion_checks import check_motions
+from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
+from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
+from hybrid.simulation.case import Case
+from hybrid.simulation.first_use import OF_LINES, compile_beside, kernels_of
+from hybrid.simulation.interrupts import interrupts
+from hybrid.simulation.layer_mesh import layered
+from hybrid.simulation.progress import (
+    ESTIMATION,
+    Listener,
+    ProgressReporter,
+    listener_of,
+    tell_of_compiling,
+)
+from hybrid.simulation.restart import remaining_run, remaining_system
+from hybrid.simulation.static_case import StaticCase
+from hybrid.store.array_recorder import MemoryTarget, Target
+from hybrid.store.hdf5_file import check_target
+from hybrid.store.lock import locked
+from hybrid.store.reader import Result, open_result, written_result
+from hybrid.store.records import ERROR_ESTIMATE
+
+if TYPE_CHECKING:
+    from hybrid.scene.system import System
+
+
+def run(
+    scene: SceneLike | System,
+    output: str | Path | None = None,
+    *,
+    progress: bool | Listener = False,
+    overwrite: bool = True,
+    criterion: UserCriterion | None = None,
+) -> Result:
+    """Integrate a scene over its duration.
+
+    scene: a Scene, a System of lines, the path of a scene file, or a dict of its tables.  output: the HDF5 file to
+    write; None keeps the result in memory.  progress: True for a line on the error stream, or a function that gets a
+    `hybrid.simulation.progress.Progress` about ten times a second.  overwrite: replace an existing result (never
+    another program's file).  criterion: for zones that move, one more: it gets a `hybrid.NodeState` at every step and
+    gives a number (N+1,) per node, 1 or more where the cable must be a rod.
+
+    Raises SceneError when the scene is refused, ResultError when the output cannot be written, and ComputationError
+    when the computation stops; what was computed until then is in the file, and the last good state beside it.
+    """
+    scene = as_scene_or_system(scene)
+    if scene.time is None:
+        raise SceneError([missing_time(scene)])
+    if not isinstance(scene, Scene):
+        if criterion is not None:
+            refuse_use(scene, "criterion", given="a criterion")
+        return _several_lines(scene, output, overwrite, progress)
+    check_motions(scene)
+    refuse_use(scene, "motion")
+    if scene.solver == "shooting":
+        from hybrid.simulation.arbiter import run_shooting
+
+        with locked(_path(output)):
+            return run_shooting(scene, output, overwrite)
+    if criterion is not None and not isinstance(scene.model, AdaptiveModel):
+        raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
+    chosen = criterion is None and model_is_free(scene)  # most often rods, which need least to be compiled
+    compile_beside(with_model(scene, "rod") if chosen else scene)
+    case, target = Case(scene, criterion), _target(output, overwrite, wants_errors(scene))
+    with locked(_path(output)), _supervised(case, progress):
+        if isinstance(target, Path):
+            beside(target).unlink(missing_ok=True)  # of a run that was cut off
+        try:
+            Passes(case, target).compute()
+        except ComputationError as error:
+            instead = rods_instead_of_slack(scene, error)
+            if instead is None:
+                raise
+            emptied(target, error)
+            case.scene, case.late_file, case.late_finer = instead.scene, None, None
+            case.notes.append((CHOSEN, instead.text))
+            Passes(case, target).compute()
+    return written_result(target, case.late_file)
+
+
+def static(scene: SceneLike | System, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
+    """Find the equilibrium of a scene at t = 0 under its full loads; the result has one output.
+
+    scene, output, overwrite and errors: as of `run`.
+    """
+    scene = as_scene_or_system(scene)
+    if not isinstance(scene, Scene):
+        return _several_lines(scene, output, overwrite, None)
+    check_motions(scene)
+    if scene.solver == "shooting":
+        from hybrid.simulation.arbiter import static_shooting
+
+        with locked(_path(output)):
+            return static_shooting(scene, output, overwrite)
+    compile_beside(scene, static=True)
+    case, begin = StaticCase(scene), clock.process_time()
+    target, resolution = _target(output, overwrite, wants_errors(scene)), first_resolution(scene)
+    with locked(_path(output)):
+        choice, resolution = _surveyed_at_rest(case, resolution)
+        scene = case.scene
+        if not wants_errors(scene):
+            case.record(resolution, target)
+            return written_result(target)
+        assert not isinstance(target, MemoryTarget)
+        compute = FinerResult(target, case.record, case.record)
+        free = free_in(scene)._replace(steps=False)
+        control = ErrorController(
+            requested_accuracy(scene), free, False, case.sample, compute, choice=choice, settle=compute.settle
+        )
+        result, errors = control.start(resolution)
+        write_errors(target, scene, control, result, errors, clock.process_time() - begin)
+    return written_result(target)
+
+
+def resume(
+    source: str | Path,
+    output: str | Path | None = None,
+    *,
+    until: float | None = None,
+    settings: Sequence[str] = (),
+    start: float | None = None,
+    progress: bool | Listener = False,
+    criterion: UserCriterion | None = None,
+) -> Result:
+    """Continue a run that was cut off, from the last checkpoint in its file; or beyond its end, or with other loads.
+
+    What comes out is, to the last bit, what the run would have been had it not been stopped (but for processor
+    times).  output: another file; None: the same.  until: s, a later end.  settings: changes such as
+    ``environment.fluid.current=[0.5, 0, 0]`` (currents, waves, and what moves and loads the ends) from `start` (s) on;
+    None: from the checkpoint; before it the run is computed anew, into another file.  criterion: as `run` was given.
+
+    Raises ResultError when there is nothing to continue or the file is another program's, and else as `run`.
+    """
+    if not isinstance(source, str | Path):
+        raise TypeError(
+            f"resume: expected the path of a result file, found {type(source).__name__}; a Result has `.file`"
+        )
+    path = Path(source).expanduser().resolve()
+    target = _path(output) or path
+    if not path.is_file():
+        open_result(path)  # which says what is there instead
+    if target != path:
+        check_target(target, True)
+    with locked(path), locked(target if target != path else None):
+        system = remaining_system(path, until, settings, start)
+        if system is not None:
+            if criterion is not None:
+                refuse_use(system, "criterion", given="a criterion")
+            _move_lines(system, target, progress, path)
+            return open_result(target)
+        remaining = remaining_run(path, until, settings, start)
+        if remaining.anew and target == path:
+            why = "a change before the checkpoint computes the run anew"
+            raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
+        case = Case(remaining.scene, criterion, remaining.changes, remaining.points)
+        with _supervised(case, progress):
+            Passes(case, target, path, remaining).compute()
+    return written_result(target, case.late_file)
+
+
+def _several_lines(
+    system: System, output: str | Path | None, overwrite: bool, progress: bool | Listener | None
+) -> Result:
+    """The motion of several lines, or, with progress None, their equilibrium."""
+    from hybrid.accuracy.system_accuracy import is_refined, refine_system
+    from hybrid.simulation.system_run import static_system
+
+    refined = is_refined(system, moves=progress is not None)
+    target = _target(output, overwrite, refined or (progress is not None and bool(system.output.errors)))
+    with locked(_path(output)):
+        if progress is None and refined:
+            assert not isinstance(target, MemoryTarget)
+            refine_system(system, target, ProgressReporter(None, 1.0), lambda: False, moves=False)
+        elif progress is None:
+            static_system(system, target, partial(scene_text, system))
+        else:
+            _move_lines(system, target, progress)
+    return written_result(target)
+
+
+def _move_lines(system: System, target: Target, progress: bool | Listener, source: Path | None = None) -> None:
+    """Compute the motion of several lines; source: the result to go on with."""
+    from hybrid.accuracy.system_accuracy import is_refined, refine_system
+    from hybrid.simulation.system_run import run_system
+
+    duration, listener = system.require_time().duration, listener_of(progress)
+    tell_of_compiling(listener, OF_LINES)
+    with interrupts() as stopped, ProgressReporter(listener, duration) as reporter:
+        notes: list[tuple[str, str]] = []
+        pending = ERROR_ESTIMATE if system.output.errors else ""
+        while True:
+            try:
+                if is_refined(system, moves=True):
+                    assert not isinstance(target, MemoryTarget), "errors are written into a file"
+                    refine_system(system, target, reporter, stopped, source, notes=notes)
+                    return
+                run_system(system, target, scene_text(system), reporter, stopped, source, pending=pending, notes=notes)
+                break
+            except ComputationError as error:
+                instead = rods_of_system(system, error) if source is None else None
+                if instead is None:
+                    raise
+                emptied(target, error)
+                system = instead.system
+                notes.append((CHOSEN, instead.text))
+        if system.output.errors:
+            assert not isinstance(target, MemoryTarget), "errors are written into a file"
+            from hybrid.accuracy.system_errors import write_system_errors
+
+            def compare(other: System, memory: io.BytesIO) -> None:
+                run_system(other, memory, scene_text(other), reporter, stopped, name=ESTIMATION)
+
+            write_system_errors(system, target, compare)
+
+
+def _surveyed_at_rest(case: StaticCase, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
+    """The same of an equilibrium, whose model is rods where the scene names none and asks for an accuracy."""
+    if not wants_survey(case.scene):
+        return NAMED, layered(case, resolution)
+    choice = NAMED
+    if model_is_free(case.scene, moves=False):
+        choice, case.scene = ModelChoice("rod", REST), with_model(case.scene, "rod")
+    return choice, surveyed(case, resolution)
+
+
+def _path(output: str | Path | None) -> Path | None:
+    """Where a result goes; ResultError for a device or a pipe, which would be replaced by a file, or block."""
+    if output is None:
+        return None
+    path = Path(output).expanduser().resolve()
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        why = "is no regular file (a device, pipe or socket)"
+        raise ResultError(f"{path} {why}\n    try:      the name of a file, such as run.h5; in Python, None for memory")
+    return path
+
+
+def _target(output: str | Path | None, overwrite: bool, amended: bool) -> Target:
+    """Where the result goes; ResultError, before anything is computed, if it cannot go there.
+
+    amended: whether it is changed when it is complete: a result in memory is then that of a file.
+    """
+    path = _path(output)
+    if path is None:
+        return io.BytesIO() if amended else MemoryTarget()
+    check_target(path, overwrite)
+    return path
+
+
+@contextmanager
+def _supervised(case: Case, progress: bool | Listener) -> Iterator[None]:
+    """Hear of interrupts, and report the progress, until a run is done."""
+    duration, listener = case.scene.require_time().duration, listener_of(progress)
+    if listener is not None:
+        tell_of_compiling(listener, kernels_of(case.scene))
+    with interrupts() as interrupted, ProgressReporter(listener, duration) as reporter:
+        case.progress, case.interrupted = reporter, interrupted
+        yield

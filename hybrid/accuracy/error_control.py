@@ -1,0 +1,604 @@
+"""Computes a scene as often and as finely as it takes for the accuracy that is asked.
+
+First the result, which stands from then on, then the runs that its errors are estimated by; where these are larger
+than asked, finer results follow, each from what the one before has shown.
+docs/accuracy.md
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybrid.accuracy.budget import Budget
+from hybrid.accuracy.error_estimate import Estimate
+from hybrid.accuracy.error_order import COARSER
+from hybrid.accuracy.error_statistics import (
+    LARGEST,
+    STATISTICS,
+    StatisticEstimate,
+    estimates,
+    irregular_notes,
+    is_chance,
+    resolves_snaps,
+    snaps,
+    statistics_of,
+)
+from hybrid.accuracy.errors_by_cause import Errors
+from hybrid.accuracy.finer_result import NOT_KEPT, Judged, is_no_better, not_kept_text
+from hybrid.accuracy.refinement import (
+    COSTLY_ACCURACY,
+    MOST_OF_MODEL,
+    RAW,
+    Free,
+    Verdict,
+    costly,
+    missed,
+    not_converged,
+    refined,
+    sizes_of,
+)
+from hybrid.accuracy.snap_scatter import snap_excess
+from hybrid.errors import ComputationError
+from hybrid.model.model_costs import NAMED, WORDS, ModelChoice
+from hybrid.model.output_points import OutputPoints
+from hybrid.model.plan import output_times
+from hybrid.model.resolution import (
+    IRREGULAR_REFINEMENTS,
+    MOST_REFINEMENTS,
+    REFINEMENTS_AT_REST,
+    RequestedAccuracy,
+    Resolution,
+)
+from hybrid.scene.schema import Scene
+from hybrid.simulation.bounded_model_errors import doubtful
+from hybrid.simulation.restore import resolution_from, resolution_tree
+from hybrid.simulation.run_sample import (
+    ALL,
+    END_FORCES,
+    RunSample,
+    compared_places,
+    restored_notes,
+    restored_sample,
+)
+from hybrid.store.named_arrays import Tree, matched
+from hybrid.store.stored_rows import MissingRows
+
+# A finer run whose error is more than this part of that before it tells that more will not help: zones that change a
+# little earlier or later, or friction that holds elsewhere, are what is left.
+STALLED = 0.8
+# Processor time, s, after which runs are not made finer for what they miss: a longer wait should be asked for.
+MOST_CPU = 600.0
+# Processor time, s, after which an equilibrium is not made finer; it takes milliseconds.
+CPU_AT_REST = 5.0
+# How much finer a run of an irregular motion may be made: chance is soon more than cells and steps are.
+IRREGULAR_FINER = 2.0
+# A run that is hardly finer is not made of it: what it changes is chance.
+WORTH_REPEATING = 1.2
+# A change of a quantity by less than this part of its largest value is round-off: a thousandth of the least error that
+# can be asked for.
+ROUND_OFF_OF = 1e-9
+# A run of so many times as many cells and steps counts as twice as fine.
+TWICE = 1.8
+# Values at an instant do not converge where halved cells and steps leave more of a difference than this: order 0.25.
+DIVERGES = 0.85
+
+
+def comparison_resolutions(resolution: Resolution, moves: bool) -> tuple[Resolution, Resolution, Resolution]:
+    """Of the runs to compare with: longer cells and steps; the same cells, longer steps still; longer cells as well.
+
+    moves: whether there are steps at all.
+    """
+    longer = COARSER if moves else 1.0
+    return (
+        resolution.coarser(COARSER, longer),
+        resolution.coarser(COARSER, longer**2),
+        resolution.coarser(COARSER**2, longer**2),
+    )
+
+
+Samples = Sequence[Callable[[], RunSample]]
+Beside = Callable[[Samples], AbstractContextManager[Samples]]
+
+
+@dataclass
+class ErrorController:
+    """Chooses mesh, step and zones of one run after the other until the accuracy that is asked is met.
+
+    asked: None asks for an error figure alone.  sample: computes a run to compare with; result: computes the result;
+    both raise ComputationError.  beside: computes several of the former at the same time (simulation.beside);
+    None: one after the other.  irregular: extremes and standard deviations are judged from the start
+    (accuracy.error_statistics); else where a line snaps and values at an instant do not converge.  Its `checkpoint`
+    is in the file of every result, so that what was cut off continues with `proceed`.
+    """
+
+    asked: RequestedAccuracy | None
+    free: Free
+    moves: bool  # whether there is a time
+    sample: Callable[[Resolution], RunSample]
+    result: Callable[[Resolution], RunSample]
+    beside: Beside | None = None
+    irregular: bool = False
+    choice: ModelChoice = NAMED  # of a scene that leaves the choice
+    settle: Callable[[bool], None] = lambda kept: None  # whether a finer result takes the place of that before it
+    from_rest: bool = True  # whether it begins from an equilibrium, or is one
+    budget: Budget | None = None  # of all results; None: there is no limit
+    stopped: str = ""  # why it is refined no further although it misses what is asked; empty: more would not help
+    runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
+    first: Resolution | None = None  # that the runs to compare with are for; the result may be finer
+    next: Resolution | None = None  # of the result that is to be computed
+    comparisons: tuple[RunSample, RunSample | None, RunSample | None] | None = None  # for the first result
+    compared: Tree | None = None  # checkpoint of the first result with its comparisons, as long as that stands
+    estimate: Estimate | None = None  # of the result as it is
+    scattered: list[str] = field(default_factory=list)  # end forces whose largest values are by chance: not judged
+    excess: np.ndarray = field(default_factory=lambda: np.zeros(2))  # N, by which snaps may exceed the largest forces
+    _ratio: float = np.inf  # of the error of the result to what is asked
+    _judged: int = 0  # results
+    _slow_from: list[float] | None = None  # cells and steps of the first result, where errors fell slowly until then
+    _lost: bool = False  # whether the runs to compare with are to be computed again
+    _every: int = 1  # outputs to one of which the statistics are
+    _notes: list[tuple[str, str]] = field(default_factory=list)
+    _statistics: dict[str, StatisticEstimate] = field(default_factory=dict)
+    _of_statistics: Callable[[], dict[str, StatisticEstimate]] | None = None  # what they are to be estimated by
+
+    @property
+    def statistics(self) -> dict[str, StatisticEstimate]:
+        """Errors of extremes and deviations, if it moves; estimated when asked for, as regular motions never do."""
+        if self._of_statistics is not None:
+            self._statistics, self._of_statistics = self._of_statistics(), None
+        return self._statistics
+
+    @statistics.setter
+    def statistics(self, found: dict[str, StatisticEstimate]) -> None:
+        self._statistics, self._of_statistics = found, None
+
+    @property
+    def notes(self) -> tuple[tuple[str, str], ...]:
+        """Events of the result, kind and text: of the control, of the result itself, and of its model error."""
+        found = self.estimate
+        own = [*self.choice.notes, *self._notes, *self._irregular_note()]
+        own += not_converged(self.diverging, self.asked)
+        if found is not None:
+            asked = None if self.asked is None else sizes_of(self.asked, found.run)
+            own += doubtful(found.errors, found.doubt, asked)
+        return (*own, *((*found.several_equilibria, *found.run.notes, *found.notes) if found is not None else ()))
+
+    @property
+    def diverging(self) -> dict[str, float]:
+        """As `Estimate.not_converged`; none of an irregular motion, which is judged otherwise."""
+        if self.estimate is None or self.irregular:
+            return {}
+        return {x: left for x, left in self.estimate.not_converged.items() if not self._is_round_off(x)}
+
+    def _is_round_off(self, name: str) -> bool:
+        """Whether runs differ in a quantity by no more than numbers of this scene do by round-off."""
+        assert self.estimate is not None
+        raw, unit = RAW.get(name, name), {"bending_moment": "N m", "curvature": "1/m", "position": "m"}.get(name, "N")
+        least = self.asked.round_off(unit) if self.asked is not None else 0.0
+        values = self.estimate.run.values[raw]
+        return self.estimate.changes[raw][0] <= max(least, ROUND_OFF_OF * float(np.abs(np.asarray(values)).max()))
+
+    def _irregular_note(self) -> list[tuple[str, str]]:
+        """What is judged of an irregular motion, and how far the result may be off in what is not."""
+        if self.asked is None or not self.irregular or not self.statistics or self.estimate is None:
+            return []
+        return irregular_notes(
+            self.statistics,
+            self.estimate.errors,
+            self._left_out,
+            self.excess,
+            self.asked,
+            by_snaps=bool(self._slow_from),
+        )
+
+    def start(self, resolution: Resolution) -> tuple[RunSample, Errors | None]:
+        """From a first resolution to the result and its errors, None where they cannot be estimated."""
+        self.first = self.next = resolution
+        return self.proceed()
+
+    def compare_with(self, runs: Sequence[RunSample | None], failed: str = "") -> None:
+        """Take over runs to compare with; failed: why there is not even the first."""
+        if failed or runs[0] is None:
+            text = f"error not known: a coarser run to compare with failed: {failed}"
+            self._notes.append(("no error figure", text))
+            return
+        self.comparisons = runs[0], runs[1], runs[2]
+
+    def proceed(self) -> tuple[RunSample, Errors | None]:
+        """The same from the next result on."""
+        if self._lost:
+            self.runs, self._notes, self._lost = [], [], False
+        while self.next is not None:
+            resolution, own = self.next, len(self.runs)
+            try:
+                result = self._counted(self.result(resolution))
+            except ComputationError as error:
+                if self.estimate is None:
+                    raise
+                why = f"a finer run failed: {str(error).splitlines()[0]}"
+                self._notes.append((NOT_KEPT, f"{why}; the result is the one before"))
+                return self.without_refinement(why)
+            if self.budget is not None:
+                self.budget.spend([result])
+            if self.estimate is None:
+                if self.comparisons is None:
+                    self.comparisons = self._compute_comparisons(self.first or resolution)
+                if self.asked is not None:  # else no finer result follows, and they need not stay in memory
+                    self.compared = self.checkpoint() | {"runs": np.delete(self.runs, own), "budget": []}
+                known = self.first_estimate(result)
+                self.settle(True)  # it may be beside one of another model
+                if not known:
+                    return result, None
+                self._judge(resolution)
+            else:
+                self._judge_finer(self.estimate, resolution, result)
+            assert self.estimate is not None
+            if self.next is not None and not any(kind == COSTLY_ACCURACY for kind, _ in self._notes):
+                self._notes += costly(self.runs, self.estimate.run, self.next)
+        assert self.estimate is not None
+        errors = self.estimate.errors
+        if self.asked is not None:
+            verdict = self.verdict(self.asked)
+            if verdict.ratio > 1.0:
+                self.note_missed(verdict)
+        return self.estimate.run, errors
+
+    def _judge(self, resolution: Resolution) -> None:
+        """Whether the result is as accurate as asked, and what follows."""
+        assert self.estimate is not None
+        if self.estimate.lacks_model_errors():
+            self._renew_model_errors(self.estimate, resolution)
+        found, run, self.stopped = self.next_resolution(), self.estimate.run, ""
+        if found is not None and self.budget is not None and not self.budget.allows([run], [found]):
+            self.stopped, found = self.budget.text([run], [found]), None
+        self.next = found
+
+    def _judge_finer(self, estimate: Estimate, resolution: Resolution, result: RunSample) -> None:
+        """The same of a finer result; where it is the last and no better than that before it, that one stays."""
+        before, excess, notes = self.judged(True).copied(), self.excess, list(self._notes)
+        try:
+            self.next_estimate(estimate, resolution, result)
+            self._judge(resolution)
+        except KeyboardInterrupt:  # in a run to compare with: the finer result stays beside, until it is resumed
+            self.estimate, self.statistics = before.estimate, dict(before.statistics)
+            self.excess, self._notes[:] = excess, notes
+            raise
+        if self.asked is None or self.next is not None:
+            self._take_finer()
+            return
+        finer = self.judged(self.irregular)
+        found = is_no_better({"": self.asked}, {"": before}, {"": finer})
+        if found is not None:
+            self.keep(before, finer)
+            self._notes.append((NOT_KEPT, not_kept_text(result, found)))
+            self.settle(False)
+        else:
+            self._take_finer()
+
+    def _take_finer(self) -> None:
+        self.settle(True)
+        self.compared = None
+
+    @property
+    def places(self) -> np.ndarray | None:
+        """Of the output points those at which runs are compared, as of `RunSample`; None: there is none yet."""
+        run = self.estimate.run if self.estimate is not None else self.comparisons and self.comparisons[0]
+        return run.places if run else None
+
+    def judged(self, of_statistics: bool) -> Judged:
+        """The errors of the result; of_statistics: with those of extremes and standard deviations."""
+        assert self.estimate is not None
+        return Judged(self.estimate, self.statistics if of_statistics else {}, tuple(self._left_out))
+
+    @property
+    def _left_out(self) -> list[str]:
+        """End forces whose largest values are not judged: they are by chance, or a snap may exceed them."""
+        allowed = self.allowed_force
+        if self.scattered or not self.irregular or allowed is None or not self.excess.max() > allowed:
+            return self.scattered
+        found = self.statistics.get(LARGEST)
+        if found is None:
+            return self.scattered
+        return [name for raw, name in END_FORCES.items() if raw in found.order]  # a snap pulls at both
+
+    def keep(self, before: Judged, finer: Judged) -> None:
+        """Go back to the result before a finer one that is no better."""
+        before.set_apart(finer)
+        self.estimate, self.statistics = before.estimate, dict(before.statistics)
+
+    def verdict(self, asked: RequestedAccuracy) -> Verdict:
+        """How the errors compare with what is asked: at every instant, or of extremes and standard deviations."""
+        return self.judged(self.irregular).verdict(asked)
+
+    @property
+    def allowed_force(self) -> float | None:
+        """Error, N, of forces at the ends that is asked; None: none is."""
+        if self.asked is None or self.estimate is None:
+            return None
+        part = self.asked.of_end_force
+        return part * self.estimate.run.largest_end_force if part is not None else self.asked.tension
+
+    @property
+    def model_misses(self) -> str:
+        """Where leaving bending out makes more of the error than is asked allows, how much; else empty."""
+        if self.asked is None or self.estimate is None:
+            return ""
+        found = self.verdict(self.asked)
+        misses = found.ratio > 1.0 and found.model > MOST_OF_MODEL
+        return f"leaving bending out makes {100 * found.model:.2g} % of what is asked" if misses else ""
+
+    def without_refinement(self, why: str) -> tuple[RunSample, Errors]:
+        """The result as it is and its errors, where a finer one did not come to its end."""
+        assert self.estimate is not None
+        run, errors = self.estimate.run, self.estimate.errors
+        if self.asked is not None:  # else its model error was to be followed
+            verdict = self.verdict(self.asked)
+            if verdict.ratio > 1.0:
+                self._notes.append(("accuracy missed", f"{verdict.text}; {why}"))
+        return run, errors
+
+    def _compute_comparisons(
+        self, resolution: Resolution
+    ) -> tuple[RunSample, RunSample | None, RunSample | None] | None:
+        """The runs to compare with; None: the first has failed."""
+        found: list[RunSample | None] = [None, None, None]
+        follows = not resolution.follow  # else the result itself knows what neglected bending does
+        each = comparison_resolutions(resolution, self.moves)
+        coarser = [replace(x, follow=follows and k == 0) for k, x in enumerate(each)]
+        which = (0, 1, 2) if self.moves else (0, 2)  # without steps the second is the first
+        samples = [partial(self.sample, coarser[k]) for k in which]
+        with self.beside(samples) if self.beside is not None else nullcontext(samples) as runs:
+            for k, run in zip(which, runs, strict=True):
+                try:
+                    found[k] = self._counted(run())
+                except ComputationError as error:
+                    if not k:
+                        text = f"error not known: a coarser run to compare with failed: {str(error).splitlines()[0]}"
+                        self._notes.append(("no error figure", text))
+                        return None
+        assert found[0] is not None
+        return found[0], found[1], found[2]
+
+    def _in_shorter_steps(self, coarse: RunSample) -> RunSample | None:
+        """The first of the runs to compare with in steps as short as those of the result; None: it fails."""
+        of_result = replace(coarse.resolution.coarser(1.0, 1.0 / COARSER), every=coarse.every, follow=False)
+        try:
+            return self._counted(self.sample(of_result))
+        except ComputationError:
+            return None
+
+    def _counted(self, run: RunSample) -> RunSample:
+        self.runs.append(run.cpu)
+        return run
+
+    def first_estimate(self, result: RunSample) -> bool:
+        """Compare the first result with the coarser runs; False: they say nothing of its errors."""
+        if self.comparisons is not None and result.touches and not self.comparisons[0].touches:
+            self.comparisons = self._compute_comparisons(self.first or result.resolution)  # with contact now
+        if self.comparisons is None:
+            self._notes += result.notes
+            return False
+        estimate = Estimate(result, *self.comparisons, self.from_rest)
+        if estimate.share_unknown and (faster := self._in_shorter_steps(self.comparisons[0])) is not None:
+            estimate.show_steps(faster)
+        self.excess = snap_excess(result.forces, self.comparisons[0].forces)
+        self._set_statistics(result, *self.comparisons)
+        if not estimate.has_mesh:
+            few = f"{result.cells} cells are so few that there is nothing coarser to compare with"
+            if self.free.follows:
+                few = (
+                    "cells follow the curvature, and nearly all are base cells, which stay: coarser runs have the same "
+                    "ones; a smaller model.curvature_error, or fewer base cells (mesh.cells)"
+                )
+            self._notes.append(("no error figure", f"no error figure: {few}"))
+            self._notes += [*result.notes, *estimate.notes]
+            return False
+        if self.moves and not estimate.has_step:
+            text = (
+                "the share of the time step is not known: runs with longer steps fail, or are halved to what they were"
+            )
+            fix = "ask for a smaller error" if self.free.steps else "leave time.step out"
+            self._notes.append(("error uncertain", f"{text}; the error may be larger; {fix}"))
+        self.estimate, self.comparisons = estimate, None
+        return True
+
+    def next_estimate(self, estimate: Estimate, resolution: Resolution, result: RunSample) -> None:
+        """Take over a finer result; where its zones are others, runs to compare with are computed anew."""
+        stricter = resolution.zones < estimate.run.resolution.zones
+        if stricter and estimate.differs_in_zones(result):
+            self.comparisons = self._compute_comparisons(resolution)
+            if self.comparisons is not None and self.first_estimate(result):
+                return
+        self.excess = snap_excess(result.forces, estimate.run.forces)
+        estimate.update(result)
+        if self.statistics:
+            found = statistics_of(result, self._every)
+            for name, of_statistic in self.statistics.items():
+                of_statistic.update(found[name])
+        if stricter and not resolution.follow:
+            self._renew_model_errors(estimate, resolution)
+
+    def _set_statistics(self, result: RunSample, *comparisons: RunSample | None) -> None:
+        """What errors of extremes and standard deviations are estimated by: the outputs that all runs have."""
+        if not self.moves or not (self.irregular or (self.asked is not None and not self.asked.instant)):
+            return
+        coarse, rough, coarsest = comparisons
+        assert coarse is not None
+        self._every = max(run.every for run in comparisons if run is not None)
+        self._of_statistics = partial(estimates, result, coarse, rough, coarsest, self._every)
+
+    def _renew_model_errors(self, estimate: Estimate, resolution: Resolution) -> None:
+        """Zones are others than those whose model error is known: follow it on the mesh of the result."""
+        longer = resolution.coarser(1.0, COARSER if self.moves else 1.0)
+        try:
+            run = self._counted(self.sample(replace(longer, follow=True)))
+            estimate.set_model_errors(run)
+            if self.statistics:
+                found = statistics_of(run, self._every)
+                for name, of_statistic in self.statistics.items():
+                    of_statistic.set_model_errors(found[name])
+        except ComputationError as error:
+            text = f"the effect of neglected bending is that of a run before: {str(error).splitlines()[0]}"
+            self._notes.append(("error uncertain", text))
+
+    def next_resolution(self) -> Resolution | None:
+        """The resolution of the next result; None: what is asked is met, or more of it would not help."""
+        assert self.estimate is not None
+        if self.asked is None:
+            return None
+        run, before = self.estimate.run, self._ratio
+        verdict = self.verdict(self.asked)
+        while verdict.ratio > 1.0 and self._leaves_out(verdict, verdict.ratio / before):
+            verdict, before = self.verdict(self.asked), np.inf
+        if not self.irregular and self._slow_from is None:
+            self.statistics = {}  # it is judged at every instant from now on
+        before *= 1.0 if self.irregular else self.estimate.revised.get(RAW.get(verdict.name, ""), 1.0)
+        self._ratio, falls = verdict.ratio, verdict.ratio / before  # 0 for the first
+        self._judged += 1
+        most = MOST_REFINEMENTS if self.moves else REFINEMENTS_AT_REST
+        left = (IRREGULAR_REFINEMENTS if self.irregular else most) + 1 - self._judged
+        stalls = falls > STALLED or (left > 0 and verdict.ratio * falls**left > 1.0)
+        hopeless = left <= 0 or (stalls if self.moves else sum(self.runs) > CPU_AT_REST)
+        along = self.asked.asks("curvature") or self.asked.asks("bending_moment")
+        sharp = run.unresolved and self.free.mesh and (along or not self.irregular)  # else at the instant of a snap
+        met = verdict.ratio <= 1.0 and not sharp
+        if met or hopeless or sum(self.runs) > MOST_CPU or self._by_chance(verdict):
+            return None
+        if self.irregular:  # what neglected bending does to it is known as a bound alone, which moves no zones
+            found = refined(run.resolution, verdict, self.free._replace(zones=False), IRREGULAR_FINER)
+            now = run.resolution
+            worth = found and max(found.fineness / now.fineness, now.step / max(found.step, 1e-300)) >= WORTH_REPEATING
+            return found if worth else None
+        if self.estimate.share_unknown or RAW.get(verdict.name, verdict.name) in self.estimate.shares_mixed:
+            verdict = replace(verdict, time=max(verdict.time, verdict.mesh))  # either may be to blame
+        found = refined(run.resolution, verdict, self.free)
+        if found is None or self.moves or found.fineness == run.resolution.fineness:
+            return found
+        # cells that are hardly shorter lie otherwise beside edges of contact: their change says little of what is left
+        return replace(found, fineness=max(found.fineness, COARSER * run.resolution.fineness))
+
+    def _leaves_out(self, verdict: Verdict, falls: float) -> bool:
+        """Whether what misses does not converge, and is not judged from now on: every instant, then a largest force."""
+        if self.asked is None or self.asked.instant:
+            return False
+        name = RAW.get(verdict.name, verdict.name)
+        if not self.irregular:
+            assert self.estimate is not None
+            return self._turns_out_to_snap(self.estimate, name, falls)
+        if not self.statistics:
+            return False
+        estimate, of_largest = self.statistics[LARGEST], verdict.statistic == LARGEST
+        diverges = falls > STALLED or estimate.falls.get(name, np.nan) > DIVERGES
+        if not (diverges or (of_largest and is_chance(self.statistics, LARGEST, name))):
+            return False
+        if verdict.statistic != LARGEST or verdict.name not in END_FORCES.values():
+            return False
+        if self._left_out:
+            return False
+        self.scattered = [name for raw, name in END_FORCES.items() if raw in estimate.order]  # a snap pulls at both
+        return True
+
+    def _turns_out_to_snap(self, estimate: Estimate, name: str, falls: float) -> bool:
+        """Whether values at an instant do not converge, because the line snaps: in two slow falls, one after the other.
+
+        Each is between runs of which one is twice as fine: in the runs that the first result is compared with, and from
+        that to a finer one.  One alone is that of coarse runs, also of a regular motion that converges.
+        """
+        run = estimate.run
+        if self._slow_from is None:
+            slow = self._judged == 0 and self.moves and estimate.falls.get(name, np.nan) > DIVERGES
+            self._slow_from = [float(run.cells), float(run.steps)] if slow else None
+            return False
+        if falls <= STALLED:
+            self._slow_from = None
+            return False
+        cells, steps = run.cells / self._slow_from[0], run.steps / self._slow_from[1]
+        twice = (cells >= TWICE or not self.free.mesh) and (steps >= TWICE or not self.free.steps)
+        self.irregular = twice and falls > STALLED and snaps(run) and resolves_snaps(run)
+        return self.irregular
+
+    def _by_chance(self, verdict: Verdict) -> bool:
+        """Whether what misses is an end force that another run would differ in as much, however fine."""
+        name = RAW.get(verdict.name, "")
+        if not self.irregular or not name or verdict.statistic not in self.statistics:
+            return False
+        diverges = self.statistics[verdict.statistic].falls.get(name, np.nan) > DIVERGES
+        return bool(diverges) or is_chance(self.statistics, verdict.statistic, name)
+
+    def note_missed(self, verdict: Verdict) -> None:
+        """Say that what was asked is not met, whose doing it is, and what to try."""
+        text = missed(verdict, self.free, len(self.runs), self._by_chance(verdict), self.stopped)
+        self._notes.append(("accuracy missed", text))
+
+    def checkpoint(self) -> Tree:
+        """What it has found until now, as named arrays and plain values."""
+        return {
+            "runs": np.array(self.runs), "next": self.next and resolution_tree(self.next),
+            "first": self.first and resolution_tree(self.first),
+            "coarse": self.comparisons and [x and x.checkpoint() for x in self.comparisons],
+            "estimate": self.estimate and self.estimate.checkpoint(),
+            "statistics": {name: x.checkpoint() for name, x in self.statistics.items()}, "every": self._every,
+            "scattered": list(self.scattered), "excess": self.excess, "choice": list(self.choice),
+            "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": list(self._notes),
+            "budget": self.budget.checkpoint() if self.budget is not None else [],
+            "slow": list(self._slow_from or ()), "places": self.places if self.places is not None else ALL,
+        }  # fmt: skip
+
+    def restore(self, tree: Mapping[str, Any], scene: Scene, points: OutputPoints, source: Path | None = None) -> None:
+        """Continue as `checkpoint` has said; points: of the result.  source: its file; runs to compare with whose
+        outputs are no longer beside it are computed again.
+
+        ResultError or ValueError: it is none of this scene.
+        """
+        template = {
+            "runs": np.zeros(0),
+            "slow": [0.0] * len(tree.get("slow", ())),
+            "ratio": np.inf,
+            "finer": 0,
+            "every": 1,
+            "irregular": False,
+        }
+        template["excess"], template["places"] = np.zeros(2), ALL
+        names = ("next", "first", "coarse", "estimate", "statistics", "scattered", "notes", "choice", "budget")
+        # not in every checkpoint of 0.6
+        older = {"choice": ["", ""], "first": None, "excess": np.zeros(2), "budget": [], "slow": [], "places": ALL}
+        saved = matched(older | dict(tree), template | dict.fromkeys(names), "error control")
+        places = saved["places"]
+        if places.size and not np.array_equal(places, compared_places(points)):
+            raise ValueError("runs are compared at other output points than those of this scene")
+        shape = len(output_times(scene)) + 1, places.size or points.s.size, points.jumps.size
+        self.runs, self._ratio, self._judged = saved["runs"].tolist(), saved["ratio"], saved["finer"]
+        self._every, self.irregular, self.excess = saved["every"], saved["irregular"], saved["excess"]
+        self._slow_from = list(saved["slow"]) or None
+        if self._every < 1:
+            raise ValueError("statistics of no outputs")
+        self._notes = list(restored_notes(saved["notes"]))
+        self.next, self.first = (x and resolution_from(x, scene) for x in (saved["next"], saved["first"]))
+        if self.budget is not None and saved["budget"]:
+            self.budget.restore(matched(saved["budget"], [0.0, 0.0], "budget"))
+        if saved["coarse"] is not None:
+            try:
+                first, second, third = (
+                    x and replace(restored_sample(x, scene, shape, source), places=places) for x in saved["coarse"]
+                )
+                self.comparisons = first, second, third
+            except MissingRows:
+                self._lost = True
+        if saved["estimate"] is not None:
+            self.estimate = Estimate.restored(saved["estimate"], scene, shape)
+            self.estimate.run = replace(self.estimate.run, places=places)
+        if saved["statistics"]:
+            trees = matched(saved["statistics"], dict.fromkeys(STATISTICS), "statistics")
+            self.statistics = {name: StatisticEstimate.restored(x, scene, (1, *shape[1:])) for name, x in trees.items()}
+        self.choice = ModelChoice(*matched(saved["choice"], ["", ""], "choice"))
+        if self.choice.kind not in ("", *WORDS):
+            raise ValueError(f"model chosen: got {self.choice.kind!r}, expected one of {', '.join(WORDS)}")
+        self.scattered = [name for name in END_FORCES.values() if name in list(saved["scattered"])]
+        if self.next is None and self.estimate is None:
+            raise ValueError("neither a result nor one that is to come")

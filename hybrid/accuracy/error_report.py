@@ -1,0 +1,125 @@
+"""Writes into a result how wrong it may be, how finely it was computed, and what that took."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from hybrid.accuracy.error_control import ErrorController
+from hybrid.accuracy.errors_by_cause import Errors, summary
+from hybrid.accuracy.free_vibrations import uncertain_by_vibrations
+from hybrid.accuracy.refinement import END_FORCE, asked_quantities, asked_text, not_asked_text, sizes_of
+from hybrid.errors import ZONE_EVENTS
+from hybrid.model.plan import output_times
+from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.simulation.bounded_model_errors import bounded
+from hybrid.simulation.result_checks import damped_jolts, undersampled_end_forces
+from hybrid.simulation.run_sample import END_FORCES, RunSample, at_all_points, is_along
+from hybrid.store.amend import NOTHING_MORE, Happened, amend
+from hybrid.store.format import Field
+from hybrid.store.late_file import LateFile
+from hybrid.store.named_arrays import Tree
+from hybrid.store.records import not_converged_attribute
+
+UNITS = {
+    "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m",
+    "right_tension": "N", "right_curvature": "1/m", "right_bending_moment": "N m",
+    "end_force_start": "N", "end_force_end": "N",
+}  # fmt: skip
+CAUSES = {
+    "mesh": "error by the mesh", "time": "error by the time step", "model": "error by neglected bending",
+    "total": "error by all causes",
+}  # fmt: skip
+
+
+def write_errors(
+    target: Path | io.BytesIO | LateFile, scene: Scene, control: ErrorController, result: RunSample,
+    errors: Errors | None, cpu: float, before: Tree | None = NOTHING_MORE,
+) -> None:  # fmt: skip
+    """Add errors (None: they could not be estimated), attributes and events to a complete result.
+
+    cpu: s, of all passes; before: as of `amend`.
+    """
+    attributes = effort(scene, control, result, cpu)
+    fields = error_fields(result, errors) if errors is not None else []
+    names = {field.name for field in fields}
+
+    def blocks() -> Iterator[tuple[str, int, np.ndarray]]:
+        for cause, name, begin, values in errors.blocks() if errors is not None else ():
+            if f"errors/{cause}/{name}" in names:
+                along = result.places.size and is_along(name)
+                yield f"errors/{cause}/{name}", begin, at_all_points(values, result.places) if along else values
+
+    def known_then(happened: Happened) -> tuple[Mapping[str, str | float | int], list[tuple[str, str]]]:
+        found, notes = known(scene, control, result, errors, happened)
+        return attributes | found, notes
+
+    amend(target, fields, blocks(), known_then, before)
+
+
+def effort(scene: Scene, control: ErrorController, result: RunSample, cpu: float) -> dict[str, str | float | int]:
+    """What was spent on a result, and what was asked, as its attributes; cpu: s, of all passes."""
+    resolution = result.resolution
+    attributes: dict[str, str | float | int] = {
+        "effort_fineness": resolution.fineness, "effort_runs": len(control.runs),
+        "effort_cpu": cpu, "effort_step": resolution.step,
+    }  # fmt: skip
+    if resolution.local is not None:
+        attributes["effort_step_error"] = resolution.local
+    if isinstance(scene.model, AdaptiveModel):
+        attributes["effort_zones"] = resolution.zones
+    if control.asked is not None:
+        attributes["accuracy_asked"] = asked_text(control.asked, result)
+        attributes["accuracy_quantities"] = asked_quantities(control.asked, result)
+    return attributes
+
+
+def known(
+    scene: Scene, control: ErrorController, result: RunSample, errors: Errors | None, happened: Happened
+) -> tuple[dict[str, float | str], list[tuple[str, str]]]:
+    """The largest errors, as attributes, and events of a result; happened: its events until now."""
+    undersampled: list[tuple[str, str]] = []
+    if errors is not None and control.moves:
+        largest = {name: errors.largest("total", name) for name in errors.fields.get("total", {})}
+        changes = [t for t, kind in happened if kind in ZONE_EVENTS]
+        undersampled = undersampled_end_forces(np.array([0.0, *output_times(scene)]), result, largest, changes)
+        if control.asked is None or control.asked.asks(END_FORCE):
+            error = max(largest.get(name, 0.0) for name in END_FORCES.values())
+            undersampled += damped_jolts(scene, result, error, control.allowed_force)
+        if not control.irregular:
+            bounds = None if control.asked is None else sizes_of(control.asked, result)
+            undersampled += uncertain_by_vibrations(scene, result, largest, bounds)
+    found: dict[str, float | str] = {**summary(errors)} if errors is not None else {}
+    found |= not_converged_attribute([control.diverging])
+    if errors is not None and control.asked is not None:
+        beside = not_asked_text(control.asked, errors, result)
+        found |= {"accuracy_not_asked": beside} if beside else {}
+    if control.irregular:
+        each = [summary(estimate.errors) for estimate in control.statistics.values()]
+        for name in each[0] if each else ():
+            found[name.replace("error_", "error_extremes_", 1)] = max(x[name] for x in each)
+    return found, [*dict(reversed(control.notes)).items(), *undersampled]
+
+
+def error_fields(result: RunSample, errors: Errors) -> list[Field]:
+    """Errors by cause and quantity; those by neglected bending only where the run's own do not count as written."""
+    written = bool(result.model_error) and bounded(result)[0] is None
+    return [
+        Field(
+            f"errors/{cause}/{name}", UNITS[name], f"{CAUSES[cause]} of {_words(name)}, estimated",
+            (result.places[-1] + 1,) if result.places.size and is_along(name) else shape[1:],
+            ("right/s" if name.startswith("right_") else "s",) if len(shape) == 2 else (),
+        )
+        for cause, quantities in errors.fields.items()
+        if not (cause == "model" and written)
+        for name, shape in quantities.items()
+    ]  # fmt: skip
+
+
+def _words(name: str) -> str:
+    """A quantity in words."""
+    after = " just after the point" if name.startswith("right_") else ""
+    return name.removeprefix("right_").replace("_", " ") + after

@@ -1,0 +1,277 @@
+"""What converges of an irregular motion: its extremes and standard deviations, of runs that are to be compared.
+
+Where a line snaps or the sea is irregular, runs differ at an instant however fine they are: a snap comes a little
+earlier or later.  Extremes over windows and standard deviations converge, and mostly the largest value of a run.
+docs/accuracy.md
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Self
+
+import numpy as np
+
+from hybrid.accuracy.error_estimate import Estimate
+from hybrid.accuracy.error_order import MOST_ORDER, ORDER, Falls
+from hybrid.accuracy.errors_by_cause import Errors
+from hybrid.accuracy.snap_scatter import snap_times, steps_in_rise
+from hybrid.model.resolution import RequestedAccuracy
+from hybrid.scene.schema import Scene
+from hybrid.simulation.bounded_model_errors import bounded, scaled
+from hybrid.simulation.run_sample import END_FORCES, RunSample
+from hybrid.store.named_arrays import Tree, matched
+
+# Windows of a run, and the outputs of the result that one has at least.
+WINDOWS, LEAST = 50, 20
+# What is judged, in this order, and what it is called.
+LARGEST = "largest"
+# Kinds of the event that says so: of waves, and of a line that snaps.
+IRREGULAR, SNAPS = "irregular motion", "snaps"
+STATISTICS = {
+    LARGEST: "largest value", "deviation": "standard deviation", "windows_largest": "mean of the windows' largest",
+    "windows_smallest": "mean of the windows' smallest",
+}  # fmt: skip
+# Steps from slack to the mean force from which on a run shows a snap.
+STEPS_IN_RISE = 3
+# Windows from which on their scatter is known.
+MANY = 10
+
+
+class StatisticEstimate(Estimate):
+    """Errors of one of STATISTICS.
+
+    One number has no field in which mesh and time step could be told apart: their sizes add.
+    """
+
+    cancels = False
+
+    def __init__(
+        self, result: RunSample, coarse: RunSample, rough: RunSample | None, coarsest: RunSample | None
+    ) -> None:
+        super().__init__(result, coarse, rough, coarsest)
+        self.chance = _chance(result, coarse)  # N, of a mean over windows at start and end: zeros of what is no mean
+
+    def _bounds(self, name: str, found: Falls) -> tuple[float, float]:
+        return ORDER, MOST_ORDER  # runs of long steps overshoot snaps, and come back with order 3
+
+    def _shorter(self, fast: RunSample, slow: RunSample) -> float:
+        return fast.steps / max(slow.steps, 1)  # of the whole run, as statistics are
+
+    def update(self, result: RunSample) -> None:
+        self.chance = _chance(result, self.run)
+        super().update(result)
+
+    def checkpoint(self) -> Tree:
+        return super().checkpoint() | {"chance": self.chance}
+
+    @classmethod
+    def restored(cls, tree: Any, scene: Scene, shape: tuple[int, int, int]) -> Self:
+        self = super().restored(tree, scene, shape)
+        self.chance = matched({"chance": np.zeros(2)} | {k: x for k, x in tree.items() if k == "chance"},
+                              {"chance": np.zeros(2)}, "statistics")["chance"]  # fmt: skip
+        return self
+
+
+def estimates(
+    result: RunSample, coarse: RunSample, rough: RunSample | None, coarsest: RunSample | None, every: int
+) -> dict[str, StatisticEstimate]:
+    """The errors of each of STATISTICS; arguments as of `Estimate`, every: as of `statistics_of`."""
+    runs = [statistics_of(x, every) if x is not None else {} for x in (result, coarse, rough, coarsest)]
+    return {x: StatisticEstimate(runs[0][x], runs[1][x], runs[2].get(x), runs[3].get(x)) for x in STATISTICS}
+
+
+def statistics_of(run: RunSample, every: int) -> dict[str, RunSample]:
+    """The same run with each of STATISTICS in place of its outputs: arrays (1, ...).
+
+    every: outputs of the result to one that counts; forces at the ends count at every step.  Reactions become
+    (magnitude, 0, 0).  Errors of neglected bending are those at the extremes, and their root mean square.
+    """
+    values = {name: _scalar(name, _thinned(np.asarray(x), every // run.every)) for name, x in run.values.items()}
+    count = len(next(iter(values.values()), ()))
+    windows = max(1, min(WINDOWS, count * every // LEAST))
+    found = {name: _statistics(x, windows) for name, x in values.items()}
+    for column, name in enumerate(END_FORCES, start=1):
+        if name in found and len(run.forces) > windows:
+            found[name] = _of_steps(run.forces[:, 0], run.forces[:, column], windows)
+    errors = _model_errors(run, values, every, windows)
+    kept = {name: run.forces[:0] for name in STATISTICS}
+    if len(run.forces) > windows:
+        kept |= {"windows_largest": _of_windows(run.forces, windows, np.maximum)}
+        kept |= {"windows_smallest": _of_windows(run.forces, windows, np.minimum)}
+    return {
+        statistic: replace(
+            run, every=1, rows={}, forces=kept[statistic], catenary=run.catenary[:0],
+            values={name: _as_vector(name, x[k]) for name, x in found.items()},
+            model_error={name: x[k] for name, x in errors.items()},
+        )
+        for k, statistic in enumerate(STATISTICS)
+    }  # fmt: skip
+
+
+def _chance(after: RunSample, before: RunSample) -> np.ndarray:
+    """By how much means over windows of the end forces may be off because runs snap at other instants: (2,) N.
+
+    Twice the standard error of the mean difference of two runs, from its scatter over the windows.
+    """
+    if not len(after.forces) or after.forces.shape != before.forces.shape:
+        return np.zeros(2)
+    differences = after.forces[:, 1:] - before.forces[:, 1:]
+    return np.asarray(2.0 * np.std(differences, axis=0) / np.sqrt(len(differences)))
+
+
+def is_chance(found: Mapping[str, StatisticEstimate], statistic: str, quantity: str) -> bool:
+    """Whether a statistic of an end force differs from that of the run before by no more than chance makes it differ.
+
+    quantity: of END_FORCES, as runs call it.  Means over windows do where they differ by less than twice the standard
+    error of that difference; then the largest force of the run does where it differs by no more than single windows do.
+    """
+    means = "windows_largest" if statistic == LARGEST else statistic
+    windows, of = found.get(means), list(END_FORCES)
+    if windows is None or quantity not in of or not windows.chance.any():
+        return False
+    count, error = len(windows.run.forces), float(windows.chance[of.index(quantity)])
+    by = {x: np.sqrt(3.0) * found[x].changes.get(quantity, (np.nan,))[0] for x in (means, LARGEST)}
+    same = bool(count >= MANY and by[means] <= error)
+    return same and (statistic != LARGEST or bool(by[LARGEST] <= error * np.sqrt(count)))
+
+
+def _of_windows(forces: np.ndarray, windows: int, f: np.ufunc) -> np.ndarray:
+    """The largest, or smallest, forces (n, 3) of each window, with its number."""
+    begins = _begins(forces[:, 0], windows)
+    return np.column_stack([np.arange(float(len(begins))), f.reduceat(forces[:, 1:], begins, axis=0)])
+
+
+def windows_uncertain(found: Mapping[str, StatisticEstimate], asked: RequestedAccuracy) -> list[tuple[str, str]]:
+    """The event that says so where chance may take means over windows of an end force beyond what is asked."""
+    if asked.tension is None and asked.of_end_force is None:
+        return []
+    most, off = found[LARGEST].run.largest_end_force, 0.0
+    for estimate in found.values():
+        for chance, name in zip(estimate.chance, END_FORCES.values(), strict=True):
+            if chance > 0.0:
+                off = max(off, chance + estimate.errors.largest("total", name))
+    bounds = asked.tension, asked.of_end_force and asked.of_end_force * most
+    allowed = min(x for x in bounds if x is not None)
+    if off <= allowed:
+        return []
+    text = (
+        f"means of the windows' largest and smallest forces may be off by {off:.2g} N, because the line snaps at other "
+        f"instants in every run; {allowed:.2g} N are asked: a longer run, or several seeds, say more"
+    )
+    return [("windows uncertain", text)]
+
+
+def irregular_notes(
+    found: Mapping[str, StatisticEstimate], errors: Errors, scattered: Sequence[str], excess: np.ndarray,
+    asked: RequestedAccuracy, by_snaps: bool,
+) -> list[tuple[str, str]]:  # fmt: skip
+    """What is judged of an irregular motion, and how far the result may be off in what is not.
+
+    errors: at every output; scattered: end forces whose largest values are by chance; excess: (2,) N, by which snaps
+    may exceed those at start and end; by_snaps: whether it is so because values at an instant do not converge.
+    """
+    force = max(errors.largest("total", name) for name in END_FORCES.values())
+    position = errors.largest("total", "position")
+    why = (
+        "the line snaps, and finer runs differ at an instant as much as coarser ones"
+        if by_snaps
+        else "the motion is irregular"
+    )
+    text = (
+        f"{why}: accuracy is that of largest values, mean extremes of windows and standard "
+        f"deviations; at an instant positions may be off by {position:.2g} m, end forces by {force:.2g} N; "
+        "accuracy: {instant: 1%} asks for every instant"
+    )
+    notes = [(SNAPS if by_snaps else IRREGULAR, text)]
+    if scattered:
+        largest, snaps_by = found[LARGEST].errors, dict(zip(END_FORCES.values(), excess, strict=True))
+        by = {x.removeprefix("end_force_"): max(largest.largest("total", x), snaps_by[x]) for x in scattered}
+        text = (
+            "the largest force is, or may be exceeded by, that of one snap, and these differ from run to run however "
+            f"fine they are (at the {', at the '.join(f'{x} {n:.2g} N' for x, n in by.items())}): it is not judged; "
+            "the spread over seeds, or a longer run, says more"
+        )
+        notes.append(("largest force uncertain", text))
+    return notes + windows_uncertain(found, asked)
+
+
+def snaps(run: RunSample) -> bool:
+    """Whether the force at an end, of all steps, comes from little to much: a line that slackens and is pulled taut.
+
+    One that is let go, whose force grows from nothing, does not: it converges at every instant after that.
+    """
+    t = run.forces[:, 0]
+    return any(snap_times(t, run.forces[:, k]) for k in (1, 2)) if t.size else False
+
+
+def resolves_snaps(run: RunSample) -> bool:
+    """Whether the force at an end rises over several steps where it snaps: else steps are too long to show anything."""
+    t = run.forces[:, 0]
+    return max(steps_in_rise(t, run.forces[:, k]) for k in (1, 2)) >= STEPS_IN_RISE
+
+
+def _thinned(x: np.ndarray, step: int) -> np.ndarray:
+    return np.asarray(x)[np.unique(np.append(np.arange(0, len(x), step), len(x) - 1))]
+
+
+def _scalar(name: str, x: np.ndarray) -> np.ndarray:
+    return np.asarray(np.linalg.norm(x, axis=-1)) if name in END_FORCES else x
+
+
+def _as_vector(name: str, x: np.ndarray) -> np.ndarray:
+    return np.stack([x, 0.0 * x, 0.0 * x], axis=-1) if name in END_FORCES else x
+
+
+def _windows(x: np.ndarray, windows: int) -> Iterator[np.ndarray]:
+    """The outputs after the first, in windows of about the same length."""
+    later = x[1:] if len(x) > 1 else x
+    return iter(np.array_split(later, min(windows, len(later))))
+
+
+def _statistics(x: np.ndarray, windows: int) -> np.ndarray:
+    """STATISTICS of (nt, ...) over time: (4, 1, ...)."""
+    begins = np.cumsum([0, *(len(part) for part in _windows(x, windows))][:-1])
+    later = x[1:] if len(x) > 1 else x
+    largest, smallest = (f.reduceat(later, begins, axis=0).mean(axis=0) for f in (np.maximum, np.minimum))
+    return np.stack([np.max(x, axis=0), np.std(x, axis=0), largest, smallest])[:, None]
+
+
+def _of_steps(t: np.ndarray, x: np.ndarray, windows: int) -> np.ndarray:
+    """STATISTICS of (n,) values at the times (n,) at which steps end: (4, 1)."""
+    dt = np.diff(t, prepend=0.0)
+    mean = np.average(x, weights=dt)
+    deviation = np.sqrt(np.average((x - mean) ** 2, weights=dt))
+    begins = _begins(t, windows)
+    largest, smallest = (float(np.mean(f.reduceat(x, begins))) for f in (np.maximum, np.minimum))
+    return np.array([[x.max()], [deviation], [largest], [smallest]])
+
+
+def _begins(t: np.ndarray, windows: int) -> np.ndarray:
+    """Numbers of the first steps of windows of about the same length; t: (n,) s, when steps end."""
+    begins = np.searchsorted(t, np.linspace(0.0, t[-1], windows + 1)[:-1], side="right")
+    return np.unique(np.minimum(begins, len(t) - 1))
+
+
+def _model_errors(run: RunSample, values: Mapping[str, np.ndarray], every: int, windows: int) -> dict[str, np.ndarray]:
+    """What errors of neglected bending (nt, ...) make of STATISTICS, to first order: (4, 1, ...)."""
+    out, (factors, _) = {}, bounded(run)
+    named = {END_FORCES.get(name, name): x for name, x in values.items()}
+    for name, field in run.model_error.items():
+        if not len(field):
+            continue
+        error, value = _thinned(scaled(np.asarray(field), factors), every // run.every), named.get(name)
+        level = np.sqrt(np.mean(error * error, axis=0))
+        if value is None or value.shape != error.shape:  # of vectors: no extreme of a component
+            out[name] = np.stack([np.max(error, axis=0), level, level, level])[:, None]
+            continue
+        pairs = list(zip(_windows(value, windows), _windows(error, windows), strict=True))
+        most, least = (np.mean([_taken(e, f(x, axis=0)) for x, e in pairs], axis=0) for f in (np.argmax, np.argmin))
+        out[name] = np.stack([_taken(error, value.argmax(axis=0)), level, most, least])[:, None]
+    return out
+
+
+def _taken(x: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """The values of (nt, ...) at the times (...)."""
+    return np.asarray(np.take_along_axis(x, np.asarray(at)[None], axis=0)[0])

@@ -1,0 +1,286 @@
+"""Whether a result is as accurate as asked, and the mesh, step and zones with which the next one should be."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil, floor, log10, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.accuracy.errors_by_cause import Errors
+from hybrid.model.resolution import Limited, RequestedAccuracy, Resolution
+from hybrid.outputs.probes import SIDED_ERRORS as RIGHT_OF
+from hybrid.scene.accuracy import ALONG, NOT_ASKED, ROUGHEST
+from hybrid.simulation.run_sample import END_FORCES, RunSample
+
+# Part of what is asked that the next run aims at.
+AIM = 0.7
+# Zones become stricter when the model makes more than the first of what is asked, so that it makes the second.
+MOST_OF_MODEL, OF_MODEL = 0.5, 0.25
+# A run is at most this much finer than the one before.
+MOST_FINER = 3.0
+# Factor on cells or steps where the error is met in parts and missed in total.
+A_LITTLE = 0.8
+# Times the processor time of its last run beyond which an accuracy says what it will cost, and the kind of event; less
+# than the last, in s, is not worth a word.
+COSTLY, COSTLY_ACCURACY, LITTLE = 4.0, "costly accuracy", 0.5
+# s of processor time that a finer run will take, from which on the errors of the result before it are written first.
+WORTH_WRITING = 2.0
+END_FORCE = next(iter(END_FORCES.values()))
+RAW = {of: raw for raw, of in END_FORCES.items()}  # what runs call the forces at the ends
+
+
+class Free(NamedTuple):
+    """What the program may choose: the mesh, the time step, how much bending zones may neglect."""
+
+    mesh: bool
+    steps: bool
+    zones: bool
+    follows: bool = False  # whether cells follow the curvature
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Estimated error over what is asked, of the quantity where that is largest; and its parts by cause."""
+
+    ratio: float
+    mesh: float
+    time: float
+    model: float
+    text: str
+    reached: str = ""  # what of it is missed, as this run meets it: an accuracy as a scene writes it
+    name: str = ""  # of the quantity
+    statistic: str = ""  # of it, that is judged; empty: every output
+
+
+def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample, skip: Collection[str] = ()) -> Verdict:
+    """How the errors of a run compare with what is asked: at a ratio of 1 or less they are met.
+
+    skip: quantities that are not judged.
+    """
+    worst, reached = Verdict(0.0, 0.0, 0.0, 0.0, "nothing is asked"), dict[str, tuple[float, str]]()
+    for bound in bounds_of(asked, run):
+        name, size = bound.name, bound.size
+        if size <= 0.0 or name in skip:
+            continue
+        total = _largest(errors, "total", bound)
+        key = "tension" if name in END_FORCES.values() else "line_tension" if name == "tension" else name
+        if total > max(size, reached.get(key, (0.0, ""))[0]) and bound.limit is None:
+            reached[key] = total, _reached(key, bound.unit, total, bound.of)
+        if total / size >= worst.ratio:
+            model = _largest(errors, "model", bound)
+            mesh, time = (_largest(errors, cause, bound) / size for cause in ("mesh", "time"))
+            share = (total - model) / size / (mesh + time) if mesh + time > 0.0 else 0.0
+            mesh, time = mesh * share, time * share  # of what they make together, where they cancel
+            text = f"{bound.words}: error {total:.3g} {bound.unit}, asked {size:.3g} {bound.unit}"
+            worst = Verdict(total / size, mesh, time, model / size, text, name=name)
+    every = [f"all: {100.0 * asked.every:.3g}%"] if asked.every is not None and reached else []
+    return replace(worst, reached=", ".join([*every, *(text for _, text in reached.values())]))
+
+
+class Bound(NamedTuple):
+    """An error that is asked of a quantity, in a unit: over all of the line, or as % of a limit of sections.
+
+    of: that of which a part is asked; used: how much of the limit is used.
+    """
+
+    name: str
+    unit: str
+    size: float
+    of: float | None = None
+    limit: Limited | None = None
+    used: float = 0.0
+
+    @property
+    def words(self) -> str:
+        """What the error is of."""
+        name = self.name.replace("end_force_", "force at the ").replace("_", " ")
+        return name if self.limit is None else f"{name} over its limit, {self.limit.limit}"
+
+
+def bounds_of(asked: RequestedAccuracy, run: RunSample) -> list[Bound]:
+    """What is asked of a run that has it."""
+    bounds: list[Bound] = []
+    if asked.position is not None:
+        position = asked.sized(run.reach).position if asked.of_motion is not None else asked.position
+        assert position is not None
+        bounds.append(Bound("position", "m", position))
+    for name in END_FORCES.values():
+        if asked.tension is not None:
+            bounds.append(Bound(name, "N", asked.tension))
+        if asked.of_end_force is not None:
+            size = max(asked.of_end_force * run.largest_end_force, asked.round_off("N"))
+            bounds.append(Bound(name, "N", size, run.largest_end_force))
+    for name, unit, part in (
+        ("curvature", "1/m", asked.of_curvature), ("bending_moment", "N m", asked.of_moment),
+        ("tension", "N", asked.of_tension),
+    ):  # fmt: skip
+        if part is not None and name in run.values:
+            largest = run.largest(name)
+            bounds.append(Bound(name, unit, max(part * largest, asked.round_off(unit)), largest))
+    for x in (limit.at(run.places) for limit in asked.limits):
+        if x.quantity in run.values:
+            used = _used(x, run)
+            bounds.append(Bound(x.quantity, "%", 100.0 * x.part(used), limit=x, used=used))
+    return bounds
+
+
+def sizes_of(asked: RequestedAccuracy, run: RunSample) -> dict[str, float]:
+    """The errors that are asked over all of the line, by quantity."""
+    return {x.name: x.size for x in bounds_of(asked, run) if x.limit is None}
+
+
+def _used(limit: Limited, run: RunSample) -> float:
+    """How much of a limit a run uses, 1: all of it."""
+    sides = (limit.quantity, limit.allowed), (f"right/{limit.quantity}", limit.allowed_right)
+    each = [np.nanmax(run.most(name) / allowed, initial=0.0) for name, allowed in sides if name in run.values]
+    return float(max(each))
+
+
+def asked_text(asked: RequestedAccuracy, run: RunSample) -> str:
+    """What is asked of a run, in words and numbers."""
+    used = {x.limit.limit: x.used for x in bounds_of(asked, run) if x.limit is not None}
+    return asked.describe(run.reach if asked.of_motion is not None else None, used)
+
+
+def asked_quantities(asked: RequestedAccuracy, run: RunSample) -> str:
+    """Names of the quantities of which something is asked of a run, with commas between."""
+    return ",".join(dict.fromkeys(bound.name for bound in bounds_of(asked, run)))
+
+
+def not_asked_text(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> str:
+    """That curvature or bending moment are not asked, where the error of one is more than a part; else empty."""
+    for name in ("bending_moment", "curvature"):
+        largest = run.largest(name) if name in run.values else 0.0
+        error = max(errors.largest("total", side) for side in (name, f"right_{name}"))
+        if not asked.asks(name) and largest > 0.0 and error > asked.coarsest_part * largest:
+            if asked.asks("curvature"):
+                continue  # a moment goes with it
+            return f"{name.replace('_', ' ')} is not asked, its error is {100.0 * error / largest:.2g} % of its largest"
+    return ""
+
+
+def figures(asked: RequestedAccuracy, errors: Sequence[Errors], run: RunSample) -> list[dict[str, str | float | None]]:
+    """What is asked of each quantity, and its error, the largest of several; errors: empty where they are not known."""
+    out: list[dict[str, str | float | None]] = []
+    for bound in bounds_of(asked, run):
+        known = bool(errors) and all(bound.name in x.fields.get("total", {}) for x in errors)
+        error = max(_largest(x, "total", bound) for x in errors) if known else None
+        name = bound.name if bound.limit is None else bound.words
+        out.append({"quantity": name, "of": bound.name, "unit": bound.unit, "asked": bound.size, "error": error})
+    return out
+
+
+def not_converged(found: Mapping[str, float], asked: RequestedAccuracy | None) -> list[tuple[str, str]]:
+    """Events of quantities that finer runs change as much as coarser ones did; found: by how many times as much."""
+    texts: dict[str, list[str]] = {}
+    for name, times in found.items():
+        named = asked is None or asked.asks(name) or (name == "tension" and asked.asks(END_FORCE))
+        kind = "error uncertain" if named else "not converged"  # forces at the ends are that tension too
+        texts.setdefault(kind, []).append(f"{name.replace('_', ' ')} ({times:.2g} times)")
+    why = "finer cells and steps change as much as coarser ones did"
+    end = "the error may be larger than its figure"
+    return [(kind, f"{why}: {', '.join(names)}; {end}") for kind, names in texts.items()]
+
+
+def times_the_cost(now: Resolution, finer: Resolution) -> float:
+    """How many times as long as a run a finer one takes."""
+    if now.local and finer.local:  # an error of a step of third order, not the longest step, decides how many there are
+        steps = float(now.local / finer.local) ** (1.0 / 3.0)
+    else:
+        steps = now.step / finer.step if finer.step else 1.0
+    return finer.fineness / now.fineness * steps
+
+
+def costly(runs: Sequence[float], before: RunSample, resolution: Resolution) -> list[tuple[str, str]]:
+    """Before a finer run: the event that says so where all runs take more than COSTLY times as long as it will.
+
+    runs: s of processor time, until now; before: the last result; resolution: of the finer one.
+    """
+    one = before.cpu * times_the_cost(before.resolution, resolution)
+    total = sum(runs) + one
+    if total <= COSTLY * one or total < LITTLE:
+        return []
+    text = (
+        f"run {len(runs) + 1} is made for this accuracy: all of them take about {total:.2g} s of processor time, "
+        f"{total / one:.2g} times that run alone"
+    )
+    return [(COSTLY_ACCURACY, text)]
+
+
+def missed(verdict: Verdict, free: Free, runs: int, chance: bool, stopped: str = "") -> str:
+    """That what was asked is not met, whose doing it is, and what to try.
+
+    runs: how many there were; chance: whether another run would differ in what is missed as much, however fine;
+    stopped: why no finer run was made that would help.
+    """
+    main = max((verdict.mesh, "mesh"), (verdict.time, "time step"), (verdict.model, "model"))[1]
+    is_free = {"mesh": free.mesh, "time step": free.steps, "model": free.zones}[main]
+    fixed = {"mesh": "mesh (or cells of zones)", "time step": "time.step", "model": "model, or its tolerance"}[main]
+    try_ = f"leave {fixed} out"
+    if is_free:
+        try_ = f"accuracy: {{{verdict.reached}}}, which this run meets"
+        try_ += ", or compare with model: rod" * (verdict.model > 0.0)
+    if main == "model" and not is_free:
+        try_ = "model: adaptive, or rod"
+    whose = f"most of it is of the {main}"
+    if chance:
+        whose = "the line snaps at other instants in every run, and finer ones differ as much"
+        try_ = f"a longer run, several seeds, or accuracy: {{{verdict.reached}}}, which this run meets"
+    if stopped:
+        whose, try_ = stopped, f"accuracy: {{{verdict.reached}}}, which this run meets; or such a mesh and steps"
+    if not verdict.reached:  # a verdict on a limit, which no other accuracy settles
+        try_ = "mesh.cells and time.step finer than these"
+    return f"{verdict.text}; {whose}, {runs} runs; try: {try_}"
+
+
+def _largest(errors: Errors, cause: str, bound: Bound) -> float:
+    """Largest error of what a bound is for, in its unit, on either side of points where it has two values."""
+    name, limit = bound.name, bound.limit
+    sides = (name, f"right_{name}") if name in RIGHT_OF else (name,)
+    if limit is None:
+        return max(errors.largest(cause, side) for side in sides)
+    each = zip(sides, (limit.allowed, limit.allowed_right), strict=True)
+    return 100.0 * max(errors.largest(cause, side, allowed) for side, allowed in each)
+
+
+def _reached(key: str, unit: str, total: float, most: float | None) -> str:
+    """An accuracy that an error of `total` meets, with a tenth to spare; most: that of which a part is asked."""
+    amount = 1.1 * total
+    if most is not None and (amount <= ROUGHEST * most or key in ALONG):
+        amount, unit = 100.0 * amount / most, "%"
+        if amount > 100.0 * ROUGHEST and key != "bending_moment":
+            return f"{key}: {NOT_ASKED}"
+        if amount > 100.0 * ROUGHEST:
+            return f"{key}: none, its error is {100.0 * total / most:.2g}%"
+    digit = 10.0 ** (floor(log10(amount)) - 1) if amount > 0.0 else 1.0
+    return f"{key}: {ceil(amount / digit) * digit:.6g} {unit}".replace(" %", "%")
+
+
+def refined(resolution: Resolution, verdict: Verdict, free: Free, most: float = MOST_FINER) -> Resolution | None:
+    """What should meet what is asked, by order 2, at least cost; None: nothing that is free would help.
+
+    most: how much finer cells and steps may be.  Errors of mesh and step add, and cost grows with fineness over step:
+    half of what is asked is for each.
+    """
+    zones, model = resolution.zones, verdict.model
+    if free.zones and model > MOST_OF_MODEL:
+        zones *= OF_MODEL / model  # at once: zones that are too strict cost what rods do, one run more costs as much
+        model = OF_MODEL
+    if model >= AIM or (verdict.mesh > 1.0 and not free.mesh) or (verdict.time > 1.0 and not free.steps):
+        return None  # what is fixed is wrong by more than is asked
+    goal = AIM - model
+    mesh = verdict.mesh if free.mesh else 0.0
+    time = verdict.time if free.steps else 0.0
+    goal_mesh = goal - (verdict.time if not free.steps else min(time, 0.5 * goal))
+    goal_time = goal - (verdict.mesh if not free.mesh else min(mesh, 0.5 * goal))
+    least = 1.0 / most
+    cells = min(max(sqrt(max(goal_mesh, 0.0) / mesh), least), 1.0) if mesh > 0.0 else 1.0
+    steps = min(max(sqrt(max(goal_time, 0.0) / time), least), 1.0) if time > 0.0 else 1.0
+    if min(cells, steps) > 0.95 and zones == resolution.zones:
+        if mesh == time == 0.0:
+            return None
+        cells, steps = (A_LITTLE, steps) if mesh >= time else (cells, A_LITTLE)
+    return replace(resolution.coarser(cells, steps), zones=zones)

@@ -1,0 +1,226 @@
+"""What a run will take, from its own beginning: the mesh pre-run and the first steps, in a budget of processor time.
+
+Cells, steps and what a step costs are then those of the scene, on this machine, as busy as it is.  What neither shows,
+whether a finer run is needed and contact to come, is the difference between the expected time and the largest.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+
+from hybrid.accuracy.budget import CELL, COMPARISONS, FINER, LEAST, MOST_TIMES, OUTPUT, POINT
+from hybrid.accuracy.model_choice import chosen_and_surveyed
+from hybrid.errors import ComputationError
+from hybrid.kernels.machine.cache import is_warm
+from hybrid.model import plan as tables
+from hybrid.model.build import build
+from hybrid.model.contents import with_accuracy
+from hybrid.model.model_costs import NAMED
+from hybrid.model.plan import Plan, SystemPlan, count_steps, output_interval
+from hybrid.model.resolution import Resolution, first_resolution, requested_accuracy, wants_errors
+from hybrid.model.run_time import COST_STEP
+from hybrid.scene.read import SceneLike, as_scene_or_system
+from hybrid.scene.schema import Scene
+from hybrid.simulation.case import Case
+from hybrid.simulation.first_use import OF_LINES, kernels_of
+from hybrid.simulation.time_loop import TimeLoop
+from hybrid.store.comparison_recorder import ComparisonRecorder
+
+if TYPE_CHECKING:  # its tables take long to make
+    from hybrid.scene.system import System
+
+# s of processor time that the pre-run, and the first steps of the result, may take.
+PRE_RUN, FIRST_STEPS = 0.2, 0.1
+# Of a run whose number of steps is known: so many show what one costs.
+ENOUGH_STEPS = 400
+# Cells of a line whose equilibrium, which comes before its first steps, takes no longer than these.
+MOST_CELLS = 4000
+# s of the file of a result, and of judging and writing errors (bench/test_bench_plan.py).
+FILE, JUDGING = 0.02, 0.1
+# How much dearer steps are, over a whole run, of a line that is to touch itself: expected, and at most.
+TOUCHING, MOST_TOUCHING = 2.5, 6.0
+# Results that an accuracy takes at most over the first, where its budget allows them: finer ones may follow it.
+MOST_FINER = 9.0
+
+
+@overload
+def plan(scene: SceneLike, *, measure: bool = True) -> Plan: ...
+@overload
+def plan(scene: System, *, measure: bool = True) -> SystemPlan: ...
+def plan(scene: SceneLike | System, *, measure: bool = True) -> Plan | SystemPlan:
+    """What would be computed for a scene (a Scene, the path of a scene file, or a dict), and how long it would take.
+
+    measure: the mesh pre-run and the first steps are computed (at most about 0.3 s of processor time), so that cells,
+    steps and processor time are those of this scene on this machine; False: nothing is computed, and they are
+    estimated from tables, as where kernels are not compiled yet.  Of several lines it is a SystemPlan.
+    """
+    scene = as_scene_or_system(scene)
+    if not isinstance(scene, Scene):
+        made = tables.plan_system(scene)
+        return _measured_lines(scene, made) if measure and scene.time is not None else made
+    found = tables.plan(scene)
+    return _measured(scene, found) if measure and scene.time is not None else found
+
+
+class _Probe(Case):
+    """A case whose passes end (KeyboardInterrupt) when their budget is used up."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene, None)
+        self.loop: TimeLoop | None = None  # the last
+        self._end = np.inf
+        self._most_steps = np.inf
+        self.interrupted = self._is_used_up
+
+    def _is_used_up(self) -> bool:
+        steps = self.loop.run.steps if self.loop is not None else 0
+        return steps >= self._most_steps or clock.process_time() > self._end
+
+    def allow(self, seconds: float, steps: float = np.inf) -> None:
+        """Processor time, s, and steps for what follows."""
+        self._end, self._most_steps = clock.process_time() + seconds, steps
+
+    def _loop(self, *args: Any, **kwargs: Any) -> TimeLoop:
+        self.loop = super()._loop(*args, **kwargs)
+        return self.loop
+
+    def first_steps(self, resolution: Resolution) -> tuple[TimeLoop, float, float]:
+        """The loop of a result after its first steps; s of processor time before them, and of them."""
+        begin = clock.process_time()
+        self.allow(np.inf)  # the budget of the pre-run may be used up, and the equilibrium has none
+        model, equilibrium, switching = self._start(resolution)
+        loop = self._loop(self.scene, model, resolution, switching, None)
+        begun = clock.process_time()
+        known = resolution.local is None and model.payout is None
+        self.allow(FIRST_STEPS, ENOUGH_STEPS if known else np.inf)
+        with suppress(KeyboardInterrupt):
+            loop.begin(equilibrium)
+            begun = clock.process_time()  # the first state is made once, however many steps there are
+            loop.to_the_end(self._duration, self._exact)
+        return loop, begun - begin, clock.process_time() - begun
+
+
+def _measured(scene: Scene, found: Plan) -> Plan:
+    """The same, with what the pre-run and the first steps show.
+
+    As it is where kernels are to be compiled first, or the equilibrium would take longer to find than a plan may.
+    """
+    if sum(found.cells) > MOST_CELLS or not is_warm(kernels_of(scene)):
+        return found
+    case, first, choice, cut = _Probe(scene), first_resolution(scene), NAMED, False
+    resolution, begin = first, clock.process_time()
+    case.allow(PRE_RUN)
+    try:
+        try:
+            choice, resolution = chosen_and_surveyed(case, first)
+        except KeyboardInterrupt:
+            cut = True
+        survey, coarse = clock.process_time() - begin, case.loop
+        if not is_warm(kernels_of(case.scene)):
+            return found
+        loop, setup, spent = case.first_steps(resolution)
+    except ComputationError:
+        return found  # the run will say why
+    duration = scene.require_time().duration
+    if cut and coarse is not None:
+        survey *= duration / max(coarse.run.t, 1e-6 * duration)
+    steps = _steps(scene, resolution, loop, coarse)
+    motion = steps * _dearer(found) * spent / max(loop.run.steps, 1)
+    seconds, most = _of_passes(scene, setup, motion, duration / output_interval(scene), found)
+    if scene.contact.self:  # by name: the first steps show nothing of it
+        seconds, most = seconds + (TOUCHING - 1.0) * motion, most + (MOST_TOUCHING - 1.0) * motion
+    mesh = tables.mesh_of(build(case.scene, resolution))
+    return replace(
+        found, **mesh, contents=with_accuracy(found.contents, scene, case.reach),
+        seconds=survey + seconds, most_seconds=survey + most, measured=True, steps=round(steps),
+        step=min(resolution.step, duration / steps), chosen=choice.kind,
+    )  # fmt: skip
+
+
+def _dearer(found: Plan) -> float:
+    """How much dearer a step is on average than the first ones, of a line that is paid out."""
+    if found.payout is None or not np.isfinite(found.payout.mean_cells):
+        return 1.0
+    first, mean = (COST_STEP + CELL * x for x in (sum(found.cells), found.payout.mean_cells))
+    return mean / first
+
+
+def _steps(scene: Scene, resolution: Resolution, loop: TimeLoop, coarse: TimeLoop | None) -> float:
+    """Steps of the result, which has come as far as its loop.
+
+    coarse: of the mesh pre-run, whose steps, longer by one factor, show how many each part of the motion asks for.
+    """
+    run, duration = loop.run, scene.require_time().duration
+    if run.t >= duration:
+        return float(run.steps)
+    if resolution.local is None:
+        return float(count_steps(scene))
+    linear = run.steps * duration / max(run.t, 1e-9 * duration)
+    if coarse is None or coarse is loop or not coarse.run.steps:
+        return linear
+    assert isinstance(coarse.recorder, ComparisonRecorder)
+    times = coarse.recorder.steps[:, 0]
+    passed = int((times <= run.t).sum())
+    if not passed:
+        return linear
+    return run.steps * times.size / passed * duration / max(coarse.run.t, 1e-9 * duration)
+
+
+def _of_passes(scene: Scene, setup: float, motion: float, outputs: float, found: Plan) -> tuple[float, float]:
+    """Processor time, s, of all runs after the pre-run: expected, and at most.
+
+    setup, motion: s, of a result before its first step, and of its steps; outputs: their number.
+    """
+    points = scene.output.points if isinstance(scene.output.points, int) else len(scene.output.points)
+    one = setup + motion
+    result = one + outputs * (OUTPUT + POINT * points) + FILE
+    if not wants_errors(scene):
+        return result, result
+    first = result + 3.0 * setup + COMPARISONS * motion + JUDGING
+    if requested_accuracy(scene) is None or found.most_runs == found.runs:
+        return first, first
+    expected = first + FINER * one
+    return expected, min(first + MOST_FINER * one, max(MOST_TIMES * expected, LEAST))
+
+
+def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
+    """The same of several lines: their first steps, as often as all runs would take them."""
+    if found.cells > MOST_CELLS or not is_warm(OF_LINES):
+        return found
+    from hybrid.simulation.system_run import SystemRun
+    from hybrid.solve.system_statics import LineFailed
+
+    time, begin = system.require_time(), clock.process_time()
+    try:
+        run = SystemRun(system, None, "", moves=True)
+        run.begin_motion()
+        begun = clock.process_time()
+
+        def look() -> None:
+            if clock.process_time() - begun > FIRST_STEPS:
+                raise KeyboardInterrupt
+
+        with suppress(KeyboardInterrupt):
+            for stop in run.stops():
+                run.go_to(stop, look)
+    except (ComputationError, LineFailed):
+        return found  # the run will say why
+    spent, setup = clock.process_time() - begun, begun - begin
+    steps = float(run.steps) if run.t >= time.duration else float(found.steps)
+    if run.loop.controlled:
+        steps = run.steps * time.duration / max(run.t, 1e-9 * time.duration)
+    motion = steps * spent / max(run.steps, 1)
+    scenes = {name: system.scene_of(name) for name in system.lines}
+    outputs = time.duration / output_interval(system)
+    each = [_of_passes(scene, 0.0, 0.0, outputs, found.lines[name]) for name, scene in scenes.items()]
+    expected, most = max(_of_passes(scene, setup, motion, 0.0, found.lines[name]) for name, scene in scenes.items())
+    more = sum(x for x, _ in each)
+    return replace(
+        found, seconds=expected + more, most_seconds=most + more, measured=True, steps=round(steps),
+        step=min(found.step, time.duration / steps),
+    )  # fmt: skip

@@ -1,0 +1,85 @@
+"""How far snaps of a line differ from run to run, and whether the largest force may be another one for that.
+
+A snap is a force at the ends that rises after a line that was taut went slack.  Its size follows from how the line lay
+while it was slack, which is another in every run, however fine: the largest force of a run can be a smooth one that
+converges, and in the next run a snap exceeds it.
+
+    symbol   meaning                                                                unit
+    t, F     times at which steps end, force at the end where it is largest          s, N
+    peaks    of the forces at start and end in each snap                            N
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.kernels.state.state import Floats
+
+# Part of its largest force to which the force at an end comes back where a line snaps.
+SLACKENS = 0.1
+# Chance that a snap of all of a run is larger than is foretold: that of two standard deviations.
+CHANCE = 0.0228
+
+
+def snap_times(t: Floats, F: Floats) -> list[tuple[float, float]]:
+    """When each snap begins, at the lowest force, and when it is over, at the next fall through the mean force."""
+    high = np.average(F, weights=np.diff(t, prepend=0.0)) <= F
+    rises, falls = np.flatnonzero(high[1:] & ~high[:-1]) + 1, np.flatnonzero(~high[1:] & high[:-1]) + 1
+    low, out = SLACKENS * float(F.max(initial=0.0)), []
+    for rise in rises.tolist():
+        k = int(np.searchsorted(falls, rise))
+        if k == 0:  # the force grows from the start, which no line that was taut before does
+            continue
+        before = int(falls[k - 1])
+        lowest = before + int(F[before:rise].argmin())
+        if F[lowest] < low:
+            out.append((float(t[lowest]), float(t[falls[k]] if k < falls.size else t[-1])))
+    return out
+
+
+def steps_in_rise(t: Floats, F: Floats) -> float:
+    """Steps from the lowest force of a snap to the mean force, the median over all snaps; 0: there are none."""
+    mean = np.average(F, weights=np.diff(t, prepend=0.0))
+    counts = []
+    for begin, end in snap_times(t, F):
+        a, b = np.searchsorted(t, (begin, end))
+        counts.append(int(np.argmax(F[a : b + 1] >= mean)))
+    return float(np.median(counts)) if counts else 0.0
+
+
+def joined(times: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The same without overlaps, in order."""
+    out: list[tuple[float, float]] = []
+    for begin, end in sorted(times):
+        if out and begin < out[-1][1]:
+            out[-1] = out[-1][0], max(end, out[-1][1])
+        else:
+            out.append((begin, end))
+    return out
+
+
+def peaks(forces: Floats, times: list[tuple[float, float]]) -> Floats:
+    """Largest forces (n, 2) N at start and end within each of n times; forces: (nt, 3) as of `RunSample`."""
+    spans = [slice(*np.searchsorted(forces[:, 0], x).tolist()) for x in times]
+    return np.array([forces[x, 1:].max(axis=0, initial=0.0) for x in spans]).reshape(-1, 2)
+
+
+def snap_excess(after: Floats, before: Floats) -> Floats:
+    """By how much snaps may exceed the largest forces of a run: (2,) N at start and end, at least 0.
+
+    after, before: forces of all steps of a run and of one that is less fine, as of `RunSample`.  The difference of two
+    runs has twice the variance that a snap of one has.  Of n snaps that variance is known as well as n numbers tell it
+    (Student's t of n degrees of freedom), and none of the n is to exceed the largest.
+    """
+    if not (len(after) and len(before)):
+        return np.zeros(2)
+    pulled = 1 + int(after[:, 1:].max(axis=0).argmax())
+    times = joined([x for run in (after, before) for x in snap_times(run[:, 0], run[:, pulled])])
+    if not times:
+        return np.zeros(2)
+    from scipy.special import stdtrit  # 0.2 s to import, and few runs snap
+
+    now, then = peaks(after, times), peaks(before, times)
+    deviation, n = np.sqrt(0.5 * np.mean((now - then) ** 2, axis=0)), len(times)
+    most = now.max(axis=0) + float(stdtrit(n, 1.0 - CHANCE / n)) * deviation
+    return np.asarray(np.maximum(most - after[:, 1:].max(axis=0), 0.0))

@@ -1,0 +1,446 @@
+"""Several lines, computed as often and as finely as it takes for the accuracy that is asked of each.
+
+As of one cable (accuracy.error_control): a coarse run shows where cells should be short, the result follows, coarser
+runs show what its errors are, and where it misses what is asked, a finer one follows.  Each line has an error control
+of its own, which sees the line in all of the runs; what one of them asks for, all get: steps are the same, and the
+error of a line may come from the cells of the next.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import time as clock
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybrid.accuracy.budget import Budget
+from hybrid.accuracy.error_control import ErrorController, comparison_resolutions
+from hybrid.accuracy.error_estimate import Estimate
+from hybrid.accuracy.error_report import effort, error_fields, known
+from hybrid.accuracy.error_statistics import statistics_of
+from hybrid.accuracy.finer_result import NOT_KEPT, Replacement, is_no_better, not_kept_text
+from hybrid.accuracy.refinement import (
+    COSTLY_ACCURACY,
+    WORTH_WRITING,
+    Free,
+    costly,
+    figures,
+    times_the_cost,
+)
+from hybrid.accuracy.system_model_errors import Stretches, as_rods, leaves_bending_out, rods_of, with_model_errors
+from hybrid.accuracy.system_samples import compared, sample_of, touch_unasked
+from hybrid.errors import ComputationError, SceneError
+from hybrid.model.output_points import output_points
+from hybrid.model.plan import output_interval, output_times
+from hybrid.model.resolution import (
+    Resolution,
+    is_irregular,
+    mesh_is_free,
+    requested_accuracy,
+    wants_errors,
+    wants_survey,
+    zones_are_free,
+)
+from hybrid.model.self_reach import system_without_contact
+from hybrid.model.system import SystemResolution, build_system
+from hybrid.scene.read import scene_text
+from hybrid.scene.system import System
+from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution, with_survey
+from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
+from hybrid.simulation.restore import refused, resolution_from, resolution_tree
+from hybrid.simulation.run_sample import RunSample
+from hybrid.simulation.system_checkpoint import kept_resolution
+from hybrid.simulation.system_run import run_system, static_system
+from hybrid.store.amend import amend_lines
+from hybrid.store.checkpoint import read_before
+from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.format import Field
+from hybrid.store.hdf5_file import opened
+from hybrid.store.named_arrays import Tree
+from hybrid.store.reader import Result, open_result
+from hybrid.store.records import ERROR_ESTIMATE, not_converged_attribute
+
+Samples = dict[str, RunSample]  # of the lines, by name
+
+
+def is_refined(system: System, moves: bool) -> bool:
+    """Whether a system is computed several times, here: an accuracy is asked, or errors of steps that follow the
+
+    motion, of an equilibrium, or of leaving bending out.  (Others of fixed steps: accuracy.system_errors.)
+    """
+    scenes = [system.scene_of(name) for name in system.lines]
+    if not any(wants_errors(x) for x in scenes):
+        return False
+    open_steps = moves and system.require_time().controlled
+    if not moves or open_steps or any(leaves_bending_out(x) for x in system.lines.values()):
+        return True
+    return any(requested_accuracy(x) is not None for x in scenes)
+
+
+class LineController(ErrorController):
+    """The error control of one line; runs to compare with are of all lines, and others compute them."""
+
+    def _compute_comparisons(self, resolution: Resolution) -> None:
+        pass
+
+    def _renew_model_errors(self, estimate: Estimate, resolution: Resolution) -> None:
+        pass
+
+    def _in_shorter_steps(self, coarse: RunSample) -> None:
+        pass
+
+    def takes_model_errors(self, run: RunSample) -> None:
+        """Take what leaving bending out changes from a run, in place of what is known."""
+        assert self.estimate is not None
+        self.estimate.set_model_errors(run)
+        if self.statistics:
+            found = statistics_of(run, self._every)
+            for name, of_statistic in self.statistics.items():
+                of_statistic.set_model_errors(found[name])
+
+
+class SystemPasses:
+    """All runs that the result of a system takes."""
+
+    def __init__(
+        self, system: System, target: Path | io.BytesIO, moves: bool, reporter: ProgressReporter,
+        interrupted: Callable[[], bool], notes: Sequence[tuple[str, str]] = (),
+    ) -> None:  # fmt: skip
+        """moves: whether its motion is computed, else its equilibrium; others as of `run_system`."""
+        self._of_results = notes
+        self.system, self.target, self.moves = system, target, moves
+        self._replacement = Replacement(target)
+        self.reporter, self.interrupted = reporter, interrupted
+        self.scenes = {name: system.scene_of(name) for name in system.lines}
+        time = system.time
+        self._steps_free = moves and time is not None and time.controlled and time.tolerance is None
+        self.controls = {
+            name: LineController(
+                requested_accuracy(scene), Free(mesh_is_free(scene), self._steps_free, zones_are_free(scene)), moves,
+                _elsewhere, _elsewhere, irregular=moves and is_irregular(scene),
+            )
+            for name, scene in self.scenes.items()
+        }  # fmt: skip
+        # Of lines, stretches (m) that were rod at any output: of the last run to compare with, and of the result.
+        self._compared_rods, self._result_rods = dict[str, Stretches](), dict[str, Stretches]()
+        # Whether a line has touched itself in a result: then lines may in runs to compare with; and whether they could.
+        self._touches = self._compared_touching = False
+        points = sum(output_points(scene).s.size for scene in self.scenes.values())
+        self._budget = Budget(len(output_times(next(iter(self.scenes.values())))), points) if moves else None
+        self._costs: list[float] = []  # s of processor time, of all runs
+        self._notes: list[tuple[str, str]] = []  # events of the system
+        self._begin = clock.process_time()
+
+    # --- runs -----------------------------------------------------------------------------------
+
+    def compute(self, source: Path | None = None) -> None:
+        """The result, as fine as it takes, with its errors; source: a result to go on with."""
+        first, result = self._goes_on(source) if source is not None else (None, None)
+        if first is None:
+            resolution = first = self._surveyed(SystemResolution.first(self.system))
+            self._expect(first)
+            result = self._record(resolution, self.target, RESULT, found=_tree(first))
+        else:
+            assert source is not None
+            resolution = kept_resolution(self.system, source)
+        assert result is not None
+        if self._budget is not None:
+            self._budget.spend(list(result.values()))
+        self._compare(first)
+        self._refine(resolution, result)
+
+    def _goes_on(self, source: Path) -> tuple[SystemResolution, Samples]:
+        """What the runs to compare with were computed for, and the result, which is computed to its end."""
+        assert isinstance(self.target, Path)
+        with opened(source) as file:
+            tree = read_before(file)
+        with refused(source):
+            self._costs += [0.0] * any(wants_survey(scene) for scene in self.scenes.values())
+            if set(tree) != set(self.scenes):
+                raise ValueError("it was begun without an accuracy")
+            first = SystemResolution({name: resolution_from(tree[name], x) for name, x in self.scenes.items()})
+        with open_result(source) as found:
+            done = found.status == "complete" and self._is_at_end(found)
+        if not done or source != self.target:
+            return first, self._record(None, self.target, RESULT, source, tree)
+        self._costs.append(0.0)
+        return first, self._samples(self.target, kept_resolution(self.system, source), 0.0)
+
+    def _is_at_end(self, found: Result) -> bool:
+        end = self.system.require_time().duration
+        return len(found.times) > 0 and float(found.times[-1]) >= end * (1.0 - 1e-9)
+
+    def _record(
+        self, resolution: SystemResolution | None, target: Path | io.BytesIO | None, name: str,
+        source: Path | None = None, found: Tree | None = None, system: System | None = None,
+    ) -> Samples:  # fmt: skip
+        """Compute the system, or another; what is compared of its lines.  target: None: it is for that alone."""
+        begin, asked = clock.process_time(), system or self.system
+        if target is None and self.moves and not self._touches:
+            asked = system_without_contact(asked)
+        if self.moves:
+            text, look = scene_text(asked), self.interrupted
+            pending, notes = ERROR_ESTIMATE, self._of_results
+            run = run_system(asked, target, text, self.reporter, look, source, name, resolution, found, pending, notes)
+        else:
+            run = static_system(asked, target, scene_text(asked), resolution, ERROR_ESTIMATE)
+        self._costs.append(clock.process_time() - begin)
+        if target is not None:
+            return self._samples(target, run.resolution, self._costs[-1])
+        recorders = {x.name: x.recorder for x in run.lines}
+        self._compared_rods = {n: x.rods for n, x in recorders.items() if isinstance(x, ComparisonRecorder)}
+        return {x.name: compared(x, run, self._costs[-1]) for x in run.lines}
+
+    def _samples(self, target: Path | io.BytesIO, resolution: SystemResolution, cpu: float) -> Samples:
+        """What is compared of a complete result."""
+        system = build_system(self.system, resolution=resolution)
+        models = dict(zip(system.names, system.models, strict=True))
+        with open_result(target) as result:
+            self._result_rods = {name: rods_of(line) for name, line in result.lines.items()}
+            self._touches |= touch_unasked(self.system, result)
+            return {n: sample_of(line, resolution.lines[n], models[n], cpu) for n, line in result.lines.items()}
+
+    def _surveyed(self, first: SystemResolution) -> SystemResolution:
+        """With cells where a coarse run shows that they should be."""
+        free = [name for name, scene in self.scenes.items() if wants_survey(scene)]
+        if not free:
+            return first
+        coarse = SystemResolution({name: survey_resolution(x) for name, x in first.lines.items()})
+        if not self.moves:
+            coarse = SystemResolution({name: replace(x, every=1) for name, x in coarse.lines.items()})
+        output = self.system.output.model_copy(update={"points": POINTS, "quantities": {}})
+        changed: dict[str, Any] = {"output": output}
+        if self.moves:
+            until = max(survey_duration(self.scenes[name]) for name in free)
+            every = output_interval(self.system)
+            changed["output"] = output.model_copy(update={"every": every})
+            changed["time"] = self.system.require_time().model_copy(update={"duration": until})
+        try:
+            asked = self.system.model_copy(update=changed)
+            runs = self._record(coarse, None, PRE_RUN, system=asked)
+        except ComputationError:
+            return first
+        model, out = build_system(self.system, resolution=coarse), dict(first.lines)
+        for name in free:
+            scene, of_line = self.scenes[name], model.models[model.names.index(name)]
+            s = output_points(asked.scene_of(name)).s
+            survey = Survey.of(scene, first.lines[name], of_line, s, runs[name].values)
+            out[name] = with_survey(first.lines[name], scene, survey)
+        return SystemResolution(out)
+
+    def _expect(self, first: SystemResolution) -> None:
+        if not self.moves:
+            return
+        passes = [(ESTIMATION, x) for x in comparison_resolutions(first.one, self.moves)]
+        self.reporter.expect([(RESULT, first.one), *passes], first.one)
+
+    def _compare(self, first: SystemResolution) -> None:
+        """The runs to compare with, as of `ErrorController`."""
+        self._compared_touching = self._touches
+        every = {name: comparison_resolutions(x, self.moves) for name, x in first.lines.items()}
+        found: list[Samples | None] = [None, None, None]
+        failed = ""
+        for k in (0, 1, 2) if self.moves else (0, 2):  # without steps the second is the first
+            resolution = SystemResolution({name: x[k] for name, x in every.items()})
+            try:
+                found[k] = self._record(resolution, None, ESTIMATION)
+            except ComputationError as error:
+                if not k:
+                    failed = str(error).splitlines()[0]
+                    break
+            if not k and (first_found := found[0]) is not None:
+                found[0] = self._with_model_errors(first_found, resolution, self._compared_rods)
+        for name, control in self.controls.items():
+            control.runs[:] = self._costs
+            control.compare_with([x[name] if x is not None else None for x in found], failed)
+
+    def _with_model_errors(
+        self, runs: Samples, resolution: SystemResolution, rods_then: Mapping[str, Stretches]
+    ) -> Samples:
+        """A run with what leaving bending out changes in it; resolution: of that run; rods_then: m, its rods."""
+        rods, finely, names = as_rods(self.system, resolution, rods_then)
+        found, failed = None, ""
+        try:
+            found = self._record(finely, None, ESTIMATION, system=rods) if names else None
+        except (ComputationError, SceneError) as error:
+            failed = str(error).splitlines()[0]
+        return with_model_errors(runs, found, names, failed)
+
+    def _finer(self, now: SystemResolution, wanted: Mapping[str, Resolution]) -> SystemResolution:
+        """As fine as the finest that is wanted; what the scene gives stays."""
+        cells = max(x.fineness / now.lines[name].fineness for name, x in wanted.items())
+        steps = min(x.step / now.one.step if now.one.step else 1.0 for x in wanted.values())
+        free = {name: cells if mesh_is_free(scene) else 1.0 for name, scene in self.scenes.items()}
+        steps = steps if self._steps_free else 1.0
+        zones = {name: min(x.zones, wanted[name].zones if name in wanted else x.zones) for name, x in now.lines.items()}
+        return SystemResolution(
+            {name: replace(x.coarser(1.0 / free[name], steps), zones=zones[name]) for name, x in now.lines.items()}
+        )
+
+    # --- judgement ------------------------------------------------------------------------------
+
+    def _refine(self, resolution: SystemResolution, result: Samples) -> None:
+        """Finer results until what is asked is met, or more would not help; then errors are written."""
+        stopped: BaseException | None = None
+        why, wanted = "", self._judged(resolution, result)
+        while wanted:
+            finer = self._finer(resolution, wanted)
+            runs, asks = list(result.values()), [finer.lines[name] for name in result]
+            if self._budget is not None and not self._budget.allows(runs, asks):
+                for control in self.controls.values():
+                    control.stopped = self._budget.text(runs, asks)
+                break
+            self._warn_of_costs(result, finer)
+            if runs[0].cpu * times_the_cost(runs[0].resolution, asks[0]) > WORTH_WRITING:
+                self._write(resolution, result, done=False)  # what follows takes long
+            try:
+                found = self._replacement.finer(partial(self._record, finer, name=REFINEMENT, found=_tree(finer)))
+            except ComputationError as error:
+                why = f"a finer run failed: {str(error).splitlines()[0]}"
+                self._notes.append((NOT_KEPT, f"{why}; the result is the one before"))
+                break
+            except KeyboardInterrupt as error:
+                why, stopped = "a finer run was stopped from outside", error
+                break
+            if self._budget is not None:
+                self._budget.spend(list(found.values()))
+            wanted, kept = self._judged_finer(finer, found)
+            if kept:
+                result, resolution = found, finer
+        self._note_missed(why)
+        self._write(resolution, result, done=stopped is None)
+        if stopped is not None:
+            raise stopped
+
+    def _judged_finer(self, resolution: SystemResolution, result: Samples) -> tuple[dict[str, Resolution], bool]:
+        """As `_judged` of a finer result, and whether it takes the place of that before it.
+
+        The last stays beside where the lines together are no better: they are one result.
+        """
+        before = {n: x.judged(True).copied() for n, x in self.controls.items() if x.estimate is not None}
+        kept = True
+        try:
+            wanted = self._judged(resolution, result)
+            if wanted:
+                return wanted, True
+            finer = {n: x.judged(x.irregular) for n, x in self.controls.items() if x.estimate is not None}
+            asked = {n: x.asked for n, x in self.controls.items() if x.asked is not None}
+            found = is_no_better(asked, before, finer)
+            if found is not None:
+                kept = False
+                for name, control in self.controls.items():
+                    if name in before and name in finer:
+                        control.keep(before[name], finer[name])
+                self._notes.append((NOT_KEPT, not_kept_text(next(iter(result.values())), found)))
+            return {}, kept
+        except KeyboardInterrupt:  # in a run to compare with: the result before it stays, and is gone on with
+            kept = False
+            raise
+        finally:
+            self._replacement.settle(kept)
+
+    def _judged(self, resolution: SystemResolution, result: Samples) -> dict[str, Resolution]:
+        """Take over a result; how finely lines that miss what is asked of them want the next one."""
+        known = {name: x.estimate for name, x in self.controls.items()}
+        stricter = {
+            name
+            for name, x in known.items()
+            if x is not None and resolution.lines[name].zones < x.run.resolution.zones
+        }  # fmt: skip
+        anew = any(known[name].differs_in_zones(result[name]) for name in stricter)  # type: ignore[union-attr]
+        anew |= self.moves and self._touches and not self._compared_touching
+        if anew:  # runs to compare with have other zones, or no contact
+            self._compare(resolution)
+        judged = []
+        for name, control in self.controls.items():
+            control.runs[:] = self._costs
+            before = known[name]
+            if (before is None or anew) and control.first_estimate(result[name]):
+                judged.append(name)
+            elif before is not None:
+                control.next_estimate(before, resolution.lines[name], result[name])
+                judged.append(name)
+        self._renew_model_errors(resolution, result, bool(stricter) and not anew)
+        wanted = {name: self.controls[name].next_resolution() for name in judged}
+        return {name: x for name, x in wanted.items() if x is not None}
+
+    def _renew_model_errors(self, resolution: SystemResolution, result: Samples, stricter: bool) -> None:
+        """Where zones of the result are others than those whose model error is known: compare it with rods itself."""
+        estimates = [x.estimate for x in self.controls.values() if x.estimate is not None]
+        if not (estimates and (stricter or any(x.lacks_model_errors() for x in estimates))):
+            return
+        for name, run in self._with_model_errors(result, resolution, self._result_rods).items():
+            control = self.controls[name]
+            control.runs[:] = self._costs
+            if control.estimate is not None:
+                control.takes_model_errors(run)
+
+    def _warn_of_costs(self, result: Samples, finer: SystemResolution) -> None:
+        if not any(kind == COSTLY_ACCURACY for kind, _ in self._notes):
+            self._notes += costly(self._costs, next(iter(result.values())), finer.one)
+
+    def _note_missed(self, why: str) -> None:
+        """Say of each line that misses what is asked; why: more was tried in vain."""
+        for control in self.controls.values():
+            if control.asked is None or control.estimate is None:
+                continue
+            if why:
+                control.without_refinement(why)
+                continue
+            verdict = control.verdict(control.asked)
+            if verdict.ratio > 1.0:
+                control.note_missed(verdict)
+
+    # --- the file -------------------------------------------------------------------------------
+
+    def _write(self, resolution: SystemResolution, result: Samples, done: bool = True) -> None:
+        """Add errors, what was asked and whether it is met to the result of each line; done: as of `amend`."""
+        cpu = clock.process_time() - self._begin
+        fields, values = dict[str, list[Field]](), dict[str, dict[str, np.ndarray]]()
+        attributes, notes = dict[str, dict[str, str | float | int]](), dict[str, list[tuple[str, str]]]()
+        with open_result(self.target) as found:
+            happened = {name: [(e.t, e.kind) for e in line.events] for name, line in found.lines.items()}
+        for name, control in self.controls.items():
+            scene, run = self.scenes[name], result[name]
+            errors = control.estimate.errors if control.estimate is not None else None
+            fields[name] = error_fields(run, errors) if errors is not None else []
+            values[name] = {x.name: np.zeros((len(run.values["position"]), *x.shape)) for x in fields[name]}
+            for cause, quantity, begin, rows in errors.blocks() if errors is not None else ():
+                if (kept := values[name].get(f"errors/{cause}/{quantity}")) is not None:
+                    kept[begin : begin + len(rows)] = rows
+            largest, notes[name] = known(scene, control, run, errors, happened[name])
+            attributes[name] = {**effort(scene, control, run, cpu), **largest}
+            if control.asked is not None:
+                of = [x.errors for x in control.statistics.values()] if control.irregular else [errors]
+                each = figures(control.asked, [x for x in of if x is not None], run)
+                attributes[name]["accuracy_verdicts"] = json.dumps(each)
+        keys = {x for each in attributes.values() for x in each if x.startswith("error_")}
+        of_all: dict[str, float | str] = {
+            x: max(float(each[x]) for each in attributes.values() if x in each) for x in keys
+        }
+        of_all |= {"effort_runs": len(self._costs), "effort_cpu": cpu}
+        of_all |= not_converged_attribute(x.diverging for x in self.controls.values())
+        events = [(kind, f"line {name}: {text}") for name, each in notes.items() for kind, text in each]
+        amend_lines(self.target, fields, values, attributes, of_all, [*self._notes, *events], notes, done)
+
+
+def _elsewhere(resolution: Resolution) -> RunSample:
+    raise AssertionError("all lines are computed together")
+
+
+def _tree(resolution: SystemResolution) -> Tree:
+    return {name: resolution_tree(x) for name, x in resolution.lines.items()}
+
+
+def refine_system(
+    system: System, target: Path | io.BytesIO, reporter: ProgressReporter, interrupted: Callable[[], bool],
+    source: Path | None = None, moves: bool = True, notes: Sequence[tuple[str, str]] = (),
+) -> None:  # fmt: skip
+    """Compute a system as finely as is asked, with its errors; arguments as of `SystemPasses` and `compute`."""
+    SystemPasses(system, target, moves, reporter, interrupted, notes).compute(source)

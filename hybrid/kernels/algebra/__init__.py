@@ -1,0 +1,1 @@
+"""Vectors and rotations, block elimination in space and in a plane, sparse rows."""

@@ -1,0 +1,499 @@
+"""Block rows along s: their layout, their elimination, and the solve back.
+
+Unknowns of block i: the tension of the cell before node i (dT_{i-1}), the node (dr_i),
+the spin of the cell after it (dpsi_i); its equations, in that order: the length of the
+cell before, the balance of the node, the spin of the cell after.  Tension stays an
+unknown, so that stiffness never enters as 1/compliance: an inextensible cell is the
+case ck = 0 and nothing else.  W holds one block row, five rows of
+
+    columns  0..4   5..9   10..14  15..19  20..22   23
+    block    i-2    i-1    i       i+1     r_{i+2}  right-hand side
+
+After elimination  x_i = X_i[8] - X_i[0..4] x_{i+1} - X_i[5..7] dr_{i+2}:  the linear
+relation that everything before node i imposes on what follows (docs/theory.md, 5).
+Rows without bending have four unknowns and take a path of their own in the same march.
+
+Where X has room for more than the X_i, the march keeps there what another right-hand side of the same
+matrix needs (`solve_again`): KEPT numbers a block,
+
+    wide     0..11 balance against (dr, dpsi) of block i-2;  12..36 against block i-1, after that;  37..61 pivot block
+    narrow   0..8 balance against dr_{i-1};  9..11 length;  12..27 pivot block
+    both     62 unit of the length row;  63 whether it is wide;  64..68 right-hand side of the pivot block
+    wide     69..72 length against (dr, dpsi) of block i-2, which tension that makes a torque reaches
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.machine.compile import inner, kernel
+
+SIZE = 5  # unknowns of a block
+WIDTH = 24  # columns of W
+SPAN = 9  # columns of X_i
+ROW = SIZE * SPAN  # numbers of X_i
+KEPT = 73  # numbers kept of a block, for another right-hand side
+# A straight inextensible line that is held at both ends has no compliance: a pivot, as a part of its row, that is none.
+NO_PIVOT = 1e-12
+
+
+@inner
+def subtract_block(W, o, X, i, l1, l2, l3, l4):
+    """Subtract (l1..l3, l4) . (dr, dpsi rows of X_i) from the row of W whose block i+1 begins at column o.
+
+    All is read before anything is written, here and below: that leaves the compiler free.
+    Returns what is to be taken from the right-hand side.
+    """
+    p = i * ROW + SPAN
+    q, s, v = p + SPAN, p + 2 * SPAN, p + 3 * SPAN
+    t0 = W[o] - l1 * X[p] - l2 * X[q] - l3 * X[s] - l4 * X[v]
+    t1 = W[o + 1] - l1 * X[p + 1] - l2 * X[q + 1] - l3 * X[s + 1] - l4 * X[v + 1]
+    t2 = W[o + 2] - l1 * X[p + 2] - l2 * X[q + 2] - l3 * X[s + 2] - l4 * X[v + 2]
+    t3 = W[o + 3] - l1 * X[p + 3] - l2 * X[q + 3] - l3 * X[s + 3] - l4 * X[v + 3]
+    t4 = W[o + 4] - l1 * X[p + 4] - l2 * X[q + 4] - l3 * X[s + 4] - l4 * X[v + 4]
+    t5 = W[o + 6] - l1 * X[p + 5] - l2 * X[q + 5] - l3 * X[s + 5] - l4 * X[v + 5]
+    t6 = W[o + 7] - l1 * X[p + 6] - l2 * X[q + 6] - l3 * X[s + 6] - l4 * X[v + 6]
+    t7 = W[o + 8] - l1 * X[p + 7] - l2 * X[q + 7] - l3 * X[s + 7] - l4 * X[v + 7]
+    W[o], W[o + 1], W[o + 2], W[o + 3], W[o + 4] = t0, t1, t2, t3, t4
+    W[o + 6], W[o + 7], W[o + 8] = t5, t6, t7
+    return l1 * X[p + 8] + l2 * X[q + 8] + l3 * X[s + 8] + l4 * X[v + 8]
+
+
+@inner
+def subtract_tension_row(W, o, X, i, l0):
+    """As `subtract_block` for the dT row of X_i."""
+    p = i * ROW
+    t0, t1, t2 = W[o] - l0 * X[p], W[o + 1] - l0 * X[p + 1], W[o + 2] - l0 * X[p + 2]
+    t3, t4, t5 = W[o + 3] - l0 * X[p + 3], W[o + 4] - l0 * X[p + 4], W[o + 6] - l0 * X[p + 5]
+    t6, t7 = W[o + 7] - l0 * X[p + 6], W[o + 8] - l0 * X[p + 7]
+    W[o], W[o + 1], W[o + 2], W[o + 3], W[o + 4] = t0, t1, t2, t3, t4
+    W[o + 6], W[o + 7], W[o + 8] = t5, t6, t7
+    return l0 * X[p + 8]
+
+
+@inner
+def subtract_row(W, o, p, f):
+    """Subtract f times the row of W at p from the row at o, over the pivot block and all to its right."""
+    t0 = W[o + 10] - f * W[p + 10]
+    t1 = W[o + 11] - f * W[p + 11]
+    t2 = W[o + 12] - f * W[p + 12]
+    t3 = W[o + 13] - f * W[p + 13]
+    t4 = W[o + 14] - f * W[p + 14]
+    t5 = W[o + 15] - f * W[p + 15]
+    t6 = W[o + 16] - f * W[p + 16]
+    t7 = W[o + 17] - f * W[p + 17]
+    t8 = W[o + 18] - f * W[p + 18]
+    t9 = W[o + 19] - f * W[p + 19]
+    t10 = W[o + 20] - f * W[p + 20]
+    t11 = W[o + 21] - f * W[p + 21]
+    t12 = W[o + 22] - f * W[p + 22]
+    t13 = W[o + 23] - f * W[p + 23]
+    W[o + 10] = t0
+    W[o + 11] = t1
+    W[o + 12] = t2
+    W[o + 13] = t3
+    W[o + 14] = t4
+    W[o + 15] = t5
+    W[o + 16] = t6
+    W[o + 17] = t7
+    W[o + 18] = t8
+    W[o + 19] = t9
+    W[o + 20] = t10
+    W[o + 21] = t11
+    W[o + 22] = t12
+    W[o + 23] = t13
+
+
+@inner
+def subtract_solved_row(X, x, y, f):
+    """Subtract f times the solved row of X at y from that at x."""
+    t0 = X[x] - f * X[y]
+    t1 = X[x + 1] - f * X[y + 1]
+    t2 = X[x + 2] - f * X[y + 2]
+    t3 = X[x + 3] - f * X[y + 3]
+    t4 = X[x + 4] - f * X[y + 4]
+    t5 = X[x + 5] - f * X[y + 5]
+    t6 = X[x + 6] - f * X[y + 6]
+    t7 = X[x + 7] - f * X[y + 7]
+    t8 = X[x + 8] - f * X[y + 8]
+    X[x] = t0
+    X[x + 1] = t1
+    X[x + 2] = t2
+    X[x + 3] = t3
+    X[x + 4] = t4
+    X[x + 5] = t5
+    X[x + 6] = t6
+    X[x + 7] = t7
+    X[x + 8] = t8
+
+
+@inner
+def solve_block(W, X, i):
+    """X_i from the five rows of W, with pivoting inside the block; False when the block is singular.
+
+    A cofactor inverse would lose eps (k_axial/k_transverse)^2.
+    """
+    for c in range(SIZE):
+        o = c * WIDTH
+        best, where = abs(W[o + 10 + c]), c
+        for r in range(c + 1, SIZE):
+            if abs(W[r * WIDTH + 10 + c]) > best:
+                best, where = abs(W[r * WIDTH + 10 + c]), r
+        if not best > 0.0:
+            return False
+        if where != c:
+            p = where * WIDTH
+            for j in range(10, WIDTH):
+                W[o + j], W[p + j] = W[p + j], W[o + j]
+        inverse = 1.0 / W[o + 10 + c]
+        for r in range(c + 1, SIZE):
+            subtract_row(W, r * WIDTH, o, W[r * WIDTH + 10 + c] * inverse)
+    for c in range(SIZE - 1, -1, -1):
+        o, x = c * WIDTH, i * ROW + c * SPAN
+        for j in range(SPAN):
+            X[x + j] = W[o + 15 + j]
+        for r in range(c + 1, SIZE):
+            subtract_solved_row(X, x, i * ROW + r * SPAN, W[o + 10 + r])
+        inverse = 1.0 / W[o + 10 + c]
+        for j in range(SPAN):
+            X[x + j] *= inverse
+    return True
+
+
+@inner
+def eliminate_wide(W, X, i, kept, size, couples):
+    """Eliminate block row i (5 unknowns); False when the block is singular.
+
+    kept: where its factors go in X, 0: nowhere; size: unit of its length row; couples: whether that row reaches back to
+    block i-2, as the balance of the node does (kernels.laws.tension_torque).
+    """
+    if kept > 0:
+        for j in range(4):
+            X[kept + 69 + j] = W[1 + j]
+        for r in range(1, 4):
+            for j in range(4):
+                X[kept + 4 * (r - 1) + j] = W[r * WIDTH + 1 + j]
+        X[kept + 62], X[kept + 63] = size, 1.0
+    if i >= 2:
+        for r in range(0 if couples else 1, 4):  # the balance of the node reaches back to block i-2
+            o = r * WIDTH
+            W[o + 23] -= subtract_block(W, o + 5, X, i - 2, W[o + 1], W[o + 2], W[o + 3], W[o + 4])
+    if kept > 0:
+        for r in range(SIZE):
+            for j in range(SIZE):
+                X[kept + 12 + SIZE * r + j] = W[r * WIDTH + 5 + j]
+    if i >= 1:
+        for r in range(SIZE):
+            o = r * WIDTH
+            l0 = W[o + 5]
+            W[o + 23] -= subtract_block(W, o + 10, X, i - 1, W[o + 6], W[o + 7], W[o + 8], W[o + 9])
+            if l0 != 0.0:  # the balance of the node, through block i-2
+                W[o + 23] -= subtract_tension_row(W, o + 10, X, i - 1, l0)
+    if kept > 0:
+        for r in range(SIZE):
+            for j in range(SIZE):
+                X[kept + 37 + SIZE * r + j] = W[r * WIDTH + 10 + j]
+            X[kept + 64 + r] = W[r * WIDTH + 23]
+    return solve_block(W, X, i)
+
+
+@inner
+def eliminate_narrow(row, hck, gap, back, L, D, ahead, U, b, X, i, kept, size):
+    """Eliminate a block of four unknowns (dT_{i-1}, dr_i); X_i keeps zeros elsewhere.  kept, size: as of a wide one.
+
+    length   row.(dr_i - dr_{i-1}) - hck dT_{i-1} = gap
+    balance  L dr_{i-1} + back dT_{i-1} + D dr_i + ahead dT_i + U dr_{i+1} = b
+    """
+    # rows of dT_{i-1}, dr_i | dT_i, dr_{i+1} | right-hand side
+    A0 = (-hck, row[0], row[1], row[2], gap)
+    A1 = (back[0], D[0], D[1], D[2], b[0])
+    A2 = (back[1], D[3], D[4], D[5], b[1])
+    A3 = (back[2], D[6], D[7], D[8], b[2])
+    if i >= 1:
+        p = (i - 1) * ROW + SPAN
+        q, s = p + SPAN, p + 2 * SPAN
+        A0 = subtract_node_rows(A0, (-row[0], -row[1], -row[2]), X, p, q, s)
+        A1 = subtract_node_rows(A1, (L[0], L[1], L[2]), X, p, q, s)
+        A2 = subtract_node_rows(A2, (L[3], L[4], L[5]), X, p, q, s)
+        A3 = subtract_node_rows(A3, (L[6], L[7], L[8]), X, p, q, s)
+    if kept > 0:
+        for j in range(9):
+            X[kept + j] = L[j]
+        X[kept + 9], X[kept + 10], X[kept + 11] = row
+        X[kept + 12], X[kept + 13], X[kept + 14], X[kept + 15] = A0[0], A0[1], A0[2], A0[3]
+        X[kept + 16], X[kept + 17], X[kept + 18], X[kept + 19] = A1[0], A1[1], A1[2], A1[3]
+        X[kept + 20], X[kept + 21], X[kept + 22], X[kept + 23] = A2[0], A2[1], A2[2], A2[3]
+        X[kept + 24], X[kept + 25], X[kept + 26], X[kept + 27] = A3[0], A3[1], A3[2], A3[3]
+        X[kept + 62], X[kept + 63] = size, 0.0
+        X[kept + 64], X[kept + 65], X[kept + 66], X[kept + 67] = A0[4], A1[4], A2[4], A3[4]
+    B0 = (A0[0], A0[1], A0[2], A0[3], 0.0, 0.0, 0.0, 0.0, A0[4])
+    B1 = (A1[0], A1[1], A1[2], A1[3], ahead[0], U[0], U[1], U[2], A1[4])
+    B2 = (A2[0], A2[1], A2[2], A2[3], ahead[1], U[3], U[4], U[5], A2[4])
+    B3 = (A3[0], A3[1], A3[2], A3[3], ahead[2], U[6], U[7], U[8], A3[4])
+    # Gauss-Jordan in registers; a pivot of zero makes everything infinite or NaN, which is seen at the end
+    if abs(B1[0]) > abs(B0[0]):
+        B0, B1 = B1, B0
+    if abs(B2[0]) > abs(B0[0]):
+        B0, B2 = B2, B0
+    if abs(B3[0]) > abs(B0[0]):
+        B0, B3 = B3, B0
+    f = 1.0 / B0[0]
+    C0 = (f * B0[1], f * B0[2], f * B0[3], f * B0[4], f * B0[5], f * B0[6], f * B0[7], f * B0[8])
+    C1, C2, C3 = eliminate8(B1, C0), eliminate8(B2, C0), eliminate8(B3, C0)
+    if abs(C2[0]) > abs(C1[0]):
+        C1, C2 = C2, C1
+    if abs(C3[0]) > abs(C1[0]):
+        C1, C3 = C3, C1
+    f = 1.0 / C1[0]
+    D1 = (f * C1[1], f * C1[2], f * C1[3], f * C1[4], f * C1[5], f * C1[6], f * C1[7])
+    D0, D2, D3 = eliminate7(C0, D1), eliminate7(C2, D1), eliminate7(C3, D1)
+    if abs(D3[0]) > abs(D2[0]):
+        D2, D3 = D3, D2
+    f = 1.0 / D2[0]
+    E2 = (f * D2[1], f * D2[2], f * D2[3], f * D2[4], f * D2[5], f * D2[6])
+    E0, E1, E3 = eliminate6(D0, E2), eliminate6(D1, E2), eliminate6(D3, E2)
+    f = 1.0 / E3[0]
+    F3 = (f * E3[1], f * E3[2], f * E3[3], f * E3[4], f * E3[5])
+    big = 0.0
+    big += store_row(X, i * ROW, eliminate5(E0, F3))
+    big += store_row(X, i * ROW + SPAN, eliminate5(E1, F3))
+    big += store_row(X, i * ROW + 2 * SPAN, eliminate5(E2, F3))
+    big += store_row(X, i * ROW + 3 * SPAN, F3)
+    return big < math.inf
+
+
+@inner
+def eliminate8(b, c):
+    f = b[0]
+    return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3],
+            b[5] - f * c[4], b[6] - f * c[5], b[7] - f * c[6], b[8] - f * c[7])  # fmt: skip
+
+
+@inner
+def eliminate7(b, c):
+    f = b[0]
+    return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3],
+            b[5] - f * c[4], b[6] - f * c[5], b[7] - f * c[6])  # fmt: skip
+
+
+@inner
+def eliminate6(b, c):
+    f = b[0]
+    return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3], b[5] - f * c[4], b[6] - f * c[5])
+
+
+@inner
+def eliminate5(b, c):
+    f = b[0]
+    return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3], b[5] - f * c[4])
+
+
+@inner
+def store_row(X, x, row):
+    X[x], X[x + 1], X[x + 2], X[x + 3] = row[0], row[1], row[2], row[3]
+    X[x + 8] = row[4]
+    return abs(row[4])
+
+
+@inner
+def subtract_node_rows(A, m, X, p, q, s):
+    """A - m . (rows of dr_{i-1} in X), over dT_{i-1}, dr_i and the right-hand side."""
+    return (
+        A[0] - m[0] * X[p] - m[1] * X[q] - m[2] * X[s],
+        A[1] - m[0] * X[p + 1] - m[1] * X[q + 1] - m[2] * X[s + 1],
+        A[2] - m[0] * X[p + 2] - m[1] * X[q + 2] - m[2] * X[s + 2],
+        A[3] - m[0] * X[p + 3] - m[1] * X[q + 3] - m[2] * X[s + 3],
+        A[4] - m[0] * X[p + 8] - m[1] * X[q + 8] - m[2] * X[s + 8],
+    )
+
+
+@kernel
+def substitute(X, x):
+    """Solve back from the end: x (N+1, 5) receives dT, dr and dpsi of every block; False if one is not finite."""
+    n = x.shape[0] - 1
+    y = (0.0, 0.0, 0.0, 0.0, 0.0)
+    z0, z1, z2 = 0.0, 0.0, 0.0
+    total = 0.0
+    for i in range(n, -1, -1):
+        p = i * ROW
+        for k in range(SIZE):
+            q = p + SPAN * k
+            x[i, k] = (
+                X[q + 8]
+                - X[q] * y[0] - X[q + 1] * y[1] - X[q + 2] * y[2] - X[q + 3] * y[3] - X[q + 4] * y[4]
+                - X[q + 5] * z0 - X[q + 6] * z1 - X[q + 7] * z2
+            )  # fmt: skip
+            total += abs(x[i, k])
+        z0, z1, z2 = y[1], y[2], y[3]
+        y = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4])
+    return total < math.inf
+
+
+@inner
+def solve4(A0, A1, A2, A3):
+    """Four unknowns from four rows (five numbers, the last the right-hand side), with pivoting."""
+    if abs(A1[0]) > abs(A0[0]):
+        A0, A1 = A1, A0
+    if abs(A2[0]) > abs(A0[0]):
+        A0, A2 = A2, A0
+    if abs(A3[0]) > abs(A0[0]):
+        A0, A3 = A3, A0
+    i0 = 1.0 / A0[0]
+    f1, f2, f3 = i0 * A1[0], i0 * A2[0], i0 * A3[0]
+    B1 = (A1[1] - f1 * A0[1], A1[2] - f1 * A0[2], A1[3] - f1 * A0[3], A1[4] - f1 * A0[4])
+    B2 = (A2[1] - f2 * A0[1], A2[2] - f2 * A0[2], A2[3] - f2 * A0[3], A2[4] - f2 * A0[4])
+    B3 = (A3[1] - f3 * A0[1], A3[2] - f3 * A0[2], A3[3] - f3 * A0[3], A3[4] - f3 * A0[4])
+    if abs(B2[0]) > abs(B1[0]):
+        B1, B2 = B2, B1
+    if abs(B3[0]) > abs(B1[0]):
+        B1, B3 = B3, B1
+    i1 = 1.0 / B1[0]
+    f2, f3 = i1 * B2[0], i1 * B3[0]
+    C2 = (B2[1] - f2 * B1[1], B2[2] - f2 * B1[2], B2[3] - f2 * B1[3])
+    C3 = (B3[1] - f3 * B1[1], B3[2] - f3 * B1[2], B3[3] - f3 * B1[3])
+    if abs(C3[0]) > abs(C2[0]):
+        C2, C3 = C3, C2
+    i2 = 1.0 / C2[0]
+    f3 = i2 * C3[0]
+    x3 = (C3[2] - f3 * C2[2]) / (C3[1] - f3 * C2[1])
+    x2 = i2 * (C2[2] - C2[1] * x3)
+    x1 = i1 * (B1[3] - B1[1] * x2 - B1[2] * x3)
+    x0 = i0 * (A0[4] - A0[1] * x1 - A0[2] * x2 - A0[3] * x3)
+    return x0, x1, x2, x3
+
+
+@inner
+def solve5(X, k, W, x, i):
+    """x_i from the pivot block kept at X[k:] and the right-hand side in x_i; W: room for 30 numbers."""
+    for r in range(SIZE):
+        for j in range(SIZE):
+            W[6 * r + j] = X[k + SIZE * r + j]
+        W[6 * r + 5] = x[i, r]
+    for c in range(SIZE):
+        best, where = abs(W[7 * c]), c
+        for r in range(c + 1, SIZE):
+            if abs(W[6 * r + c]) > best:
+                best, where = abs(W[6 * r + c]), r
+        if where != c:
+            for j in range(c, 6):
+                W[6 * c + j], W[6 * where + j] = W[6 * where + j], W[6 * c + j]
+        for r in range(c + 1, SIZE):
+            f = W[6 * r + c] / W[7 * c]
+            for j in range(c + 1, 6):
+                W[6 * r + j] -= f * W[6 * c + j]
+    for c in range(SIZE - 1, -1, -1):
+        y = W[6 * c + 5]
+        for j in range(c + 1, SIZE):
+            y -= W[6 * c + j] * x[i, j]
+        x[i, c] = y / W[7 * c]
+
+
+@inner
+def solve_last(X, k, x, n):
+    """The last block of a line whose end is joined to a point, held there: x_n from its right-hand side in x_n."""
+    a, rest = X[k + 37] if X[k + 63] > 0.0 else X[k + 12], 0.0
+    for j in range(1, 4):
+        rest = max(rest, abs(X[k + 37 + j] if X[k + 63] > 0.0 else X[k + 12 + j]))
+    x[n, 0] = x[n, 0] / a if abs(a) > NO_PIVOT * rest else 0.0
+    for j in range(1, SIZE):
+        x[n, j] = 0.0
+
+
+@inner
+def solve_forward(X, W, b, x, joined):
+    """The first half of `solve_with`: what another right-hand side makes of that of every X_i, into x."""
+    n = x.shape[0] - 1
+    for i in range(n + 1):
+        k = (n + 1) * ROW + i * KEPT
+        size = X[k + 62]
+        if X[k + 63] > 0.0:
+            x[i, 0], x[i, 4] = size * b[i, 0], b[i, 4]
+            if i >= 2:
+                for j in range(4):
+                    x[i, 0] -= X[k + 69 + j] * x[i - 2, j + 1]
+            for r in range(3):
+                y = b[i, r + 1]
+                if i >= 2:
+                    for j in range(4):
+                        y -= X[k + 4 * r + j] * x[i - 2, j + 1]
+                x[i, r + 1] = y
+            if i >= 1:
+                for r in range(SIZE):
+                    y = x[i, r]
+                    for j in range(SIZE):
+                        y -= X[k + 12 + SIZE * r + j] * x[i - 1, j]
+                    x[i, r] = y
+            if not (joined and i == n):
+                solve5(X, k + 37, W, x, i)
+        else:
+            b0, b1, b2, b3 = size * b[i, 0], b[i, 1], b[i, 2], b[i, 3]
+            if i >= 1:
+                y0, y1, y2 = x[i - 1, 1], x[i - 1, 2], x[i - 1, 3]
+                b0 += X[k + 9] * y0 + X[k + 10] * y1 + X[k + 11] * y2
+                b1 -= X[k] * y0 + X[k + 1] * y1 + X[k + 2] * y2
+                b2 -= X[k + 3] * y0 + X[k + 4] * y1 + X[k + 5] * y2
+                b3 -= X[k + 6] * y0 + X[k + 7] * y1 + X[k + 8] * y2
+            if joined and i == n:
+                x[n, 0] = b0
+            else:
+                x[i, 0], x[i, 1], x[i, 2], x[i, 3] = solve4(
+                    (X[k + 12], X[k + 13], X[k + 14], X[k + 15], b0),
+                    (X[k + 16], X[k + 17], X[k + 18], X[k + 19], b1),
+                    (X[k + 20], X[k + 21], X[k + 22], X[k + 23], b2),
+                    (X[k + 24], X[k + 25], X[k + 26], X[k + 27], b3),
+                )
+            x[i, 4] = 0.0
+    if joined:
+        solve_last(X, (n + 1) * ROW + n * KEPT, x, n)
+
+
+@inner
+def solve_backward(X, x):
+    """The second half of `solve_with`, in place."""
+    n = x.shape[0] - 1
+    total = 0.0
+    for i in range(n - 1, -1, -1):
+        p = i * ROW
+        if X[(n + 1) * ROW + i * KEPT + 63] > 0.0:
+            for j in range(SIZE):
+                q = p + SPAN * j
+                y = x[i, j]
+                for m in range(SIZE):
+                    y -= X[q + m] * x[i + 1, m]
+                if i + 2 <= n:
+                    y -= X[q + 5] * x[i + 2, 1] + X[q + 6] * x[i + 2, 2] + X[q + 7] * x[i + 2, 3]
+                x[i, j] = y
+                total += abs(y)
+        else:
+            y0, y1, y2, y3 = x[i + 1, 0], x[i + 1, 1], x[i + 1, 2], x[i + 1, 3]
+            for j in range(SIZE - 1):
+                q = p + SPAN * j
+                y = x[i, j] - X[q] * y0 - X[q + 1] * y1 - X[q + 2] * y2 - X[q + 3] * y3
+                x[i, j] = y
+                total += abs(y)
+    return total < math.inf
+
+
+@inner
+def solve_with(X, W, b, x, joined):
+    """As `solve_again`; joined: the end is joined to a point (kernels.junctions.joined_lines), and is held there."""
+    solve_forward(X, W, b, x, joined)
+    return solve_backward(X, x)
+
+
+@inner
+def add_to_right(X, part, x):
+    """Add a part of what `solve_forward` has left in x to the right-hand sides of all X_i."""
+    for i in range(x.shape[0]):
+        for k in range(SIZE):
+            X[i * ROW + k * SPAN + SPAN - 1] += part * x[i, k]
+
+
+@kernel
+def solve_again(X, W, b, x):
+    """Solve with another right-hand side b (N+1, 5) and the factors that the last march kept behind the X_i.
+
+    b: length of the cell before (m), balance of the node (N), spin of the cell after (N m), as the march assembles
+    them; of a held node nothing, because it stays.  x as in `substitute`; False if it is not finite.
+    """
+    return solve_with(X, W, b, x, False)

@@ -1,0 +1,1 @@
+"""Contact of a line with itself: pairs that are near, law, friction, the solve."""

@@ -1,0 +1,335 @@
+"""Contact of a line with itself in a step: pairs of pieces that are near, limits of corrections, forces and friction.
+
+A run calls `contact_task` by its address, so that lines without self-contact compile none of it: before a try of a step
+(PREPARE), to shorten what Newton's method predicts and corrects so that no two strands pass through each other (LIMIT),
+to put the forces of contact into a correction (TOUCH; kernels.contact.self_contact_solve), and for the energy at the end (FINISH).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.contact.self_contact_energy import puts_energy_in
+from hybrid.kernels.contact.self_contact_friction import (
+    GRIP,
+    add_held,
+    hold_point,
+    keep_grips,
+    link_grips,
+)
+from hybrid.kernels.contact.self_contact_law import FORCE, WX, WY, P, Q, add_gradient
+from hybrid.kernels.contact.self_contact_pairs import (
+    CALMS,
+    ENERGY,
+    FADED,
+    FADES,
+    FRESH,
+    FRICTION,
+    GRIPS,
+    HORIZON,
+    KEEPS,
+    LOOKS,
+    OVERFLOW,
+    PART,
+    POINTS,
+    PRODUCTS,
+    QUIET,
+    REMESHED,
+    RETURNS,
+    ROLLS,
+    SINCE,
+    SLIP_WORK,
+    SPEED,
+    STALE,
+    STORED,
+    TRIED,
+    TRIES,
+    WIDEST,
+    Contact,
+    blank_contact,
+    farthest_from_mean,
+    find_points,
+    keep_pairs,
+    limit,
+    look_ahead,
+)
+from hybrid.kernels.contact.self_contact_solve import solve_contact
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.references import reader
+from hybrid.kernels.state.books import (
+    CLOCK_SIZE,
+    CONTROLLED,
+    COUNT_SIZE,
+    NOW,
+    PARITY,
+    QUOTA,
+    RATES,
+    RHO,
+    RHO_BEFORE,
+    STEP_BEFORE,
+    TRY_END,
+)
+from hybrid.kernels.state.report import FORCE_A, NET_A, REPORT_SIZE, SELF_FRICTION_WORK
+from hybrid.kernels.state.state import Ends, Floats, Line, State, Work, blank_line, blank_state, no_ends, no_work
+from hybrid.kernels.step.generalized_alpha import before_fixed, radius_of_step, scheme
+from hybrid.kernels.step.newton import ASKED, FIND, FINISH, GAIN, LIMIT, NEAR, PREPARE, RADIUS, REST, TOUCH
+
+
+class ContactJob(NamedTuple):
+    """Arguments of the entry: two states in turn as kernels.run.run has them, its clock and counts."""
+
+    line: Line
+    ends: Ends
+    old: State
+    new: State
+    work: Work
+    clock: Floats
+    counts: NDArray[np.int64]
+    call: NDArray[np.int64]
+    contact: Contact
+    touch: Floats  # (3, N+1) as kernels.state.books.Books has it, and so have
+    velocity: Floats  # (2, 3) m/s
+    power: Floats  # (2, RATES) W
+    report: Floats  # (3, REPORT_SIZE)
+
+
+def blank_contact_job() -> ContactJob:
+    """A job with the types that every one has."""
+    state = blank_state(1)
+    clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+    call = np.zeros(3, np.int64)
+    return ContactJob(
+        blank_line(1), no_ends(), state, state, no_work(), clock, counts, call, blank_contact(1),
+        np.zeros((3, 2)), np.zeros((2, 3)), np.zeros((2, RATES)), np.zeros((3, REPORT_SIZE)),
+    )  # fmt: skip
+
+
+read = reader(blank_contact_job())
+
+
+# --- friction -------------------------------------------------------------------------------------
+
+
+@inner
+def keep_last(contact, now):
+    """What the last try has left of friction is kept if that was the step that led to the time now."""
+    numbers, counts = contact.numbers, contact.counts
+    if numbers[SINCE] == now:
+        counts[GRIPS], numbers[STORED], counts[REMESHED] = counts[FRESH], numbers[TRIED], 0
+        for k in range(counts[FRESH]):
+            for j in range(GRIP):
+                contact.grips[k, j] = contact.fresh[k, j]
+    numbers[SINCE] = math.nan
+    link_grips(contact, counts[GRIPS])
+
+
+@inner
+def radius(contact, clock, near):
+    """Spectral radius at infinity of a step: 0 near contact, and from there back to that of the run."""
+    if near:
+        return 0.0
+    part = (contact.numbers[QUIET] - CALMS) / RETURNS
+    return clock[RHO] * min(max(part, 0.0), 1.0)
+
+
+@inner
+def find_spins(line, contact, clock, near, old, new, u):
+    """contact.x = shifts of nodes and spins of cells in the step that is tried."""
+    x, dt = contact.x, clock[TRY_END] - clock[NOW]
+    rho = radius_of_step(radius(contact, clock, near), clock[STEP_BEFORE], clock[RHO_BEFORE], dt)
+    cv = scheme(rho, clock[STEP_BEFORE], clock[RHO_BEFORE], dt).cv
+    for i in range(u.shape[0]):
+        for k in range(3):
+            x[i, k] = u[i, k]
+        x[i, 3] = 0.0
+        if i < line.h.shape[0] and line.spin[i] and contact.numbers[ROLLS] > 0.0:
+            ahead = dt * old.wa[i]
+            x[i, 3] = dt * old.w[i] + 0.5 * dt * ahead + (new.w[i] - old.w[i] - ahead) / cv
+
+
+@inner
+def hold_points(line, contact):
+    """Friction of all points of contact at contact.x."""
+    numbers = contact.numbers
+    other = contact.counts[REMESHED] != 0
+    numbers[SLIP_WORK], numbers[TRIED] = 0.0, 0.0
+    for k in range(contact.counts[POINTS]):
+        work, energy = hold_point(
+            line, contact, numbers[FRICTION], contact.points[k], contact.holds[k], numbers[TRIES], other
+        )
+        numbers[SLIP_WORK] += work
+        numbers[TRIED] += energy
+
+
+@inner
+def rest_points(line, contact):
+    """Friction of a state in which no step is tried."""
+    for i in range(contact.x.shape[0]):
+        for k in range(4):
+            contact.x[i, k] = 0.0
+    hold_points(line, contact)
+
+
+# --- entry ----------------------------------------------------------------------------------------
+
+
+@inner
+def place(contact, old, u):
+    """The nodes of a configuration."""
+    for i in range(u.shape[0]):
+        for k in range(3):
+            contact.at[i, k] = old.r[i, k] + u[i, k]
+    contact.counts[STALE] = 1
+
+
+@inner
+def prepare(line, ends, contact, old, u, now, dt):
+    """Before a try of a step of dt from the time now: how much of the prediction is safe, whether it comes to contact.
+
+    The size of the law follows the speed of what meets.  While anything touches it fades to what still moves: what is
+    at rest must not depend on how fast it came there.  It does not grow then, which would put energy in.
+    """
+    numbers, speed = contact.numbers, contact.numbers[SPEED]
+    for i in range(u.shape[0]):
+        for k in range(3):
+            u[i, k] = 0.0
+            contact.move[i, k] = dt * old.v[i, k] + 0.5 * dt * dt * old.a[i, k]
+    place(contact, old, u)
+    keep_pairs(line, ends, contact)
+    find_points(line, ends, contact, 0.0)
+    numbers[SPEED] = 0.0
+    limit(line, ends, contact, 0.0)
+    near = numbers[SPEED] > 0.0 or contact.counts[POINTS] > 0
+    seen = numbers[SPEED] / dt
+    if contact.counts[POINTS] > 0:
+        since = now - numbers[FADED] if numbers[FADED] < now else 0.0
+        faded = speed / (1.0 + speed * since / (FADES * numbers[WIDEST]))
+        seen = min(speed, max(faded, seen))
+    numbers[SPEED], numbers[FADED] = seen, now
+    return near
+
+
+@inner
+def charge(line, contact, counts):
+    """Take what contact has cost in the try, in steps of the line, from those that the call may still make.
+
+    A look takes about as long as a cell of a step does, and a product a part of its solution.
+    """
+    cells = line.h.shape[0]
+    cost = contact.counts[LOOKS] + contact.counts[PRODUCTS] * max(cells // 4, 1)
+    counts[QUOTA] -= cost // cells
+    contact.counts[LOOKS], contact.counts[PRODUCTS] = cost % cells, 0
+
+
+@inner
+def press(line, contact, touch, row):
+    """Force across per length, N/m, at the nodes, into a row of `touch`: of both strands, as the seabed has it."""
+    n = line.h.shape[0]
+    for i in range(n + 1):
+        touch[row, i] = 0.0
+    for k in range(contact.counts[POINTS]):
+        point = contact.points[k]
+        p, q = int(point[P]), int(point[Q])
+        for j in range(3):
+            touch[row, p - 1 + j] -= point[WX + j] * point[FORCE]
+            touch[row, q - 1 + j] -= point[WY + j] * point[FORCE]
+    for i in range(n + 1):
+        a, b = line.s[max(i - 1, 0)], line.s[min(i + 1, n)]
+        touch[row, i] *= 2.0 / (b - a)
+
+
+@inner
+def load_ends(line, ends, contact, report):
+    """Add the force of contact on the end nodes that are held to what the report says these bear."""
+    y, n = contact.y, line.h.shape[0]
+    for k in range(2):
+        for j in range(3):
+            y[k * n, j] = 0.0
+    for i in range(contact.counts[POINTS]):
+        point = contact.points[i]
+        p, q = int(point[P]), int(point[Q])
+        if min(p, q) == 1 or max(p, q) == n - 1:
+            add_gradient(point, y)
+            if contact.numbers[FRICTION] > 0.0:
+                add_held(line, contact, i, y)
+    for k in range(2):
+        if ends.held[k] != 0:
+            for j in range(3):
+                report[FORCE_A + 3 * k + j] -= y[k * n, j]
+                report[NET_A + 3 * k + j] -= y[k * n, j]
+
+
+@kernel
+def contact_task(table):
+    """What is asked by `call[ASKED]` of the configuration old.r + work.u.
+
+    PREPARE, LIMIT: the part of the prediction, of the correction work.x, that is safe; TOUCH: 1, or 0 where it fails; FIND: points of contact
+    alone, which kernels.junctions.system_contact solves for;
+    RADIUS: the spectral radius of the step; GAIN: 1 where the try has put energy in and has to be repeated in halves,
+    else 0; FINISH, and REST, where no step is tried: the energy of contact, J.
+    """
+    job = read(table)
+    line, ends, contact, work, phase = job.line, job.ends, job.contact, job.work, job.call[ASKED]
+    old, new = (job.new, job.old) if job.counts[PARITY] else (job.old, job.new)
+    rubs, numbers = contact.numbers[FRICTION] > 0.0, contact.numbers
+    if rubs and phase in (PREPARE, REST):
+        keep_last(contact, job.clock[NOW])
+    if phase == PREPARE:
+        near = prepare(line, ends, contact, old, work.u, job.clock[NOW], job.clock[TRY_END] - job.clock[NOW])
+        job.call[NEAR] = 1 if near else 0
+        numbers[TRIES] += 1.0
+        if near:
+            numbers[QUIET] = 0.0
+        return contact.numbers[PART]
+    if phase == RADIUS:
+        clock, rho = job.clock, radius(contact, job.clock, job.call[NEAR] != 0)
+        if not job.counts[CONTROLLED]:
+            clock[STEP_BEFORE], clock[RHO_BEFORE] = before_fixed(
+                clock[TRY_END] - clock[NOW], clock[STEP_BEFORE], clock[RHO_BEFORE], rho
+            )
+        return rho
+    if phase == GAIN:
+        if not puts_energy_in(line, ends, contact, job, job.clock, old, new, work):
+            return 0.0
+        numbers[QUIET] -= 1.0
+        return 1.0
+    if phase == LIMIT:
+        speed = contact.numbers[SPEED]
+        for i in range(work.x.shape[0]):
+            for k in range(3):
+                contact.move[i, k] = work.x[i, 1 + k]
+        limit(line, ends, contact, farthest_from_mean(work.u))
+        contact.numbers[SPEED] = speed
+        return contact.numbers[PART]
+    place(contact, old, work.u)
+    if phase == REST:
+        numbers[KEEPS] = -1.0
+    find_points(line, ends, contact, farthest_from_mean(work.u))
+    if rubs and phase == REST:
+        rest_points(line, contact)
+    elif rubs:
+        find_spins(line, contact, job.clock, job.call[NEAR] != 0, old, new, work.u)
+        hold_points(line, contact)
+    if phase == FINISH and rubs:
+        keep_grips(line, contact, contact.counts[POINTS])
+        contact.counts[FRESH], numbers[SINCE] = contact.counts[POINTS], job.clock[TRY_END]
+        work.report[SELF_FRICTION_WORK] = numbers[SLIP_WORK] + numbers[TRIED] - numbers[STORED]
+    if numbers[HORIZON] > 0.0 and phase in (FINISH, REST):
+        look_ahead(line, ends, contact, new.v if phase == FINISH else old.v)
+    if phase == FINISH:
+        numbers[QUIET] += 1.0
+        load_ends(line, ends, contact, work.report)
+    if phase in (FINISH, REST):
+        press(line, contact, job.touch, 2 if phase == FINISH else 0)
+    if phase == FIND:
+        return 1.0
+    if phase != TOUCH:
+        return numbers[ENERGY] + (numbers[TRIED] if rubs else 0.0)
+    charge(line, contact, job.counts)
+    if contact.counts[OVERFLOW] or (contact.counts[POINTS] > 0 and not solve_contact(line, ends, contact, work)):
+        return 0.0
+    return 1.0

@@ -1,0 +1,144 @@
+"""Energy that a step of a line that touches itself puts in though no work accounts for it: such a step is repeated."""
+
+from __future__ import annotations
+
+from hybrid.kernels.algebra.rotations import dot, frame, get3, get9, sub
+from hybrid.kernels.contact.self_contact_pairs import (
+    BALANCE,
+    BEGUN,
+    CALMS,
+    ENERGY,
+    GAINED,
+    HAD,
+    HAS,
+    LARGEST,
+    LED,
+    NARROWEST,
+    QUIET,
+    RETURNS,
+    STALE,
+    TRIED_BALANCE,
+    farthest_from_mean,
+)
+from hybrid.kernels.laws.cell import chord, turning
+from hybrid.kernels.laws.element import strain_of_element
+from hybrid.kernels.laws.tension_torque import couples
+from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.powers import find_powers
+from hybrid.kernels.march.zone_torque import twist_energy
+from hybrid.kernels.state.books import NOW, RATES, STORED, TRY_END
+from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, SEABED
+from hybrid.kernels.state.report import (
+    CONTACT_WORK,
+    FRICTION_WORK,
+    SEABED_ENERGY,
+    SELF_CONTACT_ENERGY,
+    SELF_FRICTION_WORK,
+    STRETCH_ENERGY,
+)
+
+# Energy that a step may put in, and all steps together, as a part of the largest energy so far.
+MOST_GAIN = 5e-4
+# Diameters that the fastest part moves, beside the mean, in the shortest step that is halved.
+LEAST_TRAVEL = 0.05
+
+
+@inner
+def energy_of_line(line, ends, state):
+    """Energies, J, of motion and bending, and of stretch, of a line in which tension makes no torque.
+
+    As `kernels.march.energies.observe` has them, without the moments, which take most of its time.
+    """
+    n = line.h.shape[0]
+    moving, bent, twisted, longer = 0.0, 0.0, 0.0, 0.0
+    before = after = get9(ends.frame, 0)
+    for i in range(n + 1):
+        vi = get3(state.v, i)
+        moving += 0.5 * line.mass[i] * dot(vi, vi)
+        if i < n:
+            d, l, il = chord(get3(state.e, i))
+            if line.ck[i] > 0.0 and not line.bits & AXIAL_LAW:
+                more = l - line.h[i]
+                longer += 0.5 * more * more / (line.h[i] * line.ck[i])
+            if line.bits & ROTARY and line.spin[i]:
+                d1, _ = turning(d, il, sub(get3(state.v, i + 1), vi), 0.0)
+                moving += 0.5 * line.rotary[i] * dot(d1, d1) + 0.5 * line.polar[i] * state.w[i] * state.w[i]
+            after = frame(get3(state.a1, i), d)
+        else:
+            after = get9(ends.frame, 1)
+        if line.element[i]:
+            kb, k0 = get3(line.kb, i), get3(line.k0, i)
+            x = sub(strain_of_element(before, after, kb, k0), k0)
+            bent += 0.5 * (kb[0] * x[0] * x[0] + kb[1] * x[1] * x[1])
+            twisted += 0.5 * kb[2] * x[2] * x[2]
+        before = after
+    return moving + bent + twisted, longer
+
+
+@inner
+def energy_without_weight(line, ends, contact, state, report):
+    """Energy, J, of motion, strain and contact of a state with its report; contact.at and .move are used as room."""
+    if couples(line):
+        parts = contact.energy
+        observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, contact.at, contact.move, parts)
+        contact.counts[STALE] = 1
+        held, stretched = parts[0] + parts[1] + parts[2], parts[3]
+    else:
+        held, stretched = energy_of_line(line, ends, state)
+    if line.bits & AXIAL_LAW:
+        stretched = report[STRETCH_ENERGY]
+    return held + stretched + twist_energy(line, state) + report[SELF_CONTACT_ENERGY]
+
+
+@inner
+def work_of_try(line, ends, contact, velocity, before, state, work, clock):
+    """Work, J, of a try as kernels.march.powers books it, with that of weight; and by how much that may be off.
+
+    before: W, powers at its beginning.  What a power that only rises, or falls, does in between is known but for half
+    of its change, and is missed by as much in long steps: of weight, in a heavy line, by far more than contact puts in.
+    """
+    report, done, missed = work.report, work.report[SELF_FRICTION_WORK], 0.0
+    half = 0.5 * (clock[TRY_END] - clock[NOW])
+    find_powers(line, ends, velocity, state, report, contact.power)
+    for k in range(RATES):
+        done += half * (before[k] + contact.power[k])
+        missed += half * abs(contact.power[k] - before[k])
+    if line.bits & SEABED:
+        done += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock[STORED] + report[FRICTION_WORK]
+    for i in range(work.u.shape[0]):
+        for k in range(3):
+            done += line.force[i, k] * work.u[i, k]
+    return done, missed
+
+
+@inner
+def puts_energy_in(line, ends, contact, books, clock, old, new, work):
+    """Whether the try has put in so much energy that it has to be repeated in halves.
+
+    A line that is not near contact, and whose vibrations from it have been damped, is not judged: contact has excited
+    nothing.
+    books: velocity (2, 3) m/s of the ends, powers (2, RATES) W and reports of the state now, as kernels.state.books has them.
+    """
+    numbers = contact.numbers
+    if not (numbers[QUIET] < CALMS + RETURNS or numbers[ENERGY] > 0.0):
+        return False
+    if numbers[BEGUN] != clock[NOW]:
+        if numbers[LED] == clock[NOW]:
+            numbers[HAD], numbers[BALANCE] = numbers[HAS], numbers[TRIED_BALANCE]
+        else:
+            numbers[HAD] = energy_without_weight(line, ends, contact, old, books.report[0])
+        numbers[BEGUN] = clock[NOW]
+        numbers[LARGEST] = max(numbers[LARGEST], numbers[HAD])
+    numbers[HAS] = energy_without_weight(line, ends, contact, new, work.report)
+    numbers[LED] = clock[TRY_END]
+    done, missed = work_of_try(line, ends, contact, books.velocity, books.power[0], new, work, clock)
+    most, gain = MOST_GAIN * numbers[LARGEST], numbers[HAS] - numbers[HAD] - done
+    gain = max(gain - missed, 0.0) if gain > 0.0 else min(gain + missed, 0.0)
+    numbers[TRIED_BALANCE] = numbers[BALANCE] + gain
+    if gain <= most and (gain <= 0.0 or numbers[TRIED_BALANCE] <= most):
+        return False
+    if not farthest_from_mean(work.u) > LEAST_TRAVEL * numbers[NARROWEST]:
+        return False
+    numbers[GAINED] += 1.0
+    return True

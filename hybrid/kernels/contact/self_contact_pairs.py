@@ -1,0 +1,467 @@
+"""Contact of a line with itself: the pairs of its pieces that are near, limits of corrections, points of contact."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
+from hybrid.kernels.contact.self_contact_friction import GRIP, HOLD
+from hybrid.kernels.contact.self_contact_law import (
+    INNER,
+    OUTER,
+    POINT,
+    P,
+    Q,
+    end_factors,
+    foot,
+    note_point,
+    spline_point,
+    spline_weights,
+)
+from hybrid.kernels.contact.self_distance import (
+    DEPTH,
+    LEAF,
+    NEIGHBOURS,
+    TURNED,
+    box_distance,
+    fill_parents,
+    nearest_feet,
+    runs_on,
+)
+from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.state.books import RATES
+from hybrid.kernels.state.state import Floats
+from hybrid.kernels.step.newton import LIMIT, TOUCH
+
+WINDOW = 2.7  # diameters of arc length within which pieces are neighbours: TURNED of it is more than OUTER
+SAFE = 0.8  # part of the way to where the force is infinite that a correction may go
+IMPACT = 25.0  # size of the law over m' v^2 in a collision at the speed v
+# The speed of the law falls by half while strands go so many diameters at it: a collision takes two or three.
+FADES = 10.0
+# Vibrations that contact leaves are damped for so many steps after it (rho_inf 0), then less and less over so many more:
+# of 400 random throws one or two in a hundred then gain energy; without, or with 4 and 8, those that gain are more.
+CALMS, RETURNS = 10.0, 20.0
+MOST_PRODUCTS = 60  # of GMRES
+PAIRS_OF_NODE = 8  # that are kept at most
+LEAST_KEEPS = 0.05  # diameters, of KEEPS
+FAR = 2.0  # diameters within which parts of the line are near each other
+LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of what is only foreseen
+(
+    PART,  # of a correction that is safe
+    ENERGY,  # J, of contact
+    SPEED,  # m/s, of the law: with which pieces met; it fades while they touch
+    WIDEST,
+    NARROWEST,  # m, diameters
+    REACH,  # m, distance within which pairs are looked at
+    FRICTION,  # coefficient of friction; 0: none
+    STORED,  # J, in the travels that are kept
+    TRIED,  # J, in those that the last try has led to
+    SINCE,  # s, time that the try led to
+    SLIP_WORK,  # J, of friction in the step
+    HORIZON,  # s, for which it is foreseen how near the line comes to itself; 0: not asked
+    KEEPS,  # m, for displacements up to which the pairs kept are all that there are; < 0: none are kept
+    ROLLS,  # 1 where friction turns strands about themselves; 0: nothing holds their spin, and it is left out
+    FADED,  # s, time up to which SPEED has faded; nan: it has not begun
+    QUIET,  # steps since the last one that was near contact
+    TRIES,  # of steps so far
+    BEGUN, LED,  # s, times of the states of HAD and HAS; nan: of none
+    HAD, HAS,  # J, energy before the step, without that of weight, and where the try has led
+    BALANCE, TRIED_BALANCE,  # J, put in by steps so far though no work accounts for it, likewise
+    LARGEST,  # J, the largest of HAD so far
+    GAINED,  # tries that were given up because they put energy in
+) = range(25)  # fmt: skip
+NUMBERS = 25
+WATCH, COLLECT = -1, -2  # beside LIMIT and TOUCH: how near the line is to itself; keep pairs for all of a step
+# Of `counts`.  STALE: the tree is of other positions; REMESHED: the grips are of other cells; LOOKS: sample points, and
+# parts of pieces, that were looked at in the try; PRODUCTS: of GMRES in it.
+POINTS, NODES, OVERFLOW, GRIPS, FRESH, PAIRS, STALE, REMESHED, LOOKS, PRODUCTS = range(10)
+COUNTS = 10
+FEW = 16  # sample points of a piece that are looked at without asking which may be within reach
+
+
+class Contact(NamedTuple):
+    """What contact works with; N cells, pieces 1 to N-1."""
+
+    width: Floats  # (N+1,) m, diameters of pieces
+    samples: NDArray[np.int64]  # (N+1,) sample points of pieces
+    stiff: Floats  # (N+1,) N, least size of the law
+    mass: Floats  # (N+1,) kg/m
+    numbers: Floats  # (NUMBERS,)
+    counts: NDArray[np.int64]  # (COUNTS,)
+    tree: Floats  # as kernels.contact.self_distance has it, of pieces
+    stack: NDArray[np.int64]
+    pairs: NDArray[np.int64]  # (L, 2) pieces that may come near each other in a step
+    at: Floats  # (N+1, 3) m, nodes
+    move: Floats  # (N+1, 3) m, the correction that is to be limited
+    near: Floats  # (N+1,) FAR diameters over the distance to other parts of the line, now or foreseen
+    points: Floats  # (C, POINT)
+    nodes: NDArray[np.int64]  # (N+1,) those in contact
+    marks: NDArray[np.int64]  # (N+1,) 1 for those
+    energy: Floats  # (5,) J, as kernels.march.energies has it
+    power: Floats  # (RATES,) W, where the try has led
+    x: Floats  # (N+1, 4) m, displacements in products, and spins of cells, rad
+    y: Floats  # (N+1, 4) N, N m
+    b: Floats  # (N+1, 5) right-hand side
+    z: Floats  # (N+1, 5) its solution
+    basis: Floats  # (MOST_PRODUCTS + 1, 3 (N+1)); of spins as well with friction: 4 (N+1)
+    hessenberg: Floats  # (MOST_PRODUCTS + 1, MOST_PRODUCTS + 4): columns, rotations (2), right-hand side, solution
+    # with friction (kernels.contact.self_contact_friction); else no rows
+    holds: Floats  # (C, HOLD) of the points of contact
+    grips: Floats  # (C, GRIP) what has been kept of the last step
+    fresh: Floats  # (C, GRIP) what is kept if the try is taken
+    heads: NDArray[np.int64]  # (N+1,) the first grip of a piece, -1: none
+    links: NDArray[np.int64]  # (C,) the next of the same piece
+
+
+def blank_contact(cells: int, points: int = 1, friction: bool = False) -> Contact:
+    """For a line of so many cells, with room for so many points of contact, with friction or without."""
+    z, nodes = np.zeros, cells + 1
+    held, leaves = points if friction else 0, 1
+    while leaves * LEAF < nodes:
+        leaves *= 2
+    return Contact(
+        width=z(nodes), samples=np.ones(nodes, np.int64), stiff=z(nodes), mass=z(nodes), numbers=z(NUMBERS),
+        counts=z(COUNTS, np.int64), tree=z((2 * leaves, 12)), stack=z((4 * DEPTH, 2), np.int64),
+        pairs=z((PAIRS_OF_NODE * nodes, 2), np.int64), at=z((nodes, 3)),
+        move=z((nodes, 3)), near=z(nodes), points=z((points, POINT)), nodes=z(nodes, np.int64), marks=z(nodes, np.int64), energy=z(5), power=z(RATES),
+        x=z((nodes, 4)), y=z((nodes, 4)), b=z((nodes, 5)), z=z((nodes, 5)),
+        basis=z((MOST_PRODUCTS + 1, (4 if friction else 3) * nodes)), hessenberg=z((MOST_PRODUCTS + 1, MOST_PRODUCTS + 4)),
+        holds=z((held, HOLD)), grips=z((held, GRIP)), fresh=z((held, GRIP)), heads=z(nodes, np.int64),
+        links=z(held, np.int64),
+    )  # fmt: skip
+
+
+@inner
+def hull(r, p, k):
+    """Coordinate k of the three points in whose triangle piece p lies."""
+    first = r[p - 1, k] if p == 1 else 0.5 * (r[p - 1, k] + r[p, k])
+    last = r[p + 1, k] if p == r.shape[0] - 2 else 0.5 * (r[p, k] + r[p + 1, k])
+    return first, r[p, k], last
+
+
+@inner
+def fill_tree(tree, r):
+    """Boxes of the pieces of nodes at r, a leaf for LEAF nodes."""
+    leaves, n = tree.shape[0] // 2, r.shape[0] - 1
+    for q in range(leaves):
+        leaf = leaves + q
+        for k in range(3):
+            tree[leaf, k], tree[leaf, 6 + k] = math.inf, math.inf
+            tree[leaf, 3 + k], tree[leaf, 9 + k] = -math.inf, -math.inf
+        for i in range(max(q * LEAF, 1), min((q + 1) * LEAF, n)):
+            for j in range(2):
+                e = sub(get3(r, i + j), get3(r, i + j - 1))
+                f = 1.0 / math.sqrt(dot(e, e))
+                for k in range(3):
+                    t = f * e[k]
+                    tree[leaf, 6 + k], tree[leaf, 9 + k] = min(tree[leaf, 6 + k], t), max(tree[leaf, 9 + k], t)
+            for k in range(3):
+                a, b, c = hull(r, i, k)
+                tree[leaf, k] = min(tree[leaf, k], min(a, min(b, c)))
+                tree[leaf, 3 + k] = max(tree[leaf, 3 + k], max(a, max(b, c)))
+    fill_parents(tree)
+
+
+@inner
+def hull_distance(r, p, q):
+    """Distance, m, of the boxes of two pieces: at most their own, and the less the more a line lies across the axes."""
+    square = 0.0
+    for k in range(3):
+        a, b, c = hull(r, p, k)
+        d, e, f = hull(r, q, k)
+        x = max(min(a, min(b, c)) - max(d, max(e, f)), min(d, min(e, f)) - max(a, max(b, c)))
+        if x > 0.0:
+            square += x * x
+    return math.sqrt(square)
+
+
+@inner
+def chord_of(r, p):
+    """Where piece p begins and ends, and how far, m, it is from the line between these at most."""
+    x, y, z = hull(r, p, 0), hull(r, p, 1), hull(r, p, 2)
+    a, b, c = (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
+    bend = sub(add(a, c), scale(2.0, b))
+    return a, c, 0.25 * math.sqrt(dot(bend, bend))
+
+
+@inner
+def least_distance(r, p, q):
+    """What two pieces are apart at least, m, however the line lies."""
+    a, c, bow = chord_of(r, p)
+    b, d, other = chord_of(r, q)
+    along, across = sub(c, a), sub(d, b)
+    x, y = nearest_feet(a, along, b, across)
+    away = sub(add(a, scale(x, along)), add(b, scale(y, across)))
+    return math.sqrt(dot(away, away)) - bow - other
+
+
+@inner
+def may_touch(line, ends, width, p, q):
+    """Whether two pieces, p before q, are no neighbours, neither along the line nor from one held end to the other."""
+    n = line.h.shape[0]
+    between, window = line.s[q] - line.s[p], WINDOW * 0.5 * (width[p] + width[q])
+    if not (q - p > NEIGHBOURS and between > window):
+        return False
+    if ends.held[0] != 0 and ends.held[1] != 0:
+        return p + n - q > NEIGHBOURS and line.s[p] - line.s[0] + line.s[n] - line.s[q] > window
+    return True
+
+
+@inner
+def largest_difference(move, p, q):
+    """Largest difference of the displacements of the nodes of two pieces."""
+    square = 0.0
+    for i in range(p - 1, p + 2):
+        for j in range(q - 1, q + 2):
+            d = sub(get3(move, i), get3(move, j))
+            square = max(square, dot(d, d))
+    return math.sqrt(square)
+
+
+@inner
+def samples_in_block(count):
+    """Sample points of a piece that are looked at together: all of few, else the root of their number."""
+    return count if count <= FEW else math.ceil(math.sqrt(count))
+
+
+@inner
+def is_beyond(r, n, p, begin, end, q, reach):
+    """Whether the part of piece p between two places on it is farther than `reach`, m, from piece q, however these lie."""
+    a, c = spline_point(r, p, spline_weights(n, p, begin)), spline_point(r, p, spline_weights(n, p, end))
+    b = spline_point(r, p, spline_weights(n, p, 0.5 * (begin + end)))
+    bend = sub(b, scale(0.5, add(a, c)))
+    first, last, bow = chord_of(r, q)
+    along, across = sub(c, a), sub(last, first)
+    x, y = nearest_feet(a, along, first, across)
+    away = sub(add(a, scale(x, along)), add(first, scale(y, across)))
+    return math.sqrt(dot(away, away)) - bow - math.sqrt(dot(bend, bend)) > reach
+
+
+@inner
+def next_sample(contact, r, n, p, q, g, reach):
+    """The sample point of piece p from g on that may be within `reach`, m, of piece q; their number: none is."""
+    count = contact.samples[p]
+    block = samples_in_block(count)
+    if block < count:
+        while g < count and g % block == 0 and is_beyond(r, n, p, g / count, min(g + block, count) / count, q, reach):
+            g += block
+    contact.counts[LOOKS] += 1
+    return min(g, count)
+
+
+@inner
+def limit_part(line, ends, contact, p, q, width, moved):
+    """Shorten the part so that no sample point of piece p comes too near piece q by a difference of `moved`, m."""
+    r, numbers = contact.at, contact.numbers
+    n, count = line.h.shape[0], contact.samples[p]
+    reach, g = INNER * width + numbers[PART] * moved / SAFE, -1
+    while True:
+        g = next_sample(contact, r, n, p, q, g + 1, reach)
+        if g == count:
+            return
+        x = spline_point(r, p, spline_weights(n, p, (g + 0.5) / count))
+        v, side = foot(r, q, x)
+        if side != 0 and 0 < q + side < n:
+            beside = q + side
+            if not may_touch(line, ends, contact.width, min(p, beside), max(p, beside)):
+                continue
+        away = sub(x, spline_point(r, q, spline_weights(n, q, v)))
+        room = max(SAFE * (math.sqrt(dot(away, away)) - INNER * width), 0.0)
+        if room < numbers[PART] * moved:
+            numbers[PART] = room / moved
+
+
+@inner
+def gather(line, contact, p, q, width):
+    """Keep the points of contact of piece p with their feet on piece q."""
+    r, counts, numbers = contact.at, contact.counts, contact.numbers
+    n, count, nearest = line.h.shape[0], contact.samples[p], OUTER * width
+    a, b = end_factors(n, p)
+    fast = IMPACT * numbers[SPEED] * numbers[SPEED]
+    size = 0.5 * (max(contact.stiff[p], fast * contact.mass[p]) + max(contact.stiff[q], fast * contact.mass[q]))
+    g = -1
+    while True:
+        g = next_sample(contact, r, n, p, q, g + 1, nearest)
+        if g == count:
+            return
+        u = (g + 0.5) / count
+        x = spline_point(r, p, spline_weights(n, p, u))
+        v, side = foot(r, q, x)
+        if side != 0 and 0 < q + side < n:
+            continue
+        away = sub(x, spline_point(r, q, spline_weights(n, q, v)))
+        if not dot(away, away) < nearest * nearest:
+            continue
+        if counts[POINTS] == contact.points.shape[0]:
+            counts[OVERFLOW] = 1
+            return
+        row = contact.points[counts[POINTS]]
+        length = 0.5 * ((1.0 - u) * a * line.h[p - 1] + u * b * line.h[p]) / count  # half: each strand has points
+        numbers[ENERGY] += note_point(r, p, u, q, v, side != 0, width, size, length, row)
+        counts[POINTS] += 1
+
+
+@inner
+def note_near(contact, p, q, width):
+    """Keep how near the cells after nodes p and q are, now, and at the end of contact.move if they close in."""
+    r, near = contact.at, contact.near
+    a, b = get3(r, p), get3(r, q)
+    d, f = sub(get3(r, p + 1), a), sub(get3(r, q + 1), b)
+    x, y = nearest_feet(a, d, b, f)
+    away = sub(add(a, scale(x, d)), add(b, scale(y, f)))
+    apart = math.sqrt(dot(away, away))
+    left = apart - largest_difference(contact.move, p, q)
+    ratio = min(FAR * width / left, FORESEEN) if left > 0.0 else FORESEEN
+    ratio = max(ratio, FAR * width / apart)
+    for i in (p, p + 1, q, q + 1):
+        near[i] = max(near[i], ratio)
+
+
+@inner
+def keep_pair(contact, p, q, room):
+    """Keep a pair if displacements up to KEEPS use up its room, m."""
+    numbers, count = contact.numbers, contact.counts[PAIRS]
+    if not room < 2.0 * numbers[KEEPS]:
+        return
+    if count == contact.pairs.shape[0]:
+        numbers[KEEPS] = -1.0
+        return
+    contact.pairs[count, 0], contact.pairs[count, 1] = p, q
+    contact.counts[PAIRS] = count + 1
+
+
+@inner
+def look_at_pair(line, ends, contact, phase, p, q):
+    """What there is to do for pieces p < q whose boxes may be near: limit what is asked, or keep points of contact."""
+    if not may_touch(line, ends, contact.width, p, q):
+        return
+    apart, width = hull_distance(contact.at, p, q), 0.5 * (contact.width[p] + contact.width[q])
+    if phase == COLLECT:
+        keep_pair(contact, p, q, apart - OUTER * width)
+    elif phase == WATCH:
+        note_near(contact, p, q, width)
+    elif phase == LIMIT:
+        moved = largest_difference(contact.move, p, q)
+        if SAFE * (apart - INNER * width) < contact.numbers[PART] * moved:
+            limit_part(line, ends, contact, p, q, width, moved)
+            limit_part(line, ends, contact, q, p, width, moved)
+        if apart - moved < OUTER * width and least_distance(contact.at, p, q) - moved < OUTER * width:
+            contact.numbers[SPEED] = max(contact.numbers[SPEED], moved)
+    elif apart < OUTER * width:
+        gather(line, contact, p, q, width)
+        gather(line, contact, q, p, width)
+
+
+@inner
+def look_at_pairs(line, ends, contact, phase):
+    """Look at all pairs of pieces whose boxes are within REACH, in an order that does not depend on anything else.
+
+    Pairs that are kept for displacements up to KEEPS are found where no cone of tangents is so narrow that these could
+    not bring it together.
+    """
+    tree, stack, n = contact.tree, contact.stack, line.h.shape[0]
+    leaves, reach, turned = tree.shape[0] // 2, contact.numbers[REACH], TURNED
+    if phase == COLLECT:
+        turned = max(TURNED, (OUTER + 2.0 * contact.numbers[KEEPS] / contact.numbers[NARROWEST]) / WINDOW)
+    if contact.counts[STALE]:
+        fill_tree(tree, contact.at)
+        contact.counts[STALE] = 0
+    stack[0, 0], stack[0, 1], top = 1, 1, 1
+    while top > 0:
+        top -= 1
+        a, b = stack[top, 0], stack[top, 1]
+        if (b - a <= 1 and turned < 1.0 and runs_on(tree, a, b, turned)) or not box_distance(tree, a, b) < reach:
+            continue
+        if a >= leaves:
+            first, second = (a - leaves) * LEAF, (b - leaves) * LEAF
+            for p in range(max(first, 1), min(first + LEAF, n)):
+                for q in range(max(second, p + NEIGHBOURS + 1), min(second + LEAF, n)):
+                    look_at_pair(line, ends, contact, phase, p, q)
+            continue
+        c, d = 2 * a, 2 * b
+        stack[top, 0], stack[top, 1] = c, d
+        stack[top + 1, 0], stack[top + 1, 1] = c + 1, d + 1
+        stack[top + 2, 0], stack[top + 2, 1] = c, d + 1
+        top += 3
+        if a != b:
+            stack[top, 0], stack[top, 1] = c + 1, d
+            top += 1
+
+
+@inner
+def farthest_from_mean(move):
+    """The largest difference of a displacement, m, from their mean."""
+    n = move.shape[0]
+    m0, m1, m2 = 0.0, 0.0, 0.0
+    for i in range(n):
+        m0, m1, m2 = m0 + move[i, 0], m1 + move[i, 1], m2 + move[i, 2]
+    mean, square = (m0 / n, m1 / n, m2 / n), 0.0
+    for i in range(n):
+        d = sub(get3(move, i), mean)
+        square = max(square, dot(d, d))
+    return math.sqrt(square)
+
+
+@inner
+def keep_pairs(line, ends, contact):
+    """Keep the pairs that twice the displacements contact.move, or a part of a diameter, may bring together."""
+    numbers = contact.numbers
+    numbers[KEEPS] = max(2.0 * farthest_from_mean(contact.move), LEAST_KEEPS * numbers[WIDEST])
+    numbers[REACH], contact.counts[PAIRS] = OUTER * numbers[WIDEST] + 2.0 * numbers[KEEPS], 0
+    look_at_pairs(line, ends, contact, COLLECT)
+
+
+@inner
+def look_at_kept(line, ends, contact, phase, gone):
+    """Look at the pairs that are kept, or where displacements have gone farther, m, at all."""
+    if gone <= contact.numbers[KEEPS]:
+        for k in range(contact.counts[PAIRS]):
+            look_at_pair(line, ends, contact, phase, contact.pairs[k, 0], contact.pairs[k, 1])
+    else:
+        look_at_pairs(line, ends, contact, phase)
+
+
+@inner
+def limit(line, ends, contact, gone):
+    """The part of contact.move that is safe; SPEED becomes the largest difference of what may come into contact, m.
+
+    gone: m, largest displacement in the step so far.
+    """
+    numbers, far = contact.numbers, farthest_from_mean(contact.move) / SAFE
+    numbers[REACH] = OUTER * numbers[WIDEST] + 2.0 * far
+    numbers[PART] = 1.0
+    look_at_kept(line, ends, contact, LIMIT, gone + far)
+
+
+@inner
+def look_ahead(line, ends, contact, v):
+    """How near nodes are to other parts of the line, or will be within HORIZON at the velocities v, m/s."""
+    numbers, move = contact.numbers, contact.move
+    for i in range(v.shape[0]):
+        contact.near[i] = 0.0
+        for k in range(3):
+            move[i, k] = numbers[HORIZON] * v[i, k]
+    numbers[REACH] = FAR / LEAST_NEAR * numbers[WIDEST] + 2.0 * farthest_from_mean(move)
+    look_at_pairs(line, ends, contact, WATCH)
+
+
+@inner
+def find_points(line, ends, contact, gone):
+    """The points of contact, their energy, and the nodes in contact; gone: m, largest displacement in the step."""
+    counts, numbers = contact.counts, contact.numbers
+    for k in range(counts[NODES]):
+        contact.marks[contact.nodes[k]] = 0
+    counts[POINTS], counts[NODES], counts[OVERFLOW], numbers[ENERGY] = 0, 0, 0, 0.0
+    numbers[REACH] = OUTER * numbers[WIDEST]
+    look_at_kept(line, ends, contact, TOUCH, gone)
+    for k in range(counts[POINTS]):
+        for of in (P, Q):
+            p = int(contact.points[k, of])
+            for i in range(p - 1, p + 2):
+                if contact.marks[i] == 0:
+                    contact.marks[i], contact.nodes[counts[NODES]] = 1, i
+                    counts[NODES] += 1

@@ -1,0 +1,184 @@
+"""Contact of a line with itself in a correction of Newton's method: GMRES with the kept factors of the line.
+
+Contact couples nodes that are no neighbours, which the block rows along s do not know.  It is added to their solution
+x0 with the kept factors of the matrix A: (A - H) x = b + g is x = A^-1 b + A^-1 (g + H x), of which only the nodes in
+contact are unknown; GMRES finds them, each product with A^-1 being one more substitution.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.block_elimination import solve_again
+from hybrid.kernels.contact.self_contact_friction import add_held, add_held_product
+from hybrid.kernels.contact.self_contact_law import add_gradient, add_product
+from hybrid.kernels.contact.self_contact_pairs import FRICTION, MOST_PRODUCTS, NODES, POINTS, PRODUCTS, ROLLS
+from hybrid.kernels.machine.compile import inner
+
+SOLVED = 1e-7  # residual of GMRES, as a part of the first
+
+
+@inner
+def find_forces(line, contact, with_gradient):
+    """contact.y = H x + g of the nodes in contact, g where asked."""
+    held_on = contact.numbers[FRICTION] > 0.0
+    x, y = contact.x, contact.y
+    for k in range(contact.counts[NODES]):
+        i = contact.nodes[k]
+        y[i, 0], y[i, 1], y[i, 2], y[i, 3] = 0.0, 0.0, 0.0, 0.0
+    for k in range(contact.counts[POINTS]):
+        add_product(contact.points[k], x, y)
+        if with_gradient:
+            add_gradient(contact.points[k], y)
+        if held_on:
+            add_held_product(line, contact, k, x, y)
+            if with_gradient:
+                add_held(line, contact, k, y)
+
+
+@inner
+def respond(line, ends, contact, work, with_gradient):
+    """contact.z = A^-1 (H x + g), g where asked; x of the nodes in contact."""
+    find_forces(line, contact, with_gradient)
+    y, b, count = contact.y, contact.b, contact.counts[NODES]
+    last = y.shape[0] - 1
+    for k in range(count):
+        i = contact.nodes[k]
+        held = (i == 0 and ends.held[0] != 0) or (i == last and ends.held[1] != 0)
+        for j in range(3):
+            b[i, 1 + j] = 0.0 if held else y[i, j]
+        b[i, 4] = y[i, 3] * contact.numbers[ROLLS]
+    good = solve_again(work.X, work.W, b, contact.z)
+    for k in range(count):
+        i = contact.nodes[k]
+        b[i, 1], b[i, 2], b[i, 3], b[i, 4] = 0.0, 0.0, 0.0, 0.0
+    return good
+
+
+@inner
+def unknowns(contact):
+    """Unknowns of a node in contact: its place, with friction the spin of the cell after it too, as a way."""
+    return 4 if contact.numbers[FRICTION] > 0.0 and contact.numbers[ROLLS] > 0.0 else 3
+
+
+@inner
+def length_of(contact, j, i):
+    """Factor, m, of unknown j of node i: a spin (rad) counts by the radius."""
+    return 0.5 * contact.width[i] if j == 3 else 1.0
+
+
+@inner
+def next_vector(contact, k):
+    """Orthogonalise basis vector k + 1 against those before; its length goes into the column k."""
+    V, H, size = contact.basis, contact.hessenberg, unknowns(contact) * contact.counts[NODES]
+    for j in range(k + 1):
+        s = 0.0
+        for i in range(size):
+            s += V[j, i] * V[k + 1, i]
+        H[j, k] = s
+        for i in range(size):
+            V[k + 1, i] -= s * V[j, i]
+    s = 0.0
+    for i in range(size):
+        s += V[k + 1, i] * V[k + 1, i]
+    s = math.sqrt(s)
+    H[k + 1, k] = s
+    if s > 0.0:
+        for i in range(size):
+            V[k + 1, i] /= s
+
+
+@inner
+def rotate_column(H, k):
+    """Givens rotations of column k of the least-squares problem; the residual that is left."""
+    cos, sin, rhs = MOST_PRODUCTS, MOST_PRODUCTS + 1, MOST_PRODUCTS + 2
+    for j in range(k):
+        a, b = H[j, k], H[j + 1, k]
+        H[j, k], H[j + 1, k] = H[j, cos] * a + H[j, sin] * b, H[j, cos] * b - H[j, sin] * a
+    a, b = H[k, k], H[k + 1, k]
+    size = math.sqrt(a * a + b * b)
+    H[k, cos], H[k, sin] = a / size, b / size
+    H[k, k], H[k + 1, k] = size, 0.0
+    H[k + 1, rhs] = -H[k, sin] * H[k, rhs]
+    H[k, rhs] = H[k, cos] * H[k, rhs]
+    return abs(H[k + 1, rhs])
+
+
+@inner
+def take_vector(contact, column):
+    """contact.x = the basis vector of a column."""
+    x, V, per = contact.x, contact.basis, unknowns(contact)
+    for k in range(contact.counts[NODES]):
+        i = contact.nodes[k]
+        for j in range(per):
+            x[i, j] = V[column, per * k + j] / length_of(contact, j, i)
+
+
+@inner
+def find_solution(line, ends, contact, work):
+    """GMRES: contact.x = the correction of the nodes in contact; False: not finite.
+
+    It begins at zero, where the residual is A^-1 (b + g), which falls as Newton converges.  The correction x0 of a line
+    without contact stays large, as the force of contact is left out of b: what SOLVED leaves of it would never fall.
+    """
+    x, z, V, H = contact.x, contact.z, contact.basis, contact.hessenberg
+    count, per, rhs, solution = contact.counts[NODES], unknowns(contact), MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
+    for k in range(count):
+        i = contact.nodes[k]
+        for j in range(per):
+            x[i, j] = 0.0
+    if not respond(line, ends, contact, work, True):
+        return False
+    s = 0.0
+    for k in range(count):
+        i = contact.nodes[k]
+        for j in range(per):
+            y = (work.x[i, 1 + j] + z[i, 1 + j]) * length_of(contact, j, i)
+            V[0, per * k + j] = y
+            s += y * y
+    s = math.sqrt(s)
+    for i in range(MOST_PRODUCTS + 1):
+        H[i, rhs] = 0.0
+    H[0, rhs] = s
+    done = 0
+    if s > 0.0:
+        for i in range(per * count):
+            V[0, i] /= s
+        left = s
+        while done < min(MOST_PRODUCTS, per * count) and left > SOLVED * s:
+            take_vector(contact, done)
+            if not respond(line, ends, contact, work, False):
+                return False
+            for k in range(count):
+                i = contact.nodes[k]
+                for j in range(per):
+                    V[done + 1, per * k + j] = V[done, per * k + j] - z[i, 1 + j] * length_of(contact, j, i)
+            next_vector(contact, done)
+            left = rotate_column(H, done)
+            done += 1
+            contact.counts[PRODUCTS] += 1
+    for j in range(done - 1, -1, -1):
+        s = H[j, rhs]
+        for k in range(j + 1, done):
+            s -= H[j, k] * H[k, solution]
+        H[j, solution] = s / H[j, j]
+    for k in range(count):
+        i = contact.nodes[k]
+        for m in range(per):
+            s = 0.0
+            for j in range(done):
+                s += H[j, solution] * V[j, per * k + m]
+            x[i, m] = s / length_of(contact, m, i)
+    return True
+
+
+@inner
+def solve_contact(line, ends, contact, work):
+    """Put contact into the correction work.x of a line without it; False if it is not finite."""
+    if not find_solution(line, ends, contact, work) or not respond(line, ends, contact, work, True):
+        return False
+    z = contact.z
+    for i in range(work.x.shape[0]):
+        for j in range(5):
+            work.x[i, j] += z[i, j]
+    return True

@@ -1,0 +1,1 @@
+"""Points and bodies, and the lines that are joined there."""

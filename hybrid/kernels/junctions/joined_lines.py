@@ -1,0 +1,280 @@
+"""One line of a system, as its ends feel it: the eliminated line as a linear relation between its two ends.
+
+The march leaves of a line (kernels.algebra.block_elimination) a relation  x_i = b_i - A_i x_{i+1} - C_i dr_{i+2}  and, of an end
+that is joined to a point, the last block not yet solved: four rows, the length of the last cell and the balance of the
+last node, for the tension of that cell and the point.  Where the start is joined as well, its shift is an unknown, and
+where a rod is clamped to what turns, so is that turn:  with q = (shift of the start, turn there, turn at the end),
+
+    x_i = b_i - A_i x_{i+1} - C_i dr_{i+2} + D_i q,
+
+the D_i from the same factors (`carry_start`, `carry_turn`), and what the start bears, its balance, which the march has
+replaced by its place, and its moment, is carried to the other end as a linear functional of what follows
+(`carry_functional`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, SPAN, solve4, solve5
+from hybrid.kernels.junctions.carried_frames import (
+    BY_CHORD,
+    BY_SPIN,
+    BY_TURN,
+    FORCE_BY_TURN,
+    MOMENT,
+    SPIN_BY_TURN,
+)
+from hybrid.kernels.machine.compile import inner
+
+# Columns of D: of the shift of the start, of the turn there, of the turn at the end.
+SHIFT, TURN, END_TURN, COLUMNS = 0, 3, 6, 9
+# Numbers of a functional: of block i, of block i+1, of r_{i+2}, what is left when all are zero, of q.
+NEXT, AFTER, LEFT, OF = 5, 10, 13, 14
+FUNCTIONAL = OF + COLUMNS
+
+
+@inner
+def last_block(X, n):
+    """Where in X the factors of the last block are."""
+    base = (n + 1) * ROW
+    return base if X.shape[0] - base == KEPT else base + n * KEPT
+
+
+@inner
+def end_row(X, k, r, c):
+    """The number of the last block in row r, for dT (c = 0) or dr (1 to 3); k: where its factors are in X."""
+    return X[k + 37 + SIZE * r + c] if X[k + 63] > 0.0 else X[k + 12 + 4 * r + c]
+
+
+@inner
+def carry_block(X, W, x, i, o, n, solved):
+    """D_i of one coordinate from those before, in row o of x, where its right-hand side stands; not `solved`: as that."""
+    k = (n + 1) * ROW + i * KEPT
+    if X[k + 63] > 0.0:
+        if i >= 2:
+            for r in range(3):
+                for j in range(4):
+                    x[o, r + 1] -= X[k + 4 * r + j] * x[o - 2, j + 1]
+        if i >= 1:
+            for r in range(SIZE):
+                y = x[o, r]
+                for j in range(SIZE):
+                    y -= X[k + 12 + SIZE * r + j] * x[o - 1, j]
+                x[o, r] = y
+        if solved:
+            solve5(X, k + 37, W, x, o)
+        return
+    b0, b1, b2, b3 = x[o, 0], x[o, 1], x[o, 2], x[o, 3]
+    if i > 0:
+        y0, y1, y2 = x[o - 1, 1], x[o - 1, 2], x[o - 1, 3]
+        b0 += X[k + 9] * y0 + X[k + 10] * y1 + X[k + 11] * y2
+        b1 -= X[k] * y0 + X[k + 1] * y1 + X[k + 2] * y2
+        b2 -= X[k + 3] * y0 + X[k + 4] * y1 + X[k + 5] * y2
+        b3 -= X[k + 6] * y0 + X[k + 7] * y1 + X[k + 8] * y2
+    x[o, 0], x[o, 1], x[o, 2], x[o, 3], x[o, 4] = b0, b1, b2, b3, 0.0
+    if solved:
+        x[o, 0], x[o, 1], x[o, 2], x[o, 3] = solve4(
+            (X[k + 12], X[k + 13], X[k + 14], X[k + 15], b0),
+            (X[k + 16], X[k + 17], X[k + 18], X[k + 19], b1),
+            (X[k + 20], X[k + 21], X[k + 22], X[k + 23], b2),
+            (X[k + 24], X[k + 25], X[k + 26], X[k + 27], b3),
+        )
+
+
+@inner
+def put_row(x, o, a, b, c, d, e):
+    x[o, 0], x[o, 1], x[o, 2], x[o, 3], x[o, 4] = a, b, c, d, e
+
+
+@inner
+def carry_start(X, W, columns, first, n, joined):
+    """D_i of the shift of the start into columns[:3, first : first + n + 1]; joined: the last block is left unsolved."""
+    base = (n + 1) * ROW
+    unit = X[base + 37 + SIZE + 1] if X[base + 63] > 0.0 else X[base + 17]  # of the row that holds the start
+    for i in range(n + 1):
+        for b in range(3):
+            x = columns[SHIFT + b]
+            put_row(x, first + i, 0.0, 0.0, 0.0, 0.0, 0.0)
+            if i == 0:
+                x[first, b + 1] = unit
+            carry_block(X, W, x, i, first + i, n, not (joined and i == n))
+
+
+@inner
+def carry_turn(X, W, columns, first, n, joined, answer):
+    """D_i of the turn of what the start is clamped to; answer: of the start (kernels.junctions.carried_frames)."""
+    g, o = FORCE_BY_TURN, first
+    for i in range(n + 1):
+        for b in range(3):
+            x = columns[TURN + b]
+            put_row(x, o + i, 0.0, 0.0, 0.0, 0.0, 0.0)
+            if i == 0:
+                x[o, 4] = answer[SPIN_BY_TURN + b]
+            elif i == 1:
+                put_row(x, o + 1, 0.0, -answer[g + b], -answer[g + 3 + b], -answer[g + 6 + b], 0.0)
+            carry_block(X, W, x, i, o + i, n, not (joined and i == n))
+
+
+@inner
+def carry_end_turn(X, W, columns, first, n, answer):
+    """D_i of the turn of what the end is clamped to: it reaches the last two blocks; those before stay zero."""
+    g, o = FORCE_BY_TURN, first + n
+    for b in range(3):
+        x = columns[END_TURN + b]
+        fx, fy, fz = answer[g + b], answer[g + 3 + b], answer[g + 6 + b]
+        put_row(x, o - 1, 0.0, -fx, -fy, -fz, -answer[SPIN_BY_TURN + b])
+        carry_block(X, W, x, n - 1, o - 1, n, True)
+        put_row(x, o, 0.0, fx, fy, fz, 0.0)
+        carry_block(X, W, x, n, o, n, False)
+
+
+@inner
+def balance_of_start(row, a, turning, answer, f):
+    """Component a of the balance of the start, as a functional; turning: what it is clamped to turns.
+
+    row: block row of the start with its balance, columns 10 to 22 and right-hand side 23 of its rows 1 to 3.
+    """
+    o = (a + 1) * 24
+    for j in range(13):
+        f[j] = row[o + 10 + j]
+    f[LEFT] = -row[o + 23]
+    for j in range(COLUMNS):
+        f[OF + j] = 0.0
+    if turning:
+        for j in range(3):
+            f[OF + TURN + j] = -answer[FORCE_BY_TURN + 3 * a + j]
+
+
+@inner
+def moment_of_end(k, a, answer, f):
+    """Component a of the moment of end k on what it is clamped to, M_0 or -M_N, as a functional of its two blocks."""
+    sign = 1.0 if k == 0 else -1.0
+    for j in range(FUNCTIONAL):
+        f[j] = 0.0
+    for j in range(3):
+        by = sign * answer[BY_CHORD + 3 * a + j]
+        f[1 + j], f[NEXT + 1 + j] = -by, by
+        f[OF + (TURN if k == 0 else END_TURN) + j] = sign * answer[BY_TURN + 3 * a + j]
+    f[4] = sign * answer[BY_SPIN + a]
+    f[LEFT] = sign * answer[MOMENT + a]
+
+
+@inner
+def carry_functional(X, columns, first, begin, n, joined, low, high, f):
+    """A functional of block `begin` and those behind it becomes one of the last block and q alone.
+
+    low, high: which of the columns there are; joined: whether the last block is left unsolved.
+    """
+    for i in range(begin, n if joined else n + 1):
+        p = i * ROW
+        a0, a1, a2, a3, a4 = f[0], f[1], f[2], f[3], f[4]
+        q, s, t, v = p + SPAN, p + 2 * SPAN, p + 3 * SPAN, p + 4 * SPAN
+        f[LEFT] += a0 * X[p + 8] + a1 * X[q + 8] + a2 * X[s + 8] + a3 * X[t + 8] + a4 * X[v + 8]
+        for b in range(low, high):
+            x = columns[b]
+            f[OF + b] += (
+                a0 * x[first + i, 0] + a1 * x[first + i, 1] + a2 * x[first + i, 2]
+                + a3 * x[first + i, 3] + a4 * x[first + i, 4]
+            )  # fmt: skip
+        for j in range(SIZE):
+            f[j] = f[NEXT + j] - (a0 * X[p + j] + a1 * X[q + j] + a2 * X[s + j] + a3 * X[t + j] + a4 * X[v + j])
+            f[NEXT + j] = 0.0
+        for j in range(3):
+            m = SIZE + j
+            f[NEXT + 1 + j] = f[AFTER + j] - (
+                a0 * X[p + m] + a1 * X[q + m] + a2 * X[s + m] + a3 * X[t + m] + a4 * X[v + m]
+            )
+            f[AFTER + j] = 0.0
+
+
+@inner
+def solve_back(X, columns, first, low, high, q, carries, place, x, joined):
+    """As `substitute`, for a line whose last block is known, in x[n] (joined), and its columns low to high - 1 by q.
+
+    carries: whether the start is joined; place: its correction, which is its shift and what it had still to go.
+    """
+    n = x.shape[0] - 1
+    y, z0, z1, z2 = (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
+    total, last = 0.0, n
+    if joined:
+        y, last = (x[n, 0], x[n, 1], x[n, 2], x[n, 3], 0.0), n - 1
+        x[n, 4] = 0.0
+    for i in range(last, -1, -1):
+        p = i * ROW
+        for k in range(SIZE):
+            m = p + SPAN * k
+            x[i, k] = (
+                X[m + 8]
+                - X[m] * y[0] - X[m + 1] * y[1] - X[m + 2] * y[2] - X[m + 3] * y[3] - X[m + 4] * y[4]
+                - X[m + 5] * z0 - X[m + 6] * z1 - X[m + 7] * z2
+            )  # fmt: skip
+            for b in range(low, high):
+                x[i, k] += columns[b, first + i, k] * q[b]
+            total += abs(x[i, k])
+        z0, z1, z2 = y[1], y[2], y[3]
+        y = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4])
+    if carries:
+        x[0, 1], x[0, 2], x[0, 3] = place  # to the last digit as the other lines at that point have it
+    return total < math.inf
+
+
+@inner
+def solve_dense(A, m):
+    """Solve m equations in the rows of A (m, m+1), the last column the right-hand side, where the solution is left.
+
+    By elimination with row pivoting, of rows and columns scaled to a largest number of about 1; False: it is singular.
+    Most numbers of many lines are 0: a pivot row is subtracted where it has others, from rows that have one in its column.
+    A has m+3 rows; the last three hold the scales of the columns, and those columns and rows of a pivot.
+    """
+    for c in range(m):
+        A[m, c] = 0.0
+    for r in range(m):
+        for c in range(m):
+            A[m, c] = max(A[m, c], abs(A[r, c]))
+    for c in range(m):
+        if not 0.0 < A[m, c] < math.inf:
+            return False
+        A[m, c] = 1.0 / A[m, c]
+    for r in range(m):
+        big = 0.0
+        for c in range(m):
+            A[r, c] *= A[m, c]
+            big = max(big, abs(A[r, c]))
+        if not big > 0.0:
+            return False
+        for c in range(m + 1):
+            A[r, c] /= big
+    for c in range(m):
+        best, where, rows, count = abs(A[c, c]), c, 0, 0
+        for r in range(c + 1, m):
+            size = abs(A[r, c])
+            if size > 0.0:
+                A[m + 2, rows] = r
+                rows += 1
+                if size > best:
+                    best, where = size, r
+        if not best > 0.0:
+            return False
+        if where != c:
+            for j in range(c, m + 1):
+                A[c, j], A[where, j] = A[where, j], A[c, j]
+        if rows > 0:
+            for j in range(c + 1, m + 1):
+                if A[c, j] != 0.0:
+                    A[m + 1, count] = j
+                    count += 1
+        for i in range(rows):
+            r = int(A[m + 2, i])
+            f = A[r, c] / A[c, c]
+            for k in range(count):
+                j = int(A[m + 1, k])
+                A[r, j] -= f * A[c, j]
+    for c in range(m - 1, -1, -1):
+        y = A[c, m]
+        for j in range(c + 1, m):
+            y -= A[c, j] * A[j, m]
+        A[c, m] = y / A[c, c]
+    for c in range(m):
+        A[c, m] *= A[m, c]
+    return True

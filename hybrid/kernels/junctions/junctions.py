@@ -1,0 +1,341 @@
+"""Points and bodies at which lines meet: their equations, from what every line hands over (kernels.junctions.joined_lines).
+
+An end that is joined to a point moves as the point, one that is joined to a body by  G z = dr + dtheta x rho  of the
+body's z = (dr, dtheta), with rho the arm of its fairlead, and where it is clamped to that by dtheta as well.  What a
+line hands over,
+
+    S (dT, q_0, q_N) = right-hand side,   rows: length of the last cell, force and moment on the start, on the end,
+
+goes by G^T into the balances of points and bodies: forces, and rho x force and moments.  A force F turns with the arm of
+its fairlead, which adds  [F]x [rho]x  to the moment.
+A point that lines are clamped to is a body without mass.
+"""
+
+from __future__ import annotations
+
+from hybrid.kernels.algebra.rotations import cross, hat, mat_mat
+from hybrid.kernels.junctions.bodies import LINES, X, add_own, reach_out, vector
+from hybrid.kernels.junctions.carried_frames import TURNS, WITH_POINT, answer_of_end, place_frame, turns
+from hybrid.kernels.junctions.joined_lines import (
+    COLUMNS,
+    END_TURN,
+    LEFT,
+    OF,
+    SHIFT,
+    TURN,
+    balance_of_start,
+    carry_end_turn,
+    carry_functional,
+    carry_start,
+    carry_turn,
+    end_row,
+    last_block,
+    moment_of_end,
+    solve_back,
+)
+from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
+from hybrid.kernels.march.zone_torque import torsional_stiffness
+from hybrid.kernels.state.report import MOMENT_A, NET_A
+from hybrid.kernels.step.job import read
+
+START, END = 0, 1
+# Columns of S: the tension, shift and turn of the start, of the end, and the right-hand side; its rows: as the first.
+TENSION, AT, RIGHT, HANDED = 0, (1, 7), 13, 14
+
+
+@inner
+def first_unknown(joint, tensions, points):
+    """Where the unknowns of a point or body begin."""
+    return tensions + 3 * joint + 3 * max(joint - points, 0)
+
+
+@inner
+def count_tensions(joints):
+    """How many lines hand over their last block, with the tension of its cell."""
+    found = 0
+    for l in range(joints.shape[0]):
+        if joints[l, END] >= 0:
+            found += 1
+    return found
+
+
+@inner
+def place_ends(l, job, system, given):
+    """Arms of the fairleads of a line, frames that are carried, and how far its ends have still to go; given: those are."""
+    joints, seats, arms, gaps, points = system.joints, system.seats, system.arms, system.gaps, system.net.shape[0]
+    old, new, work, fairleads = system.old, system.new, system.work, system.fairleads
+    for k in range(2):
+        joint, node = joints[l, k], k * job.line.h.shape[0]
+        if joint >= points:
+            b = joint - points
+            rho, place = reach_out(new[b], old[b], work[b], vector(fairleads[l, k], 0))
+            for i in range(3):
+                arms[l, k, i] = rho[i]
+                if not given:
+                    gaps[l, k, i] = place[i] - job.old.r[node, i] - job.work.u[node, i]
+            if turns(seats, l, k):
+                place_frame(job.ends, k, seats[l, k], new[b])
+        if k == START and joint >= 0:
+            for i in range(3):
+                job.ends.position[0, i] = job.old.r[0, i]
+                if not given:  # as it is, -u is what it has still to go, too small to be added to a place
+                    job.ends.position[0, i] += job.work.u[0, i] + gaps[l, k, i]
+
+
+@inner
+def add_pull(joint, report, k, arm, clamped, net, work):
+    """The force of an end on its point or body, and where it is clamped there its moment."""
+    o, points = NET_A + 3 * k, net.shape[0]
+    F = (report[o], report[o + 1], report[o + 2])
+    if joint < points:
+        for i in range(3):
+            net[joint, i] += F[i]
+        return
+    M = cross(vector(arm, 0), F)
+    for i in range(3):
+        work[joint - points, LINES + i] += F[i]
+        work[joint - points, LINES + 3 + i] += M[i]
+        if clamped:
+            moment = report[MOMENT_A + 3 * k + i]
+            work[joint - points, LINES + 3 + i] += moment if k == START else -moment
+
+
+@inner
+def put_functional(f, low, high, joined, S, e):
+    """A functional of the last block and q as row e of S."""
+    S[e, RIGHT] = -f[LEFT]
+    for b in range(low, high):
+        S[e, 1 + b if b < END_TURN else AT[END] + 3 + b - END_TURN] = f[OF + b]
+    if joined:
+        S[e, TENSION] = f[0]
+        for b in range(3):
+            S[e, AT[END] + b] = f[1 + b]
+
+
+@inner
+def hand_over(l, job, system, cv):
+    """What a line hands over: its rows and columns of S; cv: of this step (that in the job is being written)."""
+    joints, seats, columns, gaps, answers, S = (
+        system.joints, system.seats, system.columns, system.gaps, system.answers, system.S,
+    )  # fmt: skip
+    new, work, points = system.new, system.work, system.net.shape[0]
+    for r in range(RIGHT):
+        for c in range(HANDED):
+            S[r, c] = 0.0
+    start, end = joints[l, START], joints[l, END]
+    n, X_, o, f = job.line.h.shape[0], job.work.X, system.first[l], system.functional
+    starts, ends = turns(seats, l, START), turns(seats, l, END)
+    low, high = used_columns(start >= 0, starts, ends)
+    for k in range(2):
+        if turns(seats, l, k):
+            b = joints[l, k] - points
+            answer_of_end(job, k, new[b], work[b], cv, answers[k])
+    if start >= 0:
+        carry_start(X_, job.work.W, columns, o, n, end >= 0)
+    if starts:
+        carry_turn(X_, job.work.W, columns, o, n, end >= 0, answers[START])
+    if ends:
+        carry_end_turn(X_, job.work.W, columns, o, n, answers[END])
+    if start >= 0:
+        for a in range(6 if starts else 3):
+            if a < 3:
+                balance_of_start(job.work.rows[0], a, starts, answers[START], f)
+            else:
+                moment_of_end(START, a - 3, answers[START], f)
+            carry_functional(X_, columns, o, 0, n, end >= 0, low, high, f)
+            put_functional(f, low, high, end >= 0, S, AT[START] + a)
+    if end < 0:
+        return
+    k = last_block(X_, n)
+    for r in range(4):
+        e = TENSION if r == 0 else AT[END] - 1 + r
+        S[e, TENSION] = end_row(X_, k, r, 0)
+        S[e, RIGHT] = X_[k + 64 + r]
+        for b in range(3):
+            S[e, AT[END] + b] = end_row(X_, k, r, 1 + b)
+        for b in range(low, high):
+            S[e, 1 + b if b < END_TURN else AT[END] + 3 + b - END_TURN] = -columns[b, o + n, r]
+    if ends:
+        for a in range(3):
+            moment_of_end(END, a, answers[END], f)
+            carry_functional(X_, columns, o, n - 1, n, True, low, high, f)
+            put_functional(f, low, high, True, S, AT[END] + 3 + a)
+    for e in range(RIGHT):
+        for b in range(3):
+            S[e, RIGHT] -= S[e, AT[END] + b] * gaps[l, END, b]
+
+
+@inner
+def used_columns(carries, starts, ends):
+    """Which columns of D a line has: the first, and the one behind the last."""
+    low = SHIFT if carries else END_TURN
+    high = COLUMNS if ends else END_TURN if starts else TURN if carries else END_TURN
+    return low, high
+
+
+@inner
+def follow(joint, points, arm, clamped, G):
+    """G (6, 6) of an end; returns how many rows and columns it has."""
+    for i in range(6):
+        for j in range(6):
+            G[i, j] = 1.0 if i == j else 0.0
+    if joint < points:
+        return 3, 3
+    H = hat(vector(arm, 0))
+    for i in range(3):
+        for j in range(3):
+            G[i, 3 + j] = -H[3 * i + j]
+    return 6 if clamped else 3, 6
+
+
+@inner
+def add_row(S, r, part, A, e, m, tension, at, rows, size, G):
+    """A part of row r of S into row e of A; tension: its column there, -1: none.
+
+    at, rows, size: where the unknowns of both ends begin, rows and columns of their G.
+    """
+    if tension >= 0:
+        A[e, tension] += part * S[r, TENSION]
+    A[e, m] += part * S[r, RIGHT]
+    for k in range(2):
+        for i in range(rows[k]):
+            value = part * S[r, AT[k] + i]
+            if value != 0.0:
+                for j in range(size[k]):
+                    if G[k, i, j] != 0.0:
+                        A[e, at[k] + j] += value * G[k, i, j]
+
+
+@inner
+def spread(l, job, system, tensions, row, m):
+    """S of a line into the equations A of all tensions, points and bodies; row: of its tension, -1: none."""
+    joints, seats, arms, points = system.joints, system.seats, system.arms, system.net.shape[0]
+    S, G, A = system.S, system.G, system.A
+    start, end, report, kb = joints[l, START], joints[l, END], job.work.report, job.line.kb
+    rows0, size0, rows1, size1 = 0, 0, 0, 0
+    if start >= 0:
+        rows0, size0 = follow(start, points, arms[l, START], turns(seats, l, START), G[START])
+    if end >= 0:
+        rows1, size1 = follow(end, points, arms[l, END], turns(seats, l, END), G[END])
+    rows, size = (rows0, rows1), (size0, size1)
+    at = (first_unknown(max(start, 0), tensions, points), first_unknown(max(end, 0), tensions, points))
+    twist_ends(l, seats, job, at, A)
+    if row >= 0:
+        add_row(S, TENSION, 1.0, A, row, m, row, at, rows, size, G)
+    for k in range(2):
+        for j in range(size[k]):
+            for i in range(rows[k]):
+                if G[k, i, j] != 0.0:
+                    add_row(S, AT[k] + i, G[k, i, j], A, at[k] + j, m, row, at, rows, size, G)
+        if size[k] == 6:
+            o = NET_A + 3 * k
+            T = mat_mat(hat((report[o], report[o + 1], report[o + 2])), hat(vector(arms[l, k], 0)))
+            for i in range(3):
+                for j in range(3):
+                    A[at[k] + 3 + i, at[k] + 3 + j] += T[3 * i + j]
+        if rows[k] == 6:  # of rods that may all spin freely
+            node = k * job.line.h.shape[0]
+            for i in range(3):
+                A[at[k] + 3 + i, at[k] + 3 + i] -= LEAST_SPIN_STIFFNESS * (kb[node, 0] + kb[node, 2])
+            if seats[l, k, TURNS] == WITH_POINT:
+                # the moment in axes of the point: that of rods which may all spin is then 0 about their axis wherever
+                # they are, and so is its change; in inertial axes they would spin at random until all else balances
+                o, sign = MOMENT_A + 3 * k, 1.0 if k == START else -1.0
+                H = hat((sign * report[o], sign * report[o + 1], sign * report[o + 2]))
+                for i in range(3):
+                    for j in range(3):
+                        A[at[k] + 3 + i, at[k] + 3 + j] += H[3 * i + j]
+
+
+@inner
+def twist_ends(l, seats, job, at, A):
+    """By how much a turn of one end of a line changes the torque through its catenary zones on both; at: as of `spread`.
+
+    Lines are eliminated with that torque as it is, and corrected for its change afterwards (kernels.march.zone_torque).
+    """
+    k = torsional_stiffness(job.line)
+    if not k > 0.0:
+        return
+    frame = job.ends.frame
+    for m in range(2):
+        for o in range(2):
+            if turns(seats, l, m) and turns(seats, l, o):
+                part = -k if m == o else k
+                for i in range(3):
+                    for j in range(3):
+                        A[at[m] + 3 + i, at[o] + 3 + j] += part * frame[m, 2 + 3 * i] * frame[o, 2 + 3 * j]
+
+
+@inner
+def assemble_junctions(system, m, cv, ca, own):
+    """Equations (m, m+1) of the last tensions, the points and the bodies, from what the lines hand over.
+
+    system: a kernels.run.system.SystemJob, or what has the same of it; own: whether what bodies are out of balance by
+    themselves is in the right-hand side.
+    """
+    tables, joints, net, A = system.tables, system.joints, system.net, system.A
+    for r in range(m):
+        for c in range(m + 1):
+            A[r, c] = 0.0
+    row, tensions, points = 0, count_tensions(joints), net.shape[0]
+    for l in range(tables.shape[0]):
+        start, end = joints[l, START], joints[l, END]
+        if start < 0 and end < 0:
+            continue
+        job = read(tables[l])
+        hand_over(l, job, system, cv)
+        spread(l, job, system, tensions, row if end >= 0 else -1, m)
+        if end >= 0:
+            row += 1
+    for r in range(m):
+        A[m, r] = A[r, m]
+    add_own(system, first_unknown(points, tensions, points), m, cv, ca)
+    if not own:
+        for r in range(m):
+            A[r, m] = A[m, r]
+
+
+@inner
+def shift_of(joint, tensions, points, arm, gap, clamped, A, m, q, o):
+    """Shift of an end with what is still to go beside it; without that it goes into q from o on, and its turn from
+    o + 3 on where it is clamped."""
+    at = first_unknown(joint, tensions, points)
+    s = (A[at, m], A[at + 1, m], A[at + 2, m])
+    if joint >= points:
+        turn = (A[at + 3, m], A[at + 4, m], A[at + 5, m])
+        t = cross(turn, vector(arm, 0))
+        s = (s[0] + t[0], s[1] + t[1], s[2] + t[2])
+        if clamped:
+            q[o + 3], q[o + 4], q[o + 5] = turn
+    if o == SHIFT:
+        q[0], q[1], q[2] = s
+    return (s[0] + gap[0], s[1] + gap[1], s[2] + gap[2])
+
+
+@inner
+def correct_all(system, points, m):
+    """Corrections of all lines and bodies from the solution; returns -1, or a line whose correction is not finite."""
+    tables, joints, seats, arms, gaps = system.tables, system.joints, system.seats, system.arms, system.gaps
+    columns, work, A, q = system.columns, system.work, system.A, system.q
+    row, tensions = 0, count_tensions(joints)
+    for b in range(work.shape[0]):
+        at = first_unknown(points + b, tensions, points)
+        for k in range(6):
+            work[b, X + k] = A[at + k, m]
+    for l in range(tables.shape[0]):
+        job, start, end = read(tables[l]), joints[l, START], joints[l, END]
+        x, n, place = job.work.x, job.line.h.shape[0], (0.0, 0.0, 0.0)
+        starts, ends = turns(seats, l, START), turns(seats, l, END)
+        low, high = used_columns(start >= 0, starts, ends)
+        for b in range(COLUMNS):
+            q[b] = 0.0
+        if end >= 0:
+            far = shift_of(end, tensions, points, arms[l, END], gaps[l, END], ends, A, m, q, END_TURN - 3)
+            x[n, 0], x[n, 1], x[n, 2], x[n, 3] = A[row, m], far[0], far[1], far[2]
+            row += 1
+        if start >= 0:
+            place = shift_of(start, tensions, points, arms[l, START], gaps[l, START], starts, A, m, q, SHIFT)
+        if not solve_back(job.work.X, columns, system.first[l], low, high, q, start >= 0, place, x, end >= 0):
+            return l
+    return -1

@@ -1,0 +1,75 @@
+"""What the kernels of several lines get: the lines, points and bodies of a system, and the task that is asked."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.machine.references import reader
+from hybrid.kernels.state.state import Floats
+from hybrid.kernels.step.newton import Limits, Task
+
+
+class SystemJob(NamedTuple):
+    """Arguments of the entries: the lines, points and bodies of a system, and room.
+
+    P points, B bodies, L lines; m tensions of last cells and coordinates of points and bodies.
+    """
+
+    asked: Floats  # (ASKED,) the task: below
+    tables: NDArray[np.int64]  # (L, ..) jobs of the lines (kernels.run.run), their task ASSEMBLY
+    numbers: Floats  # the same memory
+    joints: NDArray[np.int64]  # (L, 2) points, then bodies, that start and end are joined to, -1 where they are held
+    fairleads: Floats  # (L, 2, 3) m of ends at bodies, in their axes
+    seats: Floats  # (L, 2, SEAT) frames of ends that turn with bodies (kernels.junctions.carried_frames)
+    arms: Floats  # (L, 2, 3) m, worked in
+    gaps: Floats  # (L, 2, 3) m that ends at bodies have still to go; given for a CORRECTION, else worked in
+    floors: Floats  # (L,) N, tension at or below which a catenary cell is slack
+    allowed: Floats  # (L,) m, error that a step may make
+    first: NDArray[np.int64]  # (L,) where columns of a line begin that carries some
+    columns: Floats  # (3, .., 5), or (COLUMNS, .., 5) where an end turns
+    functional: Floats  # (FUNCTIONAL,) worked in, as what follows
+    answers: Floats  # (2, ANSWER)
+    q: Floats  # (COLUMNS,)
+    net: Floats  # (P, 3) on return what does not balance at the points, N
+    bodies: Floats  # (B, NUMBERS ..) what bodies are (kernels.junctions.bodies)
+    old: Floats  # (B, STATE) of bodies
+    new: Floats  # (B, STATE)
+    work: Floats  # (B, WORK)
+    S: Floats  # (HANDED - 1, HANDED)
+    G: Floats  # (2, 6, 6)
+    A: Floats  # (m+3, m+1)
+    touch_table: NDArray[np.int64]  # of kernels.junctions.system_contact.touch_system
+    solver: int = 0  # address of the kernel that marches a line
+    touch: int = 0  # of touch_system; 0: no line touches itself
+
+
+# Numbers of `asked`: of the task (kernels.step.newton.Task), and the time of the new states, s.
+(WHAT, DT, BEFORE, RHO_OF_STEP, CV, CA, REACH, SCALE, MOST, RHO_OF_LAST, FIXED, TIME) = range(12)
+ASKED = 12
+
+
+def blank_system_job() -> SystemJob:
+    """A job with the types that every one has."""
+    z, one, two = np.zeros, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
+    return SystemJob(
+        z(ASKED), two, z((1, 1)), two, z((1, 2, 3)), z((1, 2, 1)), z((1, 2, 3)), z((1, 2, 3)), z(1), z(1), one,
+        z((1, 1, 1)), z(1), z((2, 1)), z(1), z((1, 3)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)),
+        z((2, 6, 6)), z((1, 1)), one,
+    )  # fmt: skip
+
+
+read_system = reader(blank_system_job())
+
+
+@inner
+def task_of(asked):
+    """The task that is asked."""
+    limits = Limits(asked[REACH], asked[SCALE], int(asked[MOST]))
+    return Task(
+        int(asked[WHAT]), asked[DT], asked[BEFORE], asked[RHO_OF_STEP], asked[CV], asked[CA], False, limits, False,
+        asked[RHO_OF_LAST], asked[FIXED] != 0.0,
+    )  # fmt: skip

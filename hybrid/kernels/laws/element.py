@@ -1,0 +1,230 @@
+"""The element at a node: bending and twist between the two cells that meet there (a rod), or nothing (a joint).
+
+    symbol     meaning                                          shape  unit   frame
+    Ra, Rb     frames of the cells before and after the node    9      -      columns inertial
+    k          log strain, exp[k]x = Ra^T Rb                    3      rad    Ra
+    kb         B/hn: stiffness of the element                   3      N m    Ra (principal axes)
+    k0         strain without stress                            3      rad    Ra
+    P          inverse left Jacobian at k                       9      -      Ra
+    M          moment of the part after the node on that before 3      N m    inertial
+    w          angular velocity of a cell, d x d1 + w3 d        3      1/s    inertial
+
+With dth = d x de/l + d dpsi the change of M is
+    dM = A de_b + a dpsi_b - B de_a - b dpsi_a.
+
+A swivel is an element without torsional stiffness (kb[2] = 0) of a round, straight section.  It knows the directions of
+the cells alone, whatever their frames: M = kb (beta/sin beta) d_a x d_b, beta the angle between them, has no component
+along either.  (The log strain of a large twist would take part of it for bending.)
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.rotations import (
+    add,
+    cross,
+    d_double_cross,
+    dot,
+    hat,
+    inverse_left_jacobian,
+    jacobian_functions,
+    log_rotation,
+    madd,
+    mat_hat,
+    mat_mat,
+    mat_matT,
+    mat_vec,
+    mscale,
+    msub,
+    outer,
+    project,
+    scale,
+    sub,
+    vec_mat,
+)
+from hybrid.kernels.machine.compile import inner
+
+# Stiffness of an angular spring of none, as a part of that of half a cell: nothing, but a number.
+NO_SPRING = 1e-12
+
+
+@inner
+def put_spring(spring, line, node):
+    """An angular spring in series with the half cell at a clamp.
+
+    The node gets the length of line that would bend as much, so that kb hn stays the bending stiffness.
+    """
+    rigid = 0.5 * (line.kb[node, 0] + line.kb[node, 1])
+    spring = max(spring, NO_SPRING * max(line.kb[node, 0], line.kb[node, 1]))
+    for k in range(2):
+        line.kb[node, k] = 1.0 / (1.0 / line.kb[node, k] + 1.0 / spring)
+    line.hn[node] *= rigid / (0.5 * (line.kb[node, 0] + line.kb[node, 1]))
+
+
+@inner
+def relative_rotation(Ra, Rb):
+    """Ra^T Rb."""
+    return (
+        Ra[0] * Rb[0] + Ra[3] * Rb[3] + Ra[6] * Rb[6],
+        Ra[0] * Rb[1] + Ra[3] * Rb[4] + Ra[6] * Rb[7],
+        Ra[0] * Rb[2] + Ra[3] * Rb[5] + Ra[6] * Rb[8],
+        Ra[1] * Rb[0] + Ra[4] * Rb[3] + Ra[7] * Rb[6],
+        Ra[1] * Rb[1] + Ra[4] * Rb[4] + Ra[7] * Rb[7],
+        Ra[1] * Rb[2] + Ra[4] * Rb[5] + Ra[7] * Rb[8],
+        Ra[2] * Rb[0] + Ra[5] * Rb[3] + Ra[8] * Rb[6],
+        Ra[2] * Rb[1] + Ra[5] * Rb[4] + Ra[8] * Rb[7],
+        Ra[2] * Rb[2] + Ra[5] * Rb[5] + Ra[8] * Rb[8],
+    )
+
+
+@inner
+def columns_scaled(A, b):
+    """A diag(b)."""
+    return (
+        A[0] * b[0], A[1] * b[1], A[2] * b[2],
+        A[3] * b[0], A[4] * b[1], A[5] * b[2],
+        A[6] * b[0], A[7] * b[1], A[8] * b[2],
+    )  # fmt: skip
+
+
+@inner
+def turns_freely(kb, k0):
+    """Whether an element is a swivel."""
+    return kb[2] == 0.0 and kb[0] == kb[1] and k0[0] == 0.0 and k0[1] == 0.0
+
+
+@inner
+def swing_functions(s, c):
+    """beta/sin beta and its derivative by cos beta."""
+    if s < 1e-3 and c > 0.0:
+        return 1.0 + s * s * (1.0 / 6.0 + 3.0 / 40.0 * s * s), -1.0 / 3.0 - 2.0 / 15.0 * s * s
+    s = max(s, 1e-12)
+    beta = math.atan2(s, c)
+    return beta / s, (beta * c - s) / (s * s * s)
+
+
+@inner
+def swing(Ra, Rb):
+    """Rotation (rad, inertial) that takes the direction of cell a to that of cell b, without twist."""
+    w = cross((Ra[2], Ra[5], Ra[8]), (Rb[2], Rb[5], Rb[8]))
+    return scale(swing_functions(math.sqrt(dot(w, w)), Ra[2] * Rb[2] + Ra[5] * Rb[5] + Ra[8] * Rb[8])[0], w)
+
+
+@inner
+def strain_of_element(Ra, Rb, kb, k0):
+    """Log strain (rad, frame Ra); of a swivel that of its bend alone."""
+    if turns_freely(kb, k0):
+        return vec_mat(swing(Ra, Rb), Ra)
+    return log_rotation(relative_rotation(Ra, Rb))
+
+
+@inner
+def swivel(Ra, Rb, stiffness):
+    """As `bending`, of a swivel of that stiffness, N m."""
+    a, b = (Ra[2], Ra[5], Ra[8]), (Rb[2], Rb[5], Rb[8])
+    w, c = cross(a, b), dot(a, b)
+    g, g1 = swing_functions(math.sqrt(dot(w, w)), c)
+    ga, gw = scale(-stiffness * g, b), scale(-stiffness * g1, w)
+    C = madd(outer(ga, a), outer(gw, w))
+    x = stiffness * g * c
+    return scale(stiffness * g, w), (C[0] + x, C[1], C[2], C[3], C[4] + x, C[5], C[6], C[7], C[8] + x)
+
+
+@inner
+def damped_swivel(Ra, Rb, stiffness, tau, wa, wb):
+    """As `damped_bending`, of a swivel: about the mean of both directions nothing is damped."""
+    M, C = swivel(Ra, Rb, stiffness)
+    b, k = (Rb[2], Rb[5], Rb[8]), tau * stiffness
+    t = (Ra[2] + b[0], Ra[5] + b[1], Ra[8] + b[2])
+    size = 1.0 / math.sqrt(max(dot(t, t), 1e-24))
+    t, y = scale(size, t), sub(wb, wa)
+    along = dot(t, y)
+    across = sub(y, scale(along, t))
+    # dt = H dth_b, H = -(1 - t t)[b]x/|d_a + d_b|
+    P = project(t)
+    H = mat_hat(P, b)
+    C = madd(C, mscale(k * size, madd(mscale(along, H), outer(t, vec_mat(y, H)))))
+    return add(M, scale(k, across)), C, mscale(k, P), k * dot(across, across)
+
+
+@inner
+def bending(Ra, Rb, kb, k0):
+    """Moment M and C, where dM = C (dth_b - dth_a) + dth_a x M."""
+    if turns_freely(kb, k0):
+        return swivel(Ra, Rb, kb[0])
+    k = log_rotation(relative_rotation(Ra, Rb))
+    g, g1 = jacobian_functions(dot(k, k))
+    P = inverse_left_jacobian(k, g)
+    n = (kb[0] * (k[0] - k0[0]), kb[1] * (k[1] - k0[1]), kb[2] * (k[2] - k0[2]))
+    M = mat_vec(Ra, vec_mat(n, P))
+
+    # d(P^T n)/dk at fixed n: P^T n = n + k x n/2 + g k x (k x n)
+    D = msub(d_double_cross(k, n, g, g1), mscale(0.5, hat(n)))
+    PT = (P[0], P[3], P[6], P[1], P[4], P[7], P[2], P[5], P[8])
+    C = mat_mat(madd(D, columns_scaled(PT, kb)), P)
+    return M, mat_matT(mat_mat(Ra, C), Ra)
+
+
+@inner
+def damped_bending(Ra, Rb, kb, k0, tau, wa, wb):
+    """As `bending` with the moment tau kb dk/dt added.
+
+    Returns M, C and Cd, where
+    dM = C (dth_b - dth_a) + dth_a x M + Cd (dw_b - dw_a - dth_a x (w_b - w_a)),
+    and the power that the damping takes out (W, positive).
+    """
+    if turns_freely(kb, k0):
+        return damped_swivel(Ra, Rb, kb[0], tau, wa, wb)
+    k = log_rotation(relative_rotation(Ra, Rb))
+    g, g1 = jacobian_functions(dot(k, k))
+    P = inverse_left_jacobian(k, g)
+    y = vec_mat(sub(wb, wa), Ra)
+    k1 = mat_vec(P, y)  # dk/dt
+    n = (
+        kb[0] * (k[0] - k0[0] + tau * k1[0]),
+        kb[1] * (k[1] - k0[1] + tau * k1[1]),
+        kb[2] * (k[2] - k0[2] + tau * k1[2]),
+    )
+    M = mat_vec(Ra, vec_mat(n, P))
+    loss = tau * (kb[0] * k1[0] * k1[0] + kb[1] * k1[1] * k1[1] + kb[2] * k1[2] * k1[2])
+
+    D = msub(d_double_cross(k, n, g, g1), mscale(0.5, hat(n)))
+    PT = (P[0], P[3], P[6], P[1], P[4], P[7], P[2], P[5], P[8])
+    PTk = columns_scaled(PT, kb)
+    # d(P y)/dk at fixed y: P y = y - k x y/2 + g k x (k x y)
+    Dy = madd(d_double_cross(k, y, g, g1), mscale(0.5, hat(y)))
+    rate = madd((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), mscale(tau, Dy))
+    C = mat_mat(madd(D, mat_mat(PTk, rate)), P)
+    Cd = mscale(tau, mat_mat(PTk, P))
+    return M, mat_matT(mat_mat(Ra, C), Ra), mat_matT(mat_mat(Ra, Cd), Ra), loss
+
+
+@inner
+def after(C, d, il):
+    """A and a: how M answers to the chord and the spin of the cell after the node."""
+    return mscale(il, mat_hat(C, d)), mat_vec(C, d)
+
+
+@inner
+def before(C, M, d, il):
+    """B and b: how M answers (with a minus sign) to the chord and the spin of the cell before the node."""
+    A, a = after(C, d, il)
+    MxS = mscale(il, mat_hat(hat(M), d))
+    return madd(A, MxS), (a[0] + M[1] * d[2] - M[2] * d[1], a[1] + M[2] * d[0] - M[0] * d[2],
+                          a[2] + M[0] * d[1] - M[1] * d[0])  # fmt: skip
+
+
+@inner
+def angular_velocity(d, d1, w3, il, D1, cv):
+    """w of a cell and its derivatives with respect to e (matrix) and psi (vector)."""
+    w = cross(d, d1)
+    # dw/de = [d]x D1 - [d1]x P/l + w3 P/l
+    dxD1 = mat_mat(hat(d), D1)
+    P = (
+        1.0 - d[0] * d[0], -d[0] * d[1], -d[0] * d[2],
+        -d[1] * d[0], 1.0 - d[1] * d[1], -d[1] * d[2],
+        -d[2] * d[0], -d[2] * d[1], 1.0 - d[2] * d[2],
+    )  # fmt: skip
+    We = madd(msub(dxD1, mscale(il, mat_mat(hat(d1), P))), mscale(w3 * il, P))
+    return (w[0] + w3 * d[0], w[1] + w3 * d[1], w[2] + w3 * d[2]), We, scale(cv, d)

@@ -1,0 +1,87 @@
+"""Morison members of a body: drag and wave force on pieces of cylinders that are fixed to it.
+
+Pieces stand in the row of numbers of their body (kernels.junctions.bodies), behind all else.  A piece has the force
+
+    f = w (-cn |un| un - ct |ut| ut + cm (a - d (d.a)))        at its middle, u = v - water
+
+of its velocity u relative to the water and of the water's acceleration a there; un, ut: parts across and along d.
+
+    symbol   meaning                                                   unit
+    cn, ct   rho D Cd h/2, pi rho D Ct h/2                              kg/m
+    cm       (1 + Ca) rho pi D^2/4 h; the part of Ca that goes with     kg
+             the body's own acceleration is in its mass matrix
+    w        wetted part
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.rotations import add, cross, dot, mat_vec, scale, sub
+from hybrid.kernels.machine.compile import inner
+
+# Of a piece: middle (m) and direction in axes of the body, coefficients, wetted part, velocity and acceleration of the
+# water.
+MIDDLE, ALONG, CN, CT, CM, WET, WATER, PUSH, PIECE = 0, 3, 6, 7, 8, 9, 10, 13, 16
+
+
+@inner
+def at(row, o):
+    return (row[o], row[o + 1], row[o + 2])
+
+
+@inner
+def piece_force(row, o, d, u):
+    """Force on the piece at o of a row, direction d, relative velocity u (inertial), and the parts of its derivative by
+
+    u: -p (1 - d d^T) - q un un^T - s d d^T.
+    """
+    w, cn, ct = row[o + WET], row[o + CN], row[o + CT]
+    ut = dot(d, u)
+    un = sub(u, scale(ut, d))
+    size, a = math.sqrt(dot(un, un)), at(row, o + PUSH)
+    push = scale(row[o + CM], sub(a, scale(dot(d, a), d)))
+    f = sub(scale(w, push), add(scale(w * cn * size, un), scale(w * ct * abs(ut) * ut, d)))
+    q = w * cn / size if size > 0.0 else 0.0
+    return f, un, w * cn * size, q, 2.0 * w * ct * abs(ut)
+
+
+@inner
+def piece_change(f, un, p, q, s, c, d, u, a, du, turn):
+    """Change of the force f of a piece by du and by a turn of its direction, inertial; c: w cm, a: of the water."""
+    dv = sub(du, cross(turn, u))  # as seen from the piece
+    t = dot(d, dv)
+    n = sub(dv, scale(t, d))
+    da = cross(a, turn)
+    push = scale(c, sub(da, scale(dot(d, da), d)))
+    drag = add(scale(p, n), add(scale(q * dot(un, n), un), scale(s * t, d)))
+    return add(cross(turn, f), sub(push, drag))
+
+
+@inner
+def members_force(row, first, count, R, v, spin):
+    """Force and moment about the origin of a body of all its pieces, and their power; spin: inertial."""
+    F, M, power = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
+    for k in range(count):
+        o = first + PIECE * k
+        arm, d = mat_vec(R, at(row, o + MIDDLE)), mat_vec(R, at(row, o + ALONG))
+        here = add(v, cross(spin, arm))
+        f, _, _, _, _ = piece_force(row, o, d, sub(here, at(row, o + WATER)))
+        F, M, power = add(F, f), add(M, cross(arm, f)), power + dot(f, here)
+    return F, M, power
+
+
+@inner
+def members_change(row, first, count, R, v, spin, dv, dspin, turn):
+    """Change of force and moment by changes of velocity and spin (inertial) and a turn; the water stays as it is."""
+    dF, dM = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for k in range(count):
+        o = first + PIECE * k
+        arm, d = mat_vec(R, at(row, o + MIDDLE)), mat_vec(R, at(row, o + ALONG))
+        darm = cross(turn, arm)
+        u = sub(add(v, cross(spin, arm)), at(row, o + WATER))
+        f, un, p, q, s = piece_force(row, o, d, u)
+        du, c, a = add(dv, add(cross(dspin, arm), cross(spin, darm))), row[o + WET] * row[o + CM], at(row, o + PUSH)
+        df = piece_change(f, un, p, q, s, c, d, u, a, du, turn)
+        dF, dM = add(dF, df), add(dM, add(cross(darm, f), cross(arm, df)))
+    return dF, dM

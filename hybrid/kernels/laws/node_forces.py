@@ -1,0 +1,216 @@
+"""What acts on a node besides the cells themselves: inertia, weight, water, bodies, seabed.
+
+Each paragraph stands behind the bit of its force; symbols as in kernels.laws.loads, kernels.laws.water
+and kernels.laws.seabed.
+"""
+
+from __future__ import annotations
+
+from hybrid.kernels.algebra.rotations import add, dot, get3, madd, mat_vec, mscale, outer, scale, sub
+from hybrid.kernels.laws.bed import bed_before, bed_beside, bed_under
+from hybrid.kernels.laws.loads import body_drag, half_cell_added_mass, half_cell_drag
+from hybrid.kernels.laws.seabed import contact, friction, pressure
+from hybrid.kernels.laws.water import current_at, wetted, wetted_stretch
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.state.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
+from hybrid.kernels.state.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_POWER, MASS_DAMPING_POWER, WAVE_POWER
+
+WATER = DRAG | ADDED_MASS | SURFACE | WAVES | BODIES
+Z3 = (0.0, 0.0, 0.0)
+Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+UP = (0.0, 0.0, 1.0)
+
+
+@inner
+def half_cell_water(line, c, side, z, eta, u, U1, vi, b, af, chord, cv, ca, report):
+    """Force of the water on the half cell c before (side -1) or after (+1) a node: f, D (dr_i), L (chord).
+
+    z: height of the node; u: velocity relative to the water; b: acceleration relative to it; af: of the water.
+    """
+    bits = line.bits
+    d, l, il = chord
+    f, D, L = Z3, Z9, Z9
+    if bits & DRAG:
+        f, B, L = half_cell_drag(u, d, il, line.drag_n[c], line.drag_t[c])
+        D = mscale(cv, B)
+        if bits & FLOW:
+            g = mat_vec(B, U1)
+            D = (D[0], D[1], D[2] - g[0], D[3], D[4], D[5] - g[1], D[6], D[7], D[8] - g[2])
+    drag = dot(f, vi)
+    added = 0.0
+    if bits & ADDED_MASS:
+        g, Dg, Lg = half_cell_added_mass(b, d, il, line.added_n[c], line.added_t[c], ca)
+        f, D, L = add(f, g), madd(D, Dg), madd(L, Lg)
+        added = dot(g, vi)
+    pushed = 0.0
+    if bits & WAVES:
+        g = scale(line.displaced[c], af)
+        f = add(f, g)
+        pushed = dot(g, vi)
+    wet = 1.0
+    if bits & SURFACE:
+        f = (f[0], f[1], f[2] + line.buoy[c])
+        pushed += line.buoy[c] * vi[2]
+        iD = 1.0 / line.diameter[c]
+        xa = (eta - z) * iD + 0.5
+        xb = xa - side * 0.5 * l * d[2] * iD
+        wet, wa, wb = wetted_stretch(xa, xb)
+        D = madd(mscale(wet, D), mscale(-(wa + wb) * iD, outer(f, UP)))
+        L = madd(mscale(wet, L), mscale(-side * 0.5 * wb * iD, outer(f, UP)))
+        f = scale(wet, f)
+    report[DRAG_POWER] -= wet * drag
+    report[ADDED_MASS_POWER] -= wet * added
+    report[WAVE_POWER] += wet * pushed
+    return f, D, L
+
+
+@inner
+def wet_parts(line, i, z, eta):
+    """Part of a body at node i under water at height z, of which its added mass counts, and their slopes by z, 1/m.
+
+    A body has the added mass that is given where it floats by itself, and deeper.
+    """
+    iH = 1.0 / line.point_height[i]
+    x, most = (eta - z) * iH + 0.5, line.point_floats[i]
+    wet, _, slope = wetted(x)
+    if line.point_upright[i]:
+        wet, slope = min(max(x, 0.0), 1.0), 1.0 if 0.0 < x < 1.0 else 0.0
+    slope *= -iH
+    if wet < most:
+        return wet, slope, wet / most, slope / most
+    return wet, slope, 1.0, 0.0
+
+
+@inner
+def body_water(line, i, z, eta, u, U1, vi, b, af, cv, ca):
+    """Force of the water on a body at node i, D, and its powers: of drag, of added mass, of waves and buoyancy."""
+    bits = line.bits
+    f, B = body_drag(u, line.point_drag[i])
+    D = mscale(cv, B)
+    if bits & FLOW:
+        g = mat_vec(B, U1)
+        D = (D[0], D[1], D[2] - g[0], D[3], D[4], D[5] - g[1], D[6], D[7], D[8] - g[2])
+    drag, pushed = dot(f, vi), 0.0
+    a = line.point_added[i]
+    added = scale(-a, b)
+    if bits & WAVES:
+        g = scale(line.point_displaced[i], af)
+        f = add(f, g)
+        pushed = dot(g, vi)
+    if bits & SURFACE and line.point_height[i] > 0.0:
+        f = (f[0], f[1], f[2] + line.point_buoy[i])
+        pushed += line.point_buoy[i] * vi[2]
+        wet, slope, part, change = wet_parts(line, i, z, eta)
+        D = madd(mscale(wet, D), outer(add(scale(slope, f), scale(change, added)), UP))
+        f, added = scale(wet, f), scale(part, added)
+        drag, pushed, a = wet * drag, wet * pushed, part * a
+    D = (D[0] - ca * a, D[1], D[2], D[3], D[4] - ca * a, D[5], D[6], D[7], D[8] - ca * a)
+    return add(f, added), D, (drag, dot(added, vi), pushed)
+
+
+@inner
+def seabed_forces(line, sea, i, x, u, v, e, cv, report):
+    """Contact and friction at node i: whether there are any, F, D, GL, GR."""
+    n, p = bed_under(sea, x)
+    left = right = n  # normals of the bed under the nodes beside this one
+    pd = -dot(n, get3(v, i))
+    N = DN = NL = NR = 0.0  # force along n; its derivatives by the penetration of node i, and by those beside it
+    if i > 0:
+        left, po = bed_before(sea, n, p, x, get3(e, i - 1))
+        if p > 0.0 or po > 0.0:
+            h = line.h[i - 1]
+            f, f0, f1, g0, g1 = contact(p, po, pd, -dot(left, get3(v, i - 1)), h, sea.stiffness, sea.damping, sea.onset)
+            N, NL, DN = N + f, f1 + cv * g1, DN + f0 + cv * g0
+    if i < line.h.shape[0]:
+        right, po = bed_beside(sea, n, p, x, get3(e, i))
+        if p > 0.0 or po > 0.0:
+            h = line.h[i]
+            f, f0, f1, g0, g1 = contact(
+                p, po, pd, -dot(right, get3(v, i + 1)), h, sea.stiffness, sea.damping, sea.onset
+            )
+            N, NR, DN = N + f, f1 + cv * g1, DN + f0 + cv * g0
+    if line.footing[i] > 0.0 and p > 0.0:
+        f, f0, g0 = pressure(0.0, p, p, pd, pd, sea.stiffness, sea.damping, sea.onset)
+        N, DN = N + line.footing[i] * f, DN + line.footing[i] * (f0 + cv * g0)
+    if N == 0.0 and DN == 0.0 and NL == 0.0 and NR == 0.0:
+        for k in range(3):
+            sea.slid[i, k], sea.bed[i, k] = 0.0, 0.0
+        return False, Z3, Z9, Z9, Z9
+    F, slope, q = scale(N, n), n, Z3
+    D = Z9
+    report[CONTACT_FORCE] += N
+    if line.bits & FRICTION and N > 0.0:
+        w = dot(n, get3(u, i))
+        q = (
+            sea.slip[i, 0] + u[i, 0] - w * n[0],
+            sea.slip[i, 1] + u[i, 1] - w * n[1],
+            sea.slip[i, 2] + u[i, 2] - w * n[2],
+        )
+        f, g, D, part = friction(q, N, get3(sea.axis, i), n, sea.friction[0], sea.friction[1], sea.slip_length)
+        F, slope, q = add(F, f), add(n, g), scale(part, q)
+    sea.slid[i, 0], sea.slid[i, 1], sea.slid[i, 2] = q
+    sea.bed[i, 0], sea.bed[i, 1], sea.bed[i, 2] = F
+    # penetrations: dp_i = -n.dr_i, dp_{i-1} = -n.(dr_i - de), dp_{i+1} = -n.(dr_i + de), each with n where it is; how
+    # n turns with x is left out: p times the curvature of the bed
+    L, R = mscale(NL, outer(slope, left)), mscale(NR, outer(slope, right))
+    D = madd(D, mscale(-DN, outer(slope, n)))
+    return True, F, madd(D, mscale(-1.0, madd(L, R))), L, mscale(-1.0, R)
+
+
+@inner
+def inertia_and_water(line, sea, i, z, vi, vdi, before, after, cv, ca, report):
+    """Weight, inertia, damping and water on node i at height z: F, and its derivatives D (dr_i), GL, GR (chords).
+
+    before, after: the chords beside the node.
+    """
+    m = line.mass[i]
+    F = sub(get3(line.force, i), scale(m, vdi))
+    c = -ca * m
+    D = (c, 0.0, 0.0, 0.0, c, 0.0, 0.0, 0.0, c)
+    GL, GR = Z9, Z9
+    bits = line.bits
+    if bits & MASS_DAMPING:
+        b = line.damp[i]
+        F = sub(F, scale(b, vi))
+        c = -cv * b
+        D = (D[0] + c, D[1], D[2], D[3], D[4] + c, D[5], D[6], D[7], D[8] + c)
+        report[MASS_DAMPING_POWER] += b * dot(vi, vi)
+    if bits & WATER:
+        eta = sea.surface
+        U, U1 = Z3, Z3
+        w, b, af = vi, vdi, Z3
+        if bits & FLOW:
+            U, U1 = current_at(sea.z, sea.current, sea.now[1], z)
+            w = sub(w, U)
+        if bits & WAVES:
+            w, af = sub(w, get3(sea.flow, i)), (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5])
+            b = sub(b, af)
+            eta += sea.flow[i, 6]
+        if i > 0:
+            f, Df, GL = half_cell_water(line, i - 1, -1.0, z, eta, w, U1, vi, b, af, before, cv, ca, report)
+            F, D = add(F, f), madd(D, Df)
+        if i < line.h.shape[0]:
+            f, Df, GR = half_cell_water(line, i, 1.0, z, eta, w, U1, vi, b, af, after, cv, ca, report)
+            F, D = add(F, f), madd(D, Df)
+        if bits & BODIES:
+            f, Df, (drag, added, pushed) = body_water(line, i, z, eta, w, U1, vi, b, af, cv, ca)
+            F, D = add(F, f), madd(D, Df)
+            report[DRAG_POWER] -= drag
+            report[ADDED_MASS_POWER] -= added
+            report[WAVE_POWER] += pushed
+    return F, D, GL, GR
+
+
+@kernel  # called for every node, not inlined in each of the loops that do
+def node_loads(line, sea, i, r, u, state, before, after, cv, ca, report):
+    """Force on node i but for the cells' own: F, and its derivatives D (dr_i), GL, GR (chord before, after)."""
+    v = state.v
+    F, D, GL, GR = inertia_and_water(
+        line, sea, i, r[i, 2] + u[i, 2], get3(v, i), get3(state.vd, i), before, after, cv, ca, report
+    )
+    if line.bits & SEABED:
+        x = (r[i, 0] + u[i, 0], r[i, 1] + u[i, 1], r[i, 2] + u[i, 2])
+        touches, f, Df, L, R = seabed_forces(line, sea, i, x, u, v, state.e, cv, report)
+        if touches:
+            F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
+    return F, D, GL, GR

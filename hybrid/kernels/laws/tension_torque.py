@@ -1,0 +1,269 @@
+"""Torque that tension makes in a helically armoured cable, and how the cable lengthens as it turns (docs/theory.md, 15).
+
+    symbol   meaning                                                              shape  unit
+    c        torque by tension, `tension_torque` of a section                     -      N m per N
+    g        twist of half a cell by tension, without torque: h c/(2 GJ)          -      rad/N
+    Q        torque at a node: of its element, of the catenary zone, of a load    -      N m
+    p        how the twist of an element answers to the turns of its cells        3      -
+    s        twist of an element by tension, g_a T_a + g_b T_b                    -      rad
+
+With W = EA (eps + c tau)^2/2 + GJ tau^2/2 per length, Q = GJ tau + c T and T = EA (eps + c tau).  The torque of an
+element is kb (k - k0 + s), so that tension takes part of the strain without stress, and the law of length of a cell is
+    l - h - h ck T - 2 g c T + g (Q_i + Q_{i+1}) = 0.
+Both follow from one function of k, l and T, so that no energy is lost.
+
+A block row does not reach the tension of the cell after next, which the spin and the force of a cell know: in these rows
+of the matrix the change of s is (g_a + g_b) dT_a, everywhere, so that torques and forces of the matrix still add up to
+nothing.  That slows Newton's method by the difference of both changes, and touches nothing else.  Lines without such sections have empty arrays here and run none of this.
+"""
+
+from __future__ import annotations
+
+from hybrid.kernels.algebra.block_elimination import WIDTH
+from hybrid.kernels.algebra.rotations import (
+    add,
+    cross,
+    dot,
+    frame,
+    get3,
+    inverse_left_jacobian,
+    jacobian_functions,
+    log_rotation,
+    mat_vec,
+    scale,
+)
+from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.element import relative_rotation, turns_freely
+from hybrid.kernels.machine.compile import inner, kernel
+
+# Columns of Work.couple, of the element at a node: kb p; how Q answers to chord and spin of the cell after it, and
+# (with a minus sign) of the cell before it; kb; Q; rate of twist, 1/s.
+AXIS, AFTER, SPIN_AFTER, BEFORE, SPIN_BEFORE, STIFF, TORQUE, RATE = 0, 3, 6, 7, 10, 11, 12, 13
+COUPLES = 14
+ZONE_FIRST, ZONE_LAST, ZONE_TORQUE = 0, 1, 1  # of Line.torsion and State.turn, as kernels.march.zone_torque has them
+
+
+@inner
+def couples(line):
+    """Whether tension makes a torque anywhere in a line."""
+    return line.tension_twist.shape[0] > 0
+
+
+@inner
+def twist_by_tension(line, T, i):
+    """s of the element at node i."""
+    s = 0.0
+    if i > 0:
+        s += line.tension_twist[i - 1] * T[i - 1]
+    if i < T.shape[0]:
+        s += line.tension_twist[i] * T[i]
+    return s
+
+
+@inner
+def twist_of_line(line, T):
+    """Twist, rad, of all of a line by the tensions T (N,)."""
+    s = 0.0
+    for c in range(line.tension_twist.shape[0]):
+        s += 2.0 * line.tension_twist[c] * T[c]
+    return s
+
+
+@inner
+def rest_strain(line, T, i):
+    """Strain without stress of the element at node i under the tensions T (N,)."""
+    k = get3(line.k0, i)
+    if couples(line):
+        k = (k[0], k[1], k[2] - twist_by_tension(line, T, i))
+    return k
+
+
+@inner
+def axis_of_twist(Ra, Rb):
+    """p, and the log strain."""
+    k = log_rotation(relative_rotation(Ra, Rb))
+    g, _ = jacobian_functions(dot(k, k))
+    P = inverse_left_jacobian(k, g)
+    return mat_vec(Ra, (P[6], P[7], P[8])), k
+
+
+@kernel
+def note_element(couple, line, T, i, Ra, Rb, before, after, rates_before, rates_after, tau):
+    """What the rows of an element at node i need.
+
+    before, after: direction and 1/length of its cells; 1/length 0 of an end.  rates: angular velocity (1/s) of each and
+    its derivatives by chord and spin.
+    """
+    for j in range(COUPLES):
+        couple[i, j] = 0.0
+    kb = line.kb[i, 2]
+    if turns_freely(get3(line.kb, i), get3(line.k0, i)) or kb == 0.0:
+        return
+    p, k = axis_of_twist(Ra, Rb)
+    q = scale(kb, p)
+    (da, ila), (db, ilb) = before, after
+    (wa, Wa, pa), (wb, Wb, pb) = rates_before, rates_after
+    A, a = scale(ilb, cross(q, db)), dot(q, db)
+    B, b = scale(ila, cross(q, da)), dot(q, da)
+    y = (wb[0] - wa[0], wb[1] - wa[1], wb[2] - wa[2])
+    rate = dot(p, y)
+    if tau > 0.0:
+        t = scale(tau, q)
+        A, a = (
+            add(A, (dot(t, (Wb[0], Wb[3], Wb[6])), dot(t, (Wb[1], Wb[4], Wb[7])), dot(t, (Wb[2], Wb[5], Wb[8])))),
+            (a + dot(t, pb)),
+        )
+        u = cross(y, t)
+        B = add(B, (dot(t, (Wa[0], Wa[3], Wa[6])), dot(t, (Wa[1], Wa[4], Wa[7])), dot(t, (Wa[2], Wa[5], Wa[8]))))
+        B, b = add(B, scale(ila, cross(u, da))), b + dot(t, pa) + dot(u, da)
+    for j in range(3):
+        couple[i, AXIS + j], couple[i, AFTER + j], couple[i, BEFORE + j] = q[j], A[j], B[j]
+    couple[i, SPIN_AFTER], couple[i, SPIN_BEFORE], couple[i, STIFF], couple[i, RATE] = a, b, kb, rate
+    couple[i, TORQUE] = kb * (k[2] - line.k0[i, 2] + twist_by_tension(line, T, i) + tau * rate)
+
+
+@kernel
+def note_end_torque(couple, line, i, moment, d, il):
+    """At a node without element: of a rod's end the torque of the moment (N m) that is given; d, il: of its cell.
+
+    What a catenary zone passes is known before the march (kernels.march.zone_torque).
+    """
+    n = line.h.shape[0]
+    torque = couple[i, TORQUE]
+    for j in range(COUPLES):
+        couple[i, j] = 0.0
+    if line.torsion.shape[0] > 0:
+        couple[i, TORQUE] = torque
+    elif (i == 0 or i == n) and line.spin[min(i, n - 1)]:
+        couple[i, TORQUE] = dot(moment, d)
+        for j in range(3):
+            x = il * (moment[j] - d[j] * couple[i, TORQUE])
+            couple[i, AFTER + j if i == 0 else BEFORE + j] = x if i == 0 else -x
+
+
+@kernel
+def couple_length(couple, line, i, T):
+    """Of the law of length of cell i: what its compliance (m/N) and its gap (m) get."""
+    g = line.tension_twist[i]
+    more = 2.0 * g * line.tension_torque[i]
+    return more, more * T - g * (couple[i, TORQUE] + couple[i + 1, TORQUE])
+
+
+@kernel
+def damping_loss(couple, line, i, along):
+    """Power, W, that damping takes out of cell i but for the torsion of its elements; along: rate of its length, m/s."""
+    n, hck, c = line.h.shape[0], line.h[i] * line.ck[i], line.tension_torque[i]
+    if line.spin[i]:
+        turn = couple[i, RATE] * (1.0 if i == 0 else 0.5) + couple[i + 1, RATE] * (1.0 if i + 1 == n else 0.5)
+        along += c * turn
+    else:
+        hck += 2.0 * line.tension_twist[i] * c
+    return line.tau[i] * along * along / hck
+
+
+@inner
+def twist_of(line, i):
+    """g of cell i; 0 where there is none."""
+    return line.tension_twist[i] if 0 <= i < line.h.shape[0] else 0.0
+
+
+@kernel
+def couple_rows(W, couple, line, e, i):
+    """Put the tensions into the balance of node i and the spin of cell i, and the twist into the length of cell i-1.
+
+    In the first two an element knows the tension of the cell before it, for both (of the start, that of the first).
+    """
+    n = line.h.shape[0]
+    g1, g2, g3, g4 = twist_of(line, i - 2), twist_of(line, i - 1), twist_of(line, i), twist_of(line, i + 1)
+    q = get3(couple, i)
+    s0, s1, s2 = g1 + (g2 if i > 1 else 0.0), g2 + (g3 if i > 0 else 0.0), g3 + g4  # of elements i-1, i, i+1
+    own = 10 if i > 0 else 15  # column of element i's
+    if i > 0:  # force of the cell before, taken from the balance; its length
+        d, _, il = chord(get3(e, i - 1))
+        before, first = get3(couple, i - 1), 5 if i > 1 else 10
+        here, there = scale(il, cross(d, before)), scale(il, cross(d, q))
+        if i == 1:
+            s0 = g2
+        for j in range(3):
+            o = (j + 1) * WIDTH
+            W[o + first] += s0 * here[j]
+            W[o + 10] -= s1 * there[j]
+        couple_length_row(W, couple, i, g1, g2, g3)
+    if i < n:  # force and spin of the cell after
+        d, _, il = chord(get3(e, i))
+        after = get3(couple, i + 1)
+        here, there = scale(il, cross(d, q)), scale(il, cross(d, after))
+        if i == 0:
+            s1 = g3
+        for j in range(3):
+            o = (j + 1) * WIDTH
+            W[o + own] -= s1 * here[j]
+            W[o + 15] += s2 * there[j]
+        if line.spin[i]:
+            W[4 * WIDTH + own] -= s1 * dot(d, q)
+            W[4 * WIDTH + 15] += s2 * dot(d, after)
+
+
+@inner
+def couple_length_row(W, couple, i, g1, g2, g3):
+    """Put the torques at both of its nodes into the length of cell i-1."""
+    a, b = couple[i - 1], couple[i]
+    for j in range(3):
+        W[1 + j] += g2 * a[BEFORE + j]
+        W[6 + j] += g2 * (b[BEFORE + j] - a[AFTER + j] - a[BEFORE + j])
+        W[11 + j] += g2 * (a[AFTER + j] - b[AFTER + j] - b[BEFORE + j])
+        W[16 + j] += g2 * b[AFTER + j]
+    W[4] -= g2 * a[SPIN_BEFORE]
+    W[5] += g2 * g1 * a[STIFF]
+    W[9] += g2 * (a[SPIN_AFTER] - b[SPIN_BEFORE])
+    W[10] += g2 * g2 * (a[STIFF] + b[STIFF])
+    W[14] += g2 * b[SPIN_AFTER]
+    W[15] += g2 * g3 * b[STIFF]
+
+
+@inner
+def stretch_energy(line, i, longer, low, high):
+    """Energy, J, of stretch of cell i longer by `longer` (m) beyond that of the twist, with torques at both ends, N m.
+
+    Torsion Q^2/(2 kb) of the elements beside it is not in it.
+    """
+    g = line.tension_twist[i]
+    hck = line.h[i] * line.ck[i] + 2.0 * g * line.tension_torque[i]
+    turn = g * (low + high)
+    T = (longer + turn) / hck
+    return 0.5 * hck * T * T - T * turn if hck > 0.0 else 0.0
+
+
+@inner
+def stretch_factor(line, c, T, torque):
+    """Length of cell c over its unstretched length under a tension (N) and a torque (N m)."""
+    if couples(line):
+        return 1.0 + compliance(line, c) * T - 2.0 * line.tension_twist[c] / line.h[c] * torque
+    return 1.0 + line.ck[c] * T
+
+
+@kernel
+def torque_beside(line, state, c):
+    """Torque, N m, at a node of cell c, where tension makes one; else 0."""
+    if not couples(line):
+        return 0.0
+    for z in range(line.torsion.shape[0]):
+        if line.torsion[z, ZONE_FIRST] <= c < line.torsion[z, ZONE_LAST]:
+            return state.turn[z, ZONE_TORQUE]
+    n = line.h.shape[0]
+    i = c if c > 0 and line.element[c] else c + 1
+    if i >= n or not line.element[i]:
+        return 0.0
+    d, _, _ = chord(get3(state.e, i - 1))
+    dn, _, _ = chord(get3(state.e, i))
+    _, k = axis_of_twist(frame(get3(state.a1, i - 1), d), frame(get3(state.a1, i), dn))
+    return line.kb[i, 2] * (k[2] - rest_strain(line, state.T, i)[2])
+
+
+@inner
+def compliance(line, i):
+    """Compliance of cell i that turns freely, 1/N."""
+    c = line.ck[i]
+    if couples(line):
+        c += 2.0 * line.tension_twist[i] * line.tension_torque[i] / line.h[i]
+    return c

@@ -1,0 +1,187 @@
+"""The water: its current at a height, the waves that pass, and how much of a cell they wet.
+
+    symbol   meaning                                              shape  unit      frame
+    U, U1    velocity of the current and its derivative dU/dz     3      m/s, 1/s  inertial
+    z        height                                               -      m
+    eta      elevation of the surface                             -      m
+    x        wetness coordinate, (eta - z)/D + 1/2                -      -
+    A, w, k  amplitude, frequency, wave number of a component     -      m, 1/s, 1/m
+
+Waves are linear (Airy), each component of an irregular sea by itself.  Above and below still
+water the kinematics are stretched after Wheeler: the depth at which a component is taken is
+scaled so that the moving surface has what linear theory has at the still one.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.state.state import LANES
+
+# A component whose motion has faded to this part of its surface value is left out at that depth.
+FADED = 1e-4
+LAST = math.log(FADED)
+# x + TO_WHOLE - TO_WHOLE is x rounded to a whole number; a quarter turn in two parts, the first of 33 bits.
+TO_WHOLE = 1.5 * 2.0**52
+QUARTER_HIGH, QUARTER_LOW = 1.57079632673412561417, 6.07710050650619224932e-11
+# Coefficients of Taylor's series of sine, cosine and exponential.
+S3, S5, S7, S9, S11, S13, S15 = ((-1.0) ** k / math.factorial(2 * k + 1) for k in range(1, 8))
+C2, C4, C6, C8, C10, C12, C14, C16 = ((-1.0) ** k / math.factorial(2 * k) for k in range(1, 9))
+E2, E3, E4, E5, E6, E7, E8, E9, E10 = (1.0 / math.factorial(k) for k in range(2, 11))
+# Wetness coordinates closer than this are one: their difference quotient would lose digits.
+SAME_WETNESS = 1e-4
+
+
+@inner
+def current_at(z, current, part, height):
+    """U and U1 at a height, from the table (z, current), times `part`."""
+    n = z.shape[0]
+    if n == 1 or height <= z[0]:
+        return (part * current[0, 0], part * current[0, 1], part * current[0, 2]), (0.0, 0.0, 0.0)
+    if height >= z[n - 1]:
+        m = n - 1
+        return (part * current[m, 0], part * current[m, 1], part * current[m, 2]), (0.0, 0.0, 0.0)
+    a, b = 0, n - 1
+    while b - a > 1:
+        m = (a + b) // 2
+        if z[m] <= height:
+            a = m
+        else:
+            b = m
+    q = part / (z[b] - z[a])
+    U1 = (q * (current[b, 0] - current[a, 0]), q * (current[b, 1] - current[a, 1]), q * (current[b, 2] - current[a, 2]))
+    t = height - z[a]
+    U = (part * current[a, 0] + t * U1[0], part * current[a, 1] + t * U1[1], part * current[a, 2] + t * U1[2])
+    return U, U1
+
+
+@inner
+def cos_sin(a):
+    """Cosine and sine without branches, so that loops over nodes use vector instructions.
+
+    The angle less whole quarter turns (Cody and Waite, in two parts: exact below 10^6 quarters), Taylor's series on
+    [-pi/4, pi/4], both within 2e-16, and the quarters turned back.
+    """
+    quarters = (a * (2.0 / math.pi) + TO_WHOLE) - TO_WHOLE
+    x = (a - quarters * QUARTER_HIGH) - quarters * QUARTER_LOW
+    m = quarters - 4.0 * ((0.25 * quarters - 0.375 + TO_WHOLE) - TO_WHOLE)
+    z = x * x
+    s = x * (1.0 + z * (S3 + z * (S5 + z * (S7 + z * (S9 + z * (S11 + z * (S13 + z * S15)))))))
+    c = 1.0 + z * (C2 + z * (C4 + z * (C6 + z * (C8 + z * (C10 + z * (C12 + z * (C14 + z * C16)))))))
+    C = abs(m - 2.0) - 1.0  # cosine and sine of m quarters
+    S = 1.0 - abs(m - 1.0) if m < 2.5 else -1.0
+    return C * c - S * s, C * s + S * c
+
+
+@inner
+def exp_of_negative(y):
+    """exp(y) for -10 <= y <= 0 without branches: the 32nd power of Taylor's series at y/32; within 1e-14 of the value."""
+    x = y / 32.0
+    q = 1.0 + x * (
+        1.0 + x * (E2 + x * (E3 + x * (E4 + x * (E5 + x * (E6 + x * (E7 + x * (E8 + x * (E9 + x * E10))))))))
+    )
+    q *= q
+    q *= q
+    q *= q
+    q *= q
+    return q * q
+
+
+@inner
+def elevate(sea, r, u, first):
+    """Heights of the surface over LANES nodes from `first` on, after Wheeler, and what is needed of the components.
+
+    Rows of sea.lanes: 0 x, 1 y, 2 the depth at which components are taken, 3 elevation, from 10 on cosine and sine.
+    """
+    lanes, waves, part = sea.lanes, sea.waves, sea.now[2]
+    for l in range(LANES):
+        i = min(first + l, r.shape[0] - 1)
+        for k in range(3):
+            lanes[k, l] = r[i, k] + u[i, k]
+        for k in range(3, 10):
+            lanes[k, l] = 0.0
+    for j in range(waves.shape[0]):
+        A, w, kx, ky, phase = waves[j, 0], waves[j, 1], waves[j, 2], waves[j, 3], waves[j, 4]
+        phase -= w * sea.now[0]
+        for l in range(LANES):
+            c, s = cos_sin(kx * lanes[0, l] + ky * lanes[1, l] + phase)
+            lanes[10 + 2 * j, l], lanes[11 + 2 * j, l] = c, s
+            lanes[3, l] += A * c
+    for l in range(LANES):
+        eta = part * lanes[3, l]
+        # Wheeler: the surface keeps what linear theory has at z = 0, the bed what it has there
+        s = min(lanes[2, l] - sea.surface, eta) - eta
+        if sea.depth < math.inf:
+            s = max(s * sea.depth / (sea.depth + eta), -sea.depth)
+        lanes[2, l], lanes[3, l] = s, eta
+
+
+@inner
+def stir(sea):
+    """Rows 4 to 9 of sea.lanes: velocity and acceleration of the fully grown waves."""
+    lanes, waves = sea.lanes, sea.waves
+    highest = -math.inf
+    for l in range(LANES):
+        highest = max(highest, lanes[2, l])
+    for j in range(waves.shape[0]):
+        w, k = waves[j, 1], waves[j, 5]
+        if k * highest < LAST:
+            continue
+        q = math.exp(-2.0 * k * sea.depth) if sea.depth < math.inf else 0.0
+        speed, towards_x, towards_y = waves[j, 0] * w / (1.0 - q), waves[j, 2] / k, waves[j, 3] / k
+        for l in range(LANES):
+            y = k * lanes[2, l]
+            fade = exp_of_negative(max(y, LAST))
+            here = speed if y >= LAST else 0.0
+            level, up = here * (fade + q / fade), here * (fade - q / fade)
+            c, s = lanes[10 + 2 * j, l], lanes[11 + 2 * j, l]
+            lanes[4, l] += towards_x * level * c
+            lanes[5, l] += towards_y * level * c
+            lanes[6, l] += up * s
+            lanes[7, l] += towards_x * w * level * s
+            lanes[8, l] += towards_y * w * level * s
+            lanes[9, l] -= w * up * c
+
+
+@kernel
+def wave_kinematics(sea, r, u):
+    """Fill sea.flow: velocity and acceleration of the waves at the positions r + u, and the elevation above them.
+
+    A component is A cos(kx x + ky y - w t + phase) at the surface; everything is multiplied by the grown part of the
+    sea, sea.now[2], and its rate of growth sea.now[3] counts in the acceleration.
+    """
+    part, rate = sea.now[2], sea.now[3]
+    lanes, flow = sea.lanes, sea.flow
+    for first in range(0, flow.shape[0], LANES):
+        elevate(sea, r, u, first)
+        stir(sea)
+        for i in range(first, min(first + LANES, flow.shape[0])):
+            l = i - first
+            for k in range(3):
+                flow[i, k] = part * lanes[4 + k, l]
+                flow[i, 3 + k] = part * lanes[7 + k, l] + rate * lanes[4 + k, l]
+            flow[i, 6] = lanes[3, l]
+
+
+@inner
+def wetted(x):
+    """Wetted part of a point with wetness coordinate x, its antiderivative and its derivative."""
+    if x <= 0.0:
+        return 0.0, 0.0, 0.0
+    if x >= 1.0:
+        return 1.0, x - 0.5, 0.0
+    return x * x * (3.0 - 2.0 * x), x * x * x * (1.0 - 0.5 * x), 6.0 * x * (1.0 - x)
+
+
+@inner
+def wetted_stretch(xa, xb):
+    """Wetted part of a straight stretch between wetness coordinates xa and xb, and its derivatives by both."""
+    ga, Ga, _ = wetted(xa)
+    gb, Gb, _ = wetted(xb)
+    q = xb - xa
+    if abs(q) < SAME_WETNESS:
+        g, _, h = wetted(0.5 * (xa + xb))
+        return g, 0.5 * h, 0.5 * h
+    W = (Gb - Ga) / q
+    return W, (W - ga) / q, (gb - W) / q

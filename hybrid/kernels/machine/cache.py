@@ -1,0 +1,240 @@
+"""Where the machine code of the kernels is kept, and whether it is there.
+
+numba's own cache looks only at the file a kernel stands in, so it keeps a stale
+kernel when a function *imported from another file* is edited.  Here the cache
+folder carries a hash of every source file that can hold a kernel; an edit
+anywhere means a new folder and a fresh compilation.
+
+Code is looked for in the package first, where a release may bring it for a level
+of processors, then in the folder of the user, then it is compiled.
+"""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import os
+import platform
+import shutil
+import stat
+import sys
+import sysconfig
+import tempfile
+import warnings
+from collections.abc import Sequence
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+from hybrid.kernels.machine.code_file import SUFFIX, digest, others_may_write
+
+KERNELS = ("kernels/**/*.py", "adapt/zone_rules.py")
+# They keep machine code and call it, and make none.
+KEEPERS = ("argument_types.py", "cache.py", "code_file.py", "kept_code.py", "linked_code.py")
+KEPT_CACHES = 4  # older compilations are deleted; four let a few versions or branches live side by side
+SHIPPED = Path(__file__).parents[1] / "compiled"
+
+
+class CacheWarning(UserWarning):
+    """Kept machine code is not used, and why."""
+
+
+class Level(NamedTuple):
+    """Processors for which a release brings machine code: LLVM's name of them, and what it may use of them."""
+
+    name: str
+    features: tuple[str, ...]
+
+
+class Processor(NamedTuple):
+    """What machine code is made for."""
+
+    triple: str
+    name: str
+    features: str  # as LLVM takes them: +avx2,-sse4a
+
+
+V2 = ("cx16", "popcnt", "sahf", "sse3", "sse4.1", "sse4.2", "ssse3")
+LEVELS = (Level("x86-64-v3", (*V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "xsave")),)
+
+
+# What numba reads of the processor, and processors on which it uses no AVX.
+_SETTINGS = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX"
+_WITHOUT_AVX = "corei7-avx", "core-avx-i", "sandybridge", "ivybridge", "nocona"
+
+
+@cache
+def kernel_hash(package: Path = Path(__file__).parents[2]) -> str:
+    """Hash of all kernel sources, of the compiler's version and of the Python that calls them.
+
+    numpy and the third number of Python's version are not in it: kernels call numba's functions and Python's C
+    interface, which know them.
+    """
+    made = hashlib.sha256()
+    for where in KERNELS:
+        for file in sorted(x for x in package.glob(where) if x.name not in KEEPERS):
+            made.update(file.relative_to(package).as_posix().encode())
+            made.update(file.read_bytes())
+    for name in ("numba", "llvmlite"):
+        made.update(f"{name} {version(name)}".encode())
+    made.update(f"{_python()} {platform.machine()} {sysconfig.get_platform()}".encode())
+    return made.hexdigest()[:16]
+
+
+def _python() -> str:
+    return f"{sys.implementation.name} {sys.version_info[0]}.{sys.version_info[1]}{getattr(sys, 'abiflags', '')}"
+
+
+@cache
+def processor() -> Processor:
+    """The processor that kernels are compiled for, as numba has it; it is asked only where its own rules count."""
+    from llvmlite import binding as llvm
+
+    name, features = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    if is_set() or name in _WITHOUT_AVX or "+avx," not in features:
+        from numba.core.registry import cpu_target
+
+        return Processor(*cpu_target.target_context.codegen().magic_tuple())
+    return Processor(llvm.get_process_triple(), name, features)
+
+
+def is_set() -> bool:
+    """Whether the user tells numba of a processor, by its variables or in its file of settings."""
+    return any(os.environ.get(x) for x in _SETTINGS) or Path(".numba_config.yaml").exists()
+
+
+@cache
+def shipped_for() -> Processor | None:
+    """The level whose code in the package this processor can execute, None where there is none.
+
+    Nor is there where the user's settings of numba name a processor.
+    """
+    if is_set():
+        return None
+    host = processor()
+    has = set(host.features.split(","))
+    for level in LEVELS:
+        if all(f"+{x}" in has for x in level.features) and folder_of(level.name).is_dir():
+            return Processor(host.triple, level.name, features_of(level))
+    return None
+
+
+def features_of(level: Level) -> str:
+    """As LLVM and NUMBA_CPU_FEATURES take them."""
+    return ",".join(f"+{x}" for x in level.features)
+
+
+def folder_of(level: str) -> Path:
+    """The folder in the package with the code for a level of this system, Python and numba."""
+    python = f"py{sys.version_info[0]}.{sys.version_info[1]}{getattr(sys, 'abiflags', '')}"
+    return SHIPPED / f"{sysconfig.get_platform()}-{level}-{python}-numba{version('numba')}"
+
+
+class Place(NamedTuple):
+    """A folder with machine code for a processor; ours: it is written to and mended, and must be the user's alone."""
+
+    folder: Path
+    processor: Processor
+    ours: bool
+
+    @property
+    def mark(self) -> str:
+        """In the name of each file: of the processor and of the kernels' sources."""
+        return digest(*self.processor, kernel_hash())[:12]
+
+
+@cache
+def shipped_place() -> Place | None:
+    """The folder in the package, which is as much trusted as the package is."""
+    level = shipped_for()
+    return level and Place(folder_of(level.name), level, ours=False)
+
+
+def places() -> list[Place]:
+    """Where machine code may be, in the order in which it is looked for."""
+    shipped = shipped_place()
+    return [*([shipped] if shipped else []), Place(cache_folder(), processor(), ours=True)]
+
+
+def shared() -> bool:
+    """Whether the user says that all who may write to the cache are trusted."""
+    return os.environ.get("HYBRID_CACHE_SHARED", "") not in ("", "0")
+
+
+def cache_folder() -> Path:
+    """Folder of this version's machine code: HYBRID_CACHE_DIR, else the user's cache folder, else a temporary one.
+
+    What is loaded from it is executed: it is used only where nobody but the user and root may write to it.
+    """
+    root = os.environ.get("HYBRID_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    base = Path(root) / "hybrid-cable"
+    try:
+        make_folder(base)
+        usable = os.access(base, os.W_OK) and _is_safe(base) and _is_safe(base / kernel_hash())
+    except OSError:
+        usable = False
+    return (base if usable else temporary_folder()) / kernel_hash()
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder of the cache, to which only the user may write unless it is shared."""
+    folder.mkdir(mode=0o777 if shared() else 0o700, parents=True, exist_ok=True)
+
+
+def _is_safe(folder: Path) -> bool:
+    """Whether nobody else may write to a folder, or it is not there yet; else it is said."""
+    if shared() or not os.path.lexists(folder):
+        return True
+    why = others_may_write(folder.stat())
+    if why:
+        remedy = "chmod go-w it, name another folder in HYBRID_CACHE_DIR, or set HYBRID_CACHE_SHARED=1"
+        warn_once(
+            f"the cache folder {folder} {why}, who could run code as you: machine code is kept in a temporary folder; "
+            f"{remedy} if you trust all of them"
+        )
+    return why is None
+
+
+@cache
+def warn_once(text: str) -> None:
+    """In one line: `hybrid` shows it as a note."""
+    warnings.warn(text, CacheWarning, stacklevel=2)
+
+
+@cache
+def temporary_folder() -> Path:
+    """A folder among the temporary ones that nobody else may write to: what is loaded from a cache is executed.
+
+    The same one for all processes of a user; where its name is taken by somebody else, one for this process alone.
+    """
+    base = Path(tempfile.gettempdir()) / f"hybrid-cable-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
+    try:
+        base.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = base.lstat()
+        private = stat.S_ISDIR(found.st_mode)
+        if hasattr(os, "getuid"):  # where it is missing, temporary folders belong to one user
+            private = private and found.st_uid == os.getuid() and not found.st_mode & 0o077
+    except OSError:
+        private = False
+    if private:
+        return base
+    own = Path(tempfile.mkdtemp(prefix="hybrid-cable-"))
+    atexit.register(shutil.rmtree, own, ignore_errors=True)
+    return own
+
+
+def is_warm(kernels: Sequence[str]) -> bool:
+    """True when these kernels of this version, as file.function, are there compiled for this processor."""
+    there = [(place.folder, place.mark) for place in places()]
+    return all(any(any(folder.glob(f"{name}-{mark}-*{SUFFIX}")) for folder, mark in there) for name in kernels)
+
+
+def prune(folder: Path) -> None:
+    """Delete the oldest sibling caches; another process may be doing the same, so nothing here may fail."""
+    try:
+        siblings = sorted((p for p in folder.parent.iterdir() if p.is_dir() and p != folder), key=os.path.getmtime)
+        for old in siblings[: max(0, len(siblings) - (KEPT_CACHES - 1))]:
+            shutil.rmtree(old, ignore_errors=True)
+    except OSError:
+        pass

@@ -1,0 +1,110 @@
+"""How functions become kernels: entries for Python, kept on disk, and functions that are inlined into them.
+
+numba is imported where a kernel has to be compiled, not here and not where it is found on disk (kernels.machine.kept_code).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from types import FunctionType
+from typing import Any
+
+
+class _Function:
+    """A function that numba hears of when it is needed: making hundreds of its dispatchers takes as long as all kernels
+    take to load."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.py_func = function
+        self.__module__, self.__doc__ = function.__module__, function.__doc__
+        self.__name__, self.__qualname__ = function.__name__, function.__qualname__
+
+
+class Inner(_Function):
+    """A function that only kernels call."""
+
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        super().__init__(function)
+        self._options = options
+
+    @cached_property
+    def made(self) -> Any:
+        """numba's own of it."""
+        from hybrid.kernels.machine.compiler import inner_of
+
+        return inner_of(self.py_func, self._options)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba takes it for."""
+        return self.made._numba_type_
+
+    def __call__(self, *args: Any, **named: Any) -> Any:
+        """There is no entry for Python: numba would jump to address 0."""
+        raise TypeError(
+            f"{self.py_func.__qualname__} is compiled for kernels only; a @kernel can be called from Python"
+        )
+
+
+class Entry(_Function):
+    """A kernel that Python calls.  Called by another kernel it is compiled as a part of that one."""
+
+    @cached_property
+    def _code(self) -> Any:
+        """Its machine code, for each signature."""
+        from hybrid.kernels.machine.kept_code import KeptCode
+
+        return KeptCode(self.py_func)
+
+    @cached_property
+    def part(self) -> Any:
+        """numba's own of it where another kernel calls it."""
+        return Inner(self.py_func).made
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba takes it for in another kernel."""
+        return self.part._numba_type_
+
+    def __call__(self, *args: Any) -> Any:
+        return self._code.taking(args).call(args)
+
+    def address(self, *args: Any) -> int:
+        """Where the machine code for arguments of the types of these is, for kernels.machine.references.caller."""
+        found: int = self._code.taking(args).address
+        return found
+
+    def compile_unless_busy(self, *args: Any) -> None:
+        """Compile for arguments of the types of these, unless another process is doing it."""
+        self._code.make_unless_busy(args)
+
+    @property
+    def signatures(self) -> list[Any]:
+        """Of the machine code in this process: keys of the types of the arguments (kernels.machine.argument_types)."""
+        return self._code.signatures
+
+    @property
+    def compilations(self) -> int:
+        """How often this process has compiled it."""
+        return self._code.compilations
+
+
+def named(function: Any, name: str) -> FunctionType:
+    """A copy of a function under another name: a kernel of its own, with its own file on disk."""
+    copy = FunctionType(function.__code__, function.__globals__, name, function.__defaults__, function.__closure__)
+    copy.__qualname__, copy.__module__, copy.__doc__ = name, function.__module__, function.__doc__
+    return copy
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile an entry point: called from Python, kept on disk under `cache_folder`."""
+    return Entry(function)
+
+
+def inner(function: Callable[..., Any]) -> Any:
+    """Compile a function that only kernels call; it is inlined into them.
+
+    Without an entry for Python it takes two thirds of the time.
+    """
+    return Inner(function, forceinline=True)

@@ -1,0 +1,159 @@
+"""How numba compiles kernels: what it is told, and what is done in another way than its own.  Imported when the first kernel
+has to be compiled (kernels.machine.kept_code).  Tried with numba 0.62.0 and 0.68.1."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numba
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+from numba.core.registry import CPUDispatcher
+
+from hybrid.kernels.machine import reference_types
+from hybrid.kernels.machine.linked_code import Code
+
+# numba's "contract" lets a*b+c become one fused instruction; no other relaxation is
+# allowed: NaN must stay visible and the order of sums must stay as written.
+# Kernels release the GIL: runs in threads of one process share no array that they write.
+_OPTIONS: dict[str, Any] = {
+    "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False, "no_cfunc_wrapper": True, "nogil": True,
+}  # fmt: skip
+_njit: Any = numba.njit  # its type knows of fewer options than it takes
+
+
+class _Kernel(CPUDispatcher):
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """A constant counts as any other value of its type: f(x, 0) and f(x, 1) are compiled once."""
+        return super().get_call_template([numba.types.unliteral(x) for x in args], kws)
+
+    def compile(self, sig: Any) -> Any:
+        """Without searches for garbage: a fifth of the time."""
+        if not gc.isenabled():
+            return super().compile(sig)
+        gc.disable()
+        try:
+            return super().compile(sig)
+        finally:
+            gc.enable()
+
+
+class _NoEnvironment:
+    def set_env(self, name: str, environment: Any) -> None:
+        """The environment is for objects of Python, of which kernels use none."""
+
+
+class _InlinedCode(JITCodeLibrary):
+    """LLVM code of one function that kernels call, without what it calls itself.
+
+    numba would optimise it together with all of that, and make machine code of it, at every level of calls anew; only
+    the machine code of entries is ever executed.
+    """
+
+    codegen = _NoEnvironment()
+
+    def finalize(self) -> None:
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        return 0
+
+    def _get_module_for_linking(self) -> Any:
+        """With all that it calls: for a function of numba that is none of ours."""
+        whole = super()._get_module_for_linking().clone()
+        _link(self, whole)
+        return whole
+
+
+class _EntryCode(JITCodeLibrary):
+    """Code of an entry with all that it calls: optimised together, once."""
+
+    def finalize(self) -> None:
+        _link(self, self._final_module)
+        self._linking_libraries = []
+        super().finalize()
+
+
+def _link(code: Any, module: Any) -> None:
+    """Link into a module all that the code calls, each once."""
+    found: dict[Any, None] = {}  # in order
+
+    def collect(calling: Any) -> None:
+        for called in calling._linking_libraries:
+            if called not in found:
+                found[called] = None
+                if isinstance(called, _InlinedCode):
+                    collect(called)
+
+    collect(code)
+    for called in found:
+        if hasattr(code, "_reload_init"):  # numba 0.62 has none
+            code._reload_init.update(called._reload_init)
+        module.link_in(JITCodeLibrary._get_module_for_linking(called), preserve=True)
+
+
+class _EntryCompiler(Compiler):
+    made: type = _EntryCode
+
+    def __init__(self, typing: Any, target: Any, library: Any, *rest: Any) -> None:
+        library = self.made(target.codegen(), "hybrid")
+        library.enable_object_caching()
+        super().__init__(typing, target, library, *rest)
+
+
+class _InnerCompiler(_EntryCompiler):
+    made = _InlinedCode
+
+
+class Made(NamedTuple):
+    """An entry as numba has compiled it."""
+
+    result: Any  # as numba calls it
+    processor: tuple[str, str, str]  # that it is for, as kernels.machine.cache.Processor
+
+    @property
+    def code(self) -> bytes:
+        """The object, which kernels.machine.linked_code.link takes."""
+        self.result.library._ensure_finalized()
+        code: bytes = self.result.library._get_compiled_object()
+        return code
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Of what is in the object."""
+        described = self.result.fndesc
+        return {
+            "symbol": described.mangled_name,
+            "wrapper": described.llvm_cpython_wrapper_name,
+            "environment": described.env_name,
+        }
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether it refers to something of this process: to Python's objects, or into numba's libraries."""
+        made = self.result
+        return bool(made.lifted or made.reload_init or made.environment.consts or made.library.has_dynamic_globals)
+
+    def code_here(self) -> Code:
+        """What numba has linked in this process."""
+        entry, symbol = self.result.entry_point, self.result.fndesc.llvm_func_name
+        return Code(lambda args: entry(*args), self.result.library.get_pointer_to_function(symbol))
+
+
+def compile_entry(function: Callable[..., Any], key: tuple[Any, ...]) -> Made:
+    """key: of the types of its arguments (kernels.machine.argument_types)."""
+    entry = _njit(pipeline_class=_EntryCompiler, **_OPTIONS)(function)
+    entry.__class__ = _Kernel
+    sig = tuple(map(reference_types.type_for, key))
+    entry.compile(sig)
+    (result,) = entry.overloads.values()
+    return Made(result, result.library.codegen.magic_tuple())
+
+
+def inner_of(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    """Of a function that only kernels call."""
+    made = _njit(no_cpython_wrapper=True, pipeline_class=_InnerCompiler, **(_OPTIONS | options))(function)
+    made.__class__ = _Kernel
+    return made

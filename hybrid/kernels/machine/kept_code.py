@@ -1,0 +1,189 @@
+"""Machine code of an entry: of this process, on disk, or compiled and kept.
+
+numba is imported only to compile.  A file holds machine code and three names (kernels.machine.code_file); nothing in it is
+unpickled, which would execute whatever it says.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import re
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext, suppress
+from functools import cache, cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybrid.kernels.machine import cache as kept
+from hybrid.kernels.machine.argument_types import key_of, text_of
+from hybrid.kernels.machine.code_file import SUFFIX, Unusable, digest, read_code, write_code
+from hybrid.kernels.machine.linked_code import Code, link
+
+if TYPE_CHECKING:
+    from filelock import FileLock
+
+    from hybrid.kernels.machine.compiler import Made
+
+
+class KeptCode:
+    """Machine code of one entry, by the types of the arguments."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self._known: dict[tuple[Any, ...], Code] = {}
+        self.compilations = 0
+
+    def taking(self, args: tuple[Any, ...]) -> Code:
+        """That takes these arguments: found, or compiled; what another process is compiling is waited for."""
+        key = tuple([key_of(x) for x in args])
+        known = self._known.get(key)
+        if known is None:
+            known = self._known[key] = self._read(key) or self._made(key)
+        return known
+
+    def make_unless_busy(self, args: tuple[Any, ...]) -> None:
+        """Compile for arguments of the types of these, unless another process is doing it."""
+        from filelock import Timeout
+
+        with suppress(Timeout, OSError), self._lock.acquire(timeout=0):
+            self.taking(args)
+
+    @property
+    def signatures(self) -> list[tuple[Any, ...]]:
+        """Keys of the types of arguments, one for each machine code."""
+        return list({_text(key): key for key in self._known}.values())
+
+    def _read(self, key: tuple[Any, ...]) -> Code | None:
+        """From the package or the user's folder; None where it has to be compiled."""
+        for place in _all_places():
+            file = self._file(place, key)
+            try:
+                found = read_code(file, self._header(place, key), trust=not place.ours or kept.shared())
+            except Unusable as why:
+                self._mend(file, place, why)
+                continue
+            if found:
+                header, code = found
+                return link(code, header)
+        return None
+
+    def _made(self, key: tuple[Any, ...]) -> Code:
+        with self._alone():
+            return self._read(key) or self._compiled(key)
+
+    def _compiled(self, key: tuple[Any, ...]) -> Code:
+        from hybrid.kernels.machine.compiler import compile_entry
+
+        made = compile_entry(self._function, key)
+        self.compilations += 1
+        if not self._can_be_kept(made):
+            return made.code_here()
+        code = made.code
+        self._write(key, code, made.names)
+        return link(code, made.names)
+
+    def _write(self, key: tuple[Any, ...], code: bytes, names: dict[str, str]) -> None:
+        place = _own_place()
+        try:
+            kept.make_folder(place.folder)
+            write_code(self._file(place, key), self._header(place, key) | names, code)
+        except OSError as error:
+            kept.warn_once(
+                f"machine code cannot be kept in {place.folder} ({error.strerror}) and is compiled at every run: "
+                "free space there, or name another folder in HYBRID_CACHE_DIR"
+            )
+
+    def _mend(self, file: Path, place: kept.Place, why: Unusable) -> None:
+        if place.ours:
+            with suppress(OSError):
+                file.unlink()
+        kept.warn_once(f"machine code {file} {why}: it is not used, and compiled again")
+
+    def _can_be_kept(self, made: Made) -> bool:
+        """Code that refers to nothing of this process, and is for the processor that its file will say."""
+        why = None
+        if made.is_bound:
+            why = "refers to objects of Python, to large global arrays or to LAPACK, which machine code on disk cannot"
+        elif made.processor != _own_place().processor:
+            why = f"is for the processor {made.processor[1]} by settings of numba that were changed in this process"
+        if why:
+            kept.warn_once(f"{self._function.__qualname__} is compiled at every run: it {why}")
+        return why is None
+
+    def _alone(self) -> AbstractContextManager[Any]:
+        """While no other process compiles it; on a file system without locks at worst both do."""
+        try:
+            return self._lock.acquire()
+        except OSError:
+            return nullcontext()
+
+    @cached_property
+    def _lock(self) -> FileLock:
+        from filelock import FileLock
+
+        name = f"{self._function.__module__}.{self._function.__qualname__}.lock"
+        return FileLock(_own_place().folder / name)
+
+    @cached_property
+    def _name(self) -> str:
+        """file.function, of characters that any file system takes."""
+        module = self._function.__module__.rpartition(".")[2]
+        return re.sub(r"[^\w.]", "", f"{module}.{self._function.__qualname__}")
+
+    @cached_property
+    def _source(self) -> str:
+        """Of what the hash of all kernels does not know: kernels of tests and users, and what a closure holds."""
+        code, content = self._function.__code__, _content(inspect.getfile(self._function))
+        return digest(code.co_code, str(code.co_firstlineno), _held(self._function), content)
+
+    def _header(self, place: kept.Place, key: tuple[Any, ...]) -> dict[str, Any]:
+        """What the file for a signature says of what it is."""
+        return {
+            "kernel": f"{self._function.__module__}.{self._function.__qualname__}",
+            "signature": _text(key),
+            "triple": place.processor.triple,
+            "processor": place.processor.name,
+            "features": place.processor.features,
+            "kernels": kept.kernel_hash(),
+            "source": self._source,
+        }
+
+    def _file(self, place: kept.Place, key: tuple[Any, ...]) -> Path:
+        which = digest(*self._header(place, key).values())[:16]
+        return place.folder / f"{self._name}-{place.mark}-{which}{SUFFIX}"
+
+
+def _text(key: tuple[Any, ...]) -> str:
+    """A signature as text."""
+    return ", ".join(map(text_of, key))
+
+
+def _held(function: Callable[..., Any]) -> bytes:
+    """What a closure holds, as bytes; of most kernels nothing."""
+    cells = tuple(x.cell_contents for x in function.__closure__ or ())
+    if not cells:
+        return b""
+    from numba.core.serialize import dumps
+
+    found: bytes = dumps(cells)
+    return found
+
+
+@cache
+def _all_places() -> list[kept.Place]:
+    """Those of this process; the user's is made, and older ones beside it are deleted."""
+    found = kept.places()
+    with suppress(OSError):  # said where code is written
+        kept.make_folder(found[-1].folder)
+        kept.prune(found[-1].folder)
+    return found
+
+
+def _own_place() -> kept.Place:
+    return _all_places()[-1]
+
+
+@cache
+def _content(source: str) -> bytes:
+    return hashlib.sha256(Path(source).read_bytes()).digest()

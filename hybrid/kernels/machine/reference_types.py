@@ -1,0 +1,223 @@
+"""What numba makes of kernels.machine.references: the type of a reference, how its fields are read, calls of an address.
+
+The layout of a table is that of kernels.machine.binding.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from types import NoneType
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import from_dtype, typeof, types
+from numba.core import cgutils
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate, make_intrinsic_template
+from numba.extending import NativeValue, infer_getattr, models, register_model, unbox
+
+from hybrid.kernels.machine.argument_types import is_array, key_of, layout_of
+from hybrid.kernels.machine.references import examples
+
+_WORD = ir.IntType(64)
+
+
+class Reference(types.Type):
+    """Type of a NamedTuple of a class that is kept by reference."""
+
+    def __init__(self, of: type) -> None:
+        self.of = of
+        super().__init__(name=f"Reference({of.__module__}.{of.__qualname__})")
+
+
+def type_of(value: Any) -> Any:
+    """numba's type of a value, as an entry takes it."""
+    return type_for(key_of(value))
+
+
+def type_for(key: Any) -> Any:
+    """numba's type for a key of kernels.machine.argument_types."""
+    if is_array(key):
+        dtype, dimensions, flags = key
+        layout, readonly, aligned = layout_of(flags)
+        made: Any = types.Array  # its type knows of fewer layouts than it takes
+        return made(from_dtype(dtype), dimensions, layout, readonly=readonly, aligned=aligned)
+    if isinstance(key, tuple):
+        return types.BaseTuple.from_types(tuple(map(type_for, key[1:])), key[0])
+    if key in examples:
+        return Reference(key)
+    return types.none if key is NoneType else from_dtype(np.dtype(key))
+
+
+@cache
+def _fields_of(of: type) -> dict[str, tuple[int, Any]]:
+    """Of a class: where each field begins in its table, and its type."""
+    fields, at = {}, 0
+    for name, value in examples[of]._asdict().items():
+        kind = type_of(value)
+        fields[name] = at, kind
+        at += size(kind)
+    return fields
+
+
+def size(kind: Any) -> int:
+    """Numbers of a table that a value of a type takes."""
+    if isinstance(kind, Reference):
+        return sum(size(x) for _, x in _fields_of(kind.of).values())
+    if isinstance(kind, types.NamedTuple):
+        return sum(size(x) for x in kind.types)
+    return 1 + kind.ndim if isinstance(kind, types.Array) else 1
+
+
+def read_function(example: Any) -> Any:
+    """What numba is told of kernels.machine.references.reader."""
+    kind = Reference(type(example))
+
+    def read(typingctx: Any, table: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            return context.make_array(signature.args[0])(context, builder, args[0]).data
+
+        return kind(table), generate
+
+    return read
+
+
+def rows_function(example: Any) -> Any:
+    """What numba is told of kernels.machine.references.rows."""
+    kind, of = types.Array(types.float64, 2, "C"), Reference(type(example))
+
+    def rows(typingctx: Any, value: Any, at: Any, columns: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            return _array(context, builder, kind, cgutils.gep_inbounds(builder, args[0], args[1]), 0, args[2])
+
+        return kind(of, types.int64, types.int64), generate
+
+    return rows
+
+
+def call_function(returned: Any) -> Any:
+    """What numba is told of kernels.machine.references.caller."""
+    result = typeof(returned)
+
+    def call(typingctx: Any, address: Any, table: Any) -> Any:
+        return result(types.int64, table), _call
+
+    return call
+
+
+def call_function_of_six(returned: Any) -> Any:
+    """The same with six arguments."""
+    result = typeof(returned)
+
+    def call(typingctx: Any, address: Any, a: Any, b: Any, c: Any, d: Any, e: Any, f: Any) -> Any:
+        return result(types.int64, a, b, c, d, e, f), _call
+
+    return call
+
+
+def function_type(of: Any, told: Any) -> Any:
+    """The type of an intrinsic function; told: what numba is told of it."""
+    return types.Function(make_intrinsic_template(of, told, told.__name__))
+
+
+def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    kinds = signature.args[1:]
+    code = context.call_conv.get_function_type(signature.return_type, kinds).as_pointer()
+    called = builder.inttoptr(args[0], code)
+    return context.call_conv.call_function(builder, called, signature.return_type, kinds, args[1:])[1]
+
+
+@register_model(Reference)
+class _Model(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, _WORD.as_pointer())
+
+
+@infer_getattr
+class _Attributes(AttributeTemplate):
+    key = Reference
+
+    def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]
+        return _fields_of(kind.of).get(name, (0, None))[1]
+
+
+@lower_getattr_generic(Reference)
+def _attribute(context: Any, builder: Any, kind: Any, table: Any, name: str) -> Any:
+    at, field = _fields_of(kind.of)[name]
+    return _built(context, builder, field, table, at)[0]
+
+
+def _built(context: Any, builder: Any, kind: Any, table: Any, at: int) -> tuple[Any, int]:
+    """The value of a type from the table's numbers at `at` on, and where the next begins."""
+
+    if isinstance(kind, Reference):
+        return cgutils.gep_inbounds(builder, table, at), at + size(kind)
+    if isinstance(kind, types.NamedTuple):
+        values = []
+        for each in kind.types:
+            value, at = _built(context, builder, each, table, at)
+            values.append(value)
+        return context.make_tuple(builder, kind, values), at
+    if isinstance(kind, types.Array):
+        return _array(context, builder, kind, table, at), at + 1 + kind.ndim
+    value = _number(builder, table, at)
+    if isinstance(kind, types.Float):
+        value = builder.bitcast(value, context.get_data_type(types.float64))
+    elif isinstance(kind, types.Boolean):
+        value = builder.icmp_signed("!=", value, value.type(0))
+    return value, at + 1
+
+
+def _number(builder: Any, table: Any, k: int) -> Any:
+    """Number k of a table."""
+    found = builder.load(cgutils.gep_inbounds(builder, table, k))
+    found.set_metadata("invariant.load", builder.module.add_metadata([]))  # no kernel writes to a table
+    return found
+
+
+def _array(context: Any, builder: Any, kind: Any, table: Any, at: int, columns: Any = None) -> Any:
+    """The array whose address stands at `at`, before its shape; columns: of one whose shape may be without them."""
+    array = context.make_array(kind)(context, builder)
+    item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+    given = kind.ndim if columns is None else 1
+    shape = [_number(builder, table, at + 1 + k) for k in range(given)]
+    shape += [] if columns is None else [columns]
+    strides = [context.get_constant(types.intp, item)]
+    for length in shape[:0:-1]:
+        strides.insert(0, builder.mul(strides[0], length))
+    data = builder.inttoptr(_number(builder, table, at), array.data.type)
+    context.populate_array(array, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
+    return array._getvalue()
+
+
+@unbox(Reference)
+def _unboxed(kind: Any, value: Any, c: Any) -> NativeValue:
+    """From Python: the table is made on the stack, for the call."""
+    builder = c.builder
+    table = cgutils.alloca_once(builder, _WORD, size=size(kind))
+    failed = cgutils.alloca_once_value(builder, cgutils.false_bit)
+    for k, (at, field) in enumerate(_fields_of(kind.of).values()):
+        native = c.unbox(field, c.pyapi.tuple_getitem(value, k))
+        with cgutils.if_unlikely(builder, native.is_error):
+            builder.store(cgutils.true_bit, failed)
+        for j, number in enumerate(_numbers(c.context, builder, field, native.value)):
+            builder.store(number, cgutils.gep_inbounds(builder, table, at + j))
+    # The optimiser must not know that the table was written to: it is read as if that had never been.
+    same = ir.FunctionType(table.type, [table.type])
+    hidden = builder.asm(same, "", "=r,0,~{memory}", [table], side_effect=True)
+    return NativeValue(hidden, is_error=builder.load(failed))
+
+
+def _numbers(context: Any, builder: Any, kind: Any, value: Any) -> list[Any]:
+    """What a table holds of an array, a number or a NamedTuple by reference."""
+    if isinstance(kind, Reference):
+        return [builder.load(cgutils.gep_inbounds(builder, value, k)) for k in range(size(kind))]
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder, value)
+        return [builder.ptrtoint(array.data, _WORD), *cgutils.unpack_tuple(builder, array.shape)]
+    if isinstance(kind, types.Float):
+        return [builder.bitcast(value, _WORD)]
+    if isinstance(kind, types.Boolean):
+        return [builder.zext(value, _WORD)]
+    return [value]

@@ -1,0 +1,449 @@
+"""Torque that passes through catenary zones (docs/theory.md, 15).
+
+A catenary has no frames, so one number stands for the twist of a zone: the turn of the frame after it against the frame
+before it, carried along the chords by the smallest rotations, and counted beyond half a turn.
+
+    symbol   meaning                                                                  unit
+    turn     of the frame after the zone (of its cell, or of an end that holds it)     rad
+    C        compliance of the zone, with the halves of the rod cells beside it        rad/(N m)
+    M        torque, (turn - turn without torque + twist by tension + tau rate)/C      N m
+    c_i      (d_{i-1} x d_i)/(1 + d_{i-1}.d_i) at node i of the zone                    -
+
+It answers to the spins of the cells beside it and to all chords:
+    d turn = dpsi_after - dpsi_before + sum c_i.(de_{i-1}/l_{i-1} + de_i/l_i).
+That couples two cells far apart, which the march does not know: its solution is corrected by that of a small dense
+system.  Newton calls `pass_torque` by its address, so that lines without such zones compile none of it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybrid.kernels.algebra.block_elimination import SIZE, solve_with
+from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale, sub
+from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.tension_torque import COUPLES, compliance, couples
+from hybrid.kernels.laws.tension_torque import TORQUE as NODE_TORQUE
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.march.assembly import JOINED
+from hybrid.kernels.state.forces import STIFFNESS_DAMPING
+from hybrid.kernels.state.report import MOMENT_A, MOMENT_B, STIFFNESS_DAMPING_POWER
+from hybrid.kernels.state.state import Floats, Line, Torsion, no_torsion
+
+# Parts of `pass_torque`.
+BEFORE_MARCH, CORRECT, AFTER_STEP = range(3)
+TURN, TORQUE, POWER = 0, 1, 2  # columns of State.turn
+FIRST, LAST, COMPLIANCE, FREE, TAU = range(5)  # columns of Line.torsion
+LOAD, HOLD = 0, 1  # rows of Torsion.passed
+# Iterations for which the answers to torques serve: they are mostly those of torsion, which does not change, and torques
+# themselves are those of the configuration, so that this touches convergence alone.  They are found anew in a step that
+# takes more than so many iterations, and where cv has changed by more than that part of it: round-off of the length of
+# steps does not count.
+SERVES, ITERATIONS, SAME_STEP = 96, 3, 1e-3
+# Torsion.known: cv of the answers, iterations they have served, whether the march keeps its factors now, whether it
+# always does, iterations of this step.
+OF_CV, SERVED, KEEPS_NOW, KEEPS_ALWAYS, OF_STEP = range(5)
+
+
+@inner
+def frame_before(line, ends, state, a):
+    """First director and direction of what lies before cell a: a cell of a rod, or the frame of the start."""
+    if a > 0:
+        d, _, _ = chord(get3(state.e, a - 1))
+        return get3(state.a1, a - 1), d
+    R = get9(ends.frame, 0)
+    return (R[0], R[3], R[6]), (R[2], R[5], R[8])
+
+
+@inner
+def frame_after(line, ends, state, b):
+    """The same of what lies after cell b - 1."""
+    if b < line.h.shape[0]:
+        d, _, _ = chord(get3(state.e, b))
+        return get3(state.a1, b), d
+    R = get9(ends.frame, 1)
+    return (R[0], R[3], R[6]), (R[2], R[5], R[8])
+
+
+@inner
+def carry(a, d, dn):
+    """Director a of d, carried to dn by the smallest rotation, and how that answers to both directions."""
+    f = 1.0 / (1.0 + dot(d, dn))
+    s = f * dot(a, dn)
+    return sub(a, scale(s, add(d, dn))), scale(f, cross(d, dn))
+
+
+@inner
+def find_turn(line, ends, state, slope, a, b):
+    """Turn (rad, less than half a turn) of the frame after the cells a to b - 1, its slopes by their chords, and
+
+    those by the directions of ends that hold the zone.
+    """
+    director, d = frame_before(line, ends, state, a)
+    none = (0.0, 0.0, 0.0)
+    before, at_start, il = none, none, 0.0
+    if a > 0:
+        il = chord(get3(state.e, a - 1))[2]
+    for i in range(a, b):
+        dn, _, iln = chord(get3(state.e, i))
+        director, c = carry(director, d, dn)
+        if i > 0:
+            p = scale(il, add(before, c))
+            slope[i - 1, 0], slope[i - 1, 1], slope[i - 1, 2] = p
+        else:
+            at_start = c
+        before, d, il = c, dn, iln
+    last, dn = frame_after(line, ends, state, b)
+    director, c = carry(director, d, dn)
+    p = scale(il, add(before, c))
+    slope[b - 1, 0], slope[b - 1, 1], slope[b - 1, 2] = p
+    if b < line.h.shape[0]:
+        p = scale(chord(get3(state.e, b))[2], c)
+        slope[b, 0], slope[b, 1], slope[b, 2] = p
+    return math.atan2(dot(cross(director, last), dn), dot(director, last)), at_start, c
+
+
+@inner
+def rate_of_ends(ends, k):
+    """Spin (1/s) of the frame of end k about its tangent, and rate of the tangent."""
+    R = get9(ends.frame, k)
+    t = (R[2], R[5], R[8])
+    w = get3(ends.spin, k)
+    return dot(w, t), cross(w, t)
+
+
+@inner
+def by_chords(slope, x, first, a, b):
+    """Change of a turn by the shifts x[:, first:first+3] of the nodes of cells a to b - 1."""
+    total = 0.0
+    for i in range(a, b):
+        total += (
+            slope[i, 0] * (x[i + 1, first] - x[i, first])
+            + slope[i, 1] * (x[i + 1, first + 1] - x[i, first + 1])
+            + slope[i, 2] * (x[i + 1, first + 2] - x[i, first + 2])
+        )
+    return total
+
+
+@inner
+def turn_rates(line, ends, state, torsion, z):
+    """Rate of the turn of zone z: by spins, and by chords (1/s)."""
+    n, slope, at_ends = line.h.shape[0], torsion.slope, torsion.directions[z]
+    a, b = int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])
+    bent = by_chords(slope, state.v, 0, max(a - 1, 0), min(b + 1, n))
+    if a > 0:
+        before = state.w[a - 1]
+    else:
+        before, t1 = rate_of_ends(ends, 0)
+        bent += dot(get3(at_ends, 0), t1)
+    if b < n:
+        after = state.w[b]
+    else:
+        after, t1 = rate_of_ends(ends, 1)
+        bent += dot(get3(at_ends, 1), t1)
+    return after - before, bent
+
+
+@inner
+def twist_of_tensions(line, T, first, z):
+    """Twist, rad, of zone z by tensions: T[c + first] of cell c (kernels.laws.tension_torque)."""
+    total, g = 0.0, line.tension_twist
+    if couples(line):
+        a, b = int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])
+        for c in range(a, b):
+            total += 2.0 * g[c] * T[c + first]
+        if a > 0:
+            total += g[a - 1] * T[a - 1 + first]
+        if b < line.h.shape[0]:
+            total += g[b] * T[b + first]
+    return total
+
+
+@inner
+def find_torques(line, ends, state, work):
+    """Turn and torque of every zone, and what rods beside them feel."""
+    torsion = work.torsion
+    passed = torsion.passed
+    n = line.h.shape[0]
+    for z in range(line.torsion.shape[0]):
+        a, b = int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])
+        turn, at_start, at_end = find_turn(line, ends, state, torsion.slope, a, b)
+        turn += 2.0 * math.pi * math.floor((state.turn[z, TURN] - turn) / (2.0 * math.pi) + 0.5)
+        torque = turn - line.torsion[z, FREE] + twist_of_tensions(line, state.T, 0, z)
+        slope = torsion.directions[z]
+        for k in range(3):
+            slope[0, k], slope[1, k] = at_start[k], at_end[k]
+        if line.bits & STIFFNESS_DAMPING and line.torsion[z, TAU] > 0.0:
+            spun, bent = turn_rates(line, ends, state, torsion, z)
+            torque += line.torsion[z, TAU] * (spun + bent)
+        torque /= line.torsion[z, COMPLIANCE]
+        state.turn[z, TURN], state.turn[z, TORQUE] = turn, torque
+        if couples(line):
+            for i in range(a, b + 1):
+                for j in range(COUPLES):
+                    work.couple[i, j] = 0.0
+                work.couple[i, NODE_TORQUE] = torque
+        if a > 0:  # of a rod of one cell the zone before has written
+            beside = z > 0 and int(line.torsion[z - 1, LAST]) == a - 1
+            passed[LOAD, a - 1] = torque + (passed[LOAD, a - 1] if beside else 0.0)
+        if b < n:
+            passed[LOAD, b] = -torque
+
+
+@inner
+def finish(line, ends, state, torsion):
+    """Power that each torque gains because its zone bends without it; what damping takes out of their torsion (W)."""
+    loss = 0.0
+    for z in range(line.torsion.shape[0]):
+        spun, bent = turn_rates(line, ends, state, torsion, z)
+        state.turn[z, POWER] = state.turn[z, TORQUE] * bent
+        if line.bits & STIFFNESS_DAMPING:
+            drive, soft = spun + bent, line.torsion[z, COMPLIANCE]
+            if couples(line):  # what stretch in its cells has lost by itself is that of a line that turns freely
+                for c in range(int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])):
+                    d, _, _ = chord(get3(state.e, c))
+                    g, hck = 2.0 * line.tension_twist[c], line.h[c] * compliance(line, c)
+                    drive += g * dot(d, sub(get3(state.v, c + 1), get3(state.v, c))) / hck
+                    soft -= g * g / hck
+            loss += line.torsion[z, TAU] * drive * drive / soft
+    return loss
+
+
+@inner
+def twist_energy(line, state):
+    """Energy, J, of the twist of zones."""
+    total = 0.0
+    for z in range(line.torsion.shape[0]):
+        twist = state.turn[z, TURN] - line.torsion[z, FREE] + twist_of_tensions(line, state.T, 0, z)
+        total += 0.5 * twist * twist / line.torsion[z, COMPLIANCE]
+    return total
+
+
+@inner
+def report_end_moments(line, ends, state, report):
+    """Moments of ends that hold a zone: its torque, about the tangent of the end."""
+    n, last = line.h.shape[0], line.torsion.shape[0] - 1
+    if line.torsion[0, FIRST] == 0.0:
+        _, t = frame_before(line, ends, state, 0)
+        for k in range(3):
+            report[MOMENT_A + k] += state.turn[0, TORQUE] * t[k]
+    if line.torsion[last, LAST] == n:
+        _, t = frame_after(line, ends, state, n)
+        for k in range(3):
+            report[MOMENT_B + k] += state.turn[last, TORQUE] * t[k]
+
+
+@inner
+def solve_columns(line, work, joined):
+    """How the line answers to each torque, and to a torque on each cell that is held meanwhile; joined: its end is, to
+
+    a point (kernels.junctions.joined_lines), and is held there.
+    """
+    torsion, n = work.torsion, line.h.shape[0]
+    zones = line.torsion.shape[0]
+    good = True
+    for j in range(torsion.columns.shape[0]):
+        right = torsion.right
+        for i in range(n + 1):
+            for k in range(SIZE):
+                right[i, k] = 0.0
+        if j < zones:
+            a, b = int(line.torsion[j, FIRST]), int(line.torsion[j, LAST])
+            if a > 0:
+                right[a - 1, 4] = 1.0
+            if b < n:
+                right[b, 4] = -1.0
+            if couples(line):
+                g = line.tension_twist
+                for c in range(a, b):
+                    right[c + 1, 0] = 2.0 * g[c]
+                if a > 0:
+                    right[a, 0] = g[a - 1]
+                if b < n:
+                    right[b + 1, 0] = g[b]
+        else:
+            cell = torsion.floating[j - zones]
+            right[cell, 4] = torsion.passed[HOLD, cell]
+        good = solve_with(work.X, work.W, right, torsion.columns[j], joined) and good
+    return good
+
+
+@inner
+def damped_part(line, z, cv):
+    """By how much damping makes the turn of zone z count more."""
+    if line.bits & STIFFNESS_DAMPING:
+        return 1.0 + cv * line.torsion[z, TAU]
+    return 1.0
+
+
+@inner
+def turn_by(line, torsion, z, x, cv):
+    """Change (rad) by a correction x (N+1, 5) of the turn of zone z, and of the twist by tension as that counts."""
+    n = line.h.shape[0]
+    a, b = int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])
+    total = by_chords(torsion.slope, x, 1, max(a - 1, 0), min(b + 1, n))
+    if a > 0:
+        total -= x[a - 1, 4]
+    if b < n:
+        total += x[b, 4]
+    return total + twist_of_tensions(line, x[:, 0], 1, z) / damped_part(line, z, cv)
+
+
+@inner
+def unknown_of(line, torsion, j, x, cv):
+    """What the correction x makes of unknown j: the change of the turn of a zone, or the spin of a cell that is held."""
+    zones = line.torsion.shape[0]
+    if j < zones:
+        return turn_by(line, torsion, j, x, cv)
+    return x[torsion.floating[j - zones], 4]
+
+
+@inner
+def solve_dense(A):
+    """Solve A[:, :n] y = A[:, n] in place by elimination with pivoting; y is then in the last column."""
+    n = A.shape[0]
+    for c in range(n):
+        best = c
+        for r in range(c + 1, n):
+            if abs(A[r, c]) > abs(A[best, c]):
+                best = r
+        for k in range(c, n + 1):
+            A[c, k], A[best, k] = A[best, k], A[c, k]
+        for r in range(c + 1, n):
+            f = A[r, c] / A[c, c]
+            for k in range(c, n + 1):
+                A[r, k] -= f * A[c, k]
+    for c in range(n - 1, -1, -1):
+        for k in range(c + 1, n):
+            A[c, n] -= A[c, k] * A[k, n]
+        A[c, n] /= A[c, c]
+
+
+@inner
+def correct(line, state, work, cv, joined):
+    """Correct the march's solution work.x for the torques that change with it."""
+    torsion, x = work.torsion, work.x
+    zones, m = line.torsion.shape[0], torsion.columns.shape[0]
+    known = torsion.known
+    if known[KEEPS_NOW] > 0.0:
+        known[OF_CV], known[SERVED] = cv, 0.0
+        if not solve_columns(line, work, joined):
+            x[0, 1] = math.nan
+            return
+        for j in range(m):
+            for k in range(m):
+                torsion.coupling[j, k] = unknown_of(line, torsion, j, torsion.columns[k], cv)
+    known[SERVED] += 1.0
+    A = torsion.dense
+    for j in range(m):
+        for k in range(m):
+            A[j, k] = torsion.coupling[j, k]
+        A[j, m] = unknown_of(line, torsion, j, x, cv)
+        size = 1.0
+        if j < zones:
+            size = line.torsion[j, COMPLIANCE] / damped_part(line, j, cv)
+        A[j, j] += size
+    solve_dense(A)
+    for j in range(m):
+        y, column = A[j, m], torsion.columns[j]
+        for i in range(x.shape[0]):
+            for k in range(SIZE):
+                x[i, k] -= y * column[i, k]
+    for z in range(zones):  # of the configuration that the correction leads to, but for what is not linear
+        state.turn[z, TORQUE] += A[z, m]
+        change = A[z, m] * line.torsion[z, COMPLIANCE] - twist_of_tensions(line, x[:, 0], 1, z)
+        state.turn[z, TURN] += change / damped_part(line, z, cv)
+
+
+@kernel
+def pass_torque(line, ends, state, work, part, cv):
+    """A part of Newton's iteration for a line whose state has turns; cv: dv'/dr' of the scheme, 1/s.
+
+    BEFORE_MARCH  the torques of the configuration, for the march
+    CORRECT       its solution work.x with the torques that change with it; the march has kept its factors
+    AFTER_STEP    powers of the configuration found, and what it reports: moments of the ends, loss
+
+    A line that is catenary from end to end feels nothing of its torque, unless that lengthens it: it is found after the
+    step.
+    """
+    felt = couples(line) or line.torsion[0, FIRST] > 0.0 or line.torsion[0, LAST] < line.h.shape[0]
+    if part == AFTER_STEP:
+        if not felt:
+            find_torques(line, ends, state, work)
+        work.report[STIFFNESS_DAMPING_POWER] += finish(line, ends, state, work.torsion)
+        report_end_moments(line, ends, state, work.report)
+        work.torsion.known[OF_STEP] = 0.0
+    elif felt and part == CORRECT:
+        correct(line, state, work, cv, ends.held[1] == JOINED)
+    elif felt:
+        known = work.torsion.known
+        known[OF_STEP] += 1.0
+        other = cv == 0.0 or not abs(known[OF_CV] - cv) <= SAME_STEP * cv
+        known[KEEPS_NOW] = 1.0 if other or known[SERVED] >= SERVES or known[OF_STEP] > ITERATIONS else 0.0
+        find_torques(line, ends, state, work)
+    return 0
+
+
+@inner
+def torsional_stiffness(line):
+    """Torque by which a line resists a turn of one end against the other, N m/rad; 0 of one without such zones."""
+    soft = 0.0
+    for z in range(line.torsion.shape[0]):
+        soft += line.torsion[z, COMPLIANCE]
+    if not soft > 0.0:
+        return 0.0
+    for i in range(line.kb.shape[0]):
+        if line.element[i] and line.kb[i, 2] > 0.0:
+            soft += 1.0 / line.kb[i, 2]
+    return 1.0 / soft
+
+
+def floating_rods(line: Line, held: np.ndarray) -> np.ndarray:
+    """One cell of each rod that a torque passes to and nothing else holds; held: (2,) whether the ends hold the twist."""
+    ends_of_zones, first_of_zones = line.torsion[:, LAST].astype(int), line.torsion[:, FIRST].astype(int)
+    found = []
+    rods = np.flatnonzero(np.diff(np.concatenate([[0], line.spin, [0]]))).reshape(-1, 2)
+    for a, b in rods:
+        passes = (ends_of_zones == a).any() or (first_of_zones == b).any()
+        if passes and not (a == 0 and held[0]) and not (b == line.h.size and held[1]):
+            found.append(a)
+    return np.array(found, np.int64)
+
+
+def torsion_of(line: Line, keep: bool) -> Torsion:
+    """What a torque through the catenary zones of a line takes; keep: the march keeps its factors every time."""
+    zones = line.torsion.shape[0]
+    if not zones:
+        return no_torsion()
+    n = line.h.size
+    held = (line.element[[0, -1]] == 1) & (line.kb[[0, -1], 2] > 0.0)
+    floating = floating_rods(line, held)
+    unknowns, z = zones + floating.size, np.zeros
+    passed = z((2, n))
+    passed[HOLD, floating] = 1.0 / line.torsion[:, COMPLIANCE].min()
+    return Torsion(
+        address=0, passed=passed, slope=z((n, 3)), directions=z((zones, 2, 3)), floating=floating,
+        columns=z((unknowns, n + 1, SIZE)), known=np.array([-1.0, 0.0, 1.0, float(keep), 0.0]), right=z((n + 1, SIZE)),
+        coupling=z((unknowns, unknowns)), dense=z((unknowns, unknowns + 1)),
+    )  # fmt: skip
+
+
+def torsion_energy(line: Line, turn: Floats, T: Floats) -> Floats:
+    """Energy, J, of the twist of zones; turn: (..., K) rad; T: (..., N) N."""
+    twist = turn - line.torsion[:, FREE]
+    if line.tension_twist.size:
+        by_tension = np.stack([T @ share for share in _shares_of_tensions(line)], axis=-1)
+        twist = twist + by_tension
+    return np.asarray((twist**2 / (2.0 * line.torsion[:, COMPLIANCE])).sum(axis=-1))
+
+
+def _shares_of_tensions(line: Line) -> Floats:
+    """(K, N) rad/N, by which tensions twist zones: as `twist_of_tensions`."""
+    out = np.zeros((len(line.torsion), line.h.size))
+    for row, (a, b) in zip(out, line.torsion[:, [FIRST, LAST]].astype(int), strict=True):
+        row[a:b] = 2.0 * line.tension_twist[a:b]
+        row[max(a - 1, 0) : a] = line.tension_twist[max(a - 1, 0) : a]
+        row[b : b + 1] = line.tension_twist[b : b + 1]
+    return out

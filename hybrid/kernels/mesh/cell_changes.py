@@ -1,0 +1,271 @@
+"""Other cells for a line in the middle of a run, on arrays that have room for the most that there can be.
+
+The steps of a change: `lay_out` places the nodes, kernels.mesh.zone_line makes the line, kernels.mesh.zone_switch carries the state
+and its lengths, `renew` what the run knows beside, `before_forces` and `after_forces` the report of the state.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.laws.end_motion import ends_at, sea_at
+from hybrid.kernels.laws.seabed import stored
+from hybrid.kernels.laws.water import wave_kinematics
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.references import reader
+from hybrid.kernels.mesh.zone_step import AGE, KNOWN, RECENT_AGE, RELAXING, STRAINED, Zones, blank_zones
+from hybrid.kernels.mesh.zone_transfer import carry_push
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Books, blank_books
+from hybrid.kernels.state.forces import FRICTION, SEABED, WAVES
+from hybrid.kernels.state.report import SEABED_ENERGY
+from hybrid.kernels.state.state import Floats, Line, Sea, State, Work, blank_line, blank_state, no_sea, no_work
+from hybrid.kernels.step.job import read
+from hybrid.kernels.step.step import friction_axes
+from hybrid.kernels.watch.carried_extremes import carry_extremes, fold_gone, match_nodes
+
+
+class LayoutJob(NamedTuple):
+    """Where nodes should be, and what that makes of the cells (written; with room for all).  K finest cells."""
+
+    plan: NDArray[np.bool_]  # (K+1,) of the finest mesh, nodes besides those of base cells
+    rod: NDArray[np.bool_]  # (n,)
+    parts: NDArray[np.int64]  # (n,) finest cells of base cells
+    finest: Floats  # (K+1,) m
+    place: NDArray[np.int64]  # (M+1,) numbers of nodes on the finest mesh
+    s: Floats  # (M+1,) m
+    of: NDArray[np.int64]  # (M,) base cells
+    rods: NDArray[np.bool_]  # (M,) whether they are rod
+    first: NDArray[np.int64]  # (n+1,) first node of base cells
+
+
+def blank_layout_job() -> LayoutJob:
+    """A job with the types that every one has."""
+    flags, whole = np.zeros(1, bool), np.zeros(1, np.int64)
+    return LayoutJob(flags, flags, whole, np.zeros(1), whole, np.zeros(1), whole, flags, whole)
+
+
+class RenewJob(NamedTuple):
+    """What a run knows of a line beside its state: before a change, of N cells, and after it, of M, in the same memory."""
+
+    s: Floats  # (N+1,) m, old nodes
+    rods: NDArray[np.bool_]  # (N,) whether old cells are rod
+    to_s: Floats  # (M+1,) m, new nodes
+    to_rods: NDArray[np.bool_]  # (M,) and cells
+    line: Line
+    place: NDArray[np.int64]  # (M+1,)
+    of: NDArray[np.int64]  # (M,)
+    first: NDArray[np.int64]  # (n+1,)
+    start: Floats  # (K+1, 3) m, of the nodes of the finest mesh: positions from which displacements count
+    marked: NDArray[np.int8]  # (n+1,) marks of base nodes
+    borne: Floats  # (n,) length over unstretched length that base cells bear
+    state: State  # of the new cells
+    twin: State  # a copy of it (written)
+    sea: Sea
+    work: Work
+    zones: Zones
+    before: Books
+    books: Books
+    push: Floats  # (N+1, 4) out of the plane; empty: none
+    new_push: Floats  # (M+1, 4)
+    next_push: Floats  # (M+1, 4) room for the next
+    envelope_s: Floats  # (E,) m, places of extremes of all meshes
+    bounds: Floats  # (4, EXTREMES, E)
+    stays: NDArray[np.int64]  # room for all nodes
+    spare: Floats  # room for the extremes of all nodes
+    width: Floats  # (M,) m, diameters of the new cells; empty: nobody watches whether the line meets itself
+    nearest: NDArray[np.int64]  # (2,) the pair of its cells that was nearest
+    widths: Floats  # (n,) m, diameters of base cells
+    scale: float  # N, tension scale
+
+
+def blank_renew_job() -> RenewJob:
+    """A job with the types that every one has."""
+    z, state, books = np.zeros, blank_state(1), blank_books()
+    return RenewJob(
+        z(2), z(1, bool), z(2), z(1, bool), blank_line(1), z(2, np.int64), z(1, np.int64), z(2, np.int64), z((2, 3)),
+        z(2, np.int8), z(1), state, state, no_sea(1), no_work(), blank_zones(1, 1), books, books, z((0, 4)), z((0, 4)), z((0, 4)), z(2),
+        z((4, b.EXTREMES, 2)), z(2, np.int64), z(2), z(0), z(2, np.int64), z(1), 1.0,
+    )  # fmt: skip
+
+
+read_layout, read_renew = reader(blank_layout_job()), reader(blank_renew_job())
+
+
+@kernel
+def lay_out(table):
+    """Cells where nodes are planned; how many there are."""
+    job = read_layout(table)
+    i, begin = 0, 0
+    for j in range(job.parts.shape[0]):
+        job.first[j] = i
+        for k in range(begin, begin + job.parts[j]):
+            if k == begin or job.plan[k]:
+                job.place[i], job.s[i], job.of[i], job.rods[i] = k, job.finest[k], j, job.rod[j]
+                i += 1
+        begin += job.parts[j]
+    job.first[job.parts.shape[0]] = i
+    job.place[i], job.s[i] = begin, job.finest[begin]
+    return i
+
+
+# --- beside the state -----------------------------------------------------------------------------
+
+
+@inner
+def set_aside(job):
+    """Copy the extremes of the old nodes, which lie in the memory of those of the new ones."""
+    now, k = job.before.extremes, 0
+    for bound in range(now.shape[0]):
+        for row in range(now.shape[1]):
+            for column in range(now.shape[2]):
+                job.spare[k] = now[bound, row, column]
+                k += 1
+
+
+@inner
+def fill_books(job):
+    """What is kept of nodes and cells begins anew."""
+    books, m = job.books, job.of.shape[0]
+    for i in range(m + 1):
+        books.marks[i], books.right[i] = 0, i
+        for j in range(3):
+            books.start[i, j] = job.start[job.place[i], j]
+    column = m + 1
+    for j in range(job.first.shape[0]):
+        i = job.first[j]
+        books.base[j] = i
+        if job.marked[j]:
+            books.marks[i], books.right[i] = job.marked[j], column
+            column += 1
+    for c in range(m):
+        books.borne[c] = job.borne[job.of[c]]
+    if job.s.shape[0] != m + 1:
+        for c in range(m):
+            books.tension[0, c], books.tension[1, c] = 0.0, 0.0
+    for i in range(books.strains.shape[0]):
+        for j in range(3):
+            books.strains[i, j] = 0.0
+    for row in range(books.extremes.shape[1]):
+        for k in range(books.extremes.shape[2]):
+            books.extremes[0, row, k], books.extremes[1, row, k] = math.inf, -math.inf
+            books.extremes[2, row, k], books.extremes[3, row, k] = math.nan, math.nan
+
+
+@inner
+def copy_state(state, out):
+    for i in range(state.r.shape[0]):
+        for j in range(3):
+            out.r[i, j], out.v[i, j], out.a[i, j] = state.r[i, j], state.v[i, j], state.a[i, j]
+            out.vd[i, j], out.slip[i, j], out.bed[i, j] = state.vd[i, j], state.slip[i, j], state.bed[i, j]
+    for c in range(state.T.shape[0]):
+        out.T[c], out.w[c], out.wa[c], out.wd[c] = state.T[c], state.w[c], state.wa[c], state.wd[c]
+        for j in range(3):
+            out.e[c, j], out.a1[c, j] = state.e[c, j], state.a1[c, j]
+
+
+@inner
+def wave_step(line, scale):
+    """As hybrid.model.scales has it."""
+    least, any_cell = math.inf, False
+    for c in range(line.h.shape[0]):
+        if not line.spin[c]:
+            mass = 0.5 * (line.mass[c] + line.mass[c + 1] - line.point_mass[c] - line.point_mass[c + 1])
+            soft = line.ck[c] if line.ck[c] > 0.0 else 1.0 / scale
+            least, any_cell = min(least, math.sqrt(soft * mass * line.h[c])), True
+    return least if any_cell else 0.0
+
+
+@inner
+def clear(x):
+    for i in range(x.shape[0]):
+        for j in range(x.shape[1]):
+            x[i, j] = 0.0
+
+
+@kernel
+def clear_state(table):
+    """What a change does not carry to the cells of a catenary, and what forces have worked in."""
+    job = read_renew(table)
+    state = job.state
+    clear(state.a1)
+    clear(state.bed)
+    for c in range(state.T.shape[0]):
+        state.w[c], state.wa[c], state.wd[c] = 0.0, 0.0, 0.0
+
+
+@kernel
+def renew(table):
+    """What a run knows of its new cells, as of the beginning; what it knew of the old ones is kept where it must be."""
+    job = read_renew(table)
+    zones, books, clock = job.zones, job.books, job.books.clock
+    cells, columns = job.rods.shape[0], job.before.extremes.shape[2]
+    if books.extremes.shape[1] > 0:
+        match_nodes(job.s, job.rods, job.to_s, job.to_rods, job.stays)
+        fold_gone(job.s, job.before.extremes, job.before.right, job.stays, job.envelope_s, job.bounds)
+        set_aside(job)
+    fill_books(job)
+    if books.extremes.shape[1] > 0:
+        carry_extremes(job.stays, cells, job.spare, columns, books.right, job.of.shape[0], books.extremes)
+    copy_state(job.state, job.twin)
+    clear(job.sea.axis)
+    clear(job.sea.slip)
+    clear(job.sea.slid)
+    clear(job.sea.bed)
+    clear(job.sea.flow)
+    for j in range(job.work.report.shape[0]):
+        job.work.report[j] = 0.0
+    for k in range(zones.here.shape[0]):
+        zones.here[k] = False
+    for i in range(job.place.shape[0]):
+        zones.place[i] = job.place[i]
+        zones.here[job.place[i]] = True
+    for k in range(zones.here.shape[0]):
+        if not zones.here[k]:
+            zones.waves[k] = 0.0
+    if job.push.shape[0] > 0:
+        carry_push(job.push, job.s, job.line.s, job.new_push)
+        clear(job.next_push)
+    for c in range(job.width.shape[0]):
+        job.width[c] = job.widths[job.of[c]]
+    job.nearest[0], job.nearest[1] = -1, -1
+    zones.clock[AGE], zones.clock[RECENT_AGE] = 0.0, 0.0
+    zones.counts[KNOWN], zones.counts[STRAINED], zones.counts[RELAXING] = 0, 0, 1
+    clock[b.WAVE_STEP], clock[b.PREVIOUS], books.counts[b.PARITY] = wave_step(job.line, job.scale), clock[b.NOW], 0
+
+
+# --- forces ---------------------------------------------------------------------------------------
+
+
+@kernel
+def before_forces(table):
+    """What the assembly of a state as it is has to know; table: of a kernels.run.run.Job of parity 0."""
+    job = read(table)
+    clock = job.books.clock
+    ends_at(clock[b.NOW], job.moves, job.sea, job.ends, job.books.velocity)
+    sea_at(clock[b.NOW], job.sea)
+    clear(job.work.u)
+    if job.line.bits & WAVES:
+        wave_kinematics(job.sea, job.old.r, job.work.u)
+    if job.line.bits & FRICTION:
+        friction_axes(job.sea, job.old.r, job.old.e, job.old.slip)
+
+
+@kernel
+def after_forces(table):
+    """The books go on from a report of the state as it is."""
+    job = read(table)
+    report, clock, count = job.work.report, job.books.clock, job.books.counts
+    if job.line.bits & SEABED:
+        report[SEABED_ENERGY] = stored(job.line, job.sea, job.old.r)
+        for i in range(job.sea.bed.shape[0]):
+            for j in range(3):
+                job.old.bed[i, j] = job.sea.bed[i, j]
+    for j in range(report.shape[0]):
+        job.books.report[0, j] = report[j]
+    clock[b.STORED] = report[SEABED_ENERGY]
+    count[b.PHASE], count[b.AFTER_START], count[b.NEW_STATE] = b.START, b.SAMPLE, 1

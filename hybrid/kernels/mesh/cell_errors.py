@@ -1,0 +1,169 @@
+"""What a cell makes wrong, against the shares that the scene allows: one rule for its kind and its length.
+
+    symbol   meaning                                                        unit
+    e_k      error of leaving bending out of a cell: of its kind            m, N, 1/m, N m
+    e_h      error of interpolating along a cell: of its length             the same
+    share    error that is allowed, infinite where nothing is asked         the same
+    lam, l0  sqrt(EI/T), over which a taut rod bends; min(lam, (EI/w)^(1/3))  m
+    kappa    curvature at a node                                            1/m
+    angle    of a kink or between a clamp and the line                      rad
+
+Each has four parts: position, tension, curvature and bending moment.  A cell whose largest e_k/share is below 1 may be a
+catenary, any other is rod; either is as long as e_h allows (docs/theory.md, 13).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from hybrid.kernels.machine.compile import inner
+
+POSITION, TENSION, CURVATURE, MOMENT = range(4)
+QUANTITIES = 4
+
+
+class CellError(NamedTuple):
+    """An error of a cell."""
+
+    position: float  # m
+    tension: float  # N
+    curvature: float  # 1/m
+    moment: float  # N m
+
+
+@inner
+def over_shares(error, shares):
+    """The largest part of an error over its share."""
+    most = error.position / shares[POSITION]
+    most = max(most, error.tension / shares[TENSION])
+    most = max(most, error.curvature / shares[CURVATURE])
+    return max(most, error.moment / shares[MOMENT])
+
+
+# --- e_k: bending left out ------------------------------------------------------------------------
+
+
+@inner
+def layer_length(EI, w, T):
+    """l0; not zero, where there is no bending stiffness either."""
+    lam = max(math.sqrt(EI / T), 1e-300)
+    if w * lam * lam * lam <= EI:  # the other one is longer; taut lines need no root of it
+        return lam
+    return min(lam, (EI / w) ** (1.0 / 3.0))
+
+
+@inner
+def lack_of_bend(EI, w, T, kappa, bends):
+    """Of a smooth curve; bends: |kappa''|, 1/m^3.
+
+    Bending holds it lam^2 kappa off the catenary, takes EI kappa^2/2 of the tension, and smooths kappa over l0.
+    """
+    l0 = layer_length(EI, w, T)
+    return CellError(EI * kappa / T, 0.5 * EI * kappa * kappa, l0 * l0 * bends, EI * kappa)
+
+
+@inner
+def lack_at_clamp(EI, w, T, angle):
+    """Of a clamp: the line leaves it along lam angle exp(-s/lam), with a curvature of angle/lam."""
+    l0 = layer_length(EI, w, T)
+    return CellError(math.sqrt(EI / T) * angle, 0.5 * T * angle * angle, angle / l0, EI * angle / l0)
+
+
+@inner
+def lack_at_kink(EI, w, T, angle):
+    """Of a kink: as of two clamps at half of the angle."""
+    return lack_at_clamp(EI, w, T, 0.5 * angle)
+
+
+@inner
+def lack_at_edge(EI, w, T):
+    """Of the place where contact with the bed begins: the curvature jumps by w/T, of which a rod has half there."""
+    return lack_of_bend(EI, w, T, 0.5 * w / T, 0.5 * w / (T * layer_length(EI, w, T) ** 2))
+
+
+@inner
+def lack_of_torque(T, torque, turn):
+    """Of a torque along a line that turns through `turn`, rad, in all: as of forces across it."""
+    return CellError(abs(torque) * turn / (2.0 * T), 0.0, 0.0, 0.0)
+
+
+@inner
+def lack_of_moment(EI, T, moment):
+    """Of a moment given at an end."""
+    kappa = moment / max(EI, 1e-300)
+    return CellError(moment / T, 0.5 * moment * kappa, kappa, moment)
+
+
+# --- e_h: interpolation ---------------------------------------------------------------------------
+
+
+@inner
+def error_of_length(EI, w, kappa, bends, h):
+    """Of a cell of length h: what a chord, or a straight line between the values at its ends, is off by."""
+    part = 0.125 * h * h
+    return CellError(part * kappa, part * w * kappa, part * bends, part * EI * bends)
+
+
+@inner
+def longest_cell(EI, w, kappa, bends, shares):
+    """h at which e_h reaches its share, m."""
+    over = over_shares(error_of_length(EI, w, kappa, bends, 1.0), shares)
+    return 1.0 / math.sqrt(over) if over > 0.0 else math.inf
+
+
+@inner
+def longest_behind_hinge(part):
+    """h/l0 at which a straight line from 0 at a hinge to kappa (1 - exp(-h/l0)) is off that curve by `part` of kappa.
+
+    Off it is by 1 - m + m log m with m = (1 - exp(-x))/x, x = h/l0; this is its inverse to 16 %, on the safe side.
+    """
+    return math.sqrt(8.0 * part) * (1.0 - part) ** -1.2
+
+
+@inner
+def longest_in_wave(error, bends):
+    """Its square, m^2: the length at which a straight line between two velocities is off by `error`, m/s.
+
+    bends: |v''|, 1/(m s).
+    """
+    return 8.0 * error / bends
+
+
+# --- what a line has ------------------------------------------------------------------------------
+
+
+@inner
+def lowest_beside(kinds, T, i):
+    """The lowest tension beside node i, N, its floor at least."""
+    n = T.shape[0]
+    return max(min(T[max(i - 1, 0)], T[min(i, n - 1)]), kinds.floor[i], 1e-300)
+
+
+@inner
+def bending_length(kinds, T, i):
+    """l0 at node i."""
+    return layer_length(kinds.EI[i], kinds.w[i], lowest_beside(kinds, T, i))
+
+
+@inner
+def node_curvature(line, turn, i):
+    """kappa at node i; at a joint that of the rod beside it, because a joint has a kink."""
+    n = line.h.shape[0]
+    if 0 < i < n and line.spin[i] != line.spin[i - 1]:
+        i = i + 1 if line.spin[i] else i - 1
+    return turn[i] / line.hn[i] if 0 < i < n or line.element[i] else 0.0
+
+
+@inner
+def second_difference(line, turn, i):
+    """|kappa''| at an inner node i."""
+    before, after = node_curvature(line, turn, i - 1), node_curvature(line, turn, i + 1)
+    return second_slope(line.s, i, before, node_curvature(line, turn, i), after)
+
+
+@inner
+def second_slope(s, i, before, k, after):
+    """|kappa''| at an inner node i of arc length s[i], m, from the curvature there and at the nodes beside it."""
+    a, b = s[i] - s[i - 1], s[i + 1] - s[i]
+    return abs(2.0 * ((after - k) / b - (k - before) / a) / (a + b))

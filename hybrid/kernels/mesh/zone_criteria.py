@@ -1,0 +1,259 @@
+"""When a stretch must be a rod: every criterion of the table, as a ratio, at every step.
+
+Every criterion is a ratio, what is there over what a catenary can stand: at 1 a stretch becomes a
+rod, and below the criterion's `off` it may become a catenary again.  Errors of position that leaving
+bending out would make (e_k of kernels.mesh.cell_errors) count against the shares that the scene allows: of position, tension,
+curvature and moment.  Slack, a torque near to a loop and contact have no bound in a catenary (docs/theory.md, 13).
+
+    symbol   meaning                                          shape  unit
+    EI       bending stiffness at a node                      -      N m2
+    T, ahead tension now, and as it will be                   -      N
+    turn     |d_b - d_a| of the chords at a node              -      rad
+    Mt       torque                                           -      N m
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.algebra.rotations import cross, dot, frame, get3, get9, log_rotation, sub, transport
+from hybrid.kernels.laws.bed import bed_under
+from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.element import relative_rotation
+from hybrid.kernels.laws.tension_torque import rest_strain
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.mesh.cell_errors import (
+    CURVATURE,
+    MOMENT,
+    CellError,
+    lack_at_clamp,
+    lack_at_edge,
+    lack_at_kink,
+    lack_of_bend,
+    lack_of_torque,
+    node_curvature,
+    over_shares,
+    second_difference,
+)
+from hybrid.kernels.mesh.criteria import BEND, CLAMP, EDGE, POINT, SLACK, TORSION
+from hybrid.kernels.state.forces import PLANAR, SEABED
+from hybrid.kernels.state.state import Floats
+
+# What a ratio is where there is no tension, or no number: large, and finite.
+MOST = 1e6
+# Torque^2/(4 EI T) from which a straight cable is near to a loop: the Maxwell torque is 0.4 of the buckling one.
+TWISTED = 0.5
+# The most that a tension counts for that is only foreseen.
+FORESEEN = 2.0
+# What may sit at a node: nothing, a jump of bending stiffness, a point load.
+SMOOTH, STEP, LOAD = 0, 1, 2
+
+
+@inner
+def raise_ratio(ratios, c, ja, jb, x):
+    """Raise a ratio of the base cells on both sides of a node; what is not a number is large."""
+    if not x < MOST:
+        x = MOST
+    if x > ratios[c, ja]:
+        ratios[c, ja] = x
+    if x > ratios[c, jb]:
+        ratios[c, jb] = x
+
+
+@inner
+def depth(sea, r, i):
+    _, p = bed_under(sea, get3(r, i))
+    return p
+
+
+@inner
+def find_turns(line, tangents, e, a1, T, torque, kinds):
+    """Turns of the nodes, rad, torques of the nodes between cells, N m, and twists per length, rad/m, into `kinds`.
+
+    tangents: (2, 3) of clamped ends, zero where there is none; torque: N m, of all the line as far as its rods do not
+    know it.
+    """
+    n, turn, twisting, twist = e.shape[0], kinds.turn, kinds.twisting, kinds.twist
+    turn[0], turn[n] = 0.0, 0.0
+    d0 = get3(tangents, 0)
+    d1, _, _ = chord(get3(e, 0))
+    if dot(d0, d0) > 0.0:
+        x = sub(d1, d0)
+        turn[0] = math.sqrt(dot(x, x))
+    for i in range(1, n):
+        d0 = d1
+        d1, _, _ = chord(get3(e, i))
+        x = sub(d1, d0)
+        turn[i] = math.sqrt(dot(x, x))
+        twisting[i] = torque
+        twist[i] = abs(torque) / kinds.GJ[i] if kinds.GJ[i] > 0.0 else 0.0
+        if line.element[i]:
+            angle = 0.0
+            if not line.bits & PLANAR:  # in a plane nothing twists
+                b, carried = get3(a1, i), transport(get3(a1, i - 1), d0, d1)
+                angle = math.atan2(dot(cross(carried, b), d1), dot(carried, b))
+            twisting[i] = line.kb[i, 2] * (angle - rest_strain(line, T, i)[2])
+            twist[i] = abs(angle) / line.hn[i] if kinds.GJ[i] > 0.0 else 0.0
+    d0 = get3(tangents, 1)
+    if dot(d0, d0) > 0.0:
+        x = sub(d1, d0)
+        turn[n] = math.sqrt(dot(x, x))
+    twist[0], twist[n] = twist[min(1, n)], twist[max(n - 1, 0)]
+
+
+@inner
+def tensions_at(T, past, a, i):
+    """Lowest tension beside node i now, and as foreseen, N; -1 where one is not a number."""
+    n = T.shape[0]
+    c = min(i, n - 1)
+    now, ahead = T[c], T[c] + a * (T[c] - past[c])
+    if 0 < i < n:
+        before = T[i - 1] + a * (T[i - 1] - past[i - 1])
+        ahead = before if not ahead < before else ahead
+        now = T[i - 1] if not now < T[i - 1] else now
+        if not T[i] + before < math.inf:  # a NaN must not hide behind a number
+            now = -1.0
+    return now, min(now, ahead)
+
+
+@inner
+def kink_at(line, turn, i):
+    """Turn of node i, rad, without what the curvature on both sides of it makes of it."""
+    n = line.h.shape[0]
+    smooth = 0.0
+    if i > 1:
+        smooth = turn[i - 1] / line.hn[i - 1]
+    if i < n - 1:
+        smooth = min(smooth, turn[i + 1] / line.hn[i + 1]) if i > 1 else turn[i + 1] / line.hn[i + 1]
+    return max(turn[i] - smooth * line.hn[i], 0.0)
+
+
+class NodeKinds(NamedTuple):
+    """What the criteria know of the nodes of a line."""
+
+    EI: Floats  # (N+1,) N m2
+    GJ: Floats  # (N+1,) N m2, the smaller one where it jumps; 0: twist has no meaning
+    w: Floats  # (N+1,) N/m, weight per length
+    bent: Floats  # (N+1,) 1/m, curvature without stress
+    node: NDArray[np.int8]  # (N+1,) SMOOTH, STEP or LOAD
+    floor: Floats  # (N+1,) N, tension floor
+    base_of_cell: NDArray[np.int64]  # (N,)
+    free: NDArray[np.int8]  # (n,) of base cells
+    turn: Floats  # (N+1,) rad, turns of nodes (written)
+    twisting: Floats  # (N+1,) N m, torques of nodes (written)
+    twist: Floats  # (N+1,) rad/m, of rods, and of what would be a rod under the torque of the line (written)
+
+
+def blank_kinds(cells: int, base: int) -> NodeKinds:
+    """Room for what criteria know of a line of so many cells and base cells."""
+    z, nodes = np.zeros, cells + 1
+    return NodeKinds(
+        z(nodes), z(nodes), z(nodes), z(nodes), z(nodes, np.int8), z(nodes), z(cells, np.int64), z(base, np.int8),
+        z(nodes), z(nodes), z(nodes),
+    )  # fmt: skip
+
+
+@inner
+def bends_at(line, turn, shares, i):
+    """|kappa''| at inner node i, 1/m^3, where curvature counts; none beside a joint, whose kink is no curvature."""
+    n = line.h.shape[0]
+    if shares[CURVATURE] < math.inf and 1 < i < n - 1 and line.spin[i - 2] == line.spin[i + 1]:
+        return second_difference(line, turn, i)
+    return 0.0
+
+
+@inner
+def lack_of_node(line, kinds, shares, i, T):
+    """What a catenary would lack at node i, at tension T, N; and the criterion that this is."""
+    n, turn, EI, w = line.h.shape[0], kinds.turn, kinds.EI[i], kinds.w[i]
+    kappa = turn[i] / line.hn[i]
+    along = shares[CURVATURE] < math.inf or shares[MOMENT] < math.inf
+    if i == 0 or i == n:
+        lack = lack_at_clamp(EI, w, T, turn[i])
+        if along and not line.element[i] and turn[i] == 0.0:  # a pin, where the curvature of a rod fades away
+            k = min(max(i, 1), n - 1)
+            lack = CellError(0.0, 0.0, node_curvature(line, turn, k), 0.0)
+        if along and line.element[i]:
+            lack = CellError(lack.position, lack.tension, kappa, EI * kappa)
+        return lack, CLAMP
+    if kinds.node[i] == LOAD or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
+        lack = lack_at_kink(EI, w, T, kink_at(line, turn, i))
+        if along and line.element[i]:
+            lack = CellError(lack.position, lack.tension, kappa, EI * kappa)
+        return lack, POINT
+    lack = lack_of_bend(EI, w, T, kappa + kinds.bent[i], bends_at(line, turn, shares, i))
+    return lack, POINT if kinds.node[i] == STEP else BEND
+
+
+@inner
+def weigh_edge(line, sea, state, kinds, shares, i, T, ratios):
+    """Raise the ratio of the base cells at inner node i, if contact with the seabed begins beside it."""
+    p, r = depth(sea, state.r, i) > 0.0, state.r
+    if p != (depth(sea, r, i - 1) > 0.0) or p != (depth(sea, r, i + 1) > 0.0):
+        of = kinds.base_of_cell
+        raise_ratio(ratios, EDGE, of[i - 1], of[i], over_shares(lack_at_edge(kinds.EI[i], kinds.w[i], T), shares))
+
+
+@inner
+def raise_ratios(line, sea, state, past, ahead, shares, kinds, ratios):
+    """Raise ratios (criteria, base cells) to those of a state: the largest of every criterion in each base cell.
+
+    past: (N,) N, tensions some time ago; ahead: how far their change since then goes on; shares: (4,) of
+    kernels.mesh.cell_errors; kinds: with the turns of this state.
+    """
+    a = ahead
+    floor, of, turn, twisting = kinds.floor, kinds.base_of_cell, kinds.turn, kinds.twisting
+    n = state.e.shape[0]
+    whole = 0.0
+    for i in range(n + 1):
+        whole += turn[i]
+    for i in range(n + 1):
+        ja, jb = of[max(i - 1, 0)], of[min(i, n - 1)]
+        now, ahead = tensions_at(state.T, past, a, i)
+        slack = min(floor[i] / ahead, FORESEEN) if ahead > 0.0 else FORESEEN
+        if not floor[i] <= slack * now:
+            slack = floor[i] / now if now > 0.0 else MOST
+        raise_ratio(ratios, SLACK, ja, jb, slack)
+        T = max(floor[i], 1e-300)
+        T = now if now > T else T
+        lack, criterion = lack_of_node(line, kinds, shares, i, T)
+        raise_ratio(ratios, criterion, ja, jb, over_shares(lack, shares))
+        if i == 0 or i == n:
+            continue
+        loop = twisting[i] * twisting[i] / (4.0 * kinds.EI[i] * TWISTED * T)
+        loop = max(loop, over_shares(lack_of_torque(T, twisting[i], whole), shares))
+        raise_ratio(ratios, TORSION, ja, jb, loop)
+        if line.bits & SEABED:
+            weigh_edge(line, sea, state, kinds, shares, i, T, ratios)
+
+
+@inner
+def largest_ratio(line, kinds, ratios):
+    """The largest ratio among base cells that are catenary and free."""
+    loudest = 0.0
+    for i in range(line.spin.shape[0]):
+        j = kinds.base_of_cell[i]
+        if not line.spin[i] and kinds.free[j]:
+            for c in range(ratios.shape[0]):
+                loudest = max(loudest, ratios[c, j])
+    return loudest
+
+
+@kernel
+def twist_of_rods(line, frames, e, a1):
+    """Twist of all elements, rad; frames: (2, 9) of the ends."""
+    n = e.shape[0]
+    twist = 0.0
+    for i in range(n + 1):
+        if line.element[i]:
+            Ra, Rb = get9(frames, 0), get9(frames, 1)
+            if i > 0:
+                Ra = frame(get3(a1, i - 1), chord(get3(e, i - 1))[0])
+            if i < n:
+                Rb = frame(get3(a1, i), chord(get3(e, i))[0])
+            twist += log_rotation(relative_rotation(Ra, Rb))[2]
+    return twist

@@ -1,0 +1,439 @@
+"""What zones that move ask of every step, compiled: lengths and stiffness before it, criteria and energy after it.
+
+A run calls `follow_zones` by its address (kernels.run.run), so that scenes whose zones stay compile none of it; Python calls
+the same functions where a criterion or joints of its own take part (simulation.zone_switching).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.algebra.rotations import dot, get3
+from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.end_motion import end_turn
+from hybrid.kernels.laws.tension_torque import twist_of_line
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.references import reader
+from hybrid.kernels.march.energies import observe
+from hybrid.kernels.mesh.cell_errors import (
+    CURVATURE,
+    MOMENT,
+    POSITION,
+    QUANTITIES,
+    TENSION,
+    lack_of_moment,
+    lack_of_torque,
+    over_shares,
+)
+from hybrid.kernels.mesh.cell_lengths import FADE, arc_less_chord, follow_arcs, foresee_edges, plan_cells
+from hybrid.kernels.mesh.criteria import CLAMP, CONTACT, CRITERIA, TORSION
+from hybrid.kernels.mesh.stiffness_ramp import advance, freed, length_defect, shares, soften
+from hybrid.kernels.mesh.wave_lengths import QUIET, TAU, WAVES, follow_waves, spread_of_velocity
+from hybrid.kernels.mesh.zone_criteria import (
+    MOST,
+    TWISTED,
+    NodeKinds,
+    blank_kinds,
+    find_turns,
+    largest_ratio,
+    raise_ratio,
+    raise_ratios,
+    twist_of_rods,
+)
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import COUNT_SIZE, WORKS
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
+
+# How far a falling tension is extrapolated, in ramp times; the rate is taken over one or two samples.
+LOOKAHEAD, LONGEST_LOOKAHEAD = 0.125, 2.0
+SAMPLES = 16  # of the tension per ramp time
+REJECT_RATIO = 4.0  # a step that ends with a catenary above this is rejected, and repeated with more rod
+
+# Numbers of `clock`; times in s.
+(
+    DT,  # since the last evaluation
+    PACE,  # ramp time of bending stiffness
+    AGE, RECENT_AGE,  # of the tensions `past` and `recent`
+    NEXT_REVIEW,
+    TOLERANCE,  # m, of position
+    LOUDEST,  # largest ratio among catenaries, at the last evaluation
+    TORQUE,  # N m, that a rod from end to end would carry, where there is none
+    TOTAL_TWIST,  # rad, of the ends against each other
+    COMPLIANCE, FREE_TWIST,  # of all the line: rad per N m; rad
+    LETTING_GO,  # over which lengths become true
+    CALM_STEP, RAMP_STEP,  # longest steps: while nothing is ramped, and else
+    SHARE,  # of the largest curvature that the length of cells may make it wrong by, where they follow it; 0: they stay
+    LEFT,  # part of what catenaries leave out that remains in results: 1, but for results that are corrected
+    FINENESS,  # of cells that follow the curvature: those that lengths ask for are so many times as short
+    FASTEST,  # m/s, by how much velocities of nodes differed of late
+) = range(18)  # fmt: skip
+CLOCK_SIZE = 18
+# Flags of `counts`.
+(
+    KNOWN,  # tensions of earlier are of these cells
+    HOLDS_TWIST,  # both ends hold the twist
+    ALL_ROD,
+    LOADED,  # moments are given at the ends
+    RELAXING, UNDER_WAY,  # lengths are on their way to true ones; those of the last step were
+    GOING, COMING,  # stiffness is ramped down; up
+    STRAINED,  # `strain` is of the state now
+    CELLS_DUE,  # rods should have other cells
+) = range(10)  # fmt: skip
+FLAG_COUNT = 10
+
+
+class Zones(NamedTuple):
+    """What zones that move know; n base cells."""
+
+    clock: Floats  # (CLOCK_SIZE,)
+    counts: NDArray[np.int64]  # (FLAG_COUNT,)
+    kinds: NodeKinds
+    clamped: Floats  # (2,) 1 where an end holds the tangent
+    tangents: Floats  # (2, 3) of the clamped ends, zero where there is none
+    moments: Floats  # (2, 3) N m, given at the ends
+    past: Floats  # (N,) N, tensions some time ago
+    recent: Floats  # (N,) N, later ones, which will take their place
+    # Of tension, curvature and moment (kernels.mesh.cell_errors; of position the tolerance stands):
+    asked: Floats  # (4,) parts of the largest that leaving bending out may make; 0: nothing is asked
+    largest: Floats  # (4,) N, 1/m, N m, of late
+    shares: Floats  # (4,) m, N, 1/m, N m, what leaving bending out may make (written)
+    limits: Floats  # (4,) and what the length of cells may make (written)
+    ratios: Floats  # (criteria, n), largest since the last review
+    rod: NDArray[np.bool_]  # (n,)
+    leaving: NDArray[np.bool_]  # (n,) rods whose stiffness is ramped down
+    grown: Floats  # (n,) part of its stiffness that each rod has
+    haste: Floats  # (n,) by how much faster it is ramped up
+    # Of cells that follow the curvature (kernels.mesh.cell_lengths); K cells of the finest mesh:
+    parts: NDArray[np.int64]  # (n,) finest cells of base cells
+    H: Floats  # (n,) m, lengths of base cells
+    next_rod: NDArray[np.bool_]  # (n,) what is rod where nodes are planned
+    here: NDArray[np.bool_]  # (K+1,) places of nodes now
+    plan: NDArray[np.bool_]  # (K+1,) and where they should be
+    calm: NDArray[np.int64]  # (K+1,) steps for which a node could have gone
+    waves: Floats  # (K+1,) m^2, squares of the longest cells that waves allow; 0: no node, or not known yet
+    place: NDArray[np.int64]  # (N+1,) places of nodes
+    wanted: Floats  # (N+1,) m, longest cells that the curvature allows
+    share: Floats  # (N+1,) the same of nodes, at the end of a step
+    stiff: Floats  # (N+1, 3) N m, all of their stiffness
+    true: Floats  # (N,) m, lengths
+    lengths: Floats  # (N,) m, at the end of the last step
+    lack: Floats  # (N,) m, that cells on their way to their true length lacked
+    rate: Floats  # (N,) m/s, its rate then
+    since: Floats  # (N,) s, when that was
+    keeps: NDArray[np.bool_]  # (N,) catenaries keep what they lack: it is what the chord of an arc is shorter by
+    strain: Floats  # (2, N+1, 3) rad, of elements: at the beginning and the end of the last step
+    moment: Floats  # (N+1, 3) this and the next: work arrays
+    energy: Floats  # (4,)
+
+
+def blank_zones(cells: int, base: int) -> Zones:
+    """Zones of a line of so many cells and base cells, all catenary."""
+    z, nodes = np.zeros, cells + 1
+    return Zones(
+        clock=np.where(np.arange(CLOCK_SIZE) == FINENESS, 1.0, 0.0), counts=z(FLAG_COUNT, np.int64),
+        kinds=blank_kinds(cells, base),
+        clamped=z(2), tangents=z((2, 3)), moments=z((2, 3)), past=z(cells), recent=z(cells),
+        asked=z(QUANTITIES), largest=z(QUANTITIES), shares=z(QUANTITIES), limits=z(QUANTITIES), ratios=z((len(CRITERIA), base)), rod=z(base, bool), leaving=z(base, bool), grown=np.ones(base),
+        haste=np.ones(base), parts=np.ones(base, np.int64), H=np.ones(base), next_rod=z(base, bool),
+        here=z(base + 1, bool), plan=z(base + 1, bool), calm=z(base + 1, np.int64),
+        waves=z(base + 1), place=z(nodes, np.int64),
+        wanted=z(nodes), share=z(nodes), stiff=z((nodes, 3)), true=z(cells), lengths=z(cells), lack=z(cells),
+        rate=z(cells), since=np.full(cells, -np.inf), keeps=z(cells, bool), strain=z((2, nodes, 3)),
+        moment=z((nodes, 3)), energy=z(4),
+    )  # fmt: skip
+
+
+class ZoneJob(NamedTuple):
+    """Arguments of the entries: two states in turn as kernels.run.run has them, and its clock, counts and work."""
+
+    line: Line
+    sea: Sea
+    ends: Ends
+    old: State
+    new: State
+    clock: Floats
+    counts: NDArray[np.int64]
+    work: Floats
+    zones: Zones
+    near: (
+        Floats  # (N+1,) how near the line is to itself (kernels.contact.self_contact_pairs.look_ahead); empty: unknown
+    )
+
+
+def blank_zone_job() -> ZoneJob:
+    """A job with the types that every one has."""
+    state = blank_state(1)
+    clock, counts, work = np.zeros(b.CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64), np.zeros((2, WORKS))
+    return ZoneJob(
+        blank_line(1), no_sea(1), no_ends(), state, state, clock, counts, work, blank_zones(1, 1), np.zeros(0)
+    )
+
+
+read = reader(blank_zone_job())
+
+
+@inner
+def copy(x, out):
+    for i in range(x.shape[0]):
+        out[i] = x[i]
+
+
+# --- before a step --------------------------------------------------------------------------------
+
+
+@inner
+def prepare(line, zones, end, dt):
+    """Lengths and stiffness as they will be at `end`, after a step of dt."""
+    z, flags = zones.clock, zones.counts
+    if flags[RELAXING]:
+        flags[UNDER_WAY] = length_defect(
+            zones.lack, zones.rate, zones.since, zones.keeps, end, z[LETTING_GO], zones.true, line.h
+        )
+    if flags[GOING] or flags[COMING]:
+        shares(zones.grown, zones.leaving, zones.haste, dt / z[PACE], zones.kinds.base_of_cell, zones.share)
+        soften(zones.share, zones.stiff, line.kb)
+
+
+# --- after a try ----------------------------------------------------------------------------------
+
+
+@inner
+def torque_of_ends(line, ends, state, zones):
+    """Torque, N m, of the turn of one end against the other, as if all the line were rod; 0 if it is: rods know."""
+    z = zones.clock
+    if zones.counts[ALL_ROD]:
+        z[TOTAL_TWIST] = twist_of_rods(line, ends.frame, state.e, state.a1)
+        return 0.0
+    turn = end_turn(state.e, ends.frame)
+    z[TOTAL_TWIST] += (turn - z[TOTAL_TWIST] + math.pi) % (2.0 * math.pi) - math.pi
+    return (z[TOTAL_TWIST] - z[FREE_TWIST] + twist_of_line(line, state.T)) / z[COMPLIANCE]
+
+
+@inner
+def lowest(x):
+    low = x[0]
+    for i in range(1, x.shape[0]):
+        low = min(low, x[i])
+    return low
+
+
+@inner
+def weigh_moments(state, zones):
+    """A moment M given at an end holds the cable off its catenary by M/T, as a clamp does; of its full size.
+
+    What of it turns about the cable is a torque, whether rods feel it already or not.
+    """
+    kinds, ratios, shares = zones.kinds, zones.ratios, zones.shares
+    n, last = state.T.shape[0], ratios.shape[1] - 1
+    turned = 0.0
+    for i in range(n + 1):
+        turned += kinds.turn[i]
+    for k in range(2):
+        cell, node, j = (n - 1, n, last) if k else (0, 0, 0)
+        M = get3(zones.moments, k)
+        T = max(state.T[cell], kinds.floor[node], 1e-300)
+        bent = over_shares(lack_of_moment(kinds.EI[node], T, math.sqrt(dot(M, M))), shares)
+        ratios[CLAMP, j] = max(ratios[CLAMP, j], min(bent, MOST))
+        along = abs(dot(M, chord(get3(state.e, cell))[0]))
+        loosest = max(lowest(state.T), lowest(kinds.floor), 1e-300)
+        twisting = along * along / (4.0 * lowest(kinds.EI) * TWISTED * loosest)
+        torsion = min(max(twisting, over_shares(lack_of_torque(loosest, along, turned), shares)), MOST)
+        for c in range(last + 1):
+            ratios[TORSION, c] = max(ratios[TORSION, c], torsion)
+
+
+@inner
+def weigh_contact(near, zones):
+    """What is near another part of the line, on both sides of every node."""
+    of, last = zones.kinds.base_of_cell, zones.kinds.base_of_cell.shape[0] - 1
+    for i in range(near.shape[0]):
+        raise_ratio(zones.ratios, CONTACT, of[max(i - 1, 0)], of[min(i, last)], near[i])
+
+
+@inner
+def find_shares(line, state, zones):
+    """What may be left out of each quantity, and what lengths may make, by the largest of late."""
+    kinds, z, n = zones.kinds, zones.clock, line.h.shape[0]
+    kappa, moment, tension = 0.0, 0.0, 0.0
+    for i in range(n + 1):
+        if line.element[i] or (0 < i < n and line.spin[i] == line.spin[i - 1]):  # not the kink of a joint
+            kappa = max(kappa, kinds.turn[i] / line.hn[i])
+            moment = max(moment, kinds.EI[i] * kinds.turn[i] / line.hn[i])
+    for c in range(n):
+        tension = max(tension, state.T[c])
+    for k, size in ((TENSION, tension), (CURVATURE, kappa), (MOMENT, moment)):
+        zones.largest[k] = max(zones.largest[k], size)
+        share = zones.asked[k] * zones.largest[k] / z[LEFT]
+        zones.shares[k], zones.limits[k] = share if share > 0.0 else math.inf, math.inf
+    finer = 1.0 / (z[FINENESS] * z[FINENESS])  # of second order
+    zones.shares[POSITION], zones.limits[POSITION] = z[TOLERANCE] / z[LEFT], z[TOLERANCE] * finer
+    if z[SHARE] > 0.0 and zones.largest[CURVATURE] > 0.0:
+        zones.limits[CURVATURE] = z[SHARE] * zones.largest[CURVATURE] * finer
+
+
+@inner
+def evaluate(line, sea, ends, state, zones, near, dt):
+    """Raise the ratios since the last review to those of a state, dt after the last one; the loudest of catenaries.
+
+    dt = 0: there was none, or it was on other nodes.
+    """
+    z, flags = zones.clock, zones.counts
+    if dt == 0.0 or not flags[KNOWN]:
+        copy(state.T, zones.past)
+        copy(state.T, zones.recent)
+        z[AGE], z[RECENT_AGE], flags[KNOWN] = 0.0, 0.0, 1
+    z[AGE], z[RECENT_AGE] = z[AGE] + dt, z[RECENT_AGE] + dt
+    ahead = min(LOOKAHEAD * z[PACE] / z[AGE], LONGEST_LOOKAHEAD) if z[AGE] > 0.0 else 0.0
+    z[TORQUE] = torque_of_ends(line, ends, state, zones) if flags[HOLDS_TWIST] else 0.0
+    for k in range(2):
+        for j in range(3):
+            zones.tangents[k, j] = ends.frame[k, 2 + 3 * j] * zones.clamped[k]
+    find_turns(line, zones.tangents, state.e, state.a1, state.T, z[TORQUE], zones.kinds)
+    find_shares(line, state, zones)
+    raise_ratios(line, sea, state, zones.past, ahead, zones.shares, zones.kinds, zones.ratios)
+    if z[SHARE] > 0.0:
+        foresee_edges(line, sea, state, zones, z[PACE])
+    if flags[LOADED]:
+        weigh_moments(state, zones)
+    weigh_contact(near, zones)
+    z[LOUDEST] = largest_ratio(line, zones.kinds, zones.ratios)
+
+
+# --- after a step -----------------------------------------------------------------------------------
+
+
+@inner
+def find_strain(line, ends, state, zones, k):
+    """Strains of the elements of a state into zones.strain[k], from what has no stress."""
+    strain = zones.strain[k]
+    observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, zones.moment, strain, zones.energy)
+    for i in range(strain.shape[0]):
+        for j in range(3):
+            strain[i, j] = (strain[i, j] - line.k0[i, j]) * line.element[i]
+
+
+@inner
+def book(line, ends, before, state, dt, zones):
+    """Energy, J, that lengths and stiffness which change put in through an accepted step of dt."""
+    z, flags, booked = zones.clock, zones.counts, 0.0
+    if flags[RELAXING]:
+        for c in range(line.h.shape[0]):
+            booked -= 0.5 * (before.T[c] + state.T[c]) * (line.h[c] - zones.lengths[c])
+            zones.lengths[c] = line.h[c]
+        flags[RELAXING] = flags[UNDER_WAY] or z[SHARE] > 0.0
+    if flags[GOING] or flags[COMING]:
+        if flags[STRAINED]:
+            for i in range(zones.moment.shape[0]):
+                for j in range(3):
+                    zones.strain[0, i, j] = zones.strain[1, i, j]
+        else:
+            find_strain(line, ends, before, zones, 0)
+        find_strain(line, ends, state, zones, 1)
+        shares(zones.grown, zones.leaving, zones.haste, 0.0, zones.kinds.base_of_cell, zones.share)
+        booked += freed(line.kb, zones.share, zones.stiff, zones.strain[0], zones.strain[1])
+        advance(zones.grown, zones.leaving, zones.haste, dt / z[PACE])
+        flags[STRAINED], flags[COMING] = 1, is_coming(zones)
+    else:
+        flags[STRAINED] = 0
+    if z[RECENT_AGE] * SAMPLES >= z[PACE]:  # tensions to extrapolate from
+        copy(zones.recent, zones.past)
+        copy(state.T, zones.recent)
+        z[AGE], z[RECENT_AGE] = z[RECENT_AGE], 0.0
+    return booked
+
+
+@inner
+def watch_waves(line, state, zones, dt):
+    """What the velocities after a step of dt ask of lengths."""
+    z = zones.clock
+    z[FASTEST] = max(z[FASTEST] * math.exp(-dt / (FADE * z[PACE])), spread_of_velocity(state.v))
+    fast = max(z[FASTEST], QUIET * z[TOLERANCE] / z[PACE])
+    error = WAVES * z[SHARE] * fast / (z[FINENESS] * z[FINENESS])
+    follow_waves(line, state, zones, error, dt / (TAU * z[PACE]), z[FINENESS])
+
+
+@inner
+def other_cells(line, sea, state, zones, dt):
+    """Whether rods should have other cells, after a step of dt."""
+    z = zones.clock
+    for j in range(zones.rod.shape[0]):
+        zones.next_rod[j] = zones.rod[j]
+    z[DT] = dt
+    return plan_cells(line, sea, state, zones, dt, z[FINENESS])
+
+
+@inner
+def is_coming(zones):
+    """Whether any stiffness is ramped up."""
+    coming = False
+    for j in range(zones.rod.shape[0]):
+        coming |= zones.rod[j] and not zones.leaving[j] and zones.grown[j] < 1.0
+    return coming
+
+
+# --- entries ----------------------------------------------------------------------------------------
+
+
+@kernel
+def evaluate_criteria(table):
+    """`evaluate` for the state `new` of a job."""
+    job = read(table)
+    evaluate(job.line, job.sea, job.ends, job.new, job.zones, job.near, job.zones.clock[DT])
+
+
+@kernel
+def take_arcs(table):
+    """True lengths that make chords of the state `new` of a job as long as arcs."""
+    job = read(table)
+    for c in range(job.line.h.shape[0]):
+        less = arc_less_chord(job.line, job.new, job.zones, c)
+        job.zones.true[c] = job.line.s[c + 1] - job.line.s[c] - less
+
+
+@kernel
+def plan_nodes(table):
+    """Places of nodes for the state `new` of a job and rods zones.next_rod, into zones.plan."""
+    job = read(table)
+    clock = job.zones.clock
+    plan_cells(job.line, job.sea, job.new, job.zones, clock[DT], clock[FINENESS])
+
+
+@kernel
+def plan_next(table):
+    """`plan_nodes` between two steps of a run, for the state that it has come to."""
+    job = read(table)
+    clock, state = job.zones.clock, job.new if job.counts[b.PARITY] else job.old
+    plan_cells(job.line, job.sea, state, job.zones, clock[DT], clock[FINENESS])
+
+
+@kernel
+def follow_zones(table):
+    """What zones do in the present phase of a run, before a try, after it, after a step; 1: Python must look at it."""
+    job = read(table)
+    line, ends, zones, clock, count = job.line, job.ends, job.zones, job.clock, job.counts
+    phase, dt = count[b.PHASE], clock[b.TRY_END] - clock[b.NOW]
+    if phase == b.SOLVE:
+        prepare(line, zones, clock[b.TRY_END], dt)
+        return 0
+    if phase == b.JUDGE:
+        evaluate(line, job.sea, ends, job.old if count[b.PARITY] else job.new, zones, job.near, dt)
+        return 1 if zones.clock[LOUDEST] > REJECT_RATIO else 0
+    # a step is accepted, and the states have changed places
+    state, before = job.old, job.new
+    if count[b.PARITY]:
+        state, before = before, state
+    for k in range(QUANTITIES):
+        zones.largest[k] *= math.exp(-clock[b.LAST_DT] / (FADE * zones.clock[PACE]))
+    job.work[0, b.ZONES] += book(line, ends, before, state, clock[b.LAST_DT], zones)
+    if zones.clock[SHARE] > 0.0:
+        follow_arcs(line, state, zones)
+        watch_waves(line, state, zones, clock[b.LAST_DT])
+        zones.counts[CELLS_DUE] = other_cells(line, job.sea, state, zones, clock[b.LAST_DT])
+    ramping = zones.counts[GOING] or zones.counts[COMING]
+    clock[b.ALLOWED] = zones.clock[RAMP_STEP] if ramping else zones.clock[CALM_STEP]
+    due = zones.clock[LOUDEST] > 1.0 or clock[b.NOW] >= zones.clock[NEXT_REVIEW] or zones.counts[CELLS_DUE] != 0
+    return 1 if due else 0

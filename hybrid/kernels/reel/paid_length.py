@@ -1,0 +1,208 @@
+"""How long a line that is paid out is, and what its length makes of the cells that it changes (docs/theory.md, 19).
+
+symbol  meaning                                                    unit
+L       unstretched length that is out                             m
+c       its rate, positive where line is paid out                  m/s
+p       place of the last material node                            m
+
+Places, nodes and cells count from the far end towards the fairlead; `node` and `cell` give their numbers in the line.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.kernels.laws.axial_law import has_law
+from hybrid.kernels.laws.element import put_spring
+from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.mesh.fill_line import B_1, COLUMNS, fill_cell, fill_element, fill_node
+from hybrid.kernels.reel.reel import (
+    ACCELERATION,
+    BALANCE_ON,
+    CHANGED,
+    EASING,
+    FAR,
+    LENGTH,
+    PLACE,
+    RATE,
+    RIDING_ON,
+    SIDE,
+    SPRING,
+)
+from hybrid.kernels.reel.winch import (
+    LENGTH_NOW,
+    RATE_NOW,
+    TENSION,
+    TRUE_NOW,
+)
+
+
+@inner
+def length_at(law, t):
+    """L, c and the rate of c at t, just before it where the latter jumps."""
+    k = 0
+    while k + 1 < law.shape[0] and law[k + 1, 0] < t:
+        k += 1
+    x = max(t - law[k, 0], 0.0)
+    value, rate, twice = 0.0, 0.0, 0.0
+    for j in range(1, 8):
+        twice = twice * x + 2.0 * rate
+        rate = rate * x + value
+        value = value * x + law[k, j]
+    return value, rate, twice
+
+
+@inner
+def made_between(pieces, begin, end, out, row):
+    """The row of the material between two arc lengths: the mean of its pieces; of stiffness that of their compliances."""
+    for j in range(COLUMNS):
+        out[row, j] = 0.0
+    for k in range(pieces.shape[0]):
+        a = max(pieces[k, 0], begin) if k > 0 else begin
+        z = min(pieces[k + 1, 0], end) if k + 1 < pieces.shape[0] else end
+        if not z > a:
+            continue
+        part = (z - a) / (end - begin)
+        for j in range(COLUMNS):
+            x = pieces[k, 1 + j]
+            if part == 1.0:
+                out[row, j] = x
+            elif B_1 <= j < B_1 + 3:
+                out[row, j] += part / x
+            else:
+                out[row, j] += part * x
+        if part == 1.0:
+            return
+    for j in range(B_1, B_1 + 3):
+        out[row, j] = 1.0 / out[row, j]
+
+
+@inner
+def node(line, reel, i):
+    """The number in the line of a node counted from the far end."""
+    return i if reel.numbers[SIDE] > 0.0 else line.h.shape[0] - i
+
+
+@inner
+def cell(line, reel, c):
+    """The number in the line of a cell counted from the far end."""
+    return c if reel.numbers[SIDE] > 0.0 else line.h.shape[0] - 1 - c
+
+
+@inner
+def growing(line, reel):
+    """The cell that grows; the nodes behind it ride with the fairlead."""
+    return line.h.shape[0] - reel.layer.shape[0]
+
+
+@inner
+def fill_between(line, reel, i, a, ha, b, hb):
+    """Node i between cells of rows a and b of `reel.made`; lengths: as of kernels.mesh.fill_line.fill_node."""
+    fill_node(line, i, reel.made, a, ha, b, hb)
+    if line.element[i]:
+        fill_element(line, i, reel.made, a, ha, b, hb, line.kb[i, 2] == 0.0)
+
+
+@inner
+def fill_cells(line, reel):
+    """Mass, loads and stiffness of the cell that grows, of those behind it and of their nodes, for the length that is out."""
+    n, layer, made, a, b = line.h.shape[0], reel.layer, reel.made, 0, 1
+    length, begin, g, before = reel.numbers[LENGTH], reel.numbers[PLACE], n - reel.layer.shape[0], reel.rest_length[0]
+    for j in range(COLUMNS):
+        made[a, j] = reel.rest[0, j]
+    for k in range(g, n):
+        end = length - layer[k - g]
+        h, c, i = end - begin, cell(line, reel, k), node(line, reel, k)
+        made_between(reel.pieces, begin, end, made, b)
+        reel.true[k] = h
+        line.s[node(line, reel, k + 1)] = reel.numbers[FAR] + reel.numbers[SIDE] * end
+        fill_between(line, reel, i, a, before, b, h)
+        ck = line.ck[c]
+        fill_cell(line, c, made, b, h)
+        if has_law(line, c):  # which is linearised anew in every iteration, and is one for all that is on the reel
+            line.ck[c] = ck
+        a, b, before, begin = b, a, h, end
+    i = node(line, reel, n)
+    fill_between(line, reel, i, a, before, b, 0.0)
+    if line.element[i] and reel.numbers[SPRING] < np.inf:
+        put_spring(reel.numbers[SPRING], line, i)
+
+
+@inner
+def set_lengths(line, reel, t):
+    """Lengths at t of cells that lacked something: on their way to their true ones, by a quintic that ends at rest."""
+    for k in range(line.h.shape[0]):
+        if reel.since[k] == -np.inf:
+            continue
+        c = cell(line, reel, k)
+        line.h[c] = reel.true[k]
+        x = (t - reel.since[k]) / reel.span[k]
+        if x < 1.0:
+            x = max(x, 0.0)
+            value = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+            fading = x * (1.0 - x) ** 3 * (1.0 + 3.0 * x)
+            line.h[c] -= reel.lack[k] * value + reel.span[k] * reel.rate[k] * fading
+
+
+@inner
+def find_length(reel, t):
+    """How long the line is at t, of what is prescribed, or of a winch before a step."""
+    numbers, winch = reel.numbers, reel.winch
+    if winch[TENSION] > 0.0:
+        numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = winch[LENGTH_NOW], winch[RATE_NOW], winch[TRUE_NOW]
+    else:
+        numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = length_at(reel.law, t)
+
+
+@inner
+def take_riding_off(line, reel):
+    """The forces on the line without those by which nodes that ride have more."""
+    if reel.stage[RIDING_ON] > 0.0:
+        first = growing(line, reel) + 1
+        for k in range(reel.layer.shape[0] - 1):
+            i = node(line, reel, first + k)
+            for j in range(3):
+                line.force[i, j] -= reel.riding[k, j]
+        reel.stage[RIDING_ON] = 0.0
+
+
+@inner
+def eased(reel, t):
+    """What part of the forces that balanced the neighbours of the last new node still acts at t: a quintic from 1 to 0."""
+    if reel.numbers[CHANGED] == -np.inf:
+        return 0.0
+    x = min(max((t - reel.numbers[CHANGED]) / reel.numbers[EASING], 0.0), 1.0)
+    return 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+
+
+@inner
+def put_balance_on(line, reel, t):
+    """The forces on the line with those that balanced the neighbours of the last new node, as far as they act at t."""
+    part = eased(reel, t)
+    if part > 0.0:
+        for i in range(line.h.shape[0] + 1):
+            for j in range(3):
+                reel.plain[i, j] = line.force[i, j]
+                line.force[i, j] += part * reel.balance[i, j]
+        reel.stage[BALANCE_ON] = 1.0
+
+
+@inner
+def take_balance_off(line, reel):
+    """The forces on the line without them, to the last bit; those on nodes that ride are off."""
+    if reel.stage[BALANCE_ON] > 0.0:
+        for i in range(line.h.shape[0] + 1):
+            for j in range(3):
+                line.force[i, j] = reel.plain[i, j]
+        reel.stage[BALANCE_ON] = 0.0
+
+
+@inner
+def prepare(line, reel, t):
+    """The line with the length of now at t."""
+    take_riding_off(line, reel)
+    take_balance_off(line, reel)
+    fill_cells(line, reel)
+    for k in range(growing(line, reel), line.h.shape[0]):
+        line.h[cell(line, reel, k)] = reel.true[k]
+    set_lengths(line, reel, t)

@@ -1,0 +1,410 @@
+"""A line that is paid out or taken in at one of its ends: what changes with its length in every step (docs/theory.md, 19).
+
+Nodes, cells and chords count from the far end, whichever end of the line that is (kernels.reel.paid_length).
+The last node is the fairlead, through which material passes.  Nodes of a layer before it ride with it; all others are
+material.  Only the cell before the layer, which is the last one where there is none, changes its length, and with it
+the mass, the loads and the stiffness that it brings to its two nodes.
+
+    symbol  meaning                                                    unit
+    L       unstretched length that is out                             m
+    c       its rate, positive where line is paid out                  m/s
+    p       place of the last material node                            m
+    K       acceleration of the fairlead less that of the material     m/s2
+
+A run calls `pay_out` by its address (kernels.run.run), so that lines of a fixed length compile none of it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybrid.kernels.algebra.rotations import add, dot, frame, get3, log_rotation, scale, sub
+from hybrid.kernels.laws.axial_law import strain_and_energy
+from hybrid.kernels.laws.cell import Chord, chord
+from hybrid.kernels.laws.element import relative_rotation
+from hybrid.kernels.laws.node_forces import Z3, inertia_and_water
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.reel.paid_length import (
+    cell,
+    eased,
+    find_length,
+    growing,
+    node,
+    prepare,
+    put_balance_on,
+    take_balance_off,
+    take_riding_off,
+)
+from hybrid.kernels.reel.payout_balance import find_balance
+from hybrid.kernels.reel.reel import (
+    ACCELERATION,
+    DUE,
+    FLUX,
+    FLUX_BEFORE,
+    LENGTH,
+    LONGEST,
+    RATE,
+    RIDING_ON,
+    SHORTEST,
+    SIDE,
+    UNBALANCED,
+    read,
+)
+from hybrid.kernels.reel.winch import (
+    BEGIN,
+    CA,
+    CV,
+    HELD,
+    INERTIA,
+    TENSION,
+    accept,
+    answer_of_cell,
+    at_its_end,
+    last_change,
+    lengthen_cell,
+    losses,
+    predict,
+    softness,
+    tension_held,
+)
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.report import FORCE_A, FORCE_B, LENGTH_OUT, NET_A, PAYOUT_POWER, PAYOUT_RATE
+
+# --- the force of the fairlead --------------------------------------------------------------------
+
+
+@inner
+def end_of(reel):
+    """Which end of the line the fairlead is: 0 or 1."""
+    return 1 if reel.numbers[SIDE] > 0.0 else 0
+
+
+@inner
+def chord_at(line, state, reel, c):
+    """Chord of a cell, towards the fairlead."""
+    return scale(reel.numbers[SIDE], get3(state.e, cell(line, reel, c)))
+
+
+@inner
+def lengths_at(line, reel, j):
+    """Lengths of the cells before and after node j."""
+    return line.h[cell(line, reel, j - 1)], line.h[cell(line, reel, j)]
+
+
+@inner
+def slope_at(line, state, reel, i):
+    """r' and r'' at node i: of the parabola through it and its neighbours, or through the last three."""
+    j = min(i, line.h.shape[0] - 1)
+    ha, hb = lengths_at(line, reel, j)
+    sa, sb = scale(1.0 / ha, chord_at(line, state, reel, j - 1)), scale(1.0 / hb, chord_at(line, state, reel, j))
+    part = ha / (ha + hb) if i == j else 1.0 + hb / (ha + hb)
+    return add(sa, scale(part, sub(sb, sa))), scale(2.0 / (ha + hb), sub(sb, sa))
+
+
+@inner
+def velocity_at(line, state, reel, i, rate, g):
+    """Velocity of the material at node i: that of a node behind the cell that grows is another one."""
+    v = get3(state.v, node(line, reel, i))
+    if i <= g:
+        return v
+    slope, _ = slope_at(line, state, reel, i)
+    return sub(v, scale(rate, slope))
+
+
+@inner
+def of_material(line, sea, ends, state, reel, i):
+    """What the force on node i, N, is more because it does not move as the material does, and r' there."""
+    n, numbers, g = line.h.shape[0], reel.numbers, growing(line, reel)
+    rate, acceleration, j = numbers[RATE], numbers[ACCELERATION], min(i, n - 1)
+    slope, bend = slope_at(line, state, reel, i)
+    ha, hb = lengths_at(line, reel, j)
+    first, middle = velocity_at(line, state, reel, j - 1, rate, g), velocity_at(line, state, reel, j, rate, g)
+    last = velocity_at(line, state, reel, j + 1, rate, g)
+    va, vb = scale(1.0 / ha, sub(middle, first)), scale(1.0 / hb, sub(last, middle))
+    part, v = (ha / (ha + hb), middle) if i == j else (1.0 + hb / (ha + hb), last)
+    turns = add(va, scale(part, sub(vb, va)))
+    K = add(scale(2.0 * rate, turns), add(scale(rate * rate, bend), scale(acceleration, slope)))
+    k, z = node(line, reel, i), ends.position[end_of(reel), 2]
+    before, after = Chord(Z3, 0.0, 0.0), Chord(Z3, 0.0, 0.0)
+    if k > 0:
+        d, l, il = chord(get3(state.e, k - 1))
+        before = Chord(d, l, il)
+    if k < n:
+        d, l, il = chord(get3(state.e, k))
+        after = Chord(d, l, il)
+    for c in range(i, n):
+        z -= numbers[SIDE] * state.e[cell(line, reel, c), 2]
+    vi, ai = get3(state.v, k), get3(state.vd, k)
+    with_material, _, _, _ = inertia_and_water(line, sea, k, z, v, sub(ai, K), before, after, 0.0, 0.0, reel.report)
+    with_node, _, _, _ = inertia_and_water(line, sea, k, z, vi, ai, before, after, 0.0, 0.0, reel.report)
+    return sub(with_material, with_node), slope
+
+
+@inner
+def put_riding_on(line, sea, ends, state, reel):
+    """The forces on the line with those by which nodes that ride have more."""
+    first = growing(line, reel) + 1
+    for k in range(reel.layer.shape[0] - 1):
+        more, _ = of_material(line, sea, ends, state, reel, first + k)
+        for j in range(3):
+            reel.riding[k, j] = more[j]
+    for k in range(reel.layer.shape[0] - 1):
+        i = node(line, reel, first + k)
+        for j in range(3):
+            line.force[i, j] += reel.riding[k, j]
+    reel.stage[RIDING_ON] = 1.0
+
+
+@inner
+def force_of_fairlead(reel, report, more):
+    """Force of the line on the fairlead, N, of the material there, and where it stands in the report."""
+    at = FORCE_B if end_of(reel) else FORCE_A
+    return (report[at] + more[0], report[at + 1] + more[1], report[at + 2] + more[2]), at
+
+
+@inner
+def pull_at(force, slope):
+    """Pull of the line at the fairlead, N: the size of its force, negative where it pushes."""
+    size = math.sqrt(dot(force, force))
+    return size if dot(force, slope) <= 0.0 else -size
+
+
+@inner
+def correct_force(line, sea, ends, state, velocity, reel, report):
+    """The report of a state: the half cell at the fairlead has the velocity and the acceleration of the material.
+
+    What the end does of power by the difference is kept in the numbers of the reel, to be taken back.  Returns the
+    pull of the line there, N.
+    """
+    numbers = reel.numbers
+    more, slope = of_material(line, sea, ends, state, reel, line.h.shape[0])
+    force, at = force_of_fairlead(reel, report, more)
+    report[at], report[at + 1], report[at + 2] = force
+    for j in range(3):
+        report[NET_A - FORCE_A + at + j] += more[j]
+    report[LENGTH_OUT], report[PAYOUT_RATE] = numbers[LENGTH], numbers[RATE]
+    report[PAYOUT_POWER] = numbers[RATE] * dot(force, slope)
+    numbers[FLUX] = dot(more, get3(velocity, end_of(reel)))
+    for i in range(growing(line, reel) + 1, line.h.shape[0]):
+        more, _ = of_material(line, sea, ends, state, reel, i)
+        numbers[FLUX] += dot(more, get3(state.v, node(line, reel, i)))
+    return pull_at(force, slope)
+
+
+# --- energy ---------------------------------------------------------------------------------------
+
+
+@inner
+def strain_before(line, state, i, k):
+    """Strain of the element at node i, from what has no stress, squared and weighed with the stiffness k."""
+    da, _, _ = chord(get3(state.e, i - 1))
+    db, _, _ = chord(get3(state.e, i))
+    turn = log_rotation(relative_rotation(frame(get3(state.a1, i - 1), da), frame(get3(state.a1, i), db)))
+    x = sub(turn, get3(line.k0, i))
+    return k[0] * x[0] * x[0] + k[1] * x[1] * x[1] + k[2] * x[2] * x[2]
+
+
+@inner
+def remember(line, reel):
+    """Lengths, and mass, weight and stiffness of the nodes that change, for the next step."""
+    n, before = line.h.shape[0], reel.before
+    for c in range(n):
+        before[c, 0] = line.h[c]
+    for j in range(growing(line, reel), n + 1):
+        i = node(line, reel, j)
+        before[i, 1], before[i, 2] = line.mass[i], line.force[i, 2]
+        for k in range(3):
+            before[i, 3 + k] = line.kb[i, k]
+    reel.numbers[FLUX_BEFORE] = reel.numbers[FLUX]
+
+
+@inner
+def changes_length(line, reel, c):
+    """Whether the length of cell c of the line changes because line is paid out, and not because zones move."""
+    k = cell(line, reel, c)  # and back
+    return k >= growing(line, reel) or reel.since[k] > -np.inf
+
+
+@inner
+def leave_to_reel(line, zones, reel):
+    """Zones that move book nothing of lengths and stiffness that change because line is paid out."""
+    for c in range(zones.lengths.shape[0]):
+        if changes_length(line, reel, c):
+            zones.lengths[c] = line.h[c]
+    for j in range(growing(line, reel), zones.stiff.shape[0]):
+        i = node(line, reel, j)
+        for k in range(3):
+            zones.stiff[i, k] = line.kb[i, k]
+
+
+@inner
+def stretch_work(line, state, c):
+    """Energy per length, N, that a cell takes up when its unstretched length grows and its ends stay."""
+    strain, energy = strain_and_energy(line, state, c)
+    return state.T[c] * (1.0 + strain) - energy
+
+
+@inner
+def book(line, old, new, reel, dt):
+    """Energy, J, that came in with material through an accepted step of dt, and with lengths that were not true."""
+    n, before, numbers = line.h.shape[0], reel.before, reel.numbers
+    booked = 0.5 * dt * (numbers[FLUX] + numbers[FLUX_BEFORE])
+    for c in range(n):
+        more = line.h[c] - before[c, 0]
+        if more != 0.0 and changes_length(line, reel, c):
+            booked -= 0.5 * more * (stretch_work(line, old, c) + stretch_work(line, new, c))
+    for j in range(growing(line, reel), n + 1):
+        i = node(line, reel, j)
+        va, vb = get3(old.v, i), get3(new.v, i)
+        booked += 0.25 * (line.mass[i] - before[i, 1]) * (dot(va, va) + dot(vb, vb))
+        booked -= 0.5 * (line.force[i, 2] - before[i, 2]) * (old.r[i, 2] + new.r[i, 2])
+        if j < n and line.element[i]:
+            more = (line.kb[i, 0] - before[i, 3], line.kb[i, 1] - before[i, 4], line.kb[i, 2] - before[i, 5])
+            if more[0] != 0.0 or more[1] != 0.0 or more[2] != 0.0:
+                booked += 0.25 * (strain_before(line, old, i, more) + strain_before(line, new, i, more))
+    return booked
+
+
+@inner
+def work_of_balance(old, new, reel, t, dt):
+    """Work, J, through an accepted step of dt of the forces that balanced the neighbours of the last new node."""
+    part, done = 0.5 * (eased(reel, t - dt) + eased(reel, t)), 0.0
+    if part > 0.0:
+        for i in range(reel.balance.shape[0]):
+            done += dot(get3(reel.balance, i), sub(get3(new.r, i), get3(old.r, i)))
+    return part * done
+
+
+# --- entries --------------------------------------------------------------------------------------
+
+
+@inner
+def note_pull(reel, t, pull):
+    """What the pull is when the brake of a winch opens: the last one before."""
+    if t <= reel.winch[BEGIN]:
+        reel.winch[HELD] = pull
+
+
+@kernel
+def pay_out(table):
+    """What a run whose line changes its length does before a try, after it, after a step; 1: Python must look at it."""
+    job = read(table)
+    line, reel, clock, count = job.line, job.reel, job.clock, job.counts
+    phase, numbers, winch = count[b.PHASE], reel.numbers, reel.winch
+    if phase == b.SOLVE:
+        find_length(reel, clock[b.TRY_END])
+        if winch[TENSION] > 0.0:
+            dt = clock[b.TRY_END] - clock[b.NOW]
+            numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = predict(
+                winch, clock[b.RHO], clock[b.STEP_BEFORE], clock[b.RHO_BEFORE], dt
+            )
+        prepare(line, reel, clock[b.TRY_END])
+        put_balance_on(line, reel, clock[b.TRY_END])
+        return 0
+    if phase == b.JUDGE:
+        tried = job.old if count[b.PARITY] else job.new
+        take_riding_off(line, reel)
+        take_balance_off(line, reel)
+        pull = correct_force(line, job.sea, job.ends, tried, job.velocity, reel, job.report)
+        note_pull(reel, clock[b.TRY_END], pull)
+        leave_to_reel(line, job.zones, reel)
+        return 0
+    # a step is accepted, and the states have changed places
+    state, before = job.old, job.new
+    if count[b.PARITY]:
+        state, before = before, state
+    if winch[TENSION] > 0.0:
+        accept(winch, numbers[LENGTH], numbers[RATE], numbers[ACCELERATION])
+    job.work[0, end_of(reel)] += book(line, before, state, reel, clock[b.LAST_DT])
+    job.work[0, b.ZONES] += work_of_balance(before, state, reel, clock[b.NOW], clock[b.LAST_DT])
+    remember(line, reel)
+    last = reel.true[growing(line, reel)]
+    numbers[DUE] = 1.0 if last > numbers[LONGEST] or last < numbers[SHORTEST] else 0.0
+    return 1 if numbers[DUE] > 0.0 or at_its_end(winch) else 0
+
+
+@kernel
+def iterate(table):
+    """What an iteration of Newton's method does before it assembles its equations, and after it has eliminated them.
+
+    Nodes that ride with the fairlead have the inertia, the drag and the added mass of the material that they pass; a
+    winch that holds a tension corrects the length, and the equations with it.
+    """
+    job = read(table)
+    line, reel, clock = job.line, job.reel, job.clock
+    numbers, winch, t = reel.numbers, reel.winch, clock[b.TRY_END]
+    if reel.stage[RIDING_ON] == 0.0:
+        put_riding_on(line, job.sea, job.ends, job.old if job.counts[b.PARITY] else job.new, reel)
+        return 0
+    take_riding_off(line, reel)
+    if t <= winch[BEGIN] or not winch[TENSION] > 0.0:
+        return 0
+    state, at, n, g = (
+        job.old if job.counts[b.PARITY] else job.new,
+        last_change(line),
+        line.h.shape[0],
+        growing(line, reel),
+    )
+    apart = end_of(reel) == 0 or g < n - 1  # the cell that grows is not the last one of the line
+    more, slope = of_material(line, job.sea, job.ends, state, reel, n)
+    force, _ = force_of_fairlead(reel, job.report, more)
+    if apart:
+        answer, more_pull = answer_of_cell(
+            line, state, job.X, job.W, reel.columns, cell(line, reel, g), n if end_of(reel) else 1
+        )
+    else:
+        answer, more_pull = softness(line, state, job.X), job.X[at]
+    pull = pull_at(force, slope) + more_pull
+    lost, steep = losses(winch, numbers[RATE])
+    left = winch[INERTIA] * numbers[ACCELERATION] + lost + tension_held(winch, t) - pull
+    carried = 0.0  # with the fairlead and the nodes that ride with it
+    for j in range(g + 1, n + 1):
+        carried += line.mass[node(line, reel, j)] * math.sqrt(dot(slope, slope))
+    stiff = (winch[INERTIA] + carried) * winch[CA] + steep * winch[CV] - answer
+    change = -left / stiff
+    numbers[LENGTH] += change
+    numbers[RATE] += winch[CV] * change
+    numbers[ACCELERATION] += winch[CA] * change
+    prepare(line, reel, t)
+    put_balance_on(line, reel, t)
+    if apart:
+        lengthen_cell(line, job.X, change, reel.columns)
+    else:
+        job.X[at] += answer * change
+    return 0
+
+
+@kernel
+def fit_line(table):
+    """The line with the length that its reel has, at clock[NOW]."""
+    job = read(table)
+    prepare(job.line, job.reel, job.clock[b.NOW])
+
+
+@kernel
+def lengthen(table):
+    """The line as it is at clock[NOW], without a look at its state."""
+    job = read(table)
+    find_length(job.reel, job.clock[b.NOW])
+    prepare(job.line, job.reel, job.clock[b.NOW])
+    remember(job.line, job.reel)
+    leave_to_reel(job.line, job.zones, job.reel)
+
+
+@kernel
+def stand_still(table):
+    """The same for a state that no step has led to: the line at clock[NOW], and the force of its fairlead."""
+    job = read(table)
+    find_length(job.reel, job.clock[b.NOW])
+    prepare(job.line, job.reel, job.clock[b.NOW])
+    state = job.new if job.counts[b.PARITY] else job.old
+    pull = correct_force(job.line, job.sea, job.ends, state, job.velocity, job.reel, job.report)
+    note_pull(job.reel, job.clock[b.NOW], pull)
+    remember(job.line, job.reel)
+    if job.reel.stage[UNBALANCED] > 0.0:
+        put_riding_on(job.line, job.sea, job.ends, state, job.reel)
+        find_balance(job.line, job.sea, job.ends, state, job.reel)
+        take_riding_off(job.line, job.reel)
+        job.reel.stage[UNBALANCED] = 0.0

@@ -1,0 +1,405 @@
+"""A node that enters a line at its fairlead, or leaves it: the state on the new nodes, and what the new cells lack.
+
+The material has a velocity and accelerations of its own at the fairlead: those of the last node less what comes from
+the flow of material through it (docs/theory.md, 19).  A new node lies on the cubic through the last four.
+Places, nodes and cells count from the far end towards the fairlead; a chord and a spin of a line whose fairlead is its
+start change their sign so.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
+from hybrid.kernels.laws.axial_law import strain_and_energy
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.references import reader
+from hybrid.kernels.reel.paid_length import cell, length_at, made_between, node
+from hybrid.kernels.reel.payout import slope_at, velocity_at
+from hybrid.kernels.reel.reel import (
+    CHANGED,
+    EASING,
+    ENTERS,
+    FAR,
+    LEAVES,
+    LONGEST,
+    PLACE,
+    SHORTEST,
+    SIDE,
+    UNBALANCED,
+    Reel,
+    blank_reel,
+)
+from hybrid.kernels.reel.winch import ALGORITHMIC_NOW, RATE_NOW, TENSION, TRUE_NOW
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.state import Floats, Line, State, blank_line, blank_state
+from hybrid.kernels.step.generalized_alpha import lead
+
+# Steps over which new cells get their true lengths, at most and at least.
+MOST_STEPS, FEWEST_STEPS = 40, 8
+
+
+class CarryJob(NamedTuple):
+    """A state on N cells, and room for it on one more or one less.
+
+    The new reel has its places already (`place_reel`), the new line its compliances.
+    """
+
+    line: Line
+    target: Line
+    state: State
+    out: State  # written
+    reel: Reel
+    new: Reel  # what its cells lack is written
+    clock: Floats  # of the run
+    tension: Floats  # (2, N) N, before the last step
+    nodes: Floats  # (M,) m, places of all material nodes that there may be
+
+
+def blank_carry_job() -> CarryJob:
+    """A job with the types that every one has."""
+    line, state, reel, z = blank_line(1), blank_state(1), blank_reel(1), np.zeros
+    return CarryJob(line, line, state, state, reel, reel, z(b.CLOCK_SIZE), z((2, 1)), z(2))
+
+
+read = reader(blank_carry_job())
+
+
+class Flow(NamedTuple):
+    """How material flows through the fairlead: c, its rate; both when the algorithmic acceleration stands for."""
+
+    rate: float  # m/s
+    acceleration: float  # m/s2
+    later_rate: float
+    later_acceleration: float
+
+
+# --- places ---------------------------------------------------------------------------------------
+
+
+@inner
+def place_reel(reel, nodes, count):
+    """What a reel knows of a line of so many material nodes; none of its cells lacks anything."""
+    numbers, before, place, next_ = reel.numbers, nodes[count - 2], nodes[count - 1], nodes[count]
+    numbers[PLACE] = place
+    numbers[LONGEST] = next_ - place + ENTERS * (nodes[count + 1] - next_)
+    numbers[SHORTEST] = LEAVES * (next_ - place)
+    made_between(reel.pieces, before, place, reel.rest, 0)
+    reel.rest_length[0] = place - before
+    for c in range(reel.true.shape[0]):
+        reel.lack[c], reel.rate[c], reel.since[c], reel.span[c] = 0.0, 0.0, -np.inf, 1.0
+    for c in range(count - 1):
+        reel.true[c] = nodes[c + 1] - nodes[c]
+    rides = reel.layer.shape[0] - 1
+    for k in range(rides):
+        reel.true[count + k] = reel.layer[k] - reel.layer[k + 1]
+
+
+@kernel
+def put_places(reel, nodes, count):
+    """`place_reel`."""
+    place_reel(reel, nodes, count)
+
+
+# --- the state ------------------------------------------------------------------------------------
+
+
+@kernel
+def move_row(old, new, forward, cut, step):
+    """Values of cells or nodes counted from the far end: up to `cut` they stay, the others move by `step`."""
+    n, m = old.shape[0], new.shape[0]
+    for k in range(m):
+        j = k if k < cut else max(k - step, 0)
+        if forward:
+            new[k] = old[j]
+        else:
+            new[m - 1 - k] = old[n - 1 - j]
+
+
+@kernel
+def move_rows(old, new, forward, cut, step):
+    """The same of rows."""
+    n, m = old.shape[0], new.shape[0]
+    for k in range(m):
+        j = k if k < cut else max(k - step, 0)
+        to, of = (k, j) if forward else (m - 1 - k, n - 1 - j)
+        for i in range(old.shape[1]):
+            new[to, i] = old[of, i]
+
+
+@inner
+def move_state(state, out, forward, cut, step):
+    """Nodes and cells that stay; those that are new have the values of their neighbours."""
+    move_rows(state.r, out.r, forward, cut, step)
+    move_rows(state.v, out.v, forward, cut, step)
+    move_rows(state.a, out.a, forward, cut, step)
+    move_rows(state.vd, out.vd, forward, cut, step)
+    move_rows(state.slip, out.slip, forward, cut, step)
+    move_rows(state.bed, out.bed, forward, cut, step)
+    move_rows(state.e, out.e, forward, cut, step)
+    move_rows(state.a1, out.a1, forward, cut, step)
+    move_row(state.T, out.T, forward, cut, step)
+    move_row(state.w, out.w, forward, cut, step)
+    move_row(state.wa, out.wa, forward, cut, step)
+    move_row(state.wd, out.wd, forward, cut, step)
+    if state.slow.shape[0] > 0:
+        move_row(state.slow, out.slow, forward, cut, step)
+    for k in range(state.turn.shape[0]):
+        for j in range(3):
+            out.turn[k, j] = state.turn[k, j]
+
+
+@inner
+def put(x, i, value):
+    x[i, 0], x[i, 1], x[i, 2] = value
+
+
+@inner
+def chord_at(line, state, reel, c):
+    """Chord of a cell, towards the fairlead."""
+    return scale(reel.numbers[SIDE], get3(state.e, cell(line, reel, c)))
+
+
+@inner
+def put_chord(line, state, reel, c, e):
+    put(state.e, cell(line, reel, c), scale(reel.numbers[SIDE], e))
+
+
+@inner
+def place_of(line, reel, i):
+    """Place, m, of a node."""
+    return reel.numbers[SIDE] * (line.s[node(line, reel, i)] - reel.numbers[FAR])
+
+
+@inner
+def flow_at(reel, clock):
+    """How material flows through the fairlead after an accepted step."""
+    t, winch = clock[b.NOW], reel.winch
+    ahead = lead(clock[b.LAST_RHO]) * clock[b.LAST_DT]
+    if winch[TENSION] > 0.0:
+        rate, acceleration = winch[RATE_NOW], winch[TRUE_NOW]
+        return Flow(rate, acceleration, rate + ahead * acceleration, winch[ALGORITHMIC_NOW])
+    _, rate, acceleration = length_at(reel.law, t)
+    _, later, then = length_at(reel.law, t + ahead)
+    return Flow(rate, acceleration, later, then)
+
+
+@inner
+def material_at(line, state, reel, flow, g):
+    """Velocity, algorithmic and true acceleration of the material at the first node behind the cell that grows."""
+    i, j = g + 1, min(g + 1, line.h.shape[0] - 1)
+    ha, hb = line.h[cell(line, reel, j - 1)], line.h[cell(line, reel, j)]
+    slope, bend = slope_at(line, state, reel, i)
+    v = velocity_at(line, state, reel, i, flow.rate, g)
+    first, middle = velocity_at(line, state, reel, j - 1, flow.rate, g), velocity_at(line, state, reel, j, flow.rate, g)
+    last = velocity_at(line, state, reel, j + 1, flow.rate, g)
+    va, vb = scale(1.0 / ha, sub(middle, first)), scale(1.0 / hb, sub(last, middle))
+    part = ha / (ha + hb) if i == j else 1.0 + hb / (ha + hb)
+    turns = add(va, scale(part, sub(vb, va)))
+    k, c, q = node(line, reel, i), flow.later_rate, flow.later_acceleration
+    then = add(scale(2.0 * c, turns), add(scale(c * c, bend), scale(q, slope)))
+    c, q = flow.rate, flow.acceleration
+    now = add(scale(2.0 * c, turns), add(scale(c * c, bend), scale(q, slope)))
+    return v, sub(get3(state.a, k), then), sub(get3(state.vd, k), now)
+
+
+@inner
+def lack_rate(reel, t, c):
+    """Rate, m/s, at which what cell c lacks changes."""
+    x = min(max((t - reel.since[c]) / reel.span[c], 0.0), 1.0)
+    slope = -reel.lack[c] / reel.span[c] * 30.0 * x * x * (1.0 - x) ** 2
+    return slope + reel.rate[c] * (1.0 - x) ** 2 * (1.0 + 2.0 * x - 15.0 * x * x)
+
+
+@inner
+def strain_of(line, state, c):
+    """Strain of cell c (of the line) under its tension."""
+    strain, _ = strain_and_energy(line, state, c)
+    return strain
+
+
+@inner
+def tension_rate(state, clock, tension, c):
+    """Rate, N/s, of the tension of cell c (of the line) over the last step."""
+    dt = clock[b.LAST_DT]
+    return (state.T[c] - tension[0, c]) / dt if dt > 0.0 else 0.0
+
+
+@inner
+def mismatch(job, flow, g, c):
+    """By how much, m/s, the rate of the chord of cell c misses that of its length."""
+    line, state, reel, clock = job.line, job.state, job.reel, job.clock
+    k, e = cell(line, reel, c), chord_at(line, state, reel, c)
+    ends = sub(get3(state.v, node(line, reel, c + 1)), get3(state.v, node(line, reel, c)))
+    along = dot(e, ends) / math.sqrt(dot(e, e))
+    grows = (flow.rate if c == g else 0.0) - lack_rate(reel, clock[b.NOW], c)
+    rises = tension_rate(state, clock, job.tension, k)
+    return along - grows * (1.0 + strain_of(line, state, k)) - line.h[k] * line.ck[k] * rises
+
+
+@inner
+def carried(a, e, to):
+    """A first director carried from one chord to another by the smallest rotation."""
+    d, f = scale(1.0 / math.sqrt(dot(e, e)), e), scale(1.0 / math.sqrt(dot(to, to)), to)
+    out = sub(a, scale(dot(a, f) / (1.0 + dot(d, f)), add(d, f)))
+    size = math.sqrt(dot(out, out))
+    return scale(1.0 / size, out) if size > 0.0 else out
+
+
+@inner
+def twist_rate(line, state, reel, i):
+    """Rate, rad/m along s, at which the frames of the two cells at a node turn about the line; 0: nothing bears torque there."""
+    k = node(line, reel, i)
+    if not 0 < k < line.h.shape[0] or not line.element[k] or not line.kb[k, 2] > 0.0 or line.bits & PLANAR:
+        return 0.0
+    e = get3(state.e, k)
+    a, b = carried(get3(state.a1, k - 1), get3(state.e, k - 1), e), get3(state.a1, k)
+    angle = math.atan2(dot(cross(a, b), e) / math.sqrt(dot(e, e)), dot(a, b))
+    return 2.0 * angle / (line.h[k - 1] + line.h[k])
+
+
+@inner
+def put_director(job, c, a, e, turn):
+    """The first director of a new cell: `a`, of a cell with the chord e, carried there and turned by `turn`, rad.
+
+    Cells of a twisted line differ by what the twist is between their middles.  Without this the torque at a new node is
+    zero, and that beside it half as much again, until twist waves have levelled it.
+    """
+    to = chord_at(job.target, job.out, job.new, c)
+    a, side = carried(a, e, to), job.new.numbers[SIDE] / math.sqrt(dot(to, to))
+    if turn != 0.0:
+        a = add(scale(math.cos(turn), a), scale(math.sin(turn) * side, cross(to, a)))
+    put(job.out.a1, cell(job.target, job.new, c), a)
+
+
+@inner
+def let_lack(job, flow, c, true, grows, rises, kept, span):
+    """Cell c of the new line lacks what its law of length misses, and gets it in `span`, s.
+
+    true: m, its length; grows: m/s, its rate; rises: N/s; kept: m/s, mismatch that it keeps.
+    """
+    target, out, new = job.target, job.out, job.new
+    k, e = cell(target, new, c), chord_at(target, out, new, c)
+    ends = sub(get3(out.v, node(target, new, c + 1)), get3(out.v, node(target, new, c)))
+    l, strain = math.sqrt(dot(e, e)), strain_of(target, out, k)
+    new.lack[c] = true - l / (1.0 + strain)
+    new.rate[c] = grows - (dot(e, ends) / l - kept - true * target.ck[k] * rises) / (1.0 + strain)
+    new.since[c], new.span[c] = job.clock[b.NOW], span
+
+
+@inner
+def span_of(job, flow, g):
+    """Time, s, over which a new cell gets its length."""
+    dt, h = job.clock[b.LAST_DT], job.nodes[g + 1] - job.nodes[g]
+    return max(min(MOST_STEPS * dt, 0.5 * h / max(abs(flow.rate), 1e-12)), FEWEST_STEPS * dt, 1e-9)
+
+
+@inner
+def enter(job, flow, g):
+    """One more node, in the cell that grows."""
+    line, target, state, out, reel, new = job.line, job.target, job.state, job.out, job.reel, job.new
+    place, i, first = job.nodes[g + 1], g + 1, max(g - 2, 0)
+    v, a, vd = material_at(line, state, reel, flow, g)
+    e_old = chord_at(line, state, reel, g)
+    chord, rate, algorithmic, true = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    back = (0.0, 0.0, 0.0)  # from node g to the one before the present one
+    for k in range(i, first - 1, -1):
+        w = 1.0  # Lagrange's weight
+        for j in range(first, i + 1):
+            if j != k:
+                w *= (place - place_of(line, reel, j)) / (place_of(line, reel, k) - place_of(line, reel, j))
+        if k == i:
+            chord, rate, algorithmic, true = scale(w, e_old), scale(w, v), scale(w, a), scale(w, vd)
+            continue
+        if k < g:
+            back = sub(back, chord_at(line, state, reel, k))
+        at = node(line, reel, k)
+        chord = add(chord, scale(w, back))
+        rate, algorithmic = add(rate, scale(w, get3(state.v, at))), add(algorithmic, scale(w, get3(state.a, at)))
+        true = add(true, scale(w, get3(state.vd, at)))
+    put_chord(target, out, new, g, chord)
+    put_chord(target, out, new, i, sub(e_old, chord))
+    at, before, behind = node(target, new, i), node(line, reel, g), node(line, reel, i)
+    put(out.r, at, add(get3(state.r, before), chord))
+    put(out.v, at, rate)
+    put(out.a, at, algorithmic)
+    put(out.vd, at, true)
+    h = place_of(line, reel, i) - place_of(line, reel, g)
+    part = (place - place_of(line, reel, g)) / h
+    put(out.slip, at, add(scale(1.0 - part, get3(state.slip, before)), scale(part, get3(state.slip, behind))))
+    cut, last = cell(line, reel, g), cell(line, reel, g - 1)
+    slope = (state.T[cut] - state.T[last]) / (0.5 * (line.h[last] + h))
+    kept, rises = mismatch(job, flow, g, g), tension_rate(state, job.clock, job.tension, cut)
+    twist, side = twist_rate(line, state, reel, g), reel.numbers[SIDE]
+    ahead = twist_rate(line, state, reel, i)
+    if ahead == 0.0:
+        ahead = twist
+    elif twist == 0.0:
+        twist = ahead
+    for c in range(g):
+        new.lack[c], new.rate[c], new.since[c], new.span[c] = reel.lack[c], reel.rate[c], reel.since[c], reel.span[c]
+    for c in range(g, g + 2):
+        length = place - place_of(line, reel, g) if c == g else place_of(line, reel, i) - place
+        middle = 0.5 * (length - h) if c == g else 0.5 * (h - length)
+        k = cell(target, new, c)
+        out.T[k] = state.T[cut] + slope * middle
+        # the twist is linear between the nodes: that between the two middles
+        rate = 0.5 * (twist + ahead) + 0.5 * (ahead - twist) * middle / h
+        put_director(job, c, get3(state.a1, cut), e_old, side * rate * middle)
+        if state.slow.shape[0] > 0:
+            out.slow[k] = state.slow[cut] + slope * middle
+        grows = flow.rate if c == i else 0.0
+        let_lack(job, flow, c, length, grows, rises, kept * length / h, span_of(job, flow, g))
+
+
+@inner
+def leave(job, flow, g):
+    """One node less: the cell that grows and the one before it become one."""
+    line, target, state, out, reel, new = job.line, job.target, job.state, job.out, job.reel, job.new
+    c = g - 1
+    last, cut, k = cell(line, reel, c), cell(line, reel, g), cell(target, new, c)
+    ha, hb = line.h[last], line.h[cut]
+    a, z = ha / (ha + hb), hb / (ha + hb)
+    e = chord_at(line, state, reel, c)
+    both = add(e, chord_at(line, state, reel, g))
+    put_chord(target, out, new, c, both)
+    out.T[k] = a * state.T[last] + z * state.T[cut]
+    out.w[k], out.wa[k] = a * state.w[last] + z * state.w[cut], a * state.wa[last] + z * state.wa[cut]
+    out.wd[k] = a * state.wd[last] + z * state.wd[cut]
+    if state.slow.shape[0] > 0:
+        out.slow[k] = a * state.slow[last] + z * state.slow[cut]
+    put_director(job, c, get3(state.a1, last), e, 0.5 * reel.numbers[SIDE] * twist_rate(line, state, reel, g) * hb)
+    kept = mismatch(job, flow, g, c) + mismatch(job, flow, g, g)
+    rises = a * tension_rate(state, job.clock, job.tension, last) + z * tension_rate(state, job.clock, job.tension, cut)
+    for j in range(c):
+        new.lack[j], new.rate[j], new.since[j], new.span[j] = reel.lack[j], reel.rate[j], reel.since[j], reel.span[j]
+    true = place_of(line, reel, g + 1) - place_of(line, reel, c)
+    let_lack(job, flow, c, true, flow.rate, rises, kept, span_of(job, flow, g))
+
+
+@inner
+def carry(job):
+    """The state on the new nodes, and what new cells lack."""
+    line, reel, new = job.line, job.reel, job.new
+    n, m = line.h.shape[0], job.target.h.shape[0]
+    g, flow, step = n - reel.layer.shape[0], flow_at(reel, job.clock), m - n
+    move_state(job.state, job.out, reel.numbers[SIDE] > 0.0, g + 1 if step > 0 else g, step)
+    if step > 0:
+        enter(job, flow, g)
+    else:
+        leave(job, flow, g)
+    plain = (
+        line.torsion.shape[0] == 0 and line.tension_twist.shape[0] == 0
+    )  # no force that payout_balance does not know
+    new.stage[UNBALANCED] = 1.0 if plain else 0.0
+    new.numbers[CHANGED], new.numbers[EASING] = job.clock[b.NOW] if plain else -np.inf, span_of(job, flow, g)
+
+
+@kernel
+def carry_node(table):
+    """`carry`."""
+    carry(read(table))

@@ -1,0 +1,127 @@
+"""What a line that is paid out knows beside its arrays: its reel, and the table of the kernels that change its length.
+
+symbol  meaning                                                    unit
+L       unstretched length that is out                             m
+c       its rate, positive where line is paid out                  m/s
+p       place of the last material node                            m
+
+Places, nodes and cells count here from the far end towards the fairlead, whichever end of the line that is.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.machine.references import reader
+from hybrid.kernels.mesh.fill_line import COLUMNS
+from hybrid.kernels.reel.winch import WINCH
+from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE, WORKS
+from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
+
+# Parts of a cell: a node enters when that much of the cell after it is out, and leaves when only that much is left.
+ENTERS, LEAVES = 0.85, 0.35
+# Numbers of a reel.
+(
+    LENGTH, RATE, ACCELERATION,  # L, c and the rate of c at the end of the try
+    PLACE,  # p
+    LONGEST, SHORTEST,  # m, the last cell: beyond the first a node enters, below the second one leaves
+    SPARE,  # in checkpoints of earlier versions
+    DUE,  # 1 when a node is to enter or to leave
+    FLUX,  # W, into the line by what the corrected force of the fairlead does not do
+    FLUX_BEFORE,  # and before the last step
+    SIDE,  # 1 where the fairlead is the end of the line, -1 where it is the start
+    FAR,  # m, arc length of the far end
+    SPRING,  # N m/rad, of an angular spring between the fairlead and a clamped line; infinite: rigid
+    CHANGED, EASING,  # s, when the last node entered or left; over which forces that balance its neighbours end
+) = range(15)  # fmt: skip
+NUMBERS = 15
+# Parts of `Reel.stage`.
+RIDING_ON, BALANCE_ON, UNBALANCED = range(3)
+
+
+class Reel(NamedTuple):
+    """What a line that is paid out knows beside its arrays; N cells."""
+
+    numbers: Floats  # (NUMBERS,)
+    law: Floats  # (K, 8) s, from which on a row holds; coefficients of L in the time since then, highest power first
+    pieces: Floats  # (P, 1 + COLUMNS) m, where a piece of the material begins; its row (kernels.mesh.fill_line)
+    rest: Floats  # (1, COLUMNS) of the cell before the last material node
+    rest_length: Floats  # (1,) m, its length
+    true: Floats  # (N,) m, lengths of cells
+    lack: Floats  # (N,) m, that cells lacked when they were made
+    rate: Floats  # (N,) m/s, its rate then
+    since: Floats  # (N,) s, when that was
+    span: Floats  # (N,) s, over which they get it
+    before: Floats  # (N+1, 6) before the last step, of cells or nodes: length; mass, weight, stiffness of the element
+    report: Floats  # (REPORT_SIZE,) this and the next: work arrays
+    made: Floats  # (2, COLUMNS)
+    layer: Floats  # (m+1,) m, how far before the fairlead the nodes that ride with it are; that is the last, 0
+    riding: Floats  # (m+1, 3) N, by which the forces on them are more because they do not move as the material does
+    stage: Floats  # (3,) 1 while these, or `balance`, are among the forces on the line; while `balance` is to be found
+    balance: Floats  # (N+1, 3) N, forces on nodes, in the order of the line, that balanced them at CHANGED
+    plain: Floats  # (N+1, 3) N, the forces on the line without them
+    winch: Floats  # (WINCH,) of a winch that holds a tension (kernels.reel.winch)
+    columns: Floats  # (3, N+1, 5) that such a winch at the start, or at a clamp, works in; else empty
+
+
+def blank_reel(
+    cells: int, law: Floats | None = None, pieces: Floats | None = None, winch: Floats | None = None,
+    layer: Floats | None = None, columns: bool = False,
+) -> Reel:  # fmt: skip
+    """A reel of a line of so many cells; columns: whether such a winch needs another right-hand side."""
+    z = np.zeros
+    numbers = z(NUMBERS)
+    numbers[CHANGED] = -np.inf
+    return Reel(
+        numbers, z((1, 8)) if law is None else law, z((1, 1 + COLUMNS)) if pieces is None else pieces,
+        z((1, COLUMNS)), z(1), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 1, 6)),
+        z(REPORT_SIZE), z((2, COLUMNS)), z(1) if layer is None else layer,
+        z((1 if layer is None else layer.size, 3)), z(3), z((cells + 1, 3)), z((cells + 1, 3)), z(WINCH) if winch is None else winch,
+        z((3, cells + 1, 5) if columns else (3, 0, 5)),
+    )  # fmt: skip
+
+
+class MovingZones(NamedTuple):
+    """Of zones that move (kernels.mesh.zone_step.Zones), what they take the work of lengths and stiffness from."""
+
+    lengths: Floats  # (N,) m, at the end of the last step; none where zones stay
+    stiff: Floats  # (N+1, 3) N m
+
+
+def zones_that_stay() -> MovingZones:
+    return MovingZones(np.zeros(0), np.zeros((0, 3)))
+
+
+class ReelJob(NamedTuple):
+    """Arguments of the entries: two states in turn as kernels.run.run has them, and its clock, counts, work and report."""
+
+    line: Line
+    sea: Sea
+    ends: Ends
+    old: State
+    new: State
+    clock: Floats
+    counts: NDArray[np.int64]
+    work: Floats  # (2, WORKS)
+    velocity: Floats  # (2, 3) m/s, of the ends
+    report: Floats  # (REPORT_SIZE,) of the step
+    reel: Reel
+    X: Floats  # of the line's kernels.state.state.Work
+    W: Floats
+    zones: MovingZones
+
+
+def blank_reel_job() -> ReelJob:
+    """A job with the types that every one has."""
+    state, z = blank_state(1), np.zeros
+    return ReelJob(
+        blank_line(1), no_sea(1), no_ends(), state, state, z(CLOCK_SIZE), z(COUNT_SIZE, np.int64), z((2, WORKS)),
+        z((2, 3)), z(REPORT_SIZE), blank_reel(1), z(0), z(0), zones_that_stay(),
+    )  # fmt: skip
+
+
+read = reader(blank_reel_job())

@@ -1,0 +1,161 @@
+"""A winch that holds a tension: its rotor in a step of generalized-alpha, and what the line answers (docs/theory.md, 19).
+
+symbol  meaning                                                    unit
+I       inertia of the drum and its drive, as a mass at the line   kg
+B(c)    force that the drive loses at the rate c, with its limit   N
+P       pull of the line at the fairlead                           N
+
+I dc/dt + B(c) = P - T(t)
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.block_elimination import ROW, SPAN, add_to_right, solve_backward, solve_forward, substitute
+from hybrid.kernels.algebra.block_elimination_plane import (
+    COLUMNS,
+    TRIPLE,
+    add_to_right_planar,
+    solve_backward_planar,
+    solve_forward_planar,
+    substitute_planar,
+)
+from hybrid.kernels.algebra.plane import row_in_plane
+from hybrid.kernels.algebra.rotations import get3
+from hybrid.kernels.laws.axial_law import SHIFT, has_law
+from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.step.generalized_alpha import radius_of_step, scheme
+
+# Numbers of a winch.
+(
+    TENSION,  # N, that it holds; 0: there is no such winch
+    BEGIN, RAMP,  # s, when its brake opens, and over which time its tension goes there from the pull of that moment
+    INERTIA, DAMPING, MAX_RATE,  # kg, N s/m, m/s
+    HELD,  # N, the pull when the brake opens
+    LENGTH_NOW, RATE_NOW, TRUE_NOW, ALGORITHMIC_NOW,  # m, m/s, m/s2: L, c and both accelerations before the step
+    CV, CA, BE, DT,  # of the step that is tried
+    LEAST, MOST,  # m, lengths between which the winch has line
+) = range(17)  # fmt: skip
+WINCH = 17
+# Part of the largest rate over which its limit sets in, and beyond which it takes a force of `TENSION` more to go.
+CORNER = 0.01
+
+
+@inner
+def tension_held(winch, t):
+    """Tension, N, that the winch holds at t."""
+    x = min(max((t - winch[BEGIN]) / winch[RAMP], 0.0), 1.0)
+    part = x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
+    return winch[HELD] + part * (winch[TENSION] - winch[HELD])
+
+
+@inner
+def losses(winch, rate):
+    """Force B, N, that the drive loses at a rate, and its derivative: damping, and a limit that sets in smoothly."""
+    force, slope = winch[DAMPING] * rate, winch[DAMPING]
+    corner = CORNER * winch[MAX_RATE]
+    beyond = abs(rate) - winch[MAX_RATE]
+    if beyond > 0.0:
+        steep = winch[TENSION] / corner
+        more, grows = 0.5 * steep * beyond * beyond / corner, steep * beyond / corner
+        if beyond > corner:
+            more, grows = steep * (beyond - 0.5 * corner), steep
+        force += math.copysign(more, rate)
+        slope += grows
+    return force, slope
+
+
+@inner
+def predict(winch, rho, before, rho_before, dt):
+    """L, c and dc/dt at the end of a step, with the algorithmic acceleration kept (kernels.step.step.predict_nodes)."""
+    s = scheme(radius_of_step(rho, before, rho_before, dt), before, rho_before, dt)
+    winch[CV], winch[CA], winch[BE], winch[DT] = s.cv, s.ca, s.be, dt
+    c, vd, a = winch[RATE_NOW], winch[TRUE_NOW], winch[ALGORITHMIC_NOW]
+    length = winch[LENGTH_NOW] + dt * c + 0.5 * dt * dt * a
+    return length, c + dt * a, (s.am * a - s.af * vd) / (1.0 - s.af) + s.ca * s.be * dt * dt * a
+
+
+@inner
+def accept(winch, length, rate, acceleration):
+    """A step is accepted: L, c and dc/dt where it ends."""
+    dt, be, a = winch[DT], winch[BE], winch[ALGORITHMIC_NOW]
+    without = winch[LENGTH_NOW] + dt * winch[RATE_NOW] + dt * dt * (0.5 - be) * a
+    winch[ALGORITHMIC_NOW] = (length - without) / (be * dt * dt)
+    winch[LENGTH_NOW], winch[RATE_NOW], winch[TRUE_NOW] = length, rate, acceleration
+
+
+@inner
+def at_its_end(winch):
+    """Whether the winch has no more line to pay out, or none to take in."""
+    return winch[TENSION] > 0.0 and not winch[LEAST] <= winch[LENGTH_NOW] <= winch[MOST]
+
+
+@inner
+def last_change(line):
+    """Where the change of tension of the last cell stands in the equations eliminated in X."""
+    n = line.h.shape[0]
+    return n * TRIPLE + COLUMNS - 1 if line.bits & PLANAR else n * ROW + SPAN - 1
+
+
+@inner
+def softness(line, state, X):
+    """How the tension of the last cell answers to its unstretched length, N/m, in the equations eliminated in X.
+
+    The fairlead stays, so that the law of length of that cell alone has the new length; what stands before it answers
+    by the first column of the block before.
+    """
+    c, moves = line.h.shape[0] - 1, 0.0
+    if line.bits & PLANAR:
+        e = row_in_plane(line.plane, state.e, c)
+        size, p = math.sqrt(e[0] * e[0] + e[1] * e[1]), c * TRIPLE
+        moves = (e[0] * X[p + COLUMNS] + e[1] * X[p + 2 * COLUMNS]) / size
+    else:
+        d, _, _ = chord(get3(state.e, c))
+        p = c * ROW
+        moves = d[0] * X[p + SPAN] + d[1] * X[p + 2 * SPAN] + d[2] * X[p + 3 * SPAN]
+    ck = line.ck[c]
+    shift = line.law[c, SHIFT] if has_law(line, c) else 0.0
+    return (1.0 + shift + ck * state.T[c]) / (moves - line.h[c] * ck)
+
+
+@inner
+def answer_of_cell(line, state, X, W, columns, c, at):
+    """The same of any cell c, behind nodes that ride or with the fairlead at the start: how the tension before node
+
+    `at` answers to its length, N/m, and the change of that tension in the equations eliminated in X, N.  X has room for
+    the factors of another right-hand side; columns: (3, N+1, 5), of which the first keeps what `lengthen_cell` adds to
+    the right-hand sides.
+    """
+    forward, column, x = columns[0], columns[1], columns[2]
+    n = line.h.shape[0]
+    for i in range(n + 1):
+        for k in range(5):
+            x[i, k] = 0.0
+    shift = line.law[c, SHIFT] if has_law(line, c) else 0.0
+    x[c + 1, 0] = 1.0 + shift + line.ck[c] * state.T[c]
+    if line.bits & PLANAR:
+        solve_forward_planar(line.plane, X, x, forward)
+    else:
+        solve_forward(X, W, x, forward, False)
+    for i in range(n + 1):
+        for k in range(5):
+            column[i, k] = forward[i, k]
+    if line.bits & PLANAR:
+        solve_backward_planar(line.plane, X, column)
+        substitute_planar(line.plane, X, x)
+    else:
+        solve_backward(X, column)
+        substitute(X, x)
+    return column[at, 0], x[at, 0]
+
+
+@inner
+def lengthen_cell(line, X, change, columns):
+    """The equations eliminated in X with a cell that is longer by a change, m, behind `answer_of_cell`."""
+    if line.bits & PLANAR:
+        add_to_right_planar(X, change, columns[0])
+    else:
+        add_to_right(X, change, columns[0])

@@ -1,0 +1,1 @@
+"""The loops over steps, and the entries that Python calls."""

@@ -1,0 +1,141 @@
+"""What Python asks of the solver: a step, a static solve, the block rows of a configuration (kernels.run.run)."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+
+from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, WIDTH
+from hybrid.kernels.algebra.block_elimination_plane import WIDE
+from hybrid.kernels.laws.tension_torque import COUPLES
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
+from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
+from hybrid.kernels.run.run import in_plane, in_space
+from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work, blank_state, no_ends, no_torsion
+from hybrid.kernels.step.job import blank_job
+from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, OK, STEP, Limits, Task
+
+NO_PUSH: Floats = np.zeros((0, 4))
+NO_STRAINS: Floats = np.zeros((0, 3))
+ONE_MARCH = Limits(1.0, 1.0, 1)
+
+
+class _OfThread(threading.local):
+    """The table of the thread that asks; it keeps what was bound last."""
+
+    def __init__(self) -> None:
+        self.table = Table(blank_job)
+
+
+_here = _OfThread()
+
+
+def _solve(
+    task: Task, line: Line, sea: Sea, ends: Ends, old: State, new: State, was: Floats, now: Floats, work: Work
+) -> tuple[int, int, float, int]:
+    """As kernels.step.newton.solve, by the kernel for the line's kind."""
+    check_turns(line, new)
+    table = _here.table
+    table.bind(task=task, line=line, sea=sea, ends=ends, old=old, new=new, was=was, now=now, work=work)
+    found: tuple[int, int, float, int] = (in_plane if line.bits & PLANAR else in_space)(table.numbers)
+    return found
+
+
+def check_turns(line: Line, state: State) -> None:
+    """ValueError: a state does not know the turns of the zones of its line that a torque passes through."""
+    if state.turn.shape[0] != line.torsion.shape[0]:
+        raise ValueError(f"a state with {state.turn.shape[0]} turns on a line that has {line.torsion.shape[0]}")
+    if state.slow.shape[0] != line.law.shape[0]:
+        raise ValueError(f"a state with {state.slow.shape[0]} mean tensions on a line that has {line.law.shape[0]}")
+
+
+def sharpest(line: Line, ends: Ends, state: State) -> tuple[float, int, float, int]:
+    """Largest bend and twist of an element, rad, and their nodes (kernels.march.resolution_checks)."""
+    if line.bits & PLANAR:
+        return sharpest_in_plane(line, ends, state.e, state.T, state.a1, NO_STRAINS)
+    return sharpest_in_space(line, ends, state.e, state.T, state.a1, NO_STRAINS)
+
+
+def workspace_of(line: Line, keep: bool = False) -> Work:
+    """Arrays for a line, with what a torque through its catenary zones takes; keep: as of `workspace`."""
+    work = workspace(line.h.size, keep or bool(line.torsion.size))
+    if line.tension_twist.size:
+        work = work._replace(couple=np.zeros((line.s.size, COUPLES)))
+    if line.torsion.size and not line.bits & PLANAR:
+        torsion = torsion_of(line, keep)
+        work = work._replace(torsion=torsion)
+        address = pass_torque.address(line, no_ends(), blank_state(line.h.size), work, 0, 0.0)
+        work = work._replace(torsion=torsion._replace(address=address))
+    return work
+
+
+def workspace(n_cells: int, keep: bool = False) -> Work:
+    """Arrays for a line of `n_cells` cells; keep: with room for the factors that another right-hand side needs."""
+    return Work(
+        u=np.zeros((n_cells + 1, 3)),
+        x=np.zeros((n_cells + 1, SIZE)),
+        W=np.zeros(SIZE * WIDTH),
+        X=np.zeros((n_cells + 1) * (ROW + KEPT if keep else ROW)),
+        report=np.zeros(REPORT_SIZE),
+        gaps=np.zeros(0),
+        rows=np.zeros((0, SIZE * WIDTH)),
+        torsion=no_torsion(),
+        couple=np.zeros((0, COUPLES)),
+    )
+
+
+def block_rows(line: Line) -> Floats:
+    """Room for the block rows of a line, for `work.rows`."""
+    n = line.s.size
+    return np.zeros((n, 3 * WIDE if line.bits & PLANAR else SIZE * WIDTH))
+
+
+def out_of_balance(line: Line, rows: Floats) -> Floats:
+    """Force (N+1, 3) N left over at every node of which the block rows are known."""
+    if line.bits & PLANAR:
+        return np.asarray(-rows.reshape(-1, 3, WIDE)[:, 1:, -1] @ line.plane[:2])
+    return np.asarray(-rows.reshape(-1, SIZE, WIDTH)[:, 1:4, -1])
+
+
+def step(
+    line: Line, sea: Sea, ends: Ends, old: State, new: State, dt: float, before: float, rho: float, limits: Limits,
+    was: Floats, now: Floats, work: Work, rho_before: float,
+) -> tuple[int, int, float, int]:  # fmt: skip
+    """One step in time from `old` to `new` (overwritten)."""
+    task = Task(STEP, dt, before, rho, 0.0, 0.0, False, limits, False, rho_before)
+    return _solve(task, line, sea, ends, old, new, was, now, work)
+
+
+def equilibrium(
+    line: Line, sea: Sea, ends: Ends, state: State, ca: float, limits: Limits, turning: bool, work: Work
+) -> tuple[int, int, float, int]:
+    """One static solve from state.r + work.u; ca: 1/s2, of springs of that times the mass."""
+    task = Task(EQUILIBRIUM, ca=ca, turning=turning, limits=limits)
+    return _solve(task, line, sea, ends, state, state, NO_PUSH, NO_PUSH, work)
+
+
+def assembly(line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
+    """The block rows and the report of a state (kernels.march.assembly.march); -1, or a node whose block was singular."""
+    return _one_march(ASSEMBLY, line, sea, ends, state, cv, ca, work)
+
+
+def correction(line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
+    """As `assembly`, and the solution into work.x; -1, or a node whose block was singular."""
+    return _one_march(CORRECTION, line, sea, ends, state, cv, ca, work)
+
+
+def assembly_of_step(line: Line, sea: Sea, ends: Ends, old: State, new: State, cv: float, ca: float, work: Work) -> int:
+    """As `assembly`, of a step from `old` by work.u to `new`, whose friction and rates count from there."""
+    task = Task(ASSEMBLY, cv=cv, ca=ca, limits=ONE_MARCH)
+    outcome, _, _, where = _solve(task, line, sea, ends, old, new, NO_PUSH, NO_PUSH, work)
+    return -1 if outcome == OK else max(where, 0)
+
+
+def _one_march(what: int, line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
+    task = Task(what, cv=cv, ca=ca, limits=ONE_MARCH)
+    outcome, _, _, where = _solve(task, line, sea, ends, state, state, NO_PUSH, NO_PUSH, work)
+    return -1 if outcome == OK else max(where, 0)

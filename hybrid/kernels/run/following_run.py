@@ -1,0 +1,281 @@
+"""A run whose cells follow the curvature, compiled: steps and changes of cells without a return to Python.
+
+Steps and the parts of a change are kernels of their own and called by address: a kernel takes a table of addresses as
+constant (kernels.machine.references), so what writes to tables must not be one that reads them.  Tables differ with the side of
+the arrays, the parity of the state and the number of cells: each is fixed numbers plus numbers per old and new cell.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.contact.self_distance import boxes_of
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.references import caller, reader
+from hybrid.kernels.mesh.zone_step import CELLS_DUE, CLOCK_SIZE, FLAG_COUNT, LOUDEST, NEXT_REVIEW, RELAXING
+from hybrid.kernels.mesh.zone_switch import AFTER, BEFORE, NUMBERS, RELAXES, TIME
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import sample_size
+from hybrid.kernels.state.state import Floats
+from hybrid.kernels.step.newton import ASSEMBLY, RUN
+from hybrid.kernels.step.sampling import SAME_TIME
+
+Numbers = NDArray[np.int64]
+
+# Addresses in `calls`.
+(STEPS, SOLVER, LAY_OUT, CLEAR, LINE, BEGIN, KINDS, END, RENEW, BEFORE_FORCES, AFTER_FORCES, REVIEW) = range(12)
+CALLS = 12
+# Numbers of `at`.
+(
+    SIDE, CELLS,  # of the arrays that are in use, and of the line now
+    NEXT_CELLS,  # of a change that has begun
+    CHANGES,  # so far
+    TASK, SAMPLES_AT,  # where the table of the run has its task, and address and rows of its samples
+    ROOM, ROOM_SIZE,  # address of the memory for samples, and numbers in it
+    MOST_ROWS,  # of samples of one line
+    ALONE,  # 1 where cells may change without Python
+    MAY_WAIT,  # 1 where outputs may wait although the cells that they are of change
+    WAITING, PLACED, USED,  # lines whose outputs wait; places of their nodes; numbers of their samples
+    BOXES_AT,  # where the table of kernels.contact.self_distance has the rows of its tree
+) = range(15)  # fmt: skip
+AT_SIZE = 15
+# Columns of `waiting`.
+OFFSET, COUNT, OF_CELLS = range(3)
+
+
+class FollowingJob(NamedTuple):
+    """A run with all that its changes of cells need.  Tables: (..., 3, size) fixed, per old cell, per new cell."""
+
+    calls: Numbers  # (CALLS,)
+    at: Numbers  # (AT_SIZE,)
+    clock: Floats  # of the run
+    counts: Numbers
+    outputs: Floats
+    work: Floats
+    zone_clock: Floats
+    zone_counts: Numbers
+    numbers: Floats  # (NUMBERS,) of kernels.mesh.zone_switch
+    run: Numbers  # table of the run
+    run_places: Numbers  # of those of its numbers that follow the cells
+    in_run: NDArray[np.int64]  # (2 sides, 3, run_places.size)
+    zones: Numbers  # likewise of the table of zones
+    zone_places: Numbers
+    in_zones: NDArray[np.int64]
+    itself: Numbers  # of kernels.contact.self_distance.watch_itself
+    itself_places: Numbers  # empty: nobody watches
+    in_itself: NDArray[np.int64]
+    layouts: NDArray[np.int64]  # (2 sides, size), tables of kernels.mesh.cell_changes.lay_out
+    line: Numbers  # table of fill_line
+    lines: NDArray[np.int64]  # (2 new sides, 3, size)
+    kind: Numbers  # of fill_kinds
+    kinds: NDArray[np.int64]
+    switch: Numbers  # of begin_switch and end_switch
+    switches: NDArray[np.int64]  # (2 old sides x 2 parities, 3, size)
+    renewed: Numbers  # of clear_state and renew
+    renews: NDArray[np.int64]
+    review: Numbers  # table of adapt.zone_rules.quiet_review
+    here: NDArray[np.bool_]  # (K+1,) of the finest mesh: nodes now
+    waiting: NDArray[np.int64]  # (lines, 3)
+    places: Numbers  # nodes of the lines whose outputs wait
+
+
+def blank_following_job() -> FollowingJob:
+    """A job with the types that every one has."""
+    z, few, pairs, sides = np.zeros, np.zeros(1, np.int64), np.zeros((1, 3), np.int64), np.zeros((2, 3, 1), np.int64)
+    return FollowingJob(
+        z(CALLS, np.int64), z(AT_SIZE, np.int64), z(b.CLOCK_SIZE), z(b.COUNT_SIZE, np.int64), z(0), z((2, b.WORKS)),
+        z(CLOCK_SIZE), z(FLAG_COUNT, np.int64), z(NUMBERS), few, few, sides, few, few, sides, few, few, sides,
+        z((2, 1), np.int64), few, sides, few, sides, few, sides, few, sides, few, z(1, bool), pairs, few,
+    )  # fmt: skip
+
+
+read = reader(blank_following_job())
+call, call_count, call_solver = caller(None), caller(0), caller((0, 0, 0.0, 0))
+numbers_of_sample, boxes = inner(sample_size), inner(boxes_of)
+
+
+@inner
+def put(numbers, old, new, table):
+    """A table for so many old and new cells."""
+    for i in range(table.shape[0]):
+        table[i] = numbers[0, i] + old * numbers[1, i] + new * numbers[2, i]
+
+
+@inner
+def put_at(numbers, places, cells, table):
+    """Numbers of a table for so many cells, at some of its places."""
+    for i in range(places.shape[0]):
+        table[places[i]] = numbers[0, i] + cells * numbers[2, i]
+
+
+@inner
+def begin_change(job):
+    """Lay out the cells that are planned, and carry the state to them."""
+    at, counts, calls = job.at, job.counts, job.calls
+    k, n = at[SIDE], at[CELLS]
+    m = call_count(calls[LAY_OUT], job.layouts[1 - k])
+    at[NEXT_CELLS] = m
+    put(job.renews[2 * k + counts[b.PARITY]], n, m, job.renewed)
+    put(job.switches[2 * k + counts[b.PARITY]], n, m, job.switch)
+    put(job.lines[1 - k], n, m, job.line)
+    job.numbers[TIME], job.numbers[RELAXES] = job.clock[b.NOW], job.zone_counts[RELAXING]
+    call(calls[CLEAR], job.renewed)
+    call(calls[LINE], job.line)
+    call(calls[BEGIN], job.switch)
+
+
+@inner
+def put_samples(job, m):
+    """Samples of the line of now come behind those that wait."""
+    at, size = job.at, numbers_of_sample(m, True)
+    job.run[at[SAMPLES_AT]] = at[ROOM] + 8 * at[USED]
+    job.run[at[SAMPLES_AT] + 1] = min(at[MOST_ROWS], (at[ROOM_SIZE] - at[USED]) // size)
+
+
+@inner
+def put_all(job):
+    """The run goes on with the line of now."""
+    k, m = job.at[SIDE], job.at[CELLS]
+    put_at(job.in_run[k], job.run_places, m, job.run)
+    put_at(job.in_zones[k], job.zone_places, m, job.zones)
+    if job.itself_places.shape[0] > 0:
+        put_at(job.in_itself[k], job.itself_places, m, job.itself)
+        job.itself[job.at[BOXES_AT]] = boxes(m)
+    put_samples(job, m)
+
+
+@inner
+def end_change(job):
+    """Lengths, books and forces of the new cells, which the run goes on with; the energy is booked."""
+    at, calls = job.at, job.calls
+    k, n, m = at[SIDE], at[CELLS], at[NEXT_CELLS]
+    put(job.kinds[1 - k], n, m, job.kind)
+    call(calls[KINDS], job.kind)
+    call(calls[END], job.switch)
+    call(calls[RENEW], job.renewed)
+    at[SIDE], at[CELLS], at[CHANGES] = 1 - k, m, at[CHANGES] + 1
+    put_all(job)
+    call(calls[BEFORE_FORCES], job.run)
+    job.run[at[TASK]] = ASSEMBLY
+    call_solver(calls[SOLVER], job.run)
+    job.run[at[TASK]] = RUN
+    call(calls[AFTER_FORCES], job.run)
+    job.work[0, b.ZONES] += job.numbers[AFTER] - job.numbers[BEFORE]
+
+
+@inner
+def due_within(job):
+    """How many outputs lie within the last step, before its end, and have not been sampled."""
+    clock, outputs, at, count = job.clock, job.outputs, job.counts[b.OUTPUT], 0
+    last = clock[b.NOW] - SAME_TIME * clock[b.LAST_DT]
+    while at + count < outputs.shape[0] and outputs[at + count] < last:
+        count += 1
+    return count
+
+
+@inner
+def may_change(job):
+    """Whether cells may change now: no outputs of those of now are to come or wait, or there is room for them."""
+    at, some = job.at, due_within(job) + job.counts[b.SAMPLES]
+    if some == 0 or at[ALONE] == 0:
+        return at[ALONE] != 0
+    room = at[WAITING] < job.waiting.shape[0] and at[PLACED] + at[CELLS] + 1 <= job.places.shape[0]
+    # room for one sample of the finest line must be left, or the run could not go on
+    left = at[ROOM_SIZE] - at[USED] - some * numbers_of_sample(at[CELLS], True)
+    fits = some <= job.run[at[SAMPLES_AT] + 1] and left >= numbers_of_sample(job.here.shape[0] - 1, True)
+    return at[MAY_WAIT] != 0 and room and fits
+
+
+# --- entries of parts, for Python -------------------------------------------------------------------
+
+
+@kernel
+def put_cells(table):
+    """`put_all`."""
+    put_all(read(table))
+
+
+@kernel
+def begin_cells(table):
+    """`begin_change`."""
+    begin_change(read(table))
+
+
+@kernel
+def end_cells(table):
+    """`end_change`."""
+    end_change(read(table))
+
+
+@kernel
+def cells_may_change(table):
+    """`may_change`."""
+    return may_change(read(table))
+
+
+# --- outputs, steps -----------------------------------------------------------------------------------
+
+
+@inner
+def set_aside(job):
+    """The outputs that have been sampled wait, with the places of the nodes that they are of."""
+    at, row = job.at, job.waiting[job.at[WAITING]]
+    row[OFFSET], row[COUNT], row[OF_CELLS] = at[USED], job.counts[b.SAMPLES], at[CELLS]
+    for i in range(job.here.shape[0]):
+        if job.here[i]:
+            job.places[at[PLACED]] = i
+            at[PLACED] += 1
+    at[USED] += row[COUNT] * numbers_of_sample(row[OF_CELLS], True)
+    at[WAITING] += 1
+    job.counts[b.SAMPLES] = 0
+
+
+@inner
+def leave(job):
+    """Outputs of the cells of now, which are to change: those within the last step are sampled, and all wait."""
+    counts = job.counts
+    if due_within(job) > 0:
+        counts[b.INSIDE], counts[b.ASKS] = 1, b.ASK_SAMPLES
+        call_count(job.calls[STEPS], job.run)
+        counts[b.INSIDE], counts[b.ASKS] = 0, 0
+    if counts[b.SAMPLES] > 0:
+        set_aside(job)
+
+
+@kernel
+def leave_cells(table):
+    """`leave`."""
+    leave(read(table))
+
+
+@kernel
+def go_on(table, reviewed):
+    """Steps of a run and changes of its cells until Python has to decide; a code of kernels.state.books.
+
+    reviewed: the criteria have just been reviewed after a step, and its zones stay as they are.
+    """
+    job = read(table)
+    code = b.STEPPED
+    if not reviewed:
+        code = call_count(job.calls[STEPS], job.run)
+    while True:
+        if code != b.STEPPED or job.counts[b.FLAGS] != 0 or job.counts[b.ASKS] != 0:
+            return code
+        due = job.zone_counts[CELLS_DUE] != 0
+        if due and not may_change(job):
+            return code
+        if not reviewed:
+            timed = job.clock[b.NOW] >= job.zone_clock[NEXT_REVIEW]
+            if job.zone_clock[LOUDEST] > 1.0 or not (timed or due):
+                return code
+            if timed and call_count(job.calls[REVIEW], job.review) == 0:
+                return code
+        if due:
+            leave(job)
+            begin_change(job)
+            end_change(job)
+        reviewed = False
+        code = call_count(job.calls[STEPS], job.run)

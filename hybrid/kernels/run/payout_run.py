@@ -1,0 +1,435 @@
+"""A run of a line that is paid out, compiled: steps, and nodes that enter and leave, without a return to Python.
+
+Two sets of arrays with room for the longest line take turns.  Steps and the parts of a change are kernels of their own
+and called by address, as in kernels.run.following_run, whose tables these are: fixed numbers plus numbers per old and new
+cell.  Places, nodes and cells count from the far end.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.contact.self_distance import boxes_of
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.references import reader
+from hybrid.kernels.march.energies import observe
+from hybrid.kernels.mesh.cell_changes import clear, copy_state, wave_step
+from hybrid.kernels.mesh.fill_line import copy_cell, copy_node, move_line
+from hybrid.kernels.mesh.zone_transfer import carry_push
+from hybrid.kernels.reel.paid_length import cell, node, prepare
+from hybrid.kernels.reel.payout_nodes import CarryJob, blank_carry_job, move_row, place_reel
+from hybrid.kernels.reel.reel import BALANCE_ON, DUE, FAR, LONGEST, RIDING_ON, SIDE, Reel, blank_reel
+from hybrid.kernels.reel.winch import at_its_end
+from hybrid.kernels.run.following_run import call, call_count, call_solver, put, put_at
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.books import Books, blank_books, sample_size
+from hybrid.kernels.state.state import (
+    Ends,
+    Floats,
+    Line,
+    Sea,
+    State,
+    Work,
+    blank_line,
+    blank_state,
+    no_ends,
+    no_sea,
+    no_work,
+)
+from hybrid.kernels.step.newton import ASSEMBLY, RUN
+from hybrid.kernels.step.sampling import SAME_TIME
+
+Numbers = NDArray[np.int64]
+
+
+class NodeJob(NamedTuple):
+    """One node more or less: what a run has before and after it, in two sets of arrays."""
+
+    carry: CarryJob
+    whole: Line  # with all material nodes that there may be
+    ends: Ends
+    sea: Sea  # of the new cells, as all that follows
+    work: Work
+    twin: State
+    before: Books
+    books: Books
+    push: Floats  # (N+1, 4) out of the plane; empty: none
+    new_push: Floats
+    next_push: Floats
+    width: Floats  # (M,) m, diameters of the new cells; empty: nobody watches whether the line meets itself
+    nearest: NDArray[np.int64]  # (2,) the pair of its cells that was nearest
+    borne: Floats  # (P,) length over unstretched length that pieces bear, as of Reel.pieces
+    widths: Floats  # (P,) m, their diameters
+    start: Floats  # (M, 3) m, of all material nodes along the line: positions from which displacements count
+    bounds: Floats  # (4, EXTREMES, E) extremes at all nodes, along the line, those that are marked twice
+    moment: Floats  # (M+1, 3) this and the next: work arrays
+    strain: Floats
+    energy: Floats  # (5,)
+    scale: float  # N, tension scale
+
+
+def blank_node_job() -> NodeJob:
+    """A job with the types that every one has."""
+    z, books, none = np.zeros, blank_books(), np.zeros((0, 4))
+    return NodeJob(
+        blank_carry_job(), blank_line(1), no_ends(), no_sea(1), no_work(), blank_state(1), books, books, none, none,
+        none, z(0), z(2, np.int64), z(1), z(1), z((2, 3)), z((4, b.EXTREMES, 2)), z((2, 3)), z((2, 3)), z(5), 1.0,
+    )  # fmt: skip
+
+
+read_node = reader(blank_node_job())
+
+
+# --- one change -----------------------------------------------------------------------------------
+
+
+@inner
+def complete(whole, line, reel, k):
+    """Node and cell k have all their material."""
+    copy_node(whole, node(whole, reel, k), line, node(line, reel, k))
+    copy_cell(whole, cell(whole, reel, k), line, cell(line, reel, k))
+
+
+@inner
+def line_as(line, whole, out, reel):
+    """The same line in another number of cells, its length still to be given to it."""
+    n, m, rides = line.h.shape[0], out.h.shape[0], reel.layer.shape[0]
+    g, grows = n - rides, m - rides
+    move_line(line, out, reel.numbers[SIDE] > 0.0, min(g, grows) + 1, m - n)
+    for k in range(g, grows):
+        complete(whole, out, reel, k)
+    if grows > g:
+        out.s[node(out, reel, grows)] = whole.s[node(whole, reel, grows)]
+    for k in range(grows, m + 1):
+        i = node(out, reel, k)
+        out.force[i, 0], out.force[i, 1] = 0.0, 0.0  # what rounding leaves of those on nodes that ride
+
+
+@inner
+def fold(job, n, forward):
+    """Take the extremes of the old nodes into those of all: the fairlead counts for the next node."""
+    books, columns = job.before, job.bounds.shape[2]
+    at = 0 if forward else columns - job.before.extremes.shape[2]
+    for i in range(n + 1):
+        take_in(books.extremes, job.bounds, i, at)
+        at += 1
+        if books.right[i] != i:
+            take_in(books.extremes, job.bounds, books.right[i], at)
+            at += 1
+
+
+@kernel
+def take_in(extremes, bounds, column, at):
+    """Extremes of one column into those at a place."""
+    for row in range(bounds.shape[1]):
+        x, y = extremes[0, row, column], extremes[1, row, column]
+        if np.isfinite(x) and x < bounds[0, row, at]:
+            bounds[0, row, at], bounds[2, row, at] = x, extremes[2, row, column]
+        if np.isfinite(y) and y > bounds[1, row, at]:
+            bounds[1, row, at], bounds[3, row, at] = y, extremes[3, row, column]
+
+
+@inner
+def piece_at(reel, s):
+    """The piece of the material at an arc length."""
+    place, k = reel.numbers[SIDE] * (s - reel.numbers[FAR]), 0
+    while k + 1 < reel.pieces.shape[0] and reel.pieces[k + 1, 0] <= place:
+        k += 1
+    return k
+
+
+@inner
+def renew_books(job, n, m, forward, cut):
+    """What a run knows beside its state, of the new nodes and cells."""
+    before, books, start, s = job.before, job.books, job.start, job.carry.target.s
+    if before.extremes.shape[1] > 0:
+        fold(job, n, forward)
+    move_row(before.marks, books.marks, forward, cut, m - n)
+    column, first = m + 1, 0 if forward else start.shape[0] - 1 - m
+    for i in range(m + 1):
+        books.right[i] = i
+        if books.marks[i]:
+            books.right[i] = column
+            column += 1
+        for j in range(3):
+            books.start[i, j] = start[first + i, j]
+    for c in range(m):
+        piece = piece_at(job.carry.new, 0.5 * (s[c] + s[c + 1]))
+        books.borne[c] = job.borne[piece]
+        if job.width.shape[0] > 0:
+            job.width[c] = job.widths[piece]
+    job.nearest[0], job.nearest[1] = -1, -1
+    if not forward:
+        for k in range(books.base.shape[0]):
+            books.base[k] += m - n
+    clear(books.tension)
+    clear(books.strains)
+    for row in range(books.extremes.shape[1]):
+        for k in range(books.extremes.shape[2]):
+            books.extremes[0, row, k], books.extremes[1, row, k] = np.inf, -np.inf
+            books.extremes[2, row, k], books.extremes[3, row, k] = np.nan, np.nan
+
+
+@kernel
+def energy_of(line, ends, state, moment, strain, parts):
+    """Kinetic, elastic and potential energy, J; the last three are work arrays (N+1, 3), (N+1, 3), (5,)."""
+    observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, moment, strain, parts)
+    found = parts[0] + parts[1] + parts[2] + parts[3]
+    for i in range(line.h.shape[0] + 1):
+        for j in range(3):
+            found -= line.force[i, j] * state.r[i, j]
+    return found
+
+
+# Parts of a change, in this order; between the first two comes kernels.reel.payout_nodes.carry_node, whose table begins this one.
+
+
+@kernel
+def change_line(table):
+    """One node more, or less, at the fairlead: the line and its reel."""
+    job = read_node(table).carry
+    reel, new = job.reel, job.new
+    for k in range(reel.numbers.shape[0]):
+        new.numbers[k] = reel.numbers[k]
+    new.stage[RIDING_ON], new.stage[BALANCE_ON], new.numbers[DUE] = 0.0, 0.0, 0.0
+    place_reel(new, job.nodes, job.target.h.shape[0] - reel.layer.shape[0] + 1)
+    line_as(job.line, read_node(table).whole, job.target, new)
+
+
+@kernel
+def fit_changed(table):
+    """The new line has the length of now."""
+    job = read_node(table).carry
+    prepare(job.target, job.new, job.clock[b.NOW])
+
+
+@kernel
+def book_change(table):
+    """The energy, J, that the new nodes put in."""
+    job = read_node(table)
+    more = 0.0
+    for k in range(2):  # one call for both: it is compiled once
+        line, state = (job.carry.target, job.carry.out) if k else (job.carry.line, job.carry.state)
+        more = energy_of(line, job.ends, state, job.moment, job.strain, job.energy) - more
+    job.before.work[0, b.ZONES] += more
+
+
+@kernel
+def renew_run(table):
+    """What a run knows beside the line and its state, as of the beginning; what it knew is kept where it must be."""
+    job = read_node(table)
+    line, target, clock, forward = job.carry.line, job.carry.target, job.carry.clock, job.carry.new.numbers[SIDE] > 0.0
+    n, m = line.h.shape[0], target.h.shape[0]
+    copy_state(job.carry.out, job.twin)
+    if job.push.shape[0] > 0:
+        carry_push(job.push, line.s, target.s, job.new_push)
+        clear(job.next_push)
+    renew_books(job, n, m, forward, min(n, m) - job.carry.new.layer.shape[0] + 1)
+    clear(job.sea.axis)
+    clear(job.sea.slip)
+    clear(job.sea.slid)
+    clear(job.sea.bed)
+    clear(job.sea.flow)
+    for j in range(job.work.report.shape[0]):
+        job.work.report[j] = 0.0
+    clock[b.WAVE_STEP], clock[b.PREVIOUS] = wave_step(target, job.scale), clock[b.NOW]
+    job.books.counts[b.PARITY] = 0
+
+
+class LineJob(NamedTuple):
+    """A line, and the same of another length (written), whose places are put into its reel."""
+
+    line: Line
+    whole: Line  # with all material nodes that there may be
+    out: Line
+    reel: Reel  # of `out`
+    nodes: Floats  # (M,) m
+
+
+def blank_line_job() -> LineJob:
+    return LineJob(blank_line(1), blank_line(1), blank_line(1), blank_reel(1), np.zeros(2))
+
+
+read_line = reader(blank_line_job())
+
+
+@kernel
+def make_line(table):
+    """`line_as`, and its reel."""
+    job = read_line(table)
+    place_reel(job.reel, job.nodes, job.out.h.shape[0] - job.reel.layer.shape[0] + 1)
+    line_as(job.line, job.whole, job.out, job.reel)
+
+
+# --- steps and changes ----------------------------------------------------------------------------
+
+# Addresses in `calls`.
+STEPS, SOLVER, CHANGE, CARRY, FIT, BOOK, RENEW, BEFORE_FORCES, STAND_STILL, AFTER_FORCES = range(10)
+CALLS = 10
+# Numbers of `at`.
+(
+    ON, CELLS,  # the arrays that are in use, and cells of the line now
+    CHANGES,  # so far
+    TASK, SAMPLES_AT,  # where the table of the run has its task, and address and rows of its samples
+    ROOM,  # address of the memory for samples
+    MOST_ROWS,  # of samples of one line
+    MOST,  # cells that there may be
+    MAY_WAIT,  # 1 where outputs may wait although the line that they are of changes
+    WAITING, USED,  # lines whose outputs wait; numbers of their samples
+    BOXES_AT,  # where the table of kernels.contact.self_distance has the rows of its tree
+) = range(12)  # fmt: skip
+AT_SIZE = 12
+# Columns of `waiting`, and numbers per cell of a reel behind the samples: lack, rate, since, span.
+OFFSET, COUNT, OF_CELLS = range(3)
+OF_REEL = 4
+
+
+class PaidRunJob(NamedTuple):
+    """A run with all that nodes which enter and leave need.  Tables: (..., 3, size) fixed, per old cell, per new cell."""
+
+    calls: Numbers  # (CALLS,)
+    at: Numbers  # (AT_SIZE,)
+    clock: Floats  # of the run
+    counts: Numbers
+    outputs: Floats
+    winch: Floats
+    first: Reel  # in the two sets of arrays, with all their room
+    second: Reel
+    run: Numbers  # table of the run
+    run_places: Numbers  # of those of its numbers that follow the cells
+    in_run: NDArray[np.int64]  # (2 sides, 3, run_places.size)
+    paid: Numbers  # likewise the table of kernels.reel.payout
+    paid_places: Numbers
+    in_paid: NDArray[np.int64]
+    itself: Numbers  # of kernels.contact.self_distance.watch_itself
+    itself_places: Numbers  # empty: nobody watches
+    in_itself: NDArray[np.int64]
+    node: Numbers  # table of a change
+    nodes: NDArray[np.int64]  # (2 old sides x 2 parities, 3, size)
+    waiting: NDArray[np.int64]  # (lines, 3)
+    room: Floats  # for samples
+
+
+def blank_paid_run_job() -> PaidRunJob:
+    """A job with the types that every one has."""
+    z, few, sides, reel = np.zeros, np.zeros(1, np.int64), np.zeros((2, 3, 1), np.int64), blank_reel(1)
+    return PaidRunJob(
+        z(CALLS, np.int64), z(AT_SIZE, np.int64), z(b.CLOCK_SIZE), z(b.COUNT_SIZE, np.int64), z(0), z(1), reel, reel,
+        few, few, sides, few, few, sides, few, few, sides, few, sides, z((1, 3), np.int64), z(1),
+    )  # fmt: skip
+
+
+read = reader(blank_paid_run_job())
+numbers_of_sample, boxes = inner(sample_size), inner(boxes_of)
+
+
+@inner
+def reel_of(job):
+    return job.second if job.at[ON] else job.first
+
+
+@inner
+def put_all(job):
+    """The run goes on with the line of now; its samples come behind those that wait."""
+    at = job.at
+    k, m = at[ON], at[CELLS]
+    put_at(job.in_run[k], job.run_places, m, job.run)
+    put_at(job.in_paid[k], job.paid_places, m, job.paid)
+    if job.itself_places.shape[0] > 0:
+        put_at(job.in_itself[k], job.itself_places, m, job.itself)
+        job.itself[at[BOXES_AT]] = boxes(m)
+    job.run[at[SAMPLES_AT]] = at[ROOM] + 8 * at[USED]
+    job.run[at[SAMPLES_AT] + 1] = min(at[MOST_ROWS], (job.room.shape[0] - at[USED]) // numbers_of_sample(m))
+
+
+@inner
+def change(job):
+    """A node enters or leaves, after the outputs of the line as it was."""
+    at, calls, counts, reel = job.at, job.calls, job.counts, reel_of(job)
+    k, n = at[ON], at[CELLS]
+    m = n + 1 if reel.true[n - reel.layer.shape[0]] > reel.numbers[LONGEST] else n - 1
+    put(job.nodes[2 * k + counts[b.PARITY]], n, m, job.node)
+    call(calls[CHANGE], job.node)
+    call(calls[CARRY], job.node)
+    call(calls[FIT], job.node)
+    call(calls[BOOK], job.node)
+    call(calls[RENEW], job.node)
+    at[ON], at[CELLS], at[CHANGES] = 1 - k, m, at[CHANGES] + 1
+    put_all(job)
+    call(calls[BEFORE_FORCES], job.run)
+    job.run[at[TASK]] = ASSEMBLY
+    call_solver(calls[SOLVER], job.run)
+    job.run[at[TASK]] = RUN
+    call(calls[STAND_STILL], job.paid)
+    call(calls[AFTER_FORCES], job.run)
+
+
+@inner
+def due_within(job):
+    """How many outputs lie within the last step, before its end, and have not been sampled."""
+    clock, outputs, at, count = job.clock, job.outputs, job.counts[b.OUTPUT], 0
+    last = clock[b.NOW] - SAME_TIME * clock[b.LAST_DT]
+    while at + count < outputs.shape[0] and outputs[at + count] < last:
+        count += 1
+    return count
+
+
+@inner
+def may_change(job):
+    """Whether a node may enter or leave now: no outputs of the line of now are to come or wait, or there is room."""
+    at, some = job.at, due_within(job) + job.counts[b.SAMPLES]
+    if some == 0:
+        return True
+    size = numbers_of_sample(at[CELLS])
+    left = job.room.shape[0] - at[USED] - some * size - OF_REEL * at[CELLS]
+    fits = some <= job.run[at[SAMPLES_AT] + 1] and left >= numbers_of_sample(at[MOST])  # or the run could not go on
+    return at[MAY_WAIT] != 0 and at[WAITING] < job.waiting.shape[0] and fits
+
+
+@inner
+def set_aside(job):
+    """The outputs that have been sampled wait, with what cells of the line lacked."""
+    at, row, reel, n = job.at, job.waiting[job.at[WAITING]], reel_of(job), job.at[CELLS]
+    row[OFFSET], row[COUNT], row[OF_CELLS] = at[USED], job.counts[b.SAMPLES], n
+    at[USED] += row[COUNT] * numbers_of_sample(n)
+    for c in range(n):
+        job.room[at[USED] + c], job.room[at[USED] + n + c] = reel.lack[c], reel.rate[c]
+        job.room[at[USED] + 2 * n + c], job.room[at[USED] + 3 * n + c] = reel.since[c], reel.span[c]
+    at[USED] += OF_REEL * n
+    at[WAITING] += 1
+    job.counts[b.SAMPLES] = 0
+
+
+@kernel
+def put_paid(table):
+    """`put_all`."""
+    put_all(read(table))
+
+
+@kernel
+def change_paid(table):
+    """`change`."""
+    change(read(table))
+
+
+@kernel
+def go_on(table):
+    """Steps of a run, and nodes that enter and leave, until Python has to decide; a code of kernels.state.books."""
+    job = read(table)
+    counts = job.counts
+    code = call_count(job.calls[STEPS], job.run)
+    while code == b.STEPPED and counts[b.FLAGS] == 0 and counts[b.ASKS] == 0:
+        if reel_of(job).numbers[DUE] == 0.0 or at_its_end(job.winch) or not may_change(job):
+            return code
+        if due_within(job) > 0:
+            counts[b.INSIDE], counts[b.ASKS] = 1, b.ASK_SAMPLES
+            call_count(job.calls[STEPS], job.run)
+            counts[b.INSIDE], counts[b.ASKS] = 0, 0
+        if counts[b.SAMPLES] > 0:
+            set_aside(job)
+        change(job)
+        code = call_count(job.calls[STEPS], job.run)
+    return code

@@ -1,0 +1,476 @@
+"""Newton's method for lines that meet at points: one nonlinear loop for all of them, in space.
+
+Every line is marched along s by the kernel of a single line, which is called by its address; what it hands over is a
+relation between its ends (kernels.junctions.joined_lines).  The unknowns of the small system are the tensions of the last cells,
+the places of the points, and the places and rotations of the bodies (kernels.junctions.junctions); each line is then solved back.
+Symbols and stopping rule as in kernels.step.newton.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.rotations import get3
+from hybrid.kernels.junctions.bodies import (
+    LINES,
+    adapt_springs,
+    book_bodies,
+    end_bodies,
+    hold_turns,
+    move_bodies,
+    own_force,
+    predict_bodies,
+    size_of_moves,
+    start_here,
+)
+from hybrid.kernels.junctions.carried_frames import turns
+from hybrid.kernels.junctions.joined_lines import solve_dense
+from hybrid.kernels.junctions.junctions import (
+    END,
+    START,
+    add_pull,
+    assemble_junctions,
+    correct_all,
+    count_tensions,
+    first_unknown,
+    place_ends,
+)
+from hybrid.kernels.junctions.system_job import DT, TIME, read_system, task_of
+from hybrid.kernels.laws.seabed import stored
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.references import caller
+from hybrid.kernels.march.configuration import first_bad, measure, update
+from hybrid.kernels.march.powers import book_work, find_powers
+from hybrid.kernels.state.books import FLAGS, NOW, RATES, RHO, RHO_BEFORE, SHORTEST, STEP_BEFORE, STORED, TRY_END
+from hybrid.kernels.state.forces import FRICTION, SEABED
+from hybrid.kernels.state.report import (
+    LOCAL_ERROR,
+    RESIDUAL,
+    RESIDUAL_NODE,
+    SEABED_ENERGY,
+    SELF_CONTACT_ENERGY,
+    SLACKEST,
+    SLACKEST_CELL,
+)
+from hybrid.kernels.step.accept import watch
+from hybrid.kernels.step.generalized_alpha import Scheme, scheme
+from hybrid.kernels.step.job import call_quantities, read
+from hybrid.kernels.step.newton import (
+    ADDRESS,
+    ASSEMBLY,
+    CORRECT,
+    CORRECTION,
+    EQUILIBRIUM,
+    FINISH,
+    GAIN,
+    LARGEST_TURN,
+    LIMIT,
+    LOW_TENSION,
+    NEAR,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    OK,
+    PREPARE,
+    RADIUS,
+    REST,
+    SINGULAR,
+    SLACK,
+    STEP,
+    TURNED_TOO_FAR,
+    WHOLE,
+    Task,
+    ask_contact,
+    follow_law,
+    has_converged,
+    most_turn,
+    pass_torque,
+    round_off_tension,
+    with_radius,
+)
+from hybrid.kernels.step.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
+from hybrid.kernels.watch.extremes import first_strains, note_extremes
+
+JUNCTIONS = 5
+call_solver, call_touch = caller((0, 0, 0.0, 0)), caller(0)
+# Where cv and ca of the task are among the numbers of a job, whose first field it is.
+TASK_CV, TASK_CA, TASK_DT = Task._fields.index("cv"), Task._fields.index("ca"), Task._fields.index("dt")
+
+
+@inner
+def march_lines(system, given):
+    """March all lines: force on each point into `net`, N, that on bodies into `work`; given: what ends have to go is.
+
+    Returns -1 or a line that failed, and its bad node.
+    """
+    tables, joints, seats, arms, net, work = (
+        system.tables, system.joints, system.seats, system.arms, system.net, system.work,
+    )  # fmt: skip
+    for p in range(net.shape[0]):
+        net[p, 0], net[p, 1], net[p, 2] = 0.0, 0.0, 0.0
+    for b in range(work.shape[0]):
+        for k in range(6):
+            work[b, LINES + k] = 0.0
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        n = job.line.h.shape[0]
+        place_ends(l, job, system, given)
+        outcome, _, _, where = call_solver(system.solver, tables[l])
+        # the last block is not solved yet
+        if outcome != OK and not (outcome == SINGULAR and joints[l, END] >= 0 and where == n):
+            return l, where
+        for k in range(2):
+            if joints[l, k] >= 0:
+                add_pull(joints[l, k], job.work.report, k, arms[l, k], turns(seats, l, k), net, work)
+    return -1, -1
+
+
+@inner
+def size_up(tables, ca):
+    """Size of a correction: largest shift as a part of the line's reach, turn and its line and cell, and what Newton
+
+    compares with its tolerance.
+    """
+    shift, turn, size, worst, where = 0.0, 0.0, 0.0, 0, -1
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        reach, scale, _ = job.task.limits
+        far, turned, cell, change, big = measure(job.new.e, job.new.T, job.work.x)
+        shift = max(shift, far / reach)
+        if not turned <= turn:
+            turn, worst, where = turned, l, cell
+        mine = max(turned, WHOLE * far / reach)
+        if not change < round_off_tension(job.line, ca, scale):
+            mine = max(mine, change / max(big, LOW_TENSION * scale))
+        if not mine <= size:
+            size = mine
+    return shift, turn, size, worst, where
+
+
+@inner
+def correct_torques(tables, cv):
+    """Corrections of lines with the torque through their catenary zones, which changes with them; their ends stay where
+
+    the correction has put them.
+    """
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        pass_torque(1, job.line, job.ends, job.new, job.work, CORRECT, cv)
+
+
+@inner
+def forget_torques(tables):
+    """How lines answer to torques is found anew in every step."""
+    for l in range(tables.shape[0]):
+        known = read(tables[l]).work.torsion.known
+        if known.shape[0] > 0:
+            known[0] = -1.0
+
+
+@inner
+def follow_laws(tables, s):
+    """Mean tensions of lines whose tensions are no multiples of strains, with the last correction."""
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        follow_law(job.line, job.old, job.new, job.work, s.dt, s.cv, s.ca)
+
+
+@inner
+def prepare_contact(tables, task, t):
+    """Before a try of a step to t (s): the part of the prediction that is safe, and the spectral radius, of all lines."""
+    safe, rho = 1.0, task.rho
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        if job.contact[ADDRESS] != 0:
+            clock = job.books.clock
+            clock[NOW], clock[TRY_END], clock[STEP_BEFORE], clock[RHO] = t - task.dt, t, task.before, task.rho
+            clock[RHO_BEFORE] = task.rho_before
+            safe = min(safe, ask_contact(job.contact, job.contact_table, PREPARE))
+            rho = min(rho, ask_contact(job.contact, job.contact_table, RADIUS))
+    common = with_radius(task, rho)
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        if job.contact[ADDRESS] != 0:  # so that each has that of all
+            own = ask_contact(job.contact, job.contact_table, RADIUS)
+            clock = job.books.clock
+            if own > rho:
+                clock[RHO] *= rho / own
+            clock[STEP_BEFORE], clock[RHO_BEFORE] = common.before, common.rho_before
+    return safe, rho
+
+
+@inner
+def safe_part(tables):
+    """The part of a correction by which no line passes through itself."""
+    part = 1.0
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        if job.contact[ADDRESS] != 0:
+            part = min(part, ask_contact(job.contact, job.contact_table, LIMIT))
+    return part
+
+
+@inner
+def begin_lines(tables, s, safe):
+    """Predict a step of all lines; returns -1, or a line that turns too far, its turn and its cell.
+
+    safe: part of the way in which no line passes through itself.
+    """
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        turn, cell = begin_step(None, 1, job.line, job.sea, job.old, job.new, job.work.u, s, safe)
+        if not turn < most_turn(job.contact):
+            return l, turn, cell
+    return -1, 0.0, -1
+
+
+@inner
+def move_joints(job, start, end):
+    """Velocity of the ends that are joined to points, for the powers; that of held ends is set from outside."""
+    n, velocity, v = job.line.h.shape[0], job.books.velocity, job.new.v
+    for k in range(3):
+        if start >= 0:
+            velocity[0, k] = v[0, k]
+        if end >= 0:
+            velocity[1, k] = v[n, k]
+
+
+@inner
+def end_lines(tables, joints, floors, s, task, good):
+    """Rates after a step of all lines, and if it is good their reports.
+
+    Returns -1, or a line whose cell turns too far, or is slack, or whose contact creates energy, and that turn (0: slack)
+    and cell.
+    """
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        find_rates(1, job.line, job.sea, job.old, job.new, job.work.u, s)
+        if good:
+            touches = job.contact[ADDRESS] != 0
+            if touches:
+                job.work.report[SELF_CONTACT_ENERGY] = ask_contact(job.contact, job.contact_table, FINISH)
+            turn, cell = end_step(
+                None, 1, job.line, job.sea, job.ends, job.old, job.new, s, task, job.was, job.now, job.work,
+                job.books.strains,
+            )  # fmt: skip
+            if not turn < most_turn(job.contact):
+                return l, turn, cell
+            report = job.work.report
+            if touches and 0.5 * task.dt >= job.books.clock[SHORTEST]:
+                move_joints(job, joints[l, START], joints[l, END])
+                if ask_contact(job.contact, job.contact_table, GAIN) > 0.0:
+                    return l, turn, cell  # it creates energy: in halves
+            if not report[SLACKEST] > floors[l]:
+                return l, 0.0, int(report[SLACKEST_CELL])
+    return -1, 0.0, -1
+
+
+@inner
+def keep_report(books, report):
+    for k in range(report.shape[0]):
+        books.report[0, k] = report[k]
+
+
+@inner
+def note_quantities(table, job, t):
+    """Ranges of the quantities that are asked of a line, to its state at t (s)."""
+    if job.quantities != 0:
+        job.books.clock[NOW] = t
+        call_quantities(job.quantities, table)
+
+
+@inner
+def begin_books(tables, joints, t):
+    """Powers of the states as they are, what the seabed stores, and extremes where they are kept; t: s, now."""
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        line, sea, new, books, report = job.line, job.sea, job.new, job.books, job.work.report
+        if line.bits & SEABED:
+            report[SEABED_ENERGY] = stored(line, sea, new.r)
+            books.clock[STORED] = report[SEABED_ENERGY]
+            for i in range(new.r.shape[0]):
+                new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
+        if job.contact[ADDRESS] != 0:
+            books.clock[NOW] = t
+            report[SELF_CONTACT_ENERGY] = ask_contact(job.contact, job.contact_table, REST)
+        move_joints(job, joints[l, START], joints[l, END])
+        find_powers(line, job.ends, books.velocity, new, report, books.power[0])
+        if books.extremes.shape[1] > 0:
+            keep_report(books, report)
+            first_strains(line, job.ends, new, books)
+            note_extremes(line, sea, job.ends, new, books, t)
+        note_quantities(tables[l], job, t)
+
+
+@inner
+def keep_books(tables, joints, dt, t):
+    """Work of a step of all lines, extremes where they are kept, and what there is to look at; t: s, its end."""
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        line, new, books, report = job.line, job.new, job.books, job.work.report
+        move_joints(job, joints[l, START], joints[l, END])
+        for k in range(RATES):
+            books.power[1, k] = books.power[0, k]
+        find_powers(line, job.ends, books.velocity, new, report, books.power[0])
+        book_work(line, dt, report, books)
+        if books.base.shape[0] > 0:
+            books.counts[FLAGS] |= watch(line, job.ends, job.old, new, books, report, t, dt)
+        for i in range(books.touch.shape[1]):
+            books.touch[0, i] = books.touch[2, i]
+        if books.extremes.shape[1] > 0:
+            keep_report(books, report)
+            note_extremes(line, job.sea, job.ends, new, books, t)
+        note_quantities(tables[l], job, t)
+
+
+@inner
+def error_ratio(tables, allowed):
+    """Largest error of the step over what is allowed of it, of all lines; reports are those of the step."""
+    ratio = 0.0
+    for l in range(tables.shape[0]):
+        ratio = max(ratio, read(tables[l]).work.report[LOCAL_ERROR] / allowed[l])
+    return ratio
+
+
+@inner
+def end_system_step(system, task, s, solved):
+    """Rates and reports of a step that is `solved`; OK or why it is refused, with its line (-1: a body) and cell.
+
+    Whoever keeps it books it (book_system_step).
+    """
+    line, turn, cell = end_lines(system.tables, system.joints, system.floors, s, task, solved)
+    turned = end_bodies(system.old, system.new, system.work, s)
+    if line >= 0:
+        return (TURNED_TOO_FAR if turn > 0.0 else SLACK), line, cell
+    if solved and not turned < LARGEST_STEP_TURN:
+        return TURNED_TOO_FAR, -1, -1
+    return OK, -1, -1
+
+
+@kernel
+def book_system_step(table):
+    """Books of the step that was solved last, and is kept."""
+    system = read_system(table)
+    dt, t = system.asked[DT], system.asked[TIME]
+    keep_books(system.tables, system.joints, dt, t)
+    book_bodies(system.work, dt)
+
+
+@inner
+def predict_step(system, task, t):
+    """Predict a step to t (s) of all lines and bodies: its task and scheme, whether something turns too far, and by how
+
+    much (rad), its line (-1: a body) and cell.
+    """
+    safe, rho = 1.0, task.rho
+    if system.touch != 0:
+        safe, rho = prepare_contact(system.tables, task, t)
+    task = with_radius(task, rho)
+    s = scheme(task.rho, task.before, task.rho_before, task.dt)
+    turn, _ = predict_bodies(system.old, system.new, system.work, s)
+    if not turn < LARGEST_STEP_TURN:
+        return task, s, True, turn, -1, -1
+    line, turn, cell = begin_lines(system.tables, s, safe)
+    return task, s, line >= 0, turn, line, cell
+
+
+@inner
+def give_scheme(system, task, s):
+    """Tell all lines of the scheme with which they are marched; whether anything rubs, as a number."""
+    rubs, tables, numbers = 0, system.tables, system.numbers
+    for l in range(tables.shape[0]):
+        numbers[l, TASK_CV], numbers[l, TASK_CA], numbers[l, TASK_DT] = s.cv, s.ca, task.dt
+        job = read(tables[l])
+        rubs |= job.line.bits & FRICTION
+        if system.touch != 0 and job.contact[ADDRESS] != 0:
+            rubs |= job.contact[NEAR]
+    return rubs
+
+
+@kernel
+def solve_system(table):
+    """Do a task (kernels.step.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a system (SystemJob).
+
+    JUNCTIONS: leave in A the equations of the tensions, points and bodies, with all else eliminated.
+    Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.
+    """
+    system = read_system(table)
+    asked, tables, joints = system.asked, system.tables, system.joints
+    net, bodies, old, new, work, A = system.net, system.bodies, system.old, system.new, system.work, system.A
+    touch, t, task = system.touch, asked[TIME], task_of(asked)
+    m, most, count, points = A.shape[1] - 1, task.limits.most, tables.shape[0], net.shape[0]
+    s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
+    if task.what == STEP:
+        task, s, fails, turn, line, cell = predict_step(system, task, t)
+        if fails:
+            return TURNED_TOO_FAR, 0, turn, line, cell
+    else:
+        start_here(old, work)
+    forget_torques(tables)
+    rubs = give_scheme(system, task, s)
+    before, left, strength = math.inf, math.inf, 1.0
+    outcome, it, line, where = NOT_CONVERGED, 0, -1, -1
+    while it < most and outcome == NOT_CONVERGED:
+        it += 1
+        given = task.what == CORRECTION
+        line, where = march_lines(system, given)
+        if line >= 0:
+            outcome = SINGULAR
+            if not read(tables[line]).work.report[RESIDUAL] < math.inf:
+                outcome, where = NOT_FINITE, int(read(tables[line]).work.report[RESIDUAL_NODE])
+            break
+        if task.what == ASSEMBLY:
+            for b in range(work.shape[0]):
+                own_force(bodies[b], old[b], new[b], work[b])
+            outcome = OK
+            break
+        assemble_junctions(system, m, s.cv, s.ca, True)
+        if task.what == JUNCTIONS:
+            outcome = OK
+            break
+        if task.what == EQUILIBRIUM and it == 1:
+            hold_turns(work, A, first_unknown(points, count_tensions(joints), points))
+        if m > 0 and not solve_dense(A, m):
+            outcome = SINGULAR
+            break
+        line = correct_all(system, points, m)
+        if line >= 0:
+            bad = read(tables[line])
+            outcome, where = NOT_FINITE, first_bad(bad.work.x, bad.new.e)
+            break
+        correct_torques(tables, s.cv)
+        if touch != 0 and call_touch(touch, system.touch_table) == 0:
+            before = math.inf
+            break
+        if task.what == CORRECTION:
+            outcome = OK
+            break
+        shift, turn, size, line, where = size_up(tables, s.ca)
+        far, turned = size_of_moves(work)
+        far /= task.limits.reach
+        shift, turn, size = max(shift, far), max(turn, turned), max(size, max(turned, WHOLE * far))
+        part = min(1.0, 1.0 / shift) if shift > 0.0 else 1.0
+        if turn * part > LARGEST_TURN:
+            part = LARGEST_TURN / turn
+        if rubs != 0 and s.cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
+            part *= 0.5
+        if touch != 0:
+            part = min(part, safe_part(tables))
+        for l in range(count):
+            job = read(tables[l])
+            update(None, 1, job.line, job.new, s.cv, s.ca, part, False, job.work)
+        move_bodies(new, work, s.cv, s.ca, part)
+        outcome, left = has_converged(size, before, it, part)
+        before = size if part == 1.0 else math.inf
+        if task.what == EQUILIBRIUM:
+            outcome = NOT_CONVERGED if strength > 1.0 else outcome
+            strength = adapt_springs(work, strength, turned, LARGEST_TURN)
+    if task.what == STEP or task.what == EQUILIBRIUM:
+        follow_laws(tables, s)
+    if task.what == STEP:
+        bad, line_of_bad, cell = end_system_step(system, task, s, outcome == OK)
+        if bad != OK:
+            outcome, line, where = bad, line_of_bad, cell
+    if task.what == ASSEMBLY and outcome == OK:
+        begin_books(tables, joints, t)
+        book_bodies(work, 0.0)
+    return outcome, it, left, line, where

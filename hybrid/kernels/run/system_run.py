@@ -1,0 +1,316 @@
+"""Steps of several lines that meet at points, many in a call: the compiled loop around kernels.run.system.
+
+Phases, lengths of steps, halvings and codes are those of one cable (kernels.state.books, kernels.step.step_control), with a clock
+and counts that all lines have in common.  The states of lines and bodies take turns: SystemJobs of both parities are
+bound once.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.junctions.bodies import LINES, OWN
+from hybrid.kernels.junctions.system_job import (
+    BEFORE,
+    CA,
+    CV,
+    DT,
+    FIXED,
+    MOST,
+    REACH,
+    RHO_OF_LAST,
+    RHO_OF_STEP,
+    SCALE,
+    TIME,
+    WHAT,
+    read_system,
+)
+from hybrid.kernels.laws.end_motion import ends_at, sea_at
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.references import caller, reader
+from hybrid.kernels.march.powers import pull
+from hybrid.kernels.run.run import watch_itself
+from hybrid.kernels.run.system import error_ratio
+from hybrid.kernels.state.books import (
+    ASK_BEFORE,
+    ASK_STEPS,
+    ASK_TRIES,
+    ASKS,
+    AT_STOP,
+    BEGIN_STEP,
+    CLOCK_SIZE,
+    COLLAPSES,
+    CONTROLLED,
+    CORRECTION,
+    COUNT_SIZE,
+    CUT_AT,
+    CUT_BY_ERROR,
+    CUT_BY_NEWTON,
+    CUT_BY_TURN,
+    END_STEP,
+    FAILED,
+    FLAGS,
+    ITERATIONS,
+    JUDGE,
+    LAST_DT,
+    LAST_RHO,
+    LOG,
+    NOW,
+    OUTCOME,
+    PARITY,
+    PAUSED,
+    PHASE,
+    PREVIOUS,
+    QUOTA,
+    REPEATS,
+    RHO,
+    RHO_BEFORE,
+    ROWS,
+    SHORTEST,
+    SOLVE,
+    STEP_BEFORE,
+    STEPPED,
+    STEPS,
+    STOP,
+    TRIED,
+    TRIED_DT,
+    TRIES,
+    TRY,
+    TRY_END,
+    TRYING,
+    UNTIL,
+    WASTED,
+    WHERE,
+)
+from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKEST_CELL, USED_RHO
+from hybrid.kernels.state.state import Floats
+from hybrid.kernels.step.accept import collapses
+from hybrid.kernels.step.generalized_alpha import SAME
+from hybrid.kernels.step.job import call_solver, read
+from hybrid.kernels.step.newton import OK, SLACK, STEP, TURNED_TOO_FAR
+from hybrid.kernels.step.step_control import begin_step, halve, passes
+
+# Of `lines`: the line (-1: a body) where the last try was worst, and of the last try that was given up.
+LINE, CUT_LINE = 0, 1
+# Of `limits`: the reach of Newton's method, m; its iterations at most; the arm by which moments on bodies are compared
+# with forces, m.
+OF_REACH, OF_ITERATIONS, OF_ARM = 0, 1, 2
+
+
+class StepsJob(NamedTuple):
+    """Arguments of the entry."""
+
+    even: NDArray[np.int64]  # of a kernels.run.system.SystemJob that leads from the states of even parity to the others
+    odd: NDArray[np.int64]  # and of one that leads back
+    joined_even: NDArray[np.int64]  # the same of the lines that are joined to what moves with them
+    joined_odd: NDArray[np.int64]
+    joined: NDArray[np.int64]  # (J,) their numbers
+    lone: NDArray[np.int64]  # (L - J, ..) jobs of the others, their task RUN
+    lone_lines: NDArray[np.int64]  # (L - J,) and their numbers
+    clock: Floats  # (CLOCK_SIZE,) of kernels.state.books, of all lines
+    counts: NDArray[np.int64]  # (COUNT_SIZE,)
+    limits: Floats  # (3,) above
+    lines: NDArray[np.int64]  # (2,) above
+    seen: NDArray[np.int64]  # (L,) bits of kernels.state.books: how near a line came to itself in the last step
+    log: Floats  # (rows, L, len(LOG))
+    solver: int = 0  # address of kernels.run.system.solve_system
+    marcher: int = 0  # of the kernel that solves a step of one line
+    book: int = 0  # of book_system_step
+
+
+def blank_steps_job() -> StepsJob:
+    """A job with the types that every one has."""
+    none, log = np.zeros(1, np.int64), np.zeros((1, 1, len(LOG)))
+    clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+    lone = np.zeros((1, 1), np.int64)
+    return StepsJob(none, none, none, none, none, lone, none, clock, counts, np.zeros(3), none, none, log)
+
+
+read_steps = reader(blank_steps_job())
+call_step, call_book = caller((0, 0, 0.0, 0, 0)), caller(0)
+
+
+@inner
+def end_of_try(clock):
+    """Time at which the present try ends."""
+    end = clock[NOW] + clock[TRIED_DT]
+    return clock[UNTIL] if clock[UNTIL] - end <= SAME * clock[TRIED_DT] else end
+
+
+@inner
+def move_lines(system, t):
+    """Ends and sea of all lines at t (s)."""
+    for l in range(system.tables.shape[0]):
+        job = read(system.tables[l])
+        ends_at(t, job.moves, job.sea, job.ends, job.books.velocity)
+        sea_at(t, job.sea)
+
+
+@inner
+def try_lone(steps, system):
+    """Solve the step that is tried of every line that is joined to nothing that moves with it.
+
+    Returns outcome, line, iterations, predicted next correction, and node, of the first that fails, else the largest.
+    """
+    clock, most, worst = steps.clock, 0, 0.0
+    for j in range(steps.lone.shape[0]):
+        job, l = read(steps.lone[j]), steps.lone_lines[j]
+        own = job.books.clock
+        own[NOW], own[TRY_END], own[RHO] = clock[NOW], clock[TRY_END], clock[RHO]
+        own[STEP_BEFORE], own[RHO_BEFORE] = clock[LAST_DT], clock[LAST_RHO]
+        outcome, it, left, where = call_solver(steps.marcher, steps.lone[j])
+        if outcome == OK and not job.work.report[SLACKEST] > system.floors[l]:
+            outcome, where = SLACK, int(job.work.report[SLACKEST_CELL])
+        if outcome != OK:
+            return outcome, l, it, left, where
+        most, worst = max(most, it), max(worst, left)
+    return OK, -1, most, worst, -1
+
+
+@inner
+def try_step(steps, system):
+    """Solve the step that is tried, and note how that ended."""
+    clock, counts, asked, table = steps.clock, steps.counts, system.asked, steps.joined_even
+    if counts[PARITY]:
+        table = steps.joined_odd
+    asked[WHAT], asked[DT], asked[TIME] = STEP, clock[TRY_END] - clock[NOW], clock[TRY_END]
+    asked[BEFORE], asked[RHO_OF_STEP], asked[RHO_OF_LAST] = clock[LAST_DT], clock[RHO], clock[LAST_RHO]
+    asked[CV], asked[CA], asked[SCALE], asked[FIXED] = 0.0, 0.0, 1.0, 1.0 - counts[CONTROLLED]
+    asked[REACH], asked[MOST] = steps.limits[OF_REACH], steps.limits[OF_ITERATIONS]
+    for l in range(system.tables.shape[0]):
+        books = read(system.tables[l]).books
+        books.counts[PARITY], books.clock[SHORTEST] = counts[PARITY], clock[SHORTEST]
+        books.counts[CONTROLLED] = counts[CONTROLLED]
+    outcome, line, it, left, where = try_lone(steps, system)
+    if outcome == OK and (steps.joined.shape[0] > 0 or system.work.shape[0] > 0):
+        result, more, worse, row, place = call_step(steps.solver, table)
+        outcome, it, left, where = result, max(it, more), max(left, worse), place
+        if row >= 0:
+            line = steps.joined[row]
+    counts[OUTCOME], counts[TRIES], counts[WHERE], clock[CORRECTION] = outcome, it, where, left
+    steps.lines[LINE] = line
+
+
+@inner
+def give_up(steps, cause):
+    """A try is given up, and repeated in another length."""
+    counts = steps.counts
+    counts[cause] += 1
+    counts[CUT_AT], steps.lines[CUT_LINE] = counts[WHERE], steps.lines[LINE]
+    counts[WASTED] += counts[TRIES]
+    counts[REPEATS] += 1
+    counts[PHASE] = TRY
+
+
+@inner
+def judge(steps, system):
+    """Whether the try is the step (1), is to be repeated in another length (0), or has failed for good (-1)."""
+    clock, counts = steps.clock, steps.counts
+    dt, outcome = clock[TRY_END] - clock[NOW], counts[OUTCOME]
+    if outcome == OK:
+        if counts[CONTROLLED] and not passes(clock, counts, dt, error_ratio(system.tables, system.allowed)):
+            give_up(steps, CUT_BY_ERROR)
+            return 0
+        return 1
+    if 0.5 * clock[TRIED_DT] < clock[SHORTEST]:
+        return -1
+    halve(clock, counts, dt)
+    give_up(steps, CUT_BY_TURN if outcome == TURNED_TOO_FAR else CUT_BY_NEWTON)
+    return 0
+
+
+@inner
+def largest_residual(system, arm):
+    """Largest force (N) that is left over at a node, a point or, moments by their arm (m), a body; without contact."""
+    most, net, work = 0.0, system.net, system.work
+    for l in range(system.tables.shape[0]):
+        most = max(most, read(system.tables[l]).work.report[RESIDUAL])
+    for p in range(net.shape[0]):
+        for k in range(3):
+            most = max(most, abs(net[p, k]))
+    for b in range(work.shape[0]):
+        for k in range(3):
+            most = max(most, abs(work[b, OWN + k] + work[b, LINES + k]))
+            most = max(most, abs(work[b, OWN + 3 + k] + work[b, LINES + 3 + k]) / arm)
+    return most
+
+
+@inner
+def accept(steps, system):
+    """The step that was tried is taken: clock, log, and what there is to look at."""
+    clock, counts = steps.clock, steps.counts
+    dt, residual = clock[TRY_END] - clock[NOW], largest_residual(system, steps.limits[OF_ARM])
+    clock[PREVIOUS], clock[NOW], clock[LAST_DT] = clock[NOW], clock[TRY_END], dt
+    counts[PARITY] = 1 - counts[PARITY]
+    counts[STEPS] += 1
+    counts[ITERATIONS] = counts[TRIES]
+    flags = COLLAPSES if collapses(clock, counts, dt) else 0
+    for l in range(system.tables.shape[0]):
+        job = read(system.tables[l])
+        report, row = job.work.report, steps.log[counts[ROWS], l]
+        if l == 0:
+            clock[LAST_RHO] = report[USED_RHO]
+        row[0], row[1], row[2], row[3] = clock[NOW], dt, counts[TRIES] + counts[WASTED], clock[CORRECTION]
+        row[4], row[5], row[6] = residual, counts[REPEATS], report[LOCAL_ERROR]
+        row[7], row[8] = pull(report, 0), pull(report, 1)
+        steps.seen[l] = watch_itself(job, job.new)
+        flags |= job.books.counts[FLAGS] | steps.seen[l]
+    counts[ROWS] += 1
+    counts[WASTED], counts[FLAGS], counts[PHASE] = 0, flags, END_STEP
+
+
+@inner
+def between_steps(steps):
+    """The phases before a try; -1 when one is to be made, else what to return."""
+    clock, counts = steps.clock, steps.counts
+    if counts[PHASE] == END_STEP:
+        counts[PHASE] = BEGIN_STEP if counts[CONTROLLED] or clock[NOW] >= clock[UNTIL] else TRY
+    if counts[PHASE] == BEGIN_STEP:
+        if not clock[NOW] < clock[STOP]:
+            return AT_STOP
+        if counts[QUOTA] <= 0 or counts[ROWS] == steps.log.shape[0]:
+            return PAUSED
+        counts[QUOTA] -= 1
+        begin_step(clock, counts)
+        counts[PHASE] = TRY
+    if counts[PHASE] == TRY:
+        if counts[ROWS] == steps.log.shape[0]:  # one step may be cut into many
+            return PAUSED
+        clock[TRY_END] = end_of_try(clock)
+        counts[PHASE] = SOLVE
+        if counts[ASKS] & ASK_BEFORE:
+            return TRYING
+    return -1
+
+
+@kernel
+def run_system(table):
+    """Steps of all lines until a code of kernels.state.books is returned."""
+    steps = read_steps(table)
+    counts = steps.counts
+    while True:
+        code = between_steps(steps)
+        if code >= 0:
+            return code
+        own = steps.even
+        if counts[PARITY]:
+            own = steps.odd
+        system = read_system(own)
+        if counts[PHASE] == SOLVE:
+            if not counts[ASKS] & ASK_BEFORE:
+                move_lines(system, steps.clock[TRY_END])
+            try_step(steps, system)
+            counts[PHASE] = JUDGE
+            if counts[ASKS] & ASK_TRIES:
+                return TRIED
+        verdict = judge(steps, system)
+        if verdict < 0:
+            return FAILED
+        if verdict > 0:
+            call_book(steps.book, own)
+            accept(steps, system)
+            if counts[FLAGS] != 0 or counts[ASKS] & ASK_STEPS:
+                return STEPPED

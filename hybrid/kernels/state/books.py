@@ -1,0 +1,199 @@
+"""What a run knows beside its state, as arrays that compiled steps read and write: clock, counts, books, samples.
+
+Numbers of `clock` (float64) and `count` (int64) have their names here; `FLAGS` are what Python has to look at.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.state.state import Floats
+
+# --- clock: times in s ----------------------------------------------------------------------------
+
+(
+    NOW, PREVIOUS,  # time of the state, and of the one before it
+    LAST_DT,  # length of the step that led there; 0 after a start
+    EARLIER_DT,  # length of the step before the last; 0: it is not known
+    STEP_BEFORE,  # length of the step before that, as the weights of the scheme took it
+    LAST_RHO, RHO_BEFORE,  # spectral radii at infinity of these two steps
+    STOP,  # where steps must end, and the call with them
+    LEG_BEGIN, LEG_STEP,  # where equal steps to `STOP` began, and their length
+    BEGIN, UNTIL,  # where the present step was begun, and where it should end
+    TRIED_DT,  # longest length of the present tries
+    TRY_END,  # where the present one ends
+    SHORTEST,  # below which a step is not tried
+    LARGEST,  # longest step that the controller may choose
+    ALLOWED,  # the same for the time being
+    TOLERANCE,  # m, error of position that a step may make
+    NEXT_DT,  # chosen by the controller
+    ERROR_RATIO,  # error over tolerance of the last accepted step
+    RHO,  # spectral radius at infinity of equal steps
+    FLOOR,  # N, a catenary cell not above it refuses the step
+    STORED,  # J, in the seabed
+    SCALED_JUMP,  # N, jump of tension in a step that is worth a look
+    MOVED,  # m, largest displacement of a base node since the start
+    LEAST_PEAK, LARGEST_PEAK,  # N, lowest and highest of the largest tensions
+    BEND_LIMIT, TWIST_LIMIT,  # rad, of an element, from which on they are worth a look
+    SLACK_LIMIT,  # N, tension of a catenary cell, likewise
+    PUSH_START,  # J, kinetic energy of the push out of the plane when it was given; 0: unknown
+    PUSH_GROWN,  # by how much its speed has grown since
+    MOST_TURN,  # rad, through which an end may turn in a step
+    CUT_ANGLE, CUT_STEP,  # rad, s: of the last step that was cut because an end turned further; 0: none was
+    MUTE_CUTS,  # 1 when an event has told of that
+    WAVE_STEP,  # in which tension waves pass a cell: a longer step that leaves a catenary slack is repeated shorter
+    SLACK_STEP,  # of the last step that was; 0: none was
+    MUTE_SLACK,  # 1 when an event has told of that
+    CORRECTION,  # of the last try: next correction of Newton's method, as predicted
+    RELEASE_START, RELEASE_END,  # N, force at which an end is let go; infinity: never
+    NEAR_PLANE,  # m, distance from its plane below which a line in space has come back to it; 0: it never does
+    LONGEST,  # of the accepted steps so far
+) = range(44)  # fmt: skip
+CLOCK_SIZE = 44
+
+# --- count -----------------------------------------------------------------------------------------
+
+(
+    CONTROLLED,  # 1 where the length of steps is controlled by their error
+    PARITY,  # which of the two states is now
+    PHASE, AFTER_START,  # what comes next (below), and what after START
+    STEPS, ITERATIONS,  # accepted steps; iterations of the last
+    OUTCOME, TRIES, WHERE,  # of the last try: its outcome, iterations, and the cell or node where it was worst
+    WASTED, REPEATS,  # iterations of tries given up since the last step, and tries repeated since `BEGIN`
+    LEG_PART, LEG_PARTS,  # equal steps taken, and all of them, from LEG_BEGIN to STOP
+    WARY,  # steps for which the length may not grow
+    ROWS,  # in the log
+    OUTPUT,  # next output that is due
+    SAMPLES,  # in the buffer
+    INSIDE,  # 1: outputs at the end of the step wait, because the line is about to change
+    ASKS,  # bits: Python is asked before every try, after it, after every step, after its outputs
+    FLAGS,  # what there is to look at after the last step
+    STIFF,  # 1 where no cell stretches
+    QUOTA,  # steps until the call returns
+    MEASURED,  # steps of which `worst` knows
+    NEW_STATE,  # 1 where the state of a START counts among the extremes
+    SLACK_CELL,  # of the step of SLACK_STEP
+    VARIES,  # 1 where samples have the lengths of cells and the stiffness of elements, which change in a run
+    MOST_ITERATIONS,  # Newton iterations that a step may take in all its tries; 0: as many as converge
+    TAKEN,  # iterations of all tries since `BEGIN`
+    IS_CUT, CUT_SHORT,  # whether the last try was taken though it had not converged, and steps so far that were
+    # Since the last step that was no small part of the longest: steps; tries cut by energy that contact puts in, by what
+    # turns too far, by Newton's method, by their error; the node where the last was.
+    TINY_STEPS, CUT_BY_GAIN, CUT_BY_TURN, CUT_BY_NEWTON, CUT_BY_ERROR, CUT_AT,
+) = range(36)  # fmt: skip
+COUNT_SIZE = 36
+
+# Phases.
+START, BEGIN_STEP, TRY, SOLVE, JUDGE, SAMPLE, END_STEP = range(7)
+ASK_BEFORE, ASK_TRIES, ASK_STEPS, ASK_SAMPLES = 1, 2, 4, 8
+# What a call returns: at STOP; a buffer is full or the quota is used up; a try to come; one to be judged; a step to be
+# looked at; its outputs to be looked at; a step that fails however small.
+AT_STOP, PAUSED, TRYING, TRIED, STEPPED, SAMPLED, FAILED = range(7)
+# Bits of FLAGS.
+STRETCHED, BENT, JUMPED, SLACKENED, LEAVES_PLANE, PUSH_DIED, STEPS_CUT, STEPS_SLACK = 1, 2, 4, 8, 16, 32, 64, 128
+UNKNOWN_ERROR = 256
+IS_BENT, MEETS_ITSELF = 512, 1024
+LETS_GO = 2048
+ITERATIONS_CUT = 4096
+NEARS_PLANE = 8192
+NEARS_ITSELF = 16384
+PARTS_ITSELF, HIDES_ITSELF = 32768, 65536
+COLLAPSES = 131072
+
+# --- powers and work --------------------------------------------------------------------------------
+
+RATES = 8  # by their rates: start, end, applied, drag, mass damping, stiffness damping, added mass, waves
+CONTACT, FRICTION, ZONES = 8, 9, 10  # by steps
+WORKS = 11
+# Columns of the step log.
+LOG = ("t", "dt", "iterations", "correction", "residual", "repeats", "error", "end_force_start", "end_force_end")
+# Steps of which the worst is remembered, with (left, t, dt, node).
+WORST = 3
+
+# --- extremes ----------------------------------------------------------------------------------------
+
+# Bits of `marks`: what a node has.
+LOADED, SEAM = 1, 2  # a point load; where one section ends and the next begins
+# Rows of `extremes`.
+TENSION, CURVATURE, MOMENT, TORQUE, PRESSURE, DISPLACEMENT, SELF_PRESSURE, WALL_TENSION, VON_MISES = range(9)
+EXTREMES = 9
+
+
+class Books(NamedTuple):
+    """What a run knows beside its state."""
+
+    clock: Floats  # (CLOCK_SIZE,)
+    counts: NDArray[np.int64]  # (COUNT_SIZE,)
+    outputs: Floats  # s, times of all outputs
+    power: Floats  # (2, RATES) W, now and before the last step
+    work: Floats  # (2, WORKS) J, since the start of the run, likewise
+    report: Floats  # (3, REPORT_SIZE) likewise, and before the step before
+    tension: Floats  # (2, N) N, before the last step, and before the step before
+    twist: Floats  # (2, 2) rad, of the elements at both ends, likewise
+    velocity: Floats  # (2, 3) m/s, of held ends now
+    imposed: Floats  # (2, 2, 21) now and before the last step, of each end: position, frame, spin, force, moment
+    loaded: NDArray[np.int8]  # (2,) 1 where there is a body at the end
+    base: NDArray[np.int64]  # nodes whose displacement is watched
+    placed: Floats  # (base.size, 3) m, where they were at the start
+    borne: Floats  # (N,) length over unstretched length that each cell bears
+    worst: Floats  # (WORST, 4)
+    log: Floats  # (rows, len(LOG))
+    samples: Floats  # (rows, sample_size(N) + K)
+    model_error: Floats  # (2, K) what samples take of the model error now and before the last step; K = 0: not followed
+    strains: Floats  # (N+1, 3) of elements: curvature (1/m), bending moment (N m), torque (N m); empty: not wanted
+    start: Floats  # (N+1, 3) m, positions from which displacements count
+    marks: NDArray[np.int8]  # (N+1,)
+    right: NDArray[np.int64]  # (N+1,) column of `extremes` for the value just after a node; of K marked nodes behind N
+    extremes: Floats  # (4, EXTREMES, N+1+K) lowest, highest, and their times (s); empty: not wanted
+    # (3, N+1) N/m, of contact of the line with itself: now, before the last step, where the try has led; empty: there is none
+    touch: Floats
+    # Of quantities that a scene asks for by name (kernels.watch.named_quantities); none: empty.
+    asked: Floats  # (Q, ASKED) what they are
+    reached: Floats  # (Q, REACHED) lowest and highest values of all steps
+    path: Floats  # (P, PATH_ROW) chords that clearances are to, m
+    radii: Floats  # (S, 2) m, where the sections of the line end, and their outer radii
+    walls: Floats  # (S, WALL) of sections, in a line that has pipes (kernels.watch.pipes); empty: it has none
+
+
+# A sample, one row: t, sea.now (4), of both ends position (2, 3), frame (2, 9), spin, force and moment (2, 3 each), report,
+# work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N); where they vary, h (N) and kb (N+1, 3); turns (K, 3)
+# of zones that a torque passes through; of a line that touches itself, the force of that (N+1); of the model error,
+# where it is followed, K numbers.
+SAMPLE_SEA, SAMPLE_POSITION, SAMPLE_FRAME, SAMPLE_SPIN, SAMPLE_FORCE, SAMPLE_MOMENT, SAMPLE_REPORT = (
+    1,
+    5,
+    11,
+    29,
+    35,
+    41,
+    47,
+)
+SAMPLE_WORK = SAMPLE_REPORT + REPORT_SIZE
+HEAD = SAMPLE_WORK + WORKS
+
+
+def sample_size(cells: int, varies: bool = False, zones: int = 0, touches: bool = False) -> int:
+    """Numbers of a sample of a line of so many cells; varies: with lengths and stiffness; zones: with turns; touches:
+
+    with the force of contact with itself.
+
+    What is sampled of the model error comes behind them.
+    """
+    return HEAD + 9 * (cells + 1) + 8 * cells + varies * (cells + 3 * (cells + 1)) + 3 * zones + touches * (cells + 1)
+
+
+def blank_books(cells: int = 1, rows: int = 1) -> Books:
+    """Books of a line of so many cells, with room for so many rows of log and samples, extremes unwanted."""
+    z, nodes = np.zeros, cells + 1
+    return Books(
+        clock=z(CLOCK_SIZE), counts=z(COUNT_SIZE, np.int64), outputs=z(0), power=z((2, RATES)), work=z((2, WORKS)),
+        report=z((3, REPORT_SIZE)), tension=z((2, cells)), twist=z((2, 2)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), base=z(0, np.int64), placed=z((0, 3)),
+        borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
+        samples=z((rows, sample_size(cells))), model_error=z((2, 0)), strains=z((0, 3)), start=z((nodes, 3)), marks=z(nodes, np.int8),
+        right=np.arange(nodes),
+        extremes=z((4, 0, nodes)), touch=z((3, 0)), asked=z((0, 0)), reached=z((0, 0)), path=z((0, 0)), radii=z((0, 2)), walls=z((0, 0)),
+    )  # fmt: skip

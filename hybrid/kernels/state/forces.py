@@ -1,0 +1,44 @@
+"""The optional forces: bit in the mask of a line, and what each needs.
+
+A force that no scene asked for has its bit off, and its parameters are never read.
+"""
+
+from __future__ import annotations
+
+DRAG = 1
+ADDED_MASS = 2
+MASS_DAMPING = 4
+STIFFNESS_DAMPING = 8
+ROTARY = 16
+FLOW = 32
+WAVES = 64
+SURFACE = 128
+BODIES = 256
+SEABED = 512
+FRICTION = 1024
+# No force: all of the cable and of what acts on it lies in a plane (hybrid.kernels.algebra.plane).
+PLANAR = 2048
+# Contact of the line with itself (hybrid.kernels.contact.self_contact).
+SELF_CONTACT = 4096
+SELF_FRICTION = 8192
+# No force: tension that is no multiple of strain (hybrid.kernels.laws.axial_law).
+AXIAL_LAW = 16384
+
+# No force: the line may come to touch itself, which is computed from where it comes near itself on.
+MAY_TOUCH = 32768
+
+FORCES = {
+    "drag": (DRAG, "velocity, direction; environment.fluid and sections[].drag, or drag_area of modules"),
+    "added mass": (ADDED_MASS, "acceleration, direction; environment.fluid and sections[].added_mass, or of modules"),
+    "mass-proportional damping": (MASS_DAMPING, "velocity; sections[].damping.mass"),
+    "stiffness-proportional damping": (STIFFNESS_DAMPING, "rate of strain; sections[].damping.stiffness"),
+    "rotary inertia": (ROTARY, "turning of the cross-section; rod zones with a diameter or rotary_inertia"),
+    "current": (FLOW, "height; environment.fluid.current"),
+    "waves": (WAVES, "position, time; environment.fluid.waves"),
+    "partly wetted cells at the surface": (SURFACE, "height; environment.fluid.surface"),
+    "drag, added mass or wetting of bodies": (BODIES, "velocity, acceleration; cable.attachments, ends of kind body"),
+    "seabed contact": (SEABED, "height and its rate; environment.seabed"),
+    "seabed friction": (FRICTION, "travel along the seabed; environment.seabed.friction"),
+    "contact of the line with itself": (SELF_CONTACT, "distance of its parts; contact.self"),
+    "friction of the line on itself": (SELF_FRICTION, "travel of its parts along each other; contact.friction"),
+}

@@ -1,0 +1,52 @@
+"""What a step reports beside its state: one array of numbers, each with its name here.
+
+The assembly of every iteration clears and writes the first `ASSEMBLED` numbers, the step the others.
+
+    name                      meaning                                                          unit
+    FORCE_A, FORCE_B          force of the line on what holds, carries or loads its start, its
+                              end (kernels.laws.end_forces), 3 numbers                              N
+    MOMENT_A, MOMENT_B        moment at the start and at the end, 3 numbers                    N m
+    DRAG_POWER                power of the drag                                                W
+    MASS_DAMPING_POWER        power lost to damping proportional to mass                       W
+    STIFFNESS_DAMPING_POWER   power lost to damping proportional to stiffness                  W
+    RESIDUAL, RESIDUAL_NODE   largest residual force, and its node                             N, -
+    ADDED_MASS_POWER          power into the added mass                                        W
+    WAVE_POWER                power of the waves, and of buoyancy at the surface               W
+    CONTACT_WORK              work of the seabed along its normal in the step                  J
+    FRICTION_WORK             work of the seabed in its plane in the step                      J
+    CONTACT_FORCE             force of the seabed along its normal                             N
+    BEND, BEND_NODE           largest bend of an element, and its node (-1: none)              rad, -
+    TWIST, TWIST_NODE         largest twist of an element, and its node (-1: none)             rad, -
+    SLACKEST, SLACKEST_CELL   lowest tension of a catenary cell, and that cell                 N, -
+    SEABED_ENERGY             energy that the seabed stores                                    J
+    PUSH_ENERGY               kinetic energy of the push out of the plane                      J
+    WRONG_PIVOTS              how many pivots of the push's equations have the wrong sign      -
+    LOCAL_ERROR, ..._NODE     local error of position that the step makes, and its node        m, -
+    SELF_CONTACT_ENERGY       energy of the contact of the line with itself                    J
+    SELF_FRICTION_WORK        work of its friction in the step, and what that has stored more  J
+    LENGTH_OUT, PAYOUT_RATE   unstretched length of a line that is paid out, and its rate      m, m/s
+    PAYOUT_POWER              power of the winch on the line                                   W
+    STRETCH_ENERGY            energy of stretch where an axial law is no straight line         J
+    USED_RHO                  spectral radius at infinity of the step                          -
+    NET_A, NET_B              resultant on the node at the start and at the end, 3 numbers     N
+"""
+
+from __future__ import annotations
+
+FORCE_A, FORCE_B, MOMENT_A, MOMENT_B = 0, 3, 6, 9
+DRAG_POWER, MASS_DAMPING_POWER, STIFFNESS_DAMPING_POWER = 12, 13, 14
+RESIDUAL, RESIDUAL_NODE = 15, 16
+ADDED_MASS_POWER, WAVE_POWER = 17, 18
+CONTACT_WORK, FRICTION_WORK, CONTACT_FORCE = 19, 20, 21
+ASSEMBLED = 22
+BEND, BEND_NODE, TWIST, TWIST_NODE = 22, 23, 24, 25
+SLACKEST, SLACKEST_CELL = 26, 27
+SEABED_ENERGY = 28
+PUSH_ENERGY, WRONG_PIVOTS = 29, 30
+LOCAL_ERROR, LOCAL_ERROR_NODE = 31, 32
+SELF_CONTACT_ENERGY, SELF_FRICTION_WORK = 33, 34
+LENGTH_OUT, PAYOUT_RATE, PAYOUT_POWER = 35, 36, 37
+STRETCH_ENERGY = 38
+USED_RHO = 39
+NET_A, NET_B = 40, 43
+REPORT_SIZE = 46

@@ -1,0 +1,382 @@
+"""The arrays a solver works on: the line (what does not move), its ends, the sea around it, its state, its work.
+
+All are NamedTuples of contiguous arrays with fixed types, so that one compiled signature serves every scene.  N cells, N+1 nodes; SI units; inertial frame unless said.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.machine.references import by_reference
+from hybrid.kernels.state.fields import HALF, MEAN, POINT, ROD, SHARED, blank, cell, fields_of, node
+from hybrid.kernels.state.report import REPORT_SIZE
+
+Floats = NDArray[np.float64]
+# Nodes for which waves are computed at a time: two vectors of eight float64, or four of four.
+LANES = 16
+# Of a line in space.  Writeable: a read-only default would give every kernel a second signature.
+NO_PLANE: Floats = np.full((3, 3), np.nan)
+NOT_VARYING: Floats = np.zeros(0)
+# Of a line without catenary zones that a torque passes through.
+NO_TORSION: Floats = np.zeros((0, 5))
+NO_TENSION_TORQUE: Floats = np.zeros(0)
+NO_TURN: Floats = np.zeros((0, 3))
+NO_TURNS: Floats = np.zeros((0, 0, 3))
+# Of a line whose tensions are multiples of strains (kernels.laws.axial_law has the columns).
+NO_LAW: Floats = np.zeros((0, 7))
+NO_TABLE: Floats = np.zeros((0, 3))
+NO_SLOW: Floats = np.zeros(0)
+NO_ADDRESS: NDArray[np.int64] = np.zeros(0, np.int64)
+
+
+class Line(NamedTuple):
+    """What the plan says: mesh, stiffness, mass and load parameters.
+
+    A parameter of a force that is off (see `bits`) is NaN: used by mistake, it shows at once.
+    """
+
+    s: Annotated[Floats, node()]  # (N+1,) m, unstretched arc length of the nodes
+    h: Annotated[Floats, cell()]  # (N,) m, unstretched cell length
+    ck: Annotated[Floats, cell(MEAN)]  # (N,) 1/N, axial compliance; 0 when inextensible
+    mass: Annotated[Floats, node(SHARED)]  # (N+1,) kg, of the half cells that meet at the node
+    force: Annotated[Floats, node(columns=3)]  # (N+1, 3) N, weight and buoyancy
+    element: Annotated[NDArray[np.int8], node(kind=np.int8)]  # (N+1,) 1 where a rod element sits
+    spin: Annotated[NDArray[np.int8], cell(kind=np.int8)]  # (N,) 1 where the cell has a frame and a spin
+    kb: Annotated[Floats, node(columns=3)]  # (N+1, 3) N m, stiffness of the element (two bending, torsion)
+    k0: Annotated[Floats, node(columns=3)]  # (N+1, 3) rad, its strain without stress
+    hn: Annotated[Floats, node()]  # (N+1,) m, length an element stands for
+    rotary: Annotated[Floats, cell(ROD)]  # (N,) kg m2, transverse rotary inertia of the cell
+    polar: Annotated[Floats, cell(ROD)]  # (N,) kg m2, polar inertia of the cell
+    drag_n: Annotated[Floats, cell(HALF)]  # (N,) kg/m, of half the cell
+    drag_t: Annotated[Floats, cell(HALF)]  # (N,) kg/m
+    added_n: Annotated[Floats, cell(HALF)]  # (N,) kg, of half the cell
+    added_t: Annotated[Floats, cell(HALF)]  # (N,) kg
+    damp: Annotated[Floats, node(SHARED)]  # (N+1,) kg/s, mass-proportional damping of the node
+    tau: Annotated[Floats, cell(MEAN)]  # (N,) s, stiffness-proportional damping time
+    # (N,) N, buoyancy of half the cell where it depends on the surface (else part of `force`)
+    buoy: Annotated[Floats, cell(HALF)]
+    # (N,) kg, water displaced by half the cell, on which the pressure of waves acts
+    displaced: Annotated[Floats, cell(HALF)]
+    diameter: Annotated[Floats, cell(MEAN)]  # (N,) m, over which a cell passes through the surface
+    point_mass: Annotated[Floats, node(POINT)]  # (N+1,) kg, of a body at the node (part of `mass`)
+    point_lift: Annotated[Floats, node(POINT)]  # (N+1,) N, buoyancy less weight of a body at the node (part of `force`)
+    point_drag: Annotated[Floats, node(POINT)]  # (N+1,) kg/m, rho CdA/2 of a body at the node
+    point_added: Annotated[Floats, node(POINT)]  # (N+1,) kg, added mass of a body at the node
+    # (N+1,) N, buoyancy of a body at the node where it depends on the surface (else in `force`)
+    point_buoy: Annotated[Floats, node(POINT)]
+    point_displaced: Annotated[Floats, node(POINT)]  # (N+1,) kg, water displaced by a body at the node
+    # (N+1,) wetted part from which on a body has its added mass; less of it at a smaller one
+    point_floats: Annotated[Floats, node(POINT)]
+    point_height: Annotated[Floats, node(POINT)]  # (N+1,) m, over which a body passes through the surface
+    # (N+1,) 1 where a body is a cylinder that stands upright, 0 where it is a sphere
+    point_upright: Annotated[Floats, node(POINT)]
+    # (N+1,) m, length of cable that presses on the seabed as much as the body at the node
+    footing: Annotated[Floats, node(POINT)]
+    bits: int  # which optional forces are on (kernels.state.forces)
+    plane: Floats = NO_PLANE  # (3, 3) rows p, q and the normal p x q of the plane that a planar line lies in
+    # (K, 5) catenary zones that a torque passes through: first cell, cell after the last, compliance (rad per N m),
+    # turn without torque (rad), stiffness-proportional damping time (s)
+    torsion: Floats = NO_TORSION
+    # (N, 7) of cells whose tension is no multiple of strain (kernels.laws.axial_law); empty: there are none
+    law: Annotated[Floats, cell(columns=7, optional=True)] = NO_LAW
+    law_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: strain, tension (N), energy per length (J/m)
+    law_at: NDArray[np.int64] = (
+        NO_ADDRESS  # (1,) address of kernels.laws.axial_law.follow_law; empty: there is no such cell
+    )
+    # (N,) of sections in which tension makes a torque (kernels.laws.tension_torque): torque by tension, N m per N; twist of half
+    # a cell by tension, rad/N; empty: there are none
+    tension_torque: Annotated[Floats, cell(optional=True)] = NO_TENSION_TORQUE
+    tension_twist: Annotated[Floats, cell(optional=True)] = NO_TENSION_TORQUE
+
+
+FIELDS = fields_of(Line)
+# Of these there is one for every node; of all but what belongs to the whole line or to few, one for every node or cell.
+NODES_OF_LINE = tuple(name for name, x in FIELDS.items() if x.of_node)
+ALONG_LINE = tuple(name for name, x in FIELDS.items() if not x.optional)
+TENSION_TORQUE = ("tension_torque", "tension_twist")
+
+
+class Ends(NamedTuple):
+    """What the two ends impose at one moment; row 0 the start, row 1 the end."""
+
+    held: NDArray[np.int8]  # (2,) 1 where the position is given
+    position: Floats  # (2, 3) m
+    frame: Floats  # (2, 9) columns (a1, a2, tangent), row order; read only where an element sits at the end
+    spin: Floats  # (2, 3) 1/s, angular velocity of that frame
+    force: Floats  # (2, 3) N, applied to the cable
+    moment: Floats  # (2, 3) N m, applied to the cable; read where a rod ends without an element
+
+
+class Moves(NamedTuple):
+    """How what the two ends impose changes in time (kernels.laws.end_motion); row 0 the start, row 1 the end.
+
+    E harmonics, L loads that act now, K knots of motion files.  What is absent has no rows, or zeros where said.
+    """
+
+    prescribed: NDArray[np.int8]  # (2, 2) 1 where a motion prescribes the position; the frame
+    position: Floats  # (2, 3) m, without motion
+    frame: Floats  # (2, 9) without motion; as Ends.frame
+    ramp: Floats  # (2,) s, over which the harmonics of an end grow; 0: none
+    harmonics: Floats  # (E, 5) end; axis, 0 to 2 along x, y, z, 3 to 5 about them; m or rad; 1/s; rad
+    velocity: Floats  # (2, 3) m/s, steady
+    velocity_ramp: Floats  # (2,) s, over which it grows; 0: no velocity
+    travel: Floats  # (2, 5) m: the way; s: its beginning and duration; duration 0: no travel
+    follows: NDArray[np.int8]  # (2,) 1 where the end follows the surface of the sea
+    file: NDArray[np.int64]  # (2, 2) first and last row of `knots`; equal: no file
+    knots: Floats  # (K,) s
+    cubics: Floats  # (K, 6, 4) coefficients from a knot on, highest power first: m (3), rotation vector in rad (3)
+    missing: Floats  # (2, 4) axis and angle (rad) by which a frame has still to turn at t = 0; angle 0: none
+    bring_in: float  # s, over which it does
+    driven: NDArray[np.int8]  # (2, 2) 1 where the position, the frame, is set from outside, step by step
+    paths: Floats  # (2, 26) of driven ends: from t to t' (s), position and velocity at both (m, m/s), then
+    # the frame at t and the rotation vector to that at t', in the axes of the frame (rad)
+    loads: Floats  # (L, 8) end; 0 force, 1 moment; N or N m (3); s, over which it grows, 0: at once; of `history` the
+    # first row and the one behind the last; equal: constant
+    history: Floats  # (H, 4) s, N or N m (3), linear between the rows of a load
+
+
+class Sea(NamedTuple):
+    """What surrounds the line at one moment.  Parameters of what is off are NaN or empty.
+
+    The last six are work arrays: `flow` and `lanes` are filled by `kernels.laws.water.wave_kinematics`, `axis` and `slip` at the start of a
+    step, `slid` and `bed` by the march.
+    """
+
+    z: Floats  # (K,) m, increasing: heights of the current profile
+    current: Floats  # (K, 3) m/s, at these heights; linear between, constant beyond
+    waves: Floats  # (W, 6) m, 1/s, 1/m, 1/m, rad, 1/m: amplitude, frequency, kx, ky, phase, k
+    depth: float  # m, for waves; infinite in deep water
+    surface: float  # m, z of still water
+    now: Floats  # (4,) time, s; grown part of the current; of the waves, and its rate, 1/s
+    ramps: Floats  # (2,) s, over which the current and the waves grow from nothing; 0: there from the start
+    normal: Floats  # (3,) unit normal of the seabed, upwards
+    offset: float  # m, normal . x on the seabed
+    bed_x: Floats  # (K,) m, increasing: of a bed of depths on a grid (kernels.laws.bed); empty: the bed is a plane
+    bed_y: Floats  # (M,) m, increasing
+    bed_heights: Floats  # (K M, 4) z (m), its slopes along x and y, and the rate of these along the other, 1/m
+    stiffness: float  # N/m per m
+    damping: float  # N s/m per m
+    onset: float  # m, penetration over which contact sets in
+    friction: Floats  # (2,) axial and lateral coefficient
+    slip_length: float  # m, elastic travel before a touching cable slides
+    flow: Floats  # (N+1, 7) velocity and acceleration of the waves at the nodes, and their elevation there
+    lanes: Floats  # (10 + 2 W, LANES) what kernels.laws.water needs for LANES nodes at a time
+    axis: Floats  # (N+1, 3) direction of the cable in the plane of the seabed
+    slip: Floats  # (N+1, 3) m, elastic travel at the start of the step
+    slid: Floats  # (N+1, 3) m, at its end
+    bed: Floats  # (N+1, 3) N, force of the seabed on the nodes
+
+
+class State(NamedTuple):
+    """Where the cable is.  The only history is kinematic; tension and moment carry none."""
+
+    r: Floats  # (N+1, 3) m
+    v: Floats  # (N+1, 3) m/s
+    a: Floats  # (N+1, 3) m/s2, algorithmic acceleration of generalized-alpha
+    vd: Floats  # (N+1, 3) m/s2, true acceleration
+    e: Floats  # (N, 3) m, chords, accumulated from increments
+    T: Floats  # (N,) N
+    a1: Floats  # (N, 3) first director of the cell's frame; unit, normal to the chord where spin = 1
+    w: Floats  # (N,) 1/s, spin rate about the chord
+    wa: Floats  # (N,) 1/s2, algorithmic spin acceleration
+    wd: Floats  # (N,) 1/s2, true spin acceleration
+    slip: Floats  # (N+1, 3) m, elastic travel of friction on the seabed
+    bed: Floats  # (N+1, 3) N, force of the seabed
+    # (K, 3) of zones that a torque passes through: turn of the frame after the zone against that before it, counted
+    # beyond half a turn (rad), torque (N m), power that the torque gains because the zone bends without it (W)
+    turn: Floats = NO_TURN
+    slow: Floats = NO_SLOW  # (N,) N, mean tension of lines with a `law`; else empty
+
+    def copy(self) -> State:
+        return State(*(x.copy() for x in self))
+
+
+class Batch(NamedTuple):
+    """What outputs are made of: nb states with their ends and what was reported of them, one row per output.
+
+    float64 but for `held`; arrays may be views of larger ones, contiguous but in the first axis.
+    """
+
+    t: Floats  # (nb,) s
+    r: Floats  # (nb, N+1, 3) m
+    v: Floats  # (nb, N+1, 3) m/s
+    vd: Floats  # (nb, N+1, 3) m/s2, true acceleration
+    e: Floats  # (nb, N, 3) m
+    T: Floats  # (nb, N) N
+    a1: Floats  # (nb, N, 3)
+    w: Floats  # (nb, N) 1/s
+    held: NDArray[np.int8]  # (nb, 2) this and the five that follow: as `Ends` has them
+    position: Floats  # (nb, 2, 3) m
+    frame: Floats  # (nb, 2, 9)
+    spin: Floats  # (nb, 2, 3) 1/s
+    force: Floats  # (nb, 2, 3) N
+    moment: Floats  # (nb, 2, 3) N m
+    report: Floats  # (nb, REPORT_SIZE) as named in kernels.state.report
+    work: Floats  # (nb, number of powers) J, since the start
+    sea_now: Floats  # (nb, 4) as `Sea.now`
+    h: Floats = NOT_VARYING  # (nb, N) m, lengths of cells where they change in a run; else empty: those of the line
+    kb: Floats = NOT_VARYING  # (nb, N+1, 3) N m, stiffness of elements, likewise
+    turn: Floats = NO_TURNS  # (nb, K, 3) as `State.turn`
+    touch: Floats = NOT_VARYING  # (nb, N+1) N/m, of contact of the line with itself; empty: there is none
+
+    def line(self, k: int, line: Line) -> Line:
+        """The line at output k, from the one of all outputs."""
+        return line._replace(h=self.h[k], kb=self.kb[k]) if self.h.size else line
+
+    def stiffness(self, node: int, line: Line) -> Floats:
+        """Stiffness (1 or nb, 3) N m of the element at a node."""
+        return self.kb[:, node] if self.kb.size else line.kb[None, node]
+
+
+def batch_of_one(
+    t: float, ends: Ends, state: State, report: Floats, work: Floats, sea: Sea, touch: Floats | None = None
+) -> Batch:
+    """The batch of a single output at time t, s, with copies of what the next step overwrites.
+
+    touch: (N+1,) N/m, force of the line on itself; None: it does not touch itself.
+    """
+    now = State(*(x[None].copy() for x in state))
+    return Batch(
+        np.array([t]), now.r, now.v, now.vd, now.e, now.T, now.a1, now.w, ends.held[None].copy(),
+        ends.position[None].copy(), ends.frame[None].copy(), ends.spin[None].copy(), ends.force[None].copy(),
+        ends.moment[None].copy(), report[None].copy(), work[None].copy(), sea.now[None].copy(), turn=now.turn,
+        **{} if touch is None else {"touch": touch[None].copy()},
+    )  # fmt: skip
+
+
+def state_in(batch: Batch, k: int, line: Line) -> State:
+    """The state of a line at output k, in arrays of its own; algorithmic accelerations and friction are not known, and
+
+    mean tensions are taken for those of a line at rest.
+    """
+    state = state_for(line)
+    state.turn[:] = batch.turn[k] if batch.turn.size else 0.0
+    state.slow[:] = batch.T[k] if state.slow.size else 0.0
+    for name in ("r", "v", "vd", "e", "T", "a1", "w"):
+        getattr(state, name)[:] = getattr(batch, name)[k]
+    return state
+
+
+def ends_in(batch: Batch, k: int) -> Ends:
+    """The conditions of the ends at output k, in arrays of their own."""
+    rows = (batch.held, batch.position, batch.frame, batch.spin, batch.force, batch.moment)
+    return Ends(*(np.array(x[k]) for x in rows))
+
+
+class Torsion(NamedTuple):
+    """What a torque through K catenary zones takes beside the march (kernels.march.zone_torque); empty: there is none."""
+
+    address: int  # of kernels.march.zone_torque.pass_torque; 0: there is none
+    passed: Floats  # (2, N) N m of cells of rods beside zones: torque on their spin; stiffness that holds it meanwhile
+    slope: Floats  # (N, 3) 1/m, how the turn of the zone of a cell, or beside it, answers to its chord
+    directions: Floats  # (K, 2, 3) how it answers to the directions of ends that hold the zone
+    floating: NDArray[np.int64]  # (F,) cells that are held meanwhile: one of each rod that no end holds
+    columns: Floats  # (K+F, N+1, 5) how the line answers to the torque of each zone, to a torque on each such cell
+    # (5,) cv of the columns, 1/s (< 0: they are not known); how often they have served; whether they are made anew, from
+    # factors that the march keeps; whether it keeps them in any case; iterations of the step; empty: it keeps them where
+    # there is room
+    known: Floats
+    right: Floats  # (N+1, 5) a right-hand side
+    coupling: Floats  # (K+F, K+F) how turns and those spins answer to the columns
+    dense: Floats  # (K+F, K+F+1) equations of the torques and of those spins
+
+
+class Work(NamedTuple):
+    """Arrays that a solver works in; kernels.run.entry.workspace makes them."""
+
+    u: Floats  # (N+1, 3) m, displacement of the nodes since the start of the step
+    x: Floats  # (N+1, 5) Newton's correction: dT of the cell before (N), dr of the node (m), dpsi of the cell after (rad)
+    W: Floats  # one block row
+    X: Floats  # the eliminated block rows, and what another right-hand side needs of them where there is room for it
+    report: Floats  # (REPORT_SIZE,) named in kernels.state.report
+    gaps: Floats  # (N,) m, change of length asked of inextensible cells; empty: their law of length
+    rows: Floats  # (N+1, ...) the block rows before their elimination; empty: they are not kept
+    torsion: Torsion
+    couple: (
+        Floats  # (N+1, COUPLES) of elements where tension makes a torque (kernels.laws.tension_torque); empty: nowhere
+    )
+
+
+def no_torsion() -> Torsion:
+    """No torque passes through catenary zones."""
+    z = np.zeros
+    return Torsion(
+        0, z((2, 0)), z((0, 3)), z((0, 2, 3)), z(0, np.int64), z((0, 0, 5)), z(0), z((0, 5)), z((0, 0)), z((0, 1))
+    )
+
+
+def blank_state(n_cells: int, zones: int = 0, slow: bool = False) -> State:
+    """A state of zeros with room for `n_cells` cells; zones: those that a torque passes through; slow: mean tensions."""
+    node, cell = (n_cells + 1, 3), (n_cells, 3)
+    z = np.zeros
+    w, wa, wd = z(n_cells), z(n_cells), z(n_cells)
+    return State(
+        z(node),
+        z(node),
+        z(node),
+        z(node),
+        z(cell),
+        z(n_cells),
+        z(cell),
+        w,
+        wa,
+        wd,
+        z(node),
+        z(node),
+        z((zones, 3)),
+        z(n_cells if slow else 0),
+    )
+
+
+def state_for(line: Line) -> State:
+    """A state of zeros of a line."""
+    return blank_state(line.h.size, len(line.torsion), line.law.size > 0)
+
+
+def no_sea(n_cells: int) -> Sea:
+    """Nothing around a line of `n_cells` cells: no current but zero, no waves, no seabed."""
+    node, nan = (n_cells + 1, 3), float("nan")
+    return Sea(
+        np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), nan, nan, np.array([0.0, 1.0, 1.0, 0.0]), np.zeros(2),
+        np.array([0.0, 0.0, 1.0]), nan, np.zeros(0), np.zeros(0), np.zeros((0, 4)), nan, nan, nan, np.full(2, nan), nan,
+        np.zeros((n_cells + 1, 7)), np.zeros((10, LANES)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
+    )  # fmt: skip
+
+
+def with_waves(sea: Sea, waves: Floats, depth: float) -> Sea:
+    """The same with waves (W, 6) over water of a depth, m."""
+    return sea._replace(waves=waves, depth=depth, lanes=np.zeros((10 + 2 * len(waves), LANES)))
+
+
+def blank_line(n_cells: int) -> Line:
+    """A line of `n_cells` cells without length, mass or load."""
+    along: dict[str, Any] = {name: blank(field, n_cells) for name, field in FIELDS.items()}
+    return Line(**along, bits=0)
+
+
+def no_ends() -> Ends:
+    """Both ends free, without loads."""
+    vectors = [np.zeros((2, 3)) for _ in range(4)]
+    return Ends(np.zeros(2, np.int8), vectors[0], np.zeros((2, 9)), *vectors[1:])
+
+
+def no_moves() -> Moves:
+    """Both ends at the origin, not moved, not loaded."""
+    z = np.zeros
+    return Moves(
+        z((2, 2), np.int8), z((2, 3)), z((2, 9)), z(2), z((0, 5)), z((2, 3)), z(2), z((2, 5)), z(2, np.int8),
+        z((2, 2), np.int64), z(0), z((0, 6, 4)), z((2, 4)), 1.0, z((2, 2), np.int8), z((2, 26)), z((0, 8)), z((0, 4)),
+    )  # fmt: skip
+
+
+def no_work() -> Work:
+    """A workspace in which nothing can be solved."""
+    z = np.zeros
+    return Work(z((2, 3)), z((2, 5)), z(1), z(1), z(REPORT_SIZE), z(0), z((0, 1)), no_torsion(), z((0, 1)))
+
+
+for _each in (blank_line(1), no_sea(1), no_ends(), no_moves(), blank_state(1), no_work()):
+    by_reference(_each)

@@ -1,0 +1,1 @@
+"""Newton's method, generalized alpha, step control, what follows an accepted step."""

@@ -1,0 +1,326 @@
+"""What follows a try of a step in a compiled run: its judgement, its books, what there is to look at."""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.rotations import get3
+from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.march.powers import book_work, find_powers, pull
+from hybrid.kernels.march.zone_torque import POWER
+from hybrid.kernels.state.books import (
+    BEGIN,
+    BEGIN_STEP,
+    BEND_LIMIT,
+    BENT,
+    CONTROLLED,
+    CORRECTION,
+    CUT_AT,
+    CUT_BY_ERROR,
+    CUT_BY_GAIN,
+    CUT_BY_NEWTON,
+    CUT_BY_TURN,
+    EARLIER_DT,
+    FLOOR,
+    IS_CUT,
+    ITERATIONS,
+    JUMPED,
+    LARGEST_PEAK,
+    LAST_DT,
+    LAST_RHO,
+    LEAST_PEAK,
+    LEAVES_PLANE,
+    LETS_GO,
+    LONGEST,
+    MEASURED,
+    MOVED,
+    NEAR_PLANE,
+    NEARS_PLANE,
+    NOW,
+    OUTCOME,
+    PARITY,
+    PHASE,
+    PREVIOUS,
+    PUSH_DIED,
+    PUSH_GROWN,
+    PUSH_START,
+    RELEASE_END,
+    RELEASE_START,
+    REPEATS,
+    ROWS,
+    SAMPLE,
+    SCALED_JUMP,
+    SHORTEST,
+    SLACK_CELL,
+    SLACK_LIMIT,
+    SLACK_STEP,
+    SLACKENED,
+    STEPS,
+    STIFF,
+    STRETCHED,
+    TAKEN,
+    TINY_STEPS,
+    TRIED_DT,
+    TRIES,
+    TRY,
+    TWIST_LIMIT,
+    UNTIL,
+    WASTED,
+    WAVE_STEP,
+    WHERE,
+    ZONES,
+)
+from hybrid.kernels.state.forces import PLANAR, SEABED, SELF_FRICTION
+from hybrid.kernels.state.report import (
+    BEND,
+    LOCAL_ERROR,
+    LOCAL_ERROR_NODE,
+    PUSH_ENERGY,
+    RESIDUAL,
+    SLACKEST,
+    SLACKEST_CELL,
+    TWIST,
+    USED_RHO,
+    WRONG_PIVOTS,
+)
+from hybrid.kernels.step.newton import CUT_SHORT, OK, SLACK, TURNED_TOO_FAR
+from hybrid.kernels.step.sampling import end_frame, holds_twist, twist_at_end
+from hybrid.kernels.step.step_control import halve, passes
+
+# Twist of an element (rad) that could become its opposite unseen: the log strain ends at pi, and a step may add what
+# an end turns in it (model.resolution.MOST_TURN); what goes beyond pi comes back as more than this.
+LARGEST_TWIST = 2.0
+# Growth of the speed of a push out of the plane at which the plane no longer holds: a disturbance of a thousandth of the
+# length, which every real cable has, would by then be as large as the cable; swings that come and go stay below a tenth.
+GROWN = 1e3
+# A push that has died to this part is given anew, so that an instability that begins late is seen as early.
+DIED = 1e-3
+# Steps that are less than TINY of the longest one, MANY after another, have collapsed: somebody has to know.
+TINY, MANY = 1e-3, 200
+
+
+@inner
+def note_try(clock, count, report, outcome, iterations, left, where):
+    """Keep how a try ended; one that leaves a catenary cell at the floor of tension or below has failed."""
+    count[TAKEN] += iterations
+    count[IS_CUT] = 0
+    if outcome == CUT_SHORT:
+        outcome, count[IS_CUT] = OK, 1
+    if outcome == OK and not report[SLACKEST] > clock[FLOOR]:
+        outcome, where = SLACK, int(report[SLACKEST_CELL])
+    count[OUTCOME], count[TRIES], count[WHERE] = outcome, iterations, where
+    clock[CORRECTION] = left
+
+
+@inner
+def judge(clock, count, report, dt, gains):
+    """Whether the try over dt is the step (1), is to be repeated in another length (0), or has failed for good (-1).
+
+    gains: whether it is to be repeated in halves because contact has put energy in, as long as it may be halved.
+    """
+    count[CUT_AT] = count[WHERE]
+    if gains and 0.5 * clock[TRIED_DT] >= clock[SHORTEST]:
+        halve(clock, count, dt)
+        count[CUT_BY_GAIN] += 1
+    elif count[OUTCOME] == OK:
+        if not count[CONTROLLED] or passes(clock, count, dt, report[LOCAL_ERROR]):
+            return 1
+        count[CUT_BY_ERROR] += 1
+        count[CUT_AT] = int(report[LOCAL_ERROR_NODE])
+    elif 0.5 * clock[TRIED_DT] < clock[SHORTEST] or (count[OUTCOME] == SLACK and dt <= clock[WAVE_STEP]):
+        # A catenary that is slack in a step that follows its waves is no matter of the step.
+        return -1
+    else:
+        if count[OUTCOME] == SLACK:
+            clock[SLACK_STEP], count[SLACK_CELL] = dt, count[WHERE]
+        halve(clock, count, dt)
+        count[CUT_BY_TURN if count[OUTCOME] == TURNED_TOO_FAR else CUT_BY_NEWTON] += 1
+    count[WASTED] += count[TRIES]
+    count[REPEATS] += 1
+    count[PHASE] = TRY
+    return 0
+
+
+@inner
+def collapses(clock, count, dt):
+    """Whether steps have become so short, for so long, after a step of dt that is taken, that somebody has to know."""
+    clock[LONGEST] = max(clock[LONGEST], dt)
+    if not dt < TINY * clock[LONGEST]:
+        count[TINY_STEPS] = count[CUT_BY_GAIN] = count[CUT_BY_TURN] = count[CUT_BY_NEWTON] = count[CUT_BY_ERROR] = 0
+        return False
+    count[TINY_STEPS] += 1
+    return count[TINY_STEPS] % MANY == 0
+
+
+@inner
+def keep_imposed(ends, imposed):
+    """What the ends impose now, and what they did before the step."""
+    for k in range(2):
+        for j in range(21):
+            imposed[1, k, j] = imposed[0, k, j]
+        for j in range(9):
+            imposed[0, k, 3 + j] = ends.frame[k, j]
+        for j in range(3):
+            imposed[0, k, j], imposed[0, k, 12 + j] = ends.position[k, j], ends.spin[k, j]
+            imposed[0, k, 15 + j], imposed[0, k, 18 + j] = ends.force[k, j], ends.moment[k, j]
+
+
+@inner
+def keep_end_twist(line, old, books):
+    """Twist of the elements at both ends before the step, and before the one before it."""
+    n = old.T.shape[0]
+    for k in range(2):
+        books.twist[1, k] = books.twist[0, k]
+        if holds_twist(line, k):
+            c = k * (n - 1)
+            books.twist[0, k] = twist_at_end(k, end_frame(books.imposed, 1, k), get3(old.e, c), get3(old.a1, c))
+
+
+@inner
+def accept(line, ends, old, new, books, work, end, dt):
+    """The step that was tried is taken: clock, books and log."""
+    clock, count, report = books.clock, books.counts, work.report
+    clock[EARLIER_DT] = clock[LAST_DT] if clock[NOW] > clock[PREVIOUS] else 0.0
+    count[PARITY] = 1 - count[PARITY]
+    clock[PREVIOUS], clock[NOW], clock[LAST_DT], clock[LAST_RHO] = clock[NOW], end, dt, report[USED_RHO]
+    count[STEPS] += 1
+    count[ITERATIONS] = count[TRIES]
+    for j in range(report.shape[0]):
+        books.report[2, j], books.report[1, j], books.report[0, j] = books.report[1, j], books.report[0, j], report[j]
+    for c in range(old.T.shape[0]):
+        books.tension[1, c], books.tension[0, c] = books.tension[0, c], old.T[c]
+    for i in range(books.touch.shape[1]):
+        books.touch[1, i], books.touch[0, i] = books.touch[0, i], books.touch[2, i]
+    for j in range(books.power.shape[1]):
+        books.power[1, j] = books.power[0, j]
+    keep_imposed(ends, books.imposed)
+    if not line.bits & PLANAR:
+        keep_end_twist(line, old, books)
+    find_powers(line, ends, books.velocity, new, report, books.power[0])
+    book_work(line, dt, report, books)
+    for z in range(new.turn.shape[0]):
+        books.work[0, ZONES] += 0.5 * dt * (old.turn[z, POWER] + new.turn[z, POWER])
+    row = books.log[count[ROWS]]
+    row[0], row[1], row[2], row[3] = end, dt, count[TRIES] + count[WASTED], clock[CORRECTION]
+    row[4], row[5], row[6] = report[RESIDUAL], count[REPEATS], report[LOCAL_ERROR]
+    row[7], row[8] = pull(report, 0), pull(report, 1)
+    count[ROWS] += 1
+    count[WASTED], count[PHASE] = 0, SAMPLE
+
+
+@inner
+def remember_worst(line, old, new, books, t, dt):
+    """Of the steps that leave the most out of the motion, how much (m), when, over what, and where (s, m)."""
+    worst, most, node = books.worst, -1.0, 0
+    for i in range(old.a.shape[0]):
+        for k in range(3):
+            x = abs(new.a[i, k] - old.a[i, k])
+            if x > most:
+                most, node = x, i
+    left = dt * dt * most
+    known = min(books.counts[MEASURED], worst.shape[0])
+    books.counts[MEASURED] += 1
+    at = known
+    while at > 0 and left > worst[at - 1, 0]:
+        at -= 1
+    if at < worst.shape[0]:
+        for j in range(min(known, worst.shape[0] - 1), at, -1):
+            for k in range(4):
+                worst[j, k] = worst[j - 1, k]
+        worst[at, 0], worst[at, 1], worst[at, 2], worst[at, 3] = left, t, dt, line.s[node]
+
+
+@inner
+def is_near_plane(line, state, most):
+    """Whether all nodes are less than `most`, m, from the plane of the line through its first node."""
+    n, r = line.plane[2], state.r
+    for i in range(1, r.shape[0]):
+        off = (r[i, 0] - r[0, 0]) * n[0] + (r[i, 1] - r[0, 1]) * n[1] + (r[i, 2] - r[0, 2]) * n[2]
+        if not abs(off) < most:
+            return False
+    return True
+
+
+@inner
+def watch(line, ends, old, new, books, report, t, dt):
+    """What there is to look at after a step, as bits; and how far the line has moved, how its peak tension varies."""
+    clock, flags = books.clock, 0
+    peak, before, stretched, slack = new.T[0], old.T[0], False, False
+    for c in range(new.T.shape[0]):
+        peak, before = max(peak, new.T[c]), max(before, old.T[c])
+        slack |= not (line.spin[c] or new.T[c] > clock[SLACK_LIMIT])
+        e, longest = new.e[c], books.borne[c] * line.h[c]
+        e2, shortest = e[0] * e[0] + e[1] * e[1] + e[2] * e[2], max(2.0 * line.h[c] - longest, 0.0)
+        stretched |= e2 > longest * longest or e2 < shortest * shortest
+    clock[LEAST_PEAK], clock[LARGEST_PEAK] = min(clock[LEAST_PEAK], peak), max(clock[LARGEST_PEAK], peak)
+    for j in range(books.base.shape[0]):
+        for k in range(3):
+            clock[MOVED] = max(clock[MOVED], abs(new.r[books.base[j], k] - books.placed[j, k]))
+    remember_worst(line, old, new, books, t, dt)
+    if stretched and not books.counts[STIFF]:
+        flags |= STRETCHED
+    if books.counts[STIFF] and peak - before > clock[SCALED_JUMP]:
+        flags |= JUMPED
+    if report[BEND] > clock[BEND_LIMIT] or report[TWIST] > min(clock[TWIST_LIMIT], LARGEST_TWIST):
+        flags |= BENT
+    if slack:
+        flags |= SLACKENED
+    if clock[NEAR_PLANE] > 0.0 and is_near_plane(line, new, clock[NEAR_PLANE]):
+        flags |= NEARS_PLANE
+    if pull(report, 0) > clock[RELEASE_START]:
+        flags |= LETS_GO
+    if pull(report, 1) > clock[RELEASE_END]:
+        flags |= LETS_GO
+    return flags
+
+
+@inner
+def watch_push(clock, report):
+    """By how much a push out of the plane has grown, as bits."""
+    energy = report[PUSH_ENERGY]
+    if report[WRONG_PIVOTS] > 0.0 or not energy < math.inf:
+        clock[PUSH_GROWN] = math.inf
+        return LEAVES_PLANE
+    if not clock[PUSH_START] > 0.0:
+        clock[PUSH_START] = energy
+    clock[PUSH_GROWN] = math.sqrt(energy / clock[PUSH_START]) if clock[PUSH_START] > 0.0 else 0.0
+    if clock[PUSH_GROWN] < DIED:
+        return PUSH_DIED
+    return LEAVES_PLANE if clock[PUSH_GROWN] >= GROWN else 0
+
+
+@inner
+def end_step(line, state, clock, count):
+    """Go on with the next part of the step, or with the next step."""
+    if not (count[CONTROLLED] or clock[NOW] >= clock[UNTIL]):
+        count[PHASE] = TRY
+        return
+    if count[REPEATS] > 0 and line.bits & SEABED:
+        settle_impact(state, clock[UNTIL] - clock[BEGIN])
+    if count[REPEATS] > 0 and line.bits & SELF_FRICTION:
+        settle_spins(state, clock[UNTIL] - clock[BEGIN])
+    count[PHASE] = BEGIN_STEP
+
+
+@inner
+def settle_spins(state, dt):
+    """After shortened steps: friction of the line on itself leaves spin accelerations that would multiply all spins."""
+    fastest = 0.0
+    for c in range(state.w.shape[0]):
+        fastest = max(fastest, abs(state.w[c]))
+    for c in range(state.w.shape[0]):
+        if abs(state.wa[c]) * dt > fastest:
+            state.wa[c], state.wd[c] = 0.0, 0.0
+
+
+@inner
+def settle_impact(state, dt):
+    """After shortened steps: an impact on the seabed leaves accelerations that would undo all velocity at once."""
+    fastest = 0.0
+    for i in range(state.v.shape[0]):
+        fastest = max(fastest, abs(state.v[i, 0]), abs(state.v[i, 1]), abs(state.v[i, 2]))
+    for i in range(state.v.shape[0]):
+        touches = state.bed[i, 0] != 0.0 or state.bed[i, 1] != 0.0 or state.bed[i, 2] != 0.0
+        if touches and max(abs(state.a[i, 0]), abs(state.a[i, 1]), abs(state.a[i, 2])) * dt > fastest:
+            for k in range(3):
+                state.a[i, k], state.vd[i, k] = 0.0, 0.0

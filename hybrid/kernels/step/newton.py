@@ -1,0 +1,278 @@
+"""Newton's method for one step (in time, or one static solve): the only nonlinear loop of the package.
+
+Each iteration is one march along s and one substitution back (kernels.march.march), then an update of positions,
+tensions, frames and rates.  `plane` and `space`: for which kind of line (kernels.march.configuration).
+
+`solve` is inlined in the one entry to all that needs the march (kernels.run.run): a second one would compile it once more.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from hybrid.kernels.algebra.block_elimination import substitute
+from hybrid.kernels.algebra.block_elimination_plane import substitute_planar
+from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.machine.references import caller, caller_of_six
+from hybrid.kernels.march.assembly_plane import march_planar
+from hybrid.kernels.march.configuration import first_bad, measure, update
+from hybrid.kernels.march.march import march
+from hybrid.kernels.march.zone_torque import AFTER_STEP, BEFORE_MARCH, CORRECT
+from hybrid.kernels.state.forces import FRICTION
+from hybrid.kernels.state.report import RESIDUAL, RESIDUAL_NODE, SELF_CONTACT_ENERGY
+from hybrid.kernels.step.generalized_alpha import Scheme, before_fixed, radius_of_step, scheme
+from hybrid.kernels.step.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
+
+# The same of a step of a line that may touch itself: longer ones feed the vibrations that contact leaves.
+LARGEST_CONTACT_TURN = 0.3
+
+# Contact of the line with itself: places of `contact` (address, what is asked, whether it is near), and what is asked
+# (kernels.contact.self_contact).
+ADDRESS, ASKED, NEAR = range(3)
+PREPARE, LIMIT, TOUCH, FINISH, REST, RADIUS, GAIN, FIND = range(8)
+call_contact = caller(0.0)
+call_reel = caller(0)
+
+OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, TURNED_TOO_FAR = 0, 1, 2, 3, 4, 5  # errors.Outcome, as kernels see it
+CUT_SHORT = -1  # a step that is taken though Newton has not converged in the iterations it may take (Task.cut)
+STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION, RUN = 0, 1, 2, 3, 4
+
+
+class Limits(NamedTuple):
+    """What Newton works with."""
+
+    reach: float  # m, largest shift of a node in one iteration
+    scale: float  # N, tension scale of the scene
+    most: int  # iterations
+
+
+class Task(NamedTuple):
+    """What is asked of `entry`: one of the tasks above, and the numbers that belong to it."""
+
+    what: int
+    dt: float = 0.0  # s, of a step
+    before: float = 0.0  # s, the step that led to its start, 0 if none did
+    rho: float = 0.0  # spectral radius at infinity
+    cv: float = 0.0  # 1/s, dv'/dr' of what is no step
+    ca: float = 0.0  # 1/s2, dvd'/dr'
+    turning: bool = False  # whether chords are turned instead of shifted (kernels.step.newton.update)
+    limits: Limits = Limits(1.0, 1.0, 1)
+    cut: bool = False  # whether a step is taken as the last iteration has left it, converged or not
+    rho_before: float = 0.0  # spectral radius of the step that led to its start
+    fixed: bool = False  # whether steps have a fixed length, but for parts of one
+
+
+# Newton stops when the next correction, predicted from the last two by quadratic
+# convergence, turns no chord by more than TOLERANCE (rad) and changes no tension by more
+# than TOLERANCE of the largest.  Differences between two ways of computing the same thing
+# (ends swapped, scene rotated) then stay near 1e-9, a hundred times above round-off.
+TOLERANCE = 1e-9
+# Below this the correction is accepted when it no longer shrinks: round-off of ill-scaled lines.
+ROUND_OFF = 1e-6
+# Round-off of the length of the line, as a part of it (equal cells are all rounded the same way), and the most, as a
+# part of the tension scale, that it may make of a tension: a step so small that it is more does not converge.
+ROUND_OFF_LENGTH, MOST_NOISE = 2.5e-16, 1e-3
+# A shift of the line as a whole turns nothing; it counts as a part of `reach` times this (that is, of the length).
+WHOLE = 0.1
+# Changes of tension count against the largest tension of the line, or against this part of
+# the tension scale of the scene where that is larger (a line can be free of tension).
+LOW_TENSION = 1e-3
+# A chord that would turn by more than this in one iteration shortens the whole correction
+# (damped Newton): the linearised constraint of length is useless beyond about half a radian.
+LARGEST_TURN = 0.7
+
+call_torque = caller_of_six(0)
+call_law = caller_of_six(0)
+# ca, 1/s2, of a solve for accelerations is larger (solve.stepper.HEAVY): mean tensions stay as they are.
+AT_REST = 1e30
+
+
+@inner
+def pass_torque(space, line, ends, state, work, part, cv):
+    """A part of what a torque through catenary zones takes (kernels.march.zone_torque), where there is one."""
+    if space is not None:
+        if work.torsion.address != 0:
+            call_torque(work.torsion.address, line, ends, state, work, part, cv)
+
+
+@inner
+def follow_law(line, old, new, work, dt, cv, ca):
+    """Linearise the law of length where tension is no multiple of strain (kernels.laws.axial_law); dt: s, of a step, else 0."""
+    if line.law_at.shape[0] != 0:
+        if not dt > 0.0 and not (cv == 0.0 and ca < AT_REST):
+            dt = -1.0
+        call_law(line.law_at[0], line, old, new, work, dt, ca)
+
+
+@inner
+def round_off_tension(line, ca, scale):
+    """What round-off of a cell's length makes of the tension, N, when inertia must account for it in a short step."""
+    heavy = 0.0
+    length = 0.0
+    for i in range(line.h.shape[0]):
+        heavy += line.mass[i]
+        length += line.h[i]
+    return min(ROUND_OFF_LENGTH * length * heavy * ca, MOST_NOISE * scale)
+
+
+@inner
+def has_converged(size, before, it, part):
+    """Outcome OK or NOT_CONVERGED after correction `it`, and the next correction as it is predicted.
+
+    size, before: of this correction and the one before, relative; before: infinite for the first one and behind one
+    that was shortened, from which nothing can be predicted; part: of the correction that was made.
+    """
+    if not before < math.inf:
+        return (OK if part == 1.0 and size <= TOLERANCE else NOT_CONVERGED), size
+    ratio = size / before
+    left = size * min(1.0, ratio * ratio)
+    if part == 1.0:
+        if size <= TOLERANCE or (it > 1 and size < 1e-3 and left <= 0.1 * TOLERANCE):
+            return OK, left
+        if it > 4 and size < ROUND_OFF and ratio > 0.3:
+            return OK, size
+    return NOT_CONVERGED, left
+
+
+@inner
+def ask_contact(contact, table, what):
+    """What kernels.contact.self_contact answers."""
+    contact[ASKED] = what
+    return call_contact(contact[ADDRESS], table)
+
+
+@inner
+def most_turn(contact):
+    """The largest turn, rad, of a chord in a step."""
+    return LARGEST_STEP_TURN if contact[ADDRESS] == 0 else LARGEST_CONTACT_TURN
+
+
+@inner
+def with_radius(task, rho):
+    """The task of a step with its spectral radius where that of equal steps is rho."""
+    before, rho_before = task.before, task.rho_before
+    if task.fixed:
+        before, rho_before = before_fixed(task.dt, before, rho_before, rho)
+    rho = radius_of_step(rho, before, rho_before, task.dt)
+    return Task(
+        task.what, task.dt, before, rho, task.cv, task.ca, task.turning, task.limits, task.cut, rho_before, task.fixed
+    )  # fmt: skip
+
+
+@inner
+def start_step(plane, space, task, line, sea, old, new, work, contact, contact_table):
+    """Predict the end of a step; the task with its spectral radius, its scheme, and the largest turn and its cell.
+
+    Where the line touches itself the radius is 0: what contact excites within a step must not stay.
+    """
+    rho, safe = task.rho, 1.0
+    if contact[ADDRESS] != 0:
+        safe = ask_contact(contact, contact_table, PREPARE)
+        rho = ask_contact(contact, contact_table, RADIUS)
+    task = with_radius(task, rho)
+    s = scheme(task.rho, task.before, task.rho_before, task.dt)
+    turn, where = begin_step(plane, space, line, sea, old, new, work.u, s, safe)
+    return task, s, turn, where
+
+
+@inner
+def solve(
+    plane, space, task, line, sea, ends, old, new, was, now, work, strains, contact, contact_table, reel, reel_table
+):  # fmt: skip
+    """Do a task at the configuration `new`, of a step that starts at old.r.
+
+    STEP            predict `new` from `old`, solve, find the rates; was, now: a push out of the plane before and
+                    after (kernels.laws.out_of_plane), empty where there is none; strains: of the elements, empty: not wanted
+    EQUILIBRIUM     solve from the prediction in work.u and `new`
+    ASSEMBLY        one march, for its report and its block rows
+    CORRECTION      one march and the solution of its equations, into work.x
+
+    contact: of a step of a line in space that may meet itself (kernels.contact.self_contact); its address is 0 for others.
+    reel: address of kernels.reel.payout.iterate, for a line that is paid out; 0: iterations need nothing of it.
+
+    Returns outcome, iterations, last predicted correction, and the cell or node where it was worst.  A step whose
+    prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused: it has missed the motion, and Newton
+    may end on a branch that has nothing to do with it.  With task.cut a step whose last iteration made a full correction
+    is taken though it has not converged (CUT_SHORT); its report is of the iterate before that correction.
+    """
+    reach, scale, most = task.limits
+    s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
+    if task.what == STEP:
+        task, s, turn, where = start_step(plane, space, task, line, sea, old, new, work, contact, contact_table)
+        if not turn < most_turn(contact):
+            return TURNED_TOO_FAR, 0, turn, where
+    cv, ca = s.cv, s.ca
+    before, left = math.inf, math.inf
+    noise = round_off_tension(line, ca, scale)
+    outcome, it, where, size = NOT_CONVERGED, 0, -1, math.inf
+    while it < most and outcome == NOT_CONVERGED:
+        it += 1
+        bad, good = -1, True
+        pass_torque(space, line, ends, new, work, BEFORE_MARCH, cv)
+        follow_law(line, old, new, work, task.dt, cv, ca)
+        if reel != 0:
+            call_reel(reel, reel_table)
+        if space is not None:
+            bad = march(line, sea, ends, old.r, new, cv, ca, work)
+        if plane is not None:
+            bad = march_planar(line, sea, ends, old.r, new, cv, ca, work)
+        if bad >= 0:
+            outcome, where = SINGULAR, bad
+            if not work.report[RESIDUAL] < math.inf:  # a NaN makes every pivot fail: say so instead of "singular"
+                outcome, where = NOT_FINITE, int(work.report[RESIDUAL_NODE])
+            break
+        if task.what == ASSEMBLY:
+            outcome = OK
+            break
+        if reel != 0:
+            call_reel(reel, reel_table)
+        if space is not None:
+            good = substitute(work.X, work.x)
+            pass_torque(space, line, ends, new, work, CORRECT, cv)
+        if plane is not None:
+            good = substitute_planar(plane, work.X, work.x)
+        if not good:
+            outcome, where = NOT_FINITE, first_bad(work.x, new.e)
+            break
+        if task.what == CORRECTION:
+            outcome = OK
+            break
+        if contact[ADDRESS] != 0 and not ask_contact(contact, contact_table, TOUCH) > 0.0:
+            before = math.inf
+            break
+        shift, turn, where, pull, big = measure(new.e, new.T, work.x)
+        part = 1.0
+        if shift > reach and not task.turning:
+            part = reach / shift
+        if turn * part > LARGEST_TURN:
+            part = LARGEST_TURN / turn
+        if (line.bits & FRICTION or contact[NEAR] != 0) and cv > 0.0 and it in (7, 10, 13):
+            part *= 0.5  # it goes round between sticking and sliding, or feet of contact between two pieces
+        if contact[ADDRESS] != 0:
+            part = min(part, ask_contact(contact, contact_table, LIMIT))
+        update(plane, space, line, new, cv, ca, part, task.turning, work)
+        turn = max(turn, WHOLE * shift / reach)
+        size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
+        outcome, left = has_converged(size, before, it, part)
+        before = size if part == 1.0 else math.inf
+    cut_short = task.cut and outcome == NOT_CONVERGED and it == most and before < math.inf
+    if cut_short:
+        outcome = OK
+        if it == 1:  # from one correction the next cannot be predicted: it is this one at most
+            left = size
+    if task.what == STEP:
+        find_rates(space, line, sea, old, new, work.u, s)
+    if task.what != ASSEMBLY:
+        follow_law(line, old, new, work, task.dt, cv, ca)
+    pass_torque(space, line, ends, new, work, AFTER_STEP, cv)
+    if task.what == STEP:
+        if outcome == OK:
+            if contact[ADDRESS] != 0:
+                work.report[SELF_CONTACT_ENERGY] = ask_contact(contact, contact_table, FINISH)
+            turn, cell = end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, strains)
+            if not turn < most_turn(contact):
+                outcome, where = TURNED_TOO_FAR, cell
+            elif cut_short:
+                outcome = CUT_SHORT
+    return outcome, it, left, where

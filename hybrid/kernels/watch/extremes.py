@@ -1,0 +1,380 @@
+"""Extremes over all accepted steps: of tension, curvature, moment, torque, contact force, displacement, at every node.
+
+Where a quantity may have two values, at point loads and changes of section, the one on the right has a column of its own
+(books.right).  They follow the rules of the outputs (outputs.observation): tension of the middles of cells is interpolated to nodes, and
+taken on both sides of point loads and changes of section; at the ends it is the pull of what holds them.  A
+catenary has the curvature of the circle that two of its chords are tangents of; its ends, joints and marked nodes, where
+it may have a kink, have what its inner nodes lead to.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybrid.kernels.algebra.rotations import add, cross, dot, frame, get3, get9, scale, sub
+from hybrid.kernels.laws.bed import bed_under
+from hybrid.kernels.laws.cell import chord, turning
+from hybrid.kernels.laws.element import bending, damped_bending
+from hybrid.kernels.laws.seabed import pressure
+from hybrid.kernels.laws.tension_torque import rest_strain
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
+from hybrid.kernels.march.zone_torque import FIRST, LAST
+from hybrid.kernels.march.zone_torque import TORQUE as PASSED
+from hybrid.kernels.state.books import CURVATURE, DISPLACEMENT, MOMENT, PRESSURE, SEAM, SELF_PRESSURE, TENSION, TORQUE
+from hybrid.kernels.state.forces import PLANAR, SEABED, STIFFNESS_DAMPING
+from hybrid.kernels.state.report import FORCE_A
+
+
+@kernel  # a call costs a nanosecond; inlined at thirty places it costs seconds of compilation
+def widen(extremes, what, i, x, t):
+    """Widen the range of a quantity in column i to x, found at time t."""
+    if x < extremes[0, what, i]:
+        extremes[0, what, i], extremes[2, what, i] = x, t
+    if x > extremes[1, what, i]:
+        extremes[1, what, i], extremes[3, what, i] = x, t
+
+
+@kernel
+def widen_both(extremes, right, what, i, x, t):
+    """The same for a quantity that has one value at node i; right: columns of values just after nodes."""
+    widen(extremes, what, i, x, t)
+    if right[i] != i:
+        widen(extremes, what, right[i], x, t)
+
+
+@inner
+def beyond(T, h, near, far):
+    """Tension where cell `near` ends, from the middles of two neighbours."""
+    return T[near] + (T[near] - T[far]) * h[near] / (h[near] + h[far])
+
+
+@inner
+def beside(T, h, marks, i, side):
+    """Tension at node i as the cells on its side (-1, 1) lead to, up to the next kink."""
+    near = i - 1 if side < 0 else i
+    far = near + side
+    if not 0 <= far < h.shape[0] or marks[i + side]:
+        far = near
+    return beyond(T, h, near, far)
+
+
+@inner
+def second_cell(h, marks, k):
+    """The cell from which, beside that at end k, values at the end are extrapolated: none across a kink."""
+    n = h.shape[0]
+    first = k * (n - 1)
+    if n == 1 or marks[n - 1 if k else 1]:
+        return first
+    return first + 1 - 2 * k
+
+
+@inner
+def beyond_spring(t, d, part):
+    """Tangent of the line at a clamp with tangent t: between it and the chord d, if an angular spring turns as well.
+
+    part: of the turn from t to d that the half cell bends by; 1 without a spring.
+    """
+    cosine = min(max(dot(t, d), -1.0), 1.0)
+    angle = math.acos(cosine)
+    if part > 1.0 - 1e-9 or angle < 1e-6:
+        return t
+    return add(scale(math.sin(part * angle), t), scale(math.sin((1.0 - part) * angle), d))
+
+
+@inner
+def end_tension(line, ends, state, report, loaded, marks, k):
+    """Tension at an end: the force of what holds or loads it along the tangent; beside a body, that of the cable."""
+    n = line.h.shape[0]
+    first, second = k * (n - 1), second_cell(line.h, marks, k)
+    if loaded[k]:
+        return beyond(state.T, line.h, first, second)
+    d, _, _ = chord(get3(state.e, first))
+    d2, _, _ = chord(get3(state.e, second))
+    t = sub(scale(1.5, d), scale(0.5, d2))
+    if line.element[k * n]:
+        R = get9(ends.frame, k)
+        t = beyond_spring((R[2], R[5], R[8]), d, 0.5 * line.h[first] / line.hn[k * n])
+    at = FORCE_A + 3 * k
+    return (1.0 - 2.0 * k) * dot((report[at], report[at + 1], report[at + 2]), t) / math.sqrt(dot(t, t))
+
+
+@inner
+def rate_of_cell(state, i):
+    """Angular velocity (rad/s) of the frame of a cell."""
+    d, _, il = chord(get3(state.e, i))
+    d1, _ = turning(d, il, sub(get3(state.v, i + 1), get3(state.v, i)), 0.0)
+    return add(cross(d, d1), scale(state.w[i], d))
+
+
+@inner
+def moment_at(line, state, i):
+    """Moment (N m) of what is after an inner node on what is before it."""
+    if not line.element[i]:
+        return (0.0, 0.0, 0.0)
+    before, _, _ = chord(get3(state.e, i - 1))
+    after, _, _ = chord(get3(state.e, i))
+    Ra, Rb = frame(get3(state.a1, i - 1), before), frame(get3(state.a1, i), after)
+    kb, k0 = get3(line.kb, i), rest_strain(line, state.T, i)
+    if line.bits & STIFFNESS_DAMPING:
+        tau = 0.5 * (line.tau[i - 1] + line.tau[i])
+        m, _, _, _ = damped_bending(Ra, Rb, kb, k0, tau, rate_of_cell(state, i - 1), rate_of_cell(state, i))
+        return m
+    m, _ = bending(Ra, Rb, kb, k0)
+    return m
+
+
+@inner
+def note_tension(line, ends, state, books, t):
+    T, h, n = state.T, line.h, line.h.shape[0]
+    for k in range(2):
+        widen_both(
+            books.extremes,
+            books.right,
+            TENSION,
+            k * n,
+            end_tension(line, ends, state, books.report[0], books.loaded, books.marks, k),
+            t,
+        )
+    for i in range(1, n):
+        if books.marks[i]:
+            widen(books.extremes, TENSION, i, beside(T, h, books.marks, i, -1), t)
+            widen(books.extremes, TENSION, books.right[i], beside(T, h, books.marks, i, 1), t)
+        else:
+            widen_both(
+                books.extremes, books.right, TENSION, i, (T[i - 1] * h[i] + T[i] * h[i - 1]) / (h[i - 1] + h[i]), t
+            )
+
+
+@inner
+def is_smooth(line, marks, i):
+    """Whether node i lies inside a catenary, away from loads and changes of section."""
+    n = line.h.shape[0]
+    return 0 < i < n and not line.element[i] and not line.spin[i - 1] and not line.spin[i] and not marks[i]
+
+
+@inner
+def of_chords(line, state, i):
+    """Curvature, 1/m, at node i of the circle that its two chords are tangents of."""
+    d, _, _ = chord(get3(state.e, i - 1))
+    dn, _, _ = chord(get3(state.e, i))
+    s = cross(d, dn)
+    return 2.0 * math.sqrt(dot(s, s)) / (max(1.0 + dot(d, dn), 1e-12) * line.hn[i])
+
+
+@inner
+def towards(line, state, marks, i, side):
+    """Curvature at what may be a kink, node i, as the nodes on its side (-1, 1) lead to."""
+    x = 0.0
+    if is_smooth(line, marks, i + side):
+        x = of_chords(line, state, i + side)
+        if is_smooth(line, marks, i + 2 * side) and is_smooth(line, marks, i + 3 * side):
+            there = of_chords(line, state, i + 2 * side)
+            far = abs(line.s[i + side] - line.s[i]) / abs(line.s[i + 2 * side] - line.s[i + side])
+            x = max(0.0, x + far * (x - there))
+    return x
+
+
+@inner
+def note_catenary(line, state, books, i, t):
+    """Curvature at a node without element; at what may be a kink, on each side, as its neighbours lead to."""
+    if is_smooth(line, books.marks, i):
+        widen_both(books.extremes, books.right, CURVATURE, i, of_chords(line, state, i), t)
+        return
+    n = line.h.shape[0]
+    for side in (-1, 1):
+        cell = i - 1 if side < 0 else i
+        if cell < 0 or cell == n or line.spin[cell]:
+            continue
+        x = towards(line, state, books.marks, i, side)
+        widen(books.extremes, CURVATURE, i if side < 0 else books.right[i], x, t)
+
+
+@inner
+def at_rod_end(line, ends, state, i, side, passed):
+    """Curvature, moment and torque at node i, where the rod on its side (-1, 1) ends without element."""
+    n, cell = line.h.shape[0], i - 1 if side < 0 else i
+    d, _, _ = chord(get3(state.e, cell))
+    torque, moment = passed, 0.0
+    if i == 0 or i == n:
+        m = scale(-1.0 if i == 0 else 1.0, get3(ends.moment, 0 if i == 0 else 1))
+        torque = dot(m, d)
+        across = add(m, scale(-torque, d))
+        moment = math.sqrt(dot(across, across))
+    j, curvature = i + side, 0.0
+    if line.element[j]:
+        curvature = math.sqrt(line.k0[j, 0] ** 2 + line.k0[j, 1] ** 2) / line.hn[j]
+        stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
+        if stiffness > 0.0:
+            curvature += moment / stiffness
+    return curvature, moment, torque
+
+
+@inner
+def note_rod_end(line, ends, state, books, i, passed, t):
+    """Curvature, moment and torque where a rod has no element: those of the moment that is given, at a joint none but
+
+    the torque `passed` of the zone beside it, N m.
+
+    Where the rod is curved without load and a moment is given, the curvature is the largest that both can have.
+    """
+    n = line.h.shape[0]
+    for side in (-1, 1):
+        cell = i - 1 if side < 0 else i
+        if cell < 0 or cell == n:
+            continue
+        if not line.spin[cell]:
+            if books.right[i] != i:  # the catenary beside the rod has a value of its own there
+                widen(books.extremes, MOMENT, i if side < 0 else books.right[i], 0.0, t)
+                widen(books.extremes, TORQUE, i if side < 0 else books.right[i], passed, t)
+            continue
+        curvature, moment, torque = at_rod_end(line, ends, state, i, side, passed)
+        at = i if side < 0 else books.right[i]
+        widen(books.extremes, CURVATURE, at, curvature, t)
+        widen(books.extremes, MOMENT, at, moment, t)
+        widen(books.extremes, TORQUE, at, torque, t)
+
+
+@inner
+def beside_seam(line, books, i, j):
+    """Curvature at the element of node i, where sections meet, on the side of its neighbour j."""
+    own = min(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
+    stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
+    x = books.strains[i, 0]
+    if line.element[j] and own > 0.0 and stiffness > 0.0:
+        x = max(0.0, x + books.strains[i, 1] * (1.0 / stiffness - 1.0 / own))
+    return x
+
+
+@inner
+def note_element(line, books, i, t):
+    """Curvature, moment and torque at an element; where sections meet, the curvature of both: the moment is one.
+
+    (Where the stiffness differs, and the cable is curved without load as well, the curvature of a side is the largest
+    that this can be.)
+    """
+    curvature, moment = books.strains[i, 0], books.strains[i, 1]
+    widen_both(books.extremes, books.right, MOMENT, i, moment, t)
+    widen_both(books.extremes, books.right, TORQUE, i, books.strains[i, 2], t)
+    if not (books.marks[i] & SEAM):
+        widen_both(books.extremes, books.right, CURVATURE, i, curvature, t)
+        return
+    for j in (i - 1, i + 1):
+        widen(books.extremes, CURVATURE, i if j < i else books.right[i], beside_seam(line, books, i, j), t)
+
+
+@inner
+def first_strains(line, ends, state, books):
+    """Strains of a state that no step has led to."""
+    if line.bits & PLANAR:
+        sharpest_in_plane(line, ends, state.e, state.T, state.a1, books.strains)
+    else:
+        sharpest_in_space(line, ends, state.e, state.T, state.a1, books.strains)
+
+
+@inner
+def node_pressure(sea, state, i):
+    """Pressure of the bed at a node, N/m."""
+    normal, p = bed_under(sea, get3(state.r, i))
+    v = -dot(normal, get3(state.v, i))
+    return pressure(0.0, p, p, v, v, sea.stiffness, sea.damping, sea.onset)[0]
+
+
+@kernel
+def note_contact(line, sea, state, books, t):
+    """Force per length that the nodes bear, each over its half cells, as outputs have it."""
+    n = line.h.shape[0]
+    here = node_pressure(sea, state, 0)
+    force = length = 0.0  # of the half cell before the node
+    for i in range(n + 1):
+        after = 0.0
+        if i < n:
+            after = node_pressure(sea, state, i + 1)
+            force += line.h[i] * (2.0 * here + after) / 6.0
+            length += 0.5 * line.h[i]
+        widen_both(books.extremes, books.right, PRESSURE, i, force / length, t)
+        if i < n:
+            force, length = line.h[i] * (here + 2.0 * after) / 6.0, 0.5 * line.h[i]
+        here = after
+
+
+@kernel  # once, for lines in a plane and in space, and for both places it is called from: 3 s less of compilation
+def note_extremes(line, sea, ends, state, books, t):
+    """Widen the extremes to the state at time t; books.strains: of its elements, books.report: of the state."""
+    n = line.h.shape[0]
+    note_tension(line, ends, state, books, t)
+    if line.bits & SEABED:
+        note_contact(line, sea, state, books, t)
+    zone, zones = 0, line.torsion.shape[0]
+    for i in range(n + 1):
+        passed = 0.0
+        if zone < zones and i >= line.torsion[zone, FIRST]:
+            passed = state.turn[zone, PASSED]
+            zone += i >= line.torsion[zone, LAST]
+        if line.element[i]:
+            note_element(line, books, i, t)
+        else:
+            note_catenary(line, state, books, i, t)
+            if line.spin[max(i - 1, 0)] or line.spin[min(i, n - 1)]:
+                note_rod_end(line, ends, state, books, i, passed, t)
+            else:
+                widen_both(books.extremes, books.right, MOMENT, i, 0.0, t)
+                widen_both(books.extremes, books.right, TORQUE, i, passed, t)
+        if books.touch.shape[1] > 0:
+            widen_both(books.extremes, books.right, SELF_PRESSURE, i, books.touch[0, i], t)
+        x = sub(get3(state.r, i), get3(books.start, i))
+        widen_both(books.extremes, books.right, DISPLACEMENT, i, math.sqrt(dot(x, x)), t)
+
+
+@inner
+def cell_under(places, s, i, k):
+    """Number of the last of `places` that place i of s belongs behind, from that k of the place before on."""
+    last = places.size - 1
+    while k < last and places[k + 1] <= s[i] and not (s[i] == places[k] and places[k + 1] == s[i]):
+        k += 1
+    if i > 0 and s[i] == s[i - 1] and k < last and places[k] == s[i] and places[k + 1] == s[i]:
+        k += 1
+    return k
+
+
+@inner
+def fold_cell(now, row, columns, near, per, s, first, end, out):
+    """Take one row of extremes `now` at both ends of a cell into those at s[first:end], linear between them.
+
+    columns: (2,) of the ends; near: m, where it begins; per: 1/m, of its length, zero where it has none.
+    """
+    a, b = columns
+    for bound in range(2):
+        x, y = now[bound, row, a], now[bound, row, b]
+        for i in range(first, end):
+            part = max((s[i] - near) * per, 0.0)
+            value = (1.0 - part) * x + part * y
+            if (value > out[bound, row, i]) if bound else (value < out[bound, row, i]):
+                out[bound, row, i], out[2 + bound, row, i] = value, now[2 + bound, row, b if part > 0.5 else a]
+
+
+@kernel
+def fold_extremes(places, s, columns, now, out):
+    """Take extremes `now` (4, rows, columns) at `places` (m) into those at s, `out` (4, rows, n): lowest, highest, times.
+
+    places, s: m, not decreasing; two equal ones are the left and the right value there, in both.  columns: column of
+    `now` of each place.  Rows in which something is not known yet are left out.
+    """
+    last, rows, known = places.size - 1, out.shape[1], 0
+    for row in range(rows):
+        finite = True
+        for c in columns:
+            finite &= np.isfinite(now[0, row, c]) and np.isfinite(now[1, row, c])
+        known |= finite << row
+    i = k = 0
+    while i < s.size:
+        k = cell_under(places, s, i, k)
+        m, first, i = min(k + 1, last), i, i + 1
+        while i < s.size and cell_under(places, s, i, k) == k:
+            i += 1
+        per = 1.0 / (places[m] - places[k]) if places[m] > places[k] else 0.0
+        for row in range(rows):
+            if known >> row & 1:
+                fold_cell(now, row, (columns[k], columns[m]), places[k], per, s, first, i, out)

@@ -1,0 +1,124 @@
+"""Wall tension and von Mises stress of pipes over all accepted steps, at every node: docs/theory.md, section on outputs.
+
+Tension, curvature and torque are those of kernels.watch.extremes, pressures those of still water at the height of the node.
+
+    symbol   meaning                                                     shape   unit
+    F        tension in the wall                                         -       N
+    po, pi   pressure outside and inside, over that of the air           -       Pa
+    m, w     mean and half difference of Lame's stresses: radial stress  -       Pa, N
+             m - w/d^2, hoop stress m + w/d^2 at the diameter d
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.march.zone_torque import FIRST, LAST
+from hybrid.kernels.march.zone_torque import TORQUE as PASSED
+from hybrid.kernels.state.books import SEAM, VON_MISES, WALL_TENSION
+from hybrid.kernels.watch.extremes import (
+    at_rod_end,
+    beside,
+    beside_seam,
+    end_tension,
+    is_smooth,
+    of_chords,
+    towards,
+    widen,
+)
+
+# Columns of `walls`: where the section ends, m; outer and inner diameter, m, Young's modulus, Pa, 0: no pipe; pressure
+# inside, Pa, at the height PRESSURE_Z, m; specific weight of the content and of the water, N/m3; surface of the water, m.
+SECTION_END, OUTER, INNER, MODULUS, INSIDE, INSIDE_Z, CONTENT, WATER, SURFACE = range(9)
+WALL = 9
+
+
+@inner
+def tension_at(line, ends, state, books, i, side):
+    """Tension at node i, on its side (-1, 1) where it has two, as kernels.watch.extremes.note_tension has it."""
+    T, h, n = state.T, line.h, line.h.shape[0]
+    if i == 0 or i == n:
+        return end_tension(line, ends, state, books.report[0], books.loaded, books.marks, 0 if i == 0 else 1)
+    if not books.marks[i]:
+        return (T[i - 1] * h[i] + T[i] * h[i - 1]) / (h[i - 1] + h[i])
+    return beside(T, h, books.marks, i, side)
+
+
+@inner
+def bend_and_torque(line, ends, state, books, i, side, passed):
+    """Curvature, 1/m, and torque, N m, at node i on its side; passed: N m, that a catenary there passes on."""
+    n = line.h.shape[0]
+    if line.element[i]:
+        curvature = books.strains[i, 0]
+        if books.marks[i] & SEAM:
+            curvature = beside_seam(line, books, i, i + side)
+        return curvature, books.strains[i, 2]
+    if is_smooth(line, books.marks, i):
+        return of_chords(line, state, i), passed
+    if i == 0 or i == n:
+        side = 1 if i == 0 else -1
+    if line.spin[i - 1 if side < 0 else i]:
+        curvature, _, torque = at_rod_end(line, ends, state, i, side, passed)
+        return curvature, torque
+    return towards(line, state, books.marks, i, side), passed
+
+
+@inner
+def pressures(wall, z):
+    """po and pi at a height; inside the pressure is never negative."""
+    outside = wall[WATER] * max(wall[SURFACE] - z, 0.0)
+    inside = max(wall[INSIDE] + wall[CONTENT] * (wall[INSIDE_Z] - z), 0.0) if wall[INNER] > 0.0 else 0.0
+    return outside, inside
+
+
+@inner
+def largest_stress(wall, outside, inside, F, curvature, torque):
+    """Largest von Mises stress, Pa: at both surfaces of the wall, on both sides of the bend."""
+    o2, i2 = wall[OUTER] ** 2, wall[INNER] ** 2
+    over = 1.0 / (o2 - i2)
+    m, w = (inside * i2 - outside * o2) * over, (inside - outside) * o2 * i2 * over
+    even, most = F * over * (4.0 / math.pi), 0.0
+    for k in range(2):
+        d = wall[INNER] if k == 0 else wall[OUTER]
+        change = w / (d * d)
+        shear = torque * d * over * (16.0 / math.pi) / (o2 + i2)
+        bend = 0.5 * wall[MODULUS] * curvature * d
+        for axial in (even - bend, even + bend):
+            across = axial - m
+            # of the stresses axial, m + change and m - change
+            most = max(most, across * across + 3.0 * change * change + 3.0 * shear * shear)
+    return math.sqrt(most)
+
+
+@kernel
+def note_pipes(line, ends, state, books, t):
+    """Widen the ranges of wall tension and stress to the state at time t (s)."""
+    n, walls = line.h.shape[0], books.walls
+    zone, zones, section = 0, line.torsion.shape[0], 0
+    for i in range(n + 1):
+        passed = 0.0
+        if zone < zones and i >= line.torsion[zone, FIRST]:
+            passed = state.turn[zone, PASSED]
+            zone += i >= line.torsion[zone, LAST]
+        for side in (-1, 1):
+            if side > 0:
+                while (
+                    i < n and section + 1 < walls.shape[0] and line.s[i] + 0.5 * line.h[i] > walls[section, SECTION_END]
+                ):
+                    section += 1
+                one = books.right[i] == i and (line.element[i] or is_smooth(line, books.marks, i))
+                if i == n or (i > 0 and one):
+                    break
+            elif i == 0:
+                continue
+            wall, column = walls[section], i if side < 0 else books.right[i]
+            outside, inside = pressures(wall, state.r[i, 2])
+            bore, full = 0.25 * math.pi * wall[INNER] ** 2, 0.25 * math.pi * wall[OUTER] ** 2
+            F = tension_at(line, ends, state, books, i, side) + inside * bore - outside * full
+            stress = 0.0
+            if wall[MODULUS] > 0.0:
+                curvature, torque = bend_and_torque(line, ends, state, books, i, side, passed)
+                stress = largest_stress(wall, outside, inside, F, curvature, torque)
+            widen(books.extremes, WALL_TENSION, column, F, t)
+            widen(books.extremes, VON_MISES, column, stress, t)
