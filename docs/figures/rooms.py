@@ -16,7 +16,7 @@ PICTURE = ROOT / "docs" / "pictures" / "rooms.svg"
 FLOORS = (
     {"cli": (2.3, "commands, console, tables")},
     {"studies": (0.05, "many runs, other programs"), "couple": (1.3, "FMU"), "live": (3.2, "page for the browser")},
-    {"accuracy": (0.5, "run: passes, errors, the choice of model")},
+    {"accuracy": (0.5, "passes, errors, choice of model")},
     {
         "simulation": (0.5, "one run, stepping, diagnostics"),
         "interop": (2.3, "MoorDyn decks"),
