@@ -30,6 +30,8 @@ MARK = re.compile(r"^<!-- not run in CI: *(.*?) *-->\n\Z", re.MULTILINE)
 MARKED = {"index.md": 1, "studies.md": 1, "trade.md": 1}
 # extend.md is tests/test_extend.py, export.md tests/exports/test_export_page.py; of the README .ci/run runs the first two blocks, and test_docs.py the others; tutorial.md test_docs.py.
 ELSEWHERE = {"extend.md", "export.md", "README.md", "tutorial.md"}
+# Files that run examples as they stand and check their figures: examples.md does not run those again.
+FIGURES = ("test_examples.py", "simulation/test_stepping.py", "couple/test_fmu.py")
 
 
 class Block(NamedTuple):
@@ -52,6 +54,14 @@ def blocks(page: Path) -> list[Block]:
 
 def runs(page: Path) -> bool:
     return page.name not in ELSEWHERE and any(b.language in ("bash", "python") for b in blocks(page))
+
+
+def checked(block: Block) -> bool:
+    """Whether a test checks the figures of the example that a block runs."""
+    tests = "".join((ROOT / "tests" / file).read_text(encoding="utf-8") for file in FIGURES)
+    examples = re.findall(r"examples/(\w+)\.(yaml|py)", block.text)
+    assert examples and all((ROOT / "examples" / f"{name}.{ending}").is_file() for name, ending in examples)
+    return all(re.search(rf'"{name}(\.{ending})?"', tests) for name, ending in examples)
 
 
 def shape(line: str) -> str:
@@ -83,7 +93,8 @@ def test_every_block_runs(
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
-    said, together = "", ""
+    said = ""
+    names: dict[str, Any] = {"__name__": "__main__"}  # blocks of one page follow one another
     for block in blocks(page):
         name = re.match(r"# (\w+\.yaml)\n", block.text)
         if block.language == "yaml" and name:  # "save this as"
@@ -92,11 +103,10 @@ def test_every_block_runs(
             flat = " ".join(map(shape, said.splitlines()))
             for line in block.text.splitlines():
                 assert shape(line) in flat, f"{page.name} shows what the program does not say: {line}"
-        if block.unrun != "":
+        if block.unrun != "" or (page.name == "examples.md" and checked(block)):
             continue
         if block.language == "python":
-            together += block.text  # blocks of one page follow one another
-            in_shell([sys.executable, "-W", "error", "-c", together])
+            exec(compile(block.text, page.name, "exec"), names)
         elif block.language == "bash" and (ours := commands(block.text)) is not None:
             for words in ours:  # as the shell would, without a second to start each
                 with pytest.raises(SystemExit) as left:
