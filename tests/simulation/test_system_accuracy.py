@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +112,15 @@ def fails(*_: Any, **__: Any) -> None:
     raise ComputationError(hybrid.errors.Outcome.SLACK, 1.0, 0.0)
 
 
+@cache
+def fine_rods() -> hybrid.Result:
+    fine = bridle(time={"duration": 4.0, "step": 0.01}, accuracy=None, output={"every": 0.2, "points": 31})
+    for line in fine["lines"].values():
+        section = line["sections"][0] | {"bending_stiffness": 300}
+        line |= {"model": "rod", "mesh": {"cells": 150}, "sections": [section]}
+    return hybrid.run(fine)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("bends", "asked"),
@@ -128,10 +138,7 @@ def test_errors_of_leaving_bending_out_against_fine_rods(bends: dict[str, Any], 
     for line in scene["lines"].values():
         line |= bends | {"sections": [line["sections"][0] | {"bending_stiffness": 300}]}
     found = hybrid.run(scene)
-    fine = bridle(time={"duration": 4.0, "step": 0.01}, accuracy=None, output=scene["output"] | {"errors": False})
-    for name, line in fine["lines"].items():
-        line |= {"model": "rod", "mesh": {"cells": 150}, "sections": scene["lines"][name]["sections"]}
-    rods = hybrid.run(fine)
+    rods = fine_rods()
     for name, line in found.lines.items():
         assert "model error not estimated" not in {e.kind for e in line.events}
         for quantity, called in system_errors.COMPARED.items():
