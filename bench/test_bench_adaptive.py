@@ -3,7 +3,7 @@
     pytest bench -m bench -s -k adaptive                 # all, about 15 minutes
     HYBRID_BENCH_SEEDS=60 pytest bench -m bench -s -k "adaptive and random"    # or one: random (200 seeds if none are
                                                                # given), suspension, switches, flicker,
-                                                               # speed, joints, slack, limits
+                                                               # speed, slack, limits
 
 "All rod" is the same scene with the same base cells, each as finely divided as the manager's rods, and rod throughout.
 CPU times are of the time loop, medians of runs that alternate; errors are against a rod of many uniform cells.
@@ -319,29 +319,6 @@ def test_adaptive_speed(name: str) -> None:
             f" all rod with the manager's cells / adaptive {c / b:.2f}"
         )
         assert a / b >= 0.7 and c / b >= 0.9  # asked: 5; docs/zones.md says what limits
-
-
-# --- the joint ------------------------------------------------------------------------------------------------------
-
-
-def test_adaptive_joints() -> None:
-    """Spherical joints against joints that carry EI kappa of the catenary, on every example that has any."""
-    print("\ndistance to all rod (1e-3 L), CPU (all rod: s), changes     spherical                  curvature")
-    names = ("02_suspension", "s_tether", "rov_tether", "touchdown", "laying", "slack_on_seabed", "irregular_sea")
-    for name in names:
-        for tolerance in (3e-3, 1e-3, 3e-4):
-            text = example(name)
-            text["model"] = {"kind": "adaptive", "tolerance": tolerance}
-            L = length(text)
-            r = run(text, force_rod=[[0, L]])
-            cells = []
-            for joint in ("spherical", "curvature"):
-                a = [run(text, joint=joint) for _ in range(3)]
-                assert apart(a[0], r) <= 2 * tolerance * L, (name, joint)
-                cells.append(
-                    f"{1e3 * apart(a[0], r) / L:8.3f} {median(cpu(x) for x in a):8.2f} {len(changes(a[0])):6d}"
-                )
-            print(f"  {name:16s} tolerance {tolerance:6g}, all rod {cpu(r):5.2f} s   {cells[0]}   {cells[1]}")
 
 
 # --- slack that others cannot do ------------------------------------------------------------------------------------

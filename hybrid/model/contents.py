@@ -71,8 +71,7 @@ def _moving(model: AdaptiveModel) -> Iterator[Entry]:
     """Zones that come and go."""
     yield Entry("rod cells: bending, torsion (12th order)", True, "model; where a criterion asks for them")
     yield Entry("catenary cells (6th order)", True, "model; where none does")
-    carry = "no moment" if model.joint == "spherical" else "the moment of the catenary's curvature"
-    yield Entry(f"joints that carry {carry}", True, "model.joint; where rod and catenary meet")
+    yield Entry("joints that carry no moment", True, "where rod and catenary meet")
 
 
 def accuracy_entry(scene: Scene, reach: Reach | None = None) -> Entry:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
 
@@ -229,8 +229,22 @@ def _are_stretches(value: Any) -> Any:
 Stretches = Annotated[tuple[NonNegativePair, ...], Field(min_length=1), Before(_are_stretches)]
 
 
+# Keys that are no more, with the value at which they asked for nothing: results of before 0.7 name every key.
+_ASKED_NOTHING = {"joint": "spherical"}
+
+
+def _without_former_keys(value: Any) -> Any:
+    if not isinstance(value, Mapping):
+        return value
+    return {key: x for key, x in value.items() if key not in _ASKED_NOTHING or x != _ASKED_NOTHING[key]}
+
+
 class AdaptiveModel(Table):
     """Zones that follow the physics: rod where bending, torsion or slack ask for it, catenary elsewhere."""
+
+    instead: ClassVar[Mapping[str, str]] = {
+        "joint": "leave it out: a joint between rod and catenary passes no moment (spherical)",
+    }
 
     kind: Literal["adaptive"] = Field(default="adaptive", description="zones that move by themselves")
     tolerance: Positive | None = Field(
@@ -264,11 +278,6 @@ class AdaptiveModel(Table):
         validation_alias=AliasChoices("force_catenary", "always_catenary"),
         description="stretches [s_a, s_b] that are always catenary [m]",
     )
-    joint: Literal["spherical", "curvature"] = Field(
-        default="spherical",
-        description="what a joint between rod and catenary passes on: no moment (spherical), or to the rod the moment "
-        "of the catenary's curvature, relaxed in time (curvature)",
-    )
     correct: Truth = Field(
         default=False,
         description="results corrected for the bending that catenary zones leave out, and criteria that count what "
@@ -295,7 +304,7 @@ Model = Annotated[
     | Annotated[CatenaryModel, Tag("<catenary>")]
     | Annotated[CorrectedModel, Tag("<corrected>")]
     | Annotated[ZonesModel, Tag("<zones>")]
-    | Annotated[AdaptiveModel, Tag("<adaptive>")],
+    | Annotated[AdaptiveModel, Before(_without_former_keys), Tag("<adaptive>")],
     Discriminator(by_kind),
     Kinds(
         ("rod", "catenary", "corrected", "zones", "adaptive"),

@@ -36,11 +36,8 @@ def payout_stands_alone(ends: Ends, model: Model, contact: Contact, solver: str)
     if corrected or isinstance(model, CorrectedModel):
         expected = f"adaptive, catenary, rod, or zones of catenary and rod, {because}"
         yield Finding(("model",), expected, "write `model: adaptive`, or `model: catenary`", f"kind: {model.kind}")
-    if isinstance(model, AdaptiveModel):
-        if model.joint == "curvature":
-            yield Finding(("model", "joint"), f"spherical, {because}", "leave it out")
-        if model.correct:
-            yield Finding(("model", "correct"), f"false, {because}", "leave it out, and make model.tolerance smaller")
+    if isinstance(model, AdaptiveModel) and model.correct:
+        yield Finding(("model", "correct"), f"false, {because}", "leave it out, and make model.tolerance smaller")
     if contact.self:
         for i, section in enumerate(getattr(ends, name).payout.reel or ()):
             if section.diameter is None:

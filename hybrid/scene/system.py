@@ -140,8 +140,6 @@ class JoinedLine(Table):
         expected = "nothing, because zones move in a line of several"
         if model.correct:
             yield Finding(("model", "correct"), expected, alone, str(model.correct))
-        if model.joint != "spherical":
-            yield Finding(("model", "joint"), "spherical, because zones move in a line of several", alone, model.joint)
 
 
 def _between(initial: Equilibrium, ends: Mapping[str, End]) -> Equilibrium:

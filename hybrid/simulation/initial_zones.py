@@ -56,7 +56,7 @@ def zones_at_start(
         model, equilibrium = equilibrium_zones(model, manager, t, equilibrium_of(scene, model, t))
     else:
         model = zones_without_equilibrium(model, manager)
-    return model, equilibrium, ZoneSwitching(model, manager, loaded=scene.model.joint == "curvature")
+    return model, equilibrium, ZoneSwitching(model, manager)
 
 
 def reasons_at_start(switching: ZoneSwitching | None) -> str:

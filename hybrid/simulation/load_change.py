@@ -20,7 +20,6 @@ def change_loads(run: Transient, scene: Scene) -> None:
     model = build(scene, run.resolution, old.mesh)
     if run.switching is not None:
         model = on_layout(model, run.switching.manager.layout)
-        run.switching.release_joints(state)
     model = released_as(model, old.ends.released, run.t)
     model.line.h[:], model.line.kb[:] = old.line.h, old.line.kb  # what is on its way goes on
     model.ends.go_on_from(old.ends, run.t)

@@ -208,6 +208,6 @@ def restored_parts(
             manager.release(k, model.cable)
         manager.load(model.ends.moments)
         manager.set_layout(model.layout)
-        switching = ZoneSwitching(model, manager, loaded=scene.model.joint == "curvature")
+        switching = ZoneSwitching(model, manager)
     torque = switching.torque if switching is not None else None
     return model, switching, Correction(model, torque) if model.follows_error else None

@@ -289,7 +289,7 @@ class SystemZones:
             state, before = run.state.lines[k], run.other.lines[k]
             x.clock[b.LAST_DT], x.clock[b.LAST_RHO] = dt, run.last_rho
             x.follow(run, b.END_STEP, run.t, run.t, state, before)
-            _, x.pending = x.switching.book_step(run.t, before, state)
+            x.pending = x.switching.book_step(run.t, state)
 
     def adapt(self) -> None:
         """After the outputs of a step: carry out what is pending."""

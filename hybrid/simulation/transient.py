@@ -191,10 +191,9 @@ class Transient:
     @property
     def unchanging(self) -> bool:
         """Whether the line that samples are of stays as it is in the next step, so that they may wait in the buffer."""
-        joints = self.switching is not None and self.switching.joints is not None
         paid = self.payout is not None and self.payout.due
         leaves = self._leaves or self._returns or self.nears_itself or self.parts_itself
-        return not (self._pending is not None or leaves or self._overloaded or joints or paid)
+        return not (self._pending is not None or leaves or self._overloaded or paid)
 
     def waiting(self) -> Iterator[list[Output]]:
         """Outputs before those in the buffer of the run, of cells that have changed since; `empty` when done."""
@@ -345,7 +344,7 @@ class Transient:
             code, begun = self._go() if begun is None else begun, None
             if code == b.TRYING:
                 assert self.switching is not None
-                self.switching.prepare_step(float(clock[b.TRY_END]) - self.t, self.state)
+                self.switching.prepare_step()
             elif code == b.TRIED:
                 self._pending = self._review_try()
                 if self._pending is not None:
@@ -489,8 +488,7 @@ class Transient:
         if self._reviewed is not None:
             self._pending, self._reviewed = self._reviewed, None
         elif self.switching is not None:
-            booked, self._pending = self.switching.book_step(end, run.before, run.state)
-            run.books.work[0, b.ZONES] += booked
+            self._pending = self.switching.book_step(end, run.state)
         changes = self._pending is not None or self._leaves or self._returns or self.nears_itself
         changes |= bool(self._overloaded) or self.parts_itself
         changes |= self.payout is not None and self.payout.due

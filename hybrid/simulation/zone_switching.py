@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from hybrid.adapt.manager import Change, DomainManager
-from hybrid.adapt.moment_joints import Joints
 from hybrid.adapt.state_transfer import Clamp, transfer_to
 from hybrid.errors import Outcome
 from hybrid.kernels.machine.binding import Table
@@ -77,10 +76,8 @@ def note_change(events: EventLog, base: Floats, t: float, change: Change, booked
 class ZoneSwitching:
     """The zones of one motion."""
 
-    def __init__(self, model: Model, manager: DomainManager, loaded: bool = False) -> None:
-        """loaded: whether joints carry the moment of the catenary's curvature."""
+    def __init__(self, model: Model, manager: DomainManager) -> None:
         self.model, self.manager = model, manager
-        self.joints = Joints(model.line) if loaded else None
         self.table = Table(blank_zone_job)  # of the compiled run
         self._switch_table, self._plan_table = Table(blank_switch_job), Table(blank_zone_job)
         self.guided = np.array(model.cable.held_tangent, float)
@@ -117,7 +114,7 @@ class ZoneSwitching:
     @property
     def compiled(self) -> bool:
         """Whether the compiled run does all that zones ask of a step; else it asks Python at every step."""
-        return self.joints is None and self.manager.user is None
+        return self.manager.user is None
 
     def attach(self, run: CompiledRun, every: int) -> None:
         """Let a run follow the zones of its line from now on; every: outputs of the result to one of this run."""
@@ -144,7 +141,7 @@ class ZoneSwitching:
         return float(self.manager.torque)
 
     def checkpoint(self) -> dict[str, Any]:
-        """What is under way: bending, lengths, moments at joints, and what the manager remembers."""
+        """What is under way: bending, lengths, and what the manager remembers."""
         line, zones = self.model.line, self.zones
         relaxing = {name: getattr(zones, name) for name in RELAXING} if zones.counts[z.RELAXING] else None
         following = None
@@ -154,15 +151,13 @@ class ZoneSwitching:
             "following": following,
             "manager": self.manager.checkpoint(), "h": line.h, "kb": line.kb, "force": line.force,
             "strain": zones.strain[1] if zones.counts[z.STRAINED] else NO_STRAIN,
-            "joints": self.joints and self.joints.checkpoint(), "relaxing": relaxing,
+            "relaxing": relaxing,
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on as `checkpoint` has said; ValueError or ResultError where that cannot be."""
         line, relaxing, strain = self.model.line, saved["relaxing"], saved["strain"]
         self.manager.restore(saved["manager"])
-        if self.joints is not None:
-            self.joints.restore(saved["joints"])
         if not (
             saved["h"].min() > 0.0 and saved["kb"].min() >= 0.0 and strain.shape in (NO_STRAIN.shape, line.kb.shape)
         ):
@@ -196,12 +191,9 @@ class ZoneSwitching:
             zones.lack[:], zones.since[:] = zones.true - self.model.line.h, 0.0
             zones.counts[z.RELAXING] = 1
 
-    def prepare_step(self, dt: float, state: State) -> None:
-        """Before a step of dt: lengths, bending and moments at joints as they will be then; of zones not compiled."""
+    def prepare_step(self) -> None:
+        """Before a step: lengths and bending as they will be after it; of zones not compiled."""
         follow_zones(self.table.numbers)
-        if self.joints is not None:
-            line, manager = self.model.line, self.manager
-            self.joints.load(line, state, manager.EI, manager.stiffness_shares(dt), dt / manager.pace)
 
     def evaluate_criteria(self, t: float, dt: float, ends: Ends, state: State) -> None:
         """Weigh the criteria of a state at t, dt after the last one."""
@@ -239,17 +231,15 @@ class ZoneSwitching:
         change = self.manager.force_rods(cells, why)
         return None if (change.rod == self.manager.layout.rod).all() and not change.stiff.any() else change
 
-    def book_step(self, t: float, before: State, state: State) -> tuple[float, Change | None]:
-        """After an accepted step: energy (J) that joints put in, and what should change."""
-        manager, booked = self.manager, 0.0
+    def book_step(self, t: float, state: State) -> Change | None:
+        """After an accepted step: what should change."""
+        manager = self.manager
         if not self.compiled:
             follow_zones(self.table.numbers)
-        if self.joints is not None:
-            booked = self.joints.unload(self.model.line, state.r - before.r)
         change = manager.review(t, state) if manager.review_due(t) else None
         if change is None and self.zones.counts[z.CELLS_DUE]:
             change = manager.same_zones()
-        return booked, change
+        return change
 
     def switch(
         self, change: Change, t: float, ends: Ends, state: State, sea: Sea, here: np.ndarray | None = None
@@ -263,8 +253,6 @@ class ZoneSwitching:
             here = self.zones.plan.copy() if change.same else self.plan(change.rod, sea, ends, state)
         new = old._replace(rod=change.rod, here=here)
         line = model.line
-        if self.joints is not None:
-            self.joints.unload(line, np.zeros_like(state.r))
         before = self.zones
         changed = on_layout(model, new)
         target, numbers = changed.line, np.zeros(NUMBERS)
@@ -282,8 +270,6 @@ class ZoneSwitching:
         end_switch(self._switch_table.numbers)
         self.zones.counts[z.RELAXING] = 1
         self.model = changed
-        if self.joints is not None:
-            self.joints = self.joints.on(target)
         return changed, transfer.out, float(numbers[AFTER] - numbers[BEFORE])
 
     def arcs_less_chords(self, state: State) -> Floats:
@@ -310,11 +296,6 @@ class ZoneSwitching:
         self._plan_table.bind(line=self.model.line, sea=sea, ends=ends, new=state, zones=zones)
         plan_nodes(self._plan_table.numbers)
         return zones.plan.copy()
-
-    def release_joints(self, state: State) -> None:
-        """Take what joints carry off the line, for another line to be put in its place."""
-        if self.joints is not None:
-            self.joints.unload(self.model.line, np.zeros_like(state.r))
 
     def clamps(self, ends: Ends) -> list[Clamp | None]:
         """First director and tangent of what holds the twist of the two ends; None: nothing does."""

@@ -1,4 +1,4 @@
-"""What a user asks of zones that move: a criterion of their own, criteria as fields, loaded joints, the default model."""
+"""What a user asks of zones that move: a criterion of their own, criteria as fields, the default model."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from adapt_scenes import (
     DWELL,
     EI,
     LENGTH,
-    bending,
     breathing,
     changes,
     comes,
@@ -25,7 +24,6 @@ from problems import Scene, clamped, pinned, scene
 
 import hybrid
 from hybrid.adapt.manager import DomainManager
-from hybrid.adapt.moment_joints import Joints
 from hybrid.kernels.mesh.criteria import BEND, CRITERIA
 from hybrid.kernels.mesh.stiffness_ramp import advance
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO
@@ -118,49 +116,6 @@ def test_criteria_are_fields():
     # slack is what is seen in tension: the floor over it, or over what it will be
     assert (ratios["slack"] > 0.0).all()
     assert "criteria/slack" not in ran("deep")
-
-
-# --- the joint -------------------------------------------------------------------------------------------
-
-
-def arc(radius):
-    return lambda s: radius * np.column_stack([np.sin(s / radius), 0 * s, 1.0 - np.cos(s / radius)])
-
-
-@pytest.mark.parametrize("flags", ["CCCCCRRRRR", "RRRRRCCCCC"])
-def test_a_joint_carries_the_moment_of_the_curvature(flags):
-    """On a circle of radius R: EI/R about -y, as a couple on the rod's last cell; no force is added to the line."""
-    radius = 20.0
-    line = on(cable(), even(10, flags))
-    state = state_on(line, arc(radius))
-    joints = Joints(line)
-    dead, stiffness = line.force.copy(), np.full(line.s.size, 2.0)
-    for _ in range(60):  # relaxed: a part of a half in each step
-        joints.load(line, state, stiffness, np.ones(line.s.size), 0.5)
-        joints.unload(line, np.full_like(state.r, 1e-9))
-    joints.load(line, state, stiffness, np.ones(line.s.size), 0.5)
-    more = line.force - dead
-    assert joints.moment[0] == pytest.approx([0.0, -2.0 / radius, 0.0], rel=2e-3, abs=1e-12)
-    assert more.sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-12)
-    couple = np.cross(state.r, more).sum(axis=0)
-    sign = -1.0 if flags[0] == "C" else 1.0  # on the end of the rod that lies after the joint, against its tangent
-    assert couple == pytest.approx(sign * joints.moment[0], rel=1e-9, abs=1e-12)
-    joints.unload(line, np.zeros_like(state.r))
-    assert (line.force == dead).all()
-
-
-@pytest.mark.parametrize("scene", [sagging, bending], ids=["deep", "bend"])
-def test_loaded_joints_stay_within_the_tolerance(scene):
-    """Both joints are approximations of the rod; the energy of both is booked."""
-    rod = hybrid.run(scene(model={"force_rod": [[0, LENGTH]]}))
-    for kind in ("spherical", "curvature"):
-        result = hybrid.run(scene(model={"joint": kind}))
-        far = np.linalg.norm(result.position - rod.position, axis=2).max()
-        assert comes(result) and goes(result)
-        assert far <= result.attributes.get("tolerance", 0.04) * LENGTH, kind
-        own = np.abs(rod["work/scheme"]).max()
-        booked = np.abs(np.diff(result["work/zones"])).sum()
-        assert np.abs(result["work/scheme"]).max() <= 3 * own + 0.1 * booked, kind
 
 
 # --- twist is remembered -----------------------------------------------------------------------------------

@@ -59,7 +59,7 @@ WHOLE: dict[str, list[Any]] = {
               {"kind": "adaptive", "tolerance": 1e-9}, {"kind": "adaptive", "rod_cell": 1e-9},
               {"kind": "adaptive", "rod_cell": 1e9}, {"kind": "adaptive", "force_rod": [[0, 1e-9]]},
               {"kind": "adaptive", "force_rod": [[0, 1]], "force_catenary": [[0.5, 2]]},
-              {"kind": "adaptive", "hold_time": 1e-9, "joint": "curvature"}, {"kind": "catenary", "slack": "warn"},
+              {"kind": "adaptive", "hold_time": 1e-9}, {"kind": "catenary", "slack": "warn"},
               {"kind": "corrected", "slack": "warn"}, {"kind": "zones", "zones": []}, {"zones": [{"rod": 1}, {"catenary": 1}]},
               {"kind": "zones", "zones": [{"rod": 1, "catenary": 1}]}],
     "solver": ["shooting", "elimination", "newton"],

@@ -24,7 +24,7 @@ ADAPTIVE = (
     OCEAN.replace(
         "model: {kind: catenary}",
         "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, curvature_error: 0.05, hold_time: 2.0, force_rod: [[0.0, 10.0]], "
-        "force_catenary: [[200.0, 250.0]], joint: curvature, correct: true, always_move: true}",
+        "force_catenary: [[200.0, 250.0]], correct: true, always_move: true}",
     )
     + "output: {criteria: true, errors: true}\naccuracy: {position: 3 cm, tension: 1%, curvature: 5%, instant: 2%, "
     "bending_moment: 5%, line_tension: 2%}\n"
@@ -255,7 +255,6 @@ SIGNED |= {
     *WORDS,
     "swivel",
     "tension_torque",
-    "joint",
     "criteria",
     "correct",
     "always_move",

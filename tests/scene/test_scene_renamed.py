@@ -29,6 +29,10 @@ RENAMED = {
 }
 
 
+# Keys that are no more: a value that asked for something, the one that asked for nothing, what is said.
+GONE = {"joint": ("curvature", "spherical", "leave it out: a joint between rod and catenary passes no moment")}
+
+
 def _old(name: str) -> tuple[str, int, int]:
     """The scene with the former name, and its line and column."""
     old, new, text, *_ = RENAMED[name]
@@ -153,3 +157,19 @@ def test_a_former_word_is_read_and_told(tmp_path: Path) -> None:
     assert (note.where, note.old, note.new) == ("initial.friction", "left_out", "neglected") and note.line is not None
     (wrong,) = complaints(change(text, "left_out", "left"))
     assert wrong.where == "initial.friction" and "neglected" in wrong.expected and "left_out" not in wrong.expected
+
+
+@pytest.mark.parametrize("key", GONE)
+def test_a_key_that_is_no_more(key: str, tmp_path: Path) -> None:
+    """Refused with its place, but where it asks for nothing, as in results of before 0.7, which name every key."""
+    value, nothing, fix = GONE[key]
+    written = change(ADAPTIVE, "hold_time: 2.0", f"hold_time: 2.0, {key}: {value}")
+    path = tmp_path / "scene.yaml"
+    path.write_text(written)
+    with pytest.raises(SceneError) as caught:
+        load_scene(path)
+    (wrong,) = caught.value.complaints
+    assert (wrong.where, wrong.value) == (f"model.{key}", value) and wrong.fix.startswith(fix)
+    assert (wrong.file, wrong.line) == (str(path), written[: written.index(f"{key}:")].count("\n") + 1)
+    assert wrong.expected == "a key of kind: adaptive"
+    assert parse_scene(written.replace(f"{key}: {value}", f"{key}: {nothing}")) == parse_scene(ADAPTIVE)

@@ -27,7 +27,6 @@ CASES = {
     "friction, laid": ("laying", ["time.duration=12"]),
     "friction, slack": ("slack_on_seabed", ["time.duration=20"]),
     "waves": ("irregular_sea", ["time.duration=6"]),
-    "joints with moments": ("s_tether", ["time.duration=6", "model={kind: adaptive, joint: curvature}"]),
     "corrected": ("touchdown", ["time.duration=6", "model=corrected", "output.errors=true"]),
     "error figure": ("touchdown", ["time.duration=10", "output.errors=true"]),
     "controlled steps": ("rov_tether", ["time={duration: 10, tolerance: 1.0e-4}"]),
