@@ -52,7 +52,7 @@ from hybrid.simulation.system_points import Rotations, fields_of, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, named
 from hybrid.simulation.system_zones import SystemZones, managers_for, zones_at_rest
-from hybrid.simulation.time_loop import SAME_STOP, WORK, apart
+from hybrid.simulation.time_loop import SAME_STOP, WORK, apart, falls_on
 from hybrid.solve.joined import SystemState, SystemTaken
 from hybrid.solve.run import ROWS
 from hybrid.solve.system import SystemSolver
@@ -534,12 +534,12 @@ class SystemRun:
 
     def _arrive(self, stop: float, step: float) -> None:
         """What is due at a stop (s): other loads, and an output."""
-        if any(abs(x - stop) <= SAME_STOP * step for x in self._breaks):
+        if falls_on(stop, self._breaks, step):
             self.loaded = self.t
             for model in self.model.models:
                 model.ends.set_loads(self.t)
             self._restart()
-        if any(abs(x - stop) <= SAME_STOP * step for x in self.times):
+        if falls_on(stop, self.times, step):
             self._output(self.solver)
 
     def finish(self, status: str = "complete", message: str = "") -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time as clock
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
@@ -61,6 +62,12 @@ def apart(stops: Iterable[float], t: float, step: float) -> list[float]:
             out.pop()
         out.append(stop)
     return out
+
+
+def falls_on(stop: float, times: Sequence[float], step: float) -> bool:
+    """Whether a stop is one of the times, which are in order, but for round-off: by halves, at each of many stops."""
+    k = bisect_left(times, stop - SAME_STOP * step)
+    return k < len(times) and times[k] <= stop + SAME_STOP * step
 
 
 class TimeLoop:
