@@ -258,9 +258,8 @@ def test_friction_holds_a_loop_and_its_work_is_booked() -> None:
     assert rough["work/scheme"].max() < 1e-3 * put_in
 
 
-@pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.slow), 0.2])
-def test_it_resumes_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, friction: float) -> None:
-    scene = hybrid.validate_scene(looped(contact={"self": True, "friction": friction}))
+def test_it_resumes_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = hybrid.validate_scene(looped(contact={"self": True, "friction": 0.2}))
     stopping = Stopping(monkeypatch)
     with hybrid.run(scene, tmp_path / "whole.h5", progress=stopping) as whole:
         assert np.interp([6.5, 8.0], whole.times, whole["energy/self_contact"]).all()

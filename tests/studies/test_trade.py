@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import shutil
 import signal
 from collections.abc import Iterator
 from dataclasses import replace
@@ -274,20 +275,27 @@ def test_a_ladder_is_computed_once_and_kept(tmp_path: Path, counted: list[str]) 
     assert len(counted) == 1 and counted[0].startswith("catenary")
 
     counted.clear()
-    hybrid.trade(scene(time={"duration": 0.9}), tmp_path, **LADDER)
+    hybrid.trade(scene(time={"duration": 0.2}), tmp_path, **LADDER)
     assert len(counted) == 5, "another scene is another ladder"
 
 
-def test_table_page_and_picture(tmp_path: Path) -> None:
-    found = hybrid.trade(scene(), tmp_path, **LADDER, command="hybrid trade sag.yaml")
-    rows = list(csv.DictReader(io.StringIO((tmp_path / "trade.csv").read_text())))
+@pytest.fixture(scope="module")
+def ladder(tmp_path_factory: pytest.TempPathFactory) -> tuple[TradeTable, Path]:
+    """The whole ladder, and its folder."""
+    folder = tmp_path_factory.mktemp("ladder")
+    return hybrid.trade(scene(), folder, **LADDER, command="hybrid trade sag.yaml"), folder
+
+
+def test_table_page_and_picture(ladder: tuple[TradeTable, Path]) -> None:
+    found, folder = ladder
+    rows = list(csv.DictReader(io.StringIO((folder / "trade.csv").read_text())))
     assert len(rows) == len(found.rows) == 6
     for read, kept in zip(rows, found.rows, strict=True):
         assert (read["model"], read["asked"], read["status"]) == (kept.model, kept.asked, kept.status)
         assert read["end_force"] == (f"{kept.end_force:.6g}" if kept.end_force is not None else "")
     assert sum(int(read["recommended"]) for read in rows) == 1
     assert {r.name for r in found.front()} == {f"{r['model']} {r['asked']}" for r in rows if r["pareto"] == "1"}
-    page = (tmp_path / "trade.md").read_text()
+    page = (folder / "trade.md").read_text()
     for said in (
         "# a line that sags", found.recommendation, "(trade.png)", "| machine | ", "cores", "| versions | hybrid-cable ",
         "`hybrid trade sag.yaml`", "Reference: rod 1%", "rod 3% differs from it by", "time.step, mesh, model.tolerance",
@@ -295,7 +303,7 @@ def test_table_page_and_picture(tmp_path: Path) -> None:
     ):  # fmt: skip
         assert said in page, said
     assert page.count("**recommended**") == 1
-    assert_drawn(tmp_path / "trade.png")
+    assert_drawn(folder / "trade.png")
 
 
 @pytest.mark.slow  # a ladder of runs
@@ -378,10 +386,8 @@ def test_a_signal_where_python_drops_exceptions_is_not_lost(
     assert "(5 runs are missing)" in (tmp_path / "trade.md").read_text()
 
 
-@pytest.mark.slow  # a ladder of runs
-def test_a_half_written_run_is_made_again(tmp_path: Path, counted: list[str]) -> None:
-    hybrid.trade(scene(), tmp_path, **LADDER)
-    counted.clear()
+def test_a_half_written_run_is_made_again(ladder: tuple[TradeTable, Path], tmp_path: Path, counted: list[str]) -> None:
+    shutil.copytree(ladder[1], tmp_path, dirs_exist_ok=True)
     for file in (tmp_path / "runs").glob("*.json"):
         if json.loads(file.read_text())["asked"] == "10%":
             file.write_text('{"code": "hyb')
