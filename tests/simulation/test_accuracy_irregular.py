@@ -370,6 +370,6 @@ def test_what_is_judged_survives_a_stop(tmp_path, monkeypatch):
     with hybrid.open(tmp_path / "whole.h5") as whole:
         assert whole.attributes["effort_runs"] > 4
     heard = stopping.heard
-    for stop in (heard // 3, heard // 2, heard - 60):
-        assert went_on(scene, tmp_path / "parts.h5", stopping, [stop]) == 1
-        assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == []
+    stops = [heard // 3, heard // 6, heard - 60 - heard // 3 - heard // 6]
+    assert went_on(scene, tmp_path / "parts.h5", stopping, stops) == 3
+    assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == []
