@@ -119,11 +119,6 @@ def test_harmed_scenes(warm: None) -> None:
     _none_is_bad(range(10_000, 10_040))
 
 
-@pytest.mark.slow
-def test_more_harmed_scenes(warm: None) -> None:
-    _none_is_bad(range(10_040, 10_140))
-
-
 @pytest.mark.bench
 def test_two_thousand_harmed_scenes(warm: None) -> None:
     _none_is_bad(range(2000))
