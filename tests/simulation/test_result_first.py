@@ -101,28 +101,28 @@ def stopped_in(name: str, scene: dict[str, Any], path: Path) -> None:
         hybrid.run(scene, path, progress=stop)
 
 
-@pytest.mark.parametrize(("name", "pending"), [(ESTIMATION, ERRORS), (REFINEMENT, FINER)])
 @pytest.mark.parametrize("scene", [asked(), two_lines()], ids=["one", "several"])
 @pytest.mark.usefixtures("rough")
-def test_stopped_after_the_result(
-    scene: dict[str, Any], name: str, pending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_stopped_after_the_result(scene: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The result is complete and says what is to come; resumed, it is what it would have been."""
     Stopping(monkeypatch)
     hybrid.run(scene, tmp_path / "whole.h5").close()
-    stopped_in(name, scene, tmp_path / "run.h5")
-    with hybrid.open(tmp_path / "run.h5") as result:
-        assert result.status == "complete" and not result.done
-        assert pending in result.pending and "`hybrid resume run.h5`" in result.pending
-        assert result.times[-1] == scene["time"]["duration"]
-        assert any(x.startswith("error_total") for x in result.attributes) == (name == REFINEMENT)
-    left = (tmp_path / ".run.h5.finer").exists()  # from which a finer result of one line goes on
-    assert left == (name == REFINEMENT and "cable" in scene)
-    hybrid.resume(tmp_path / "run.h5").close()
-    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
-    assert sorted(x.name for x in tmp_path.iterdir()) == ["run.h5", "whole.h5"]
-    with hybrid.open(tmp_path / "run.h5") as result:
-        assert result.done and not result.pending and "amended" not in result.attributes
+    for name, pending in ((ESTIMATION, ERRORS), (REFINEMENT, FINER)):
+        folder = tmp_path / name
+        folder.mkdir()
+        stopped_in(name, scene, folder / "run.h5")
+        with hybrid.open(folder / "run.h5") as result:
+            assert result.status == "complete" and not result.done
+            assert pending in result.pending and "`hybrid resume run.h5`" in result.pending
+            assert result.times[-1] == scene["time"]["duration"]
+            assert any(x.startswith("error_total") for x in result.attributes) == (name == REFINEMENT)
+        left = (folder / ".run.h5.finer").exists()  # from which a finer result of one line goes on
+        assert left == (name == REFINEMENT and "cable" in scene)
+        hybrid.resume(folder / "run.h5").close()
+        assert differences(tmp_path / "whole.h5", folder / "run.h5") == []
+        assert [x.name for x in folder.iterdir()] == ["run.h5"]
+        with hybrid.open(folder / "run.h5") as result:
+            assert result.done and not result.pending and "amended" not in result.attributes
 
 
 def test_whoever_looks_at_it_is_told(

@@ -10,6 +10,7 @@ import pytest
 from bits import FEW_STEPS, Stopping, differences
 
 import hybrid
+import hybrid.simulation.system_run
 from hybrid.errors import SceneError
 
 SECTION = {"length": 12.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5, "bending_stiffness": 20.0}
@@ -175,7 +176,8 @@ def test_a_stopped_run_goes_on_bit_for_bit(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
     stopping = Stopping(monkeypatch)
     points = {"left": {"break_at": {"time": 0.8}}}
-    made, whole, path = scene({"b": {"break_at": {"time": 0.5}}}, points), tmp_path / "whole.h5", tmp_path / "run.h5"
+    made = scene({"b": {"break_at": {"time": 0.5}}}, points, time={"duration": 1.0, "step": 0.01})
+    whole, path = tmp_path / "whole.h5", tmp_path / "run.h5"
     hybrid.run(made, whole, progress=stopping).close()
     for k, stop in enumerate([40, 20, 30, -1]):
         stopping.left = stop
