@@ -23,18 +23,15 @@ CASES = {
         "touchdown",
         ["time.duration=8", "model={kind: adaptive, curvature_error: 0.05}", "mesh=null"],
     ),
-    "adaptive in space": ("s_tether", ["time.duration=8"]),
+    "adaptive in space": ("s_tether", ["time.duration=6"]),
     "friction, laid": ("laying", ["time.duration=12"]),
-    "friction, slack": ("slack_on_seabed", ["time.duration=20"]),
     "waves": ("irregular_sea", ["time.duration=6"]),
     "corrected": ("touchdown", ["time.duration=6", "model=corrected", "output.errors=true"]),
-    "error figure": ("touchdown", ["time.duration=10", "output.errors=true"]),
     "controlled steps": ("rov_tether", ["time={duration: 10, tolerance: 1.0e-4}"]),
     "accuracy": ("06_whip", ["accuracy=0.3%", "time={duration: 0.3}"]),
     "accuracy by a second result": ("s_tether", ["accuracy={tension: 0.3%}", "mesh=null", "time={duration: 3}"]),
 }
-# What they consist of others do too, together.
-LONG = ("friction, slack", "error figure", "accuracy by a second result", "adaptive in space")
+LONG = ("accuracy by a second result",)  # several runs for each part
 
 
 @pytest.mark.parametrize("name", [pytest.param(x, marks=pytest.mark.slow) if x in LONG else x for x in CASES])
