@@ -17,6 +17,7 @@ BURIED, BURIED_ONSETS = 0.02, 100.0
 # shape is right to a cell, as the diagnostics say.  A rod that presses on the fold by more than that load, and than the
 # EI/h^2 that its bend there bears, stands on it, which no bend of its true size lets it.
 FOLDED = 0.5 * np.pi
+HARDLY = 1e-3  # of the tension scale: a catenary that is compressed by less is slack
 RESOLVED = 0.3  # rad from one cell to the next, of a bend that cells show
 
 
@@ -70,3 +71,11 @@ def fold_text(line: Line, state: State, node: int) -> str:
     turn = float(folds(line, state)[node])
     cell = RESOLVED * line.hn[node] / turn
     return f"{np.degrees(turn):.0f} deg from one cell to the next; cells of {cell:.2g} m would show the bend"
+
+
+def slack_text(line: Line, state: State, scale: float) -> str:
+    """How much of a catenary that is not all under tension is compressed, or slack; scale: its tension scale, N."""
+    T, h, hardly = state.T[line.spin == 0], line.h[line.spin == 0], HARDLY * scale
+    if T.min() < -hardly:
+        return f"{h[T < 0.0].sum():.3g} m are compressed, by {-T.min():.3g} N at most"
+    return f"{h[hardly > T].sum():.3g} m are slack, under less than {hardly:.2g} N: a catenary has no shape there"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from hybrid.kernels.junctions.bodies import DAMPING, MASS, V
 from hybrid.kernels.state.forces import AXIAL_LAW, FLOW, FRICTION, SEABED, WAVES
 from hybrid.kernels.state.state import NO_ADDRESS, Floats
 from hybrid.solve.contact_statics import damped, stop
-from hybrid.solve.flaws import fold_text, lowest_tension
+from hybrid.solve.flaws import fold_text, lowest_tension, slack_text
 from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
 from hybrid.solve.statics import CALM, HARDENING, LIMP, NEARLY_STIFF, PUSHED, RELAXING_STEPS, SOFT_BED, nudged
 from hybrid.solve.system import SystemSolver
@@ -52,6 +53,8 @@ class LineFailed(ComputationError):
 
 
 Start = tuple[str, SystemState]
+# What a balanced state may be and yet no equilibrium of its lines; the first is what a search that found none tells.
+FLAWS = (Outcome.SLACK, Outcome.UNSTABLE, Outcome.FOLDED, Outcome.BURIED)
 
 
 def solve_system_statics(
@@ -65,24 +68,37 @@ def solve_system_statics(
     bits = FRICTION | WAVES
     solver = SystemSolver([x._replace(line=x.line._replace(bits=x.line.bits & ~bits)) for x in lines], points, bodies)
     path: list[str] = []
-    total, failed = 0, list[tuple[SystemTaken, SystemState]]()
-    for how, taken, states in _attempts(solver, points, starts):
+    total, failed = 0, list[_Attempt]()
+    for tried in _attempts(solver, points, starts):
+        taken = tried.taken
         total += taken.iterations
-        path.append(f"{how}: {taken.outcome.cause if taken.outcome else 'found'} ({total} iterations in all)")
+        cause = taken.outcome.cause if taken.outcome else "found"
+        cause = cause if tried.real else "stopped on the way"
+        path.append(f"{tried.how}: {cause} ({total} iterations in all)")
         if taken.outcome == Outcome.OK:
-            residual = solver.evaluate_forces(states, solver.anchor).residual
-            return SystemEquilibrium(states, tuple(path), total, residual, solver)
-        failed.append((taken, states))
-    for worst in (Outcome.SLACK, Outcome.UNSTABLE, Outcome.FOLDED, Outcome.BURIED, failed[0][0].outcome):
-        for taken, states in failed:
-            if taken.outcome == worst == Outcome.SLACK and lines[taken.line].slackens:
-                residual = solver.evaluate_forces(states, solver.anchor).residual
-                if solver.is_balanced(states, residual):  # which what a continuation has left on its way is not
-                    return SystemEquilibrium(states, tuple(path), total, residual, solver)
-        for taken, states in failed:
-            if taken.outcome == worst:
-                raise _failed(lines, taken, states, path)
+            residual = solver.evaluate_forces(tried.states, solver.anchor).residual
+            return SystemEquilibrium(tried.states, tuple(path), total, residual, solver)
+        if tried.real:
+            failed.append(tried)
+    for worst in (*FLAWS, failed[0].taken.outcome):
+        these = [x for x in failed if x.taken.outcome == worst]
+        for x in these:
+            if worst == Outcome.SLACK and lines[x.taken.line].slackens:
+                residual = solver.evaluate_forces(x.states, solver.anchor).residual
+                if solver.is_balanced(x.states, residual):
+                    return SystemEquilibrium(x.states, tuple(path), total, residual, solver)
+        if these:  # the last way, a damped motion, is that of a real line
+            raise _failed(lines, these[-1].taken, these[-1].states, path)
     raise AssertionError("one of the ways has failed with the first way's outcome")
+
+
+class _Attempt(NamedTuple):
+    """What a way led to; real: with the loads, bed and lines of the scene, not with easier ones on the way to them."""
+
+    how: str
+    taken: SystemTaken
+    states: SystemState
+    real: bool = True
 
 
 def _failed(
@@ -91,36 +107,42 @@ def _failed(
     """The error of a search of which nothing came, with the place where the worst result has its flaw."""
     if worst.line < 0:
         return LineFailed(-1, worst.outcome, None, 0.0, "\n              ".join(path))
-    line = lines[worst.line].line
+    line, state = lines[worst.line].line, states.lines[worst.line]
     node = min(max(worst.where, 0), line.s.size - 1)
     if worst.outcome == Outcome.FOLDED:
-        path = [fold_text(line, states.lines[worst.line], node), *path]
+        path = [fold_text(line, state, node), *path]
+    if worst.outcome == Outcome.SLACK:
+        path = [slack_text(line, state, lines[worst.line].scale), *path]
     return LineFailed(worst.line, worst.outcome, None, float(line.s[node]), "\n              ".join(path))
 
 
-def _attempts(
-    solver: SystemSolver, points: int, starts: Iterable[Start]
-) -> Iterator[tuple[str, SystemTaken, SystemState]]:
+def _attempts(solver: SystemSolver, points: int, starts: Iterable[Start]) -> Iterator[_Attempt]:
     """Ways to an equilibrium, the quickest first; each is tried only when those before it failed."""
     given: list[Start] = []
     flawed: list[SystemState] = []
     for name, start in starts:
         given.append((name, start))
-        yield f"Newton from {name}", *solver.newton(start)
+        yield _Attempt(f"Newton from {name}", *solver.newton(start))
     if any(x.line.bits & (SEABED | FLOW) or x.line.element[[0, -1]].any() for x in solver.lines):
         for name, start in given:
-            how, taken, states = _eased(solver, points, start)
-            yield f"{how}, from {name}", taken, states
+            tried = _eased(solver, points, start)
+            yield tried._replace(how=f"{tried.how}, from {name}")
     for name, start in given:
-        how, taken, states = _hardened(solver, points, start)
-        yield f"{how}, from {name}", taken, states
+        tried = _hardened(solver, points, start)
+        yield tried._replace(how=f"{tried.how}, from {name}")
     for name, start in given:
-        taken, states = solver.newton(_relax(solver, points, start))
-        yield f"damped motion to rest from {name}, then Newton", taken, states
+        rest, calm = _relax(solver, points, start)
+        taken, states = solver.newton(rest)
+        if calm and taken.outcome not in (Outcome.OK, *FLAWS):
+            slack, _ = _taut(solver, replace(taken, outcome=Outcome.OK), rest)
+            if slack.outcome == Outcome.SLACK:  # what has no tension has no one place that Newton could find
+                taken, states = slack, rest
+        yield _Attempt(f"damped motion to rest from {name}, then Newton", taken, states)
         if taken.outcome in (Outcome.UNSTABLE, Outcome.FOLDED):
             flawed.append(states)
     for states in flawed:
-        yield PUSHED, *solver.newton(_relax(solver, points, pushed(solver, states)))
+        rest, _ = _relax(solver, points, pushed(solver, states))
+        yield _Attempt(PUSHED, *solver.newton(rest))
 
 
 def _easier(x: JoinedLine, part: float) -> JoinedLine:
@@ -133,7 +155,7 @@ def _easier(x: JoinedLine, part: float) -> JoinedLine:
     return x._replace(sea=sea, line=x.line._replace(kb=x.line.kb * LIMP ** (1.0 - part)))
 
 
-def _eased(solver: SystemSolver, points: int, start: SystemState) -> tuple[str, SystemTaken, SystemState]:
+def _eased(solver: SystemSolver, points: int, start: SystemState) -> _Attempt:
     """Continuation from an easy sea to the real one.  A part of the way that fails is halved."""
     states, done, part, steps = start, -1.0, 1.0, 0
     while True:
@@ -150,10 +172,11 @@ def _eased(solver: SystemSolver, points: int, start: SystemState) -> tuple[str, 
         else:
             part *= 0.5
         if done >= 1.0 or part < 1e-3 or (done < 0.0 and part <= 0.5):
-            return f"from a soft seabed, no current and little bending in {steps} steps", taken, states
+            how = f"from a soft seabed, no current and little bending in {steps} steps"
+            return _Attempt(how, taken, states, last)
 
 
-def _hardened(solver: SystemSolver, points: int, start: SystemState) -> tuple[str, SystemTaken, SystemState]:
+def _hardened(solver: SystemSolver, points: int, start: SystemState) -> _Attempt:
     """From soft and short lines, stretched by their start, to the real ones, as of one cable.  A part of the way that
     fails is halved."""
     states, soft, short, hard = start.copy(), [], [], []
@@ -185,7 +208,7 @@ def _hardened(solver: SystemSolver, points: int, start: SystemState) -> tuple[st
         else:
             part *= 0.5
         if done >= 1.0 or part < 1e-3:
-            return f"soft lines hardened in {steps} steps", taken, found
+            return _Attempt(f"soft lines hardened in {steps} steps", taken, found, goal == 1.0)
 
 
 def _taut(solver: SystemSolver, taken: SystemTaken, states: SystemState) -> tuple[SystemTaken, SystemState]:
@@ -208,8 +231,9 @@ def pushed(solver: SystemSolver, states: SystemState) -> SystemState:
     return SystemState(out, states.bodies.copy())
 
 
-def _relax(solver: SystemSolver, points: int, start: SystemState) -> SystemState:
-    """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until the lines hardly move."""
+def _relax(solver: SystemSolver, points: int, start: SystemState) -> tuple[SystemState, bool]:
+    """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until the lines hardly move; and whether
+    they came to that."""
     mass = sum(float(x.line.mass.sum()) for x in solver.lines) + float(solver.bodies[:, MASS].sum())
     time_scale = float(np.sqrt(mass * solver.length / solver.scale))
     lines = [x._replace(line=damped(x.line, x.length, time_scale), slackens=True) for x in solver.lines]
@@ -232,8 +256,8 @@ def _relax(solver: SystemSolver, points: int, start: SystemState) -> SystemState
         if taken.iterations <= 5:
             dt = min(2.0 * dt, time_scale)
         if calm >= 3:
-            break
-    return old
+            return old, True
+    return old, False
 
 
 def damped_bodies(bodies: Floats, time_scale: float) -> Floats:

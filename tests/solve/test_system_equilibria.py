@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 import hybrid
+from hybrid.errors import ComputationError, Outcome
 
 DEFECTS = Path(__file__).parents[1] / "data" / "defects"
 LEG = {"length": 10.0, "mass": 1e-3, "axial_stiffness": 1e6, "bending_stiffness": 100.0}
@@ -132,3 +133,29 @@ def slack_mooring() -> dict[str, Any]:
         "points": {"buoy": buoy} | {f"a{k}": {"position": place} for k, place in enumerate(anchors)},
         "lines": {f"l{k}": leg | {"start": f"a{k}"} for k in range(3)},
     }
+
+
+def test_a_leg_that_lies_slack_is_refused_as_slack_and_not_for_what_was_met_on_the_way() -> None:
+    """A leg 10 m longer than along the bed and up to the buoy that a taut one holds: it lies without tension.
+
+    Softer, shorter lines on the way to it are compressed where this one is not; what a damped motion comes to tells.
+    """
+    section = {"mass": 8.0, "diameter": 0.05, "axial_stiffness": 5e6}
+    leg = {"model": "catenary", "mesh": {"cells": 20}, "end": "buoy"}
+    scene = {
+        "environment": {"fluid": {"density": 1025, "surface": 0.0}, "seabed": {"z": -30.0, "stiffness": 3000.0}},
+        "points": {
+            "a": {"position": [0, 0, -30]}, "b": {"position": [20, 0, -30]},
+            "buoy": {"mass": 100.0, "volume": 1.0, "initial_guess": [0, 0, -10]},
+        },
+        "lines": {
+            "taut": leg | {"start": "a", "sections": [section | {"length": 20.0}]},
+            "long": leg | {"start": "b", "sections": [section | {"length": 50.0}]},
+        },
+    }  # fmt: skip
+    with pytest.raises(ComputationError) as refused:
+        hybrid.static(scene)
+    assert refused.value.outcome == Outcome.SLACK
+    first, *ways = refused.value.detail.splitlines()
+    assert first.startswith("line long; ") and "m are slack" in first
+    assert any("hardened" in way and "stopped on the way" in way for way in ways)
