@@ -21,6 +21,9 @@ from hybrid.studies.tradeoff import ACCURACIES
 from hybrid.view.tradeoff import plot_trade
 
 ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "bench"))
+from peers import trade  # noqa: E402  of the bench
+
 PICTURES = ROOT / "docs" / "pictures"
 SCENES = ("touchdown", "s_tether", "rov_tether", "laying", "slack_on_seabed")
 PARTS = [part for name in SCENES for part in (name, f"{name}.levels")]
@@ -37,7 +40,6 @@ recommends a setting.
 hybrid trade scene.yaml                      # a folder scene.trade with trade.md, trade.csv and trade.png
 hybrid trade scene.yaml --for "3 cm"         # the cheapest setting for this accuracy
 hybrid trade scene.yaml --models rod,adaptive --accuracies 3%,1% --repeat 3
-hybrid trade scene.yaml --peers              # other programs as well, those that are installed and can do the scene
 ```
 
 Every run is compared with a rod everywhere, at an accuracy of 0.03 % (or a third of the finest accuracy of the study).
@@ -64,8 +66,9 @@ print(table.recommendation)
 print(table.recommended, table.front(), table.rows)
 ```
 
-Other programs run in processes of their own (`hybrid/studies/peers/` has an adapter for each): a uniform line between
-two points, fixed or moved, in still water, on a level seabed. Their CPU time includes their statics.
+Other programs beside it are a bench: in the folder `bench` of the sources, `python -m peers.trade SCENE.yaml` does the
+same and then runs those that are installed, in processes of their own (`bench/peers/adapters/` has one for each): a
+uniform line between two points, fixed or moved, in still water, on a level seabed. Their CPU time includes statics.
 
 ## What each level costs
 
@@ -80,7 +83,7 @@ two points, fixed or moved, in still water, on a level seabed. Their CPU time in
 Models are rods, catenaries, zones that move, and ("following") zones that move with rods whose cells follow the
 curvature. Each run asks for the accuracy of its level, with moments and curvature at every point; it is compared with a
 rod everywhere of a third of that error.
-`--peers` adds other programs to level A: they give positions and end forces.
+`python -m peers.trade SCENE.yaml --levels` adds other programs to level A: they give positions and end forces.
 The folder gets levels.md and levels.csv.
 
 The sections below were written by `python docs/make_trade.py` for example scenes.
@@ -89,9 +92,9 @@ The sections below were written by `python docs/make_trade.py` for example scene
 
 def levels(name: str, folder: Path) -> str:
     """What the levels of one scene cost."""
-    command = f"hybrid trade examples/{name}.yaml --levels --peers"
+    command = f"python -m peers.trade ../examples/{name}.yaml --levels"
     path = ROOT / "examples" / f"{name}.yaml"
-    return hybrid.trade_levels(path, folder / f"{name}.levels", peers=True, command=command).markdown(level=2)
+    return trade.trade_levels(path, folder / f"{name}.levels", command=command).markdown(level=2)
 
 
 def section(name: str, folder: Path, accuracies: list[str], peers: bool) -> str:
@@ -101,10 +104,12 @@ def section(name: str, folder: Path, accuracies: list[str], peers: bool) -> str:
         if now.part == 0.0:
             print(f"{name}: {now.done} of {now.total}, {now.what}", file=sys.stderr, flush=True)
 
-    command = f"hybrid trade examples/{name}.yaml --accuracies {','.join(accuracies)}" + (" --peers" if peers else "")
+    program, where = ("python -m peers.trade", "../") if peers else ("hybrid trade", "")
+    command = f"{program} {where}examples/{name}.yaml --accuracies {','.join(accuracies)}"
+    compute = trade.trade if peers else hybrid.trade
     scene = hybrid.load_scene(ROOT / "examples" / f"{name}.yaml")
     try:
-        table = hybrid.trade(scene, folder / name, accuracies=accuracies, peers=peers, progress=show, command=command)
+        table = compute(scene, folder / name, accuracies=accuracies, progress=show, command=command)
     except HybridError as error:
         return f"## {scene.title}\n\nNo table: {str(error).splitlines()[0]}\n\n"
     page = io.BytesIO()

@@ -56,7 +56,6 @@ def copy(tmp_path: Path) -> Path:
 
 def test_every_change_can_be_made(copy: Path) -> None:
     assert "LAMINAR" in (copy / "hybrid" / "kernels" / "laws" / "node_forces.py").read_text(encoding="utf-8")
-    assert (copy / "hybrid" / "studies" / "peers" / "masses.py").is_file()
 
 
 def test_a_change_that_no_longer_fits_is_noticed(copy: Path) -> None:

@@ -208,13 +208,17 @@ def trade(
     ] = None,
     target: Annotated[str, typer.Option("--for", metavar="A", help="Accuracy to recommend a setting for.")] = "1%",
     repeat: Annotated[int, typer.Option(metavar="N", help="Runs of which the median CPU time counts.")] = 1,
-    peers: Annotated[bool, flag("--peers", help="Other programs as well, if installed.")] = False,
+    peers: Annotated[bool, typer.Option("--peers", hidden=True)] = False,
     levels: Annotated[
         bool, flag("--levels", help="Instead: what position and tension, moments, curvature cost with every model.")
     ] = False,
     settings: Settings = None, quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
     """Compare models and accuracies on a scene: error against CPU time; recommend one."""
+    if peers:
+        from hybrid.studies.tradeoff import PEERS_ARE
+
+        raise UsageError(f"--peers: {PEERS_ARE}")
     with session(as_json, quiet) as console:
         from hybrid.cli.tables import judged, trade_table
 
@@ -224,13 +228,13 @@ def trade(
         console.note(f"runs and tables go to the folder {folder}")
         console.compiling(asked)
         if levels:
-            _trade_levels(console, asked, folder, repeat, peers, shlex.join(["hybrid", *(context.obj or [])]))
+            _trade_levels(console, asked, folder, repeat, shlex.join(["hybrid", *(context.obj or [])]))
             return
         chosen = {"accuracies": accuracies} if accuracies else {}
         with console.study() as listener:
             table = hybrid.trade(
                 asked, folder, models=models, **chosen, reference=reference, target=target, repeat=repeat,
-                peers=peers, progress=listener, command=shlex.join(["hybrid", *(context.obj or [])]),
+                progress=listener, command=shlex.join(["hybrid", *(context.obj or [])]),
             )  # fmt: skip
         for row in table.rows:
             console.json("row", **(asdict(row) | judged(table, row)))
@@ -242,14 +246,12 @@ def trade(
         console.done(f"{len(table.rows)} runs", *files, **facts)
 
 
-def _trade_levels(console: Any, scene: Any, folder: Path, repeat: int, peers: bool, command: str) -> None:
+def _trade_levels(console: Any, scene: Any, folder: Path, repeat: int, command: str) -> None:
     """The three levels of studies.levels, as a table and a sentence for each."""
     from hybrid.cli.tables import level_table
 
     with console.study() as listener:
-        table = hybrid.trade_levels(
-            scene, folder, repeat=repeat, peers=peers, progress=listener, command=command
-        )  # fmt: skip
+        table = hybrid.trade_levels(scene, folder, repeat=repeat, progress=listener, command=command)
     for row in table.rows:
         console.json("row", **asdict(row))
     console.show(lambda: level_table(table))

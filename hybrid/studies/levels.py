@@ -11,15 +11,15 @@ import io
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-import hybrid.studies.peers as peer_codes
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.simulation.interrupts import interrupts
-from hybrid.store.tradeoff_table import FAILED, Row
+from hybrid.store.tradeoff_table import Row
 from hybrid.studies.runs import RunStore, StudyProgress, level_spec
-from hybrid.studies.tradeoff import force_difference, peer_found
+from hybrid.studies.tradeoff import force_difference, refuse_peers
 
 # Parts that each level asks for: of the length, of the largest end force, moment and curvature.
 POSITION, TENSION, ALONG = 1e-3, 0.01, 0.05
@@ -101,6 +101,11 @@ class LevelTable:
             writer.writerow(["" if x is None else x for x in asdict(row).values()])
         return out.getvalue()
 
+    def write(self, folder: Path) -> None:
+        """levels.csv and levels.md in the folder."""
+        for name, text in (("levels.csv", self.csv()), ("levels.md", self.markdown())):
+            (folder / name).write_text(text, encoding="utf-8")
+
     def markdown(self, level: int = 1) -> str:
         """The page."""
         lines = [f"{'#' * level} {self.title or 'A cable'}: what each level costs", ""]
@@ -123,7 +128,7 @@ class LevelTable:
 
 def status_of(row: LevelRow) -> str:
     """Whether a run meets its level, else by what factor it misses, or why it failed."""
-    if row.status in (FAILED, peer_codes.UNSUPPORTED) or row.worst is None:
+    if row.worst is None:
         return f"{row.status}: {row.cause}"
     text = "meets it" if row.meets else f"error {row.worst:.2g} times what is asked"
     return f"{text}; reports: {row.cause}" if row.cause else text
@@ -134,18 +139,20 @@ def trade_levels(
     folder: str | Path,
     *,
     repeat: int = 1,
-    peers: bool = False,
     progress: Callable[[StudyProgress], None] | None = None,
     command: str = "",
+    **former: Any,
 ) -> LevelTable:
     """Compute a scene at the three LEVELS with every model that it admits; what meets each at least cost.
 
     folder: gets levels.md, levels.csv and, in runs/, what each run has found; a second call does what is missing.
-    repeat: of so many runs the median CPU time counts; peers: other programs as well, for level A (they give positions
-    and end forces); progress, command: as of `trade`.
+    repeat: of so many runs the median CPU time counts; progress, command: as of `trade`.
 
     Raises SceneError when the scene is refused, ComputationError when the reference fails.
     """
+    refuse_peers(former)
+    for name in former:
+        raise TypeError(f"trade_levels() got an unexpected keyword argument {name!r}")
     scene = as_scene(scene)
     scene.require_time()
     specs = []
@@ -156,26 +163,20 @@ def trade_levels(
             more = {"curvature_error": ALONG} if model == FOLLOWING else {}
             kind = "adaptive" if model == FOLLOWING else model
             specs.append((level, model, level_spec(scene, kind, f"level {level}", asked, more)))
-    others = peer_codes.peer_runs(scene) if peers else []
     with interrupts() as stopped:
-        store = RunStore(Path(folder), progress, 1 + len(specs) + len(others), stopped)
+        store = RunStore(Path(folder), progress, 1 + len(specs), stopped)
         best, exact = store.get(level_spec(scene, "rod", "reference", REFERENCE), required=True)
         rows = []
         for level, model, spec in specs:
             row, values = store.get(replace(spec, times=repeat))
-            rows.append(_row(level, model, row, values, exact, scene.length))
-        for peer in others:
-            row, values = peer_found(store, peer, repeat, scene)
-            rows.append(_row("A", peer.name, row, values, exact, scene.length))
-    rows.sort(key=lambda row: row.level)
+            rows.append(level_row(level, model, row, values, exact, scene.length))
     facts = (*store.facts, *([("command", f"`{command}`")] if command else []))
     table = LevelTable(scene.title, best, tuple(rows), facts)
-    for name, text in (("levels.csv", table.csv()), ("levels.md", table.markdown())):
-        (store.folder / name).write_text(text, encoding="utf-8")
+    table.write(store.folder)
     return table
 
 
-def _row(
+def level_row(
     level: str, model: str, row: Row, values: Mapping[str, np.ndarray], exact: Mapping[str, np.ndarray], length: float
 ) -> LevelRow:
     """The row of a run with its errors."""

@@ -10,28 +10,24 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
 
-import hybrid.studies.peers as peer_codes
 from hybrid.errors import Complaint, SceneError
-from hybrid.model.plan import output_times
 from hybrid.model.resolution import RequestedAccuracy, requested_accuracy
 from hybrid.scene.accuracy import amount
 from hybrid.scene.analysis import LEAST_DAMPED
 from hybrid.scene.read import SceneLike, as_scene, validate_scene
 from hybrid.scene.schema import Scene
 from hybrid.simulation.interrupts import interrupts
-from hybrid.store.tradeoff_table import CHECK, DONE, FAILED, OURS, REFERENCE, Row, TradeTable, judged
+from hybrid.store.tradeoff_table import CHECK, FAILED, REFERENCE, Row, TradeTable, judged
 from hybrid.studies.runs import (
     COMPARED,
     FINENESS,
     RunSpec,
     RunStore,
     StudyProgress,
-    key_of,
     model_kinds,
     run_spec,
     scene_data,
@@ -45,6 +41,8 @@ REFERENCE_ACCURACY, LEAST_FINER = "0.03%", 0.5
 CHECK_COARSER = 3.0  # the run that shows how converged the reference is: asked for so many times its error
 ROUGHEST_PART = 0.1  # of what `accuracy` takes
 END_FORCES = COMPARED[1:]
+# Said to those who ask for other programs.
+PEERS_ARE = "other programs are compared by a bench now: in bench of the sources, python -m peers.trade SCENE.yaml"
 
 
 def trade(
@@ -56,7 +54,6 @@ def trade(
     reference: str | None = None,
     target: str = "1%",
     repeat: int = 1,
-    peers: bool = False,
     progress: Callable[[StudyProgress], None] | None = None,
     command: str = "",
     **former: Any,
@@ -65,8 +62,8 @@ def trade(
 
     folder: gets trade.csv, trade.md, trade.png and, in runs/, what each run has found; a second call does what is
     missing.  models: kinds of `model`, None: all that the scene admits; accuracies, reference, target: as the
-    scene's `accuracy`; repeat: of so many runs the median CPU time counts; peers: other programs as well, those that
-    are installed; progress: called with a StudyProgress; command: for the heading of the page.
+    scene's `accuracy`; repeat: of so many runs the median CPU time counts; progress: called with a StudyProgress;
+    command: for the heading of the page.
 
     Raises SceneError when the scene or an argument is refused, ResultError when the folder cannot be written to,
     ComputationError when the reference fails.
@@ -86,9 +83,8 @@ def trade(
     kinds = [kind for kind, reason in names.items() if not reason or models is not None]
     rod = "rod" if _refusal(scene, "rod", goal) == "" else kinds[0]
     specs = [replace(run_spec(scene, kind, x), times=repeat) for x in accuracies for kind in kinds]
-    peer_runs = peer_codes.peer_runs(scene) if peers else []
     with interrupts() as stopped:
-        store = RunStore(Path(folder), progress, 2 + len(specs) + len(peer_runs), stopped)
+        store = RunStore(Path(folder), progress, 2 + len(specs), stopped)
         best, reference_values = store.get(run_spec(scene, rod, goal), required=True)
         rows = [replace(best, status=REFERENCE)]
         limits: list[tuple[float | None, float | None]] = [(None, None)]
@@ -100,14 +96,11 @@ def trade(
             for spec, want in zip(specs, [x for x in checks for _ in kinds], strict=True):
                 rows.append(_compared(store, spec, reference_values, scene.length)[0])
                 limits.append(_bounds(want, largest))
-            for peer_run in peer_runs:
-                rows.append(_peer_row(store, peer_run, repeat, scene, reference_values))
-                limits.append((None, None))
         finally:
             position, end_force = _bounds(wanted, largest)
             table = TradeTable(
                 scene.title, target, scene.length, largest, position, end_force, tuple(rows), tuple(notes),
-                (*store.facts, *_measured(store, repeat, command, peer_runs)), store.total - len(rows),
+                (*store.facts, *_measured(store, repeat, command)), store.total - len(rows),
             )  # fmt: skip
             table = judged(table, limits)
             table = replace(table, rows=tuple(sorted(table.rows, key=lambda row: _order(row, kinds))))
@@ -116,8 +109,15 @@ def trade(
     return table
 
 
+def refuse_peers(given: Mapping[str, Any]) -> None:
+    """TypeError if other programs are asked for, as 0.6 took them."""
+    if "peers" in given:
+        raise TypeError(f"peers: {PEERS_ARE}")
+
+
 def _renamed(former: dict[str, Any], target: str, progress: Any) -> tuple[str, Any]:
     """Arguments of `trade` under their names of 0.5."""
+    refuse_peers(former)
     now = {"asked_for": "target", "told": "progress"}
     for name in former:
         if name not in now:
@@ -127,10 +127,10 @@ def _renamed(former: dict[str, Any], target: str, progress: Any) -> tuple[str, A
 
 
 def _order(row: Row, kinds: Sequence[str]) -> int:
-    """Reference and check first, then model by model, then other programs."""
+    """Reference and check first, then model by model."""
     if row.status in (REFERENCE, CHECK):
         return -1
-    return kinds.index(row.model) if row.code == OURS and row.model in kinds else len(kinds)
+    return kinds.index(row.model) if row.model in kinds else len(kinds)
 
 
 # --- what is asked ------------------------------------------------------------------------------
@@ -255,60 +255,9 @@ def _largest_end_force(reference: Mapping[str, np.ndarray]) -> float | None:
     )
 
 
-# --- other programs -----------------------------------------------------------------------------
-
-
-def peer_found(
-    store: RunStore, peer_run: peer_codes.PeerRun, repeat: int, scene: Scene
-) -> tuple[Row, dict[str, np.ndarray]]:
-    """The row of another program, kept as ours are, and what it computes; nothing where it fails."""
-    row = Row(
-        peer_run.code,
-        peer_run.model,
-        peer_run.settings,
-        FAILED,
-        peer_run.unsupported,
-        key=key_of(scene, repeat, peer_codes.fingerprint(peer_run)) + peer_run.tag,
-    )
-    if peer_run.unsupported:
-        store.done += 1
-        return replace(row, status=peer_codes.UNSUPPORTED), {}
-    found = store.load(row.key)
-    if found is None:
-        store.report(peer_run.name, 0.0)
-        try:
-            answers = [peer_codes.compute(peer_run, scene) for _ in range(repeat)]
-        except peer_codes.PeerFailed as error:
-            found = store.save(replace(row, cause=str(error)), {})
-        else:
-            values = answers[-1].values
-            row = replace(row, status=DONE, cells=peer_run.elements, steps=answers[-1].steps)
-            found = store.save(replace(row, cpu=median(x.cpu for x in answers)), values)
-            store.computed += 1
-    store.done += 1
-    return found
-
-
-def _peer_row(
-    store: RunStore, peer_run: peer_codes.PeerRun, repeat: int, scene: Scene, reference: Mapping[str, np.ndarray]
-) -> Row:
-    """The same with its errors."""
-    found = peer_found(store, peer_run, repeat, scene)
-    if not found[1]:
-        return found[0]
-    forces = np.max([force_difference(found[1][x], reference[x]) for x in END_FORCES], axis=0)
-    # The median tells a transient at the start, or one impact, from an error that lasts.
-    worst, usual = [0.0, *output_times(scene)][int(forces.argmax())], float(np.median(forces))
-    cause = f"largest error of its end force at t = {worst:g} s; median error {usual:.3g} N"
-    return with_errors(replace(found[0], cause=cause), found[1], reference, scene.length)
-
-
-def _measured(
-    store: RunStore, repeat: int, command: str, peer_runs: Sequence[peer_codes.PeerRun]
-) -> list[tuple[str, str]]:
+def _measured(store: RunStore, repeat: int, command: str) -> list[tuple[str, str]]:
     """How costs were measured, for the heading."""
     count = "one run each" if repeat == 1 else f"median of {repeat} runs"
     made = "all computed now" if store.computed == store.done else f"{store.computed} of {store.done} computed now"
-    rows = [("other programs", found)] if (found := peer_codes.versions(peer_runs)) else []
-    rows += [("command", f"`{command}`")] if command else []
+    rows = [("command", f"`{command}`")] if command else []
     return [*rows, ("CPU time", f"of the process, kernels loaded beforehand; {count}; {made}")]

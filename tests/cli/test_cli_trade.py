@@ -109,6 +109,13 @@ def test_nonsense_is_refused(call: Call, options: list[str], where: str) -> None
     assert said.code == 1 and where in said.err and "expected:" in said.err and not Path("sag.trade").exists()
 
 
+@pytest.mark.parametrize("more", [[], ["--levels"]])
+def test_who_asks_for_other_programs_is_told_where_they_are(call: Call, more: list[str]) -> None:
+    said = call("trade", "sag.yaml", "--peers", *more)
+    assert said.code == 1 and "python -m peers.trade SCENE.yaml" in " ".join(said.err.split())
+    assert not Path("sag.trade").exists()
+
+
 def test_a_scene_without_time_is_refused(call: Call) -> None:
     Path("sag.yaml").write_text(SAG.replace("time: {duration: 1.0, step: 0.05}\n", ""))
     said = call("trade", "sag.yaml")

@@ -13,7 +13,7 @@ import pytest
 import hybrid
 from hybrid.store.tradeoff_table import FAILED, Row
 from hybrid.studies import runs
-from hybrid.studies.levels import ALONG, LEVELS, LevelRow, LevelTable, _row, status_of
+from hybrid.studies.levels import ALONG, LEVELS, LevelRow, LevelTable, level_row, status_of
 
 SAG: dict[str, Any] = {
     "title": "a line that sags",
@@ -46,7 +46,7 @@ def test_errors_are_those_of_each_level() -> None:
     """The largest moment of an output may lie elsewhere; curvature counts at every point."""
     found = values(0.01, 0.5, [[9.8, 0.0], [8.0, 4.0]], [[0.0, 1.04], [0.48, 0.8]])
     done = Row("hybrid", "rod", "level", "done", cpu=1.0)
-    a, b, c = (_row(level, "rod", done, found, EXACT, 20.0) for level in "ABC")
+    a, b, c = (level_row(level, "rod", done, found, EXACT, 20.0) for level in "ABC")
     assert (a.position, a.end_force, a.moment, a.curvature) == pytest.approx((0.0005, 0.005, 0.02, 0.08))
     assert (a.worst, b.worst) == pytest.approx((0.5, 0.5)) and a.meets and b.meets
     assert c.worst == pytest.approx(0.08 / ALONG) and not c.meets

@@ -19,7 +19,7 @@ import pytest
 import hybrid
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.store.tradeoff_table import CHECK, FAILED, MISSED, REFERENCE, Row, TradeTable, judged, pareto
-from hybrid.studies import peers, runs, tradeoff
+from hybrid.studies import runs, tradeoff
 from hybrid.view.tradeoff import plot_trade
 
 # A second of a line that hangs in water: every model can do it, and a run is some 0.1 s.
@@ -170,6 +170,13 @@ def test_names_of_0_5_still_work() -> None:
     assert refused.value.complaints[0].where == "for"
     with pytest.raises(TypeError, match="goal"):
         hybrid.trade(scene(), "nowhere", goal="1%")
+
+
+@pytest.mark.parametrize("compute", [hybrid.trade, hybrid.trade_levels])
+def test_who_asks_for_other_programs_is_told_where_they_are(compute: Any, tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match=r"peers: .*python -m peers\.trade"):
+        compute(scene(), tmp_path / "new", peers=True)
+    assert not (tmp_path / "new").exists()
 
 
 # --- the study ---------------------------------------------------------------------------------
@@ -427,69 +434,3 @@ def test_a_picture_without_runs_or_pulls_says_so() -> None:
     assert any("no finished run" in text.get_text() for text in plot_trade(table()).texts)
     figure = plot_trade(table(row(end_force=None, end_force_part=None)))
     assert [ax.get_label() for ax in figure.axes] == ["score", "position"]
-
-
-# --- other programs -----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("change", "reason"),
-    [
-        ({}, ""),
-        ({"environment": {}, "initial": "equilibrium"}, "no water"),
-        ({"environment": {"fluid": {"density": 1025, "current": [1, 0, 0]}}}, "water moves"),
-        ({"initial": {"kind": "points", "points": [[0, 0, -5], [5, 0, -9], [10, 0, -5]]}}, "starts points"),
-        ({"ends": SAG["ends"] | {"end": "free"}}, "not pinned"),
-    ],
-)
-def test_what_other_programs_cannot_do_is_said(change: dict[str, Any], reason: str) -> None:
-    data = dict(SAG | change)
-    if "environment" in change and not change["environment"]:
-        section = {k: v for k, v in SAG["cable"]["sections"][0].items() if k not in ("drag", "added_mass")}
-        data["cable"] = {"sections": [section]}
-    said = peers.unsupported(hybrid.validate_scene(data))
-    assert reason in said and bool(said) == bool(reason)
-
-
-def test_a_program_that_is_not_installed_has_no_row_and_one_that_cannot_has_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(peers.importlib.util, "find_spec", lambda name: object() if name == "moordyn" else None)
-    moving = scene(environment={"fluid": {"density": 1025, "current": [0.1, 0, 0]}})
-    found = hybrid.trade(moving, tmp_path, **LADDER | {"models": ["rod"], "accuracies": ["10%"]}, peers=True)
-    (peer_run,) = (r for r in found.rows if r.code != "hybrid")
-    assert (peer_run.code, peer_run.status, peer_run.cause) == ("MoorDyn", "unsupported", "the water moves")
-    assert "MoorDyn" in (tmp_path / "trade.md").read_text()
-
-
-@pytest.mark.parametrize("code", list(peers.PEERS))
-def test_another_program_agrees(code: str) -> None:
-    """With the rod at 0.3 %, to 1 % of the length, and in the middle of all outputs 1 % of the pull: what 50 elements can."""
-    pytest.importorskip(peers.PEERS[code].package)
-    peer_run = next(g for g in peers.peer_runs(scene()) if g.code == code and g.elements == 50)
-    answer = peers.compute(peer_run, scene())
-    result = hybrid.run(hybrid.validate_scene(runs.scene_data(scene(), "rod", "0.3%")))
-    truth = {name: np.array(result[name]) for name in runs.COMPARED}
-    found = tradeoff.with_errors(row(), answer.values, truth, 12.0)
-    assert found.position_part is not None and found.position_part < 0.01
-    usual = [np.median(tradeoff.force_difference(answer.values[x], truth[x])) for x in tradeoff.END_FORCES]
-    assert max(usual) < 0.01 * tradeoff._largest_end_force(truth)
-    assert answer.cpu > 0.0 and answer.steps > 10
-
-
-@pytest.mark.slow  # a ladder of runs
-def test_a_program_that_fails_is_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(peers.importlib.util, "find_spec", lambda name: object() if name == "moordyn" else None)
-    real = peers.compute
-
-    def failing(peer_run: peers.PeerRun, scene: hybrid.Scene) -> peers.PeerResult:
-        if peer_run.elements != 25:
-            raise peers.PeerFailed("diverged")
-        return real(replace(peer_run, code="nobody"), scene)
-
-    monkeypatch.setattr(peers, "compute", failing)
-    monkeypatch.setattr(peers, "versions", lambda peer_runs: "moordyn 0")
-    found = hybrid.trade(scene(), tmp_path, **LADDER | {"models": ["rod"], "accuracies": ["10%"]}, peers=True)
-    peer_runs = [r for r in found.rows if r.code != "hybrid"]
-    assert [r.status for r in peer_runs] == [FAILED] * 3
-    assert "nobody" in peer_runs[0].cause and peer_runs[1].cause == "diverged"

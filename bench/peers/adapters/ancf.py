@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.studies.peers.interface import Line, PeerFailed, PeerResult, PeerRun
+from peers.adapters.interface import Line, PeerFailed, PeerResult, PeerRun
 
 BLEND = 1e-2  # m of depth of the seabed over which its damper, which acts on the way down only, comes in
 OUT_OF_PLANE = 1e-6  # of the length: what leaves the vertical plane of the ends by more is not planar

@@ -1,4 +1,4 @@
-"""The process of another program: `python -m hybrid.studies.peers FOLDER` runs the task in the folder."""
+"""The process of another program: `python -m peers.adapters FOLDER` runs the task in the folder."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import numpy as np
 
 from hybrid.model.plan import output_times
 from hybrid.scene.read import parse_scene
-from hybrid.studies.peers import PEERS
-from hybrid.studies.peers.interface import PeerFailed, PeerRun, line_of
+from peers.adapters import PEERS
+from peers.adapters.interface import PeerFailed, PeerRun, line_of
 
 
 @contextmanager

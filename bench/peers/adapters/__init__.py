@@ -5,7 +5,8 @@
     Exudyn     planar cable elements (ANCF), implicit         ancf.py
 
 All of them compute a uniform line between two points, fixed or moved, in still water, on a level seabed; `unsupported`
-says why a scene is anything else.
+says why a scene is anything else.  A new one is a class like these and a row in PEERS; what it alone cannot do it raises
+as PeerFailed.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -26,10 +28,11 @@ import numpy as np
 from hybrid.scene.ends import Pinned
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
-from hybrid.studies.peers.ancf import Exudyn
-from hybrid.studies.peers.decks import CableDyn, MoorDyn
-from hybrid.studies.peers.interface import Peer, PeerFailed, PeerResult, PeerRun
+from peers.adapters.ancf import Exudyn
+from peers.adapters.decks import CableDyn, MoorDyn
+from peers.adapters.interface import Peer, PeerFailed, PeerResult, PeerRun
 
+BENCH = Path(__file__).parents[2]
 UNSUPPORTED = "unsupported"
 TIME_LIMIT = 900.0  # s of wall time for one run
 PEERS: Mapping[str, Peer] = {"CableDyn": CableDyn(), "MoorDyn": MoorDyn(), "Exudyn": Exudyn()}
@@ -96,9 +99,12 @@ def compute(peer_run: PeerRun, scene: Scene) -> PeerResult:
     with tempfile.TemporaryDirectory() as folder:
         task = {"scene": scene_text(scene), "run": asdict(peer_run)}
         Path(folder, "task.json").write_text(json.dumps(task), encoding="utf-8")
-        command = [sys.executable, "-m", "hybrid.studies.peers", folder]
+        command = [sys.executable, "-m", "peers.adapters", folder]
+        env = os.environ | {
+            "PYTHONPATH": os.pathsep.join([str(BENCH), *os.environ.get("PYTHONPATH", "").split(os.pathsep)])
+        }
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT, check=False)
+            done = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT, env=env)
         except subprocess.TimeoutExpired:
             raise PeerFailed(f"not done after {TIME_LIMIT:g} s") from None
         if done.returncode:

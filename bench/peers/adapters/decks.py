@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hybrid.studies.peers.interface import (
+from peers.adapters.interface import (
     Line,
     PeerFailed,
     PeerResult,
