@@ -375,9 +375,6 @@ TURNS_OF_ONE = Feature("turns at an end", "turns", Absent(
     {"ClampedConnection": ("turns",)},
     "leave it out, or compute this line alone; a rotation over time is the motion of its point or body",
 ))  # fmt: skip
-HISTORY = Feature("places of histories", "output.history", Absent(
-    {"SystemOutput": ("history",)}, "leave it out: fields over time hold every output point of a line"
-))  # fmt: skip
 ELEVATION = Feature("elevation of the sea", "output.elevation", Absent(
     {"SystemOutput": ("elevation",)}, "leave it out: it is recorded of one cable"
 ))  # fmt: skip
@@ -525,7 +522,7 @@ REFUSALS: tuple[Refusal, ...] = (
     *(
         Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)
         for x in (
-            ONE_PLANE, LAYERS_OF_ONE, OTHER_STARTS, WINCH, TURNS_OF_ONE, HISTORY, ELEVATION, CRITERIA, EXACT
+            ONE_PLANE, LAYERS_OF_ONE, OTHER_STARTS, WINCH, TURNS_OF_ONE, ELEVATION, CRITERIA, EXACT
         )
         if isinstance(x.places, Absent)
     ),

@@ -26,7 +26,7 @@ from hybrid.scene.analysis import (
     Time,
 )
 from hybrid.scene.attachments import Attachment
-from hybrid.scene.base import Finding, Positive, Table, Text, Truth, Whole, refuse
+from hybrid.scene.base import Finding, NonNegative, Positive, Table, Text, Truth, Whole, refuse
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, turned, without_turns
 from hybrid.scene.cable import Cable, Contact, Environment, Section
 from hybrid.scene.combinations import instead
@@ -171,7 +171,12 @@ class SystemOutput(Table):
         default=None, description="time between two outputs; absent: a hundredth of the duration, or one a step [s]"
     )
     points: Annotated[Whole, Field(ge=2)] = Field(
-        default=101, description="points along each line, evenly over its length, its ends included [-]"
+        default=101,
+        description="points along each line, evenly over its length, its ends included; those of `history`, point "
+        "loads, changes of section and joints are added [-]",
+    )
+    history: dict[Name, Annotated[tuple[NonNegative, ...], Field(min_length=1)]] = Field(
+        default={}, description="by name of the line: arc lengths that plots follow over time [m]"
     )
     quantities: Quantities = Field(
         default={},
@@ -392,6 +397,7 @@ class System(Table):
         if self.time is not None:
             tables["time"] = self.time
         given = {key: getattr(self.output, key) for key in ("points", "every", "errors")}
+        given["history"] = self.output.history.get(name)
         tables["output"] = {key: value for key, value in given.items() if value is not None}
         return Scene.model_validate(tables)
 

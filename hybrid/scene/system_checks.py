@@ -48,6 +48,8 @@ def _unknown_names(system: System) -> Iterator[Finding]:
     for name, point in system.points.items():
         if isinstance(point, Fairlead):
             yield from _unknown(point.body, system.bodies, ("points", name, "body"), "body")
+    for name in system.output.history:
+        yield from _unknown(name, system.lines, ("output", "history", name), "line")
 
 
 def _lonely_points(system: System) -> Iterator[Finding]:
@@ -143,6 +145,8 @@ def _of_system(system: System, name: str, found: Finding) -> Finding:
         at = ("lines", name, *at[1:])
     elif at[:1] in (("model",), ("mesh",)) or (at[:1] == ("accuracy",) and line.accuracy is not None):
         at = ("lines", name, *at)
+    elif at[:2] == ("output", "history"):
+        at = (*at[:2], name, *at[2:])
     elif at[:1] == ("accuracy",):
         expected = f"{found.expected}, in line {name}"
         return Finding(at, expected, f"{found.fix}; or give the other lines an `accuracy` of their own", found.given)
@@ -164,7 +168,7 @@ def _of_system(system: System, name: str, found: Finding) -> Finding:
 
 def _unknown(name: str, known: Mapping[str, Any], at: Place, what: str) -> Iterator[Finding]:
     if name not in known:
-        tables = {"point": "points", "body": "bodies"}[what]
+        tables = {"point": "points", "body": "bodies", "line": "lines"}[what]
         expected = f"the name of a {what}: {', '.join(known) or 'there is none'}"
         fix = nearest(name, dict.fromkeys(known, "")) or f"add `{name}: ...` to {tables}"
         yield Finding(at, expected, fix)
