@@ -381,9 +381,6 @@ ELEVATION = Feature("elevation of the sea", "output.elevation", Absent(
 CRITERIA = Feature("criteria as outputs", "output.criteria", Absent(
     {"SystemOutput": ("criteria",)}, "leave it out: they are recorded of one cable"
 ))  # fmt: skip
-EXACT = Feature("steps that end at outputs", "output.exact", Absent(
-    {"SystemOutput": ("exact",)}, "leave it out, or give a fixed time.step of which output.every is a multiple"
-))  # fmt: skip
 
 RELEASED_TWIST = Refusal(
     TWISTED_RELEASE, TWISTED_CATENARY, "not worked out", "a torque passes through it into catenary zones",
@@ -522,7 +519,7 @@ REFUSALS: tuple[Refusal, ...] = (
     *(
         Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)
         for x in (
-            ONE_PLANE, LAYERS_OF_ONE, OTHER_STARTS, WINCH, TURNS_OF_ONE, ELEVATION, CRITERIA, EXACT
+            ONE_PLANE, LAYERS_OF_ONE, OTHER_STARTS, WINCH, TURNS_OF_ONE, ELEVATION, CRITERIA
         )
         if isinstance(x.places, Absent)
     ),

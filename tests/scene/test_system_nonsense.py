@@ -50,7 +50,7 @@ SCENE: dict[str, Any] = {
                  "break_at": {"time": 4.0, "tension": 4e5, "end": "start"}},
     },
     "time": {"duration": 10.0, "step": 0.05},
-    "output": {"every": 1.0, "points": 11, "errors": True, "history": {"one": [20.0, 30.0]}},
+    "output": {"every": 1.0, "points": 11, "errors": True, "exact": True, "history": {"one": [20.0, 30.0]}},
 }  # fmt: skip
 SCENE["points"]["mast"] = {"body": "spar", "place": [0.0, 0.0, -2.0]}
 NONSENSE = (

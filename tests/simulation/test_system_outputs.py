@@ -50,3 +50,21 @@ def test_places_of_histories_are_those_of_the_line() -> None:
 def test_a_place_on_no_line_is_refused_where_it_is(history: Any, where: str) -> None:
     with pytest.raises(SceneError, match=where):
         both({}, {"history": history})
+
+
+def test_steps_end_at_outputs() -> None:
+    """Whether that is said or not: outputs are no multiples of steps here, and the motion is that of the cable."""
+    said, silent = ({"every": 0.13, "history": {"one": [7.0]}} | x for x in ({"exact": True}, {}))
+    cable, system = both({"every": 0.13, "history": [7.0], "exact": True}, said)
+    _, other = both({"every": 0.13, "history": [7.0], "exact": True}, silent)
+    inexact, _ = both({"every": 0.13, "history": [7.0]}, silent)
+    line = system.lines["one"]
+    assert np.array_equal(line.times, cable.times) and np.array_equal(line.position, other.lines["one"].position)
+    assert np.isin(line.times[1:], line.steps["t"]).all()
+    assert np.abs(line.tension - cable.tension).max() < 1e-8 * cable.tension.max()
+    assert np.abs(line.tension - inexact.tension).max() > 1e-6 * cable.tension.max()
+
+
+def test_outputs_within_steps_are_refused() -> None:
+    with pytest.raises(SceneError, match="outputs of several lines are those of steps"):
+        both({}, {"exact": False})
