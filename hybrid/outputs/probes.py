@@ -160,6 +160,11 @@ def model_errors(plain: Observation, corrected: Observation) -> dict[str, Floats
     return out
 
 
+def elevation_field(places: Floats) -> Field:
+    """What is recorded of the surface at places (n, 2) m."""
+    return Field("elevation", "m", "elevation of the sea above still water", (len(places),), ("gauge",))
+
+
 def elevation(sea: Sea, places: Floats, now: Floats) -> Floats:
     """Elevation (nb, n) m of the surface above still water at places (n, 2); now: (nb, 4) `Sea.now`."""
     A, w, kx, ky, phase, _ = sea.waves.T
@@ -264,8 +269,7 @@ class Observer:
             ]  # fmt: skip
         self.gauges = np.array(gauges, float).reshape(-1, 2)
         if len(self.gauges):
-            text = "elevation of the sea above still water"
-            fields.append(Field("elevation", "m", text, (len(self.gauges),), ("gauge",)))
+            fields.append(elevation_field(self.gauges))
         if finest is not None:
             text = "which of the nodes mesh/s there are: bit k % 64 of word k // 64"
             fields.append(Field(THERE, "", text, (-(-finest.size // 64),), ("word",), dtype="int64"))

@@ -10,7 +10,7 @@ import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hybrid.scene import (
     attachment_checks,
@@ -44,6 +44,9 @@ from hybrid.scene.ends import Clamped, Ends, Free, Pinned
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.quantities import of_one_line
 from hybrid.scene.start_checks import SAME_LENGTH
+
+if TYPE_CHECKING:
+    from hybrid.scene.system import SystemOutput
 
 # Error of a step, as a part of the length, that positions of 16 digits can still tell from their own round-off.
 FINEST_STEP = 1e-12
@@ -263,7 +266,7 @@ def _accuracy_has_errors(accuracy: Accuracy | None, output: Output) -> Iterator[
         yield Finding(("output", "errors"), expected, "leave it out, or leave accuracy out")
 
 
-def _elevation_has_waves(output: Output, environment: Environment) -> Iterator[Finding]:
+def elevation_has_waves(output: Output | SystemOutput, environment: Environment) -> Iterator[Finding]:
     if output.elevation and (environment.fluid is None or environment.fluid.waves is None):
         expected = "nothing, because the sea has no waves (environment.fluid.waves)"
         yield Finding(("output", "elevation"), expected, "leave it out, or give waves")
@@ -428,7 +431,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _releases,
     _tolerance_is_felt,
     _accuracy_has_errors,
-    _elevation_has_waves,
+    elevation_has_waves,
     _quantities,
     _pressure_of_pipes,
     _moment_is_there,

@@ -375,9 +375,6 @@ TURNS_OF_ONE = Feature("turns at an end", "turns", Absent(
     {"ClampedConnection": ("turns",)},
     "leave it out, or compute this line alone; a rotation over time is the motion of its point or body",
 ))  # fmt: skip
-ELEVATION = Feature("elevation of the sea", "output.elevation", Absent(
-    {"SystemOutput": ("elevation",)}, "leave it out: it is recorded of one cable"
-))  # fmt: skip
 CRITERIA = Feature("criteria as outputs", "output.criteria", Absent(
     {"SystemOutput": ("criteria",)}, "leave it out: they are recorded of one cable"
 ))  # fmt: skip
@@ -519,7 +516,7 @@ REFUSALS: tuple[Refusal, ...] = (
     *(
         Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)
         for x in (
-            ONE_PLANE, LAYERS_OF_ONE, OTHER_STARTS, WINCH, TURNS_OF_ONE, ELEVATION, CRITERIA
+            ONE_PLANE, LAYERS_OF_ONE, OTHER_STARTS, WINCH, TURNS_OF_ONE, CRITERIA
         )
         if isinstance(x.places, Absent)
     ),

@@ -26,7 +26,7 @@ from hybrid.scene.analysis import (
     Time,
 )
 from hybrid.scene.attachments import Attachment
-from hybrid.scene.base import Finding, NonNegative, Positive, Table, Text, Truth, Whole, refuse
+from hybrid.scene.base import Finding, NonNegative, Pair, Positive, Table, Text, Truth, Whole, refuse
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, turned, without_turns
 from hybrid.scene.cable import Cable, Contact, Environment, Section
 from hybrid.scene.combinations import instead
@@ -177,6 +177,9 @@ class SystemOutput(Table):
     )
     history: dict[Name, Annotated[tuple[NonNegative, ...], Field(min_length=1)]] = Field(
         default={}, description="by name of the line: arc lengths that plots follow over time [m]"
+    )
+    elevation: tuple[Pair, ...] | None = Field(
+        default=None, min_length=1, description="places [x, y] at which the elevation of the sea is recorded [m]"
     )
     quantities: Quantities = Field(
         default={},

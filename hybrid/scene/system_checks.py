@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.bodies import FixedBody, FreeBody
+from hybrid.scene.checks import elevation_has_waves
 from hybrid.scene.combinations import refused, tables_of
 from hybrid.scene.connections import connection_findings
 from hybrid.scene.ends import Clamped, Ends, Free
@@ -34,6 +35,7 @@ def system_findings(system: System) -> Iterator[Iterator[Finding]]:
     yield chain.from_iterable(_moment_findings(system, name) for name in system.points)
     yield chain.from_iterable(_line_findings(system, name) for name in system.lines)
     yield travel_findings(system)
+    yield elevation_has_waves(system.output, system.environment)
     yield of_several_lines(system.output.quantities, system.lines, system.environment.seabed is not None)
 
 

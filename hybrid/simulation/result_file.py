@@ -10,7 +10,7 @@ import numpy as np
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.machine.cache import cache_folder
 from hybrid.kernels.state.forces import SEABED, SURFACE
-from hybrid.kernels.state.state import Sea
+from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
 from hybrid.model.payout import whole_scene
@@ -82,9 +82,7 @@ def result_recorder(
         fixed.append(
             (Field("history", "m", "arc lengths to follow in histories", (points.size,), ("history",)), points)
         )
-    if len(observer.gauges):
-        text = "x and y, inertial, of the places at which `elevation` is recorded"
-        fixed.append((Field("elevation_at", "m", text, observer.gauges.shape, ("gauge", "xy")), observer.gauges))
+    fixed += places_of_elevation(observer.gauges)
     fixed += _limits_of_quantities(observer)
     if observer.jumps.size:
         text = "arc lengths of point loads, joints and changes of section; right/* has the values just after them"
@@ -106,6 +104,12 @@ def result_recorder(
     if model.layout is not None:
         _note_neglected_bending(scene, model, recorder)
     return recorder
+
+
+def places_of_elevation(gauges: Floats) -> list[tuple[Field, Floats]]:
+    """The places (n, 2) m of gauges, of which there may be none."""
+    text = "x and y, inertial, of the places at which `elevation` is recorded"
+    return [(Field("elevation_at", "m", text, gauges.shape, ("gauge", "xy")), gauges)] if len(gauges) else []
 
 
 def _note_neglected_bending(scene: Scene, model: Model, recorder: BaseRecorder) -> None:

@@ -12,6 +12,7 @@ from hybrid.kernels.state.report import FORCE_A, MOMENT_A
 from hybrid.kernels.state.state import Floats
 from hybrid.model.bodies import angles_of
 from hybrid.model.system import SystemModel
+from hybrid.outputs.probes import elevation, elevation_field
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.points import Fairlead, FreePoint, Point
 from hybrid.scene.system import System
@@ -23,7 +24,7 @@ WORKS = ("lines", "damping", "loads")
 
 
 def fields_of(system: System) -> list[Field]:
-    """Place and velocity of all points and bodies, the forces on them, and the energies of free bodies."""
+    """Place and velocity of all points and bodies, forces on them, energies of free bodies, and the sea at gauges."""
 
     def vector(name: str, unit: str, what: str) -> Field:
         return Field(name, unit, what, (3,), ("xyz",), "inertial")
@@ -58,7 +59,14 @@ def fields_of(system: System) -> list[Field]:
             for work in WORKS:
                 what = {"lines": "its lines", "damping": "its damping", "loads": "given loads"}[work]
                 fields.append(Field(f"{at}/work/{work}", "J", f"work done on body {name} by {what} since t = 0"))
+    if system.output.elevation:
+        fields.append(elevation_field(gauges_of(system)))
     return fields
+
+
+def gauges_of(system: System) -> Floats:
+    """Places (n, 2) m at which the elevation of the sea is recorded."""
+    return np.array(system.output.elevation or (), float).reshape(-1, 2)
 
 
 def values_of(
@@ -66,6 +74,9 @@ def values_of(
 ) -> dict[str, Any]:  # fmt: skip
     """The values of all fields for a state at t (s) and the forces that the solver has found for it."""
     values: dict[str, Any] = {}
+    if system.output.elevation:
+        sea = model.models[0].sea.values  # of the time t, as of every line
+        values["elevation"] = elevation(sea, gauges_of(system), sea.now[None])[0]
     pulls: dict[str, list[tuple[Floats, Floats, Floats]]] = {name: [] for name in system.bodies}
     for name, point in system.points.items():
         at = [(model.names.index(line), -(end == "end")) for line, end in system.lines_at(name)]

@@ -30,6 +30,7 @@ from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restore import refused
+from hybrid.simulation.result_file import places_of_elevation
 from hybrid.simulation.step_events import CUTS
 from hybrid.simulation.system_checkpoint import (
     check_files,
@@ -48,7 +49,7 @@ from hybrid.simulation.system_contact import (
 )
 from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_lines import LineResult, LineStep
-from hybrid.simulation.system_points import Rotations, fields_of, values_of
+from hybrid.simulation.system_points import Rotations, fields_of, gauges_of, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, named
 from hybrid.simulation.system_zones import SystemZones, managers_for, zones_at_rest
@@ -199,7 +200,7 @@ class SystemRun:
         if on_bodies:
             attributes["fairleads"] = json.dumps(on_bodies)
         fields = [*fields_of(self.system), *self.quantities.fields]
-        fixed = [*self.quantities.limits, *self.quantities.ranges]
+        fixed = [*self.quantities.limits, *self.quantities.ranges, *places_of_elevation(gauges_of(self.system))]
         if isinstance(self.target, MemoryTarget):
             return ArrayRecorder(
                 self.target, grid_s=np.zeros(1), fields=fields, step_fields=(), attributes=attributes,

@@ -16,7 +16,7 @@ SECTION = {"length": 185.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1
 MOTION = {"heave": {"amplitude": 1.0, "period": 9.0}, "roll": {"amplitude": 2.0, "period": 9.0}, "ramp": 9.0}
 SCENE: dict[str, Any] = {
     "title": "all keys",
-    "environment": {"fluid": {"density": 1025.0, "surface": 30.0}, "seabed": {"z": -101.0, "stiffness": 1e4}},
+    "environment": {"fluid": {"density": 1025.0, "surface": 30.0, "waves": {"kind": "regular", "height": 1.0, "period": 7.0}}, "seabed": {"z": -101.0, "stiffness": 1e4}},
     "points": {
         "west": {"position": [-150.0, 0.0, -100.0], "break_at": {"time": 5.0}},
         "east": {"kind": "fixed", "position": [150.0, 0.0, -100.0], "motion": {"travel": {"by": [1.0, 0.0, 0.0], "over": 9.0}}},
@@ -50,7 +50,7 @@ SCENE: dict[str, Any] = {
                  "break_at": {"time": 4.0, "tension": 4e5, "end": "start"}},
     },
     "time": {"duration": 10.0, "step": 0.05},
-    "output": {"every": 1.0, "points": 11, "errors": True, "exact": True, "history": {"one": [20.0, 30.0]}},
+    "output": {"every": 1.0, "points": 11, "errors": True, "exact": True, "elevation": [[1.0, 2.0], [3.0, 4.0]], "history": {"one": [20.0, 30.0]}},
 }  # fmt: skip
 SCENE["points"]["mast"] = {"body": "spar", "place": [0.0, 0.0, -2.0]}
 NONSENSE = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,9 +19,15 @@ LINE: dict[str, Any] = {"sections": [SECTION], "mesh": {"cells": 12}, "model": "
 
 
 def both(
-    of_cable: dict[str, Any], of_lines: dict[str, Any] | None = None, line: dict[str, Any] | None = None, **more: Any
+    of_cable: dict[str, Any],
+    of_lines: dict[str, Any] | None = None,
+    line: dict[str, Any] | None = None,
+    compute: Callable[..., hybrid.Result] = hybrid.run,
+    **more: Any,
 ) -> tuple[hybrid.Result, hybrid.Result]:
-    """A cable whose far end heaves and a system of that line, with what the output of each is asked; line: its keys."""
+    """A cable whose far end heaves and a system of that line, with what the output of each is asked.
+
+    line: its keys."""
     line = LINE | (line or {})
     high = {"position": HIGH, "motion": {"heave": {"amplitude": 0.3, "period": 4}, "ramp": 0.5}}
     common = {"environment": SEA, "time": {"duration": 1.0, "step": 0.02}} | more
@@ -32,7 +39,7 @@ def both(
         "points": {"low": {"position": LOW}, "high": high}, "lines": {"one": {"start": "low", "end": "high"} | line},
         "output": every | (of_cable if of_lines is None else of_lines),
     }  # fmt: skip
-    return hybrid.run(common | cable), hybrid.run(common | system)
+    return compute(common | cable), compute(common | system)
 
 
 def test_places_of_histories_are_those_of_the_line() -> None:
@@ -68,3 +75,18 @@ def test_steps_end_at_outputs() -> None:
 def test_outputs_within_steps_are_refused() -> None:
     with pytest.raises(SceneError, match="outputs of several lines are those of steps"):
         both({}, {"exact": False})
+
+
+@pytest.mark.parametrize("compute", [hybrid.run, hybrid.static])
+def test_the_sea_at_gauges_is_beside_the_points(compute: Callable[..., hybrid.Result]) -> None:
+    places = [[3.0, -2.0], [40.0, 25.0]]
+    cable, system = both({"elevation": places, "exact": True}, compute=compute)
+    assert system["elevation"].shape == (len(cable.times), 2) and np.array_equal(system["elevation_at"], places)
+    assert np.abs(system["elevation"] - cable["elevation"]).max() < 1e-12
+    assert compute is hybrid.static or np.ptp(system["elevation"], axis=0).min() > 0.05
+
+
+def test_gauges_ask_for_waves() -> None:
+    still = {"fluid": {"density": 1025, "surface": 30.0}}
+    with pytest.raises(SceneError, match="the sea has no waves"):
+        both({}, {"elevation": [[0, 0]]}, environment=still)
