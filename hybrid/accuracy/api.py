@@ -58,6 +58,9 @@ from hybrid.store.records import ERROR_ESTIMATE
 if TYPE_CHECKING:
     from hybrid.scene.system import System
 
+# Why there is nothing that a criterion could ask for.
+NO_ZONES = "a criterion is for zones that move: the scene's model is not adaptive"
+
 
 def run(
     scene: SceneLike | System,
@@ -73,7 +76,7 @@ def run(
     write; None keeps the result in memory.  progress: True for a line on the error stream, or a function that gets a
     `hybrid.simulation.progress.Progress` about ten times a second.  overwrite: replace an existing result (never
     another program's file).  criterion: for zones that move, one more: it gets a `hybrid.NodeState` at every step and
-    gives a number (N+1,) per node, 1 or more where the cable must be a rod.
+    gives a number (N+1,) per node, 1 or more where the cable must be a rod; of several lines each such one is asked.
 
     Raises SceneError when the scene is refused, ResultError when the output cannot be written, and ComputationError
     when the computation stops; what was computed until then is in the file, and the last good state beside it.
@@ -82,9 +85,7 @@ def run(
     if scene.time is None:
         raise SceneError([missing_time(scene)])
     if not isinstance(scene, Scene):
-        if criterion is not None:
-            refuse_use(scene, "criterion", given="a criterion")
-        return _several_lines(scene, output, overwrite, progress)
+        return _several_lines(scene, output, overwrite, progress, criterion)
     check_motions(scene)
     refuse_use(scene, "motion")
     if scene.solver == "shooting":
@@ -93,7 +94,7 @@ def run(
         with locked(_path(output)):
             return run_shooting(scene, output, overwrite)
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
-        raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
+        raise TypeError(NO_ZONES)
     chosen = criterion is None and model_is_free(scene)  # most often rods, which need least to be compiled
     compile_beside(with_model(scene, "rod") if chosen else scene)
     case, target = Case(scene, criterion), _target(output, overwrite, wants_errors(scene))
@@ -179,9 +180,7 @@ def resume(
     with locked(path), locked(target if target != path else None):
         system = remaining_system(path, until, settings, start)
         if system is not None:
-            if criterion is not None:
-                refuse_use(system, "criterion", given="a criterion")
-            _move_lines(system, target, progress, path)
+            _move_lines(system, target, progress, path, criterion)
             return open_result(target)
         remaining = remaining_run(path, until, settings, start)
         if remaining.anew and target == path:
@@ -194,7 +193,11 @@ def resume(
 
 
 def _several_lines(
-    system: System, output: str | Path | None, overwrite: bool, progress: bool | Listener | None
+    system: System,
+    output: str | Path | None,
+    overwrite: bool,
+    progress: bool | Listener | None,
+    criterion: UserCriterion | None = None,
 ) -> Result:
     """The motion of several lines, or, with progress None, their equilibrium."""
     from hybrid.accuracy.system_accuracy import is_refined, refine_system
@@ -209,15 +212,20 @@ def _several_lines(
         elif progress is None:
             static_system(system, target, partial(scene_text, system))
         else:
-            _move_lines(system, target, progress)
+            _move_lines(system, target, progress, criterion=criterion)
     return written_result(target)
 
 
-def _move_lines(system: System, target: Target, progress: bool | Listener, source: Path | None = None) -> None:
+def _move_lines(
+    system: System, target: Target, progress: bool | Listener, source: Path | None = None,
+    criterion: UserCriterion | None = None,
+) -> None:  # fmt: skip
     """Compute the motion of several lines; source: the result to go on with."""
     from hybrid.accuracy.system_accuracy import is_refined, refine_system
     from hybrid.simulation.system_run import run_system
 
+    if criterion is not None and not system.adaptive:
+        raise TypeError(NO_ZONES)
     duration, listener = system.require_time().duration, listener_of(progress)
     tell_of_compiling(listener, OF_LINES)
     with interrupts() as stopped, ProgressReporter(listener, duration) as reporter:
@@ -227,9 +235,12 @@ def _move_lines(system: System, target: Target, progress: bool | Listener, sourc
             try:
                 if is_refined(system, moves=True):
                     assert not isinstance(target, MemoryTarget), "errors are written into a file"
-                    refine_system(system, target, reporter, stopped, source, notes=notes)
+                    refine_system(system, target, reporter, stopped, source, notes=notes, criterion=criterion)
                     return
-                run_system(system, target, scene_text(system), reporter, stopped, source, pending=pending, notes=notes)
+                run_system(
+                    system, target, scene_text(system), reporter, stopped, source, pending=pending, notes=notes,
+                    criterion=criterion,
+                )  # fmt: skip
                 break
             except ComputationError as error:
                 instead = rods_of_system(system, error) if source is None else None
@@ -243,7 +254,7 @@ def _move_lines(system: System, target: Target, progress: bool | Listener, sourc
             from hybrid.accuracy.system_errors import write_system_errors
 
             def compare(other: System, memory: io.BytesIO) -> None:
-                run_system(other, memory, scene_text(other), reporter, stopped, name=ESTIMATION)
+                run_system(other, memory, scene_text(other), reporter, stopped, name=ESTIMATION, criterion=criterion)
 
             write_system_errors(system, target, compare)
 

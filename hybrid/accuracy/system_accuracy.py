@@ -35,6 +35,7 @@ from hybrid.accuracy.refinement import (
 )
 from hybrid.accuracy.system_model_errors import Stretches, as_rods, leaves_bending_out, rods_of, with_model_errors
 from hybrid.accuracy.system_samples import compared, sample_of, touch_unasked
+from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, SceneError
 from hybrid.model.output_points import output_points
 from hybrid.model.plan import output_interval, output_times
@@ -111,9 +112,10 @@ class SystemPasses:
     def __init__(
         self, system: System, target: Path | io.BytesIO, moves: bool, reporter: ProgressReporter,
         interrupted: Callable[[], bool], notes: Sequence[tuple[str, str]] = (),
+        criterion: UserCriterion | None = None,
     ) -> None:  # fmt: skip
         """moves: whether its motion is computed, else its equilibrium; others as of `run_system`."""
-        self._of_results = notes
+        self._of_results, self._criterion = notes, criterion
         self.system, self.target, self.moves = system, target, moves
         self._replacement = Replacement(target)
         self.reporter, self.interrupted = reporter, interrupted
@@ -187,7 +189,10 @@ class SystemPasses:
         if self.moves:
             text, look = scene_text(asked), self.interrupted
             pending, notes = ERROR_ESTIMATE, self._of_results
-            run = run_system(asked, target, text, self.reporter, look, source, name, resolution, found, pending, notes)
+            run = run_system(
+                asked, target, text, self.reporter, look, source, name, resolution, found, pending, notes,
+                self._criterion,
+            )  # fmt: skip
         else:
             run = static_system(asked, target, scene_text(asked), resolution, ERROR_ESTIMATE)
         self._costs.append(clock.process_time() - begin)
@@ -441,6 +446,7 @@ def _tree(resolution: SystemResolution) -> Tree:
 def refine_system(
     system: System, target: Path | io.BytesIO, reporter: ProgressReporter, interrupted: Callable[[], bool],
     source: Path | None = None, moves: bool = True, notes: Sequence[tuple[str, str]] = (),
+    criterion: UserCriterion | None = None,
 ) -> None:  # fmt: skip
     """Compute a system as finely as is asked, with its errors; arguments as of `SystemPasses` and `compute`."""
-    SystemPasses(system, target, moves, reporter, interrupted, notes).compute(source)
+    SystemPasses(system, target, moves, reporter, interrupted, notes, criterion).compute(source)

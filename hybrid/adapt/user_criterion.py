@@ -16,7 +16,7 @@ class NodeState(NamedTuple):
     """What a user criterion receives; the arrays are read-only.
 
     t: s; s: (N+1,) m; position, velocity: (N+1, 3) m, m/s; tension: (N,) N, of cells; curvature: (N+1,) 1/m;
-    bending_stiffness: (N+1,) N m2.
+    bending_stiffness: (N+1,) N m2; line: its name among several, empty of one cable.
     """
 
     t: float
@@ -26,20 +26,27 @@ class NodeState(NamedTuple):
     tension: Floats
     curvature: Floats
     bending_stiffness: Floats
+    line: str = ""
 
 
 # (N+1,) above 1: rod around the node; below 0.5: catenary again.
 UserCriterion = Callable[[NodeState], Floats]
 
 
+def of_line(criterion: UserCriterion | None, name: str) -> UserCriterion | None:
+    """The criterion for a line of several, which sees its name."""
+    return None if criterion is None else lambda nodes: criterion(nodes._replace(line=name))
+
+
 def cell_ratios(criterion: UserCriterion, nodes: NodeState) -> Floats:
     """Ratios (N,) of cells, the larger of their nodes; ValueError: the criterion gave another shape, or no number."""
-    for x in nodes[1:]:
+    arrays = [x for x in nodes if isinstance(x, np.ndarray)]
+    for x in arrays:
         x.flags.writeable = False
     try:
         ratio = np.asarray(criterion(nodes), float)
     finally:
-        for x in nodes[1:]:
+        for x in arrays:
             x.flags.writeable = True
     if ratio.shape != nodes.s.shape:
         raise ValueError(

@@ -26,7 +26,7 @@ Tables = Mapping[str, Any]
 Kind = Literal["physics", "not worked out", "several lines"]
 # Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
 USE, SYSTEM, LINE = "use", "system", "line"
-Use = Literal["", "motion", "stepped", "changed loads", "criterion", "fmu"]
+Use = Literal["", "motion", "stepped", "changed loads", "fmu"]
 LEAVE_OUT = "leave it out"
 ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
@@ -354,7 +354,6 @@ STEPPED = Feature("steps from outside", "hybrid.Simulation", _used("stepped"))
 CHANGED_LOADS = Feature(
     "loads that change in mid-run", "hybrid resume --set KEY=VALUE", _used("changed loads", "settings")
 )
-CRITERION = Feature("a criterion of one's own", "hybrid.run(criterion=...)", _used("criterion", "criterion"))
 FMU = Feature("co-simulation (FMU)", "hybrid.export_fmu", _used("fmu", "lines"))
 
 # Of one cable alone, by keys that several lines do not have.
@@ -504,10 +503,6 @@ REFUSALS: tuple[Refusal, ...] = (
         CHANGED_LOADS, SEVERAL_LINES, "several lines",
         "the result is of several lines: they go on with the loads they have", "nothing to change",
         "run the changed scene from its start",
-    ),
-    Refusal(
-        CRITERION, SEVERAL_LINES, "several lines", "zones of several lines move by the criteria of the program",
-        fix="leave criterion out",
     ),
     Refusal(
         FMU, SEVERAL_LINES, "several lines", "a unit is of one cable, whose ends are set from outside",

@@ -12,6 +12,7 @@ from time import process_time as clock_now
 import numpy as np
 
 from hybrid.adapt.manager import DomainManager
+from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.junctions.bodies import FRAME, PLACE, V
 from hybrid.kernels.machine.cache import cache_folder
@@ -78,14 +79,15 @@ class SystemRun:
     def __init__(
         self, system: System, target: Target | None, text: Text, moves: bool, kept: bool = False,
         source: Path | None = None, resolution: SystemResolution | None = None, found: Tree | None = None,
-        pending: str = "", notes: Sequence[tuple[str, str]] = (),
+        pending: str = "", notes: Sequence[tuple[str, str]] = (), criterion: UserCriterion | None = None,
     ) -> None:  # fmt: skip
         """target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether
 
         its motion is wanted, else its equilibrium under full loads; kept: whether a file gets checkpoints; source: the
         result to go on with, from its checkpoint, in place of a start; resolution: how finely, None: as the scene asks
         for, or the checkpoint says; found: what was found before the run, for whoever goes on with its file; pending:
-        what is to come when it is complete (store.records); notes: events (kind, text) of the whole of the run.
+        what is to come when it is complete (store.records); notes: events (kind, text) of the whole of the run;
+        criterion: one more for zones that move (adapt.user_criterion).
         """
         self._before, self._pending, self._notes = found or {}, pending, notes
         self.system, self.target, self.moves = system, target, moves
@@ -110,14 +112,14 @@ class SystemRun:
                 self.found = equilibrium_of_system(system, self.model, 0.0 if moves else np.inf)
                 if system.adaptive:
                     scenes = dict(zip(names, self.scenes, strict=True))
-                    start = zones_at_rest(scenes, self.model, self.found, 0.0 if moves else np.inf)
+                    start = zones_at_rest(scenes, self.model, self.found, 0.0 if moves else np.inf, criterion)
                     self.model, self.found, managers = start
             self.state: SystemState = self.found.state.copy()
             self.start_from(self.found.state.bodies)
         else:
             blank = [state_for(x.line) for x in self.model.models]
             self.state = SystemState(blank, np.zeros_like(self.model.body_places))
-            managers = managers_for(dict(zip(names, self.scenes, strict=True)), self.model)
+            managers = managers_for(dict(zip(names, self.scenes, strict=True)), self.model, criterion)
             self.start_from(self.model.body_places)
         self.lines = [
             LineResult(k, name, scene, model, self.found, state, len(self.times), target, pending)
@@ -616,12 +618,12 @@ def run_system(
     system: System, target: Target | None, text: str, reporter: ProgressReporter,
     interrupted: Callable[[], bool], source: Path | None = None, name: str = RESULT,
     resolution: SystemResolution | None = None, found: Tree | None = None, pending: str = "",
-    notes: Sequence[tuple[str, str]] = (),
+    notes: Sequence[tuple[str, str]] = (), criterion: UserCriterion | None = None,
 ) -> SystemRun:  # fmt: skip
     """Compute the motion of a system into a file, into memory, or (target None) to be compared with.
 
     source: what to go on with; name: of the pass;
-    resolution: how finely, None: as the scene asks for; found, pending, notes: as of `SystemRun`.
+    resolution: how finely, None: as the scene asks for; found, pending, notes, criterion: as of `SystemRun`.
     """
     run = SystemRun(
         system,
@@ -634,6 +636,7 @@ def run_system(
         found=found,
         pending=pending,
         notes=notes,
+        criterion=criterion,
     )
     reporter.begin(name, run.resolution.one)
     run.record_motion(reporter, interrupted)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hybrid.adapt.manager import Change, DomainManager
+from hybrid.adapt.user_criterion import UserCriterion, of_line
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.zone_step import LOOKAHEAD, follow_zones
@@ -53,22 +54,26 @@ class Start(NamedTuple):
     managers: Mapping[int, DomainManager]  # by the number of the line
 
 
-def managers_for(scenes: Mapping[str, Scene], model: SystemModel) -> dict[int, DomainManager]:
+def managers_for(
+    scenes: Mapping[str, Scene], model: SystemModel, criterion: UserCriterion | None
+) -> dict[int, DomainManager]:
     """The domain managers of lines that are rod wherever they may be."""
     return {
-        k: manager_for(scenes[name], x, model.resolution.lines[name], None)
+        k: manager_for(scenes[name], x, model.resolution.lines[name], of_line(criterion, name))
         for k, (name, x) in enumerate(zip(model.names, model.models, strict=True))
         if isinstance(scenes[name].model, AdaptiveModel)
     }
 
 
-def zones_at_rest(scenes: Mapping[str, Scene], model: SystemModel, found: SystemEquilibrium, t: float) -> Start:
+def zones_at_rest(
+    scenes: Mapping[str, Scene], model: SystemModel, found: SystemEquilibrium, t: float, criterion: UserCriterion | None
+) -> Start:
     """Zones for the equilibrium of a system whose lines are all rod, and that equilibrium: rod only where it is needed.
 
     As of one cable (simulation.initial_zones): where the two equilibria are further apart than the tolerance of a line
     criteria become stricter, and where that does not help zones stay rod.
     """
-    managers = managers_for(scenes, model)
+    managers = managers_for(scenes, model, criterion)
     allowed = {k: manager.tolerance for k, manager in managers.items()}
     try:
         for part in STRICTER:
@@ -150,7 +155,7 @@ class _LineZones:
     """What moves the zones of one line, with the numbers of a compiled run (kernels.mesh.zone_step)."""
 
     def __init__(self, number: int, model: Model, manager: DomainManager, every: int) -> None:
-        self.number, self.full, self.switching = number, model, ZoneSwitching(model, manager)
+        self.number, self.full, self.switching = number, model, ZoneSwitching(model, manager, followed=True)
         self.clock, self.counts = np.zeros(b.CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
         longest, clock = LONGEST_IN_PACE * manager.pace * every, manager.zones.clock
         clock[z.RAMP_STEP], clock[z.CALM_STEP] = longest, longest * READY
@@ -235,7 +240,7 @@ class SystemZones:
             model = on_layout(models[k], layout._replace(rod=mine["rod"]))
             assert model.layout is not None
             manager.set_layout(model.layout)
-            x.switching, x.pending = ZoneSwitching(model, manager), None
+            x.switching, x.pending = ZoneSwitching(model, manager, followed=True), None
             x.full = replace(x.full, line=x.full.line._replace(bits=model.line.bits))
             models[k], states[k] = model, state_for(model.line)
             run.lines[k].take_zones(model, extremes=False)

@@ -76,8 +76,9 @@ def note_change(events: EventLog, base: Floats, t: float, change: Change, booked
 class ZoneSwitching:
     """The zones of one motion."""
 
-    def __init__(self, model: Model, manager: DomainManager) -> None:
-        self.model, self.manager = model, manager
+    def __init__(self, model: Model, manager: DomainManager, followed: bool = False) -> None:
+        """followed: whether others follow the zones around every try and step, whatever is compiled."""
+        self.model, self.manager, self._followed = model, manager, followed
         self.table = Table(blank_zone_job)  # of the compiled run
         self._switch_table, self._plan_table = Table(blank_switch_job), Table(blank_zone_job)
         self.guided = np.array(model.cable.held_tangent, float)
@@ -206,10 +207,9 @@ class ZoneSwitching:
         """
         line, manager, most = self.model.line, self.manager, MOST_RESCUES
         if how.outcome == Outcome.OK:
-            if not self.compiled:
-                follow_zones(self.table.numbers)
-                if manager.user is not None:
-                    manager.ask_user(line, tried, end)
+            self._follow()
+            if manager.user is not None:
+                manager.ask_user(line, tried, end)
             cells = manager.cells_to_reject if manager.loudest > REJECT_RATIO else NONE
             why = "a step would have left it a catenary far beyond its criterion; the step is repeated"
         elif how.outcome == Outcome.SLACK:
@@ -220,6 +220,11 @@ class ZoneSwitching:
             why = f"a step failed here ({how.outcome.cause}); it is repeated"
             most = 1  # after that, a smaller step
         return self._force_rod(cells, why) if rescues < most and cells.size else None
+
+    def _follow(self) -> None:
+        """After a try, or a step, that nobody else has followed."""
+        if not (self.compiled or self._followed):
+            follow_zones(self.table.numbers)
 
     def all_rod(self, how: Tried) -> Change | None:
         """The last resort of a step that fails however small: rod wherever the scene lets it be; None: it is."""
@@ -234,8 +239,7 @@ class ZoneSwitching:
     def book_step(self, t: float, state: State) -> Change | None:
         """After an accepted step: what should change."""
         manager = self.manager
-        if not self.compiled:
-            follow_zones(self.table.numbers)
+        self._follow()
         change = manager.review(t, state) if manager.review_due(t) else None
         if change is None and self.zones.counts[z.CELLS_DUE]:
             change = manager.same_zones()

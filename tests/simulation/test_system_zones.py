@@ -190,3 +190,34 @@ def test_an_equilibrium_has_zones_too() -> None:
     found = hybrid.static(scene)
     kinds = {zone.kind for line in found.lines.values() for zone in line.zones[0]}
     assert kinds == {"rod", "catenary"}
+
+
+def test_a_criterion_of_ones_own_asks_for_the_rods_of_the_cable() -> None:
+    """Where and when nothing else would, as one cable; it sees the name of the line."""
+    cable, system = slackening(duration=0.6)
+    seen = set()
+
+    def criterion(look: hybrid.NodeState) -> np.ndarray:
+        seen.add(look.line)
+        return np.where((look.s > 20) & (look.s < 30) & (look.t > 0.2), 1.5, 0.0)
+
+    one, quiet = hybrid.run(cable, criterion=criterion), hybrid.run(system).lines["rope"]
+    assert seen == {""}
+    line = hybrid.run(system, criterion=criterion).lines["rope"]
+    assert seen == {"", "rope"}
+    assert [*line.zones] == [*one.zones] and [*line.zones] != [*quiet.zones]
+    assert any(x.kind == "rod" and x.s_a < 25 < x.s_b for x in line.zones[-1])
+    assert np.abs(line.position - one.position).max() < 1e-7 * 60
+    assert np.abs(line["work/zones"] - one["work/zones"]).max() < 1e-6 * np.abs(one["work/zones"]).max()
+
+
+def test_a_criterion_sees_the_line_that_it_is_asked_for() -> None:
+    """And asks for rods in that alone; where no zones move there is nothing to ask for."""
+    short = mooring(time={"duration": 0.3, "step": 0.02})
+    result = hybrid.run(short, criterion=lambda look: np.full(look.s.size, 1.5 * (look.line == "north")))
+    kinds = {name: {x.kind for x in line.zones[-1]} for name, line in result.lines.items()}
+    assert kinds["north"] == {"rod"} and "catenary" in kinds["east"] & kinds["south"]
+    for line in short["lines"].values():
+        line["model"] = "rod"
+    with pytest.raises(TypeError, match="not adaptive"):
+        hybrid.run(short, criterion=lambda look: look.s)
