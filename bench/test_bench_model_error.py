@@ -103,42 +103,40 @@ EVERY = {"kind": "adaptive", "rod_cell": 1e9}  # base cells everywhere: the same
 
 
 def cases():
-    """Name, scene of a model, of it corrected, of the rod."""
-    for name, low, corrected, rod in (
+    """Name, scene of a model, of the rod."""
+    for name, low, rod in (
         (
             "touchdown, catenary",
-            example("touchdown", "catenary", **TOUCHDOWN), example("touchdown", "corrected", **TOUCHDOWN),
-            example("touchdown", "rod", **TOUCHDOWN),
+            example("touchdown", "catenary", **TOUCHDOWN), example("touchdown", "rod", **TOUCHDOWN),
         ),
         (
             "touchdown, rod 70 to 120 m",
             *(
                 example("touchdown", zones((k, 70, 28), ("rod", 50, 20), (k, 130, 52)), **BEDDED)
-                for k in ("catenary", "corrected", "rod")
+                for k in ("catenary", "rod")
             ),
         ),
         (
             "s_tether, catenary",
-            *(example("s_tether", {"kind": k, "slack": "warn"}, **S) for k in ("catenary", "corrected")),
-            example("s_tether", "rod", **S),
+            example("s_tether", {"kind": "catenary", "slack": "warn"}, **S), example("s_tether", "rod", **S),
         ),
         (
             "s_tether, rod 8 to 50 m",
             *(
                 example("s_tether", zones((k, 8, 16), ("rod", 42, 84), (k, 10, 20)), mesh=None, **S)
-                for k in ("catenary", "corrected", "rod")
+                for k in ("catenary", "rod")
             ),
         ),
-        ("pins, current across", *(clamped(k, "pinned", 300.0) for k in ("catenary", "corrected", "rod"))),
-        ("clamps, current across", *(clamped(k) for k in ("catenary", "corrected", "rod"))),
-        ("clamps, EI ten times", *(clamped(k, EI=300.0) for k in ("catenary", "corrected", "rod"))),
-        ("twisted by 0.4 turns", *(twisted(k) for k in ("catenary", "corrected", "rod"))),
+        ("pins, current across", *(clamped(k, "pinned", 300.0) for k in ("catenary", "rod"))),
+        ("clamps, current across", *(clamped(k) for k in ("catenary", "rod"))),
+        ("clamps, EI ten times", *(clamped(k, EI=300.0) for k in ("catenary", "rod"))),
+        ("twisted by 0.4 turns", *(twisted(k) for k in ("catenary", "rod"))),
     ):  # fmt: skip
-        yield name, low, corrected, rod
+        yield name, low, rod
     for joint in (0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.5, 1.7):
-        yield f"suspension at rest, {joint} m", *(hung(joint, k, True) for k in ("catenary", "corrected", "rod"))
+        yield f"suspension at rest, {joint} m", *(hung(joint, k, True) for k in ("catenary", "rod"))
     for joint in (0.5, 1.0, 1.5):
-        yield f"suspension let go, {joint} m", *(hung(joint, k, False) for k in ("catenary", "corrected", "rod"))
+        yield f"suspension let go, {joint} m", *(hung(joint, k, False) for k in ("catenary", "rod"))
     for name, tolerance in (
         ("touchdown", 2e-5), ("s_tether", 1e-3), ("s_tether", 1e-2), ("slack_on_seabed", 1e-3), ("irregular_sea", 3e-3),
     ):  # fmt: skip
@@ -148,38 +146,24 @@ def cases():
                 "time": plain.require_time().model_copy(update={"duration": min(plain.require_time().duration, 40.0)})
             }
         )
-        one, two = (
-            plain.model_copy(update={"model": plain.model.model_copy(update=x)})
-            for x in ({"correct": True}, {"force_rod": ((0.0, plain.length),)})
-        )
-        yield f"{name}, adaptive {tolerance:g}", plain, one, two
-
-
-def largest(x: np.ndarray) -> np.ndarray:
-    return np.abs(x).reshape(len(x), -1).max(axis=1)
+        model = plain.model.model_copy(update={"force_rod": ((0.0, plain.length),)})
+        yield f"{name}, adaptive {tolerance:g}", plain, plain.model_copy(update={"model": model})
 
 
 def test_model_error_effectivity():
-    """Effectivity: estimated over true largest distance to the rod, median over time; left: after correction."""
-    print(f"\n{'':28s} {'true (m)':>9s}  effectivity (5 % .. 95 %)   left: position  tension  moment  pull of ends")
-    for name, low, corrected, rod in cases():
-        a, c, b = hybrid.run(low), hybrid.run(corrected), hybrid.run(rod)
+    """Effectivity: estimated over true largest distance to the rod, median over time."""
+    print(f"\n{'':28s} {'true (m)':>9s}  effectivity (5 % .. 95 %)")
+    for name, low, rod in cases():
+        a, b = hybrid.run(low), hybrid.run(rod)
         true = np.linalg.norm(b["position"] - a["position"], axis=2).max(axis=1)
         clear = true > 1e-3 * true.max()
         ratio = (a["errors/model/position"].max(axis=1) / np.maximum(true, 1e-300))[clear]
-        left = []
-        for q in ("position", "tension", "bending_moment", "reaction_start", "reaction_end"):
-            was = largest(b[q] - a[q] if q in a.names else b[q])[clear]
-            left.append((float(np.median(largest(b[q] - c[q])[clear])), float(np.median(was))))
-        parts = [x / y if y > 0.0 else 0.0 for x, y in left]
-        ends = f"{left[3][1] + left[4][1]:.3g} -> {left[3][0] + left[4][0]:.3g} N"
         print(
             f"{name:28s} {np.median(true[clear]):9.2e}  {np.median(ratio):5.3f} ({np.percentile(ratio, 5):.2f} .. "
-            f"{np.percentile(ratio, 95):.2f})        {parts[0]:14.3f} {parts[1]:8.3f} {parts[2]:7.3f}  {ends}"
+            f"{np.percentile(ratio, 95):.2f})"
         )
         if "adaptive" not in name and "s_tether, catenary" not in name:
             assert 0.7 < np.median(ratio) < 1.3, name  # the worst when written: 0.94 and 1.09
-            assert parts[0] < 0.35, name  # 0.26
 
 
 def test_model_error_cost():
@@ -237,32 +221,3 @@ def test_model_error_cost():
         print(
             f"{name:12s} whole run: {runs[False]:.3f} s without, {runs[True]:.3f} s with: {runs[True] / runs[False] - 1:.0%}"
         )
-
-
-def test_model_error_correct_adaptive():
-    """Zones that move, corrected or not: largest distance to all rod over the tolerance, share of rod, time."""
-    print()
-    for name in ("touchdown", "s_tether", "slack_on_seabed", "irregular_sea", "rov_tether"):
-        for tolerance in (3e-3, 1e-3, 3e-4, 1e-4):
-            scene = example(name, EVERY | {"tolerance": tolerance}, mesh={"cells": 120})
-            duration = min(scene.require_time().duration, 40.0)
-            scene = scene.model_copy(
-                update={
-                    "time": scene.require_time().model_copy(update={"duration": duration}),
-                    "output": scene.output.model_copy(update={"errors": None}),
-                }
-            )
-            said, apart, rod = [], [], None
-            for update in ({"force_rod": ((0.0, scene.length),)}, {}, {"correct": True}):
-                begin = time.process_time()
-                result = hybrid.run(scene.model_copy(update={"model": scene.model.model_copy(update=update)}))
-                took = time.process_time() - begin
-                if rod is None:
-                    rod = result
-                    continue
-                far = np.linalg.norm(result["position"] - rod["position"], axis=2).max() / (tolerance * scene.length)
-                share = np.mean([sum(z.s_b - z.s_a for z in x if z.kind == "rod") for x in result.zones]) / scene.length
-                said.append(f"{far:.3f}, rod {share:.2f}, {took:.2f} s")
-                apart.append(far)
-            print(f"{name:16s} {tolerance:g}: plain {said[0]}; corrected {said[1]}")
-            assert max(apart) < 1.5, "zones that move are further from the rod than their tolerance allows"

@@ -407,7 +407,7 @@ class Estimate:
         return ((SEVERAL, text),)
 
     def _model_error(self, quantity: str, a: int, b: int) -> np.ndarray | None:
-        """Errors of neglecting bending: what a corrected run says of itself, else those of a coarser run."""
+        """Errors of neglecting bending: what the run says of itself, else those of a coarser run."""
         if quantity in self.run.model_error:
             factors = self._bound[a:b] if self._bound is not None else None
             return scaled(np.asarray(self.run.model_error[quantity][a:b]), factors)

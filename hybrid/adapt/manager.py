@@ -107,7 +107,6 @@ class DomainManager:
         scale: float,
         user: UserCriterion | None = None,
         pace: float | None = None,
-        left: float = 1.0,
         on_base: LineOnBase | None = None,
         curvature_error: float | None = None,
         asked: Mapping[int, float] = MappingProxyType({}),
@@ -115,7 +114,6 @@ class DomainManager:
     ) -> None:
         """tolerance: m; given: (n,) 1 force_rod, -1 force_catenary, 0 adaptive; scale: tension scale, N.
 
-        left: part of the bending error of catenaries that remains in results (1: no correction);
         dwell: hold time, s; pace: ramp time of bending stiffness, s (None: dwell); on_base: of the model.
         curvature_error: part of the largest curvature that the length of cells, which follow it, may make it wrong by;
         None: they stay as they are.  asked: parts of the largest tension, curvature and moment (numbers of
@@ -132,7 +130,7 @@ class DomainManager:
             waves=np.zeros(places),
         )  # fmt: skip
         self.zones.clock[z.SHARE], self.zones.clock[z.FINENESS] = curvature_error or 0.0, fineness
-        self.tolerance, self.zones.clock[z.LEFT] = tolerance, left
+        self.tolerance, self.zones.clock[z.LEFT] = tolerance, 1.0
         for quantity, part in asked.items():
             self.zones.asked[quantity] = part
         self.zones.clock[z.PACE] = self.pace

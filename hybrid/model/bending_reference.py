@@ -7,18 +7,10 @@ import numpy as np
 from hybrid.kernels.state.state import Floats
 from hybrid.model.material import Material, tension_floor
 
-# Part of the error that a corrected result still has: a quarter, because correction has left 2 to 18 % of it, and 26 %
-# where a cable is bent by a clamp through 60 degrees (docs/zones.md).  More where it changes the tension by more.
-LEFT = 0.25
 # Change of tension over tension (`Shift.share`) beyond which a linear estimate of what bending does may be half wrong.
 HALF_WRONG = 0.5
 # Where such an estimate knows least: t, s; m; share; m, the shift that it gives.
 NO_DOUBT = (0.0, 0.0, 0.0, 0.0)
-
-
-def left_by_correction(share: Floats) -> Floats:
-    """Part of the error that a result corrected for it still has; share: as of `solve.bending_corrector.Shift`."""
-    return np.clip(share, LEFT, 1.0)
 
 
 def full_bending(cable: Material, s: Floats, h: Floats, scale: float) -> tuple[Floats, Floats]:

@@ -43,8 +43,6 @@ from hybrid.model.self_reach import contact_bits
 from hybrid.scene.motion_checks import prescribed_twist
 from hybrid.scene.schema import (
     AdaptiveModel,
-    CorrectedModel,
-    CorrectedZone,
     RodModel,
     RodZone,
     Scene,
@@ -79,7 +77,6 @@ class Model:
     on_base: LineOnBase | None = None  # and what makes its lines
     plane: Floats | None = None  # (3, 3) rows p, q, normal: what the scene lies in, if it does
     follows_error: bool = False  # whether the error of leaving bending out is followed
-    corrected: bool = False  # whether results are corrected for it
     payout: PayoutPlan | None = None  # of a line that is paid out or taken in
 
     @property
@@ -146,18 +143,10 @@ def zone_plans(scene: Scene) -> tuple[ZonePlan, ...]:
         return tuple(
             ZonePlan("rod", z.rod, z.cells, z.ratio)
             if isinstance(z, RodZone)
-            else ZonePlan("catenary", z.corrected if isinstance(z, CorrectedZone) else z.catenary, z.cells, z.ratio)
+            else ZonePlan("catenary", z.catenary, z.cells, z.ratio)
             for z in model.zones
         )
     return (ZonePlan("rod" if isinstance(model, AdaptiveModel | RodModel) else "catenary", scene.length),)
-
-
-def corrects(scene: Scene) -> bool:
-    """Whether the results of a scene are corrected for the bending that its catenaries leave out."""
-    model = scene.model
-    if isinstance(model, ZonesModel):
-        return any(isinstance(z, CorrectedZone) for z in model.zones)
-    return isinstance(model, CorrectedModel) or (isinstance(model, AdaptiveModel) and model.correct)
 
 
 def build(
@@ -208,20 +197,19 @@ def build(
         for name, r in (spare_shapes(scene, s) if shape is not None else from_joint(scene, s))
         if spare and like is None
     ]
-    corrected = corrects(scene)
-    follows = (resolution.follow or corrected) and followed(scene, zones, corrected).on
+    follows = resolution.follow and followed(scene, zones).on
     plane, flat = in_plane(scene, start, others, ends.values)
     if plane is not None and scene.dimension == 2:
         line = planar(line, plane)
     return Model(
         line=line, zones=zones, ends=ends, sea=sea, start=start, start_shape=shape_name, other_starts=tuple(others),
-        contents=contents_of(scene, line, zones, flat, corrected), length=float(s[-1]), tension_scale=scale,
+        contents=contents_of(scene, line, zones, flat), length=float(s[-1]), tension_scale=scale,
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),
         inextensible=not line.ck.any(),
         attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
         on_base=LineOnBase(cable, layout.base) if layout is not None else None,
-        plane=plane, corrected=corrected, follows_error=follows,
+        plane=plane, follows_error=follows,
         payout=paid or payout_plan(scene, line, zones),
     )  # fmt: skip
 

@@ -133,11 +133,10 @@ def _parts(scene: Scene, line: Line, rods: bool, flat: Entry) -> Iterator[Entry]
     yield Entry(f"attachments: {attached}", attached > 0, "cable.attachments, ends of kind body")
 
 
-def followed(scene: Scene, zones: Sequence[Zone], corrects: bool) -> Entry:
-    """Whether the error of leaving bending out is followed along the run; corrects: whether results are corrected."""
+def followed(scene: Scene, zones: Sequence[Zone]) -> Entry:
+    """Whether the error of leaving bending out is followed along the run."""
     what, sections = "model error (bending left out), along the run", scene.cable.sections
-    why = "error figure; in a coarser run" if wants_errors(scene) else "results are corrected for it (model)"
-    if not (wants_errors(scene) or corrects):
+    if not wants_errors(scene):
         return Entry(what, False, "output.errors: true")
     if not isinstance(scene.model, AdaptiveModel):
         if all(z.kind == "rod" for z in zones):
@@ -148,7 +147,7 @@ def followed(scene: Scene, zones: Sequence[Zone], corrects: bool) -> Entry:
             return Entry(what, False, "bends differently in two directions: a catenary does not know which way it lies")
     if any(x.intrinsic_curvature and any(x.intrinsic_curvature[:2]) for x in sections):
         return Entry(what, False, "curved without stress: a catenary does not know which way it lies")
-    return Entry(what, True, why)
+    return Entry(what, True, "error figure; in a coarser run")
 
 
 def _force(scene: Scene, line: Line, name: str, bit: int, needs: str) -> Entry:
@@ -181,9 +180,7 @@ def _idle(scene: Scene, line: Line) -> Iterator[Entry]:
         yield Entry(IDLE, False, f"{why} to what it carries", event="ignored")
 
 
-def contents_of(
-    scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry, corrects: bool = False
-) -> tuple[Entry, ...]:
+def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) -> tuple[Entry, ...]:
     """What is on and by which key, what is off and what would switch it on; flat: whether it is in a plane."""
     kinds = {z.kind for z in zones}
     entries = list(_moving(scene.model) if isinstance(scene.model, AdaptiveModel) else _fixed(zones))
@@ -208,10 +205,7 @@ def contents_of(
                 )
             )
     entries += [Entry(x.what, True, x.why, "implausible", x.s) for x in implausible(scene)]
-    entries.append(followed(scene, zones, corrects))
-    if corrects:
-        text = "position, tension, curvature and moment with what bending adds to them"
-        entries.append(Entry("corrected catenary zones", True, f"model; {text}"))
+    entries.append(followed(scene, zones))
     if isinstance(scene.model, AdaptiveModel):
         entries += _watched(scene)
         entries.append(Entry("criteria as fields", scene.output.criteria, "output.criteria"))

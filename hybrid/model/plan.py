@@ -205,10 +205,8 @@ def mesh_of(model: Model) -> dict[str, Any]:
     """What a plan says of the mesh of a model: zones, cells, base_cells, unknowns."""
     middle = 0.5 * (model.line.s[:-1] + model.line.s[1:])
     cells = tuple(int(((middle > z.s_a) & (middle < z.s_b)).sum()) for z in model.zones)
-    names = {"catenary": "corrected"} if model.corrected else {}
-    zones = tuple(replace(z, kind=names.get(z.kind, z.kind)) for z in model.zones)
     base = model.layout.rod.size if model.layout else None
-    return {"zones": zones, "cells": cells, "base_cells": base, "unknowns": model.unknowns}
+    return {"zones": model.zones, "cells": cells, "base_cells": base, "unknowns": model.unknowns}
 
 
 def _critical_torque(scene: Scene, model: Model) -> CriticalTorque | None:

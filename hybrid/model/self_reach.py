@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from hybrid.kernels.state.forces import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Line
-from hybrid.scene.analysis import CorrectedZone
 from hybrid.scene.payout import Payout
-from hybrid.scene.schema import AdaptiveModel, CatenaryModel, CorrectedModel, Scene, ZonesModel
+from hybrid.scene.schema import CatenaryModel, Scene
 
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.scene.system import System
@@ -43,7 +42,6 @@ def self_reach(scene: Scene) -> Reach:
     off = {
         "a section has no diameter": any(x.diameter is None for x in sections),
         "catenaries that stay touch each other with contact: {self: true} alone": isinstance(model, CatenaryModel),
-        "corrected catenaries know no contact; those that are not corrected do": is_corrected(model),
         f"solver: {scene.solver} knows no contact": scene.solver != "elimination",
         "dimension: 2, and contact leads out of a plane": scene.dimension == 2,
     }
@@ -55,13 +53,6 @@ def self_reach(scene: Scene) -> Reach:
         return Reach(False, False, f"the slack of {max(slack, 0.0):.3g} m is less than {least:.3g} m, of a loop")
     much = "whatever its ends do" if math.isinf(slack) else f"a slack of {slack:.3g} m, and a loop takes {least:.3g} m"
     return Reach(False, True, f"{WHERE_NEAR}: {much}; {COST}")
-
-
-def is_corrected(model: object) -> bool:
-    """Whether results of catenaries are corrected for bending, which knows no contact of the line with itself."""
-    if isinstance(model, ZonesModel):
-        return any(isinstance(zone, CorrectedZone) for zone in model.zones)
-    return isinstance(model, CorrectedModel) or (isinstance(model, AdaptiveModel) and model.correct)
 
 
 def no_contact(scene: Scene) -> str:

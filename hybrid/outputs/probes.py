@@ -13,7 +13,6 @@ import numpy as np
 from hybrid.kernels.march.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twist
 from hybrid.kernels.state.forces import MAY_TOUCH, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea
-from hybrid.model.bending_reference import LEFT, left_by_correction
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import NEAR
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
@@ -132,8 +131,6 @@ WORK = {
 SIDED = (
     "tension", "theta", "phi", "curvature", "twist", "bending_moment", "torque", "shear", "wall_tension", "von_mises",
 )  # fmt: skip
-# Probes that a corrected catenary has as a rod has them.
-CORRECTED = ("bending_moment", "moment_start", "moment_end", "shear")
 # What leaving bending out makes of each quantity, by name: unit, description, dimensions.
 MODEL_ERRORS = {
     "position": ("m", "distance", _S),
@@ -188,7 +185,6 @@ class Observer:
         criteria: Sequence[tuple[str, str]] = (),
         only: Sequence[str] | None = None,
         errors: bool = False,
-        corrected: bool = False,
         jumps: Sequence[float] | Floats = (),
         changes: Sequence[float] = (),
         finest: Floats | None = None,
@@ -199,8 +195,8 @@ class Observer:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
 
         criteria: name and description of those that are written as well; only: names of probes, None: all.
-        errors: whether what leaving bending out makes of the results is written; corrected: whether they are corrected
-        for it.  `values_of` gets the criteria, and for both of the latter the shift.
+        errors: whether what leaving bending out makes of the results is written.  `values_of` gets the criteria, and
+        for the latter the shift.
         jumps: arc lengths, m, inside the line and in s where a quantity may have two values; changes: those where one
         section ends and the next begins; finest: m, all nodes that there may be, where cells follow the curvature;
         gauges: places (x, y), m, where the elevation of the sea is recorded.
@@ -220,15 +216,14 @@ class Observer:
         self._probes = {
             name: p
             for name, p in PROBES.items()
-            if (not p.needs or has.intersection(p.needs.split()) or (corrected and name in CORRECTED))
-            and (only is None or name in only)
+            if (not p.needs or has.intersection(p.needs.split())) and (only is None or name in only)
         }
         self.quantities = quantities
         may_be_nan: tuple[str, ...] = MAY_BE_NAN
         if self.quantities is not None:
             self._probes |= self.quantities.probes()
             may_be_nan += tuple(self.quantities.wanted)
-        self._errors, self._corrected = errors, corrected
+        self._errors = errors
         self.first_energy: float | None = None  # J, at the first output
         self._with_work = with_work
         sizes = {"s": s.size, "xyz": 3, "edge": 2}
@@ -251,12 +246,11 @@ class Observer:
             for name, (_, text) in zip(self._criteria, criteria, strict=True)
         ]
         if errors:
-            left = f", what correction leaves of it ({LEFT:g} or more)" if corrected else ""
             fields += [
                 Field(
                     f"errors/model/{name}",
                     unit,
-                    f"{text} by bending that is left out{left}",
+                    f"{text} by bending that is left out",
                     (s.size,) * len(dims),
                     dims,
                 )
@@ -332,8 +326,7 @@ class Observer:
 
     def rows_of(self, zones: Sequence[Zone]) -> list[tuple[str, float, float]]:
         """Zones as they stand in the file."""
-        names = {"catenary": "corrected"} if self._corrected else {}
-        return [(names.get(z.kind, z.kind), z.s_a, z.s_b) for z in zones]
+        return [(z.kind, z.s_a, z.s_b) for z in zones]
 
     @property
     def writes_criteria(self) -> bool:
@@ -350,22 +343,19 @@ class Observer:
         """All fields of nb outputs, (nb, ...) in the units of the fields, as new arrays.
 
         plain: as of `look`; ratios: (nb, criteria, ns), if they are written: the largest since the output before;
-        shift: of these outputs, what bending that is left out would change, if results are corrected for it or its
-        error is written.
+        shift: of these outputs, what bending that is left out would change, if its error is written.
         """
         batch = plain.batch
         corrected = plain.corrected(shift) if shift is not None else plain
-        view = corrected if self._corrected else plain
-        found = {name: p.value(view) for name, p in self._probes.items()}
+        found = {name: p.value(plain) for name, p in self._probes.items()}
         if self._right:
-            right = view.on(self._after)
+            right = plain.on(self._after)
             found |= {f"right/{name}": self._probes[name].value(right) for name in self._right}
         if self._errors:
-            part = left_by_correction(shift.share) if self._corrected and shift is not None else 1.0
-            found |= {f"errors/model/{name}": part * x for name, x in model_errors(plain, corrected).items()}
+            found |= {f"errors/model/{name}": x for name, x in model_errors(plain, corrected).items()}
             if self.jumps.size:
                 after = model_errors(plain.on(self._after), corrected.on(self._after))
-                found |= {f"errors/model/right_{name}": part * after[name] for name in SIDED_ERRORS}
+                found |= {f"errors/model/right_{name}": after[name] for name in SIDED_ERRORS}
         out = {name: plain.by_output(x, self._dims(name)) for name, x in found.items()}
         if self._criteria:
             if ratios is None:

@@ -145,15 +145,7 @@ class CatenaryZone(Table):
     ratio: Positive | None = Field(default=None, description=_RATIO)
 
 
-class CorrectedZone(Table):
-    """A stretch that carries tension only, its results corrected for the bending left out."""
-
-    corrected: Positive = Field(description="unstretched length of this corrected catenary zone [m]")
-    cells: Whole | None = Field(default=None, ge=1, description="number of cells; absent: chosen [-]")
-    ratio: Positive | None = Field(default=None, description=_RATIO)
-
-
-_ZONES: dict[str, type[Table]] = {"rod": RodZone, "catenary": CatenaryZone, "corrected": CorrectedZone}
+_ZONES: dict[str, type[Table]] = {"rod": RodZone, "catenary": CatenaryZone}
 
 
 def _zone_tag(value: Any) -> str:
@@ -164,22 +156,20 @@ def _zone_tag(value: Any) -> str:
 
 
 def _one_zone_kind(value: Any) -> Any:
-    """Every zone has one of the keys rod, catenary, corrected: the key is its kind and the value its length."""
-    if isinstance(value, RodZone | CatenaryZone | CorrectedZone):
+    """Every zone has one of the keys rod, catenary: the key is its kind and the value its length."""
+    if isinstance(value, RodZone | CatenaryZone):
         return value
     fix = "write {rod: length} or {catenary: length}"
     if not isinstance(value, Mapping):
         refuse([Finding((), "a zone", fix)])
     kinds = [kind for kind in _ZONES if kind in value]
     if len(kinds) != 1:
-        refuse([Finding((), "either rod or catenary (or corrected), with the length of the zone in m", fix)])
+        refuse([Finding((), "either rod or catenary, with the length of the zone in m", fix)])
     return value
 
 
 Zone = Annotated[
-    Annotated[RodZone, Tag("<rod zone>")]
-    | Annotated[CatenaryZone, Tag("<catenary zone>")]
-    | Annotated[CorrectedZone, Tag("<corrected zone>")],
+    Annotated[RodZone, Tag("<rod zone>")] | Annotated[CatenaryZone, Tag("<catenary zone>")],
     Discriminator(_zone_tag),
     Before(_one_zone_kind),
 ]
@@ -198,16 +188,6 @@ class CatenaryModel(Table):
     """The whole cable is perfectly flexible."""
 
     kind: Literal["catenary"] = Field(default="catenary", description="tension only: a string")
-    slack: Slack = Field(default="stop", description=_SLACK)
-
-
-class CorrectedModel(Table):
-    """The whole cable is a catenary, its results corrected for the bending left out."""
-
-    kind: Literal["corrected"] = Field(
-        default="corrected",
-        description="tension only; position, tension, curvature and moment corrected for the bending left out",
-    )
     slack: Slack = Field(default="stop", description=_SLACK)
 
 
@@ -230,7 +210,7 @@ Stretches = Annotated[tuple[NonNegativePair, ...], Field(min_length=1), Before(_
 
 
 # Keys that are no more, with the value at which they asked for nothing: results of before 0.7 name every key.
-_ASKED_NOTHING = {"joint": "spherical"}
+_ASKED_NOTHING = {"joint": "spherical", "correct": False}
 
 
 def _without_former_keys(value: Any) -> Any:
@@ -244,6 +224,8 @@ class AdaptiveModel(Table):
 
     instead: ClassVar[Mapping[str, str]] = {
         "joint": "leave it out: a joint between rod and catenary passes no moment (spherical)",
+        "correct": "leave it out: `output: {errors: true}` says what bending would change, a smaller tolerance makes "
+        "more of the line rod",
     }
 
     kind: Literal["adaptive"] = Field(default="adaptive", description="zones that move by themselves")
@@ -278,11 +260,6 @@ class AdaptiveModel(Table):
         validation_alias=AliasChoices("force_catenary", "always_catenary"),
         description="stretches [s_a, s_b] that are always catenary [m]",
     )
-    correct: Truth = Field(
-        default=False,
-        description="results corrected for the bending that catenary zones leave out, and criteria that count what "
-        "is left after it",
-    )
     always_move: Truth = Field(
         default=False,
         description="zones move even where rods or catenaries everywhere are predicted to cost less; any other key of "
@@ -302,17 +279,17 @@ def usual_model(cable: Any) -> RodModel | CatenaryModel | AdaptiveModel:
 Model = Annotated[
     Annotated[RodModel, Tag("<rod>")]
     | Annotated[CatenaryModel, Tag("<catenary>")]
-    | Annotated[CorrectedModel, Tag("<corrected>")]
     | Annotated[ZonesModel, Tag("<zones>")]
     | Annotated[AdaptiveModel, Before(_without_former_keys), Tag("<adaptive>")],
     Discriminator(by_kind),
     Kinds(
-        ("rod", "catenary", "corrected", "zones", "adaptive"),
+        ("rod", "catenary", "zones", "adaptive"),
         usual=("adaptive", "rod", "catenary"),
         implied=(
             ("zones", "zones"),
             *((key, "adaptive") for key in (*AdaptiveModel.model_fields, *AdaptiveModel.former) if key != "kind"),
         ),
+        gone=(("corrected", "write catenary: with `output: {errors: true}` it says what bending would change"),),
     ),
 ]
 

@@ -323,12 +323,14 @@ def _of_kind(table: type[Table]) -> str:
 class Kinds:
     """Annotation of a union by `kind`: checks the kind first and takes a bare word as ``{kind: word}``.
 
-    `usual` names what to advise where no kind is given; `implied`: keys that only one kind has, and that kind.
+    `usual` names what to advise where no kind is given; `implied`: keys that only one kind has, and that kind;
+    `gone`: kinds that are no more, and what to do.
     """
 
     names: tuple[str, ...]
     usual: tuple[str, ...]
     implied: tuple[tuple[str, str], ...] = ()
+    gone: tuple[tuple[str, str], ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         descriptions = {tag: _of_kind(table) for table, tag in _tagged(source)}
@@ -367,7 +369,8 @@ class Kinds:
             fix = "write kind, not type" if "type" in value else f"add `kind: {self.usual[0]}`, or another of these"
             refuse([Finding(("kind",), expected, fix)])
         elif kind not in self.names:
-            refuse([Finding(("kind",), expected, nearest(str(kind), descriptions) or "write one of these")])
+            fix = dict(self.gone).get(str(kind)) or nearest(str(kind), descriptions) or "write one of these"
+            refuse([Finding(("kind",), expected, fix)])
         return value
 
     def _refuse_table(self, given: str | None) -> NoReturn:

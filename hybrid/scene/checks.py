@@ -7,7 +7,6 @@ when another table of the scene cannot be read.
 from __future__ import annotations
 
 import inspect
-import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -26,8 +25,6 @@ from hybrid.scene.analysis import (
     AdaptiveModel,
     CatenaryModel,
     CatenaryZone,
-    CorrectedModel,
-    CorrectedZone,
     Initial,
     Mesh,
     Model,
@@ -96,10 +93,7 @@ def _zones_fill(cable: Cable, model: Model) -> Iterator[Finding]:
 
 
 def _zone_length(zone: Any) -> float:
-    for kind in ("rod", "catenary"):
-        if hasattr(zone, kind):
-            return float(getattr(zone, kind))
-    return float(zone.corrected)
+    return float(zone.rod if isinstance(zone, RodZone) else zone.catenary)
 
 
 def _rods_can_bend(cable: Cable, model: Model) -> Iterator[Finding]:
@@ -121,33 +115,6 @@ def _rods_can_bend(cable: Cable, model: Model) -> Iterator[Finding]:
             yield Finding((*here, "torsional_stiffness"), f"a number > 0, in N m^2, because {over}", fix)
 
 
-def _corrections_know_the_bending(cable: Cable, model: Model, ends: Ends) -> Iterator[Finding]:
-    """What is corrected must bend, and the same in all directions: a catenary does not know which way it lies."""
-    zones = model.zones if isinstance(model, ZonesModel) else ()
-    corrected = any(isinstance(z, CorrectedZone) for z in zones)
-    for k, zone in enumerate(zones):
-        if corrected and isinstance(zone, CatenaryZone):
-            fix = "write {corrected: length} for this zone too, or {catenary: length} for all"
-            yield Finding(("model", "zones", k), "no catenary beside a corrected one: a correction shifts all", fix)
-    if not (corrected or isinstance(model, CorrectedModel) or (isinstance(model, AdaptiveModel) and model.correct)):
-        return
-    for name, end in ends.named().items():
-        if end.spring < math.inf:
-            expected = "nothing, because what is corrected for bending (model) knows rigid clamps alone"
-            yield Finding(("ends", name, "bend_stiffness"), expected, "leave it out, or write `model: rod`")
-    for i, section in enumerate(cable.sections):
-        here: Place = ("cable", "sections", i)
-        if not section.weakest_bending and not isinstance(model, AdaptiveModel):
-            fix = "add `bending_stiffness: ...` (N m^2), or make the model a catenary"
-            yield Finding((*here, "bending_stiffness"), "a number > 0, in N m^2, because model corrects for it", fix)
-        if section.anisotropic and not isinstance(model, AdaptiveModel):
-            expected = "one number, because a corrected catenary (model) does not know which way its sections lie"
-            yield Finding((*here, "bending_stiffness"), expected, "give one number, or write `model: rod`")
-        if section.intrinsic_curvature and any(section.intrinsic_curvature[:2]):
-            expected = "no curvature, because a corrected catenary (model) does not know which way its sections lie"
-            yield Finding((*here, "intrinsic_curvature"), expected, "leave it out, or write `model: rod`")
-
-
 def _stretches_on_cable(cable: Cable, model: Model) -> Iterator[Finding]:
     if not isinstance(model, AdaptiveModel):
         return
@@ -164,9 +131,6 @@ def _stretches_on_cable(cable: Cable, model: Model) -> Iterator[Finding]:
 def _zones_that_move(model: Model, solver: str) -> Iterator[Finding]:
     if isinstance(model, AdaptiveModel) and solver == "shooting":
         yield Finding(("solver",), "elimination, because zones move (model)", "or write `model: rod`")
-    zones = model.zones if isinstance(model, ZonesModel) else ()
-    if solver == "shooting" and (isinstance(model, CorrectedModel) or any(isinstance(z, CorrectedZone) for z in zones)):
-        yield Finding(("solver",), "elimination, because the arbiter corrects nothing (model)", "or leave solver out")
 
 
 def _stretch_by_a_law(cable: Cable, model: Model, ends: Ends, solver: str) -> Iterator[Finding]:
@@ -237,8 +201,8 @@ def _in_a_plane(
     yield from plane_of(environment, cable, ends, initial, TYPED)[1]
 
 
-def _touches_itself(cable: Cable, contact: Contact, model: Model, solver: str) -> Iterator[Finding]:
-    """Contact of the cable with itself is computed of lines that are not corrected for bending."""
+def _touches_itself(cable: Cable, contact: Contact, solver: str) -> Iterator[Finding]:
+    """Contact of the cable with itself keeps diameters apart."""
     if contact.self is False and contact.friction > 0.0:
         expected = "0 or nothing, because parts of the cable do not touch each other without contact.self"
         yield Finding(("contact", "friction"), expected, "leave `self: false` out, or leave friction out")
@@ -249,13 +213,6 @@ def _touches_itself(cable: Cable, contact: Contact, model: Model, solver: str) -
         if section.diameter is None:
             expected = "a number > 0, in m, which parts of the cable keep apart (contact.self)"
             yield Finding(("cable", "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
-    if isinstance(model, AdaptiveModel) and model.correct:
-        expected = "false, because the correction knows no contact of the cable with itself (contact.self)"
-        yield Finding(("model", "correct"), expected, "leave it out, or leave contact out")
-    zones = model.zones if isinstance(model, ZonesModel) else ()
-    if isinstance(model, CorrectedModel) or any(isinstance(zone, CorrectedZone) for zone in zones):
-        expected = "false, because the correction of catenaries knows no contact of the cable with itself"
-        yield Finding(here, expected, "write catenary in place of corrected, or leave contact out")
     if solver == "shooting":
         yield Finding(here, "false, because shooting knows no contact", "leave it out, or leave solver out")
 
@@ -331,7 +288,7 @@ def _turns_are_held(cable: Cable, ends: Ends, model: Model, solver: str) -> Iter
                 fix = f"leave turns out, or clamp ends.{which} (guided: give `normal`) without a swivel"
                 yield Finding(here, f"0, because ends.{which} turns freely, so that nothing is twisted", fix, given)
         for i, section in enumerate(cable.sections):
-            if section.torsional_stiffness is None and not isinstance(model, CatenaryModel | CorrectedModel):
+            if section.torsional_stiffness is None and not isinstance(model, CatenaryModel):
                 expected = f"a number > 0, in N m^2, because ends.{name}.turns twists the cable"
                 yield Finding(("cable", "sections", i, "torsional_stiffness"), expected, "add it")
 
@@ -342,7 +299,7 @@ def _axes_are_given(cable: Cable, ends: Ends, model: Model, dimension: int | Non
     A clamp alone says nothing of it, and an axis of the world in its place would bend the same cable otherwise when the
     scene is turned.
     """
-    if dimension == 2 or isinstance(model, CatenaryModel | CorrectedModel):
+    if dimension == 2 or isinstance(model, CatenaryModel):
         return
     held = [name for name, end in ends.named().items() if end.holds_twist]
     if not held or any(end.gives_axes for end in ends.both):
@@ -423,7 +380,6 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     magnitude_checks.end_forces,
     _zones_fill,
     _rods_can_bend,
-    _corrections_know_the_bending,
     _stretches_on_cable,
     _zones_that_move,
     _stretch_by_a_law,

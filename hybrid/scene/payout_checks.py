@@ -4,13 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hybrid.scene.analysis import (
-    AdaptiveModel,
-    CorrectedModel,
-    CorrectedZone,
-    Model,
-    ZonesModel,
-)
 from hybrid.scene.base import Finding
 from hybrid.scene.cable import Contact
 from hybrid.scene.ends import Clamped, Ends, Pinned
@@ -26,18 +19,12 @@ def _winch(ends: Ends) -> tuple[str, Pinned | Clamped, Payout] | None:
     return found
 
 
-def payout_stands_alone(ends: Ends, model: Model, contact: Contact, solver: str) -> Iterator[Finding]:
-    """By elimination, of models that nodes can enter; contact with itself knows the diameters on the reel."""
+def payout_stands_alone(ends: Ends, contact: Contact, solver: str) -> Iterator[Finding]:
+    """By elimination; contact with itself knows the diameters on the reel."""
     found = _winch(ends)
     if found is None:
         return
     name, because = found[0], f"because line is paid out (ends.{found[0]}.payout)"
-    corrected = isinstance(model, ZonesModel) and any(isinstance(x, CorrectedZone) for x in model.zones)
-    if corrected or isinstance(model, CorrectedModel):
-        expected = f"adaptive, catenary, rod, or zones of catenary and rod, {because}"
-        yield Finding(("model",), expected, "write `model: adaptive`, or `model: catenary`", f"kind: {model.kind}")
-    if isinstance(model, AdaptiveModel) and model.correct:
-        yield Finding(("model", "correct"), f"false, {because}", "leave it out, and make model.tolerance smaller")
     if contact.self:
         for i, section in enumerate(getattr(ends, name).payout.reel or ()):
             if section.diameter is None:

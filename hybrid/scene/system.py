@@ -6,7 +6,7 @@ Each line is checked as a scene of its own, between the places where its two poi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import accumulate, pairwise
 from typing import Annotated, Any, ClassVar, Literal
@@ -18,7 +18,6 @@ from hybrid.scene.accuracy import USUAL, Accuracy, AskedAccuracy, of_unnamed_mod
 from hybrid.scene.analysis import (
     AdaptiveModel,
     CatenaryModel,
-    CorrectedModel,
     Equilibrium,
     Mesh,
     Model,
@@ -124,22 +123,10 @@ class JoinedLine(Table):
         return RodModel() if all(x.weakest_bending for x in self.sections) else CatenaryModel()
 
     @model_validator(mode="after")
-    def _zones_stay(self) -> JoinedLine:
-        if isinstance(self.model, CorrectedModel):
-            expected = "rod, catenary, adaptive, or zones that stay, because several lines are computed together"
-            refuse([Finding(("model",), expected, "write `model: rod`", f"kind: {self.model.kind}")])
-        if isinstance(self.model, AdaptiveModel):
-            refuse(self._of_moving_zones(self.model))
+    def _ends_apart(self) -> JoinedLine:
         if self.start == self.end:
             refuse([Finding(("end",), f"a point other than {self.start}, where the line starts", "name another point")])
         return self
-
-    def _of_moving_zones(self, model: AdaptiveModel) -> Iterator[Finding]:
-        """What zones that move do not do in a line of several."""
-        alone = "leave it out, or compute this line alone, with `cable` and `ends`"
-        expected = "nothing, because zones move in a line of several"
-        if model.correct:
-            yield Finding(("model", "correct"), expected, alone, str(model.correct))
 
 
 def _between(initial: Equilibrium, ends: Mapping[str, End]) -> Equilibrium:

@@ -496,7 +496,7 @@ class Case:
         errors = model.follows_error and wants_errors(self.scene)
         return Observer(
             model.line, model.sea.values, model.zones, s, not only, model.attached, kinds, criteria, only, errors,
-            model.corrected, self.points.jumps, section_changes(self.scene),
+            self.points.jumps, section_changes(self.scene),
             model.finest_nodes if follows_curvature(self.scene) and model.layout and not only else None,
             () if only else self.scene.output.elevation or (),
             model.payout is not None, None if only else quantities_of(self.scene),

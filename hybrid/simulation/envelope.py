@@ -112,8 +112,7 @@ class Envelope:
         has |= ({"seabed"} if model.line.bits & SEABED else set()) | ({"time"} if moves else set())
         has |= {"self_contact"} if moves and model.line.bits & (SELF_CONTACT | MAY_TOUCH) else set()
         has |= {"torsion"} if "rod" in has or (model.line.torsion.size and not model.line.bits & PLANAR) else set()
-        # corrected outputs are not of the line that steps compute
-        pipes = Pipes(scene) if moves and not model.corrected and any(x.pipe for x in scene.cable.sections) else None
+        pipes = Pipes(scene) if moves and any(x.pipe for x in scene.cable.sections) else None
         has |= {"pipe"} if pipes is not None else set()
         self._rows = {row: what for row, what in QUANTITIES.items() if what[3] in has}
         side = 3.0 * NEAR * model.length  # beyond which a place is no longer at a change of section
@@ -131,7 +130,7 @@ class Envelope:
         if moves and model.line.bits & MAY_TOUCH and not model.line.bits & SELF_CONTACT:
             self.bounds[:, b.SELF_PRESSURE] = 0.0  # there is no contact before it is computed
         self.itself = SelfWatch(model, no_contact(scene)) if moves else SelfWatch(model)
-        asked = scene.output.quantities if moves and not model.corrected else {}
+        asked = scene.output.quantities if moves else {}
         self.quantities = StepQuantities(scene, asked, pipes)
 
     # --- what is kept -------------------------------------------------------------------------------

@@ -68,7 +68,7 @@ def _beside_solver(scene: Scene, static: bool) -> list[str]:
         needed.insert(1, PAYOUT)  # asked for before the first step
     if scene.time is not None and scene.model.kind == "adaptive":
         needed.append(ZONES)
-    if scene.model.kind == "corrected" or (wants_errors(scene) and scene.model.kind != "rod"):
+    if wants_errors(scene) and scene.model.kind != "rod":
         needed.append(MODEL_ERROR)
     return needed
 

@@ -18,14 +18,12 @@ from hybrid.kernels.mesh.cell_lengths import CALM_STEPS
 from hybrid.kernels.mesh.criteria import CRITERIA
 from hybrid.kernels.state.forces import PLANAR, SELF_CONTACT
 from hybrid.kernels.state.state import Ends, Line, State
-from hybrid.model.bending_reference import LEFT
 from hybrid.model.build import Model, given_zones
 from hybrid.model.coarsen import FEWER, picked, refined
 from hybrid.model.layout import Layout, edges
 from hybrid.model.payout_law import fastest
 from hybrid.model.resolution import Resolution, follows_curvature, requested_accuracy
 from hybrid.scene.schema import AdaptiveModel, Scene
-from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.contact_equilibrium import nearness, settled_from
 from hybrid.simulation.equilibrium import MANY, equilibrium_of, solve_model
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
@@ -146,8 +144,7 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
     manager = DomainManager(
         model.cable, model.layout, resolution.zones * model.length, hold, _given(scene, model, ramp),
         model.tension_scale, criterion, ramp,
-        LEFT if model.corrected else 1.0, model.on_base,
-        curvature_error, shares_asked(scene, curvature_error), resolution.fineness,
+        model.on_base, curvature_error, shares_asked(scene, curvature_error), resolution.fineness,
     )  # fmt: skip
     manager.load(model.ends.moments)
     return manager
@@ -248,15 +245,10 @@ def _rods(model: Model, manager: DomainManager, state: State, t: float) -> np.nd
 
 
 def _difference(full: State, layout: Layout, answer: tuple[Model, Equilibrium], t: float) -> float:
-    """Largest distance, m, of base nodes between the equilibrium of a rod and another, corrected if its results are."""
+    """Largest distance, m, of base nodes between the equilibrium of a rod and another."""
     model, found = answer
     assert model.layout is not None
-    r = found.state.r
-    if model.corrected:
-        correction = Correction(model)
-        correction.begin(model.ends.at(t), found.state, at_rest=True, with_friction=found.with_friction)
-        r = r + correction.corrector.position
-    return float(np.linalg.norm(full.r[layout.first] - r[model.layout.first], axis=1).max())
+    return float(np.linalg.norm(full.r[layout.first] - found.state.r[model.layout.first], axis=1).max())
 
 
 def _equilibrium(model: Model, t: float, start: State, like: Equilibrium) -> Equilibrium:

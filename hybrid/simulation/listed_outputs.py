@@ -74,15 +74,15 @@ def _of_scene(scene: Scene) -> list[Listed]:
     else:
         observer = StaticCase(scene).observer(model)
     found = _over_time(observer.fields, steps=moves)
-    return _with_ranges(found, scene.output.quantities, model.corrected) if moves else found
+    return _with_ranges(found, scene.output.quantities) if moves else found
 
 
-def _with_ranges(found: list[Listed], asked: Mapping[str, Quantity], corrected: bool = False) -> list[Listed]:
+def _with_ranges(found: list[Listed], asked: Mapping[str, Quantity]) -> list[Listed]:
     """Listed quantities that say whether extremes and limits of them are those of every step; asked: by name."""
     out = []
     for x in found:
         if x.name in asked or x.name in ("wall_tension", "von_mises"):
-            outputs = corrected or (x.name in asked and asked[x.name].other is not None)
+            outputs = x.name in asked and asked[x.name].other is not None
             text = "extremes and limits: at the outputs" if outputs else "extremes and limits: of every step"
             x = x._replace(description=f"{x.description}; {text}")
         out.append(x)

@@ -71,7 +71,7 @@ def _hidden_at(model: Model, seen: Observation, node: int, EI: Floats) -> Sectio
     side = int(np.flatnonzero(seen.grid.side_nodes == node)[-1 if after else 0])
     shown = seen.curvature_on_sides[side]
     cell = node if after else node - 1
-    may_show = line.spin[cell] == 1 or model.corrected
+    may_show = line.spin[cell] == 1
     hidden = (true > MORE * shown) & (true * fades.min(axis=0) > ASKEW) & (true > SMALL * kappa.max(axis=0))
     hidden &= (seen.T[node] > 0.0) & (fades.min(axis=0) < 0.1 * length)
     if may_show:

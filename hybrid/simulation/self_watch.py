@@ -81,7 +81,7 @@ def least_bending(model: Model) -> Floats:
 
 # Diameters and cells, of both ends together, within which held ends are neighbours (contact.self_contact_pairs).
 BESIDE, BESIDE_CELLS = WINDOW, NEIGHBOURS + 1
-REMEDY = "contact: {self: true} does, of catenaries that are not corrected for bending too"
+REMEDY = "contact: {self: true} does, of catenaries too"
 
 
 def meeting_text(

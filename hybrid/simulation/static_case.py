@@ -136,7 +136,7 @@ class StaticCase:
         errors = model.follows_error and wants_errors(self.scene)
         return Observer(
             model.line, model.sea.values, model.zones, s, False, model.attached, only=only, errors=errors,
-            corrected=model.corrected, jumps=jumps, changes=section_changes(self.scene),
+            jumps=jumps, changes=section_changes(self.scene),
             gauges=() if only else self.scene.output.elevation or (),
             quantities=None if only else quantities_of(self.scene),
         )  # fmt: skip

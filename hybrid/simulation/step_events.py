@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS, TOLD
 from hybrid.kernels.state import books as b
 from hybrid.kernels.step.accept import MANY
-from hybrid.model.resolution import ZONES, wants_errors
-from hybrid.simulation.bounded_model_errors import doubt_text
 from hybrid.simulation.collapse import COLLAPSE, ERROR, GAIN, GIVE_UP, NEWTON, TURN, collapse_text
 from hybrid.simulation.contact_start import comes_near
 from hybrid.simulation.events import energy_gains_text, slack_steps_text, steps_cut_text
@@ -78,16 +76,6 @@ def note_unknown_error(moving: Transient) -> None:
         s = float(moving.model.line.s[max(moving.correction.corrector.furthest, 0)])
         moving.events.event(moving.t, s, s, NOT_ESTIMATED, moving.correction.beyond)
         moving.beyond = moving.t + moving.model.time_scale  # that it takes the whole line to move
-
-
-def note_unknown_correction(moving: Transient) -> None:
-    """At the end: a result without an error figure is corrected where a linear estimate does not know by how much."""
-    model, found = moving.model, moving.correction
-    if found is None or wants_errors(moving.scene) or not model.corrected:
-        return
-    t, s, share, far = found.doubt
-    if min(share, 1.0) * far > ZONES * model.length:
-        moving.events.event(t, s, s, NOT_ESTIMATED, f"{doubt_text(found.doubt)}: the result may be off by as much")
 
 
 def look_at_itself(moving: Transient, flags: int) -> None:

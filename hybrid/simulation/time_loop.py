@@ -26,7 +26,7 @@ from hybrid.simulation.load_change import change_loads
 from hybrid.simulation.releases import due
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import program, resolution_tree
-from hybrid.simulation.step_events import count_energy_gains, count_iterations, note_unknown_correction
+from hybrid.simulation.step_events import count_energy_gains, count_iterations
 from hybrid.simulation.transient import StepFailed, Transient
 from hybrid.simulation.transient_checkpoint import checkpoint, restore
 from hybrid.simulation.vibration_steps import VibrationSteps
@@ -161,7 +161,6 @@ class TimeLoop:
             run.envelope.note_broken(run.envelope_values(), self.recorder.recorded(), run.events.event)
         count_iterations(run)
         count_energy_gains(run)
-        note_unknown_correction(run)
         if run.itself is not None and self.target is not None:
             run.itself.tell_unkept(run.model, run.events.event)
         run.events.write_to(self.recorder)

@@ -44,7 +44,7 @@ def extent(result: Result, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarra
     """Arc lengths (n,), lowest and highest value there with a gap at jumps, and of what: every step, or every output.
 
     Every accepted step, and outputs between nodes that go beyond it, where the file has its envelope, except where
-    zones are corrected for bending: an envelope is of the line that was computed.
+    zones are corrected for bending, as in results of 0.6: an envelope is of the line that was computed.
     """
     found = along(result, name)
     low, high = found.values.min(axis=0), found.values.max(axis=0)

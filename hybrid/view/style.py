@@ -12,7 +12,7 @@ INK, GREY, ALARM = "#222222", "#6E6E6E", "#C00000"
 KIND_COLOURS = {
     "rod": "#D55E00",
     "catenary": "#0072B2",
-    "corrected": "#009E73",
+    "corrected": "#009E73",  # of 0.6
 }  # kinds that are not named here are drawn in ink
 SAND, BED, BODY = "#EEE5D0", "#8C6D31", "#F0E442"
 WATER, LEVEL = "#EFF6FA", "#4A90C2"

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # Colours that no kind of zone has, of the same family; other codes are grey, apart by their marks.
 COLOURS = {"adaptive": "#CC79A7", "zones": "#56B4E9"} | KIND_COLOURS
-MARKS = {"rod": "o", "catenary": "s", "adaptive": "D", "corrected": "^", "zones": "v"}
+MARKS = {"rod": "o", "catenary": "s", "adaptive": "D", "zones": "v"}
 _PEER_MARKS = ("P", "X", "p", "d")
 _MET, STAR = "#009E73", "#F0E442"
 _BESIDE = 1.8  # of the smallest and largest value, times that which an axis leaves beside them

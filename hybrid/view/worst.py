@@ -1,7 +1,7 @@
 """Where a result is at its worst: lowest and highest values, and how near it came to the limits of its sections.
 
-Of the envelope, which knows every accepted step and every node, and of the outputs, which know what is between nodes
-and what is corrected for bending that is neglected; of the outputs alone where a file has no envelope, as of 0.6.
+Of the envelope, which knows every accepted step and every node, and of the outputs, which know what is between nodes;
+of the outputs alone where a file has no envelope, as of 0.6.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ COLOURS = {
     "rod": ("#FCE5BB", "#F2C78E", "#E9A862", "#E08735", "#D1680E", "#B84F04", "#9B3A0D", "#7B2C17", "#5B1F17"),
     "catenary": ("#CFEEF7", "#A6D8EA", "#7FC0DF", "#5AA7D6", "#398CCC", "#2C72B6", "#2158A0", "#204181", "#1D2C5D"),
 }
-COLOURS["corrected"] = COLOURS["catenary"]  # no result has both
+COLOURS["corrected"] = COLOURS["catenary"]  # of 0.6; no result has both
 _UNSEEN = "#D9D9D9"
 _DECADES = 2.0  # of curvature, at most: what is a hundred times straighter than the tightest bend is straight
 _SPAN = 10.0  # a curvature that varies by more is shown by its logarithm

@@ -55,12 +55,12 @@ TASKS: dict[str, list[tuple[str, list[str]]]] = {
     ],
 }  # fmt: skip
 WHOLE: dict[str, list[Any]] = {
-    "model": ["rod", "catenary", "corrected", "adaptive", "zones", {"kind": "adaptive", "correct": True},
+    "model": ["rod", "catenary", "adaptive", "zones",
               {"kind": "adaptive", "tolerance": 1e-9}, {"kind": "adaptive", "rod_cell": 1e-9},
               {"kind": "adaptive", "rod_cell": 1e9}, {"kind": "adaptive", "force_rod": [[0, 1e-9]]},
               {"kind": "adaptive", "force_rod": [[0, 1]], "force_catenary": [[0.5, 2]]},
               {"kind": "adaptive", "hold_time": 1e-9}, {"kind": "catenary", "slack": "warn"},
-              {"kind": "corrected", "slack": "warn"}, {"kind": "zones", "zones": []}, {"zones": [{"rod": 1}, {"catenary": 1}]},
+              {"kind": "zones", "zones": []}, {"zones": [{"rod": 1}, {"catenary": 1}]},
               {"kind": "zones", "zones": [{"rod": 1, "catenary": 1}]}],
     "solver": ["shooting", "elimination", "newton"],
     "dimension": [2, 3, 1, 2.0, "2"],

@@ -59,7 +59,6 @@ def warm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, model in (
         ("touchdown", "adaptive"),
         ("touchdown", "rod"),
-        ("touchdown", "corrected"),
         ("sea", "catenary"),
     ):
         data = all_scenes()[name]

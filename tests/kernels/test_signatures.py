@@ -43,7 +43,7 @@ across = {"fluid": {**sea["fluid"], "current": [0.3, 0.4, 0]}}
 hybrid.run(scene(environment=across))
 hybrid.static(scene(environment=bed))
 hybrid.run(scene(environment=bed, model="adaptive"))
-hybrid.run(scene(environment=bed, model={"kind": "zones", "zones": [{"corrected": 20.0}]}))
+hybrid.run(scene(environment=bed, model="catenary", output={"errors": True}))
 
 found = {}
 rooms = [x.name for x in pkgutil.walk_packages(hybrid.kernels.__path__, "hybrid.kernels.")] + ["hybrid.adapt.zone_rules"]

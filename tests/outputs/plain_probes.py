@@ -316,16 +316,14 @@ class Plain:
         return float(T[first] + (T[first] - T[second]) * h[first] / (h[first] + h[second]) if len(h) > 1 else T[0])
 
 
-def plain_values(
-    observer: Observer, batch: Batch, i: int, shift: Shift | None, corrected: bool, grid: Grid
-) -> dict[str, object]:
-    """What `observer.values_of` should have at output i, but for work, criteria and factors on the errors of the model."""
+def plain_values(observer: Observer, batch: Batch, i: int, shift: Shift | None, grid: Grid) -> dict[str, object]:
+    """What `observer.values_of` should have at output i, but for work and criteria."""
     x = batch
     state = blank_state(x.T.shape[1])._replace(r=x.r[i], v=x.v[i], e=x.e[i], T=x.T[i], a1=x.a1[i], w=x.w[i])
     ends = Ends(x.held[i], x.position[i], x.frame[i], x.spin[i], x.force[i], x.moment[i])
     computed = Plain(x.line(i, observer.line), observer.sea, observer.zones, ends, state, grid, x.report[i])
     shifted = computed.corrected(shift) if shift is not None else computed
-    v = shifted if corrected else computed
+    v = computed
     t = v.tangent
     out = {
         "position": v.grid.nodes @ v.state.r, "velocity": v.grid.nodes @ v.state.v, "tension": v.tension,

@@ -118,7 +118,7 @@ def test_a_smooth_cable_has_neither() -> None:
 
 
 def test_errors_are_known_on_both_sides(tmp_path: Path) -> None:
-    """A corrected catenary with a clump: errors by mesh, step and neglected bending of both values."""
+    """A catenary with a clump: errors by mesh, step and neglected bending of both values."""
     scene = chain(errors=True, every=0.1) | {"time": {"duration": 0.5, "step": 0.02}, "mesh": {"cells": 20}}
     scene["cable"]["sections"][0]["bending_stiffness"] = 1.0
     heave = {"heave": {"amplitude": 0.1, "period": 2.0}, "ramp": 0.5}
@@ -126,7 +126,7 @@ def test_errors_are_known_on_both_sides(tmp_path: Path) -> None:
         "start": scene["ends"]["start"] | {"motion": heave},
         "end": {"kind": "pinned", "position": [7, 0, 0]},
     }
-    scene["model"] = "corrected"
+    scene["model"] = "catenary"
     found = hybrid.run(hybrid.validate_scene(scene))
     for cause in ("mesh", "time", "model", "total"):
         left, right = found[f"errors/{cause}/tension"], found[f"errors/{cause}/right_tension"]

@@ -24,16 +24,16 @@ ADAPTIVE = (
     OCEAN.replace(
         "model: {kind: catenary}",
         "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, curvature_error: 0.05, hold_time: 2.0, force_rod: [[0.0, 10.0]], "
-        "force_catenary: [[200.0, 250.0]], correct: true, always_move: true}",
+        "force_catenary: [[200.0, 250.0]], always_move: true}",
     )
     + "output: {criteria: true, errors: true}\naccuracy: {position: 3 cm, tension: 1%, curvature: 5%, instant: 2%, "
     "bending_moment: 5%, line_tension: 2%}\n"
 )
-CORRECTED = """\
+IN_ZONES = """\
 cable: {sections: [{length: 10.0, mass: 1.0, bending_stiffness: 2.0}]}
 ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
 initial: {kind: equilibrium}
-model: {kind: zones, zones: [{corrected: 4.0}, {rod: 6.0}]}
+model: {kind: zones, zones: [{catenary: 4.0}, {rod: 6.0}]}
 resolution: {cells_per_layer: 4.0}
 """
 TOUCHING = """\
@@ -122,7 +122,7 @@ TEXTS = (
         "everything else": EVERYTHING_ELSE,
         "ocean": OCEAN,
         "at rest": AT_REST,
-        "corrected": CORRECTED,
+        "in zones": IN_ZONES,
         "touching": TOUCHING,
         "twisted": TWISTED,
         "swivels": SWIVELS,
@@ -200,7 +200,6 @@ def _harmless(path: tuple[str | int, ...], nonsense: Any) -> bool:
         "title": ("nonsense",),
         "swivel": (True,),
         "criteria": (True,),
-        "correct": (True,),
         "always_move": (True,),
         "errors": (True,),
         "self": (True,),
@@ -256,7 +255,6 @@ SIGNED |= {
     "swivel",
     "tension_torque",
     "criteria",
-    "correct",
     "always_move",
     "errors",
     "self",

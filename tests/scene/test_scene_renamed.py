@@ -30,7 +30,10 @@ RENAMED = {
 
 
 # Keys that are no more: a value that asked for something, the one that asked for nothing, what is said.
-GONE = {"joint": ("curvature", "spherical", "leave it out: a joint between rod and catenary passes no moment")}
+GONE = {
+    "joint": ("curvature", "spherical", "leave it out: a joint between rod and catenary passes no moment"),
+    "correct": ("true", "false", "leave it out: `output: {errors: true}` says what bending would change"),
+}
 
 
 def _old(name: str) -> tuple[str, int, int]:
@@ -174,3 +177,16 @@ def test_a_key_that_is_no_more(key: str, tmp_path: Path) -> None:
     assert f"{path}:{wrong.line}:" in str(caught.value)
     assert wrong.expected == "a key of kind: adaptive"
     assert parse_scene(written.replace(f"{key}: {value}", f"{key}: {nothing}")) == parse_scene(ADAPTIVE)
+
+
+@pytest.mark.parametrize(
+    ("model", "fix"),
+    [
+        ("corrected", "write catenary: with `output: {errors: true}` it says what bending would change"),
+        ("{zones: [{corrected: 200.0}, {rod: 50.0}]}", "write {rod: length} or {catenary: length}"),
+    ],
+)
+def test_the_corrected_catenary_is_no_more(model: str, fix: str) -> None:
+    (wrong,) = complaints(change(OCEAN, "{kind: catenary}", model))
+    assert wrong.where.startswith("model") and "corrected" in wrong.value and wrong.line is not None
+    assert "corrected" not in wrong.expected and wrong.fix == fix

@@ -114,12 +114,6 @@ def test_points_farther_apart_than_lines_reach_are_refused_with_the_line() -> No
         hybrid.static(system(TEXT.replace("[150, 0, -100]", "[900, 0, -100]")))
 
 
-def test_corrected_catenaries_are_refused() -> None:
-    text = TEXT.replace("end: buoy, sections", "end: buoy, model: corrected, sections", 1)
-    with pytest.raises(SceneError, match="zones that stay"):
-        parse_either(text)
-
-
 @pytest.mark.parametrize(
     "table", [FixedPoint, FreePoint, Fairlead, FixedBody, FreeBody, Hydrostatics, JoinedLine, SystemOutput]
 )

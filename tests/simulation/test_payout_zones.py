@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.errors import SceneError
 
 ADAPTIVE = {"kind": "adaptive", "tolerance": 1e-3, "hold_time": 1.0, "rod_cell": 2.5}
 CHANGES = ("grow", "split", "shrink", "merge")
@@ -94,8 +93,3 @@ def test_a_winch_that_holds_a_tension_with_zones_that_move() -> None:
         lengths.append(hybrid.run(scene)["payout/length"])
     assert np.ptp(lengths[1]) > 3.0
     assert np.abs(lengths[0] - lengths[1]).max() < 0.02
-
-
-def test_what_does_not_go_with_payout_is_refused() -> None:
-    with pytest.raises(SceneError, match=r"model\.correct"):
-        hybrid.run(touching(model=ADAPTIVE | {"correct": True}))

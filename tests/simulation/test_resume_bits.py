@@ -12,7 +12,7 @@ from hybrid.errors import OMITTED
 from hybrid.store import recorder as record
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-# Everything that a state can consist of: fixed zones, adaptive ones, friction, waves, a plane, the corrected catenary,
+# Everything that a state can consist of: fixed zones, adaptive ones, friction, waves, a plane, the model error,
 # joints with moments, steps that follow the error, a climb to an accuracy with several results.
 CASES = {
     "fixed zones": ("02_suspension", ["time.duration=2"]),
@@ -26,7 +26,7 @@ CASES = {
     "adaptive in space": ("s_tether", ["time.duration=6"]),
     "friction, laid": ("laying", ["time.duration=12"]),
     "waves": ("irregular_sea", ["time.duration=6"]),
-    "corrected": ("touchdown", ["time.duration=6", "model=corrected", "output.errors=true"]),
+    "model error": ("touchdown", ["time.duration=6", "model=catenary", "output.errors=true"]),
     "controlled steps": ("rov_tether", ["time={duration: 10, tolerance: 1.0e-4}"]),
     "accuracy": ("06_whip", ["accuracy=0.3%", "time={duration: 0.3}"]),
     "accuracy by a second result": ("s_tether", ["accuracy={tension: 0.3%}", "mesh=null", "time={duration: 3}"]),

@@ -44,7 +44,7 @@ def shown(result: hybrid.Result, first: float = SOFT) -> float:
 
 
 @pytest.mark.parametrize("first", [SOFT, STIFF])
-@pytest.mark.parametrize("model", ["rod", "corrected", "catenary"])
+@pytest.mark.parametrize("model", ["rod", "catenary"])
 def test_what_is_not_shown_is_said(model: str, first: float) -> None:
     """On long cells with any model, and of a catenary on any cells; what the text says is the exact curvature."""
     for mesh in ({"cells": 60}, {"nodes": graded(0.01)}):

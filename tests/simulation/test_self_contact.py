@@ -410,17 +410,6 @@ def test_a_strand_lies_on_another_on_a_seabed() -> None:
     assert result["work/scheme"].max() < 1e-2 * put_in
 
 
-@pytest.mark.parametrize(
-    "model",
-    [
-        "corrected", {"kind": "adaptive", "correct": True}, {"zones": [{"rod": 4.0}, {"corrected": 4.0}]},
-    ],
-)  # fmt: skip
-def test_corrected_catenaries_are_refused(model: Any) -> None:
-    with pytest.raises(hybrid.SceneError, match=r"contact"):
-        hybrid.validate_scene(closing(model))
-
-
 def test_a_start_within_itself_is_refused() -> None:
     r = hairpin(60.0, 0.3 * WIDTH)
     with pytest.raises(hybrid.SceneError, match=r"s = \S+ m and s = \S+ m are \S+ m apart"):

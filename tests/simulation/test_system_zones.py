@@ -148,7 +148,6 @@ def test_a_line_breaks_while_zones_move() -> None:
 @pytest.mark.parametrize(
     ("line", "scene", "where"),
     [
-        ({"model": MODEL | {"correct": True}}, {}, "correct"),
         ({"connections": {"end": {"tangent": [0, 0, 1]}}}, {}, "connections"),
         (
             {"connections": {"start": {"tangent": [0, 0, 1]}}, "model": MODEL | {"force_catenary": [[0, 5]]}},

@@ -79,12 +79,3 @@ def test_limits_are_in_the_closing_lines_and_the_report(tmp_path: Path) -> None:
     said = "not verified: the error of tension is not estimated"
     assert said in dict(extremes_rows(extremes_facts(free), moves=True))["largest tension"]
     assert f"Allowed are 5 kN, {said}" in fact(free, "tension").text
-
-
-def test_a_corrected_line_is_judged_with_its_correction() -> None:
-    """The envelope is of the catenary without bending, whose curvature is larger or smaller than the corrected one."""
-    result = hybrid.run(
-        tether("model=corrected", "cable.attachments=[]", "mesh={cells: 60}", "time.duration=1", "output.every=0.1")
-    )
-    shown, kept = result.both_sides("curvature")[1].max(), result["envelope/curvature_max"].max()
-    assert fact(result, "bend").values["radius"] == pytest.approx(1.0 / max(shown, kept))
