@@ -13,7 +13,7 @@ from hybrid.kernels.state.state import Floats, Line, State, blank_state
 from hybrid.model.layout import Layout
 
 Clamp = tuple[Floats, Floats]  # first director and tangent
-states = Packed(blank_state, given=("turn",))
+states = Packed(blank_state, given=("turn", "slow"))
 
 
 class Remapped(NamedTuple):
@@ -44,7 +44,7 @@ def transfer_to(
     for k, clamp in enumerate(clamps):
         if clamp is not None:
             held[k], frames[k] = True, clamp
-    out = states(target.h.size, turn=np.zeros((len(target.torsion), 3)))
+    out = states(target.h.size, turn=np.zeros((len(target.torsion), 3)), slow=np.zeros(len(target.law)))
     return Transfer(
         line, target, state, out, old.places, new.places, new.base_of_cell, old.first, kinks, twist,
         frames, held, np.array([shifts]), blank_match(line.h.size, target.h.size),

@@ -144,11 +144,11 @@ def _stretch_by_a_law(cable: Cable, model: Model, ends: Ends, solver: str) -> It
         if section.curve is None:
             continue
         key = "dynamic_stiffness" if section.dynamic_stiffness is not None else "tension_strain"
-        if isinstance(model, AdaptiveModel):
+        if isinstance(model, AdaptiveModel) and paid:
             fix = "write `model: rod`, `model: catenary`, or zones of both"
             expected = (
-                "nothing, because zones that move (model: adaptive) make new cells, which are not given the tables of "
-                "tension over strain, nor the mean tension that a slow part of the stretch remembers"
+                "nothing, because the line is paid out and its zones move (model: adaptive): what each of the two does "
+                "with the tables of tension over strain has not been proved together"
             )
             yield Finding((*here, key), expected, fix)
         if solver == "shooting":

@@ -15,7 +15,17 @@ from hybrid.kernels.mesh.zone_step import Zones
 from hybrid.kernels.run import following_run as f
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.state.books import Books, sample_size
-from hybrid.kernels.state.state import NO_TENSION_TORQUE, NO_TORSION, TENSION_TORQUE, Floats, Line, Sea, State, Work
+from hybrid.kernels.state.state import (
+    NO_SLOW,
+    NO_TENSION_TORQUE,
+    NO_TORSION,
+    TENSION_TORQUE,
+    Floats,
+    Line,
+    Sea,
+    State,
+    Work,
+)
 from hybrid.simulation.cell_arrays import REST_OF_SEA, Cells, Side, blank_kept, seas, works
 from hybrid.solve.run import MOST_SAMPLED, ROWS
 
@@ -81,7 +91,7 @@ class CellViews:
         return found
 
     def state(self, k: int, which: int, cells: int) -> State:
-        found: State = self._view(self.sides[k].states[which], cells, lambda: {"turn": self._turn})
+        found: State = self._view(self.sides[k].states[which], cells, lambda: {"turn": self._turn, "slow": NO_SLOW})
         return found
 
     def layout(self, k: int, cells: int) -> Cells:

@@ -213,3 +213,64 @@ def test_judging_stability_leaves_the_law_of_stretch_of_a_line_alone() -> None:
     assert is_stable(line, model.sea.at(0.0), ends, model.start, model.length, model.tension_scale)
     assert (line.ck == 1e-7).all()
     assert np.array_equal(line.law, law)
+
+
+ZONES = ("adaptive", {"kind": "adaptive", "curvature_error": 0.1})
+
+
+def heaved(law: dict[str, Any], model: Any) -> dict[str, Any]:
+    """60 m of rope between a clamp and a vessel that heaves."""
+    wet = {"drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}}
+    section = {"length": 60, "diameter": 0.03, "mass": 1.5, "bending_stiffness": 60} | wet | law
+    heave = {"heave": {"amplitude": 1.5, "period": 3}, "ramp": 1}
+    return {
+        "environment": {"fluid": {"density": 1025, "surface": 0}},
+        "cable": {"sections": [section]},
+        "ends": {
+            "start": {"kind": "clamped", "position": [0, 0, -40], "tangent": [0, 0, 1]},
+            "end": {"kind": "pinned", "position": [30, 0, -3], "motion": heave},
+        },
+        "initial": "equilibrium",
+        "model": model,
+        "mesh": {"cells": 20},
+        "time": {"duration": 2.0, "step": 0.02},
+        "output": {"every": 0.1},
+    }
+
+
+@pytest.mark.parametrize("model", ZONES, ids=["zones", "cells"])
+def test_a_straight_table_is_a_stiffness_where_zones_move(model: Any) -> None:
+    table = {"tension_strain": [[0, 0], [0.01, 2000], [0.2, 4e4]]}
+    plain, law = (hybrid.run(heaved(x, model)) for x in ({"axial_stiffness": 2e5}, table))
+    assert len(plain.events) == len(law.events) > 0
+    assert np.abs(law.position - plain.position).max() < 1e-6
+    assert np.abs(law.tension - plain.tension).max() < 1e-5 * plain.tension.max()
+
+
+@pytest.mark.parametrize("model", ZONES, ids=["zones", "cells"])
+def test_mean_tensions_go_along_where_zones_move(model: Any) -> None:
+    """Of a rope that remembers for ever they stay, on whatever cells, what they are at rest."""
+    rope = SOFT | {"dynamic_stiffness": {"constant": 6e5, "per_tension": 0, "relaxation_time": 1e9}}
+
+    def means(simulation: hybrid.Simulation) -> tuple[Any, Any]:
+        run = simulation._loop.run
+        s = run.model.line.s
+        return 0.5 * (s[1:] + s[:-1]), run.state.slow.copy()
+
+    with hybrid.Simulation(hybrid.validate_scene(heaved(rope, model))) as simulation:
+        s, first = means(simulation)
+        simulation.advance(2.0)
+        then, last = means(simulation)
+    assert not np.array_equal(s, then)
+    inside = (then >= s[0]) & (then <= s[-1])  # beyond, np.interp goes on level
+    assert np.abs(last - np.interp(then, s, first))[inside].max() < 0.02 * first.max()
+    assert np.ptp(first) > 0.5 * first.max() > 0.0
+
+
+def test_a_rope_whose_zones_move_goes_on_bit_for_bit(tmp_path: Path) -> None:
+    rope = SOFT | {"dynamic_stiffness": {"constant": 6e5, "per_tension": 15, "relaxation_time": 1}}
+    scene, long, short = heaved(rope, "adaptive"), tmp_path / "long.h5", tmp_path / "short.h5"
+    hybrid.run(scene, long)
+    hybrid.run(scene | {"time": scene["time"] | {"duration": 1.0}}, short)
+    hybrid.resume(short, until=2.0)
+    assert differences(long, short) == []

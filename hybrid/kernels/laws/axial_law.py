@@ -147,6 +147,13 @@ def strain_and_energy(line, state, i):
     return strain + (T - mean) / E, stored + 0.5 * (T * T - mean * mean) / E
 
 
+@inner
+def stretch_work(line, state, c):
+    """Energy per length, N, that a cell takes up when its unstretched length grows and its ends stay."""
+    strain, energy = strain_and_energy(line, state, c)
+    return state.T[c] * (1.0 + strain) - energy
+
+
 @kernel
 def stretch_energy(line, state):
     """Energy, J, of the stretch of a line without damping, from its tensions."""

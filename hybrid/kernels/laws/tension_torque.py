@@ -32,6 +32,7 @@ from hybrid.kernels.algebra.rotations import (
     mat_vec,
     scale,
 )
+from hybrid.kernels.laws.axial_law import strain_and_energy
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import relative_rotation, turns_freely
 from hybrid.kernels.machine.compile import inner, kernel
@@ -235,11 +236,12 @@ def stretch_energy(line, i, longer, low, high):
 
 
 @inner
-def stretch_factor(line, c, T, torque):
-    """Length of cell c over its unstretched length under a tension (N) and a torque (N m)."""
+def stretch_factor(line, state, c, torque):
+    """Length of cell c over its unstretched length under its tension and a torque (N m)."""
     if couples(line):
-        return 1.0 + compliance(line, c) * T - 2.0 * line.tension_twist[c] / line.h[c] * torque
-    return 1.0 + line.ck[c] * T
+        return 1.0 + compliance(line, c) * state.T[c] - 2.0 * line.tension_twist[c] / line.h[c] * torque
+    strain, _ = strain_and_energy(line, state, c)
+    return 1.0 + strain
 
 
 @kernel

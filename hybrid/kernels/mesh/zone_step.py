@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import dot, get3
+from hybrid.kernels.laws.axial_law import has_law, stretch_work
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.end_motion import end_turn
 from hybrid.kernels.laws.tension_torque import twist_of_line
@@ -322,7 +323,10 @@ def book(line, ends, before, state, dt, zones):
     z, flags, booked = zones.clock, zones.counts, 0.0
     if flags[RELAXING]:
         for c in range(line.h.shape[0]):
-            booked -= 0.5 * (before.T[c] + state.T[c]) * (line.h[c] - zones.lengths[c])
+            pulls = before.T[c] + state.T[c]
+            if has_law(line, c):
+                pulls = stretch_work(line, before, c) + stretch_work(line, state, c)
+            booked -= 0.5 * pulls * (line.h[c] - zones.lengths[c])
             zones.lengths[c] = line.h[c]
         flags[RELAXING] = flags[UNDER_WAY] or z[SHARE] > 0.0
     if flags[GOING] or flags[COMING]:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
+from hybrid.kernels.laws.axial_law import stretch_energy
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.seabed import stored
 from hybrid.kernels.laws.tension_torque import stretch_factor, torque_beside
@@ -19,7 +20,7 @@ from hybrid.kernels.mesh.cell_lengths import arc_less_chord
 from hybrid.kernels.mesh.stiffness_ramp import shares, soften
 from hybrid.kernels.mesh.zone_step import LETTING_GO, SHARE, Zones, blank_zones
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_transfer, old_cell, put3, transfer_state
-from hybrid.kernels.state.forces import PLANAR, SEABED
+from hybrid.kernels.state.forces import AXIAL_LAW, PLANAR, SEABED
 from hybrid.kernels.state.state import Ends, Floats, Sea, no_ends, no_sea
 
 # Numbers of a switch: J, J, s, 1 where lengths were on their way.
@@ -66,6 +67,8 @@ def energy(line, sea, ends, state, zones):
         zones.energy,
     )
     total = zones.energy[0] + zones.energy[1] + zones.energy[2] + zones.energy[3] + twist_energy(line, state)
+    if line.bits & AXIAL_LAW:
+        total += stretch_energy(line, state)
     for i in range(state.r.shape[0]):
         total -= dot(get3(line.force, i), get3(state.r, i))
     return total + stored(line, sea, state.r) if line.bits & SEABED else total
@@ -144,7 +147,7 @@ def growth(job, c, t):
     rate = lengthening(transfer.state, c)
     if job.numbers[RELAXES] > 0.0:
         line, state = transfer.line, transfer.state
-        rate += stretch_factor(line, c, state.T[c], torque_beside(line, state, c)) * lack_rate(zones, c, t)
+        rate += stretch_factor(line, state, c, torque_beside(line, state, c)) * lack_rate(zones, c, t)
     return rate
 
 
@@ -162,7 +165,7 @@ def relax_cell(job, c, t):
     for k in range(a, b):
         total += growth(job, k, t)
     part = transfer.match.lengths[c] / (line.s[b] - line.s[a])
-    stretch = stretch_factor(target, c, transfer.out.T[c], torque_beside(line, transfer.state, of))
+    stretch = stretch_factor(target, transfer.out, c, torque_beside(line, transfer.state, of))
     zones.lack[c] = zones.true[c] - transfer.match.lengths[c]
     zones.rate[c] = (total * part - lengthening(transfer.out, c)) / stretch
     zones.since[c] = t

@@ -213,6 +213,8 @@ def copy_cell(state, out, a, c):
     put3(out.e, c, get3(state.e, a))
     put3(out.a1, c, get3(state.a1, a))
     out.T[c], out.w[c], out.wa[c], out.wd[c] = state.T[a], state.w[a], state.wa[a], state.wd[a]
+    if state.slow.shape[0] > 0:
+        out.slow[c] = state.slow[a]
 
 
 @inner
@@ -231,8 +233,10 @@ def carry_cells(job):
         while of + 1 < line.h.shape[0] and line.s[of + 1] <= middle:
             of += 1
         out.T[c] = tension_at(line.s, state.T, match.single, of, middle)
+        if state.slow.shape[0] > 0:
+            out.slow[c] = tension_at(line.s, state.slow, match.single, of, middle)
         torque = torque_beside(line, state, of)
-        match.lengths[c] = math.sqrt(dot(e, e)) / stretch_factor(target, c, out.T[c], torque)
+        match.lengths[c] = math.sqrt(dot(e, e)) / stretch_factor(target, out, c, torque)
 
 
 @inner

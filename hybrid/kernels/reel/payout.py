@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, dot, frame, get3, log_rotation, scale, sub
-from hybrid.kernels.laws.axial_law import strain_and_energy
+from hybrid.kernels.laws.axial_law import stretch_work
 from hybrid.kernels.laws.cell import Chord, chord
 from hybrid.kernels.laws.element import relative_rotation
 from hybrid.kernels.laws.node_forces import Z3, inertia_and_water
@@ -237,13 +237,6 @@ def leave_to_reel(line, zones, reel):
         i = node(line, reel, j)
         for k in range(3):
             zones.stiff[i, k] = line.kb[i, k]
-
-
-@inner
-def stretch_work(line, state, c):
-    """Energy per length, N, that a cell takes up when its unstretched length grows and its ends stay."""
-    strain, energy = strain_and_energy(line, state, c)
-    return state.T[c] * (1.0 + strain) - energy
 
 
 @inner
