@@ -36,7 +36,7 @@ from hybrid.scene.analysis import (
     ZonesModel,
 )
 from hybrid.scene.base import Finding, Place
-from hybrid.scene.cable import Cable, Contact, Environment, Section
+from hybrid.scene.cable import Cable, Contact, Environment
 from hybrid.scene.ends import Clamped, Ends, Free, Pinned
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.quantities import of_one_line
@@ -133,25 +133,13 @@ def _zones_that_move(model: Model, solver: str) -> Iterator[Finding]:
         yield Finding(("solver",), "elimination, because zones move (model)", "or write `model: rod`")
 
 
-def _stretch_by_a_law(cable: Cable, model: Model, ends: Ends, solver: str) -> Iterator[Finding]:
+def _stretch_by_a_law(cable: Cable, ends: Ends, solver: str) -> Iterator[Finding]:
     """Sections whose tension is no multiple of strain, where that cannot be computed."""
-    places: list[tuple[Place, Section]] = [(("cable", "sections", i), x) for i, x in enumerate(cable.sections)]
     paid = [name for name, x in ends.named().items() if isinstance(x, Pinned | Clamped) and x.payout is not None]
-    for name in paid:
-        reel = getattr(ends, name).payout.reel or ()
-        places += [(("ends", name, "payout", "reel", i), x) for i, x in enumerate(reel)]
-    for here, section in places:
-        if section.curve is None:
-            continue
-        key = "dynamic_stiffness" if section.dynamic_stiffness is not None else "tension_strain"
-        if isinstance(model, AdaptiveModel) and paid:
-            fix = "write `model: rod`, `model: catenary`, or zones of both"
-            expected = (
-                "nothing, because the line is paid out and its zones move (model: adaptive): what each of the two does "
-                "with the tables of tension over strain has not been proved together"
-            )
-            yield Finding((*here, key), expected, fix)
-        if solver == "shooting":
+    reels = [x for name in paid for x in getattr(ends, name).payout.reel or ()]
+    for section in (*cable.sections, *reels):
+        if section.curve is not None and solver == "shooting":
+            key = "dynamic_stiffness" if section.dynamic_stiffness is not None else "tension_strain"
             yield Finding(("solver",), f"elimination, because of {key} of a section", "leave solver out")
     for name in paid:
         own = cable.sections[0 if name == "start" else -1]

@@ -27,7 +27,6 @@ REASONS = [re.escape(x.why).replace(r"\{key\}", r"[\w.\[\]]+") for x in REFUSALS
 ASKED = (
     "tension_torque lengthens a cable that turns",  # so it has a stiffness that is a number
     "this end of the line is a catenary, which has no moment",
-    "zones that move (model: adaptive) make new cells, which are not given the tables of tension over strain",
 )
 
 

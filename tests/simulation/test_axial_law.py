@@ -274,3 +274,63 @@ def test_a_rope_whose_zones_move_goes_on_bit_for_bit(tmp_path: Path) -> None:
     hybrid.run(scene | {"time": scene["time"] | {"duration": 1.0}}, short)
     hybrid.resume(short, until=2.0)
     assert differences(long, short) == []
+
+
+def touching(law: dict[str, Any], model: Any, cells: int, step: float = 0.05) -> dict[str, Any]:
+    """100 m over 80 m that touch the seabed, in a plane, from a clamp that heaves by 1 m in 4 s."""
+    section = {"length": 100, "mass": 5, "diameter": 0.05, "bending_stiffness": 500} | law
+    heave = {"heave": {"amplitude": 1, "period": 4}, "ramp": 4}
+    return {
+        "dimension": 2,
+        "environment": {"seabed": {"z": -18, "stiffness": 5e3, "damping": 5e2}},
+        "cable": {"sections": [section]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {"kind": "clamped", "position": [80, 0, 0], "tangent": [1, 0, 0.5], "motion": heave},
+        },
+        "initial": "equilibrium",
+        "model": model,
+        "mesh": {"cells": cells},
+        "time": {"duration": 6.0, "step": step},
+        "output": {"every": 0.5, "points": 41},
+    }
+
+
+def zones(tolerance: float, cell: float) -> dict[str, Any]:
+    return {"kind": "adaptive", "tolerance": tolerance, "hold_time": 1, "rod_cell": cell}
+
+
+MOVED = {
+    "table": SOFT,
+    "rope": SOFT | {"dynamic_stiffness": {"constant": 6e5, "per_tension": 15, "relaxation_time": 1}},
+}
+
+
+@pytest.mark.parametrize("which", MOVED)
+def test_zones_that_move_converge_to_rods(which: str) -> None:
+    """Of finer cells and a tighter tolerance: places and tensions come closer to those of fine rods everywhere."""
+    rods = hybrid.run(touching(MOVED[which], "rod", 160))
+    off = []
+    for tolerance, cells in ((4e-3, 25), (1e-3, 50), (2.5e-4, 100)):
+        found = hybrid.run(touching(MOVED[which], zones(tolerance, 100 / cells), cells))
+        apart = found.tension - rods.tension
+        off.append((np.abs(found.position - rods.position).max(), np.sqrt(np.mean(apart**2))))
+    print(f"{which}: off in place (m) and tension (N, root of the mean square): {off}")
+    assert sum(x.kind == "grow" for x in found.events) > 3
+    for coarse, fine in pairwise(off):
+        assert fine[0] < 0.5 * coarse[0]
+        assert fine[1] < 0.5 * coarse[1]
+    assert off[-1][0] < 1e-3 * 100
+    assert off[-1][1] < 5e-3 * rods.tension.max()
+
+
+@pytest.mark.parametrize("which", MOVED)
+def test_energy_balances_where_zones_move(which: str) -> None:
+    """What no work accounts for is what it is of rods, and falls with the square of the step."""
+    off = []
+    for step in (0.05, 0.025):
+        found, rods = (hybrid.run(touching(MOVED[which], x, 100, step)) for x in (zones(2.5e-4, 1.0), "rod"))
+        off.append(np.abs(found["work/scheme"]).max())
+        assert np.abs(found["work/zones"]).max() > 0.5  # J
+        assert off[-1] < 1.02 * np.abs(rods["work/scheme"]).max()
+    assert off[1] < 0.3 * off[0]

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_payout_stretch import EA, ROPE, SAME, TABLE
 
 import hybrid
 
@@ -93,3 +94,30 @@ def test_a_winch_that_holds_a_tension_with_zones_that_move() -> None:
         lengths.append(hybrid.run(scene)["payout/length"])
     assert np.ptp(lengths[1]) > 3.0
     assert np.abs(lengths[0] - lengths[1]).max() < 0.02
+
+
+def stretching(law: dict[str, Any], rate: float, model: Any = ADAPTIVE) -> hybrid.Result:
+    scene = touching(rate, model)
+    section = scene["cable"]["sections"][0]
+    del section["axial_stiffness"]
+    return hybrid.run(scene | {"cable": {"sections": [section | law]}})
+
+
+@pytest.mark.parametrize("rate", [0.8, -0.8])
+def test_a_straight_table_is_a_stiffness_where_zones_move(rate: float) -> None:
+    one, other = stretching({"axial_stiffness": EA}, rate), stretching(SAME, rate)
+    assert sum(x.kind in CHANGES for x in one.events) >= 2
+    for name in ("reaction_end", "position", "energy/stretch", "work/end", "work/zones"):
+        assert np.abs(other[name] - one[name]).max() < 1e-6 * np.abs(one[name]).max()
+
+
+@pytest.mark.parametrize("rate", [0.8, -0.8])
+@pytest.mark.parametrize("law", [TABLE, ROPE], ids=["table", "rope"])
+def test_a_rope_by_a_law_is_paid_out_as_with_rods(law: dict[str, Any], rate: float) -> None:
+    found, rods = stretching(law, rate), stretching(law, rate, "rod")
+    assert sum(x.kind in CHANGES for x in found.events) >= 2
+    assert np.abs(found["position"] - rods["position"]).max() < 1e-3 * 100.0
+    pulls = [np.linalg.norm(x["reaction_end"], axis=1) for x in (found, rods)]
+    assert np.abs(pulls[0] - pulls[1]).max() < 0.01 * pulls[1].mean()
+    left = [np.abs(x["work/scheme"]).max() for x in (found, rods)]
+    assert left[0] < 1.05 * left[1]
