@@ -300,7 +300,7 @@ def zones(tolerance: float, cell: float) -> dict[str, Any]:
     return {"kind": "adaptive", "tolerance": tolerance, "hold_time": 1, "rod_cell": cell}
 
 
-MOVED = {
+MOVED: dict[str, dict[str, Any]] = {
     "table": SOFT,
     "rope": SOFT | {"dynamic_stiffness": {"constant": 6e5, "per_tension": 15, "relaxation_time": 1}},
 }
