@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +29,7 @@ from hybrid.model.members import Members, pieces_of
 from hybrid.model.sea import Surroundings
 from hybrid.scene.bodies import FixedBody, FreeBody, turned
 from hybrid.scene.end_loads import GivenLoad
-from hybrid.scene.motion import EndMotion
+from hybrid.scene.motion import EndMotion, MotionTerms
 
 
 def frame_of(rotation: tuple[float, float, float]) -> Floats:
@@ -117,18 +116,18 @@ class KnownMotion(EndMotion):
 
     def __init__(self, body: FixedBody, around: Surroundings) -> None:
         waves = around.values.waves, float(around.values.ramps[1]), True
-        super().__init__(body.motion, body.position, frame_of(body.rotation), around.elevation, waves)
+        self.axes = frame_of(body.rotation)  # without motion
+        super().__init__(body.motion, body.position, self.axes, around.elevation, waves)
 
 
-class FairleadMotion(EndMotion):
+class FairleadMotion:
     """The motion of a point of a body whose motion is known, and of the frame of a line that is clamped there."""
 
     def __init__(self, body: KnownMotion, place: tuple[float, float, float], seat: Floats | None = None) -> None:
         """place: (3,) m, in axes of the body; seat: (SEAT,) frame of the line in these; None: it turns freely."""
         self._body, self._place = body, np.array(place)
         self._seat = None if seat is None else seat[:9].reshape(3, 3)
-        position, _, _, _ = self.at(0.0)
-        super().__init__(None, position)
+        self.base = body.base
 
     def at(self, t: float) -> tuple[Floats, Floats, Floats | None, Floats]:
         """As of `EndMotion`; where the line turns freely there is no frame."""
@@ -143,6 +142,6 @@ class FairleadMotion(EndMotion):
     def turn_from(self, frame: ArrayLike) -> None:
         """Nothing: the frame is that of the body."""
 
-    def terms(self) -> NoReturn:
-        """A fairlead is moved by its body: only systems of lines, which ask `at`, have one."""
-        raise TypeError("a fairlead moves with its body, not by terms of its own")
+    def terms(self) -> MotionTerms:
+        """Those of its body, and where it is there."""
+        return self._body.terms()._replace(ride=(self._body.axes, self._place, self._seat))

@@ -8,7 +8,17 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from hybrid.kernels.state.state import Ends, Floats, Moves
+from hybrid.kernels.state.state import (
+    FAIRLEAD,
+    PLACE_THERE,
+    RIDES,
+    SEAT_THERE,
+    TURNS_FREELY,
+    TURNS_WITH_BODY,
+    Ends,
+    Floats,
+    Moves,
+)
 from hybrid.model.driven_end import PATH, DrivenEnd
 from hybrid.scene.motion import MotionTerms
 
@@ -95,6 +105,16 @@ def end_load(
     """A load with all values (n, 3) that it takes, and the rows (R, 4) of its history, if it has one."""
     largest = max(values, key=lambda v: float(np.dot(v, v)))
     return EndLoad(what, end, np.array(largest, float), until, ramp, np.array(rows, float).reshape(-1, 4))
+
+
+def table_of_loads(loads: Sequence[EndLoad]) -> tuple[Floats, Floats]:
+    """What kernels.laws.end_motion reads of loads: as Moves.loads and Moves.history."""
+    rows = np.cumsum([0, *(len(x.history) for x in loads)])
+    table = [
+        (x.end, x.what == "moment", *x.value, x.ramp or 0.0, a, b)
+        for x, a, b in zip(loads, rows[:-1], rows[1:], strict=True)
+    ]
+    return np.array(table, float).reshape(-1, 8), np.concatenate([CONSTANT, *(x.history for x in loads)])
 
 
 class EndConditions:
@@ -236,7 +256,8 @@ class EndConditions:
 
     def moves_from_here(self) -> Moves:
         """The same for ends whose frames have been settled since, as those of lines that are clamped at points are."""
-        moves, frame = self.moves(), self._given[0].copy()
+        moves = self.moves()
+        frame = moves.frame.copy()
         for k in (0, 1):
             if k not in self.motions and k not in self._turns:
                 frame[k] = self.values.frame[k]
@@ -278,7 +299,7 @@ class EndConditions:
         prescribed, file = np.zeros((2, 2), np.int8), np.zeros((2, 2), np.int64)
         ramp, velocity, velocity_ramp, travel = np.zeros(2), np.zeros((2, 3)), np.zeros(2), np.zeros((2, 5))
         follows, missing, position = np.zeros(2, np.int8), np.zeros((2, 4)), self.values.position.copy()
-        driven = np.zeros((2, 2), np.int8)
+        driven, frame, fairlead = np.zeros((2, 2), np.int8), self._given[0].copy(), np.zeros((2, FAIRLEAD))
         harmonics: list[tuple[float, ...]] = []
         knots, cubics = [np.zeros(0)], [np.zeros((0, 6, 4))]
         for k, motion in self.motions.items():
@@ -287,6 +308,11 @@ class EndConditions:
                 continue
             terms = motion.terms()
             position[k] = motion.base
+            if terms.ride is not None:
+                axes, place, seat = terms.ride
+                frame[k], fairlead[k, PLACE_THERE:SEAT_THERE] = axes.ravel(), place
+                fairlead[k, RIDES] = TURNS_FREELY if seat is None else TURNS_WITH_BODY
+                fairlead[k, SEAT_THERE:] = self.values.frame[k] if seat is None else seat.ravel()
             prescribed[k] = terms.translates, terms.rotates
             ramp[k], velocity[k], velocity_ramp[k] = terms.ramp, terms.velocity, terms.velocity_ramp
             travel[k], follows[k] = terms.travel, terms.follows
@@ -297,16 +323,12 @@ class EndConditions:
             cubics.append(terms.cubics)
         for k, (axis, angle) in self._turns.items():
             missing[k] = [*axis, angle]
-        rows = np.cumsum([0, *(len(x.history) for x in self._acting)])
-        loads = [
-            (x.end, x.what == "moment", *x.value, x.ramp or 0.0, a, b)
-            for x, a, b in zip(self._acting, rows[:-1], rows[1:], strict=True)
-        ]
-        history = np.concatenate([CONSTANT, *(x.history for x in self._acting)])
+        loads, history = table_of_loads(self._acting)
         return Moves(
-            prescribed, position, self._given[0].copy(), ramp, np.array(harmonics).reshape(-1, 5), velocity,
+            prescribed, position, frame, ramp, np.array(harmonics).reshape(-1, 5), velocity,
             velocity_ramp, travel, follows, file, np.concatenate(knots), np.concatenate(cubics), missing,
-            float(self._bring_in), driven, self._paths, np.array(loads, float).reshape(-1, 8), history,
+            float(self._bring_in), driven, self._paths, loads, history,
+            fairlead,
         )  # fmt: skip
 
     def _grow(self, t: float) -> None:

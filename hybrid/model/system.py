@@ -98,6 +98,20 @@ class SystemModel:
         for moments, row in zip(self.moments, out[len(self.bodies) :], strict=True):
             row[MOMENT : MOMENT + 3] = sum((x.grown(t) for x in moments if since < x.until), np.zeros(3))
 
+    def growing_loads(self, since: float) -> list[EndLoad]:
+        """All loads of the bodies, and points behind them, on which one grows or follows a table: `end` is their row.
+
+        since: as of `load_bodies`.
+        """
+        given = [*(body.loads for body in self.bodies), *self.moments]
+        return [
+            x._replace(end=row)
+            for row, loads in enumerate(given)
+            if any(x.ramp or len(x.history) for x in loads)
+            for x in loads
+            if since < x.until
+        ]
+
     @property
     def breaks(self) -> list[float]:
         """Times (s) at which a load on a body, or a moment on a point, stops."""

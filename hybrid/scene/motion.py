@@ -36,7 +36,9 @@ class MotionTerms(NamedTuple):
     translates, rotates: whether it moves and turns the end; harmonics: axis (0 to 2 along x, y, z, 3 to 5 about them),
     amplitude [m or rad], angular frequency [1/s], phase [rad]; ramp [s], 0: none; velocity [m/s] and its ramp [s],
     0: no velocity; travel: the way [m], its beginning and its duration [s], 0: no travel; follows: the surface of the
-    sea; knots: (K,) [s] of a file; cubics: (K, 6, 4) from each knot on, highest power first [m, rad].
+    sea; knots: (K,) [s] of a file; cubics: (K, 6, 4) from each knot on, highest power first [m, rad]; ride: of an end
+    on a body that moves so, the axes (3, 3) of that without motion, the place (3,) [m] of the end in these, and the
+    frame (3, 3) with which it turns there, None: it turns freely.
     """
 
     translates: bool
@@ -49,6 +51,7 @@ class MotionTerms(NamedTuple):
     follows: bool
     knots: Array
     cubics: Array
+    ride: tuple[Array, Array, Array | None] | None = None
 
 
 class EndMotion:

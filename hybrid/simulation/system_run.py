@@ -20,7 +20,7 @@ from hybrid.kernels.state import books as b
 from hybrid.kernels.state.forces import SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Moves, state_for
 from hybrid.kernels.step.accept import MANY
-from hybrid.model.bodies import FairleadMotion
+from hybrid.model.ends import table_of_loads
 from hybrid.model.plan import output_times
 from hybrid.model.plan import parts as equal_parts
 from hybrid.model.system import SystemResolution, build_system
@@ -135,6 +135,7 @@ class SystemRun:
         self._logged = 0.0  # s, likewise, when steps were logged last
         self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
         self._moved: list[Moves] = []  # by which ends move in compiled steps
+        self._loaded = np.nan  # and `loaded`, of the loads that act there on bodies
         self.dry: set[str] = set()  # bodies that have been said to be out of the water
         self.failures = Failures(self)
         self.zones = SystemZones(self, managers) if managers and moves else None
@@ -368,12 +369,9 @@ class SystemRun:
             self.zones.look_ahead()
         if self.loop.controlled:
             self.solver.allowed[:] = self.resolution.allowed
-        moved = (motion for model in self.model.models for motion in model.ends.motions.values())
-        grow = (x for loads in (*(body.loads for body in self.model.bodies), *self.model.moments) for x in loads)
-        asks = any(isinstance(x, FairleadMotion) for x in moved) or any(x.ramp or len(x.history) for x in grow)
-        asks = asks or any(body.members is not None for body in self.model.bodies)
-        self._asks = b.ASK_BEFORE if asks else 0  # whether Python moves ends and loads bodies before every try
-        self._moved = []
+        asks = any(body.members is not None for body in self.model.bodies)
+        self._asks = b.ASK_BEFORE if asks else 0  # whether Python stirs the water around members before every try
+        self._moved, self._loaded = [], np.nan
 
     def take_other(self) -> None:
         """Room for the state after the next step, of lines as they are now."""
@@ -470,6 +468,9 @@ class SystemRun:
         if len(moves) != len(self._moved) or any(x is not y for x, y in zip(moves, self._moved, strict=True)):
             self._moved = moves
             loop.move(solver, [model.ends.moves_from_here() for model in self.model.models])
+        if self._loaded != self.loaded:
+            self._loaded = self.loaded
+            loop.load(*table_of_loads(self.model.growing_loads(self.loaded)))
 
     def _prepare(self, t: float) -> None:
         """Ends, loads and zones as they are at the end of a try, t (s)."""

@@ -70,6 +70,10 @@ class SystemSteps:
         for k, each in enumerate(moves):
             solver.bind_line(k, moves=each)
 
+    def load(self, loads: Floats, history: Floats) -> None:
+        """Bodies are loaded so from now on: as Moves.loads and history, of rows of bodies."""
+        self._job.bind(loads=loads, history=history)
+
     @property
     def states(self) -> tuple[SystemState, SystemState]:
         """The state now, and the other one, before the last step."""

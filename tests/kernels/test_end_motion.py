@@ -12,8 +12,10 @@ import hybrid
 from hybrid.kernels.laws import end_motion
 from hybrid.kernels.machine.compile import kernel
 from hybrid.kernels.state.state import Ends, no_sea
+from hybrid.model.bodies import FairleadMotion, KnownMotion
 from hybrid.model.ends import EndConditions, EndLoad
 from hybrid.model.sea import Surroundings
+from hybrid.scene.bodies import FixedBody
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.schema import Harmonic, Motion, Travel
 
@@ -110,6 +112,21 @@ def test_compiled_is_python(first: str) -> None:
     around = waters()
     check(conditions(KINDS[first], KINDS["everything"], around), around, (*TIMES, math.inf))
     check(conditions(None, KINDS[first], around), around, (*TIMES, math.inf))
+
+
+@pytest.mark.parametrize("name", [*KINDS, "file"])
+def test_ends_on_a_body_that_moves_compiled_are_python(tmp_path: Path, name: str) -> None:
+    """One end turns freely, and one with the body."""
+    around = waters()
+    motion = KINDS.get(name) or Motion(file=csv(tmp_path, "a.csv", True, True))
+    body = FixedBody(kind="fixed", position=tuple(PLACES[0]), rotation=(10.0, -20.0, 130.0), motion=motion)
+    known, seat = KnownMotion(body, around), np.append(BASES[0].ravel(), 1.0)
+    ends = conditions(None, None, around)
+    ends.motions |= {0: FairleadMotion(known, (1.0, 2.0, -3.0)), 1: FairleadMotion(known, (-4.0, 0.5, 1.0), seat)}
+    check(ends, around, (*TIMES, math.inf))
+    assert (
+        np.abs(ends.at(13.1).position[1] - PLACES[0] - known.axes @ (-4.0, 0.5, 1.0)).max() > 0.05 or name == "at rest"
+    )
 
 
 @pytest.mark.parametrize("begin", [0.0, -5.0])

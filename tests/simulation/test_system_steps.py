@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.kernels.state import books
 from hybrid.simulation import progress, system_run
 
 ROPE = {"mass": 20.0, "diameter": 0.06, "axial_stiffness": 2e7, "drag": {"normal": 1.2}}
@@ -97,3 +98,64 @@ def test_progress_is_told_between_outputs_where_python_looks_at_every_step(monke
     hybrid.run(scene(part, output={"every": 2.0, "points": 7}), progress=lambda x: told.append(x.step)).close()
     inside = [x for x in np.unique(told) if 0 < x < 40]
     assert inside and np.diff([0, *inside, 40]).max() <= system_run.LOOK
+
+
+# A ship that moves and turns, with a line that is clamped to it and one that turns freely, and a buoy that is loaded by
+# a force that grows until it stops, and by a moment that follows a table.
+TOWED = {
+    "environment": {"fluid": {"density": 1025, "current": [0.3, 0.1, 0]}},
+    "points": {
+        "foot": {"position": [-60, 0, -50]},
+        "bow": {"body": "ship", "place": [3, 1, -2]},
+        "stern": {"body": "ship", "place": [-20, 0.5, -3]},
+        "top": {"body": "buoy", "place": [0, 0, 1]},
+        "anchor": {"position": [-20, 10, -60]},
+    },
+    "bodies": {
+        "ship": {
+            "position": [60, 5, 0], "rotation": [5, 0, 30],
+            "motion": {"heave": {"amplitude": 1.0, "period": 4.0}, "surge": {"amplitude": 0.4, "period": 5.0},
+                       "pitch": {"amplitude": 3.0, "period": 4.5}, "yaw": {"amplitude": 5.0, "period": 6.0}, "ramp": 2},
+        },
+        "buoy": {
+            "initial_guess": [0, 0, -10], "mass": 300, "volume": 1.2, "inertia": [200, 200, 200],
+            "force": {"value": [300, 200, 0], "ramp": 1.0, "until": 1.5},
+            "moment": {"history": [[0, 0, 0, 0], [0.7, 80, 20, 0], [3, -50, 0, 30]]},
+        },
+    },
+    "lines": {
+        "first": {"start": "foot", "end": "top", "sections": [ROPE | {"length": 75}], "mesh": {"cells": 8}},
+        "last": {"start": "top", "end": "bow", "sections": [ROPE | {"length": 72}], "mesh": {"cells": 8}},
+        "hose": {"start": "anchor", "end": "stern", "sections": [ROPE | {"length": 85, "bending_stiffness": 2e4}],
+                 "connections": {"end": {"tangent": [0.6, 0, 0.8]}}, "mesh": {"cells": 10}},
+    },
+    "time": {"duration": 2.0, "step": 0.05}, "output": {"every": 0.1, "points": 7},
+}  # fmt: skip
+
+
+def test_bodies_are_moved_and_loaded_in_compiled_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where Python moves and loads them before every try, which it does for bodies with members alone."""
+    prepared: list[float] = []
+    prepare, make_solver = system_run.SystemRun._prepare, system_run.SystemRun.make_solver
+
+    def note(run: Any, t: float) -> None:
+        prepared.append(t)
+        prepare(run, t)
+
+    def ask(run: Any) -> None:
+        make_solver(run)
+        run._asks = books.ASK_BEFORE
+
+    monkeypatch.setattr(system_run.SystemRun, "_prepare", note)
+    compiled = hybrid.run(TOWED)
+    assert not prepared
+    monkeypatch.setattr(system_run.SystemRun, "make_solver", ask)
+    asked = hybrid.run(TOWED)
+    assert len(prepared) >= 40
+    for key in ("position", "rotation"):
+        here, there = (x[f"bodies/buoy/{key}"] for x in (compiled, asked))
+        assert np.ptp(there, axis=0).max() > 0.01 and np.abs(here - there).max() <= 1e-9 * np.abs(there).max(), key
+    for name, line in compiled.lines.items():
+        for key in ("position", "velocity", "tension", "work/end"):
+            other = asked.lines[name][key]
+            assert np.abs(line[key] - other).max() <= 1e-9 * np.abs(other).max() > 0.0, (name, key)

@@ -7,7 +7,7 @@
     eta      elevation of the surface above still water                m
 
 A motion adds r A sin(w t + p), a steady velocity times the integral of r, a travel, the surface that it follows, and
-the splines of a file.  A load is r times a constant, or r times what is linear between the rows of its history.  Roll, pitch and yaw turn the given frame by Rz Ry Rx, a file turns it by exp(v).  Vectors are
+the splines of a file.  An end on a body is where the motion of the body brings it.  A load is r times a constant, or r times what is linear between the rows of its history.  Roll, pitch and yaw turn the given frame by Rz Ry Rx, a file turns it by exp(v).  Vectors are
 inertial.  scene.motion.EndMotion states the same laws in Python, for the second solver and for tests.
 """
 
@@ -18,6 +18,7 @@ import math
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, hat, mat_mat, mat_vec, scale, transport
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.state.state import NOT_ON_BODY, PLACE_THERE, RIDES, SEAT_THERE, TURNS_FREELY
 
 # Rotation vectors shorter than this (rad) take Taylor series: the next terms are below round-off.
 SMALL_VECTOR = 1e-4
@@ -218,7 +219,7 @@ def driven_frame(t, k, moves):
 
 @inner
 def frame_at(t, k, moves):
-    """Frame (9) and angular velocity (1/s) of an end."""
+    """Frame (9) and angular velocity (1/s) that the motion of an end, or of the body that it is on, prescribes."""
     f = moves.frame[k]
     frame, spin = (f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8]), (0.0, 0.0, 0.0)
     when = t if t < math.inf else 0.0
@@ -232,6 +233,25 @@ def frame_at(t, k, moves):
             angle, rate = harmonics_at(when, k, 3.0, moves)
             turn, spin = turn_by_angles(angle, rate)
         frame = mat_mat(turn, frame)
+    return frame, spin
+
+
+@inner
+def ride_at(x, v, frame, spin, k, moves):
+    """Position, velocity, frame and angular velocity of end k, from those of the body that it is on."""
+    p = moves.fairlead[k]
+    arm = mat_vec(frame, (p[PLACE_THERE], p[PLACE_THERE + 1], p[PLACE_THERE + 2]))
+    s = p[SEAT_THERE:]
+    seat = (s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8])
+    x, v = add(x, arm), add(v, cross(spin, arm))
+    if p[RIDES] == TURNS_FREELY:
+        return x, v, seat, (0.0, 0.0, 0.0)
+    return x, v, mat_mat(frame, seat), spin
+
+
+@inner
+def bring_in(t, k, moves, frame, spin):
+    """Frame and angular velocity of an end as far as it has turned from the tangent that it started with."""
     missing = moves.missing[k, 3]
     if missing != 0.0:
         part, rate = rise(t, moves.bring_in)
@@ -245,9 +265,8 @@ def frame_at(t, k, moves):
 
 
 @inner
-def load_at(t, j, moves):
-    """Load j (N or N m) at t when it has grown: linear between the rows of its history, constant outside them."""
-    load, rows = moves.loads[j], moves.history
+def load_at(t, load, rows):
+    """A load (of Moves.loads, N or N m) at t when it has grown: linear between its rows, constant outside them."""
     a, b = int(load[6]), int(load[7])
     if a == b:
         return load[2], load[3], load[4]
@@ -281,6 +300,9 @@ def ends_at(t, moves, sea, ends, velocity):
         if moves.driven[k, 0]:
             x, v = driven_position(when, k, moves)
         frame, spin = frame_at(t, k, moves)
+        if moves.fairlead[k, RIDES] != NOT_ON_BODY:
+            x, v, frame, spin = ride_at(x, v, frame, spin, k, moves)
+        frame, spin = bring_in(t, k, moves, frame, spin)
         if moves.driven[k, 1]:
             frame, spin = driven_frame(when, k, moves)
         for i in range(3):
@@ -293,7 +315,7 @@ def ends_at(t, moves, sea, ends, velocity):
         k, target = int(moves.loads[j, 0]), ends.force
         if moves.loads[j, 1] == 1.0:
             target = ends.moment
-        load = load_at(when, j, moves)
+        load = load_at(when, moves.loads[j], moves.history)
         for i in range(3):
             target[k, i] += part * load[i]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.junctions.bodies import LINES, OWN
+from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN
 from hybrid.kernels.junctions.system_job import (
     BEFORE,
     CA,
@@ -28,7 +28,7 @@ from hybrid.kernels.junctions.system_job import (
     WHAT,
     read_system,
 )
-from hybrid.kernels.laws.end_motion import ends_at, sea_at
+from hybrid.kernels.laws.end_motion import ends_at, load_at, rise, sea_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.powers import pull
@@ -116,9 +116,16 @@ class StepsJob(NamedTuple):
     lines: NDArray[np.int64]  # (2,) above
     seen: NDArray[np.int64]  # (L,) bits of kernels.state.books: how near a line came to itself in the last step
     log: Floats  # (rows, L, len(LOG))
+    loads: Floats  # (K, 8) as kernels.state.state.Moves.loads, of the bodies of which one grows or follows a table
+    history: Floats  # (H, 4) likewise
     solver: int = 0  # address of kernels.run.system.solve_system
     marcher: int = 0  # of the kernel that solves a step of one line
     book: int = 0  # of book_system_step
+
+
+def no_loads() -> tuple[Floats, Floats]:
+    """StepsJob.loads and history where none changes."""
+    return np.zeros((0, 8)), np.zeros((0, 4))
 
 
 def blank_steps_job() -> StepsJob:
@@ -126,7 +133,7 @@ def blank_steps_job() -> StepsJob:
     none, log = np.zeros(1, np.int64), np.zeros((1, 1, len(LOG)))
     clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
     lone = np.zeros((1, 1), np.int64)
-    return StepsJob(none, none, none, none, none, lone, none, clock, counts, np.zeros(3), none, none, log)
+    return StepsJob(none, none, none, none, none, lone, none, clock, counts, np.zeros(3), none, none, log, *no_loads())
 
 
 read_steps = reader(blank_steps_job())
@@ -147,6 +154,23 @@ def move_lines(system, t):
         job = read(system.tables[l])
         ends_at(t, job.moves, job.sea, job.ends, job.books.velocity)
         sea_at(t, job.sea)
+
+
+@inner
+def load_bodies(bodies, loads, history, t):
+    """Forces and moments at t (s) of bodies of which one grows or follows a table."""
+    for j in range(loads.shape[0]):
+        b = int(loads[j, 0])
+        for i in range(3):
+            bodies[b, FORCE + i] = bodies[b, MOMENT + i] = 0.0
+    for j in range(loads.shape[0]):
+        part, _ = rise(t, loads[j, 5])
+        b, o = int(loads[j, 0]), FORCE
+        if loads[j, 1] == 1.0:
+            o = MOMENT
+        load = load_at(t, loads[j], history)
+        for i in range(3):
+            bodies[b, o + i] += part * load[i]
 
 
 @inner
@@ -302,6 +326,7 @@ def run_system(table):
         if counts[PHASE] == SOLVE:
             if not counts[ASKS] & ASK_BEFORE:
                 move_lines(system, steps.clock[TRY_END])
+                load_bodies(system.bodies, steps.loads, steps.history, steps.clock[TRY_END])
             try_step(steps, system)
             counts[PHASE] = JUDGE
             if counts[ASKS] & ASK_TRIES:

@@ -136,6 +136,13 @@ class Moves(NamedTuple):
     loads: Floats  # (L, 8) end; 0 force, 1 moment; N or N m (3); s, over which it grows, 0: at once; of `history` the
     # first row and the one behind the last; equal: constant
     history: Floats  # (H, 4) s, N or N m (3), linear between the rows of a load
+    fairlead: Floats  # (2, FAIRLEAD) of ends on a body that moves as is said above, below
+
+
+# Of `Moves.fairlead`: whether the end is at a body that moves, and turns with it or freely; its place there; its frame,
+# in axes of the body where it turns with it, else inertial.
+RIDES, PLACE_THERE, SEAT_THERE, FAIRLEAD = 0, 1, 4, 13
+NOT_ON_BODY, TURNS_FREELY, TURNS_WITH_BODY = 0.0, 1.0, 2.0
 
 
 class Sea(NamedTuple):
@@ -369,6 +376,7 @@ def no_moves() -> Moves:
     return Moves(
         z((2, 2), np.int8), z((2, 3)), z((2, 9)), z(2), z((0, 5)), z((2, 3)), z(2), z((2, 5)), z(2, np.int8),
         z((2, 2), np.int64), z(0), z((0, 6, 4)), z((2, 4)), 1.0, z((2, 2), np.int8), z((2, 26)), z((0, 8)), z((0, 4)),
+        z((2, FAIRLEAD)),
     )  # fmt: skip
 
 
