@@ -1,4 +1,5 @@
-"""hybrid and CableDyn on CableDyn's own decks of several lines: tensions at rest, and with fairleads that heave.
+"""hybrid and CableDyn on CableDyn's own decks of several lines: tensions at rest, and with fairleads that heave; what
+the deck of three lines costs both, and MoorDyn, by errors of mean, largest and least tension.
 
     pip install -e ".[dev,bench]"
     pytest bench/test_bench_cabledyn_systems.py -m bench -s
@@ -13,12 +14,14 @@ from __future__ import annotations
 
 import math
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from peers.moordyn_touchdown import silence
 
 import hybrid
 
@@ -89,8 +92,8 @@ def heaved(t: float) -> float:
     return ramp**3 * (10.0 - 15.0 * ramp + 6.0 * ramp**2) * math.sin(2.0 * math.pi * t / PERIOD)
 
 
-def theirs(count: int) -> Vector:
-    """Tension (nt,) N at the fairlead of the first line, every EVERY s."""
+def theirs(count: int, step: float = STEP) -> tuple[Vector, float]:
+    """Tension (nt,) N at the fairlead of the first line, every EVERY s; CPU time (s) of the loop."""
     points, lines = [], []
     for k in range(count):
         points += [
@@ -98,7 +101,7 @@ def theirs(count: int) -> Vector:
             "Coupled {} {} {} 0 0 0 0".format(*around(count, FAIRLEADS, k)),
         ]
         lines.append((2 * k + 2, 2 * k + 1, LENGTH))
-    rows = f"{DEPTH} WtrDpth", f"{BED} kBot", f"{BED_DAMPING} cBot", f"{STEP} dtM", f"{DURATION} TMax"
+    rows = f"{DEPTH} WtrDpth", f"{BED} kBot", f"{BED_DAMPING} cBot", f"{step} dtM", f"{DURATION} TMax"
     with model_of(deck(R4_185, points, lines, SEGMENTS, *rows)) as model:
         position, velocity, acceleration = model.get_coupled_motion()
         velocity[:], acceleration[:] = 0.0, 0.0
@@ -107,22 +110,24 @@ def theirs(count: int) -> Vector:
         up = [k for k in range(2, rest.size, 3) if abs(rest.ravel()[k] - FAIRLEADS[1]) < 1e-9]
         assert len(up) == count
         pull = [float(model.channel("FairTen1"))]
-        for k in range(1, round(DURATION / STEP) + 1):
-            t = k * STEP
+        begin = time.process_time()
+        for k in range(1, round(DURATION / step) + 1):
+            t = k * step
             before, now, after = heaved(t - d), heaved(t), heaved(t + d)
             position.ravel()[up] = rest.ravel()[up] + now
             velocity.ravel()[up], acceleration.ravel()[up] = (
                 (after - before) / (2 * d),
                 (after - 2 * now + before) / d**2,
             )
-            model.step(STEP, position, velocity, acceleration)
-            if k % round(EVERY / STEP) == 0:
+            model.step(step, position, velocity, acceleration)
+            if k % max(round(EVERY / step), 1) == 0:
                 pull.append(float(model.channel("FairTen1")))
-    return np.array(pull)
+        spent = time.process_time() - begin
+    return np.array(pull), spent
 
 
-def ours(count: int) -> Vector:
-    """The same of hybrid: the pull of the line on its fairlead."""
+def ours(count: int, step: float = STEP, **output: Any) -> tuple[Vector, float]:
+    """The same of hybrid, the pull of the line on its fairlead; CPU time (s) of the whole run, file written."""
     motion = {"heave": {"amplitude": 1.0, "period": PERIOD}, "ramp": RAMP}
     points: dict[str, Any] = {}
     for k in range(count):
@@ -134,24 +139,139 @@ def ours(count: int) -> Vector:
         for k in range(count)
     }  # fmt: skip
     bed = {"z": -DEPTH, "stiffness": BED * R4_185[0], "damping": BED_DAMPING * R4_185[0]}
-    result = hybrid.run(
-        {
-            "environment": {"gravity": GRAVITY, "fluid": {"density": DENSITY}, "seabed": bed}, "points": points,
-            "lines": lines, "time": {"duration": DURATION, "step": STEP}, "output": {"every": EVERY, "points": 11},
-        }
-    )  # fmt: skip
-    return np.linalg.norm(result["points/fairlead0/force"], axis=1)
+    scene = {
+        "environment": {"gravity": GRAVITY, "fluid": {"density": DENSITY}, "seabed": bed}, "points": points,
+        "lines": lines, "time": {"duration": DURATION, "step": step},
+        "output": {"every": EVERY, "points": 11} | output,
+    }  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:
+        begin = time.process_time()
+        result = hybrid.run(scene, Path(folder) / "run.h5", progress=False)
+        spent = time.process_time() - begin
+        pull = np.linalg.norm(result["points/fairlead0/force"], axis=1)
+        result.close()
+    return pull, spent
 
 
 @pytest.mark.parametrize("name", SPREADS)
 def test_a_spread_mooring_pulls_as_in_cabledyn(name: str) -> None:
     pytest.importorskip("cabledyn")
-    mine, other = ours(SPREADS[name]), theirs(SPREADS[name])
+    (mine, _), (other, _) = ours(SPREADS[name]), theirs(SPREADS[name])
     last = round(2 * PERIOD / EVERY)
     rest = 100.0 * (other[0] / mine[0] - 1.0)
     mean, most, least = (100.0 * (f(other[-last:]) / f(mine[-last:]) - 1.0) for f in (np.mean, np.max, np.min))
     print(f"\n| {name} | {mine[0] / 1e3:.2f} kN | {rest:+.3f} % | {mean:+.3f} % | {most:+.3f} % | {least:+.3f} % |")
     assert max(abs(rest), abs(mean)) < MEAN and max(abs(most), abs(least)) < PEAK
+
+
+MOORDYN = """\
+--- LINE TYPES ---
+TypeName Diam MassDen EA BA/-zeta EI Cd Ca CdAx CaAx
+(-) (m) (kg/m) (N) (-) (N-m^2) (-) (-) (-) (-)
+chain {diameter} {mass} {ea} -0.8 0 1.37 1.0 0.64 0.0
+--- POINTS ---
+ID Attachment X Y Z M V CdA Ca
+(-) (-) (m) (m) (m) (kg) (m^3) (m^2) (-)
+{points}
+--- LINES ---
+ID LineType AttachA AttachB UnstrLen NumSegs Outputs
+(-) (-) (-) (-) (m) (-) (-)
+{lines}
+--- OPTIONS ---
+{gravity} g
+{density} rhoW
+{depth} WtrDpth
+{bed} kBot
+{damping} cBot
+{step} dtM
+RK2 tScheme
+1 disableOutput
+1 disableOutTime
+0 writeLog
+20 TmaxIC
+--- need this line ---
+"""
+COUPLING = 0.02  # s, between two positions of fairleads that MoorDyn is given
+
+
+def moordyns(count: int, step: float) -> tuple[Vector, float]:
+    """The same of MoorDyn: the force of its line on the first fairlead, CPU time (s) of the loop."""
+    moordyn = pytest.importorskip("moordyn")
+    points = [
+        "{} {} {} {} {} 0 0 0 0".format(2 * k + first, kind, *around(count, place, k))
+        for k in range(count)
+        for first, kind, place in ((1, "Fixed", ANCHORS), (2, "Coupled", FAIRLEADS))
+    ]
+    lines = [f"{k + 1} chain {2 * k + 1} {2 * k + 2} {LENGTH} {SEGMENTS} -" for k in range(count)]
+    text = MOORDYN.format(
+        diameter=R4_185[0], mass=R4_185[1], ea=R4_185[2], points="\n".join(points), lines="\n".join(lines),
+        gravity=GRAVITY, density=DENSITY, depth=DEPTH, bed=BED, damping=BED_DAMPING, step=step,
+    )  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder, silence():
+        path = Path(folder) / "deck.txt"
+        path.write_text(text)
+        system = moordyn.Create(str(path))
+        rest, velocity = np.array([around(count, FAIRLEADS, k) for k in range(count)]), np.zeros((count, 3))
+        assert moordyn.Init(system, rest.ravel().tolist(), velocity.ravel().tolist()) == 0
+        point = moordyn.GetPoint(system, 2)
+        pull = [float(np.linalg.norm(moordyn.GetPointForce(point)))]
+        begin = time.process_time()
+        for k in range(round(DURATION / COUPLING)):
+            now, then = heaved(COUPLING * k), heaved(COUPLING * (k + 1))
+            position = rest.copy()
+            position[:, 2] += now
+            velocity[:, 2] = (then - now) / COUPLING
+            moordyn.Step(system, position.ravel().tolist(), velocity.ravel().tolist(), COUPLING * k, COUPLING)
+            if (k + 1) % round(EVERY / COUPLING) == 0:
+                pull.append(float(np.linalg.norm(moordyn.GetPointForce(point))))
+        spent = time.process_time() - begin
+        moordyn.Close(system)
+    return np.array(pull), spent
+
+
+def figures(pull: Vector) -> Vector:
+    """Mean, largest and least of the last two periods."""
+    last = pull[-round(2 * PERIOD / EVERY) :]
+    return np.array([last.mean(), last.max(), last.min()])
+
+
+# Steps (s) of each program, the last one the reference for its own errors; times are medians of so many runs.
+LADDERS: dict[str, tuple[float, ...]] = {
+    "hybrid": (0.1, 0.05, 0.025, 0.0125), "CableDyn": (0.1, 0.05, 0.025, 0.00625), "MoorDyn": (4e-3, 2e-3, 5e-4),
+}  # fmt: skip
+ROUNDS = 5
+
+
+def test_what_a_mooring_of_three_lines_costs() -> None:
+    """Whole runs of hybrid with a file, against the loops alone of the others: each row beside those as exact or better."""
+    pytest.importorskip("cabledyn")
+    programs = {"hybrid": ours, "CableDyn": theirs, "MoorDyn": moordyns}
+    error: dict[tuple[str, float], float] = {}
+    cost: dict[tuple[str, float], float] = {}
+    for name, steps in LADDERS.items():
+        right = figures(programs[name](3, steps[-1])[0])
+        for step in steps[:-1]:
+            try:
+                runs = [programs[name](3, step) for _ in range(ROUNDS)]
+            except Exception as fault:  # of a program that is not stable with such a step
+                print(f"{name:9} {step:8g} s: {fault}")
+                continue
+            off = 100.0 * (figures(runs[0][0]) / right - 1.0)
+            if not np.isfinite(off).all():
+                continue
+            error[name, step], cost[name, step] = float(np.abs(off).max()), float(np.median([x for _, x in runs]))
+            print(
+                f"{name:9} {step:8g} s: {cost[name, step]:6.2f} s of CPU; mean, max, min off by {np.round(off, 3)} %",
+                flush=True,
+            )
+    with_error = float(np.median([ours(3, STEP, errors=True)[1] for _ in range(3)]))
+    for (name, step), off in error.items():
+        if name != "hybrid":
+            equal = [cost[x] for x in cost if x[0] == "hybrid" and error[x] <= off]
+            best = f"{cost[name, step] / min(equal):.2f}" if equal else "no step of hybrid is as exact"
+            print(f"{name} at {step:g} s over hybrid, not less exact: {best}; with its errors at {STEP} s: ", end="")
+            print(f"{cost[name, step] / with_error:.2f}")
+    assert max(off for (name, _), off in error.items() if name == "hybrid") < PEAK
 
 
 def test_a_weight_on_two_chains_pulls_as_in_cabledyn() -> None:
