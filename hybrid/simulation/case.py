@@ -49,7 +49,7 @@ from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
-from hybrid.simulation.restore import program, refused, resolution_from, resolution_tree, restored_parts
+from hybrid.simulation.restore import program, refused, require_same, resolution_from, resolution_tree, restored_parts
 from hybrid.simulation.result_checks import damped_vibrations
 from hybrid.simulation.result_file import STEP_FIELDS, mesh_fields, result_recorder
 from hybrid.simulation.run_sample import (
@@ -72,7 +72,7 @@ from hybrid.simulation.transient import Transient
 from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
-from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
+from hybrid.store.checkpoint import digest_of, read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.hdf5_file import is_result, open_file, opened
 from hybrid.store.late_file import LateFile
@@ -210,7 +210,7 @@ class Case:
         """The same from the checkpoint of a result, which may be the target; ResultError if it has none."""
         with opened(source) as file:
             point = read_checkpoint(file)
-            self._check(point, source)
+            require_same(point, self._files, self.criterion, source)
             texts = self._texts
             if (
                 "self_contact" not in file and self_reach(self.scene).may
@@ -296,17 +296,6 @@ class Case:
             for path in (*x.ends.files(), *x.environment.files(), *x.cable.files())
         }
         return {path: digest_of(Path(path)) for path in sorted(paths)}
-
-    def _check(self, point: Checkpoint, source: Path) -> None:
-        """ResultError: the criterion of a run is missing, or the files that it reads have changed."""
-        if point.asks and self.criterion is None:
-            advice = "hybrid.resume(path, criterion=...) with the function that it was run with"
-            raise ResultError(f"{source} was computed with a criterion of its own\n    try:      {advice}")
-        now = self._files
-        changed = [path for path, digest in point.files.items() if now.get(path) != digest]
-        if changed:
-            detail = f"{', '.join(changed)}: other than when the run began"
-            raise ResultError(f"{source} cannot go on\n    detail:   {detail}\n    try:      run its scene again")
 
     def _compared(self, run: Transient, target: Target, cpu: float, late: LateFile | None) -> RunSample:
         """What is to be compared of a complete result; late: it has no file yet."""

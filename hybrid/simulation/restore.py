@@ -34,6 +34,7 @@ from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.initial_zones import manager_for
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
+from hybrid.store.checkpoint import Checkpoint
 from hybrid.store.named_arrays import Tree, matched
 from hybrid.store.reader import Result
 
@@ -53,6 +54,20 @@ def program() -> str:
         if file.relative_to(package).with_suffix("").parts[0] in COMPUTES:
             digest.update(file.read_bytes())
     return f"{version('hybrid-cable')} {digest.hexdigest()[:16]}"
+
+
+def require_same(point: Checkpoint, files: Mapping[str, str], criterion: UserCriterion | None, source: Path) -> None:
+    """ResultError: the criterion of a run is missing, or the files that it reads have changed.
+
+    files: digests by path, as they are now; source: the result whose checkpoint this is.
+    """
+    if point.asks and criterion is None:
+        advice = "hybrid.resume(path, criterion=...) with the function that it was run with"
+        raise ResultError(f"{source} was computed with a criterion of its own\n    try:      {advice}")
+    changed = [path for path, digest in point.files.items() if files.get(path) != digest]
+    if changed:
+        detail = f"{', '.join(changed)}: other than when the run began"
+        raise ResultError(f"{source} cannot go on\n    detail:   {detail}\n    try:      run its scene again")
 
 
 @contextmanager

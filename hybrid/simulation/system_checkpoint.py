@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.errors import ResultError
 from hybrid.kernels.junctions.bodies import SPRING
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.model.system import SystemResolution
@@ -137,7 +136,8 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
 def content(run: SystemRun) -> dict[str, Any]:
     """What the writer keeps of a checkpoint."""
     resolution = {name: resolution_tree(x) for name, x in run.resolution.lines.items()}
-    return {"program": program(), "asks": False, "resolution": resolution, "state": checkpoint(run)}
+    asks = run.criterion is not None
+    return {"program": program(), "asks": asks, "resolution": resolution, "state": checkpoint(run)}
 
 
 def kept_resolution(system: System, source: Path) -> SystemResolution:
@@ -171,15 +171,6 @@ def files_of(system: System) -> dict[str, str]:
     for name in system.rigid:
         found |= {given.load.file for given in system.moments_on(name) if given.load.file is not None}
     return {path: digest_of(Path(path)) for path in sorted(found)}
-
-
-def check_files(system: System, point: Checkpoint, source: Path) -> None:
-    """ResultError: files that a run reads have changed."""
-    now = files_of(system)
-    changed = [path for path, digest in point.files.items() if now.get(path) != digest]
-    if changed:
-        detail = f"{', '.join(changed)}: other than when the run began"
-        raise ResultError(f"{source} cannot go on\n    detail:   {detail}\n    try:      run its scene again")
 
 
 def other_program(point: Checkpoint) -> str:

@@ -30,11 +30,10 @@ from hybrid.simulation.collapse import COLLAPSE, CONTACT, GIVE_UP, collapse_text
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.progress import RESULT, ProgressReporter
-from hybrid.simulation.restore import refused
+from hybrid.simulation.restore import refused, require_same
 from hybrid.simulation.result_file import places_of_elevation
 from hybrid.simulation.step_events import CUTS
 from hybrid.simulation.system_checkpoint import (
-    check_files,
     content,
     files_of,
     kept_resolution,
@@ -90,6 +89,7 @@ class SystemRun:
         criterion: one more for zones that move (adapt.user_criterion).
         """
         self._before, self._pending, self._notes = found or {}, pending, notes
+        self.criterion = criterion
         self.system, self.target, self.moves = system, target, moves
         self.kept = kept and isinstance(target, Path)
         if source is not None:
@@ -223,7 +223,7 @@ class SystemRun:
         assert isinstance(self.target, Path)
         with opened(source) as file:
             point = read_checkpoint(file)
-            check_files(self.system, point, source)
+            require_same(point, files_of(self.system), self.criterion, source)
             self.make_solver()
             with refused(source):
                 restore(self, point.state)

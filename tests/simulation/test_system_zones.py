@@ -220,3 +220,24 @@ def test_a_criterion_sees_the_line_that_it_is_asked_for() -> None:
         line["model"] = "rod"
     with pytest.raises(TypeError, match="not adaptive"):
         hybrid.run(short, criterion=lambda look: look.s)
+
+
+def test_a_resumed_run_asks_the_same_criterion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is the run that was not stopped, bit for bit; without the criterion it is refused."""
+    _, system = slackening(duration=0.6)
+    whole, path = tmp_path / "whole.h5", tmp_path / "run.h5"
+    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+
+    def criterion(look: hybrid.NodeState) -> np.ndarray:
+        return np.where((look.s > 20) & (look.s < 30) & (look.t > 0.2), 1.5, 0.0)
+
+    stopping = Stopping(monkeypatch)
+    hybrid.run(system, whole, criterion=criterion, progress=stopping).close()
+    stopping.left = stopping.heard // 2
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(system, path, criterion=criterion, progress=stopping)
+    with pytest.raises(hybrid.ResultError, match="criterion"):
+        hybrid.resume(path)
+    hybrid.resume(path, criterion=criterion).close()
+    assert differences(whole, path) == []
