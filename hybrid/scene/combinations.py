@@ -378,9 +378,6 @@ TURNS_OF_ONE = Feature("turns at an end", "turns", Absent(
     {"ClampedConnection": ("turns",)},
     "leave it out, or compute this line alone; a rotation over time is the motion of its point or body",
 ))  # fmt: skip
-CRITERIA = Feature("criteria as outputs", "output.criteria", Absent(
-    {"SystemOutput": ("criteria",)}, "leave it out: they are recorded of one cable"
-))  # fmt: skip
 
 RELEASED_TWIST = Refusal(
     TWISTED_RELEASE, TWISTED_CATENARY, "not worked out", "a torque passes through it into catenary zones",
@@ -520,7 +517,7 @@ REFUSALS: tuple[Refusal, ...] = (
     *(
         Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)
         for x in (
-            ONE_PLANE, LAYERS_OF_ONE, OTHER_STARTS, WINCH, TURNS_OF_ONE, CRITERIA
+            ONE_PLANE, LAYERS_OF_ONE, OTHER_STARTS, WINCH, TURNS_OF_ONE
         )
         if isinstance(x.places, Absent)
     ),

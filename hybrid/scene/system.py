@@ -173,6 +173,9 @@ class SystemOutput(Table):
         description="further quantities over time by name: forces and angles at ends, touchdown, layback, clearance",
     )
     exact: Truth = Field(default=True, description="steps end at outputs, of several lines always: true")
+    criteria: Truth = Field(
+        default=False, description="also write the criteria of lines whose zones move, as fields over time and s"
+    )
     errors: Truth | None = Field(
         default=None,
         description="estimate how wrong the result is, by mesh and time step; absent: where an accuracy is asked",
@@ -396,6 +399,7 @@ class System(Table):
             tables["time"] = self.time
         given = {key: getattr(self.output, key) for key in ("points", "every", "errors")}
         given["history"] = self.output.history.get(name)
+        given["criteria"] = self.output.criteria and (name in self.adaptive or not self.adaptive)  # none: each says so
         tables["output"] = {key: value for key, value in given.items() if value is not None}
         return Scene.model_validate(tables)
 

@@ -9,10 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybrid.adapt.manager import DomainManager
 from hybrid.errors import Outcome
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.march.link import holds_twist
+from hybrid.kernels.mesh.criteria import CRITERIA
 from hybrid.kernels.mesh.zone_criteria import twist_of_rods
 from hybrid.kernels.run.entry import sharpest
 from hybrid.kernels.state.books import (
@@ -84,10 +86,12 @@ def twist_at_rest(x: JoinedLine, state: State) -> float:
 def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | None = None) -> Observer:
     """What records the outputs of a line; moves: whether it does, or is in equilibrium; only: quantities, None: all."""
     s, jumps = output_points(scene)
-    kinds = {"rod", "catenary"} if moves and model.layout is not None else None
+    zones_move = moves and model.layout is not None
+    kinds = {"rod", "catenary"} if zones_move else None
+    criteria = [(x.name, x.ratio) for x in CRITERIA] if scene.output.criteria and zones_move and only is None else ()
     return Observer(
-        model.line, model.sea.values, model.zones, s, moves and only is None, model.attached, kinds, only=only,
-        jumps=jumps, changes=section_changes(scene), quantities=None if only else quantities_of(scene),
+        model.line, model.sea.values, model.zones, s, moves and only is None, model.attached, kinds, criteria,
+        only=only, jumps=jumps, changes=section_changes(scene), quantities=None if only else quantities_of(scene),
     )  # fmt: skip
 
 
@@ -135,6 +139,7 @@ class LineResult:
             self.recorder = recorder
         self.books = self._own_books(state)
         self.contact: SelfContact | None = None
+        self.manager: DomainManager | None = None  # of zones that move
         self._touching = model  # for whose cells that is
         self._waiting: list[Batch] = []
         self._log: list[Floats] = []
@@ -312,7 +317,11 @@ class LineResult:
         waiting, self._waiting = self._waiting, []
         batch = Batch(*(np.concatenate(x) for x in zip(*waiting, strict=True)))
         seen = self.observer.look(batch)
-        values = self.observer.values_of(seen)
+        ratios = None
+        if self.observer.writes_criteria:  # of a line whose outputs do not wait
+            assert self.manager is not None
+            ratios = self.manager.largest_ratios(self.observer.grid.s)[None]
+        values = self.observer.values_of(seen, ratios)
         self.recorder.save_batch(batch.t.copy(), values, self.observer.zone_rows)
         if not self._moves:
             self.diagnostics.mesh(seen)

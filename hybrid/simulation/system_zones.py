@@ -182,6 +182,8 @@ class SystemZones:
         every = run.resolution.one.every
         self._run = run
         self.lines = [_LineZones(k, run.model.models[k], x, every) for k, x in managers.items()]
+        for k, x in managers.items():
+            run.lines[k].manager = x
         self._rescues = 0  # of the step that is tried
 
     def look_ahead(self) -> None:

@@ -27,7 +27,7 @@ def slackening(**time: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """A rope whose end moves towards its start, as one cable and as a system."""
     end = {"position": [50, 0, 10], "motion": {"travel": {"by": [-14, 0, 0], "over": 3.0}}}
     common = {"environment": SEA, "time": {"duration": 3.2, "step": 0.02} | time}
-    output = {"every": 0.1, "points": 31}
+    output = {"every": 0.1, "points": 31, "criteria": True}
     cable = {
         "cable": {"sections": [ROPE]}, "mesh": {"cells": 30}, "model": MODEL, "initial": "equilibrium",
         "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned"} | end},
@@ -51,7 +51,7 @@ def mooring(**more: Any) -> dict[str, Any]:
         "environment": SEA,
         "points": {name: {"position": x} for name, x in feet.items()} | {"float": free},
         "lines": {name: {"start": name, "end": "float"} | LINE for name in feet},
-        "time": {"duration": 5.0, "step": 0.02}, "output": {"every": 0.1, "points": 31, "quantities": asked},
+        "time": {"duration": 5.0, "step": 0.02}, "output": {"every": 0.1, "points": 31, "quantities": asked, "criteria": True},
     } | more  # fmt: skip
 
 
@@ -83,6 +83,11 @@ def test_a_system_of_one_line_has_the_zones_of_the_cable_at_the_same_times(
     rope = system.lines["rope"]
     assert changes(rope) == changes(cable) and len(changes(cable)) > 5
     assert [*rope.zones] == [*cable.zones]
+    criteria = {name for name in cable.names if name.startswith("criteria/")}
+    assert criteria == {name for name in rope.names if name.startswith("criteria/")} and len(criteria) > 3
+    for name in criteria:
+        assert np.allclose(rope[name], cable[name], rtol=1e-6, atol=1e-9), name
+    assert max(rope[name].max() for name in criteria) > 1.0
     assert np.abs(rope.position - cable.position).max() < 1e-9
     assert np.abs(rope.tension - cable.tension).max() < 1e-6 * cable.tension.max()
     assert np.isclose(rope["work/zones"][-1], cable["work/zones"][-1], rtol=1e-6)
