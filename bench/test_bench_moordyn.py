@@ -18,6 +18,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import arbiter
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -123,19 +124,20 @@ def test_a_deck_and_its_scene_pull_alike(name: str) -> None:
 def test_a_line_that_doubles_back_at_a_rod_is_not_alike() -> None:
     """A limit that is known: rod_end.txt with its line led over the rod and down into end B, at rest.
 
-    MoorDyn's shape stays away from ours, with more segments a little more; our two solvers, which share no equation,
+    MoorDyn's shape stays away from ours, with more segments a little more; hybrid and the arbiter, which share no equation,
     agree.  Bounds: a tenth of MoorDyn's distance for ours; its own two-sided, so that a version that agrees is noticed.
     """
     pytest.importorskip("moordyn")
     text = (DECKS / "rod_end.txt").read_text().replace("R1A", "R1B")
     (made,) = from_text(text).scenes.values()
     data = made.scene.model_dump(mode="json", exclude_none=True) | {"model": "rod", "output": {"points": 61}}
-    # What shooting does not know, and what does nothing here: the bed and the surface are far off, and all is at rest.
+    # What the arbiter does not know, and what does nothing here: the bed and the surface are far off, and all is at rest.
     del data["environment"]["seabed"], data["environment"]["fluid"]["surface"], data["cable"]["sections"][0]["damping"]
     fine = hybrid.static(hybrid.validate_scene(data | {"mesh": {"cells": 400}})).position[-1]
-    other = hybrid.static(hybrid.validate_scene(data | {"solver": "shooting"})).position[-1]
+    ours = hybrid.validate_scene(data)
+    other = arbiter.at(arbiter.static(ours), hybrid.static(ours).s)["position"]
     between = np.linalg.norm(fine - other, axis=1).max()
-    print(f"\nline that doubles back, 62 m: our two solvers {between:.3f} m apart")
+    print(f"\nline that doubles back, 62 m: hybrid and the arbiter {between:.3f} m apart")
     for factor, step in ((1.0, 2e-4), (2.0, 1e-4)):
         quiet = {"disableOutput": 1, "disableOutTime": 1, "writeLog": 0}
         deck = options(segments(text, factor), dtM=step, tScheme="RK4", **quiet)

@@ -74,7 +74,6 @@ class Outcome(IntEnum):
     UNSTABLE = 6
     GAINS_ENERGY = 7
     TWISTED_TOO_FAR = 8
-    ILL_CONDITIONED = 9
     BURIED = 10
     OVERSTRETCHED = 11
     TURNS_LOST = 12
@@ -192,7 +191,6 @@ _CAUSE = {
     Outcome.SLACK: "the line goes into compression; a catenary cannot carry it",
     Outcome.TURNED_TOO_FAR: "a cell turned, or spun against the next, by more than a radian in a step, however small",
     Outcome.GAINS_ENERGY: "the computation creates energy: as much as all the work done on the cable so far",
-    Outcome.ILL_CONDITIONED: "the line is too long for literal shooting: the system is ill-conditioned",
     Outcome.TWISTED_TOO_FAR: "the twist from one cell to the next nears half a turn, and could be its opposite",
     Outcome.UNSTABLE: "the only equilibrium found is unstable: the cable would buckle out of it",
     Outcome.BURIED: "the only equilibrium found lies deep in the seabed",
@@ -212,7 +210,6 @@ _REMEDY = {
     Outcome.SLACK: "make this stretch a rod zone (it needs bending_stiffness), or keep it taut",
     Outcome.TURNED_TOO_FAR: "look for a jump of force at this time; add damping or bending stiffness, or add cells",
     Outcome.GAINS_ENERGY: "make time.step or rho_inf smaller, give axial_stiffness, add cells where the cable folds",
-    Outcome.ILL_CONDITIONED: "take solver: elimination",
     Outcome.TWISTED_TOO_FAR: "add cells: each can take a twist of a quarter of a turn",
     Outcome.BURIED: "start from another shape (initial.points), and check stiffness and height of the seabed",
     Outcome.TURNS_LOST: "add cells, hold the cable tauter, or turn the end in time (ends.*.motion), with damping",

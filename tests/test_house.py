@@ -29,9 +29,8 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "solve": ("errors", "kernels", "model"),
     "adapt": ("errors", "kernels", "model"),
     "outputs": ("errors", "kernels", "model", "solve", "store"),
-    "shooting": ("errors", "scene"),  # the second solver shares nothing with the first but the scene
-    "simulation": (*COMPUTING, "shooting"),
-    "accuracy": (*COMPUTING, "shooting", "simulation"),
+    "simulation": COMPUTING,
+    "accuracy": (*COMPUTING, "simulation"),
     "view": ("errors", "statistics", "store"),
     "exports": ("errors", "store"),
     "interop": ("errors", "scene"),
@@ -56,7 +55,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
 
 # Packages from outside that only these rooms may import.
 ONLY = {
-    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "shooting", "simulation", "accuracy", "view", "exports", "studies"),
+    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "simulation", "accuracy", "view", "exports", "studies"),
     "numba": ("kernels",),
     "h5py": ("store", "exports"),
     "matplotlib": ("view",),

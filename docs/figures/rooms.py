@@ -23,7 +23,7 @@ FLOORS = (
         "view": (3.2, "plots, report, films"),
         "exports": (4.1, "netCDF, CSV, VTK"),
     },
-    {"outputs": (0.05, "values on the output grid"), "shooting": (1.5, "second, independent solver")},
+    {"outputs": (0.05, "values on the output grid")},
     {"solve": (0.05, "statics, stepping in time"), "adapt": (0.95, "domain manager, zones")},
     {"model": (0.5, "the scene as arrays")},
     {

@@ -25,11 +25,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.errors import ComputationError
 from hybrid.model.build import build
 from hybrid.scene.schema import Scene
-from hybrid.shooting import static
 from hybrid.solve.statics import solve_statics
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
+from arbiter import ArbiterError, static
 
 Array = NDArray[np.float64]
 Slopes = tuple[Array, Array]  # s (n,) m and dz/ds (n,)
@@ -53,7 +54,6 @@ def scene_of(ratio: float) -> Scene:
             "initial": {"kind": "straight", "direction": (1, 0, 0)},
             "model": {"kind": "rod"},
             "mesh": {"cells": cells},
-            "solver": "shooting",
         }
     )
 
@@ -76,11 +76,11 @@ def box(s: Array, ratio: float) -> Array:
     return SLOPE * layer(np.log((1.0 + z) / abs(1.0 - z)), np.arange(n, -1.0, -1.0))
 
 
-# --- solvers: one line each; a refusal is a ComputationError ---------------------------------------
+# --- solvers: one line each; a refusal is an ArbiterError ----------------------------------------
 
 
 def shooting(scene: Scene) -> Slopes:
-    """The arbiter: Newton on the literal march, every check on."""
+    """The arbiter (bench/arbiter): Newton on the literal march, every check on."""
     state = static(scene)
     return state.s, state.tangent[:, 2]
 
@@ -121,7 +121,7 @@ def errors_of(solver: str, ratios: Sequence[float], truth: Callable[[Array, floa
     for ratio in ratios:
         try:
             s, slope = SOLVERS[solver](scene_of(ratio))
-        except ComputationError:
+        except ArbiterError:
             errors.append(np.nan)
             continue
         with np.errstate(all="ignore"):
@@ -147,7 +147,7 @@ def draw(ratios: Array, file: Path) -> None:
     axis.loglog(ratios, total, "s-", ms=3, color="tab:blue", label="shooting, Newton on top: all errors")
     axis.loglog(ratios, ours, "d-", ms=3, color="tab:green", label="production, elimination along s: all errors")
     refused = ratios[np.isnan(total)]
-    axis.loglog(refused, np.ones(len(refused)), "x", color="tab:blue", label="shooting refuses (ComputationError)")
+    axis.loglog(refused, np.ones(len(refused)), "x", color="tab:blue", label="shooting refuses")
     axis.set(xlabel="L/lambda, lambda = sqrt(EI/T)", ylabel="largest error of the slope / imposed slope")
     axis.set(xlim=(0.8, 1.3e3), ylim=(1e-17, 1e5))
     axis.grid(True, which="major", color="0.92")

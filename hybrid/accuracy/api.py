@@ -88,11 +88,6 @@ def run(
         return _several_lines(scene, output, overwrite, progress, criterion)
     check_motions(scene)
     refuse_use(scene, "motion")
-    if scene.solver == "shooting":
-        from hybrid.simulation.arbiter import run_shooting
-
-        with locked(_path(output)):
-            return run_shooting(scene, output, overwrite)
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError(NO_ZONES)
     chosen = criterion is None and model_is_free(scene)  # most often rods, which need least to be compiled
@@ -123,11 +118,6 @@ def static(scene: SceneLike | System, output: str | Path | None = None, *, overw
     if not isinstance(scene, Scene):
         return _several_lines(scene, output, overwrite, None)
     check_motions(scene)
-    if scene.solver == "shooting":
-        from hybrid.simulation.arbiter import static_shooting
-
-        with locked(_path(output)):
-            return static_shooting(scene, output, overwrite)
     compile_beside(scene, static=True)
     case, begin = StaticCase(scene), clock.process_time()
     target, resolution = _target(output, overwrite, wants_errors(scene)), first_resolution(scene)

@@ -44,7 +44,7 @@ class SystemInstead(NamedTuple):
 
 def rods_instead_of_slack(scene: Scene, error: ComputationError) -> Instead | None:
     """A scene with rods in place of catenaries that stood for no model; None: they did not, or did not go slack."""
-    named = "model" in scene.model_fields_set or scene.solver != "elimination" or payout_of(scene) is not None
+    named = "model" in scene.model_fields_set or payout_of(scene) is not None
     if error.outcome != Outcome.SLACK or error.t is None or named or scene.model.kind != "catenary":
         return None
     sections, given = _stiffened(scene.cable.sections, scene.environment)

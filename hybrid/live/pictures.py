@@ -6,7 +6,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from hybrid.accuracy.api import static
 from hybrid.errors import Complaint, ComputationError, HybridError, SceneError
 from hybrid.kernels.machine.cache import is_warm
 from hybrid.live import drawing
@@ -71,8 +70,6 @@ def equilibrium(scene: Scene | System, made: Plan | SystemPlan) -> Result:
         static_system(scene, memory, partial(scene_text, scene))
         return written_result(memory)
     check_motions(scene)
-    if scene.solver == "shooting":
-        return static(scene)
     assert isinstance(made, Plan)
     if model_is_free(scene, moves=False):
         scene = with_model(scene, "rod")

@@ -27,8 +27,6 @@ def in_plane(scene: Scene, start: State, others: list[tuple[str, State]], ends: 
     """
     if scene.dimension == 3:
         return None, Entry(WHAT, False, "dimension: 3")
-    if scene.solver != "elimination":
-        return None, Entry(WHAT, False, f"solver: {scene.solver} computes in space")
     if scene.contact.self:
         return None, Entry(WHAT, False, "contact.self: contact of the line with itself is computed in space")
     asked = scene.dimension == 2

@@ -382,8 +382,7 @@ def model_is_free(scene: Scene, moves: bool = True) -> bool:
     """
     named = scene.model != AdaptiveModel()
     wants = (scene.time is not None or not moves) and requested_accuracy(scene) is not None and mesh_is_free(scene)
-    plain = scene.solver == "elimination" and not scene.contact.self
-    return wants and not named and not scene.output.criteria and plain
+    return wants and not named and not scene.output.criteria and not scene.contact.self
 
 
 def first_resolution(scene: Scene) -> Resolution:

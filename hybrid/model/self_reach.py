@@ -42,7 +42,6 @@ def self_reach(scene: Scene) -> Reach:
     off = {
         "a section has no diameter": any(x.diameter is None for x in sections),
         "catenaries that stay touch each other with contact: {self: true} alone": isinstance(model, CatenaryModel),
-        f"solver: {scene.solver} knows no contact": scene.solver != "elimination",
         "dimension: 2, and contact leads out of a plane": scene.dimension == 2,
     }
     why = next((text for text, holds in off.items() if holds), "")

@@ -209,16 +209,6 @@ def _are_stretches(value: Any) -> Any:
 Stretches = Annotated[tuple[NonNegativePair, ...], Field(min_length=1), Before(_are_stretches)]
 
 
-# Keys that are no more, with the value at which they asked for nothing: results of before 0.7 name every key.
-_ASKED_NOTHING = {"joint": "spherical", "correct": False}
-
-
-def _without_former_keys(value: Any) -> Any:
-    if not isinstance(value, Mapping):
-        return value
-    return {key: x for key, x in value.items() if key not in _ASKED_NOTHING or x != _ASKED_NOTHING[key]}
-
-
 class AdaptiveModel(Table):
     """Zones that follow the physics: rod where bending, torsion or slack ask for it, catenary elsewhere."""
 
@@ -227,6 +217,7 @@ class AdaptiveModel(Table):
         "correct": "leave it out: `output: {errors: true}` says what bending would change, a smaller tolerance makes "
         "more of the line rod",
     }
+    asked_nothing: ClassVar[Mapping[str, Any]] = {"joint": "spherical", "correct": False}
 
     kind: Literal["adaptive"] = Field(default="adaptive", description="zones that move by themselves")
     tolerance: Positive | None = Field(
@@ -280,7 +271,7 @@ Model = Annotated[
     Annotated[RodModel, Tag("<rod>")]
     | Annotated[CatenaryModel, Tag("<catenary>")]
     | Annotated[ZonesModel, Tag("<zones>")]
-    | Annotated[AdaptiveModel, Before(_without_former_keys), Tag("<adaptive>")],
+    | Annotated[AdaptiveModel, Before(AdaptiveModel.without_former), Tag("<adaptive>")],
     Discriminator(by_kind),
     Kinds(
         ("rod", "catenary", "zones", "adaptive"),

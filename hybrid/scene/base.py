@@ -86,6 +86,15 @@ class Table(BaseModel):
     former: ClassVar[Mapping[str, str]] = {}  # of each former name, the key of today
     usual: ClassVar[tuple[str, ...]] = ()  # keys that examples show beside those that are required
     instead: ClassVar[Mapping[str, str]] = {}  # of keys that other tables have and this one cannot: what to do
+    # Of keys that are no more, the value at which they asked for nothing: results of before 0.7 name every key.
+    asked_nothing: ClassVar[Mapping[str, Any]] = {}
+
+    @classmethod
+    def without_former(cls, value: Any) -> Any:
+        """The keys of a table, without those that are no more where they ask for nothing."""
+        if not isinstance(value, Mapping):
+            return value
+        return {key: x for key, x in value.items() if key not in cls.asked_nothing or x != cls.asked_nothing[key]}
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:

@@ -18,7 +18,6 @@ from hybrid.scene import (
     payout_checks,
     sea_checks,
     start_checks,
-    torque_checks,
 )
 from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.analysis import (
@@ -128,19 +127,9 @@ def _stretches_on_cable(cable: Cable, model: Model) -> Iterator[Finding]:
                 yield Finding(("model", key, i), "a stretch apart from those of force_rod", "let them end before")
 
 
-def _zones_that_move(model: Model, solver: str) -> Iterator[Finding]:
-    if isinstance(model, AdaptiveModel) and solver == "shooting":
-        yield Finding(("solver",), "elimination, because zones move (model)", "or write `model: rod`")
-
-
-def _stretch_by_a_law(cable: Cable, ends: Ends, solver: str) -> Iterator[Finding]:
+def _stretch_by_a_law(cable: Cable, ends: Ends) -> Iterator[Finding]:
     """Sections whose tension is no multiple of strain, where that cannot be computed."""
     paid = [name for name, x in ends.named().items() if isinstance(x, Pinned | Clamped) and x.payout is not None]
-    reels = [x for name in paid for x in getattr(ends, name).payout.reel or ()]
-    for section in (*cable.sections, *reels):
-        if section.curve is not None and solver == "shooting":
-            key = "dynamic_stiffness" if section.dynamic_stiffness is not None else "tension_strain"
-            yield Finding(("solver",), f"elimination, because of {key} of a section", "leave solver out")
     for name in paid:
         own = cable.sections[0 if name == "start" else -1]
         for i, section in enumerate(getattr(ends, name).payout.reel or ()):
@@ -149,22 +138,6 @@ def _stretch_by_a_law(cable: Cable, ends: Ends, solver: str) -> Iterator[Finding
                 keys = [key for key in ("dynamic_stiffness", "tension_strain") if getattr(section, key) is not None]
                 at: Place = ("ends", name, "payout", "reel", i, *keys[:1])
                 yield Finding(at, expected, "give it the same, or leave these out and give axial_stiffness (N)")
-
-
-def _arbiter_steps(time: Time | None, solver: str, accuracy: Accuracy | None) -> Iterator[Finding]:
-    if solver == "shooting" and accuracy is not None:
-        yield Finding(
-            ("accuracy",), "nothing, because shooting has no error figure", "leave it out, or leave solver out"
-        )
-    if solver == "shooting" and time is not None and time.controlled:
-        yield Finding(("time", "step"), "a fixed step, because shooting has no other", "add `step: ...` (s)")
-
-
-def _releases(ends: Ends, solver: str) -> Iterator[Finding]:
-    """Ends that are let go, by a solver that cannot."""
-    for name, end in ends.named().items():
-        if end.release is not None and solver == "shooting":
-            yield Finding(("solver",), f"elimination, because ends.{name} is let go (release_at)", "leave solver out")
 
 
 def _tolerance_is_felt(cable: Cable, time: Time | None) -> Iterator[Finding]:
@@ -179,30 +152,23 @@ def _tolerance_is_felt(cable: Cable, time: Time | None) -> Iterator[Finding]:
 
 
 def _in_a_plane(
-    environment: Environment, cable: Cable, ends: Ends, initial: Initial, solver: str, dimension: int | None
+    environment: Environment, cable: Cable, ends: Ends, initial: Initial, dimension: int | None
 ) -> Iterator[Finding]:
-    if dimension != 2:
-        return
-    if solver == "shooting":
-        yield Finding(("dimension",), "3 or nothing, because shooting computes in space", "or leave solver out")
-        return
-    yield from plane_of(environment, cable, ends, initial, TYPED)[1]
+    if dimension == 2:
+        yield from plane_of(environment, cable, ends, initial, TYPED)[1]
 
 
-def _touches_itself(cable: Cable, contact: Contact, solver: str) -> Iterator[Finding]:
+def _touches_itself(cable: Cable, contact: Contact) -> Iterator[Finding]:
     """Contact of the cable with itself keeps diameters apart."""
     if contact.self is False and contact.friction > 0.0:
         expected = "0 or nothing, because parts of the cable do not touch each other without contact.self"
         yield Finding(("contact", "friction"), expected, "leave `self: false` out, or leave friction out")
     if not contact.self:
         return
-    here: Place = ("contact", "self")
     for i, section in enumerate(cable.sections):
         if section.diameter is None:
             expected = "a number > 0, in m, which parts of the cable keep apart (contact.self)"
             yield Finding(("cable", "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
-    if solver == "shooting":
-        yield Finding(here, "false, because shooting knows no contact", "leave it out, or leave solver out")
 
 
 def _accuracy_has_errors(accuracy: Accuracy | None, output: Output) -> Iterator[Finding]:
@@ -217,21 +183,17 @@ def elevation_has_waves(output: Output | SystemOutput, environment: Environment)
         yield Finding(("output", "elevation"), expected, "leave it out, or give waves")
 
 
-def _quantities(output: Output, cable: Cable, ends: Ends, environment: Environment, solver: str) -> Iterator[Finding]:
+def _quantities(output: Output, cable: Cable, ends: Ends, environment: Environment) -> Iterator[Finding]:
     free = [name for name in ("start", "end") if isinstance(getattr(ends, name), Free)]
     yield from of_one_line(output.quantities, cable.length, free, environment.seabed is not None)
-    if output.quantities and solver == "shooting":
-        yield Finding(("output", "quantities"), "nothing, because shooting records none (solver)", "leave it out")
 
 
-def _pressure_of_pipes(cable: Cable, environment: Environment, solver: str) -> Iterator[Finding]:
+def _pressure_of_pipes(cable: Cable, environment: Environment) -> Iterator[Finding]:
     for i, section in enumerate(cable.sections):
         here: Place = ("cable", "sections", i, "pipe")
         if section.pipe is not None and environment.fluid is not None and environment.fluid.surface is None:
             expected = "nothing, because the fluid has no surface, on which the pressure outside depends"
             yield Finding(here, expected, "add `surface: 0` (m) to environment.fluid, or leave pipe out")
-        if section.pipe is not None and solver == "shooting":
-            yield Finding(here, "nothing, because shooting records no stress (solver)", "leave it out")
 
 
 def _moment_is_there(accuracy: Accuracy | None, model: Model) -> Iterator[Finding]:
@@ -262,15 +224,12 @@ def _rod_over(cable: Cable, model: Model, i: int) -> str:
     return ""
 
 
-def _turns_are_held(cable: Cable, ends: Ends, model: Model, solver: str) -> Iterator[Finding]:
+def _turns_are_held(cable: Cable, ends: Ends, model: Model) -> Iterator[Finding]:
     """Turns twist a rod between two ends that both hold it."""
     for name, end in ends.named().items():
         if not end.held_turns:
             continue
         here, given = ("ends", name, "turns"), f"{end.held_turns:g}"
-        if solver == "shooting":
-            expected = "0, because shooting knows the twist of a frame to within a turn only"
-            yield Finding(here, expected, "leave turns out, or leave solver out", given)
         for which, other in ends.named().items():
             if not other.holds_twist:
                 fix = f"leave turns out, or clamp ends.{which} (guided: give `normal`) without a swivel"
@@ -313,18 +272,14 @@ def _mesh_spans(cable: Cable, mesh: Mesh | None) -> Iterator[Finding]:
             yield Finding(("mesh", "nodes", index), f"{target:.12g} m, {name}", f"{target:.12g}")
 
 
-def _layers_are_meshed(
-    resolution: Resolution | None, model: Model, mesh: Mesh | None, solver: str
-) -> Iterator[Finding]:
+def _layers_are_meshed(resolution: Resolution | None, model: Model, mesh: Mesh | None) -> Iterator[Finding]:
     """Cells to a layer are for rods whose cells the program places."""
     if resolution is None:
         return
     zones = model.zones if isinstance(model, ZonesModel) else ()
     rods = isinstance(model, RodModel | AdaptiveModel) or any(isinstance(zone, RodZone) for zone in zones)
     why = ""
-    if solver == "shooting":
-        why = "shooting (solver) places no cells by layers"
-    elif mesh is not None or any(zone.cells or zone.ratio for zone in zones):
+    if mesh is not None or any(zone.cells or zone.ratio for zone in zones):
         why = f"{'mesh' if mesh is not None else 'model.zones'} already says where the cells are"
     elif isinstance(model, AdaptiveModel) and model.rod_cell is not None:
         why = "model.rod_cell already says how long the cells of rods are"
@@ -363,16 +318,12 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     sea_checks.followed,
     sea_checks.surface_over_seabed,
     sea_checks.nothing_in_the_ground,
-    sea_checks.arbiter_knows,
     magnitude_checks.friction,
     magnitude_checks.end_forces,
     _zones_fill,
     _rods_can_bend,
     _stretches_on_cable,
-    _zones_that_move,
     _stretch_by_a_law,
-    _arbiter_steps,
-    _releases,
     _tolerance_is_felt,
     _accuracy_has_errors,
     elevation_has_waves,
@@ -387,5 +338,4 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _layers_are_meshed,
     _output_on_cable,
     payout_checks.payout_stands_alone,
-    torque_checks.shooting_knows_no_torque,
 )

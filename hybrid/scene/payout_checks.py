@@ -19,16 +19,14 @@ def _winch(ends: Ends) -> tuple[str, Pinned | Clamped, Payout] | None:
     return found
 
 
-def payout_stands_alone(ends: Ends, contact: Contact, solver: str) -> Iterator[Finding]:
-    """By elimination; contact with itself knows the diameters on the reel."""
+def payout_stands_alone(ends: Ends, contact: Contact) -> Iterator[Finding]:
+    """Contact with itself knows the diameters on the reel."""
     found = _winch(ends)
     if found is None:
         return
-    name, because = found[0], f"because line is paid out (ends.{found[0]}.payout)"
+    name = found[0]
     if contact.self:
         for i, section in enumerate(getattr(ends, name).payout.reel or ()):
             if section.diameter is None:
                 expected = "a number > 0, in m, which parts of the cable keep apart (contact.self)"
                 yield Finding(("ends", name, "payout", "reel", i, "diameter"), expected, "add `diameter: ...` (m)")
-    if solver == "shooting":
-        yield Finding(("solver",), f"elimination, {because}", "leave solver out")

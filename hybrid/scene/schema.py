@@ -8,7 +8,8 @@ The tables live in five files (`cable`, `attachments`, `sea`, `ends`, `task`); i
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -113,6 +114,9 @@ __all__ = [
 class Scene(Table):
     """A cable, what holds it, what acts on it, and what is asked."""
 
+    instead: ClassVar[Mapping[str, str]] = {"solver": "leave it out: every scene is solved by elimination"}
+    asked_nothing: ClassVar[Mapping[str, Any]] = {"solver": "elimination"}
+
     title: Text = Field(default="", description="a line for people; it heads plots and reports")
     environment: Environment = Field(default=Environment(), description="what acts on the cable from outside")
     cable: Cable = Field(description="what the cable is made of")
@@ -137,10 +141,6 @@ class Scene(Table):
         description="how wrong the result may be, such as 1%, 3 cm or 50 N; absent: 1% where steps are to follow the "
         "motion, else not asked",
     )
-    solver: Literal["elimination", "shooting"] = Field(
-        default="elimination",
-        description="elimination for all scenes; shooting is the slow, independent arbiter for short lines",
-    )
     dimension: Literal[2, 3] | None = Field(
         default=None,
         description="2: in a plane, refused if the scene does not lie in one; 3: in space; absent: a motion is "
@@ -162,6 +162,11 @@ class Scene(Table):
         if self.time is None:
             raise SceneError([missing_time(self)])
         return self.time
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_former(cls, value: Any) -> Any:
+        return cls.without_former(value)
 
     @model_validator(mode="after")
     def _no_contradiction(self) -> Scene:

@@ -188,28 +188,3 @@ def _straight_in_the_ground(
     if under > sunk:
         given = f"a cable that ends at [{x:.8g}, {y:.8g}, {z:.8g}], {under:.4g} m under the seabed"
         yield Finding(("initial", "direction"), "a cable on the seabed or above", "another direction", given)
-
-
-# --- what the arbiter knows --------------------------------------------------------------------
-
-
-def arbiter_knows(environment: Environment, cable: Cable, ends: Ends, solver: str) -> Iterator[Finding]:
-    """What the shooting arbiter cannot compute."""
-    if solver != "shooting":
-        return
-    fluid = environment.fluid
-    beyond = {
-        "a seabed": environment.seabed is not None,
-        "a surface": fluid is not None and fluid.surface is not None,
-        "a current that is not a plain vector": fluid is not None
-        and fluid.current is not None
-        and not (isinstance(fluid.current, tuple) and isinstance(fluid.current[0], float)),
-        "attachments": bool(cable.attachments),
-        "bodies": bool(ends.bodies()),
-        "angular springs (bend_stiffness)": any(x.spring < math.inf for x in ends.both),
-        "vessels": any(m is not None and m.vessel is not None for m in (x.prescribed_motion for x in ends.both)),
-    }
-    unknown = [name for name, there in beyond.items() if there]
-    if unknown:
-        expected = f"elimination, because shooting does not know {' and '.join(unknown)}"
-        yield Finding(("solver",), expected, "leave solver out")

@@ -197,7 +197,7 @@ class System(Table):
         "model": "each line has its own: lines.NAME.model",
         "mesh": "each line has its own: lines.NAME.mesh",
         "contact": "each line has its own, for itself: lines.NAME.contact; lines do not touch each other",
-        "solver": "leave it out: several lines are solved by elimination",
+        "solver": "leave it out: every scene is solved by elimination",
     }
 
     title: Text = Field(default="", description="a line for people; it heads plots and reports")

@@ -47,7 +47,7 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     beside = _beside_solver(scene, static)
     tables = scene.environment, scene.cable, scene.ends, scene.initial
     leaves = plane_of(*tables, TYPED if scene.dimension == 2 else EXACT)[1]
-    in_space = scene.dimension == 3 or scene.contact.self or scene.solver != "elimination" or bool(leaves)
+    in_space = scene.dimension == 3 or scene.contact.self or bool(leaves)
     if scene.dimension is None and MODEL_ERROR in beside:
         in_space = True  # what leaving bending out does is followed in space
     turned = any(load.what == "moment" for end in scene.ends.both for load in end.loads)

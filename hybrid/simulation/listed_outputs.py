@@ -9,12 +9,10 @@ from hybrid.model.build import build
 from hybrid.model.model_costs import with_model
 from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.model.system import build_system
-from hybrid.outputs.probes import PROBES
 from hybrid.scene.quantities import KINDS, Quantity
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.scene.system import System
-from hybrid.simulation.arbiter import RECORDED
 from hybrid.simulation.case import Case
 from hybrid.simulation.result_file import STEP_FIELDS
 from hybrid.simulation.static_case import StaticCase
@@ -62,9 +60,6 @@ def kinds_of_quantities() -> list[Listed]:
 
 def _of_scene(scene: Scene) -> list[Listed]:
     moves = scene.time is not None
-    if scene.solver == "shooting":
-        probes = {name: PROBES[name] for name in RECORDED}
-        return [Listed(name, p.unit, ("t", *p.dims), p.description) for name, p in probes.items()]
     if model_is_free(scene):
         scene = with_model(scene, "adaptive")
     model = build(scene, first_resolution(scene))

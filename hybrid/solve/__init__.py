@@ -1,1 +1,1 @@
-"""The solve: the march along s, Newton, time, statics; and the arbiter, which shares nothing with them."""
+"""The solve: the march along s, Newton, time, statics."""

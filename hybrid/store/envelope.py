@@ -114,7 +114,7 @@ def not_verified(why: str, remedy: str) -> str:
 
 
 def has_envelope(result: Result) -> bool:
-    """Whether a result has its envelope: files of 0.6 and of the shooting solver do not, nor have runs killed early."""
+    """Whether a result has its envelope: files of 0.6 and runs killed early have none."""
     return END in result and bool(np.isfinite(result[END]))
 
 

@@ -76,8 +76,7 @@ def scene_data(scene: Scene, kind: str, accuracy: str | Mapping[str, str]) -> di
     A part is one of the length and of the end forces, by which runs are compared.
     """
     data = scene.model_dump(mode="json", exclude_none=True)
-    for name in ("mesh", "solver"):
-        data.pop(name, None)
+    data.pop("mesh", None)
     time, output = data["time"], data.get("output", {})
     for name in ("step", "tolerance"):
         time.pop(name, None)

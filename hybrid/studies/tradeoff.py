@@ -156,7 +156,6 @@ def _notes(scene: Scene, models: Mapping[str, str], chosen: bool) -> list[str]:
     dropped += ["time.rho_inf"] if time.rho_inf > LEAST_DAMPED else []
     dropped += [name for name in ("mesh", "accuracy") if getattr(scene, name) is not None]
     dropped += [f"output.{x}" for x in ("errors", "criteria") if x in scene.output.model_fields_set]
-    dropped += ["solver"] if scene.solver != "elimination" else []
     given = scene.model.model_dump(exclude_none=True)
     dropped += [f"model.{x}" for x in FINENESS[1:] if x in given]
     notes = [f"The study chooses mesh, steps and tolerance: it ignores these keys of the scene: {', '.join(dropped)}."]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import arbiter
 import numpy as np
 from extreme import AXES, MODELS, Case, Floats, Measured, Z, across, clamped, free, pinned, scene, spread
 from lines import G, section, told
@@ -180,7 +181,7 @@ def rolled() -> Iterator[Case]:
 def shot() -> Iterator[Case]:
     """Short lines of any shape in space, against the arbiter: the paper's own fields, marched literally."""
     source = (
-        "hybrid's arbiter (solver: shooting), which shares nothing with production but the scene; discretisation: both are "
+        "literal shooting (bench/arbiter), which shares nothing with hybrid but the scene; discretisation: both are "
         "of order 2, 2/n² of the length on the shape and 10/n² on the moment at the clamp"
     )
     rng = np.random.default_rng(34)
@@ -197,10 +198,10 @@ def shot() -> Iterator[Case]:
         )  # no push: one equilibrium
 
         def truth(result: Any, L: float = L, n: int = n, again: dict[str, Any] = {}) -> Measured:  # noqa: B006
-            other = hybrid.static(hybrid.validate_scene(again["tables"] | {"solver": "shooting"}))
-            yield "shape/L", np.abs(result.position[-1] - other.position[-1]).max() / L, 2 / n**2
-            both = [np.linalg.norm(x.bending_moment[-1, 0]) for x in (result, other)]
-            yield "moment", both[0] / both[1] - 1, 10 / n**2
+            state = arbiter.static(hybrid.validate_scene(again["tables"]))
+            other = arbiter.at(state, result.s)
+            yield "shape/L", np.abs(result.position[-1] - other["position"]).max() / L, 2 / n**2
+            yield "moment", np.linalg.norm(result.bending_moment[-1, 0]) / other["bending_moment"][0] - 1, 10 / n**2
 
         line = rod(L, EI, mass, rotary_inertia=0.0)
         tables = scene(line, clamped((0, 0, 0), tangent), free(pull), model, n, G)

@@ -127,8 +127,3 @@ def test_a_coarse_polygon_is_no_catenary():
     line = {"length": 10.0, "mass": 1.0}
     assert "unresolved bend" in kinds(solved(scene(line, pinned(), pinned(9.5 * X), "catenary", 2, 9.81)))
     assert not solved(scene(line, pinned(), pinned(9.5 * X), "catenary", 10, 9.81)).events
-
-
-def test_shooting_says_that_it_does_not_judge_stability():
-    tables = scene(rod(1.0, 1.0, 0.1), clamped((0, 0, 0), X), free(), "rod", 20, 9.81)
-    assert kinds(solved(tables | {"solver": "shooting"})) == ["stability not judged"]

@@ -62,7 +62,6 @@ WHOLE: dict[str, list[Any]] = {
               {"kind": "adaptive", "hold_time": 1e-9}, {"kind": "catenary", "slack": "warn"},
               {"kind": "zones", "zones": []}, {"zones": [{"rod": 1}, {"catenary": 1}]},
               {"kind": "zones", "zones": [{"rod": 1, "catenary": 1}]}],
-    "solver": ["shooting", "elimination", "newton"],
     "dimension": [2, 3, 1, 2.0, "2"],
     "accuracy": ["1%", "3 cm", "50 N", "0.0001%", "1000%", "0%", "-1%", "1e-30 m", "3 parsec", 0.01, {"position": "1%"},
                  {"tension": "1 m"}, {}, "100 km", "1e9 N", "0.1%"],

@@ -95,7 +95,6 @@ model:
 mesh: {cells: 50, ratio: 1.0}
 time: {duration: 20.0, step: 0.01, rho_inf: 0.5}
 output: {every: 0.1, points: 51, history: [0.0, 10.0]}
-solver: elimination
 dimension: 3
 """
 

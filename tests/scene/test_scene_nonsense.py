@@ -175,7 +175,7 @@ REQUIRED = {
     "length", "mass", "kind", "amplitude", "period", "density", "duration", "rod", "catenary", "z",
     "at", "over", "cells_per_layer", "range", "significant_height", "peak_period", "stiffness",
 }  # fmt: skip
-WORDS = {"title", "kind", "slack", "guess", "solver", "follow", "dimension"}
+WORDS = {"title", "kind", "slack", "guess", "follow", "dimension"}
 
 
 def _of(name: str, cases: list[tuple[str, tuple[str | int, ...]]]) -> list[tuple[str | int, ...]]:

@@ -66,7 +66,7 @@ CASES = {
     "table for list": (SUSPENSION, ZONES, "§{rod: 2.0}", "model.zones", "dash"),
     "number for title": ("title: §2024\n" + AT_REST, None, None, "title", "quotes"),
     "word not in the list": (EVERYTHING, "slack: warn", "slack: §wran", "model.slack", "did you mean warn?"),
-    "solver": (EVERYTHING, "solver: elimination", "solver: §shoting", "solver", "did you mean shooting?"),
+    "a solver": (EVERYTHING, "dimension: 3", "dimension: 3\n§solver: shooting", "solver", "every scene is solved by elimination"),
     "fraction of a cell": (EVERYTHING, "cells: 20", "cells: §20.5", "model.zones[0].cells", "round"),
     "no cell": (EVERYTHING, "cells: 20", "cells: §0", "model.zones[0].cells", ">= 1"),
     "one cell": (EVERYTHING, "cells: 50", "cells: §1", "mesh.cells", ">= 2"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from inspect import signature
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from scene_texts import OCEAN, SEA, change, complaints
 
 from hybrid.errors import SceneError
 from hybrid.scene.base import FORMER_NAMES, Table
+from hybrid.scene.checks import CHECKS
 from hybrid.scene.read import RenamedKey, load_scene, parse_scene, read_scene, validate_scene
 from hybrid.scene.schema import AdaptiveModel, Body, JonswapWaves, Modules, PowerLawCurrent, Scene
 
@@ -177,6 +179,19 @@ def test_a_key_that_is_no_more(key: str, tmp_path: Path) -> None:
     assert f"{path}:{wrong.line}:" in str(caught.value)
     assert wrong.expected == "a key of kind: adaptive"
     assert parse_scene(written.replace(f"{key}: {value}", f"{key}: {nothing}")) == parse_scene(ADAPTIVE)
+
+
+def test_every_check_asks_for_tables_that_a_scene_has() -> None:
+    """A check is skipped where a table of its arguments is missing: one that is misnamed would never run."""
+    for check in CHECKS:
+        assert set(signature(check).parameters) <= set(Scene.model_fields), check.__name__
+
+
+def test_there_is_one_solver() -> None:
+    """`solver: elimination`, which results of before 0.7 name, asks for nothing."""
+    assert parse_scene(f"{OCEAN}solver: elimination\n") == parse_scene(OCEAN)
+    (wrong,) = complaints(f"{OCEAN}solver: shooting\n")
+    assert (wrong.where, wrong.fix) == ("solver", "leave it out: every scene is solved by elimination")
 
 
 @pytest.mark.parametrize(

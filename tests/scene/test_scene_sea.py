@@ -390,10 +390,6 @@ CASES = {
     "is pulled": (change(CALM, ", friction: 0.4", ""), "mass: 10.0", "mass: 10.0, thrust: [9, 0, 0]", "initial.kind", "horizontal force of 9 N"),
     "slides": (CALM, ", friction: 0.4", ", slope: [0.1, 0]", "initial.kind", "slope of the seabed"),
     "lies anywhere": (CALM, "{kind: equilibrium, points: [[0.0, 0.0, -20.0], [10.0, 0.0, -20.0]]}", "§{kind: equilibrium}", "initial.points", "add `points"),
-    # --- the arbiter
-    "arbiter in the sea": (change(CALM, "model:", "solver: §shooting\nmodel:"), None, None, "solver", "does not know a seabed and bodies"),
-    "arbiter in a current": (change(SEA_UNIFORM, "model:", "solver: §shooting\nmodel:"), None, None, "solver", "not a plain vector"),
-    "arbiter with attachments": (change(AT_REST, "model:", "solver: §shooting\nmodel:"), "mass: 1.0}]", "mass: 1.0}], attachments: [{kind: clump, at: 3, mass: 1}]", "solver", "attachments"),
 }  # fmt: skip
 
 # What is refused for one reason and contradicts another table as well.

@@ -37,7 +37,6 @@ def test_a_cable_with_a_table_is_a_rod_by_default() -> None:
 @pytest.mark.parametrize(
     ("end", "more", "where"),
     [
-        ("free", "solver: shooting", "solver"),
         (
             "{kind: pinned, position: [8, 0, 0], payout: {rate: 0.1, ramp: 5, reel: [{length: 5, mass: 1}]}}",
             "model: catenary",

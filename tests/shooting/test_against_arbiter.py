@@ -7,6 +7,7 @@ is bounded.
 The lines are short: the arbiter loses a digit for every 2.3 lengths sqrt(EI/T) of rod.
 """
 
+import arbiter
 import numpy as np
 import pytest
 
@@ -25,7 +26,7 @@ ZONES = {
 }
 
 
-def scene(zones, cells, solver, **changes):
+def scene(zones, cells, **changes):
     section = {
         "length": 1.0, "mass": 0.1, "diameter": 0.01, "bending_stiffness": 0.5, "torsional_stiffness": 0.4,
         "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0}, "damping": 0.5,
@@ -40,7 +41,6 @@ def scene(zones, cells, solver, **changes):
         "initial": {"kind": "equilibrium", "direction": [1, 0.1, 0.1]},
         "model": {"kind": "zones", "zones": [{kind: x, "cells": max(2, round(x * cells))} for kind, x in zones]},
         "output": {"points": 11},
-        "solver": solver,
     }
     return hybrid.validate_scene(data | changes)
 
@@ -53,19 +53,19 @@ def limit(values):
 
 @pytest.mark.parametrize("zones", ZONES)
 def test_statics(zones):
-    found = {
-        solver: [hybrid.static(scene(ZONES[zones], cells, solver)) for cells in (80, 160)]
-        for solver in ("elimination", "shooting")
-    }
+    scenes = [scene(ZONES[zones], cells) for cells in (80, 160)]
+    ours = [hybrid.static(x) for x in scenes]
+    theirs = [arbiter.at(arbiter.static(x), ours[0].s) for x in scenes]
     for name, unit in (("position", 1.0), ("tension", 20.0)):
-        a, b = (limit([r[name][0] for r in found[s]]) for s in ("elimination", "shooting"))
+        a, b = limit([r[name][0] for r in ours]), limit([r[name] for r in theirs])
         inner = slice(None) if name == "position" else [i for i in range(11) if i not in joints(ZONES[zones])]
         apart = np.abs(a - b)[inner].max() / unit
-        direct = np.abs(found["elimination"][1][name][0] - found["shooting"][1][name][0])[inner].max() / unit
+        direct = np.abs(ours[1][name][0] - theirs[1][name])[inner].max() / unit
         print(f"{zones}: {name} apart by {direct:.1e} at 160 cells, {apart:.1e} extrapolated")
         assert apart < (PLACE if name == "position" else TENSION)
     if "rod" in zones:
-        moments = [limit([np.linalg.norm(r.bending_moment[0][1:3]) for r in found[s]]) for s in found]
+        found = [[r.bending_moment[0] for r in ours], [r["bending_moment"] for r in theirs]]
+        moments = [limit([np.linalg.norm(x[1:3]) for x in each]) for each in found]
         print(f"{zones}: moments {moments}")
         assert abs(moments[0] - moments[1]) <= MOMENT * max(moments[1], 1.0)
 
@@ -87,21 +87,14 @@ def test_motion(zones):
     ends = {"start": start, "end": {"kind": "free", "force": [20.0, 3.0, 2.0]}}
     apart = []
     for cells, step in ((20, 0.02), (40, 0.01)):
-        a, b = (
-            hybrid.run(
-                scene(
-                    ZONES[zones],
-                    cells,
-                    solver,
-                    ends=ends,
-                    time={"duration": 0.6, "step": step},
-                    output={"every": 0.2, "points": 11},
-                )
-            )
-            for solver in ("elimination", "shooting")
-        )
-        assert np.abs(a.times - b.times).max() < 1e-9
-        apart.append(np.abs(a.position - b.position).max())
+        time, output = {"duration": 0.6, "step": step}, {"every": 0.2, "points": 11}
+        moving = scene(ZONES[zones], cells, ends=ends, time=time, output=output)
+        ours, states = hybrid.run(moving), []
+        arbiter.simulate(moving, states.append)
+        theirs = states[:: round(0.2 / step)]
+        assert np.abs(ours.times - [x.t for x in theirs]).max() < 1e-9
+        off = [ours.position[k] - arbiter.at(x, ours.s)["position"] for k, x in enumerate(theirs)]
+        apart.append(np.abs(off).max())
     print(f"{zones}: apart by {apart[0]:.1e} and {apart[1]:.1e} m, ratio {apart[0] / apart[1]:.2f}")
     assert apart[1] < 2e-3
     assert 2.5 < apart[0] / apart[1] < 7.0

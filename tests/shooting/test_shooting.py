@@ -13,19 +13,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from arbiter import ArbiterError, Outcome, ShootingRun, ShootingState, simulate, static
+from arbiter import fields as fields_
+from arbiter.conditions import Before
+from arbiter.guess import straight
+from arbiter.line import Line, line_of
+from arbiter.newton import Problem
+from arbiter.rotations import exp, log
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 from scipy.special import j0
 
-from hybrid.errors import ComputationError, Outcome, SceneError
+from hybrid.errors import SceneError
 from hybrid.scene.schema import Scene
-from hybrid.shooting import ShootingRun, ShootingState, simulate, static
-from hybrid.shooting import fields as fields_
-from hybrid.shooting.conditions import Before
-from hybrid.shooting.guess import straight
-from hybrid.shooting.line import Line, line_of
-from hybrid.shooting.newton import Problem
-from hybrid.shooting.rotations import exp, log
 
 DATA = json.loads((Path(__file__).parents[1] / "data" / "suspension.json").read_text())
 
@@ -45,7 +45,6 @@ def scene(
         "ends": {"start": start, "end": end},
         "initial": more.pop("initial", {"kind": "equilibrium"}),
         "model": {"kind": model} if isinstance(model, str) else {"kind": "zones", "zones": model},
-        "solver": "shooting",
         **more,
     }
     if cells is not None:
@@ -449,25 +448,24 @@ def test_short_enough() -> None:
 
 @pytest.mark.parametrize("ratio", [60.0, 200.0, 1000.0])
 def test_too_long_is_said(ratio: float) -> None:
-    with pytest.raises(ComputationError) as caught:
+    with pytest.raises(ArbiterError) as caught:
         static(taut(ratio))
     assert caught.value.outcome is Outcome.ILL_CONDITIONED
     assert "literal shooting" in str(caught.value)
-    assert "solver: elimination" in str(caught.value)
 
 
 def test_nothing_holds_it() -> None:
     """A rod adrift has no equilibrium: refused, not answered."""
     section = {"length": 1.0, "mass": 1.0, "bending_stiffness": 1.0}
     initial = {"kind": "straight", "direction": (1, 0, 0), "origin": (0, 0, 0)}
-    with pytest.raises(ComputationError) as caught:
+    with pytest.raises(ArbiterError) as caught:
         static(scene(section, free(), free(), "rod", 20, initial=initial))
     assert caught.value.outcome is Outcome.ILL_CONDITIONED
 
 
 def test_slack_catenary_is_said() -> None:
     """A chain folded between two ends at one point: no tension at the fold, no answer."""
-    with pytest.raises(ComputationError):
+    with pytest.raises(ArbiterError):
         static(scene({"length": 4.0, "mass": 1.0}, pinned(0, 0, 0), pinned(0, 0, 0), "catenary", 40, 9.81))
 
 
@@ -524,7 +522,7 @@ def test_hanging_chain() -> None:
 
 def test_chain_with_too_small_steps_is_said() -> None:
     """100 steps a period of the chain: waves cross it in 40 steps, exp(75) is too much growth to shoot through."""
-    with pytest.raises(ComputationError) as caught:
+    with pytest.raises(ArbiterError) as caught:
         history(swinging_chain(40, 100)[0])
     assert caught.value.outcome is Outcome.ILL_CONDITIONED
     assert caught.value.t is not None

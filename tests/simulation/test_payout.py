@@ -460,7 +460,6 @@ RATE: dict[str, Any] = {"rate": 0.5, "ramp": 2.0}
         ({"accuracy": "1%"}, "accuracy"),
         ({"time": {"duration": 5.0}}, "time.step"),
         ({"output": {"errors": True}}, "output.errors"),
-        ({"solver": "shooting"}, "solver"),
     ],
 )
 def test_what_is_not_possible_is_refused(change: dict[str, Any], where: str) -> None:

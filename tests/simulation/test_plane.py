@@ -300,7 +300,6 @@ WRONG = {
                "ends.start.motion.sway", 4),
     "slope": ("environment: {", "environment: {seabed: {z: -20, stiffness: 100, slope: [0, 0.1]}, ",
               "environment.seabed.slope", 1),
-    "solver": ("model: rod", "model: rod\nsolver: shooting", "dimension", 9),
     "roll": ("tangent: [1, 0, 0.5]", "tangent: [1, 0, 0.5], motion: {ramp: 1, roll: {amplitude: 5, period: 1}}",
              "ends.end.motion.roll", 5),
     "twist": ("diameter: 0.02, bending_stiffness: 1", "diameter: 0.02, bending_stiffness: [1, 2], torsional_stiffness: 1",

@@ -171,7 +171,6 @@ def test_a_simulation_releases_and_takes_it_back(model: str) -> None:
 
 REFUSED = {
     "nothing": ({}, {}, "time or tension"),
-    "arbiter": ({"time": 0.5}, {"solver": "shooting"}, r"ends\.end is let go"),
 }
 
 

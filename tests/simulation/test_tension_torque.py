@@ -138,7 +138,6 @@ def test_what_it_needs(change, where):
     ("more", "words"),
     [
         ({"dimension": 2}, "tension_torque"),
-        ({"solver": "shooting"}, "shooting knows no torque of tension"),
         ({"model": {"kind": "adaptive", "curvature_error": 0.05}}, "cells follow the curvature"),
     ],
 )

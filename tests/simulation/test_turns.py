@@ -101,7 +101,6 @@ REFUSED = {
     "free": ({"ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": clamped([100, 0, 0], turns=2)}},
              r"ends.start turns freely"),
     "torsion": ({"section": {"torsional_stiffness": None}}, r"torsional_stiffness(?s:.*)ends.end.turns"),
-    "shooting": ({"solver": "shooting"}, r"ends.end.turns(?s:.*)shooting"),
     "plane": ({"dimension": 2}, r"ends.end.turns(?s:.*)dimension"),
     "nan": ({"second": {"turns": math.nan}}, r"ends.end.turns"),
 }  # fmt: skip

@@ -101,7 +101,6 @@ def test_a_winch_behind_a_spring_that_pays_nothing_out_is_that_spring() -> None:
     [
         ({"end": {"swivel": True, "bend_stiffness": 0}}, "ends.end.swivel"),
         ({"end": {"bend_stiffness": -1}}, "ends.end.bend_stiffness"),
-        ({"solver": "shooting"}, "solver"),
     ],
 )
 def test_what_knows_no_springs_is_refused(change: dict[str, Any], where: str) -> None:

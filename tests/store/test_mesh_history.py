@@ -1,5 +1,6 @@
 """`result.mesh[i]`: the cells at every output, whatever the output grid is."""
 
+import h5py
 import numpy as np
 import pytest
 
@@ -75,9 +76,13 @@ def test_the_mesh_of_zones_that_move(monkeypatch, tmp_path):
         result.mesh[len(result.mesh)]
 
 
-def test_a_result_without_a_mesh_has_none():
-    """That of the second solver."""
-    result = hybrid.static(swinging("catenary", solver="shooting"))
+def test_a_result_without_a_mesh_has_none(tmp_path):
+    """As results of before 0.6."""
+    path = tmp_path / "still.h5"
+    hybrid.static(swinging("catenary"), path).close()
+    with h5py.File(path, "r+") as file:
+        del file["mesh"]
+    result = hybrid.open(path)
     assert not hasattr(result, "mesh")
     with pytest.raises(ResultError, match="no 'mesh'"):
         result.mesh  # noqa: B018

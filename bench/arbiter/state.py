@@ -42,6 +42,21 @@ class ShootingState:
     condition: float
 
 
+def at(state: ShootingState, s: Array) -> dict[str, Array]:
+    """Position (n, 3) m, tension (n,) N and bending moment (n,) N m of a state at arc lengths s (n,) m."""
+
+    def along(x: Array) -> Array:
+        flat = x.reshape(x.shape[0], -1)
+        columns = [np.interp(s, state.s, flat[:, k]) for k in range(flat.shape[1])]
+        return np.column_stack(columns).reshape(s.size, *x.shape[1:])
+
+    tangent, moment = along(state.tangent), along(state.moment)
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    torque = np.einsum("ij,ij->i", moment, tangent)
+    bending = np.linalg.norm(moment - torque[:, None] * tangent, axis=1)
+    return {"position": along(state.r), "tension": along(state.tension), "bending_moment": bending}
+
+
 def state_of(line: Line, solved: Solved, t: float) -> ShootingState:
     """The state of solved fields at time t."""
     rows: dict[str, list[Array]] = {k: [] for k in ("r", "v", "tangent", "force", "moment", "frame", "k", "w")}

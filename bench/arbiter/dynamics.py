@@ -28,14 +28,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hybrid.errors import Outcome
 from hybrid.scene.schema import Equilibrium, Scene
 
 from .conditions import SETTLE, Before
 from .fields import PLACE, TURN, CatenaryFields, Clock, Fields, RodFields, moved
 from .guess import given
 from .line import Line, Piece, line_of, refuse
-from .newton import Problem, Solved, newton
+from .newton import Outcome, Problem, Solved, newton
 from .rotations import Array, log
 from .state import ShootingState, state_of
 from .statics import equilibrium
@@ -101,7 +100,7 @@ def _clock(scheme: Scheme, past: Past, y: Fields) -> Clock:
 class ShootingRun:
     """A motion, step by step; `state` is the line now, `advance()` goes one step on.
 
-    Errors: SceneError for what the arbiter cannot do, ComputationError where it dies.
+    Errors: SceneError for what the arbiter cannot do, ArbiterError where it dies.
     """
 
     def __init__(self, scene: Scene) -> None:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
-
-from hybrid.errors import ComputationError, Outcome
 
 from .conditions import Before, end_rows, meeting, node, spinning
 from .fields import CatenaryFields, Clock, Fields, RodFields, cells, moved
@@ -74,6 +73,24 @@ class Problem:
         return [rod if p.rod else catenary for p in line.pieces]
 
 
+class Outcome(Enum):
+    """How a solve ended."""
+
+    OK = "done"
+    NOT_CONVERGED = "Newton's method did not converge"
+    NOT_FINITE = "a number stopped being finite"
+    SLACK = "a catenary lost its tension"
+    ILL_CONDITIONED = "the line is too long for literal shooting: the system is ill-conditioned"
+
+
+class ArbiterError(Exception):
+    """Where literal shooting dies: how, at which time (s; None in statics) and arc length (m; None if nowhere)."""
+
+    def __init__(self, outcome: Outcome, t: float | None, s: float | None, detail: str) -> None:
+        super().__init__(f"{outcome.value} (t = {t} s, s = {s} m): {detail}")
+        self.outcome, self.t, self.s = outcome, t, s
+
+
 @dataclass(frozen=True)
 class Solved:
     """Fields, and how the iteration ended: outcome, iterations, last scaled correction and residual, growth."""
@@ -93,7 +110,7 @@ class Solved:
         return self.outcome not in (Outcome.OK, Outcome.SLACK) and not self.growth < DROWNED
 
     def demand(self, t: float | None) -> Solved:
-        """Itself if all is well; ComputationError otherwise."""
+        """Itself if all is well; ArbiterError otherwise."""
         if self.outcome is Outcome.OK:
             return self
         detail = (
@@ -102,8 +119,8 @@ class Solved:
             f"end has condition {self.condition:.1e}"
         )
         if self.drowned:
-            detail += "; a double has 16 digits: the line is too long for literal shooting, take solver: elimination"
-        raise ComputationError(self.outcome, t, self.s, detail)
+            detail += "; a double has 16 digits: the line is too long for literal shooting"
+        raise ArbiterError(self.outcome, t, self.s, detail)
 
 
 def _residuals(linear: Linear) -> list[Array]:

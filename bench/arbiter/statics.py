@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from hybrid.errors import Outcome
 from hybrid.scene.schema import Scene
 
 from .guess import guesses
 from .line import Line, line_of
-from .newton import Problem, Solved, homotopy, newton
+from .newton import Outcome, Problem, Solved, homotopy, newton
 from .state import ShootingState, state_of
 
 
@@ -34,7 +33,7 @@ def static(scene: Scene, *, marches: int | None = None) -> ShootingState:
     """Equilibrium of the scene at t = 0 (loads with an `until` are on).
 
     `marches`: for the figure of growth only: so many marches from the first guess, unchecked.
-    Errors: SceneError for what the arbiter cannot do, ComputationError where literal shooting dies.
+    Errors: SceneError for what the arbiter cannot do, ArbiterError where literal shooting dies.
     """
     line = line_of(scene)
     if marches is not None:

@@ -8,7 +8,8 @@ Newton around it (newton.py), generalized-alpha in time (dynamics.py).  It loses
 """
 
 from .dynamics import ShootingRun, simulate
-from .state import ShootingState
+from .newton import ArbiterError, Outcome
+from .state import ShootingState, at
 from .statics import static
 
-__all__ = ["ShootingRun", "ShootingState", "simulate", "static"]
+__all__ = ["ArbiterError", "Outcome", "ShootingRun", "ShootingState", "at", "simulate", "static"]

@@ -137,6 +137,7 @@ def refuse(where: str, value: object, expected: str, fix: str) -> SceneError:
 
 def line_of(scene: Scene) -> Line:
     """The line of a scene; SceneError for what the arbiter cannot do."""
+    _only_what_is_known(scene)
     length = math.fsum(section.length for section in scene.cable.sections)
     pieces: list[Piece] = []
     for rod, s in _zones(scene, length):
@@ -158,6 +159,32 @@ def line_of(scene: Scene) -> Line:
     return Line(tuple(merged), _hold(scene.ends.start, merged[0]), _hold(scene.ends.end, merged[-1]), length, scene)
 
 
+def _only_what_is_known(scene: Scene) -> None:
+    """SceneError for what the arbiter would otherwise leave out in silence."""
+    fluid, ends, sections = scene.environment.fluid, scene.ends, scene.cable.sections
+    current = None if fluid is None else fluid.current
+    motions = [end.prescribed_motion for end in ends.both]
+    beyond = {
+        "a seabed": scene.environment.seabed is not None,
+        "a surface": fluid is not None and fluid.surface is not None,
+        "a current that is not a plain vector": current is not None
+        and not (isinstance(current, tuple) and isinstance(current[0], float)),
+        "attachments": bool(scene.cable.attachments),
+        "bodies": bool(ends.bodies()),
+        "angular springs (bend_stiffness)": any(end.spring < math.inf for end in ends.both),
+        "vessels": any(motion is not None and motion.vessel is not None for motion in motions),
+        "turns": any(end.held_turns for end in ends.both),
+        "release_at": any(end.release is not None for end in ends.both),
+        "payout": any(getattr(end, "payout", None) is not None for end in ends.both),
+        "contact.self": bool(scene.contact.self),
+        "tension_torque": any(section.tension_torque for section in sections),
+        "tension_strain and dynamic_stiffness": any(section.curve is not None for section in sections),
+    }
+    unknown = [name for name, there in beyond.items() if there]
+    if unknown:
+        raise refuse("scene", ", ".join(unknown), "a scene without them: the arbiter knows none", "take hybrid itself")
+
+
 def _zones(scene: Scene, length: float) -> list[tuple[bool, Array]]:
     """(is it a rod, nodes (n,)) per zone, section boundaries among the nodes."""
     model, mesh = scene.model, scene.mesh
@@ -171,7 +198,7 @@ def _zones(scene: Scene, length: float) -> list[tuple[bool, Array]]:
     elif isinstance(model, RodModel | CatenaryModel):
         kinds, spans, wanted = [isinstance(model, RodModel)], [length], [(None, None)]
     else:
-        raise refuse("model.kind", model.kind, "rod, catenary or zones", "use solver: elimination")
+        raise refuse("model.kind", model.kind, "rod, catenary or zones", "take hybrid itself")
     bounds = np.concatenate([[0.0], np.cumsum(spans)])
     if abs(bounds[-1] - length) > 1.0e-6 * length:
         raise refuse("model.zones", f"{bounds[-1]} m", f"{length} m, the length of the cable", "add up the zones")
@@ -218,7 +245,7 @@ def _piece(rod: bool, s: Array, section: Section, around: Environment, i: int) -
     damping = section.damping
     if damping is not None and damping.stiffness:
         expected = "0: the arbiter knows no stiffness-proportional damping"
-        raise refuse(f"{where}.damping.stiffness", damping.stiffness, expected, "use solver: elimination")
+        raise refuse(f"{where}.damping.stiffness", damping.stiffness, expected, "take hybrid itself")
     stiffness, inertia, curvature = np.zeros(3), np.zeros(3), np.zeros(3)
     if rod:
         if section.bending_stiffness is None:
