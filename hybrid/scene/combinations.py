@@ -490,10 +490,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "write `model: rod`, or leave the clamp out",
     ),
     Refusal(
-        TORQUE_OF_TENSION, SEVERAL_LINES, "several lines",
-        "several lines are computed together, which know no torque of tension", "nothing or 0", ALONE,
-    ),
-    Refusal(
         FIBRE_ROPE, MOVING_OF_SEVERAL, "several lines",
         "zones of several lines move ({key}), and their steps lose the mean tension of a rope whose cells change",
         fix="leave it out, write `model: rod`, or compute this line alone, with `cable` and `ends`",

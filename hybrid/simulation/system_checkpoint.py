@@ -86,9 +86,9 @@ def _of(saved: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 
 
 def of_today(lines: Any, template: Mapping[str, Any]) -> Any:
-    """Lines of a checkpoint with what earlier programs did not have: mean tensions, the end of a report,
+    """Lines of a checkpoint with what earlier programs did not have: mean tensions, the end of a report, answers to
 
-    and what diagnostics remember.
+    torques, and what diagnostics remember.
     """
     if not (isinstance(lines, dict) and all(isinstance(x, dict) for x in lines.values())):
         return lines
@@ -99,6 +99,8 @@ def of_today(lines: Any, template: Mapping[str, Any]) -> Any:
             line = line | {"state": {"slow": mine["state"]["slow"], **state}}
         if isinstance(report, np.ndarray) and report.ndim == 1 and FIRST_REPORT <= report.size < REPORT_SIZE:
             line = line | {"report": np.pad(report, (0, REPORT_SIZE - report.size))}
+        if mine is not None and "torsion" in mine:
+            line = {"torsion": mine["torsion"]} | line
         if mine is not None and isinstance(line.get("noted"), dict):
             line = line | {"noted": mine["noted"] | line["noted"]}
         found[name] = line

@@ -14,6 +14,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels.contact.self_distance import HIDES, MEETS, NEARS, PARTS
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.march.link import holds_twist
+from hybrid.kernels.march.zone_torque import answers_of
 from hybrid.kernels.mesh.criteria import CRITERIA
 from hybrid.kernels.mesh.zone_criteria import twist_of_rods
 from hybrid.kernels.run.entry import sharpest
@@ -372,12 +373,13 @@ class LineResult:
 
     def checkpoint(self, work: Work, t: float) -> dict[str, Any]:
         """What the rest of the run depends on beside the state at t (s), between two steps, with no output waiting."""
-        books = self.books
+        books, answers = self.books, answers_of(work.torsion)
         return {
             "work": books.work[0].copy(), "power": books.power[0].copy(), "stored": float(books.clock[STORED]),
             "report": work.report.copy(), "envelope": self.envelope.checkpoint(books.extremes), 
             "noted": self.diagnostics.checkpoint(books),
             "ends": self.model.ends.checkpoint(), "first_energy": self.observer.first_energy or 0.0,
+            **({"torsion": {name: x.copy() for name, x in answers.items()}} if answers else {}),
             **({} if self.contact is None else {"self_contact": self.contact.checkpoint(t)}),
         }  # fmt: skip
 
@@ -386,6 +388,8 @@ class LineResult:
         books, model = self.books, self.model
         books.work[0], books.power[0], books.clock[STORED] = saved["work"], saved["power"], saved["stored"]
         work.report[:] = saved["report"]
+        for name, x in answers_of(work.torsion).items():
+            x[:] = saved["torsion"][name]
         self.envelope.restore(saved["envelope"], books.extremes)
         books.start[:] = self.envelope.start_of(model.line.s)
         books.placed[:] = self.diagnostics.restore(saved["noted"], books, books.start)

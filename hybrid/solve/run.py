@@ -13,6 +13,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.march.zone_torque import answers_of
 from hybrid.kernels.mesh.zone_step import follow_zones
 from hybrid.kernels.run.entry import NO_PUSH, check_turns
 from hybrid.kernels.run.run import in_plane, in_space, run
@@ -256,10 +257,7 @@ class CompiledRun:
     @property
     def answers(self) -> dict[str, Floats]:
         """How the line answers to torques through its zones, which serves for several steps (march.zone_torque)."""
-        torsion = self._torsion
-        if not torsion.known.size:
-            return {}
-        return {"known": torsion.known, "columns": torsion.columns, "coupling": torsion.coupling}
+        return answers_of(self._torsion)
 
     @property
     def solver(self) -> Any:

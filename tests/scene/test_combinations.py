@@ -78,7 +78,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
         CLAMPED | {ONE + "model": {"kind": "adaptive"}, "points.b": {"body": "buoy", "place": [0, 0, 0]},
                    "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0]}}, ""
     ),
-    (c.TORQUE_OF_TENSION, c.SEVERAL_LINES): ({ONE + "sections.0.tension_torque": 1e-3}, ""),
     (c.FIBRE_ROPE, c.MOVING_OF_SEVERAL): (
         {ONE + "model": MOVING["model"], ONE + "sections.0.dynamic_stiffness": ROPE[SECTION + "dynamic_stiffness"]}, ""
     ),

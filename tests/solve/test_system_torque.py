@@ -107,6 +107,57 @@ def test_torque_passes_as_in_one_cable(whole: hybrid.Result, name: str) -> None:
         assert np.abs(moment + whole[key]).max() < 1e-4 * np.abs(whole[key]).max()
 
 
+def armoured(scene: dict[str, Any], model: str = "") -> dict[str, Any]:
+    """The same of lines in which tension makes a torque; model: of all of them, none: as they are."""
+    parts = [scene["cable"]["sections"]] if "cable" in scene else []
+    for x in scene.get("lines", {}).values():
+        parts.append(x["sections"])
+        if model:
+            x |= {"model": model, "mesh": {"cells": int(x["sections"][0]["length"])}}
+    for sections in parts:
+        sections[:] = [section | {"tension_torque": C} for section in sections]
+    return scene
+
+
+C = 5e-3
+RODS = {"model": "rod", "mesh": {"cells": CELLS}}
+
+
+@pytest.mark.parametrize(("name", "model"), [
+    ("whole, the other way", ""), ("zones on both sides of a point", ""),
+    ("whole, the other way", "rod"), ("zones on both sides of a point", "rod"), ("that both run to", "rod"),
+])  # fmt: skip
+def test_torque_of_tension_passes_as_in_one_cable(name: str, model: str, tmp_path: Path) -> None:
+    """As above, a torque that tension makes; with exact derivatives at a clamp that turns where all is rod."""
+    whole, pieces = hybrid.run(armoured(one(**(RODS if model else {})))), in_pieces(name)
+    found = hybrid.run(armoured(pieces, model), tmp_path / "found.h5")
+    assert np.ptp(whole["torque"][:, 20]) > 0.3 and whole["torque"][0].max() < -3.0  # -5 without
+    lines = [*found.lines.values()]
+    if len(lines) == 1:
+        apart = np.abs(lines[0]["position"][:, ::-1] - whole["position"])
+        assert apart[0].max() < 1e-9 * LENGTH and apart.max() < 20 * TOLERANCE * LENGTH
+    else:
+        assert np.abs(found["points/cut/position"] - whole["position"][:, 20]).max() < 1e-7 * LENGTH
+    for moment, key in ((found["points/a/moment"], "moment_start"), (found["points/b/moment"], "moment_end")):
+        assert np.abs(moment + whole[key]).max() < 1e-4 * np.abs(whole[key]).max()
+    if model:
+        assert lines[0]["steps/iterations"].sum() <= whole["steps/iterations"].sum() + 5
+    hybrid.run(pieces | {"time": COMMON["time"] | {"duration": 1.5}}, tmp_path / "part.h5").close()
+    with hybrid.resume(tmp_path / "part.h5", until=3.0) as more:
+        for a, b in zip(lines, more.lines.values(), strict=True):
+            assert np.array_equal(a["position"], b["position"]) and np.array_equal(a["torque"], b["torque"])
+
+
+def test_a_body_between_lines_whose_tension_makes_a_torque() -> None:
+    """One line gets M/2 more than c T and the other M/2 less; the first, twisted on, is shorter by c M/2 L/GJ."""
+    found = hybrid.static(armoured(on_a_body([9.0, 0, 0])))
+    tension = float(found.lines["one"].tension[-1, 50])
+    for name, sign in (("one", 1.0), ("two", -1.0)):
+        assert found.lines[name]["torque"][-1] == pytest.approx(C * tension + sign * 4.5, rel=1e-5)
+    assert found["bodies/body/rotation"][-1, 0] == pytest.approx(np.degrees(4.5 * 20.0 / GJ), rel=1e-5)
+    assert found["bodies/body/position"][-1, 0] == pytest.approx(30.03 - C * 4.5 * 20.0 / GJ, abs=1e-6)
+
+
 def on_a_body(moment: Any) -> dict[str, Any]:
     """A body between two taut lines along x without weight, turned by a moment about them."""
     held = {"start": {"tangent": [1, 0, 0], "normal": [0, 0, 1]}, "end": {"tangent": [1, 0, 0], "normal": [0, 0, 1]}}

@@ -8,7 +8,9 @@ e and psi of the cell, theta (inertial) of the point or body; A and a are those 
 
     at the start   G = -C - [M]x - C_d (W - [w_cell - w_frame]x),       at the end   G = C + C_d W,
 
-with W the change of the frame's angular velocity,  W = cv R' J_l(n)^-1 R^T - [w_frame]x.
+with W the change of the frame's angular velocity,  W = cv R' J_l(n)^-1 R^T - [w_frame]x.  Where tension makes a torque
+(kernels.laws.tension_torque), the moment changes by  g q dT  with the tension of the cell as well, and the law of length
+of the cell by  g q . (1 + tau W) dtheta,  at the start with a minus sign.
 """
 
 from __future__ import annotations
@@ -28,17 +30,30 @@ from hybrid.kernels.algebra.rotations import (
     mat_vec,
     mscale,
     msub,
+    scale,
     sub,
     vec_mat,
 )
 from hybrid.kernels.junctions.bodies import FRAME, START, N, W, matrix, vector
 from hybrid.kernels.laws.cell import chord, turning
 from hybrid.kernels.laws.element import after, angular_velocity, before, bending, damped_bending
+from hybrid.kernels.laws.tension_torque import couples, rest_strain
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.state.forces import STIFFNESS_DAMPING
 
-# Numbers of an end: G, A, a, the moment M, and what goes into the balance of nodes and of the spin: [d]x G/l and d.G.
-BY_TURN, BY_CHORD, BY_SPIN, MOMENT, FORCE_BY_TURN, SPIN_BY_TURN, ANSWER = 0, 9, 18, 21, 24, 33, 36
+# Numbers of an end: G, A, a, the moment M, what goes into the balance of nodes and of the spin, [d]x G/l and d.G, and
+# where tension makes a torque what the moment gets by tension, and the length of the cell by the turn.
+BY_TURN, BY_CHORD, BY_SPIN, MOMENT, FORCE_BY_TURN, SPIN_BY_TURN, BY_TENSION, LENGTH_BY_TURN = (
+    0,
+    9,
+    18,
+    21,
+    24,
+    33,
+    36,
+    39,
+)
+ANSWER = 42
 # Numbers of a seat: frame of the end in axes of its point or body, and whether it turns with that: 0, or one of these.
 TURNS, SEAT = 9, 10
 WITH_BODY, WITH_POINT = 1.0, 2.0
@@ -76,7 +91,8 @@ def end_moment(line, ends, state, k, cv, way):
     n = line.h.shape[0]
     c, node = k * (n - 1), k * n
     d, _, il = chord(get3(state.e, c))
-    R, own, kb, k0 = get9(ends.frame, k), frame(get3(state.a1, c), d), get3(line.kb, node), get3(line.k0, node)
+    R, own, kb = get9(ends.frame, k), frame(get3(state.a1, c), d), get3(line.kb, node)
+    k0 = rest_strain(line, state.T, node)
     if line.bits & STIFFNESS_DAMPING:
         e1, spin = sub(get3(state.v, c + 1), get3(state.v, c)), get3(ends.spin, k)
         d1, D1 = turning(d, il, e1, cv)
@@ -105,9 +121,19 @@ def end_moment(line, ends, state, k, cv, way):
 @inner
 def answer_of_end(job, k, row, work, cv, out):
     """The numbers of end k into `out`; row, work: of what carries its frame."""
-    M, A, a, G, d, il = end_moment(job.line, job.ends, job.new, k, cv, spin_change(row, work, cv))
+    line, way = job.line, spin_change(row, work, cv)
+    M, A, a, G, d, il = end_moment(line, job.ends, job.new, k, cv, way)
     SG, dG = mscale(il, mat_mat(hat(d), G)), vec_mat(d, G)
     for i in range(9):
         out[BY_TURN + i], out[BY_CHORD + i], out[FORCE_BY_TURN + i] = G[i], A[i], SG[i]
     for i in range(3):
         out[BY_SPIN + i], out[MOMENT + i], out[SPIN_BY_TURN + i] = a[i], M[i], dG[i]
+    if couples(line):
+        n = line.h.shape[0]
+        c = k * (n - 1)
+        q = scale(line.tension_twist[c], get3(job.work.couple, k * n))  # AXIS is the first of its numbers
+        turned = q
+        if line.bits & STIFFNESS_DAMPING:
+            turned = add(q, scale(line.tau[c], vec_mat(q, way)))
+        for i in range(3):
+            out[BY_TENSION + i], out[LENGTH_BY_TURN + i] = q[i], turned[i] if k == 1 else -turned[i]

@@ -20,8 +20,10 @@ from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, SPAN, solv
 from hybrid.kernels.junctions.carried_frames import (
     BY_CHORD,
     BY_SPIN,
+    BY_TENSION,
     BY_TURN,
     FORCE_BY_TURN,
+    LENGTH_BY_TURN,
     MOMENT,
     SPIN_BY_TURN,
 )
@@ -53,6 +55,8 @@ def carry_block(X, W, x, i, o, n, solved):
     k = (n + 1) * ROW + i * KEPT
     if X[k + 63] > 0.0:
         if i >= 2:
+            for j in range(4):
+                x[o, 0] -= X[k + 69 + j] * x[o - 2, j + 1]
             for r in range(3):
                 for j in range(4):
                     x[o, r + 1] -= X[k + 4 * r + j] * x[o - 2, j + 1]
@@ -102,6 +106,12 @@ def carry_start(X, W, columns, first, n, joined):
 
 
 @inner
+def length_by_turn(X, i, n, answer, b):
+    """What a turn puts into the length in block row i (kernels.laws.tension_torque), in the unit of that row."""
+    return X[(n + 1) * ROW + i * KEPT + 62] * answer[LENGTH_BY_TURN + b]
+
+
+@inner
 def carry_turn(X, W, columns, first, n, joined, answer):
     """D_i of the turn of what the start is clamped to; answer: of the start (kernels.junctions.carried_frames)."""
     g, o = FORCE_BY_TURN, first
@@ -112,7 +122,8 @@ def carry_turn(X, W, columns, first, n, joined, answer):
             if i == 0:
                 x[o, 4] = answer[SPIN_BY_TURN + b]
             elif i == 1:
-                put_row(x, o + 1, 0.0, -answer[g + b], -answer[g + 3 + b], -answer[g + 6 + b], 0.0)
+                longer = length_by_turn(X, 1, n, answer, b)
+                put_row(x, o + 1, -longer, -answer[g + b], -answer[g + 3 + b], -answer[g + 6 + b], 0.0)
             carry_block(X, W, x, i, o + i, n, not (joined and i == n))
 
 
@@ -125,7 +136,7 @@ def carry_end_turn(X, W, columns, first, n, answer):
         fx, fy, fz = answer[g + b], answer[g + 3 + b], answer[g + 6 + b]
         put_row(x, o - 1, 0.0, -fx, -fy, -fz, -answer[SPIN_BY_TURN + b])
         carry_block(X, W, x, n - 1, o - 1, n, True)
-        put_row(x, o, 0.0, fx, fy, fz, 0.0)
+        put_row(x, o, -length_by_turn(X, n, n, answer, b), fx, fy, fz, 0.0)
         carry_block(X, W, x, n, o, n, False)
 
 
@@ -156,7 +167,7 @@ def moment_of_end(k, a, answer, f):
         by = sign * answer[BY_CHORD + 3 * a + j]
         f[1 + j], f[NEXT + 1 + j] = -by, by
         f[OF + (TURN if k == 0 else END_TURN) + j] = sign * answer[BY_TURN + 3 * a + j]
-    f[4] = sign * answer[BY_SPIN + a]
+    f[4], f[NEXT] = sign * answer[BY_SPIN + a], sign * answer[BY_TENSION + a]
     f[LEFT] = sign * answer[MOMENT + a]
 
 

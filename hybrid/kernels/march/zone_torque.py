@@ -388,7 +388,11 @@ def pass_torque(line, ends, state, work, part, cv):
 
 @inner
 def torsional_stiffness(line):
-    """Torque by which a line resists a turn of one end against the other, N m/rad; 0 of one without such zones."""
+    """Torque by which a line resists a turn of one end against the other, N m/rad; 0 of one without such zones.
+
+    Where tension makes a torque, it is that of a line that cannot stretch: with less, Newton's method would go back and
+    forth between the turn and the tension.
+    """
     soft = 0.0
     for z in range(line.torsion.shape[0]):
         soft += line.torsion[z, COMPLIANCE]
@@ -397,6 +401,10 @@ def torsional_stiffness(line):
     for i in range(line.kb.shape[0]):
         if line.element[i] and line.kb[i, 2] > 0.0:
             soft += 1.0 / line.kb[i, 2]
+    for c in range(line.tension_twist.shape[0]):
+        g, hck = 2.0 * line.tension_twist[c], line.h[c] * compliance(line, c)
+        if hck > 0.0:
+            soft -= g * g / hck
     return 1.0 / soft
 
 
@@ -428,6 +436,12 @@ def torsion_of(line: Line, keep: bool) -> Torsion:
         columns=z((unknowns, n + 1, SIZE)), known=np.array([-1.0, 0.0, 1.0, float(keep), 0.0]), right=z((n + 1, SIZE)),
         coupling=z((unknowns, unknowns)), dense=z((unknowns, unknowns + 1)),
     )  # fmt: skip
+
+
+def answers_of(torsion: Torsion) -> dict[str, Floats]:
+    """How a line answers to torques through its zones, which serves for several steps; {} without such zones."""
+    names = ("known", "columns", "coupling") if torsion.known.size else ()
+    return {name: getattr(torsion, name) for name in names}
 
 
 def torsion_energy(line: Line, turn: Floats, T: Floats) -> Floats:
