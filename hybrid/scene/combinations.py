@@ -206,7 +206,12 @@ def _rod_at_winch(tables: Tables) -> Iterator[Place]:
 
 def _turns(tables: Tables) -> Iterator[Place]:
     ends: Ends | None = tables.get("ends")
-    return (("ends", name, "turns") for name, end in (ends.named().items() if ends else ()) if end.held_turns)
+    for name, end in ends.named().items() if ends else ():
+        if end.held_turns:
+            yield "ends", name, "turns"
+    for at in _clamped(tables):
+        if getattr(tables["connections"], str(at[1])).turns:
+            yield (*at, "turns")
 
 
 def _swivels(tables: Tables) -> Iterator[Place]:
@@ -374,10 +379,6 @@ WINCH = Feature("line that is paid out", "payout", Absent(
     {x: ("payout",) for x in ("FixedPoint", "FreePoint", "Fairlead", "JoinedLine")},
     "leave it out: lines of several keep their lengths; one cable, with `cable` and `ends`, can be paid out",
 ))  # fmt: skip
-TURNS_OF_ONE = Feature("turns at an end", "turns", Absent(
-    {"ClampedConnection": ("turns",)},
-    "leave it out, or compute this line alone; a rotation over time is the motion of its point or body",
-))  # fmt: skip
 
 RELEASED_TWIST = Refusal(
     TWISTED_RELEASE, TWISTED_CATENARY, "not worked out", "a torque passes through it into catenary zones",
@@ -490,6 +491,10 @@ REFUSALS: tuple[Refusal, ...] = (
         "write `model: rod`, or leave the clamp out",
     ),
     Refusal(
+        TURNS, CLAMPED_TO_FREE, "not worked out", "{key} is at what turns freely, by turns that nobody counts",
+        "0", "leave it out, or hold both ends of this line at fixed points or bodies; a moment on a body twists it too",
+    ),
+    Refusal(
         FIBRE_ROPE, MOVING_OF_SEVERAL, "several lines",
         "zones of several lines move ({key}), and their steps lose the mean tension of a rope whose cells change",
         fix="leave it out, write `model: rod`, or compute this line alone, with `cable` and `ends`",
@@ -513,7 +518,7 @@ REFUSALS: tuple[Refusal, ...] = (
     *(
         Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)
         for x in (
-            ONE_PLANE, LAYERS_OF_ONE, OTHER_STARTS, WINCH, TURNS_OF_ONE
+            ONE_PLANE, LAYERS_OF_ONE, OTHER_STARTS, WINCH
         )
         if isinstance(x.places, Absent)
     ),

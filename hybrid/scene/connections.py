@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from hybrid.scene.base import Direction, Finding, Kinds, NonNegative, Table, Truth, by_kind, parallel, refuse
-from hybrid.scene.combinations import holds_rod, instead
-from hybrid.scene.ends import BEND_STIFFNESS
+from hybrid.scene.base import Direction, Finding, Kinds, NonNegative, Number, Table, Truth, by_kind, parallel, refuse
+from hybrid.scene.combinations import holds_rod
+from hybrid.scene.ends import BEND_STIFFNESS, TWISTED_BY
 from hybrid.scene.motion_tables import TURNS
 from hybrid.scene.points import FixedPoint, FreePoint
 
@@ -31,8 +31,6 @@ class PinnedConnection(Table):
 class ClampedConnection(Table):
     """The line holds its direction at its point, and its moment acts there.  It needs a rod at that end."""
 
-    instead: ClassVar[Mapping[str, str]] = instead("ClampedConnection")
-
     kind: Literal["clamped"] = Field(default="clamped", description="direction held: moment and torque pass")
     tangent: Direction | None = Field(
         default=None,
@@ -44,6 +42,7 @@ class ClampedConnection(Table):
         description="direction of the material axis a1 at this end, in the same axes; only its part across the tangent "
         "counts; absent: no twist of a line that is bent the short way from tangent to tangent [-]",
     )
+    turns: Number = Field(default=0.0, description=TWISTED_BY)
     swivel: Truth = Field(default=False, description="true: free to spin about the tangent, so no torque")
     bend_stiffness: NonNegative | None = Field(default=None, description=BEND_STIFFNESS)
 
@@ -66,7 +65,7 @@ Connection = Annotated[
     Kinds(
         ("pinned", "clamped"),
         usual=("clamped",),
-        implied=tuple((key, "clamped") for key in ("tangent", "normal", "swivel", "bend_stiffness")),
+        implied=tuple((key, "clamped") for key in ("tangent", "normal", "turns", "swivel", "bend_stiffness")),
     ),
 ]
 

@@ -35,7 +35,7 @@ _NORMAL = (
     "direction of the material axis a1 at this end; only its part across the tangent counts; any length; needed at one "
     "end where two bending stiffnesses differ and a clamp holds their axes [-]"
 )
-_TURNS = (
+TWISTED_BY = (
     "turns about the tangent by which this end is twisted against the other, right-handed, counted from `normal`, or "
     "from where the shape carries the frame; may be a fraction; both ends must hold the twist [-]"
 )
@@ -195,7 +195,7 @@ class Clamped(EndTable):
     position: Vector = Field(description="position of the end, inertial frame [m]")
     tangent: Direction = Field(description=_TANGENT)
     normal: Direction | None = Field(default=None, description=_NORMAL)
-    turns: Number = Field(default=0.0, description=_TURNS)
+    turns: Number = Field(default=0.0, description=TWISTED_BY)
     swivel: Truth = Field(default=False, description="true: free to spin about the tangent, so no torque")
     bend_stiffness: NonNegative | None = Field(default=None, description=BEND_STIFFNESS)
     motion: Motion | None = Field(default=None, description="how the clamp moves and turns; absent: not at all")
@@ -224,7 +224,7 @@ class Guided(EndTable):
     kind: Literal["guided"] = Field(default="guided", description="direction held, position free")
     tangent: Direction = Field(description=_TANGENT)
     normal: Direction | None = Field(default=None, description=_NORMAL)
-    turns: Number = Field(default=0.0, description=_TURNS)
+    turns: Number = Field(default=0.0, description=TWISTED_BY)
     force: Loading | None = Field(default=None, description="force on the end, inertial frame [N]")
     motion: Motion | None = Field(
         default=None, description="how the direction turns; a guided end takes no translation"

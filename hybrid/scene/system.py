@@ -384,7 +384,7 @@ class System(Table):
             else:
                 clamp = getattr(line.connections, key)
                 ends[key] = (_JoinedClamp if self.may_leave(name, key) else Clamped)(
-                    position=place, tangent=held[0], normal=held[1], swivel=clamp.swivel,
+                    position=place, tangent=held[0], normal=held[1], turns=clamp.turns, swivel=clamp.swivel,
                     bend_stiffness=clamp.bend_stiffness, motion=motion,
                 )  # fmt: skip
         initial = _between(line.initial, ends)

@@ -155,9 +155,11 @@ def _of_system(system: System, name: str, found: Finding) -> Finding:
     elif at[:1] == ("ends",) and len(at) > 1:
         point = getattr(line, str(at[1]))
         rest = at[2:]
-        if rest[:1] == ("normal",):
+        if rest[:1] in (("normal",), ("turns",)):
             at = ("lines", name, "connections", *at[1:])
-            return Finding(at, found.expected.replace("cable.", f"lines.{name}."), found.fix, found.given)
+            words = (x.replace("ends.", f"lines.{name}.connections.") for x in (found.expected, found.fix))
+            expected, fix = (x.replace("cable.", f"lines.{name}.") for x in words)
+            return Finding(at, expected, fix, found.given)
         if isinstance(system.points[point], FreePoint) and rest:
             rest = ({"position": "initial_guess", "thrust": "force"}.get(str(rest[0]), rest[0]), *rest[1:])
         at = ("points", point, *rest)

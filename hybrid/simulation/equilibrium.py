@@ -57,7 +57,7 @@ def _without_contact(scene: Scene, model: Model, t: float) -> Equilibrium:
     """Equilibrium of a line that nothing keeps from passing through itself."""
     try:
         found = _by_coarser(scene, model, t) or _statics(scene, model, t)
-        _count_turns(scene, model, t, found.state)
+        count_turns(scene, model, t, found.state)
         return found
     except ComputationError as failed:
         flexible = float(model.line.h[model.line.spin == 0].max(initial=0.0))
@@ -71,8 +71,8 @@ def _without_contact(scene: Scene, model: Model, t: float) -> Equilibrium:
         raise ComputationError(failed.outcome, None, failed.s, because) from None
 
 
-def _count_turns(scene: Scene, model: Model, t: float, state: State) -> None:
-    """ComputationError where a rod between two ends is not twisted by the turns of the scene.
+def count_turns(scene: Scene, model: Model, t: float, state: State) -> None:
+    """ComputationError where a rod between two ends that hold it is not twisted by the turns of the scene.
 
     What closes the frames of the initial shape comes to at most half a turn, and the shape itself takes the writhe of
     the equilibrium, less than half a turn unless the cable forms a loop.
@@ -151,7 +151,7 @@ def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equil
 
     def keeps_turns(state: State) -> bool:
         try:
-            _count_turns(scene, model, t, state)
+            count_turns(scene, model, t, state)
         except ComputationError:
             return False
         return True

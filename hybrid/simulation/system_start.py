@@ -14,6 +14,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.system import SystemModel, balanced_places, starts_between
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
+from hybrid.simulation.equilibrium import count_turns
 from hybrid.simulation.system_contact_equilibrium import settle, solve_with_contact
 from hybrid.solve.joined import JoinedLine, SystemState, joined_ends
 from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
@@ -31,6 +32,7 @@ def equilibrium_of_system(system: System, model: SystemModel, t: float) -> Syste
     try:
         numbers = model.body_numbers(t)
         found = solve_with_contact(model, joined_lines(model, t), numbers, lambda: _starts(system, model))
+        _keep_turns(model, t, found)
         if not any(body.members for body in model.bodies):
             return found
         part, before = 1.0, None
@@ -75,8 +77,19 @@ def solve_from(
     """The equilibrium with the loads of time t from a start next to another one, with contact if that has it."""
     lines = joined_lines(model, t)
     if found.settled:
-        return settle(model, lines, bodies, start, near=True)
-    return solve_system_statics(lines, len(model.free), bodies, iter([(name, start)]))
+        return _keep_turns(model, t, settle(model, lines, bodies, start, near=True))
+    return _keep_turns(model, t, solve_system_statics(lines, len(model.free), bodies, iter([(name, start)])))
+
+
+def _keep_turns(model: SystemModel, t: float, found: SystemEquilibrium) -> SystemEquilibrium:
+    """The same equilibrium; LineFailed where a line has lost turns by which its ends, which hold it, twist it."""
+    for k, (name, x, state) in enumerate(zip(model.names, model.models, found.state.lines, strict=True)):
+        try:
+            count_turns(model.scenes[name], x, t, state)
+        except ComputationError as failed:
+            detail = failed.detail.replace("ends.", f"lines.{name}.connections.")
+            raise LineFailed(k, failed.outcome, None, failed.s, detail) from None
+    return found
 
 
 def _same_water(there: Floats, taken: Floats) -> bool:

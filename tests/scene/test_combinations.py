@@ -78,6 +78,10 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
         CLAMPED | {ONE + "model": {"kind": "adaptive"}, "points.b": {"body": "buoy", "place": [0, 0, 0]},
                    "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0]}}, ""
     ),
+    (c.TURNS, c.CLAMPED_TO_FREE): (
+        CLAMPED | {ONE + "connections.end.turns": 2, "points.b": {"body": "buoy", "place": [0, 0, 0]},
+                   "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0]}}, ""
+    ),
     (c.FIBRE_ROPE, c.MOVING_OF_SEVERAL): (
         {ONE + "model": MOVING["model"], ONE + "sections.0.dynamic_stiffness": ROPE[SECTION + "dynamic_stiffness"]}, ""
     ),
@@ -127,7 +131,7 @@ def test_it_is_refused_with_its_reason_and_remedy(pair: tuple[c.Feature, c.Featu
 def test_keys_that_several_lines_do_not_have_say_what_to_do(refusal: Refusal) -> None:
     assert isinstance(refusal.feature.places, Absent)
     at = {"System": "", "SystemOutput": "output.", "FixedPoint": "points.b.", "JoinedLine": ONE,
-          "FreePoint": "points.free.", "Fairlead": "points.on.", "ClampedConnection": ONE + "connections.end."}  # fmt: skip
+          "FreePoint": "points.free.", "Fairlead": "points.on."}  # fmt: skip
     more: dict[str, Any] = {
         "output": {}, "points.free": {"kind": "free", "initial_guess": [4, 0, -1]},
         "points.on": {"kind": "fairlead", "body": "x", "place": [0, 0, 0]}, **CLAMPED,

@@ -92,8 +92,8 @@ def test_an_equilibrium_that_has_lost_a_turn_is_refused(monkeypatch):
     model = build(scene)
     lost = build(taut(second={"turns": 2})).start
     with pytest.raises(hybrid.ComputationError, match=r"(?s)ends.end.turns: 3;.*start with 3 turns.*have 2\n.*try"):
-        equilibrium._count_turns(scene, model, 0.0, model.start._replace(a1=lost.a1))
-    equilibrium._count_turns(scene, model, 0.0, model.start)
+        equilibrium.count_turns(scene, model, 0.0, model.start._replace(a1=lost.a1))
+    equilibrium.count_turns(scene, model, 0.0, model.start)
 
 
 REFUSED = {

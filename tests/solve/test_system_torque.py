@@ -70,7 +70,10 @@ PIECES = {
 
 
 def turned(held: Any) -> Any:
-    return held | {"tangent": [-x for x in held["tangent"]]} if isinstance(held, dict) else held
+    if not isinstance(held, dict):
+        return held
+    turns = {"turns": -held["turns"]} if "turns" in held else {}
+    return held | {"tangent": [-x for x in held["tangent"]]} | turns
 
 
 def in_pieces(name: str) -> dict[str, Any]:
@@ -117,6 +120,51 @@ def armoured(scene: dict[str, Any], model: str = "") -> dict[str, Any]:
     for sections in parts:
         sections[:] = [section | {"tension_torque": C} for section in sections]
     return scene
+
+
+@pytest.mark.parametrize("model", ["zones", "rod", "adaptive"])
+def test_a_line_twisted_by_turns_is_the_cable(model: str, tmp_path: Path) -> None:
+    """In either direction, with fractions of a turn, about clamps that roll; resumed to the bit."""
+    kind = {"rod": "rod", "zones": zoned(ZONES), "adaptive": {"kind": "adaptive", "force_rod": [[16, 20]]}}[model]
+    mesh = {} if model == "zones" else {"mesh": {"cells": CELLS}}
+    scene = one(model=kind, **mesh)
+    scene["ends"]["end"]["turns"] = 2.3
+    system = several({"line": line("a", "b", ZONES, {"start": START, "end": END | {"turns": 2.3}}) | mesh})
+    system["lines"]["line"]["model"] = kind
+    cable = hybrid.run(scene)
+    assert np.abs(cable["torque"][0]).max() > 2.0 * np.pi * 2.0 * GJ / LENGTH
+    with hybrid.run(system, tmp_path / "whole.h5") as result:
+        mine = result.lines["line"]
+        apart = np.abs(mine["position"] - cable["position"]).max(axis=(1, 2))
+        assert apart[0] < 1e-9 * LENGTH and apart.max() < 20 * TOLERANCE * LENGTH
+        assert mine["torque"] == pytest.approx(cable["torque"], rel=1e-5, abs=1e-5)
+        assert mine["turns/link"] == pytest.approx(cable["turns/link"], abs=1e-6)
+    hybrid.run(system | {"time": COMMON["time"] | {"duration": 1.5}}, tmp_path / "part.h5").close()
+    with hybrid.open(tmp_path / "whole.h5") as whole, hybrid.resume(tmp_path / "part.h5", until=3.0) as more:
+        for name in ("position", "torque", "turns/link"):
+            assert np.array_equal(whole.lines["line"][name], more.lines["line"][name]), name
+
+
+def test_turns_the_other_way_and_on_a_body() -> None:
+    """Two taut lines to a body that is held: GJ 2 pi n / L in each, whichever end says it."""
+    scene = on_a_body([0, 0, 0])
+    scene["bodies"]["body"] = {"position": scene["bodies"]["body"]["initial_guess"], "rotation": [20, 0, 0]}
+    for name, turns in (("one", 3.25), ("two", -1.0)):
+        held = scene["lines"][name]["connections"]
+        scene["lines"][name]["connections"] = held | {"end": held["end"] | {"turns": turns}}
+    found = hybrid.static(scene)
+    for name, turns in (("one", 3.25 + 20 / 360), ("two", -1.0 - 20 / 360)):
+        assert found.lines[name]["torque"][-1] == pytest.approx(GJ * 2.0 * np.pi * turns / 20.0, rel=1e-6)
+
+
+def test_turns_that_cells_cannot_hold_are_said() -> None:
+    rods = {"model": "rod", "mesh": {"cells": 8}}
+    scene = several({"line": line("a", "b", [("rod", 40)], {"start": START, "end": END | {"turns": 9}}) | rods})
+    with pytest.raises(hybrid.ComputationError, match=r"line line; lines\.line\.connections\.end\.turns: 9; 8 cells"):
+        hybrid.static(scene)
+    scene["lines"]["line"]["connections"]["start"] = START | {"swivel": True}
+    with pytest.raises(hybrid.SceneError, match=r"lines\.line\.connections\.start turns freely"):
+        hybrid.static(scene)
 
 
 C = 5e-3
