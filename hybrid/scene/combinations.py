@@ -322,8 +322,6 @@ TORQUE_OF_TENSION = Feature("torque of tension", "tension_torque",
                             _in_sections("tension_torque", of=lambda x: x.tension_torque))  # fmt: skip
 STRETCH_LAW = Feature("tension over strain by a table or a rope's law", "tension_strain, dynamic_stiffness",
                       _stretch_laws)  # fmt: skip
-FIBRE_ROPE = Feature("fibre ropes", "dynamic_stiffness",
-                     _in_sections("dynamic_stiffness", of=lambda x: x.dynamic_stiffness is not None))  # fmt: skip
 STIFFNESS_DAMPING = Feature("damping proportional to stiffness", "damping.stiffness",
                             _in_sections("damping", "stiffness",
                                          of=lambda x: x.damping is not None and x.damping.stiffness))  # fmt: skip
@@ -355,8 +353,6 @@ SETTLED_FRICTION = Feature("friction that has settled in the equilibrium", "init
 CLAMPED_CONNECTION = Feature("a clamped connection", "lines.NAME.connections", _clamped)
 BREAKS_OFF_CLAMP = Feature("a break at a clamp", "break_at", _breaks_off_clamp)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
-MOVING_OF_SEVERAL = Feature("zones of several lines that move", "lines.NAME.model",
-                            lambda tables: _moving(tables) if SYSTEM in tables else iter(()))  # fmt: skip
 CLAMPED_TO_FREE = Feature("a line that is clamped to a free point or body", "lines.NAME.connections", _clamped_to_free)
 
 STEPPED = Feature("steps from outside", "hybrid.Simulation", _used("stepped"))
@@ -493,11 +489,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         TURNS, CLAMPED_TO_FREE, "not worked out", "{key} is at what turns freely, by turns that nobody counts",
         "0", "leave it out, or hold both ends of this line at fixed points or bodies; a moment on a body twists it too",
-    ),
-    Refusal(
-        FIBRE_ROPE, MOVING_OF_SEVERAL, "several lines",
-        "zones of several lines move ({key}), and their steps lose the mean tension of a rope whose cells change",
-        fix="leave it out, write `model: rod`, or compute this line alone, with `cable` and `ends`",
     ),
     Refusal(
         FOLLOWING_CELLS, SEVERAL_LINES, "several lines", "cells of several lines have lengths that stay", fix=ALONE

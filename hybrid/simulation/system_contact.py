@@ -138,6 +138,6 @@ def renew_solver(run: SystemRun, after: str) -> None:
         model.ends.at(run.t)
         model.sea.at(run.t)
     run.model.load_bodies(run.t, run.solver.bodies, run.loaded)
-    taken = run.solver.evaluate_forces(run.state, 0.0, run.t)
+    taken = run.solver.forces_in_motion(run.state, run.t)
     if taken.outcome != Outcome.OK:
         raise LineFailed(taken.line, taken.outcome, run.t, None, after)

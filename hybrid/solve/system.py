@@ -365,7 +365,7 @@ class SystemSolver:
             turning = (x.line.spin == 1) & (x.line.polar > 0)  # a spin without inertia has no acceleration
             state.wd[turning] = HEAVY * work.x[:-1, 4][turning]
             state.wa[:] = state.wd
-        return self.evaluate_forces(states, 0.0, t)
+        return self.forces_in_motion(states, t)
 
     def _turning_gaps(self, states: SystemState) -> None:
         """What fairleads accelerate beside the acceleration of their bodies, towards the axis of rotation."""
@@ -379,7 +379,7 @@ class SystemSolver:
                     self._gaps[l, k] = np.cross(spin, np.cross(spin, R @ x.fairleads[k])) / HEAVY
 
     def evaluate_forces(self, states: SystemState, ca: float, t: float = 0.0) -> SystemTaken:
-        """The forces, reports, powers and residuals of states as they are at t (s).
+        """The forces, reports, powers and residuals of states at rest as they are, at t (s).
 
         ca: 1/s2, of springs of that times the mass.
         """
@@ -390,6 +390,10 @@ class SystemSolver:
         if taken.outcome == Outcome.OK:
             self._settle_contact(states)
         return taken
+
+    def forces_in_motion(self, states: SystemState, t: float) -> SystemTaken:
+        """The same of states between two steps, at t (s): mean tensions of ropes stay what they are."""
+        return self.evaluate_forces(states, HEAVY, t)
 
     def _settle_contact(self, states: SystemState) -> None:
         """Put what contact does to held ends into the reports and powers of states that have just been evaluated."""

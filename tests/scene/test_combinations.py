@@ -82,9 +82,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
         CLAMPED | {ONE + "connections.end.turns": 2, "points.b": {"body": "buoy", "place": [0, 0, 0]},
                    "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0]}}, ""
     ),
-    (c.FIBRE_ROPE, c.MOVING_OF_SEVERAL): (
-        {ONE + "model": MOVING["model"], ONE + "sections.0.dynamic_stiffness": ROPE[SECTION + "dynamic_stiffness"]}, ""
-    ),
     (c.FOLLOWING_CELLS, c.SEVERAL_LINES): ({ONE + "model": FOLLOWING["model"]}, ""),
     (c.SETTLED_FRICTION, c.SEVERAL_LINES): ({ONE + "initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
     (c.CHANGED_LOADS, c.SEVERAL_LINES): ({}, "changed loads"),
@@ -99,7 +96,7 @@ def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
 
 
 def _of_several(pair: tuple[c.Feature, c.Feature]) -> bool:
-    names = (c.SEVERAL_LINES, c.MOVING_OF_SEVERAL, c.CLAMPED_TO_FREE, c.CLAMPED_CONNECTION)
+    names = (c.SEVERAL_LINES, c.CLAMPED_TO_FREE, c.CLAMPED_CONNECTION)
     return any(x in names for x in pair)
 
 

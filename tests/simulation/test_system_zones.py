@@ -94,6 +94,57 @@ def test_a_system_of_one_line_has_the_zones_of_the_cable_at_the_same_times(
     assert np.allclose(rope.envelope["tension_max"], cable.envelope["tension_max"], rtol=1e-6)
 
 
+# A static stiffness by a table, and more than that for what is fast.
+FIBRES = ROPE | {
+    "tension_strain": [[0, 0], [0.05, 5e4], [0.1, 2e5]],
+    "dynamic_stiffness": {"constant": 5e6, "per_tension": 20, "relaxation_time": 2},
+}  # fmt: skip
+FIBRES.pop("axial_stiffness")
+
+
+def of_fibres(**more: Any) -> tuple[hybrid.Result, dict[str, Any]]:
+    """The slackening rope of fibres, as one cable, and its scene as a system; more: of the line there."""
+    one, several = slackening(duration=1.6)
+    one["cable"]["sections"] = several["lines"]["rope"]["sections"] = [FIBRES]
+    several["lines"]["rope"] |= more
+    one["model"] = several["lines"]["rope"]["model"]
+    return hybrid.run(one), several
+
+
+def test_fibre_ropes_keep_their_mean_tensions_when_zones_change(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As one cable does, and resumed to the bit."""
+    cable, scene = of_fibres()
+    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    stopping, whole, path = Stopping(monkeypatch), tmp_path / "whole.h5", tmp_path / "run.h5"
+    hybrid.run(scene, whole, progress=stopping).close()
+    stopping.left = stopping.heard // 2
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(scene, path, progress=stopping)
+    hybrid.resume(path).close()
+    assert differences(whole, path) == []
+    with hybrid.open(whole) as result:
+        rope = result.lines["rope"]
+        assert changes(rope) == changes(cable) and changes(cable)
+        assert np.abs(rope.position - cable.position).max() < 1e-9 * 60
+        assert np.abs(rope.tension - cable.tension).max() < 1e-8 * cable.tension.max()
+
+
+def test_fibre_ropes_keep_their_mean_tensions_when_another_line_breaks() -> None:
+    """All lines begin anew then, which the order of steps feels; lost mean tensions would be 74 % of the tension."""
+    cable, scene = of_fibres(model="rod")
+    other = {"start": "a", "end": "c", "sections": [ROPE], "mesh": {"cells": 8}, "model": "rod"}
+    scene["lines"]["other"] = other | {"break_at": {"time": 0.6}}
+    scene["points"]["c"] = {"position": [0, 50, 10]}
+    found = hybrid.run(scene)
+    assert any(e.kind == "end released" for e in found.events)
+    rope = found.lines["rope"]
+    assert np.abs(rope.position - cable.position).max() < 1e-4
+    assert np.abs(rope.tension - cable.tension).max() < 1e-3 * cable.tension.max()
+
+
 def test_lines_go_slack_in_turn(three: hybrid.Result) -> None:
     rods = {
         name: np.array([sum(z.s_b - z.s_a for z in zones if z.kind == "rod") for zones in line.zones])
