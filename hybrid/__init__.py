@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.exports.api import export
     from hybrid.interop.moordyn import export_moordyn, import_moordyn
+    from hybrid.modal.api import modes
     from hybrid.scene.read import load_scene, load_system, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
     from hybrid.scene.system import System
@@ -64,6 +65,7 @@ _HOME = {
     "import_moordyn": ("hybrid.interop.moordyn", "import_moordyn"),
     "load_scene": ("hybrid.scene.read", "load_scene"),
     "load_system": ("hybrid.scene.read", "load_system"),
+    "modes": ("hybrid.modal.api", "modes"),
     "offsets": ("hybrid.simulation.system_stiffness", "offsets"),
     "open": ("hybrid.store.reader", "open_result"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
@@ -113,6 +115,7 @@ __all__ = [
     "listed_outputs",
     "load_scene",
     "load_system",
+    "modes",
     "offsets",
     "open",
     "open_study",

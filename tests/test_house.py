@@ -34,6 +34,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "view": ("errors", "statistics", "store"),
     "exports": ("errors", "store"),
     "interop": ("errors", "scene"),
+    "modal": (*COMPUTING, "simulation", "accuracy"),
     "studies": (*COMPUTING, "simulation", "accuracy", "view"),
     "couple": (*COMPUTING, "simulation", "accuracy", "interop"),
     "live": (*COMPUTING, "simulation", "accuracy", "view"),
@@ -47,15 +48,16 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "studies",
         "couple",
         "live",
+        "modal",
         "__init__",
     ),
-    "__init__": (*COMPUTING, "simulation", "accuracy", "view", "exports", "interop", "studies", "couple"),
+    "__init__": (*COMPUTING, "simulation", "accuracy", "modal", "view", "exports", "interop", "studies", "couple"),
     "__main__": ("cli",),
 }
 
 # Packages from outside that only these rooms may import.
 ONLY = {
-    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "simulation", "accuracy", "view", "exports", "studies"),
+    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "simulation", "accuracy", "modal", "view", "exports", "studies"),
     "numba": ("kernels",),
     "h5py": ("store", "exports"),
     "matplotlib": ("view",),

@@ -15,7 +15,12 @@ PICTURE = ROOT / "docs" / "pictures" / "rooms.svg"
 # Floors from the top; in each room's entry its column and what it does.
 FLOORS = (
     {"cli": (2.3, "commands, console, tables")},
-    {"studies": (0.05, "many runs, other programs"), "couple": (1.3, "FMU"), "live": (3.2, "page for the browser")},
+    {
+        "studies": (0.05, "many runs, other programs"),
+        "couple": (1.1, "FMU"),
+        "modal": (2.15, "natural modes"),
+        "live": (3.2, "page for the browser"),
+    },
     {"accuracy": (0.5, "passes, errors, choice of model")},
     {
         "simulation": (0.5, "one run, stepping, diagnostics"),

@@ -259,6 +259,12 @@ def _surveyed_at_rest(case: StaticCase, resolution: Resolution) -> tuple[ModelCh
     return choice, surveyed(case, resolution)
 
 
+def resolution_at_rest(case: StaticCase) -> Resolution:
+    """How finely the equilibrium of a case is computed first; where the scene leaves it open, its model is chosen."""
+    check_motions(case.scene)
+    return _surveyed_at_rest(case, first_resolution(case.scene))[1]
+
+
 def _path(output: str | Path | None) -> Path | None:
     """Where a result goes; ResultError for a device or a pipe, which would be replaced by a file, or block."""
     if output is None:

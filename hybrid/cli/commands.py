@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybrid
-import hybrid.cli.result_commands  # registers its commands
+import hybrid.cli.modes_command  # registers its command
+import hybrid.cli.result_commands
 import hybrid.cli.statistics_command
 import hybrid.cli.study_command
 import hybrid.cli.view_command

@@ -112,6 +112,10 @@ class StaticCase:
         run = {name: np.asarray(values[name])[None] for name in ("position", "curvature", "tension")}
         return Survey.of(self.scene, resolution, model, s, run)
 
+    def at_rest(self, resolution: Resolution) -> tuple[Model, Equilibrium]:
+        """Model and equilibrium, for whoever looks at more of it than its outputs."""
+        return self._equilibrium(resolution)[:2]
+
     def first_shape(self, resolution: Resolution) -> tuple[Model, State]:
         """Model and state of an equilibrium, which are kept for a result of this resolution that comes next."""
         model, found, _ = begun = self._equilibrium(resolution)

@@ -1,0 +1,75 @@
+"""The command modes: natural periods of a scene about its equilibrium."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import hybrid
+from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, flag, load_either, session
+
+if TYPE_CHECKING:
+    from hybrid.modal.api import Modes
+
+SHOWN = 3  # parts of the energy of a mode, and the least of them
+LEAST = 0.05
+
+
+@app.command()
+def modes(
+    scene: SceneFile, settings: Settings = None,
+    count: Annotated[int, typer.Option("--count", metavar="N", help="How many, the longest periods first.")] = 10,
+    near: Annotated[float | None, typer.Option(metavar="S", help="Those nearest to this period (s) instead.")] = None,
+    smooth: Annotated[bool, flag("--smooth", help="Without friction of the bed, which else holds the line.")] = False,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", metavar="FILE", help="Draw the shapes into a PNG, PDF or SVG.")
+    ] = None,
+    quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Natural periods and shapes of a cable, or of lines with their points and bodies, about the equilibrium."""
+    with session(as_json, quiet) as console:
+        from hybrid.view.save import PICTURES, check_target
+
+        asked = load_either(console, scene, settings)
+        picture = check_target(plot, PICTURES) if plot is not None else None
+        found = hybrid.modes(asked, count, near, friction=not smooth)
+        if picture is not None:
+            from hybrid.view.mode_shapes import plot_modes
+
+            plot_modes(found, picture)
+        console.show(lambda: _table(found))
+        for note in found.notes:
+            console.note(f"note: {note}")
+        console.json(
+            "modes", cells=found.cells, mass=found.mass.tolist(), notes=list(found.notes),
+            picture=None if picture is None else str(picture),
+            modes=[
+                {
+                    "period": x.period, "error": x.error, "frequency": x.frequency, "what": x.what,
+                    "energy": dict(x.energy), "mass": x.mass.tolist(),
+                }
+                for x in found.modes
+            ],
+        )  # fmt: skip
+
+
+def _table(found: Modes) -> Any:
+    from rich.table import Table
+
+    title = f"{found.title or 'modes'}: {len(found.modes)} modes on {found.cells} cells"
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 2), min_width=len(title))
+    for name in ("mode", "period (s)", "error (s)", "Hz"):
+        table.add_column(name, justify="right")
+    table.add_column("moves, by kinetic energy")
+    for name in "xyz":
+        table.add_column(f"mass {name} (%)", justify="right")
+    for k, x in enumerate(found.modes, start=1):
+        parts = [f"{word} {100.0 * part:.0f} %" for word, part in x.energy.items() if part >= LEAST][:SHOWN]
+        masses = [
+            f"{100.0 * m / all_of:.1f}" if all_of > 0.0 else "" for m, all_of in zip(x.mass, found.mass, strict=True)
+        ]
+        error = "not known" if x.error is None else f"{x.error:.2g}"
+        table.add_row(str(k), f"{x.period:.5g}", error, f"{x.frequency:.4g}", ", ".join(parts), *masses)
+    return table

@@ -1,0 +1,148 @@
+"""Natural modes of a network: the eigenvalues of A q = w^2 M q nearest to a frequency, and how many lie below."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, eigsh, splu
+
+from hybrid.errors import ComputationError, Outcome
+from hybrid.kernels.state.state import Floats
+from hybrid.modal.matrices import LinearNetwork
+
+# More modes are found than asked for, so that the last are not cut off from others of the same frequency.
+MORE = 4
+# Where no frequency is given the shift lies below zero by this part of a size of w^2: what drifts is found too.
+BELOW = 1e-3
+# Two w^2 are as good as equal below this relative difference.
+SAME = 1e-7
+# Networks of up to so many unknowns are decomposed whole.
+DENSE = 250
+# So many shifts are tried, each by this part farther off; what a mode may leave of its equations, of their
+# terms and of the largest stiffness.
+SHIFTS, ASIDE, LEFT, NO_FORCE = 4, 1.37e-3, 1e-3, 1e-13
+SEED = 1
+
+
+@dataclass(frozen=True)
+class Eigen:
+    """Modes of a network: w^2 (m,) 1/s^2, increasing, and vectors (q, m) of mass 1.
+
+    missed: modes between zero and the largest found that were not found; None: it could not be counted.
+    """
+
+    squares: Floats
+    vectors: Floats
+    missed: int | None
+
+
+def lowest_modes(network: LinearNetwork, count: int, near: float | None = None) -> Eigen:
+    """The modes nearest to a frequency `near`, rad/s; None: the lowest.  ComputationError where there are fewer."""
+    A, M = network.stiffness, network.mass
+    most = int((M.diagonal() > 0.0).sum())
+    if most < 1:
+        raise ComputationError(Outcome.SINGULAR, None, None, "nothing of this network can move: it has no modes")
+    count = min(count, most)
+    wanted = min(count + MORE, most)
+    shift = near * near if near is not None else -BELOW * network.slow
+    squares, vectors = _proved(A, M, shift, wanted)
+    order = np.argsort(squares)
+    squares, vectors = squares[order], vectors[:, order]
+    missed = _missed(network, squares) if near is None else _missed_between(network, squares)
+    chosen = np.arange(count)
+    if near is not None:
+        away = np.abs(np.sqrt(np.maximum(squares, 0.0)) - near)
+        chosen = np.sort(np.argsort(away)[:count])
+    return Eigen(squares[chosen], vectors[:, chosen], missed)
+
+
+def _proved(A: sparse.csc_array, M: sparse.csc_array, shift: float, count: int) -> tuple[Floats, Floats]:
+    """The w^2 nearest to a shift and their vectors, which fulfil the equations; a shift that is a w^2 itself is moved.
+
+    ComputationError: none of the shifts gives them.
+    """
+    nearest = _every if A.shape[0] <= DENSE or 2 * count > A.shape[0] else _nearest
+    for k in range(SHIFTS):
+        moved = shift * (1.0 + k * ASIDE)
+        try:
+            squares, vectors = nearest(A, M, moved, count)
+        except (RuntimeError, np.linalg.LinAlgError):  # exactly singular; no convergence
+            continue
+        size = np.abs(A) @ np.abs(vectors) + np.abs(M) @ np.abs(vectors) * np.abs(squares)
+        left = np.abs(A @ vectors - (M @ vectors) * squares)
+        round_off = NO_FORCE * float(np.abs(A).max()) * np.abs(vectors).max(axis=0)
+        if (left.max(axis=0) <= LEFT * size.max(axis=0) + round_off).all():
+            return squares, vectors
+    detail = f"modes near a w^2 of {shift:.4g} 1/s^2 do not fulfil their equations, whatever the shift"
+    raise ComputationError(Outcome.SINGULAR, None, None, detail)
+
+
+def _every(A: sparse.csc_array, M: sparse.csc_array, shift: float, count: int) -> tuple[Floats, Floats]:
+    """As `_nearest`, from all eigenvalues of M^1/2 (A - shift M)^-1 M^1/2."""
+    sizes, axes = np.linalg.eigh(M.toarray())
+    there = sizes > 1e-14 * sizes[-1]
+    root = axes[:, there] * np.sqrt(sizes[there])
+    answer = np.linalg.solve((A - shift * M).toarray(), root)
+    inverse, vectors = np.linalg.eigh(root.T @ answer)
+    largest = np.argsort(-np.abs(inverse))[:count]
+    vectors = answer @ vectors[:, largest]
+    vectors /= np.sqrt(np.einsum("ij,ij->j", vectors, M @ vectors))
+    return np.einsum("ij,ij->j", vectors, A @ vectors), np.asarray(vectors)
+
+
+def _nearest(A: sparse.csc_array, M: sparse.csc_array, shift: float, count: int) -> tuple[Floats, Floats]:
+    """The w^2 nearest to a shift, by Lanczos on (A - shift M)^-1 M."""
+    factors = splu(sparse.csc_array(A - shift * M))
+    inverse = LinearOperator(A.shape, matvec=factors.solve, dtype=float)
+    start = factors.solve(M @ np.random.default_rng(SEED).normal(size=A.shape[0]))
+    squares, vectors = eigsh(A, count, M=M, sigma=shift, OPinv=inverse, which="LM", v0=start)
+    # what has no mass follows what has: one more round takes the rest of the start out of it
+    vectors = np.stack([factors.solve(M @ x) for x in vectors.T], axis=1)
+    vectors /= np.sqrt(np.einsum("ij,ij->j", vectors, M @ vectors))
+    squares = np.einsum("ij,ij->j", vectors, A @ vectors)
+    return np.asarray(squares), np.asarray(vectors)
+
+
+def _gap_above(squares: Floats, least: int) -> float | None:
+    """A w^2 in a gap behind at least so many of those found; None: none is wide enough."""
+    for k in range(len(squares) - 1, least - 1, -1):
+        a, b = squares[k - 1], squares[k]
+        if b - a > SAME * max(abs(a), abs(b)):
+            return float(0.5 * (a + b))
+    return None
+
+
+def _below(network: LinearNetwork, square: float) -> int | None:
+    """How many modes have a smaller w^2 (Sylvester's law of inertia); None: the factors do not tell."""
+    A = network.stiffness - square * network.mass - sparse.diags_array(network.tensions)
+    try:
+        factors = splu(
+            sparse.csc_array(A), permc_spec="NATURAL",
+            diag_pivot_thresh=0.0, options={"SymmetricMode": True, "Equil": False},
+        )  # fmt: skip
+    except RuntimeError:
+        return None
+    if not np.array_equal(factors.perm_r, factors.perm_c):
+        return None
+    return int((factors.U.diagonal() < 0.0).sum()) - int((network.tensions > 0.0).sum())
+
+
+def _missed(network: LinearNetwork, squares: Floats) -> int | None:
+    """Modes below a gap near the largest w^2 found, less those found there."""
+    gap = _gap_above(squares, 1)
+    below = _below(network, gap) if gap is not None else None
+    return None if below is None or gap is None else below - int((squares < gap).sum())
+
+
+def _missed_between(network: LinearNetwork, squares: Floats) -> int | None:
+    """Modes between two gaps, less those found there."""
+    high = _gap_above(squares, 2)
+    low = None if high is None else -(_gap_above(-squares[::-1], 2) or np.inf)
+    if high is None or low is None or not np.isfinite(low) or not low < high:
+        return None
+    above, under = _below(network, high), _below(network, low)
+    if above is None or under is None:
+        return None
+    return above - under - int(((squares > low) & (squares < high)).sum())

@@ -1,0 +1,390 @@
+"""Stiffness and mass of a network about its equilibrium, as sparse matrices, from the block rows of the march.
+
+The block rows of a state are linear in c_v and c_a (docs/theory.md, 2): with c_v = 0 they are K + c_a M.  Unknowns of
+a line are those of its blocks, (dT of the cell before a node, dr of the node, dpsi of the cell after it); tension stays
+an unknown, so that a line may be inextensible:
+
+    A = | K   B^T |        M = | M_r  0 |
+        | B   -C  |            | 0    0 |
+
+Ends that are joined move with their point or body by  x = P q, with q all that is free;  A and M of the network are
+P^T A P and P^T M P, with what belongs to the bodies themselves added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
+from hybrid.kernels.junctions.bodies import FRAME, MASS, NUMBERS, OWN, PIECES, PLACE, V
+from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.laws.axial_law import DYNAMIC, PER_TENSION
+from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
+from hybrid.kernels.run import entry
+from hybrid.kernels.state.forces import AXIAL_LAW, FRICTION, PLANAR, ROTARY, WAVES
+from hybrid.kernels.state.report import MOMENT_A
+from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, State, no_torsion
+from hybrid.kernels.step.step import friction_axes
+from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.stability import ANCHOR as STATIC_ANCHOR
+from hybrid.solve.system import SystemSolver
+
+# Springs of this many 1/s^2 times the mass hold what is free while block rows are made; they are taken out again.
+ANCHOR = 1e-9
+# Shifts (of the longest line) and turns (rad) of a body by which forces of the water and its weight are differentiated.
+SHIFT, TURN = 1e-5, 1e-4
+# Strain under the largest tension that is lent to lines that do not stretch where modes are counted.
+NO_STRAIN = 1e-10
+# Turn, rad, of an end's frame by which the element there is differentiated.
+FRAME_TURN = 1e-5
+
+
+@dataclass(frozen=True)
+class LinearLine:
+    """A line about its equilibrium, its matrices over the unknowns of all its blocks (5 a node).
+
+    free: (5 (N+1),) which of them are free; r: (N+1, 3) m; t: (N+1, 3) unit tangents at the nodes; rods: (N,) cells
+    with a spin.
+    """
+
+    name: str
+    line: Line
+    state: State
+    stiffness: sparse.csr_array
+    mass: sparse.csr_array
+    free: np.ndarray
+    net: Floats  # (2, 3) N, that each end passes to what it is joined to
+    turned: Floats  # (2, 6, 5 (N+1)) N, N m, .. what turns of an end's frame do, from the left; zeros: it carries none
+    held_moment: Floats  # (2, 3, 3) N m/rad, moment that the frame of an end resists a turn with
+
+    @property
+    def r(self) -> Floats:
+        """Positions (N+1, 3) m of the nodes."""
+        return self.state.r
+
+    @property
+    def t(self) -> Floats:
+        """Unit tangents (N+1, 3) at the nodes: the mean of the chords beside each."""
+        d = self.state.e / np.linalg.norm(self.state.e, axis=1)[:, None]
+        mean = np.vstack([d[:1], d[1:] + d[:-1], d[-1:]])
+        return np.asarray(mean / np.maximum(np.linalg.norm(mean, axis=1), 1e-300)[:, None])
+
+
+@dataclass(frozen=True)
+class LinearNetwork:
+    """A network about its equilibrium: A q = lambda M q for what is free.
+
+    lines: of the network; at: (L + 1,) where the unknowns of each line begin among those of all lines; place: sparse
+    (all lines, q) how they follow q; points, bodies: how many are free, the last of q; frames: (bodies, 3, 3) axes.
+    """
+
+    lines: tuple[LinearLine, ...]
+    at: np.ndarray
+    place: sparse.csr_array
+    stiffness: sparse.csc_array  # A, made symmetric
+    skew: sparse.csc_array  # the part of A that was not
+    mass: sparse.csc_array
+    points: int
+    bodies: int
+    slow: float  # 1/s^2, a size of w^2 of what swings slowly: the largest tension over mass and length
+    tensions: Floats  # (q,) m/N, a compliance that changes no mode, of unknowns that are tensions; else 0
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns q."""
+        return int(self.mass.shape[0])
+
+    def unit_shifts(self) -> Floats:
+        """(q, 3): all that is free shifted by 1 m along x, y, z."""
+        whole = np.zeros((int(self.at[-1]), 3))
+        for k in range(3):
+            for a, b in zip(self.at[:-1], self.at[1:], strict=True):
+                whole[a + 1 + k : b : SIZE, k] = 1.0
+        out = np.asarray(self.place.T @ whole)
+        # each unknown that is itself a node's keeps its 1; points and bodies gather those of several ends
+        first = self.size - 3 * self.points - 6 * self.bodies
+        out[first:] = 0.0
+        for p in range(self.points):
+            out[first + 3 * p : first + 3 * p + 3] = np.eye(3)
+        for b in range(self.bodies):
+            at = first + 3 * self.points + 6 * b
+            out[at : at + 3] = np.eye(3)
+        return out
+
+
+class _Entries:
+    """Numbers of a sparse matrix with their rows and columns, one after the other; those of one place are added."""
+
+    def __init__(self) -> None:
+        self._parts: list[tuple[Any, Any, Any]] = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0))]
+
+    def add(self, row: Any, column: Any, value: Any) -> None:
+        """One, or as many as the arrays have."""
+        self._parts.append((row, column, value))
+
+    def matrix(self, rows: int, columns: int) -> sparse.csr_array:
+        """The matrix of this shape."""
+        i, j, values = (np.concatenate([np.atleast_1d(x[k]) for x in self._parts]) for k in range(3))
+        return sparse.csr_array((values, (i, j)), shape=(rows, columns))
+
+
+def linear_line(x: JoinedLine, name: str, state: State, sticks: bool) -> LinearLine:
+    """A line about an equilibrium, with ends that are joined as if they were free: the network holds them.
+
+    sticks: whether friction holds it elastically where it lies on the bed, as before it slides; else there is none.
+    """
+    line, count = _in_space(x.line, state, sticks), x.line.s.size
+    if line.bits & FRICTION:
+        friction_axes(x.sea, state.r, state.e, np.zeros_like(state.slip))
+    held, joined = x.ends.held.copy(), [x.joints[k] >= 0 for k in (0, 1)]
+    held[joined] = 0
+    ends = x.ends._replace(held=held)
+    base = np.zeros((count, SIZE * WIDTH))
+    report = _rows(line, x, ends, state, ANCHOR, base)
+    forces = -base.reshape(count, SIZE, WIDTH)[[0, -1], 1:4, -1]
+    # the largest stiffness over mass: neither drowns in the other's round-off
+    diagonal = np.abs(np.stack([base[:, (1 + k) * WIDTH + 11 + k] for k in range(3)], axis=1)).max(axis=1)
+    high = float((diagonal / np.maximum(line.mass, 1e-300)).max()) or 1.0
+    more = np.zeros_like(base)
+    _rows(line, x, ends, state, high, more)
+    mass = (more - base) / (high - ANCHOR)
+    base -= ANCHOR * mass
+    K, M = _sparse(base), _sparse(mass)
+    K = K - sparse.diags_array(_spin_springs(line))  # what turns freely about its axis is a motion that costs nothing
+    if line.torsion.size:
+        K = K + _through_zones(line)
+    free = np.ones((count, SIZE), bool)
+    free[0, 0], free[-1, 4] = False, False
+    free[:-1, 4] = line.spin != 0
+    for k in (0, 1):
+        if held[k]:
+            free[-k, 1:4] = False
+    turned, moments = np.zeros((2, 3, SIZE * count)), np.zeros((2, 3, 3))
+    for k in (0, 1):
+        if x.seats[k, TURNS] != 0.0:
+            turned[k], moments[k] = _by_turn(line, x, ends, state, k, report)
+    return LinearLine(
+        name, line, state, K, M, free.ravel(), forces, turned, moments
+    )  # fmt: skip
+
+
+def _in_space(line: Line, state: State, sticks: bool) -> Line:
+    """The line in space, without what makes no stiffness; ropes are as stiff as they are to quick motions."""
+    ck = line.ck
+    if line.law.size:
+        dynamic = line.law[:, DYNAMIC] + line.law[:, PER_TENSION] * np.maximum(state.T, 0.0)
+        ck = np.where(line.law[:, DYNAMIC] > 0.0, 1.0 / np.maximum(dynamic, 1e-300), ck)
+    off = PLANAR | WAVES | AXIAL_LAW | (0 if sticks else FRICTION)
+    return line._replace(bits=line.bits & ~off, law_at=NO_ADDRESS, ck=ck)
+
+
+def _rows(line: Line, x: JoinedLine, ends: Ends, state: State, ca: float, rows: Floats) -> Floats:
+    """Fill the block rows of a state at rest; its report."""
+    work = entry.workspace_of(line)._replace(rows=rows, torsion=no_torsion())
+    still = state.copy()
+    for rate in (still.v, still.a, still.vd, still.w, still.wa, still.wd, still.slip):
+        rate[:] = 0.0
+    plain = line._replace(torsion=line.torsion[:0])
+    entry.assembly(plain, x.sea, ends, still._replace(turn=still.turn[:0]), 0.0, ca, work)
+    return work.report
+
+
+def _sparse(rows: Floats) -> sparse.csr_array:
+    """A (5 (N+1), 5 (N+1)) of block rows: balances and spins with the opposite sign, so that it is symmetric."""
+    n = rows.shape[0]
+    blocks = rows.reshape(n, SIZE, WIDTH)[:, :, :-1].copy()
+    blocks[:, 1:] *= -1.0
+    first = SIZE * (np.arange(n) - 2)
+    columns = np.concatenate([np.arange(4 * SIZE), 4 * SIZE + 1 + np.arange(3)])
+    i = np.broadcast_to((SIZE * np.arange(n)[:, None] + np.arange(SIZE))[:, :, None], blocks.shape)
+    j = np.broadcast_to((first[:, None] + columns)[:, None, :], blocks.shape)
+    here = (blocks != 0.0) & (j >= 0) & (j < SIZE * n)
+    return sparse.csr_array((blocks[here], (i[here], j[here])), shape=(SIZE * n, SIZE * n))
+
+
+def _spin_springs(line: Line) -> Floats:
+    """(5 (N+1),) N m/rad: the springs against spin that kernels.march.assembly.fill_spin lends to rods.
+
+    Rods whose twist has no inertia keep them: what has neither stiffness nor inertia has no modes.
+    """
+    if not line.bits & ROTARY:
+        return np.zeros(SIZE * line.s.size)
+    bending, torsion = line.kb[:, 0], line.kb[:, 2] * line.element
+    soft = torsion[:-1] + torsion[1:]
+    soft = LEAST_SPIN_STIFFNESS * np.where(soft == 0.0, bending[:-1] + bending[1:], soft)
+    out = np.zeros((line.s.size, SIZE))
+    out[:-1, 4] = np.where(line.spin != 0, soft, 0.0)
+    return out.ravel()
+
+
+def _through_zones(line: Line) -> sparse.csr_array:
+    """How catenary zones that a torque passes through join the twist of the rods beside them."""
+    size = SIZE * line.s.size
+    entries = _Entries()
+    for first, after, compliance, _, _ in line.torsion:
+        rods = [int(c) for c in (first - 1, after) if 0 <= c < line.h.size and line.spin[int(c)]]
+        for a in rods:
+            for b in rods:
+                entries.add(SIZE * a + 4, SIZE * b + 4, (1.0 if a == b else -1.0) / compliance)
+    return entries.matrix(size, size)
+
+
+def _by_turn(line: Line, x: JoinedLine, ends: Ends, state: State, k: int, report: Floats) -> tuple[Floats, Floats]:
+    """What turns of the frame of end k do: (3, 5 (N+1)) to the balances of nodes and spins, (3, 3) to its own moment.
+
+    By differences, so that every law of the element counts.
+    """
+    count = line.s.size
+    forces, moments = np.zeros((3, SIZE * count)), np.zeros((3, 3))
+    frame = ends.frame[k].reshape(3, 3).copy()
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            frames = ends.frame.copy()
+            frames[k] = (_rotation(sign * FRAME_TURN * np.eye(3)[axis]) @ frame).ravel()
+            rows = np.zeros((count, SIZE * WIDTH))
+            report = _rows(line, x, ends._replace(frame=frames), state, ANCHOR, rows)
+            right = rows.reshape(count, SIZE, WIDTH)[:, :, -1].copy()  # minus the balance, minus the spin's
+            right[:, 0] = 0.0
+            forces[axis] += sign * right.ravel() / (2.0 * FRAME_TURN)
+            moment = report[MOMENT_A + 3 * k : MOMENT_A + 3 * k + 3] * (1.0 if k == 0 else -1.0)
+            moments[:, axis] -= sign * moment / (2.0 * FRAME_TURN)
+    return forces, moments
+
+
+def _rotation(n: Floats) -> Floats:
+    """exp([n]x) of a small rotation vector, to the fourth order."""
+    S = _hat(n)
+    return np.asarray(np.eye(3) + S + S @ S / 2.0 + S @ S @ S / 6.0)
+
+
+def _hat(a: Floats) -> Floats:
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def linear_network(solver: SystemSolver, states: SystemState, names: Sequence[str], sticks: bool) -> LinearNetwork:
+    """The network of lines, points and bodies that a solver holds about an equilibrium; sticks: as of `linear_line`."""
+    lines = tuple(
+        linear_line(x, name, state, sticks) for x, name, state in zip(solver.lines, names, states.lines, strict=True)
+    )
+    at = np.concatenate([[0], np.cumsum([x.free.size for x in lines])])
+    points, bodies = len(solver.net), len(solver.bodies)
+    own = int(sum(x.free.sum() for x in lines))
+    own -= 3 * sum(j >= 0 for joined in solver.lines for j in joined.joints)
+    size = own + 3 * points + 6 * bodies
+    entries, column = _Entries(), 0
+    extra: list[tuple[int, Floats]] = []  # body, its stiffness by the forces and frames of ends
+    coupling: list[tuple[int, int, Floats]] = []  # line, body, (3, unknowns of the line) by turns of its frame
+    for l, (x, joined) in enumerate(zip(lines, solver.lines, strict=True)):
+        count = x.free.size // SIZE
+        free = x.free.reshape(count, SIZE).copy()
+        for k, joint in enumerate(joined.joints):
+            if joint < 0:
+                continue
+            free[-k, 1:4] = False
+            rows = at[l] + SIZE * (k * (count - 1)) + 1 + np.arange(3)
+            if joint < points:
+                for c in range(3):
+                    entries.add(rows[c], own + 3 * joint + c, 1.0)
+                continue
+            b = joint - points
+            first = own + 3 * points + 6 * b
+            arm = states.bodies[b, FRAME:V].reshape(3, 3) @ joined.fairleads[k]
+            by_turn = -_hat(arm)
+            for c in range(3):
+                entries.add(rows[c], first + c, 1.0)
+                for d in range(3):
+                    entries.add(rows[c], first + 3 + d, by_turn[c, d])
+            f = x.net[k]
+            extra.append((b, x.held_moment[k] - _hat(f) @ _hat(arm)))
+            if x.turned[k].any():
+                coupling.append((l, b, x.turned[k]))
+        own_rows = at[l] + np.flatnonzero(free.ravel())
+        entries.add(own_rows, np.arange(column, column + own_rows.size), np.ones(own_rows.size))
+        column += own_rows.size
+    assert column == own, (column, own)
+    place = entries.matrix(int(at[-1]), size)
+    A = sparse.block_diag([x.stiffness for x in lines], format="csr")
+    M = sparse.block_diag([x.mass for x in lines], format="csr")
+    A, M = sparse.csr_array(place.T @ A @ place), sparse.csr_array(place.T @ M @ place)
+    A, M = A + _couplings(coupling, at, place, own + 3 * points), M + _masses(solver, states, own + 3 * points, size)
+    A = A + _of_bodies(solver, states, extra, own + 3 * points, size)
+    tensions = np.zeros(int(at[-1]))
+    for x, a in zip(lines, at[:-1], strict=True):
+        pull = max(float(np.abs(x.state.T).max()), 1e-300)
+        tensions[a + SIZE : a + x.free.size : SIZE] = NO_STRAIN * x.line.h / pull
+    return LinearNetwork(
+        lines, at, place, sparse.csc_array(0.5 * (A + A.T)), sparse.csc_array(0.5 * (A - A.T)),
+        sparse.csc_array(0.5 * (M + M.T)), points, bodies, solver.anchor / STATIC_ANCHOR,
+        np.asarray(place.T @ tensions),
+    )  # fmt: skip
+
+
+def _couplings(
+    given: Sequence[tuple[int, int, Floats]], at: np.ndarray, place: sparse.csr_array, first: int
+) -> sparse.csr_array:
+    """How turns of bodies turn the frames of ends, and these push nodes and twist cells: both ways."""
+    size = place.shape[1]
+    out = sparse.csr_array((size, size))
+    for l, b, forces in given:
+        whole = np.zeros((place.shape[0], 3))
+        whole[at[l] : at[l + 1]] = forces.T
+        by_turn = place.T @ whole  # (q, 3): forces on q that hold it while the frame turns
+        rows = np.flatnonzero(by_turn.any(axis=1))
+        columns = first + 6 * b + 3 + np.arange(3)
+        block = sparse.csr_array(
+            (by_turn[rows].ravel(), (np.repeat(rows, 3), np.tile(columns, rows.size))), shape=(size, size)
+        )
+        out = out + block + block.T
+    return out
+
+
+def _masses(solver: SystemSolver, states: SystemState, first: int, size: int) -> sparse.csr_array:
+    """Mass and added mass of bodies, in inertial axes."""
+    entries = _Entries()
+    for b, (row, state) in enumerate(zip(solver.bodies, states.bodies, strict=True)):
+        R = np.kron(np.eye(2), state[FRAME:V].reshape(3, 3))
+        m = R @ row[MASS : MASS + 36].reshape(6, 6) @ R.T
+        for c, d in zip(*np.nonzero(m), strict=True):
+            entries.add(first + 6 * b + c, first + 6 * b + d, m[c, d])
+    return entries.matrix(size, size)
+
+
+def _of_bodies(
+    solver: SystemSolver, states: SystemState, extra: Sequence[tuple[int, Floats]], first: int, size: int
+) -> sparse.csr_array:
+    """Stiffness of bodies: of their weight and the water, and of forces of lines that turn with their arms."""
+    entries = _Entries()
+    for b in range(len(solver.bodies)):
+        K = _own_stiffness(solver, states, b)
+        for other, by_turn in extra:
+            if other == b:
+                K[3:, 3:] += by_turn
+        for c, d in zip(*np.nonzero(K), strict=True):
+            entries.add(first + 6 * b + c, first + 6 * b + d, K[c, d])
+    return entries.matrix(size, size)
+
+
+def _own_stiffness(solver: SystemSolver, states: SystemState, b: int) -> Floats:
+    """(6, 6) of the weight of a body and of the water on it, against shifts and turns (inertial), by differences."""
+    K, row = np.zeros((6, 6)), states.bodies[b]
+    if not solver.bodies[b, 36:NUMBERS].any() and solver.bodies[b, PIECES] == 0:
+        return K  # a point at which lines are clamped
+    shift = SHIFT * solver.length
+    for k in range(6):
+        for sign in (1.0, -1.0):
+            moved = states.copy()
+            if k < 3:
+                moved.bodies[b, PLACE + k] += sign * shift
+            else:
+                R = _rotation(sign * TURN * np.eye(3)[k - 3]) @ row[FRAME:V].reshape(3, 3)
+                moved.bodies[b, FRAME:V] = R.ravel()
+            solver.evaluate_forces(moved, 0.0)
+            own = solver.body_work[b, OWN : OWN + 6]
+            K[:, k] -= sign * own / (2.0 * (shift if k < 3 else TURN))
+    solver.evaluate_forces(states, 0.0)
+    return K

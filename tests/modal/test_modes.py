@@ -1,0 +1,313 @@
+"""Natural modes against closed forms, published frequencies, and the compliance of joints by another way."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import hybrid
+from hybrid.cli.commands import app
+from hybrid.modal.api import _found, _system
+from hybrid.modal.matrices import linear_network
+from hybrid.scene.read import as_scene_or_system
+
+G = 9.81
+
+
+def pinned(*place, **more):
+    return {"kind": "pinned", "position": list(place)} | more
+
+
+def clamped(*place, **more):
+    return {"kind": "clamped", "position": list(place), "tangent": [1, 0, 0], "normal": [0, 0, 1]} | more
+
+
+def scene(sections, start, end, model, cells, gravity=0.0, **more):
+    environment = {"gravity": gravity} | more.pop("environment", {})
+    sections = sections if isinstance(sections, list) else [sections]
+    cable = {"sections": sections} | more.pop("cable", {})
+    tables = {
+        "environment": environment,
+        "cable": cable,
+        "ends": {"start": start, "end": end},
+        "initial": "equilibrium",
+    }
+    return hybrid.validate_scene(tables | {"model": model, "mesh": {"cells": cells}} | more)
+
+
+def string(cells, **more):
+    """100 m under 100 kN, 10 kg/m."""
+    section = {"length": 100.0, "mass": 10.0, "axial_stiffness": 1e9}
+    return scene(section, pinned(0, 0, 0), pinned(100.01, 0, 0), "catenary", cells, **more)
+
+
+def chain(cells):
+    return scene({"length": 10.0, "mass": 1.0}, pinned(0, 0, 0), {"kind": "free"}, "catenary", cells, G)
+
+
+def sag(cells):
+    """Span of 100 m with 1/77 of sag; lambda^2 = 19.2."""
+    section = {"length": 99.990048, "mass": 10.0, "axial_stiffness": 2e8}
+    return scene(section, pinned(0, 0, 0), pinned(100, 0, 0), "catenary", cells, G)
+
+
+def omega(found):
+    return np.array([2.0 * np.pi / x.period for x in found.modes])
+
+
+def test_string_is_that_of_lumped_masses():
+    """2/h sqrt(T/m) sin(n pi/2N), of which half waves lie in either direction; h and m are of the unstretched line."""
+    cells = 40
+    found = omega(hybrid.modes(string(cells), 8))
+    speed = math.sqrt(1e5 / 10.0 * 1.0001)
+    exact = 2.0 * cells / 100.01 * speed * np.sin(np.arange(1, 5) * np.pi / (2 * cells))
+    np.testing.assert_allclose(found, np.repeat(exact, 2), rtol=1e-6)
+
+
+CLOSED = {
+    # zeros of J0: omega = z/2 sqrt(g/L)
+    "hanging chain": (chain, (50, 100), np.array([2.404826, 5.520078, 8.653728]).repeat(2) / 2.0 * math.sqrt(G / 10.0)),
+    # own finite elements, N to infinity (docs of the brief); across and in plane
+    "sagging line": (sag, (100, 200), np.array([3.14213, 4.99833, 6.27986, 6.28369])),
+    "pinned beam": (lambda n: beam(n, pinned), (40, 80), np.array([3.143143, 6.295576, 9.466544]).repeat(2)),
+    "clamped beam": (lambda n: beam(n, clamped), (200, 400), np.array([3.207298, 6.424129, 9.659977]).repeat(2)),
+}
+
+
+def beam(cells, end):
+    section = {
+        "length": 100.0, "mass": 10.0 / 1.0001, "axial_stiffness": 1e9, "bending_stiffness": 1e5,
+        "torsional_stiffness": 1e7,
+    }  # fmt: skip
+    return scene(section, end(0, 0, 0), end(100.01, 0, 0), "rod", cells)
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_closed_forms_with_order_two(name):
+    make, meshes, exact = CLOSED[name]
+    coarse, fine = (hybrid.modes(make(n), exact.size) for n in meshes)
+    off = [np.abs(omega(x) / exact - 1.0).max() for x in (coarse, fine)]
+    print(f"{name}: off by {off[0]:.1e} and {off[1]:.1e}, order {math.log2(off[0] / off[1]):.2f}")
+    assert off[1] < 2e-3
+    assert 1.7 < math.log2(off[0] / off[1]) < 2.4
+    # the error figure is about as large as the error
+    figure = np.array([x.error / x.period for x in coarse.modes])
+    true = np.abs(omega(coarse) / exact - 1.0)
+    seen = true > 0.1 * true.max()
+    ratio = figure[seen] / true[seen]
+    assert ratio.min() > 0.7 and ratio.max() < 3.0
+
+
+def test_twist_of_a_rod():
+    """omega = n pi/L sqrt(GJ/G_p) between two clamps, G_p = m d^2/8 of a round section; lumped, as the string is."""
+    section = {"length": 10.0, "mass": 8.0, "diameter": 0.5, "bending_stiffness": 1e9, "torsional_stiffness": 1e3}
+    cells = 20
+    made = scene(section | {"axial_stiffness": 1e12}, clamped(0, 0, 0), clamped(10, 0, 0), "rod", cells)
+    found = hybrid.modes(made, 3)
+    speed = math.sqrt(1e3 / (8.0 * 0.25 / 8.0))
+    half = np.arange(1, 4) * np.pi / (2 * cells)
+    # spins belong to cells: those beside a clamp are half a cell away from it
+    exact = 2.0 * cells / 10.0 * speed * np.sin(half)
+    assert [x.what for x in found.modes] == ["twist"] * 3
+    np.testing.assert_allclose(omega(found), exact, rtol=2e-3)
+    assert all(np.abs(x.twists["cable"]).max() == pytest.approx(1.0) for x in found.modes)
+
+
+def test_mass_on_a_string():
+    """1000 kg in the middle of two strings of 50 m: x tan x = 1."""
+    made = string(200, cable={"attachments": [{"kind": "clump", "at": 50.0, "mass": 1000.0}]})
+    found = omega(hybrid.modes(made, 2))
+    np.testing.assert_allclose(found, 1.720667, rtol=2e-4)
+
+
+def test_riser_of_huera_huarte():
+    """13.12 m of 28 mm in water, 1188.28 N at the top: 0.80865 .. 4.9822 Hz, computed by Huera-Huarte (2006)."""
+    area = math.pi * 0.028**2 / 4.0
+    mass = 3.0 * 1000.0 * area
+    section = {
+        "length": 13.12, "mass": mass, "diameter": 0.028, "bending_stiffness": 29.88, "axial_stiffness": 1e9,
+        "torsional_stiffness": 1e3, "added_mass": {"normal": 1.0, "tangential": 0.0}, "rotary_inertia": 0.0,
+    }  # fmt: skip
+    top = {"kind": "guided", "tangent": [0, 0, 1], "force": [0, 0, 1188.28]}
+    pull = 1188.28 / 1e9 * 13.12
+    weight = (mass - 1000.0 * area) * G * 13.12
+    height = 13.12 + pull - 0.5 * weight * 13.12 / 1e9
+    del top
+    made = scene(
+        section, pinned(0, 0, -20), pinned(0, 0, -20 + height), "rod", 200, G,
+        environment={"fluid": {"density": 1000.0, "surface": 0.0}},
+    )  # fmt: skip
+    found = [x for x in hybrid.modes(made, 12).modes if x.what != "twist"]
+    hertz = np.array([x.frequency for x in found])[::2]
+    np.testing.assert_allclose(hertz[:6], [0.80865, 1.6211, 2.4411, 3.2722, 4.1181, 4.9822], rtol=4e-4)
+
+
+def test_all_modes_have_all_the_mass():
+    """Of ten cells: 27 modes of nine nodes, whose effective masses add up to what can move."""
+    found = hybrid.modes(string(10), 27)
+    assert len(found.modes) == 27
+    np.testing.assert_allclose(sum(x.mass for x in found.modes), found.mass, rtol=1e-9)
+    np.testing.assert_allclose(found.mass, 900.0, rtol=1e-12)
+    first = found.modes[0]
+    assert np.abs(first.shifts["cable"]).max() == pytest.approx(1.0)
+    assert first.energy[first.what] > 0.9
+
+
+def test_nearest_to_a_period():
+    whole = hybrid.modes(sag(60), 10)
+    some = hybrid.modes(sag(60), 3, near=whole.modes[5].period)
+    away = np.abs(omega(whole) - omega(whole)[5])
+    near = np.sort(omega(whole)[np.argsort(away)[:3]])
+    np.testing.assert_allclose(omega(some), near, rtol=1e-9)
+    assert not some.notes
+
+
+def test_turned_scenes_have_the_same_periods():
+    """About the vertical; and written as one line between two points."""
+    c, s = math.cos(0.7), math.sin(0.7)
+    section = {"length": 99.990048, "mass": 10.0, "axial_stiffness": 2e8}
+    turned = scene(section, pinned(0, 0, 0), pinned(100 * c, 100 * s, 0), "catenary", 60, G)
+    points = {"a": {"kind": "fixed", "position": [0, 0, 0]}, "b": {"kind": "fixed", "position": [100, 0, 0]}}
+    line = {"start": "a", "end": "b", "sections": [section], "model": "catenary", "mesh": {"cells": 60}}
+    several = {"environment": {"gravity": G}, "points": points, "lines": {"l": line}}
+    one = hybrid.modes(sag(60), 6)
+    for other in (turned, several):
+        found = hybrid.modes(other, 6)
+        np.testing.assert_allclose(omega(found), omega(one), rtol=1e-9)
+        assert [x.what for x in found.modes] == [x.what for x in one.modes]
+
+
+BUOY = {
+    "mass": 50.0, "inertia": [5.0, 6.0, 7.0], "volume": 0.2, "centre_of_buoyancy": [0, 0, 0.3],
+    "initial_guess": [0.0, 0.0, -20.0],
+}  # fmt: skip
+
+
+def moored(cells=20, **body):
+    """A buoy, all of it in water, over its anchor on a light line, its fairlead 0.5 m below its origin."""
+    line = {"length": 30.0, "mass": 1e-3, "diameter": 1e-3, "axial_stiffness": 1e9}
+    return (
+        {
+            "environment": {"fluid": {"density": 1000.0}},
+            "points": {
+                "anchor": {"kind": "fixed", "position": [0, 0, -50]},
+                "eye": {"kind": "fairlead", "body": "buoy", "place": [0, 0, -0.5]},
+            },
+            "bodies": {"buoy": BUOY | body},
+            "lines": {
+                "tether": {
+                    "start": "anchor", "end": "eye", "sections": [line], "model": "catenary", "mesh": {"cells": cells}
+                }
+            },
+        }
+    )  # fmt: skip
+
+
+def test_moored_body():
+    """A rigid pendulum on a massless line, upside down in water: two freedoms in each upright plane.
+
+    With x the origin's shift and q its tilt, B the buoyancy, W the weight, T = B - W, a and b the arms of the eye and
+    of the centre of buoyancy:  M x'' = -T (x + a q)/L,  J q'' = -T a (x + a q)/L - (T a + B b) q.
+    """
+    found = hybrid.modes(moored(), 8)
+    B, W, L, a, b = 1000.0 * 0.2 * 9.80665, 50.0 * 9.80665, 30.0, 0.5, 0.3
+    T = B - W
+    for inertia, what in ((6.0, ("surge", "pitch")), (5.0, ("sway", "roll"))):
+        K = np.array([[T / L, T * a / L], [T * a / L, T * a * a / L + T * a + B * b]])
+        w = np.sqrt(np.linalg.eigvals(np.linalg.solve(np.diag([50.0, inertia]), K)).real)
+        for value, word in zip(np.sort(w), what, strict=True):
+            near = [x for x in found.modes if x.what == f"body buoy, {word}"]
+            assert 2.0 * math.pi / near[0].period == pytest.approx(value, rel=1e-4)
+    assert found.notes == ("what nothing holds has no period and is left out: body buoy, yaw",)
+
+
+def test_joints_give_way_as_the_solver_says():
+    """(K + ca M)^-1 at points and bodies is the compliance that the junctions of the solver have from its factors."""
+    system = as_scene_or_system(PIPE)
+    solver, states, names, points, bodies = _system(system, 1.0)
+    network = linear_network(solver, states, names, False)
+    m = 3 * len(points) + 6 * len(bodies)
+    assert (len(points), len(bodies)) == (1, 1)
+    for ca in (0.0, 0.5):
+        theirs = solver.compliance(states, max(ca, solver.anchor))
+        A = (network.stiffness + network.skew + max(ca, solver.anchor) * network.mass).toarray()
+        ours = np.linalg.inv(A)[-m:, -m:]
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-6 * np.abs(theirs).max())
+
+
+PIPE = {
+    "environment": {"fluid": {"density": 1025.0, "current": [0.3, 0, 0]}},
+    "points": {
+        "bed": {"kind": "fixed", "position": [0, 0, -60]},
+        "east": {"kind": "fixed", "position": [60, 0, -60]},
+        "ring": {"kind": "free", "mass": 20.0, "volume": 0.05, "initial_guess": [30, 0, -30]},
+        "hang": {"kind": "fairlead", "body": "buoy", "place": [0.5, 0, -1.0]},
+        "side": {"kind": "fairlead", "body": "buoy", "place": [0.8, 0.2, 0.0]},
+    },
+    "bodies": {
+        "buoy": {
+            "mass": 900.0, "inertia": [300.0, 300.0, 200.0], "initial_guess": [0.0, 0.0, 0.0],
+            "hydrostatics": {"level": 0.0, "heave": 2e4, "roll": 4e4, "pitch": 4e4},
+        }
+    },
+    "lines": {
+        "pipe": {
+            "start": "bed", "end": "hang", "model": "rod", "mesh": {"cells": 30},
+            "connections": {"end": {"kind": "clamped", "tangent": [0, 0, 1], "normal": [1, 0, 0]}},
+            "sections": [{
+                "length": 59.5, "mass": 12.0, "diameter": 0.1, "axial_stiffness": 1e6, "bending_stiffness": 2e3,
+                "torsional_stiffness": 1e3,
+            }],
+        },
+        "leg": {
+            "start": "east", "end": "ring", "model": "catenary", "mesh": {"cells": 15},
+            "sections": [{"length": 45.0, "mass": 3.0, "diameter": 0.02, "axial_stiffness": 1e6}],
+        },
+        "guy": {
+            "start": "ring", "end": "side", "model": "catenary", "mesh": {"cells": 15},
+            "sections": [{"length": 45.0, "mass": 3.0, "diameter": 0.02, "axial_stiffness": 1e6}],
+        },
+    },
+}  # fmt: skip
+
+
+def test_friction_holds_what_lies_on_the_bed():
+    section = {"length": 60.0, "mass": 5.0, "axial_stiffness": 1e7}
+    bed = {"seabed": {"z": 0.0, "stiffness": 1e5, "friction": 0.6}}
+    made = scene(section, pinned(0, 0, 0), pinned(45, 0, 20), "catenary", 60, G, environment=bed)
+    stuck, smooth = (hybrid.modes(made, 6, friction=x) for x in (True, False))
+    rest = smooth.position["cable"][:, 2] < 0.0
+    sideways = [max(np.abs(x.shifts["cable"][rest, 1]).max() for x in each.modes[:3]) for each in (stuck, smooth)]
+    assert sideways[0] < 0.05 and sideways[1] > 0.2
+
+
+def test_periods_that_meet_and_what_turns_freely():
+    motion = {"heave": {"amplitude": 0.1, "period": 1.27}, "ramp": 1.0}
+    section = {"length": 99.990048, "mass": 10.0, "axial_stiffness": 2e8}
+    made = scene(section, pinned(0, 0, 0), pinned(100, 0, 0, motion=motion), "catenary", 40, G)
+    (note,) = hybrid.modes(made, 3).notes
+    assert note == "ends.end.motion.heave has a period of 1.27 s, near that of mode 2 (1.257 s)"
+
+
+def test_what_is_refused():
+    with pytest.raises(hybrid.SceneError, match="a number of modes from 1 to 200"):
+        hybrid.modes(string(10), 0)
+    with pytest.raises(hybrid.SceneError, match="a period > 0"):
+        hybrid.modes(string(10), 3, near=-1.0)
+
+
+def test_the_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sag.yaml").write_text(hybrid.scene_text(sag(40)))
+    told = CliRunner().invoke(app, ["modes", "sag.yaml", "--count", "4", "--plot", "sag.svg"])
+    assert told.exit_code == 0, told.output
+    assert "4 modes on 40 cells" in told.output and "sideways 100 %" in told.output
+    assert "<dc:title>hybrid-cable</dc:title>" in (tmp_path / "sag.svg").read_text()
+    told = CliRunner().invoke(app, ["modes", "sag.yaml", "--count", "2", "--json"])
+    (line,) = [x for x in map(json.loads, told.output.splitlines()) if x.get("event", x.get("kind")) == "modes"]
+    assert [round(x["period"], 3) for x in line["modes"]] == [2.0, 1.257]
+    assert _found(sag(40), 1.0, 2, None, True).eigen.missed == 0
