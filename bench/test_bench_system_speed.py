@@ -274,3 +274,40 @@ def test_many_lines() -> None:
         print(
             f"\n{count} x {cells} cells, {outputs} outputs: {steps} steps in {steps * step:.2f} s, whole {whole:.2f} s"
         )
+
+
+def stepped_from_outside(one_by_one: bool, joined: bool, steps: int = 1000) -> float:
+    """CPU time (s) of a step of three lines of 20 cells, in one call or one by one with their points set each time.
+
+    joined: two legs and a line from a ship to a buoy, whose ship is set; else three legs whose tops are set.
+    """
+    leg = {"sections": [{"length": 70, "mass": 20, "diameter": 0.05, "axial_stiffness": 2e7, "drag": {"normal": 1.2}}],
+           "mesh": {"cells": 20}}  # fmt: skip
+    at = [(np.cos(2.1 * k), np.sin(2.1 * k)) for k in range(3)]
+    points = {f"foot{k}": {"position": [50 * x, 50 * y, -40]} for k, (x, y) in enumerate(at[: 2 if joined else 3])}
+    lines = {f"leg{k}": leg | {"start": f"foot{k}", "end": "buoy" if joined else f"top{k}"} for k in range(len(points))}
+    tops = {"ship": (10.0, 0.0, 0.0)} if joined else {f"top{k}": (2 * x, 2 * y, 0.0) for k, (x, y) in enumerate(at)}
+    points |= {name: {"position": [float(x) for x in place]} for name, place in tops.items()}
+    if joined:
+        points["buoy"] = {"initial_guess": [0, 0, -8], "mass": 500, "volume": 1.5, "drag_area": 1}
+        lines["tow"] = leg | {"start": "ship", "end": "buoy", "sections": [leg["sections"][0] | {"length": 20}]}
+    scene = {"environment": {"fluid": {"density": 1025}}, "points": points, "lines": lines,
+             "time": {"duration": 60.0, "step": 0.05}, "output": {"every": 60.0}}  # fmt: skip
+    with hybrid.SystemSimulation(scene) as simulation:
+        now = simulation.advance(1.0)
+        begin = clock.process_time()
+        if not one_by_one:
+            simulation.advance(now + steps * 0.05)
+        for k in range(steps * one_by_one):
+            for name, (x, y, z) in tops.items():
+                simulation.set_point(name, (float(x), float(y), z), (0.0, 0.0, 0.0))
+            simulation.advance(now + (k + 1) * 0.05)
+        return (clock.process_time() - begin) / steps
+
+
+@pytest.mark.parametrize("joined", [False, True])
+def test_three_lines_stepped_from_outside(joined: bool) -> None:
+    """What a step from outside of three lines costs above one in the compiled loop: at most 15 us are wanted."""
+    inside, outside = (min(stepped_from_outside(x, joined) for _ in range(5)) for x in (False, True))
+    told = "a ship that is set, a buoy on three lines" if joined else "three legs whose tops are set"
+    print(f"{told}: {1e6 * inside:.1f} us a step in one call, {1e6 * (outside - inside):.1f} us more from outside")

@@ -251,6 +251,8 @@ class SystemRun:
         if not (new or self.recorder.due):
             return
         begin = monotonic()
+        self.write_log()
+        self.ends_of_now()
         for line in self.lines:
             line.write_down()
             line.write_envelope(self.t)
@@ -428,12 +430,10 @@ class SystemRun:
             elif code == b.FAILED:
                 self._failed_step()
             else:
-                self._write_log()
-                if not loop.counts[b.ASKS] & b.ASK_BEFORE:  # they are where compiled steps have moved them
-                    for model in self.model.models:
-                        model.ends.at(self.t)
-                        model.sea.at(self.t)
+                if code != b.AT_STOP:
+                    self.write_log()
                 if code == b.STEPPED:
+                    self.ends_of_now()
                     self._after_step(step)
                 self._go_on_leg(stop, parts)
                 if self.t >= stop:
@@ -498,7 +498,14 @@ class SystemRun:
             raise self._stopped(self.solver, self.loop.tried, dt)
         self.loop.try_whole()
 
-    def _write_log(self) -> None:
+    def ends_of_now(self) -> None:
+        """Let ends and sea be as they are now: compiled steps have moved them without Python."""
+        if not self.loop.counts[b.ASKS] & b.ASK_BEFORE:
+            for model in self.model.models:
+                model.ends.at(self.t)
+                model.sea.at(self.t)
+
+    def write_log(self) -> None:
         """Log the steps that have been made since this was called last."""
         rows = self.loop.rows()
         if not len(rows):
@@ -538,16 +545,20 @@ class SystemRun:
 
     def _arrive(self, stop: float, step: float) -> None:
         """What is due at a stop (s): other loads, and an output."""
-        if falls_on(stop, self._breaks, step):
+        jumps, outputs = falls_on(stop, self._breaks, step), falls_on(stop, self.times, step)
+        if jumps or outputs:
+            self.ends_of_now()
+        if jumps:
             self.loaded = self.t
             for model in self.model.models:
                 model.ends.set_loads(self.t)
             self._restart()
-        if falls_on(stop, self.times, step):
+        if outputs:
             self._output(self.solver)
 
     def finish(self, status: str = "complete", message: str = "") -> None:
         """Write what waits, and close the file."""
+        self.write_log()
         for line in self.lines:
             if status == "complete":
                 line.write_down()

@@ -11,6 +11,7 @@ import numpy as np
 from hybrid.kernels.state.state import Floats
 from hybrid.model.system import SystemModel
 from hybrid.simulation.deferred_recorder import DeferredRecorder
+from hybrid.simulation.stepped import Triple
 from hybrid.simulation.system_checkpoint import checkpoint, set_state
 from hybrid.simulation.system_run import SystemRun
 from hybrid.store.writer import Recorder
@@ -27,7 +28,7 @@ class SavedSystem(NamedTuple):
     marks: tuple[int, ...]  # of the recorders
     stops: tuple[float, ...]  # s, that are still to come
     paths: Mapping[str, list[Floats]]  # of points that are set from outside, for each end there
-    next: Mapping[str, tuple[Floats, Floats]]  # where points are to be at the end of the next step
+    next: Mapping[str, tuple[Triple, Triple]]  # where points are to be at the end of the next step
 
     def place(self, line: str, end: str) -> Floats:
         """Position (3,) m of a held end."""
@@ -57,6 +58,7 @@ def commit(run: SystemRun) -> None:
     """
     assert isinstance(run.recorder, DeferredRecorder)
     due, begin = run.recorder.due, monotonic()
+    run.write_log()
     if due:
         for line in run.lines:
             line.write_down()
@@ -72,6 +74,8 @@ def commit(run: SystemRun) -> None:
 
 def kept(run: SystemRun) -> dict[str, Any]:
     """What a run depends on, in copies: fields of `SavedSystem`."""
+    run.write_log()
+    run.ends_of_now()
     run.gather_events()
     return {
         "run": copied(checkpoint(run)), "model": run.model, "waiting": tuple(line.waiting() for line in run.lines),

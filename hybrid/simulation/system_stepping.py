@@ -21,7 +21,8 @@ from hybrid.scene.points import FreePoint
 from hybrid.scene.read import as_scene_or_system, scene_text
 from hybrid.scene.schema import missing_time
 from hybrid.scene.system import System
-from hybrid.simulation.stepped import CableState, one_thread, vector
+from hybrid.simulation.stepped import CableState, Triple, one_thread, triple
+from hybrid.simulation.stepped_ends import STILL
 from hybrid.simulation.system_run import SystemRun
 from hybrid.simulation.system_saving import SavedSystem, bring_back, commit, defer, kept, recorders
 from hybrid.simulation.system_start import named
@@ -30,7 +31,6 @@ from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
 from hybrid.store.reader import Result, open_result
 
-STILL: Floats = np.zeros(3)
 # Of a step: a step so short is round-off of the times of others.
 SLIVER = 1e-6
 
@@ -82,7 +82,7 @@ class SystemSimulation:
             raise
         self._stops = self._run.stops()
         self._driven: dict[str, list[DrivenEnd]] = {}
-        self._next: dict[str, tuple[Floats, Floats]] = {}
+        self._next: dict[str, tuple[Triple, Triple]] = {}
         self._owner, self._final = object(), 0  # how often what had been recorded was made final
         self._here: SavedSystem | None = None  # what was saved of the state as it is now
 
@@ -101,11 +101,11 @@ class SystemSimulation:
         it is.  ValueError: there is no such point, or it is free, on a body, or has a motion in the scene.
         """
         self._check_open()
-        self._check_point(name)
-        point = self.scene.points[name]
-        if isinstance(point, FreePoint) or self.scene.body_of(name) is not None:
-            raise ValueError(f"points.{name} is free or on a body: only fixed points are set")
-        if name not in self._driven:
+        if not isinstance(name, str) or name not in self._driven:
+            self._check_point(name)
+            point = self.scene.points[name]
+            if isinstance(point, FreePoint) or self.scene.body_of(name) is not None:
+                raise ValueError(f"points.{name} is free or on a body: only fixed points are set")
             if getattr(point, "motion", None) is not None:
                 raise ValueError(f"points.{name} has a motion in the scene: leave it out to set the point from outside")
             model = self._run.model
@@ -113,7 +113,7 @@ class SystemSimulation:
                 model.models[model.names.index(line)].ends.drive(int(end == "end"))
                 for line, end in self.scene.lines_at(name)
             ]
-        self._next[name] = vector(position, "position"), vector(STILL if velocity is None else velocity, "velocity")
+        self._next[name] = triple(position, "position"), STILL if velocity is None else triple(velocity, "velocity")
 
     @one_thread
     def advance(self, until: float) -> float:
@@ -134,7 +134,7 @@ class SystemSimulation:
         until = min(float(until), time.duration)
         before = self._before() if self._final else None
         for name, ends in self._driven.items():
-            position, velocity = self._next.pop(name, (ends[0].at(now)[0], STILL))
+            position, velocity = self._next.pop(name, None) or (ends[0].at(now)[0].tolist(), STILL)
             for end in ends:
                 end.set(now, until, position, velocity, STILL)
         try:
