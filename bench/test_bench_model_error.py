@@ -99,7 +99,7 @@ def hung(joint: float, kind: str, at_rest: bool) -> hybrid.Scene:
 TOUCHDOWN = {"time": {"duration": 60.0, "step": 0.1}}
 BEDDED = {"mesh": None} | TOUCHDOWN
 S = {"time": {"duration": 30.0, "step": 0.05}}
-EVERY = {"kind": "adaptive", "rod_cell": 1e9}  # base cells everywhere: the same nodes whatever they are
+EVERY = {"kind": "adaptive"}  # base cells everywhere: the same nodes whatever they are
 
 
 def cases():

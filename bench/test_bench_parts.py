@@ -203,13 +203,13 @@ def test_what_zones_that_move_and_outputs_cost():
         return 1e6 * median(each)
 
     fixed = run(output={"every": 10.0})
-    moving = run(model={"kind": "adaptive", "force_rod": [[0.0, 20.0]], "rod_cell": 0.4}, output={"every": 10.0})
+    moving = run(model={"kind": "adaptive", "force_rod": [[0.0, 20.0]]}, output={"every": 10.0})
     outputs = run(output={"every": 0.1})
     criteria = run(
-        model={"kind": "adaptive", "force_rod": [[0.0, 20.0]], "rod_cell": 0.4},
+        model={"kind": "adaptive", "force_rod": [[0.0, 20.0]]},
         output={"every": 0.1, "criteria": True},
     )
-    plain = run(model={"kind": "adaptive", "force_rod": [[0.0, 20.0]], "rod_cell": 0.4}, output={"every": 0.1})
+    plain = run(model={"kind": "adaptive", "force_rod": [[0.0, 20.0]]}, output={"every": 0.1})
     print(f"\n50 cells, us a step of a whole run: rod {fixed:.0f}; with a manager {moving:.0f}")
     print(
         f"an output every 5 steps: rod {outputs:.0f}; with a manager {plain:.0f}; with criteria as fields {criteria:.0f}"

@@ -242,8 +242,8 @@ model: catenary
 
 `model: adaptive`, or no `model` for a cable that bends: rod where bending, torsion or slack ask for it, catenary
 elsewhere, at every step anew; docs/zones.md says by which criteria.
-`tolerance` is a part of the length; `force_rod` and `force_catenary` take whole base cells and, for rods, a buffer;
-base cells are `mesh.cells` (60) or `mesh.nodes`, and each is divided into 1 to 32 rod cells no longer than `rod_cell`.
+`tolerance` is a part of the length; `force_rod` and `force_catenary` take whole cells and, for rods, a buffer.
+The mesh is that of rods everywhere; `rod_cell` is for cells that follow the curvature (`curvature_error`).
 
 ```yaml
 environment: {fluid: {density: 1025}}

@@ -8,9 +8,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from hybrid.model.build import rod_cells
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.model_costs import (
     NAMED,
@@ -28,7 +25,7 @@ from hybrid.model.resolution import Resolution, for_motion, model_is_free, wants
 from hybrid.scene.schema import AdaptiveModel
 from hybrid.simulation.case import Case
 from hybrid.simulation.layer_mesh import layered
-from hybrid.simulation.mesh_survey import allowed, with_survey
+from hybrid.simulation.mesh_survey import with_survey
 from hybrid.simulation.static_case import StaticCase
 
 
@@ -39,25 +36,16 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
     survey = case.survey(resolution)
     if survey is None:
         return ModelChoice("rod", "the pre-run that would show what others cost failed"), resolution
-    resolution = for_motion(resolution, scene, survey.reach)
-    resolution = replace(resolution, zones=min(resolution.zones, allowed(scene, survey) / scene.length))
+    resolution = with_survey(resolution, scene, survey)
     model, demand = survey.model, survey.demand
-    moving = with_model(scene, "adaptive")
-    gradings: dict[str, Grading] = {
-        "rod": survey.grading(),
-        "catenary": survey.grading_of_catenary,
-        "adaptive": survey.grading_for(moving),
-    }
+    gradings: dict[str, Grading] = {"rod": survey.grading(), "catenary": survey.grading_of_catenary}
+    gradings["adaptive"] = gradings["rod"]
     found = ratios(scene, model, demand, resolution.zones * model.length)
-    counts = [grading.count(0.0, model.length, resolution.fineness) for grading in gradings.values()]
-    zones = gradings["adaptive"]
-    lengths = rod_cells(moving, model.cable, zones.s, zones)
-    parts = resolution.fineness * float(np.trapezoid(1.0 / lengths, zones.s))
+    rods, catenaries = (gradings[kind].count(0.0, model.length, resolution.fineness) for kind in ("rod", "catenary"))
     near = "it comes near itself, and contact of catenaries alone is not asked for" if case.came_near_itself else ""
     why_not = structural(scene, model.cable) or near or no_catenary(found, demand.s)
     share = rod_share(model, demand, found)
-    rods, catenaries, base = counts
-    each = costs(scene, model, (rods, catenaries, base, max(base, round(parts))), share, why_not)
+    each = costs(scene, model, (rods, catenaries, rods, rods), share, why_not)
     kind = cheapest(each).kind
     if kind != "rod":
         case.scene = with_model(scene, kind)

@@ -165,7 +165,8 @@ def _model(plan: Plan) -> str:
 def _mesh(plan: Plan) -> str:
     cells = sum(plan.cells)
     if plan.base_cells is not None:
-        return f"{plan.base_cells} cells as catenary, {cells} ({plan.unknowns} unknowns) if all is rod"
+        few = f"{plan.base_cells} cells as catenary, " if plan.base_cells < cells else ""
+        return f"{few}{_count(cells, 'cell')} ({plan.unknowns} unknowns) if all is rod"
     return f"{_count(cells, 'cell')}, {plan.unknowns} unknowns"
 
 
@@ -244,7 +245,8 @@ def contents_table(plan: Plan) -> Any:
     zones.add_row("zone", "from", "to", "cells", style="bold")
     moving = plan.base_cells is not None
     for zone, cells in zip(plan.zones, plan.cells, strict=True):
-        kind, count = ("adaptive", f"{plan.base_cells} to {cells}") if moving else (zone.kind, str(cells))
+        fewest = f"{plan.base_cells} to " if moving and plan.base_cells != cells else ""
+        kind, count = "adaptive" if moving else zone.kind, f"{fewest}{cells}"
         zones.add_row(kind, f"{zone.s_a:.6g} m", f"{zone.s_b:.6g} m", count)
     return Group("", entries, zones)
 

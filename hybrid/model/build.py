@@ -32,7 +32,6 @@ from hybrid.model.line import line_on, spins_freely
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
-from hybrid.model.mesh_grading import Grading
 from hybrid.model.payout import PayoutPlan, payout_of, payout_plan, shorter_behind_clamp
 from hybrid.model.plane import in_plane, planar
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, mesh_is_free
@@ -231,21 +230,15 @@ def _nodes(
     return None, *_placed(scene, cable, zone_plans(scene), cuts, resolution, DEFAULT_CELLS)
 
 
-# Base cells of a line whose zones move, when the scene does not say; rod cells as a part of (EI/w)^(1/3), the length
-# over which a cable without tension bends under its weight; the most rod cells in a base cell.
-BASE_CELLS, ROD_CELL, MOST_PARTS = 60, 0.25, 32
 LEAST_WEIGHT = 1e-3  # of the weight in air: a cable that floats bends under what is left of its weight
-GRADED_ROD_CELL = 1.0  # the same where the mesh follows the bends of an earlier run
-# Base cells of a graded mesh are as long as its rod cells but for rounding: up to so many more of these are none, or
-# rods of a coarse mesh would have as many cells as those of a fine one.
-NEARLY = 0.25
 # Twist, rad, that a cell takes of what the ends prescribe, at fineness 1: runs to compare with have cells four times as
 # long, and must stay below the twist at which a run stops (simulation.diagnostics).  Beyond so many cells it is left
 # to that: it is more likely that a stiffness is in another unit.
 TWIST, MOST_FOR_TWIST = 0.25, 5000
 FEWEST_CELLS = 4  # of a zone, however little is asked
-# Of rods whose cells follow the curvature: base cells, the shortest cell over (EI/w)^(1/3), most cells in a base cell.
-FOLLOWING_BASE, FOLLOWING_CELL, MOST_FOLLOWING = 24, 0.125, 512
+# Of rods whose cells follow the curvature: base cells without a mesh, and with one that does not say how many; the
+# shortest cell over (EI/w)^(1/3); most cells in a base cell.
+FOLLOWING_BASE, FOLLOWING_CELLS, FOLLOWING_CELL, MOST_FOLLOWING = 24, 60, 0.125, 512
 
 
 def given_zones(scene: Scene, layout: Layout) -> np.ndarray:
@@ -299,7 +292,7 @@ def _placed(
 ) -> tuple[Floats, tuple[Zone, ...]]:  # fmt: skip
     """Nodes and zones; usual: cells of a line whose scene does not say."""
     mesh, free = scene.mesh, mesh_is_free(scene)
-    carries = all(plan.kind == "rod" for plan in plans) and not isinstance(scene.model, AdaptiveModel)
+    carries = all(plan.kind == "rod" for plan in plans)
     if free and resolution.grading is not None:
         bounds = np.concatenate([[0.0], np.cumsum([plan.length for plan in plans])])
         bounds[-1] = scene.length
@@ -325,59 +318,32 @@ def _placed(
 
 
 def _layout(scene: Scene, cable: Material, cuts: Sequence[float], resolution: Resolution) -> Layout:
-    """Base cells, all rod."""
-    model = scene.model
+    """The cells that rods everywhere would have; where cells follow the curvature, base cells, all rod."""
+    model, whole = scene.model, (ZonePlan("rod", scene.length),)
     assert isinstance(model, AdaptiveModel)
-    follows, finer = follows_curvature(scene), resolution.fineness
-    if follows:  # base cells stay, whatever the fineness: what is asked of rods decides
-        resolution = replace(resolution, grading=None, fineness=max(resolution.fineness, 1.0))
-        base, _ = place_nodes((ZonePlan("rod", scene.length),), cuts, None, None, FOLLOWING_BASE)
+    if not follows_curvature(scene):
+        return of_rods(_placed(scene, cable, whole, cuts, resolution, DEFAULT_CELLS)[0])
+    finer = resolution.fineness
+    # base cells stay, whatever the fineness: what is asked of rods decides
+    resolution = replace(resolution, grading=None, fineness=max(finer, 1.0))
+    if mesh_is_free(scene):
+        base, _ = place_nodes(whole, cuts, None, None, FOLLOWING_BASE)
         assert model.curvature_error is not None
         base = shorter_behind_clamp(scene, cable, base, model.curvature_error, finer)
-    if not (follows and mesh_is_free(scene)):
-        base, _ = _placed(scene, cable, (ZonePlan("rod", scene.length),), cuts, resolution, BASE_CELLS)
-    if follows:
-        return Layout(base, _following_parts(scene, cable, base, resolution), np.ones(base.size - 1, bool))
-    cell = _rod_cells(scene, cable, base, resolution)
-    nearly = NEARLY if resolution.grading is not None else 1e-9
-    parts = np.clip(np.ceil(np.diff(base) / cell - nearly), 1, MOST_PARTS).astype(int)
-    layout = Layout(base, parts, np.ones(base.size - 1, bool))
-    # of a line that is paid out catenaries have the cells of rods, so that whatever enters and leaves is of one kind
-    return layout if payout_of(scene) is None else of_rods(layout.nodes)
-
-
-def _rod_cells(scene: Scene, cable: Material, base: Floats, resolution: Resolution) -> Floats:
-    """Longest cells (n,) m of rods in base cells between nodes (n+1,) m."""
-    middle = 0.5 * (base[:-1] + base[1:])
-    twisted = TWIST / np.maximum(twist_rate(scene, cable, middle), TWIST / scene.length)
-    cell = np.minimum(rod_cells(scene, cable, middle, resolution.grading), twisted)
-    return np.asarray(cell / resolution.fineness)
+    else:
+        base, _ = _placed(scene, cable, whole, cuts, resolution, FOLLOWING_CELLS)
+    return Layout(base, _following_parts(scene, cable, base, resolution), np.ones(base.size - 1, bool))
 
 
 def _following_parts(scene: Scene, cable: Material, base: Floats, resolution: Resolution) -> np.ndarray:
     """Finest cells (n,) of base cells between nodes (n+1,) m, where they follow the curvature."""
-    cell = _rod_cells(scene, cable, base, resolution)
+    assert isinstance(scene.model, AdaptiveModel)
+    middle = 0.5 * (base[:-1] + base[1:])
+    bend = cable.bending_length(LEAST_WEIGHT * 9.81 * cable.mass)[cable.piece(middle)]
+    twisted = TWIST / np.maximum(twist_rate(scene, cable, middle), TWIST / scene.length)
+    cell = np.minimum(scene.model.rod_cell or FOLLOWING_CELL * bend, twisted) / resolution.fineness
     halvings = np.ceil(np.log2(np.maximum(np.diff(base) / cell, 1.0)) - 1e-9)
     return np.asarray(np.minimum(2 ** halvings.astype(int), MOST_FOLLOWING))
-
-
-def rod_cells(scene: Scene, cable: Material, s: Floats, grading: Grading | None = None) -> Floats:
-    """Length, m, of the cells of rods that come and go, at places s (K,) m, at fineness 1.
-
-    As a part of the length over which a cable bends under its weight; where it is known how the cable bends, no
-    shorter than that asks for.
-    """
-    asked = scene.model.rod_cell if isinstance(scene.model, AdaptiveModel) else None
-    if asked:
-        return np.full(s.size, asked)
-    bend = cable.bending_length(LEAST_WEIGHT * 9.81 * cable.mass)[cable.piece(s)]
-    if follows_curvature(scene):
-        return np.asarray(FOLLOWING_CELL * bend)
-    if grading is None:
-        return np.asarray(ROD_CELL * bend)
-    if grading.rods is not None:
-        return np.asarray(np.interp(s, grading.s, grading.rods))
-    return np.asarray(np.minimum(grading.cell(s), GRADED_ROD_CELL * bend))
 
 
 def _refuse_single_rod_cells(zones: Sequence[Zone], zone_of: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""A mesh whose rods come and go: base cells, each one catenary cell, or several cells of one kind."""
+"""A mesh whose rods come and go: its cells; where cells follow the curvature, base cells of one or several cells."""
 
 from __future__ import annotations
 

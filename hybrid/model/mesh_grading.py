@@ -31,7 +31,6 @@ class Grading:
 
     s: Floats
     density: Floats
-    rods: Floats | None = None  # (K,) m, cells of rods that come and go, at fineness 1; None: as for any cable
 
     def count(self, a: float, b: float, fineness: float) -> int:
         """Cells of the stretch [a, b]."""

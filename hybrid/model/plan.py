@@ -47,7 +47,7 @@ class Plan:
     contents: tuple[Entry, ...]
     zones: tuple[Zone, ...]
     cells: tuple[int, ...]  # per zone
-    base_cells: int | None  # where zones move: cells if all were catenary; `cells` are those if all were rod
+    base_cells: int | None  # where zones move: cells if all were catenary; more of rods only where cells follow
     unknowns: int
     steps: int
     step: float  # s, of most steps

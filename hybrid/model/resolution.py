@@ -190,6 +190,7 @@ class Resolution:
     fixed; zones: error that neglected bending may make, as a part of the length; every: outputs of the result to one
     of such a run; follow: whether the error of neglected bending is followed along the run.  later: s, the largest step
     where no vibration is there that a ramp has set off along the line with more than `still` (N); 0: all are alike.
+    bends: error of curvature that is asked, as a part of the largest that a pre-run has shown; infinite: none is.
     """
 
     fineness: float
@@ -201,6 +202,7 @@ class Resolution:
     follow: bool = False
     later: float = 0.0
     still: float = 0.0
+    bends: float = inf
 
     def coarser(self, cells: float = 1.0, steps: float = 1.0) -> Resolution:
         """With cells and steps longer by these factors; the error of a step is of third order."""

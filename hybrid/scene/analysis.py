@@ -227,7 +227,9 @@ class AdaptiveModel(Table):
         "absent: 1e-3, or what accuracy leaves for it [-]",
     )
     rod_cell: Positive | None = Field(
-        default=None, description="length of the cells of a rod; absent: a quarter of (EI/w)^(1/3), w the weight [m]"
+        default=None,
+        description="with curvature_error: the shortest cells of rods; absent: an eighth of (EI/w)^(1/3), w the weight "
+        "[m]",
     )
     curvature_error: Positive | None = Field(
         default=None,

@@ -281,8 +281,6 @@ def _layers_are_meshed(resolution: Resolution | None, model: Model, mesh: Mesh |
     why = ""
     if mesh is not None or any(zone.cells or zone.ratio for zone in zones):
         why = f"{'mesh' if mesh is not None else 'model.zones'} already says where the cells are"
-    elif isinstance(model, AdaptiveModel) and model.rod_cell is not None:
-        why = "model.rod_cell already says how long the cells of rods are"
     elif not rods:
         why = "no part of the cable is a rod (model), and bending fades in rods alone"
     if why:

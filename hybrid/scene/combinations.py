@@ -311,6 +311,11 @@ def _used(use: Use, at: str = "") -> Callable[[Tables], Iterator[Place]]:
 
 MOVING_ZONES = Feature("zones that move", "model: adaptive", _moving)
 FOLLOWING_CELLS = Feature("cells that follow the curvature", "model.curvature_error", _of_moving("curvature_error"))
+STAYING_CELLS = Feature(
+    "zones that move on cells that stay", "model: adaptive",
+    lambda tables: (at for at in _moving(tables) if not tables["model"].curvature_error),
+)  # fmt: skip
+SHORTEST_CELLS = Feature("shortest cells of rods", "model.rod_cell", _of_moving("rod_cell"))
 ROTARY_INERTIA = Feature("rotary inertia", "rotary_inertia", _in_sections("rotary_inertia", of=lambda x: x.turns))
 TWO_STIFFNESSES = Feature(
     "two bending stiffnesses", "bending_stiffness: [EI_1, EI_2]",
@@ -426,6 +431,10 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         TORQUE_OF_TENSION, FOLLOWING_CELLS, "not worked out", "cells follow the curvature (model.curvature_error)",
         "nothing or 0", "leave curvature_error out",
+    ),
+    Refusal(
+        SHORTEST_CELLS, STAYING_CELLS, "physics", "rods and catenaries have the cells of one mesh, which stay",
+        fix="leave it out and give mesh.cells or mesh.nodes, or write curvature_error for cells that follow",
     ),
     Refusal(
         LAYERS, FOLLOWING_CELLS, "not worked out", "cells follow the curvature, as model.curvature_error has it",

@@ -257,7 +257,8 @@ class Diagnostics:
             finer = 0.3 * first / bend
             how = f"the bend at the end s = {s:g} m is sharper than the mesh"
         layout, paid = self._model.layout, self._model.payout
-        ask = "`ratio` grades them" if layout is None else "`model.rod_cell`"
+        follows = layout is not None and layout.parts.max() > 1
+        ask = "`model.rod_cell`" if follows else "`mesh.nodes` or `ratio`"
         if layout is not None and paid is not None and paid.follows and layout.parts[layout.base_of_cell[cell]] == 1:
             ask = "`mesh.cells`: those at the winch stay whole"
         return f"{how}: curvature and moment are wrong there; cells of {finer:.2g} m would do ({ask})"

@@ -23,6 +23,7 @@ from hybrid.model.coarsen import FEWER, picked, refined
 from hybrid.model.layout import Layout, edges
 from hybrid.model.payout_law import fastest
 from hybrid.model.resolution import Resolution, follows_curvature, requested_accuracy
+from hybrid.scene.accuracy import ROUGHEST
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.contact_equilibrium import nearness, settled_from
 from hybrid.simulation.equilibrium import MANY, equilibrium_of, solve_model
@@ -144,7 +145,7 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
     manager = DomainManager(
         model.cable, model.layout, resolution.zones * model.length, hold, _given(scene, model, ramp),
         model.tension_scale, criterion, ramp,
-        model.on_base, curvature_error, shares_asked(scene, curvature_error), resolution.fineness,
+        model.on_base, curvature_error, shares_asked(scene, curvature_error, resolution.bends), resolution.fineness,
     )  # fmt: skip
     manager.load(model.ends.moments)
     return manager
@@ -161,11 +162,16 @@ def _given(scene: Scene, model: Model, pace: float) -> np.ndarray:
     return rods_at_winch(scene, paid, model, paid.count(paid.first), pace, fastest(paid.law))
 
 
-def shares_asked(scene: Scene, curvature_error: float | None) -> dict[int, float]:
-    """Parts of the largest tension, curvature and moment along the line that leaving bending out may make."""
+def shares_asked(scene: Scene, curvature_error: float | None, bends: float = math.inf) -> dict[int, float]:
+    """Parts of the largest tension, curvature and moment along the line that leaving bending out may make.
+
+    bends: of `Resolution`: what limits of bending ask for as well.
+    """
     wanted = requested_accuracy(scene)
     parts = (wanted.of_tension, wanted.of_curvature, wanted.of_moment) if wanted is not None else (None,) * 3
     asked = {k: OF_ALONG * part for k, part in zip((TENSION, CURVATURE, MOMENT), parts, strict=True) if part}
+    if bends <= ROUGHEST:
+        asked[CURVATURE] = min(OF_ALONG * bends, asked.get(CURVATURE, np.inf))
     if curvature_error is not None:
         asked[CURVATURE] = min(curvature_error, asked.get(CURVATURE, np.inf))
     return asked

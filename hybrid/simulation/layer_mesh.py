@@ -22,8 +22,9 @@ from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model, twist_rate
 from hybrid.model.mesh import DEFAULT_CELLS
 from hybrid.model.mesh_grading import GROWTH, SAMPLES, Grading, layers
+from hybrid.model.model_costs import with_model
 from hybrid.model.payout import payout_of
-from hybrid.model.resolution import Resolution, mesh_is_free
+from hybrid.model.resolution import Resolution, follows_curvature, mesh_is_free
 from hybrid.scene.schema import AdaptiveModel
 from hybrid.simulation.section_layers import MORE
 
@@ -45,17 +46,26 @@ BESIDE = np.concatenate([[0.0], np.geomspace(0.05, 20.0, 40)])
 
 
 def layered(case: Case | StaticCase, resolution: Resolution) -> Resolution:
-    """With cells as bends and layers of the equilibrium ask for, of rods whose mesh is left open."""
+    """With cells as bends and layers of the equilibrium ask for, of rods whose mesh is left open.
+
+    Zones that move have the mesh of rods, hence that of an equilibrium of rods.
+    """
     scene = case.scene
-    if isinstance(scene.model, AdaptiveModel) or resolution.grading is not None or not mesh_is_free(scene):
+    if follows_curvature(scene) or resolution.grading is not None or not mesh_is_free(scene):
         return resolution
     if payout_of(scene) is not None:
         return resolution
+    moves = isinstance(scene.model, AdaptiveModel)
+    shown = replace(resolution) if moves else resolution  # a run begins with what was kept for its own resolution
+    if moves:
+        case.scene = with_model(scene, "rod")
     try:
-        model, state = case.first_shape(resolution)
+        model, state = case.first_shape(shown)
+        grading = grading_of(case, model, state)
     except ComputationError:
         return resolution  # the run says why
-    grading = grading_of(case, model, state)
+    finally:
+        case.scene = scene
     return resolution if grading is None else replace(resolution, grading=grading)
 
 

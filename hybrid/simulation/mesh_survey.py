@@ -9,36 +9,24 @@ from functools import cached_property
 import numpy as np
 
 from hybrid.kernels.state.state import Floats
-from hybrid.model.build import Model, rod_cells
+from hybrid.model.build import Model
 from hybrid.model.mesh_grading import AT_PLACE, LAYER, SAMPLES, Grading, grading, layers
 from hybrid.model.model_costs import Demand
-from hybrid.model.resolution import (
-    Reach,
-    RequestedAccuracy,
-    Resolution,
-    for_motion,
-    is_irregular,
-    requested_accuracy,
-    zones_are_free,
-)
+from hybrid.model.resolution import Reach, Resolution, for_motion, is_irregular, requested_accuracy
 from hybrid.model.sections import limits_along
 from hybrid.scene.accuracy import ROUGHEST
 from hybrid.scene.motion_checks import stationary_from
-from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.scene.schema import Scene
 from hybrid.simulation.run_sample import Outputs, reach_of
 
 # Cells and steps so many times as long as those of the first result; places at which it is looked at.
 CELLS, STEPS, POINTS = 2.0, 4.0, 201
 # Periods of a stationary irregular motion that the pre-run follows: what 98 % of its outputs ask for is known by then.
 PERIODS = 100
-# Rod cells in a base cell of zones that move.
-MOST_PARTS = 24.0
 # Part of the outputs of an irregular motion whose curvature cells must show.  With 1 (the largest) the ten storms of
 # bench/test_bench_irregular.py take about three times as long and are hardly better; with 0.9 largest forces are wrong
 # without an event.  Chosen on these ten.
 OFTEN = 0.98
-# Share of an error of curvature, moment or tension along the line that zones may make.
-OF_ALONG = 0.5
 
 
 def survey_resolution(resolution: Resolution) -> Resolution:
@@ -54,20 +42,10 @@ def survey_duration(scene: Scene) -> float:
 
 
 def with_survey(resolution: Resolution, scene: Scene, survey: Survey | None) -> Resolution:
-    """With cells where a pre-run shows that they should be, and zones as it shows that curvature needs them."""
+    """With cells where a pre-run shows that they should be, and the share of curvature that limits ask for."""
     if survey is None:
         return resolution
-    resolution = for_motion(resolution, scene, survey.reach)
-    zones = resolution.zones
-    if zones_are_free(scene):
-        zones = min(zones, allowed(scene, survey) / scene.length)
-    return replace(resolution, grading=survey.grading_for(scene), zones=zones)
-
-
-def allowed(scene: Scene, survey: Survey) -> float:
-    """Error of position, m, up to which zones may leave bending out, by what a scene asks of values along the line."""
-    asked = requested_accuracy(scene)
-    return survey.tolerance(asked) if asked is not None else np.inf
+    return replace(for_motion(resolution, scene, survey.reach), grading=survey.grading(), bends=survey.bends)
 
 
 def asks_along(scene: Scene) -> bool:
@@ -170,29 +148,6 @@ class Survey:
         stiff = self._square > 0.0
         return np.where(stiff, np.maximum(1.0, 0.5 * cell / np.sqrt(np.where(stiff, self._square, 1.0))), 1.0)
 
-    def tolerance(self, asked: RequestedAccuracy) -> float:
-        """Error of position, m, up to which zones may leave bending out for what is asked of values along the line.
-
-        A catenary lacks what curvature changes by within sqrt(EI/T), and has EI curvature^2/2 of tension too much.
-        Where this is more than a share of what is asked the line must be rod; infinite where it is so nowhere.
-        """
-        demand, must = self.demand, np.zeros(self.demand.s.size, bool)
-        sharpest = np.maximum(demand.curvature, np.maximum(*self._beside())) + self._jumps() * (
-            1.0 - 1.0 / self._smeared
-        )
-        if np.isfinite(self.bends):
-            must |= self._jumps() > OF_ALONG * self.bends * demand.curvature.max()
-        if asked.of_tension:
-            less = 0.5 * self._square * demand.least * sharpest**2
-            must |= less > OF_ALONG * asked.of_tension * demand.largest.max()
-        return float(np.min(OF_ALONG * (self._square * sharpest)[must], initial=np.inf))
-
-    def grading_for(self, scene: Scene) -> Grading:
-        """Cells for the model of a scene; the pre-run was of that model, or of rods."""
-        if not isinstance(scene.model, AdaptiveModel):
-            return self.grading()
-        return self.grading_of_moving_zones(scene.model, rod_cells(scene, self.model.cable, self.demand.s))
-
     def grading(self) -> Grading:
         """Cells of a line whose zones stay what they are, those of the pre-run."""
         model, demand = self.model, self.demand
@@ -208,20 +163,3 @@ class Survey:
     def grading_of_catenary(self) -> Grading:
         """Cells of a line that is catenary everywhere."""
         return self._grading(np.zeros(SAMPLES))
-
-    def grading_of_moving_zones(self, zones: AdaptiveModel, rod_cell: Floats) -> Grading:
-        """Base cells of a line whose zones move; rod_cell: (K,) m, length of the cells of its rods if curvature counts.
-
-        Where positions and tensions are all that is asked, base cells are those of rods everywhere, and are not cut.
-        """
-        beside = self._layers(np.ones(self.demand.s.size, bool), [])
-        exact = self.given is not None or self.along
-        if not exact and zones.rod_cell is None:
-            found = self._grading(beside)
-            return replace(found, rods=np.full(SAMPLES, self.model.length))
-        found = self.grading_of_catenary
-        rods = np.interp(found.s, self.demand.s, rod_cell)
-        if exact:
-            rods = 1.0 / (1.0 / rods + beside)
-        density = np.maximum(found.density, 1.0 / (MOST_PARTS * rods))
-        return replace(found, density=density, rods=rods if exact else None)

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import fields, replace
 from functools import cache
 from importlib.metadata import version
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ import numpy as np
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ResultError
 from hybrid.kernels.machine.cache import kernel_hash
-from hybrid.model.build import MOST_FOLLOWING, MOST_PARTS, Model, build
+from hybrid.model.build import MOST_FOLLOWING, Model, build
 from hybrid.model.layout import Layout
 from hybrid.model.mesh import MOST_CELLS, Zone
 from hybrid.model.mesh_grading import Grading
@@ -99,7 +100,7 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
     first = first_resolution(scene)
     if "later" not in tree:  # of a checkpoint of before, whose steps were short from one end to the other
         tree = tree | {"later": first.later * tree["step"] / first.step if first.step else 0.0, "still": first.still}
-    saved = matched(tree, resolution_tree(first) | {"grading": None}, "resolution")
+    saved = matched({"bends": inf} | tree, resolution_tree(first) | {"grading": None}, "resolution")
     for name in ("fineness", "step", "local", "zones", "later", "still"):
         asked, is_ = getattr(first, name), saved[name]
         if (asked is None) != (is_ is None):
@@ -108,18 +109,13 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
             raise ValueError(f"{name} = {is_:g}, where the scene asks for {asked:g}")
     grading = saved["grading"]
     if grading is not None:
-        template = {"s": np.zeros(0), "density": np.zeros(0)}
-        if grading.get("rods") is not None:
-            template["rods"] = np.zeros(0)
-        grading = Grading(**matched({k: x for k, x in grading.items() if x is not None}, template, "grading"))
+        grading = Grading(**matched(grading, {"s": np.zeros(0), "density": np.zeros(0)}, "grading"))
         s, density = grading.s, grading.density
         ordered = s.ndim == density.ndim == 1 and 1 < s.size == density.size and bool((np.diff(s) > 0.0).all())
         within = ordered and 0.0 <= s[0] < s[-1] <= scene.length * (1 + 1e-9) and density.min() > 0.0
-        if grading.rods is not None and not (grading.rods.shape == s.shape and grading.rods.min() > 0.0):
-            raise ValueError("cells of rods that no mesh has")
         if not within or saved["fineness"] * density.max() * scene.length > MOST_CELLS:
             raise ValueError("cells that no mesh has")
-    if not (saved["fineness"] * 100 <= MOST_CELLS and 1 <= saved["every"] <= FARTHEST):
+    if not (saved["fineness"] * 100 <= MOST_CELLS and 1 <= saved["every"] <= FARTHEST and saved["bends"] > 0.0):
         raise ValueError("cells that no mesh has")
     return Resolution(**saved | {"grading": grading})
 
@@ -162,7 +158,7 @@ def restored_model(scene: Scene, resolution: Resolution, saved: Mapping[str, Any
         layout = Layout(**matched({"here": None} | dict(mesh), template, "mesh"))
         _check_nodes(layout.base, scene)
         fits = layout.parts.shape == layout.rod.shape == (layout.base.size - 1,)
-        most = MOST_FOLLOWING if follows_curvature(scene) else MOST_PARTS
+        most = MOST_FOLLOWING if follows_curvature(scene) else 1
         fits &= layout.here is None or (layout.here.dtype == bool and layout.here.shape == (layout.parts.sum() + 1,))
         if not (fits and 1 <= layout.parts.min() <= layout.parts.max() <= most):
             raise ValueError("base cells that no mesh has")

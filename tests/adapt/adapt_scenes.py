@@ -83,9 +83,7 @@ def bending(**more: Any) -> Scene:
 def kinking(**more: Any) -> Scene:
     """A clump of 30 N on a light cable: sqrt(EI/T) sin(angle/2) from 11 to 100 mm; the tolerance is 60 mm."""
     clump = [{"kind": "clump", "at": 5.0, "mass": 3.0}]
-    return breathing(
-        9.9, 8.0, {"tolerance": 0.006, "rod_cell": 0.05} | more.pop("model", {}), mass=0.1, attachments=clump, **more
-    )
+    return breathing(9.9, 8.0, {"tolerance": 0.006} | more.pop("model", {}), mass=0.1, attachments=clump, **more)
 
 
 def nodding(**more: Any) -> Scene:
@@ -121,8 +119,8 @@ def lowering(**more: Any) -> Scene:
 def easing(normal: tuple[float, float, float], **more: Any) -> Scene:
     """A cable clamped where it is lowest, along its own tangent; its end comes near, and it goes slack at the clamp."""
     clamp = {"kind": "clamped", "position": (0, 0, 0), "tangent": (1, 0, 0), "normal": normal}
-    model = {"tolerance": 0.04} | more.pop("model", {})
-    return breathing(7.0, 2.5, model, start=clamp, height=6.0, duration=3.0, **more)
+    model = {"tolerance": 0.02} | more.pop("model", {})
+    return breathing(7.0, 2.0, model, start=clamp, height=6.0, duration=3.0, **more)
 
 
 def turning(**more: Any) -> Scene:

@@ -16,13 +16,12 @@ from hybrid.simulation.zone_switching import on_layout
 from hybrid.store.reader import Result
 
 # One rod cell a base cell: the same nodes whatever a zone is, so that what differs is bending alone.
-NODES = {"rod_cell": 1e9}
 
 
 @cache
 def ran(name: str, rod: bool = False) -> Result:
     what = {"bending": bending, "sagging": sagging}[name]()
-    model = what.model.model_copy(update=NODES | ({"force_rod": ((0.0, LENGTH),)} if rod else {}))
+    model = what.model.model_copy(update={"force_rod": ((0.0, LENGTH),)} if rod else {})
     output = what.output.model_copy(update={"errors": None if rod else True})
     return hybrid.run(what.model_copy(update={"model": model, "output": output}))
 

@@ -217,9 +217,9 @@ def test_off_as_the_manager_saw_it(name, tmp_path):
     loud = np.max([result[f"criteria/{k}"] / off for k, off in OFF.items()], axis=0)
     is_rod = np.array([flags_of(rods(result, k)) for k in range(len(result.times))])
     held = np.maximum(loud[:, :-1:2], loud[:, 2::2]) * is_rod  # in the base cells that are rod
-    before = result.times < gone[-1].t - 0.5 * DWELL  # while bending goes, ratios may rise again, to twice that
+    before = result.times < gone[-1].t - DWELL  # while bending goes, ratios may rise again, to twice that
     last = result.times[np.flatnonzero((held.max(axis=1) > 1.0) & before)[-1]]
-    assert DWELL - 2 * DT <= gone[-1].t - last <= 2.6 * DWELL + 2 * DT
+    assert 2 * DWELL - 4 * DT <= gone[-1].t - last <= 2.6 * DWELL + 2 * DT
     assert rods(result, -1) == []
 
 
@@ -235,7 +235,7 @@ def test_every_event_says_why(name):
     for e in goes(ran(name)):
         assert e.value < 1.0 and e.threshold == OFF[e.criterion] and e.criterion in e.text
     booked = sum(e.energy for e in events)
-    assert np.isfinite(booked) and (booked != 0.0 or not events)
+    assert np.isfinite(booked) and (booked != 0.0 or not events or name == "slack")  # which is straight
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -344,11 +344,10 @@ def test_nothing_asks_is_a_catenary(how):
 
 @pytest.mark.parametrize("how", ["always rod", "intolerant"])
 def test_everything_asks_is_a_rod(how):
-    """Rods of two cells in each base cell here: a quarter of (EI/w)^(1/3) is 0.1 m."""
     what = sagging(model={"force_rod": [[0, LENGTH]]} if how == "always rod" else {"tolerance": 1e-9})
     result = hybrid.run(what)
     assert all(rods(result, k) == [(0.0, LENGTH)] for k in range(len(result.times)))
-    same(result, fixed(what, "rod", np.linspace(0, LENGTH, 2 * CELLS + 1)))
+    same(result, fixed(what, "rod", BASE))
 
 
 def test_rods_that_come_and_go_have_no_rotary_inertia():
@@ -356,7 +355,7 @@ def test_rods_that_come_and_go_have_no_rotary_inertia():
     with pytest.raises(ValueError, match="rods that come and go have no rotary inertia"):
         sagging(rotary_inertia=0.01)
     what = sagging(model={"force_rod": [[0, LENGTH]]}, diameter=0.2)
-    same(hybrid.run(what), fixed(sagging(rotary_inertia=0, diameter=0.2), "rod", np.linspace(0, LENGTH, 2 * CELLS + 1)))
+    same(hybrid.run(what), fixed(sagging(rotary_inertia=0, diameter=0.2), "rod", BASE))
     plan = {x.what: x for x in hybrid.plan(what).contents}
     assert not plan["rotary inertia"].on and "come and go" in plan["rotary inertia"].why
 

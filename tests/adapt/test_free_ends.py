@@ -30,7 +30,7 @@ def hanging(random: np.random.Generator) -> dict[str, Any]:
             "start": {"kind": "pinned", "position": [0.0, 0.0, 0.0], "motion": {"ramp": 1.8 * period, "surge": surge}},
             "end": {"kind": "free"},
         },
-        "initial": "equilibrium", "mesh": {"cells": 80},
+        "initial": "equilibrium", "mesh": {"cells": 80, "ratio": 0.1},
         "time": {"duration": duration, "step": duration / 200.0}, "output": {"every": duration / 20.0, "points": 41},
     }  # fmt: skip
 
@@ -69,7 +69,7 @@ def defect(force: float, length: float, time: float) -> dict[str, Any]:
             "start": {"kind": "pinned", "position": [0.0] * 3, "motion": {"ramp": 15.1943 * time, "surge": surge}},
             "end": {"kind": "free"},
         },
-        "initial": "equilibrium", "mesh": {"cells": 80}, "model": "adaptive",
+        "initial": "equilibrium", "mesh": {"cells": 80, "ratio": 0.1}, "model": "adaptive",
         "time": {"duration": 13.8593 * time, "step": 0.0692965 * time},
         "output": {"every": 0.692963 * time, "points": 201},
     }  # fmt: skip

@@ -56,8 +56,9 @@ TASKS: dict[str, list[tuple[str, list[str]]]] = {
 }  # fmt: skip
 WHOLE: dict[str, list[Any]] = {
     "model": ["rod", "catenary", "adaptive", "zones",
-              {"kind": "adaptive", "tolerance": 1e-9}, {"kind": "adaptive", "rod_cell": 1e-9},
-              {"kind": "adaptive", "rod_cell": 1e9}, {"kind": "adaptive", "force_rod": [[0, 1e-9]]},
+              {"kind": "adaptive", "tolerance": 1e-9}, {"kind": "adaptive", "curvature_error": 0.1, "rod_cell": 1e-9},
+              {"kind": "adaptive", "curvature_error": 0.1, "rod_cell": 1e9}, {"kind": "adaptive", "rod_cell": 1.0},
+              {"kind": "adaptive", "force_rod": [[0, 1e-9]]},
               {"kind": "adaptive", "force_rod": [[0, 1]], "force_catenary": [[0.5, 2]]},
               {"kind": "adaptive", "hold_time": 1e-9}, {"kind": "catenary", "slack": "warn"},
               {"kind": "zones", "zones": []}, {"zones": [{"rod": 1}, {"catenary": 1}]},

@@ -35,7 +35,7 @@ def _scene(steps: int) -> hybrid.Scene:
     }
     return hybrid.validate_scene(
         {"cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "mesh": {"cells": 8},
-         "model": {"kind": "adaptive", "rod_cell": 1.3, "tolerance": 0.01, "hold_time": 2.0},
+         "model": {"kind": "adaptive", "tolerance": 0.01, "hold_time": 2.0},
          "time": {"duration": steps * STEP, "step": STEP}, "output": {"every": steps * STEP / 100, "points": 5}}
     )  # fmt: skip
 

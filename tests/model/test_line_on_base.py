@@ -20,7 +20,7 @@ ROUND = 4e-16  # a product and a sum may be one operation
 @pytest.mark.parametrize("name", ["touchdown", "rov_tether", "laying", "irregular_sea"])
 def test_a_line_on_base_cells_is_that_of_the_material(name: str) -> None:
     """Sections, floats, end bodies, waves, a seabed with friction; any base cells rod, any of their nodes there."""
-    scene = hybrid.load_scene(EXAMPLES / f"{name}.yaml", ["model={kind: adaptive}"])
+    scene = hybrid.load_scene(EXAMPLES / f"{name}.yaml", ["model={kind: adaptive, curvature_error: 0.05}"])
     model = build(scene)
     assert model.layout is not None and model.on_base is not None
     random = np.random.default_rng(1)

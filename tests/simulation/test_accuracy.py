@@ -393,7 +393,8 @@ def test_what_finer_runs_change_as_much_does_not_converge():
 def test_what_does_not_converge_is_written_and_printed_as_not_known(capsys, monkeypatch):
     """Curvature on cells that were chosen for positions: no figure beside it, in the tile and in the terminal."""
     monkeypatch.setenv("COLUMNS", "120")
-    result = hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["accuracy=1%", "time.duration=9.4"]))
+    asked = ["mesh=null", "model=rod", "accuracy={position: 1%, tension: 1%}", "time.duration=9.4"]
+    result = hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", asked))
     assert result.attributes["errors_not_converged"] == "curvature,bending_moment"
     assert [e.kind for e in result.events if "coarser ones did" in e.text] == ["not converged"]
     console = Console(False, False)

@@ -124,3 +124,13 @@ def test_rods_show_the_bend_at_the_clamp() -> None:
     (limit,) = coarse.verdicts().limits
     assert coarse.attributes["cells"] <= 165 and limit.verdict == "not verified"
     assert limit.why == "unresolved bend at s = 800 m"
+
+
+def test_zones_that_move_have_the_mesh_of_rods() -> None:
+    """At rest and in motion, where nothing is said of the mesh."""
+    asked = scene({"sections": [section(200, 500)]}, CLAMP, time={"duration": 0.1, "step": 0.1})
+    for of in (hybrid.run, hybrid.static):
+        rods, moving = (of(asked | {"model": model}) for model in ("rod", "adaptive"))
+        assert rods.mesh[-1].s.size > 105
+        assert np.array_equal(moving.mesh[-1].s, rods.mesh[-1].s)
+        assert any(zone.kind == "catenary" for zone in moving.zones[-1])

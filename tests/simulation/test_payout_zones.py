@@ -11,7 +11,7 @@ from test_payout_stretch import EA, ROPE, SAME, TABLE
 
 import hybrid
 
-ADAPTIVE = {"kind": "adaptive", "tolerance": 1e-3, "hold_time": 1.0, "rod_cell": 2.5}
+ADAPTIVE = {"kind": "adaptive", "tolerance": 1e-3, "hold_time": 1.0}
 CHANGES = ("grow", "split", "shrink", "merge")
 
 

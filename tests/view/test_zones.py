@@ -349,7 +349,9 @@ def test_the_picture_of_zones_says_why_a_stretch_is_rod() -> None:
         assert [(x.s_a, x.s_b) for x in first] == [(z.s_a, z.s_b) for z in result.zones[0] if z.kind == "rod"]
         assert [x.why[0] for x in first] == ["bending", "asked for by the scene"]
         said = why_rods(result)
-        assert said.startswith("rod at the start: s = 14 to 47 m, bending; s = 55 to 60 m, asked for by the scene")
+        assert said.startswith(
+            "rod at the start: s = 14.4 to 46.64 m, bending; s = 55.47 to 60 m, asked for by the scene"
+        )
         assert said.endswith("rod later: bending × 1") is any(x.kind == "grow" for x in result.events)
         words = [x.text for x in zone_map(result).items if isinstance(x, Text)]
         assert words == ["bending", "asked for by the scene"]
