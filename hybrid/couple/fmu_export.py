@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.scene.combinations import refuse_use
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import Scene
+from hybrid.scene.system import System
 from hybrid.simulation.stepped_ends import ENDS
 from hybrid.simulation.stepping import Simulation
+from hybrid.simulation.system_stepping import SystemSimulation
 from hybrid.store.selection import check_target, write_atomically
 
 # In the folder `resources` of the unit.
@@ -32,7 +33,7 @@ ABILITIES = {
 }  # fmt: skip
 
 
-def export_fmu(scene: SceneLike, path: str | Path, *, name: str | None = None, overwrite: bool = True) -> Path:
+def export_fmu(scene: SceneLike | System, path: str | Path, *, name: str | None = None, overwrite: bool = True) -> Path:
     """Write a scene as a co-simulation unit (FMI 3.0) and return its path.
 
     scene: as of `hybrid.Simulation`; it is built once, so that a unit that cannot start is not written.  path: the
@@ -49,8 +50,6 @@ def export_fmu(scene: SceneLike, path: str | Path, *, name: str | None = None, o
         advice = 'pip install "hybrid-cable[fmu]"'
         raise ResultError(f"an FMU is made by pythonfmu3, which is not installed\n    try:      {advice}") from None
     found = as_scene_or_system(scene)
-    refuse_use(found, "fmu", given="several lines")
-    assert isinstance(found, Scene)
     model = re.sub(r"\W", "_", name or target.stem)
     if not model[:1].isalpha():
         model = f"cable_{model}"
@@ -63,7 +62,8 @@ def export_fmu(scene: SceneLike, path: str | Path, *, name: str | None = None, o
         # a module of its own for each unit: several may run in one interpreter
         token = hashlib.sha256((text + (folder / SCENE).read_text(encoding="utf-8")).encode()).hexdigest()[:16]
         script = folder / f"hybrid_{model}_{token}.py"
-        script.write_text(_SCRIPT.format(model=model), encoding="utf-8")
+        unit = "CableUnit" if isinstance(found, Scene) else "LinesUnit"
+        script.write_text(_SCRIPT.format(model=model, unit=unit), encoding="utf-8")
         made = FmuBuilder.build_FMU(
             script, folder / "made", [folder / SCENE, folder / INTERFACE, *files], **ABILITIES
         )  # fmt: skip
@@ -71,19 +71,19 @@ def export_fmu(scene: SceneLike, path: str | Path, *, name: str | None = None, o
     return target
 
 
-_SCRIPT = '''"""A cable of hybrid as a co-simulation unit; made by `hybrid export`."""
+_SCRIPT = '''"""A scene of hybrid as a co-simulation unit; made by `hybrid export`."""
 
 from pythonfmu3 import Fmi3Slave
 
-from hybrid.couple.fmu_unit import CableUnit
+from hybrid.couple.fmu_unit import {unit}
 
 
-class {model}(CableUnit, Fmi3Slave):
+class {model}({unit}, Fmi3Slave):
     pass
 '''
 
 
-def _write_scene(scene: Scene, folder: Path) -> list[Path]:
+def _write_scene(scene: Scene | System, folder: Path) -> list[Path]:
     """The scene in `folder`, and copies there of the files that it names."""
     data, copies = scene.model_dump(mode="json", exclude_none=True), dict[str, Path]()
 
@@ -109,9 +109,17 @@ def _yaml(data: Any) -> str:
     return json.dumps(data, indent=1)  # JSON is YAML 1.2
 
 
-def _interface(scene: Scene) -> dict[str, Any]:
-    """What may be set of the ends, and where they begin."""
+def _interface(scene: Scene | System) -> dict[str, Any]:
+    """What may be set of the ends or points, and where they begin."""
     with Simulation(scene) as cable:
+        if isinstance(cable, SystemSimulation):
+            points = {
+                name: {"settable": cable.settable(name), "position": np.round(cable.point(name).position, 12).tolist()}
+                for name in cable.scene.points
+            }
+            time = cable.scene.require_time()
+            return {"points": points, "lines": [*cable.scene.lines], "step": time.step, "duration": time.duration}
+        assert isinstance(scene, Scene)
         positions = cable.state.position[[0, -1]]
         time = scene.require_time()
         payout = next(filter(None, (getattr(end, "payout", None) for end in scene.ends.both)), None)

@@ -1,13 +1,16 @@
-"""A cable as a co-simulation unit of FMI 3.0: what runs inside an FMU that `hybrid.couple.fmu_export` has written.
+"""A scene as a co-simulation unit of FMI 3.0: what runs inside an FMU that `hybrid.couple.fmu_export` has written.
 
 Inputs are what the ends reach at the end of a communication step: place (m), velocity (m/s) and rotation vector (rad,
 from the start's frame) of held ends, force (N) and moment (N m) of free ones; all inertial.  Outputs are forces and
 moments of the cable on what holds its ends, places and velocities of the ends, the largest and the lowest tension.
+Of several lines points stand in place of ends: places and velocities of fixed ones that the scene does not move are
+inputs, the force of its lines on each, its place and velocity, and tensions of each line are outputs.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +31,10 @@ from hybrid.couple.fmu_export import INTERFACE, SCENE
 from hybrid.errors import ComputationError, HybridError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.driven_end import rotation
-from hybrid.scene.read import load_scene
+from hybrid.scene.read import load_scene, load_system
 from hybrid.simulation.stepped_ends import ENDS
 from hybrid.simulation.stepping import Simulation
+from hybrid.simulation.system_stepping import SystemSimulation
 
 UNITS = (
     Unit("m", m=1), Unit("s", s=1), Unit("m/s", m=1, s=-1), Unit("rad", rad=1), Unit("N", kg=1, m=1, s=-2),
@@ -51,59 +55,80 @@ OUTPUTS = {
     "node_position": ("m", "where the end is"),
     "node_velocity": ("m/s", "velocity of the end"),
 }
+OF_POINTS = {
+    "force": "force of the lines on the point",
+    "node_position": "where the point is",
+    "node_velocity": "velocity of the point",
+}
 
 
-class CableUnit:
-    """The variables and steps of an FMU; a subclass names the model and inherits pythonfmu3's Fmi3Slave as well."""
+class SceneUnit:
+    """What the units of any scene have in common."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         self._folder = Path(self.resources)  # type: ignore[attr-defined]
         known = json.loads((self._folder / INTERFACE).read_text(encoding="utf-8"))
-        self._cable: Simulation | None = None
+        self._simulation: Any = None
         self._values: dict[str, Floats] = {}
-        self._recovered: Floats | None = None  # tension along the cable now
+        self._recovered: dict[str, Floats] = {}  # tension along each line now
         self._refused = ""  # why a state could not be set
         self.output_file, self.inputs_at_begin = "", False
-        self.author, self.description = "hybrid", f"cable {known['name']}: hybrid, Kirchhoff rods and catenaries"
+        self.author, self.description = "hybrid", f"{known['name']}: hybrid, Kirchhoff rods and catenaries"
         self.default_experiment = DefaultExperiment(0.0, known["duration"], known["step"])
         self.register_units(UNITS)  # type: ignore[attr-defined]
-        self.payout_rate, self._winch = 0.0, bool(known["winch"])
-        self._register(known["ends"], bool(known["payout"]))
+        self._register_common()
+        self.register_parts(known)
 
-    def _register(self, ends: dict[str, Any], pays_out: bool) -> None:
+    def begun(self) -> Any:
+        """The simulation of the scene, begun."""
+        raise NotImplementedError
+
+    def register_parts(self, known: dict[str, Any]) -> None:
+        """Register the variables of the scene; known: its interface."""
+        raise NotImplementedError
+
+    def apply(self, step: float) -> None:
+        """Hand the inputs of a step (s) to the simulation."""
+        raise NotImplementedError
+
+    def value_of(self, part: str, name: str) -> Floats:
+        """An output (3,) of an end or a point."""
+        raise NotImplementedError
+
+    def tension_of(self, line: str) -> Floats:
+        """Tension along a line now, at the points of the result.  ValueError: there is none."""
+        raise NotImplementedError
+
+    @property
+    def simulation(self) -> Any:
+        """The simulation, begun when it is first needed: parameters are set before."""
+        if self._simulation is None:
+            self._simulation = self.begun()
+        return self._simulation
+
+    def _register_common(self) -> None:
         fixed = {"causality": Fmi3Causality.parameter, "variability": Fmi3Variability.fixed}
         add = self.register_variable  # type: ignore[attr-defined]
         clock = {"causality": Fmi3Causality.independent, "variability": Fmi3Variability.continuous, "unit": "s"}
-        add(Float64("time", getter=lambda: self.cable.t, **clock))
+        add(Float64("time", getter=lambda: self.simulation.t, **clock))
         text = "HDF5 file to write the result to; empty: none is written"
         add(String("output_file", description=text, **fixed))
         text = "inputs are of the begin of a step: places go on with their velocity for one step"
         add(Boolean("inputs_at_begin", description=text, **fixed))
-        for end in ENDS:
-            settable = ends[end]["settable"]
-            wanted = {"position": settable.count("position"), "velocity": settable.count("position")}
-            wanted |= {"rotation": settable.count("frame"), "applied_force": settable.count("force")}
-            wanted["applied_moment"] = settable.count("moment")
-            for name, (unit, text) in INPUTS.items():
-                if wanted[name]:
-                    begin = ends[end]["position"] if name == "position" else np.zeros(3)
-                    self._vector(end, name, unit, text, np.array(begin))
-            for name, (unit, text) in OUTPUTS.items():
-                self._vector(end, name, unit, text, None)
-        if self._winch:
-            text = "rate at which line is paid out at the end of a step; negative: taken in"
-            what = {"causality": Fmi3Causality.input, "variability": Fmi3Variability.continuous, "unit": "m/s"}
-            add(Float64("payout_rate", description=text, **what))
-        if pays_out:
-            text = "unstretched length that is out"
-            what = {"causality": Fmi3Causality.output, "variability": Fmi3Variability.continuous, "unit": "m"}
-            add(Float64("length", description=text, getter=lambda: self.cable.length, **what))
-        for name, text in (("tension_max", "largest"), ("tension_min", "lowest")):
-            what = {"causality": Fmi3Causality.output, "variability": Fmi3Variability.continuous, "unit": "N"}
-            add(Float64(name, description=f"{text} tension along the cable", getter=getattr(self, f"_{name}"), **what))
 
-    def _vector(self, end: str, name: str, unit: str, text: str, begin: Floats | None) -> None:
+    def output(self, name: str, unit: str, text: str, get: Callable[[], float]) -> None:
+        """Register a number that is read."""
+        what = {"causality": Fmi3Causality.output, "variability": Fmi3Variability.continuous, "unit": unit}
+        variable = Float64(name, description=text, getter=get, **what)
+        self.register_variable(variable, nested=False)  # type: ignore[attr-defined]
+
+    def tensions(self, line: str, prefix: str, of: str) -> None:
+        """Register the extremes of the tension along a line."""
+        self.output(f"{prefix}tension_max", "N", f"largest tension {of}", lambda: float(self._tension(line).max()))
+        self.output(f"{prefix}tension_min", "N", f"lowest tension {of}", lambda: float(self._tension(line).min()))
+
+    def vector(self, end: str, name: str, unit: str, text: str, begin: Floats | None) -> None:
         """Three scalars, which all masters can connect."""
         if begin is not None:
             self._values[f"{end}.{name}"] = begin
@@ -111,7 +136,7 @@ class CableUnit:
         for axis, letter in enumerate("xyz"):
 
             def get(axis: int = axis) -> float:
-                return float((self._values[f"{end}.{name}"] if begin is not None else self._of(end, name))[axis])
+                return float((self._values[f"{end}.{name}"] if begin is not None else self.value_of(end, name))[axis])
 
             def put(value: float, axis: int = axis) -> None:
                 self._values[f"{end}.{name}"][axis] = value
@@ -122,60 +147,39 @@ class CableUnit:
             )  # fmt: skip
             self.register_variable(variable, nested=False)  # type: ignore[attr-defined]
 
-    # --- the cable ----------------------------------------------------------------------------------
+    def placed(self, part: str, step: float) -> tuple[Floats, Floats] | None:
+        """Place and velocity that are set of an end or a point, at the end of a step (s); None: none are."""
+        place, speed = (self._values.get(f"{part}.{name}") for name in ("position", "velocity"))
+        if place is None or speed is None:
+            return None
+        return (place + step * speed if self.inputs_at_begin else place), speed
 
-    @property
-    def cable(self) -> Simulation:
-        """The simulation, begun when it is first needed: parameters are set before."""
-        if self._cable is None:
-            self._cable = Simulation(load_scene(self._folder / SCENE), self.output_file or None)
-            self._frames = self._cable.frames()
-        return self._cable
-
-    def _of(self, end: str, name: str) -> Floats:
-        k, cable = ENDS.index(end), self.cable
-        if name == "node_position":
-            return cable.state.position[-k]
-        if name == "node_velocity":
-            return cable.state.velocity[-k]
-        try:
-            forces = cable.forces()
-        except ValueError as error:  # an exception here would end the master
-            self.log(str(error), Fmi3Status.warning)  # type: ignore[attr-defined]
-            return np.full(3, np.nan)
-        return forces[k] if name == "force" else forces[2 + k]
-
-    def _tension(self) -> Floats:
-        """Tension along the cable, at the points of the result, as recovered once for a state."""
-        if self._recovered is None:
+    def _tension(self, line: str) -> Floats:
+        """Tension along a line, as recovered once for a state."""
+        if line not in self._recovered:
             try:
-                self._recovered = self.cable.tension()
-            except ValueError as error:
+                self._recovered[line] = self.tension_of(line)
+            except ValueError as error:  # an exception here would end the master
                 self.log(str(error), Fmi3Status.warning)  # type: ignore[attr-defined]
                 return np.full(1, np.nan)
-        return self._recovered
-
-    def _tension_max(self) -> float:
-        return float(self._tension().max())
-
-    def _tension_min(self) -> float:
-        return float(self._tension().min())
+        return self._recovered[line]
 
     # --- what a master calls ------------------------------------------------------------------------
 
     def exit_initialization_mode(self) -> None:
-        self.cable  # noqa: B018  # begun now at the latest
+        self.simulation  # noqa: B018  # begun now at the latest
 
     def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:
         """One communication step; `discard` where a shorter one may do (after a return to a saved state)."""
-        self._recovered = None
+        self._recovered.clear()
         try:
             if self._refused:
                 raise ValueError(self._refused)
-            if abs(current_time - self.cable.t) > CLOCK * max(step_size, 0.0):
-                raise ValueError(f"a step from {current_time:.9g} s, but the cable is at {self.cable.t:.9g} s")
-            self._apply(step_size)
-            self.cable.advance(current_time + step_size)
+            now = self.simulation.t
+            if abs(current_time - now) > CLOCK * max(step_size, 0.0):
+                raise ValueError(f"a step from {current_time:.9g} s, but the cable is at {now:.9g} s")
+            self.apply(step_size)
+            self.simulation.advance(current_time + step_size)
         except ComputationError as error:
             return self._failed(error, Fmi3Status.discard)
         except (ValueError, HybridError) as error:
@@ -188,44 +192,146 @@ class CableUnit:
         self.log(str(error), status)  # type: ignore[attr-defined]
         return Fmi3StepResult(status=status)
 
-    def _apply(self, step: float) -> None:
-        """Hand the inputs to the simulation."""
-        values = self._values
-        if self._winch:
-            self.cable.set_payout(self.payout_rate)
-        for k, end in enumerate(ENDS):
-            place, speed, turn = (values.get(f"{end}.{name}") for name in ("position", "velocity", "rotation"))
-            if place is not None and speed is not None:
-                place = place + step * speed if self.inputs_at_begin else place
-            frame = None if turn is None else rotation(turn) @ self._frames[k]
-            if place is not None or frame is not None:
-                self.cable.set_end(end, place, speed, frame)
-            force, moment = values.get(f"{end}.applied_force"), values.get(f"{end}.applied_moment")
-            if force is not None:
-                self.cable.set_force(end, force, moment)
-
     def terminate(self) -> None:
         try:
-            if self._cable is not None:
-                self._cable.close()
+            if self._simulation is not None:
+                self._simulation.close()
         except HybridError as error:  # an exception here would end the master
             self.log(str(error), Fmi3Status.error)  # type: ignore[attr-defined]
 
     def _get_fmu_state(self) -> dict[str, Any]:
         values = {name: value.copy() for name, value in self._values.items()}
         try:
-            return {"cable": self.cable.save(), "values": values}
+            return {"cable": self.simulation.save(), "values": values}
         except ValueError as error:  # a step has failed: this is no state to come back to, which the return to it says
             self.log(str(error), Fmi3Status.error)  # type: ignore[attr-defined]
             return {"cable": None, "values": values}
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        self._recovered = None
+        self._recovered.clear()
         try:
-            self.cable.restore(state["cable"])
+            self.simulation.restore(state["cable"])
         except ValueError as error:  # an exception here would end the master: the next step says it
             self._refused = str(error)
             return
         self._refused = ""
         for name, value in state["values"].items():
             self._values[name][:] = value
+
+
+class CableUnit(SceneUnit):
+    """The variables and steps of an FMU of one cable; a subclass names the model and inherits Fmi3Slave as well."""
+
+    def register_parts(self, known: dict[str, Any]) -> None:
+        """Of both ends what may be set and read, the length that is out, the tension."""
+        self.payout_rate, self._winch = 0.0, bool(known["winch"])
+        for end in ENDS:
+            settable = known["ends"][end]["settable"]
+            wanted = {"position": settable.count("position"), "velocity": settable.count("position")}
+            wanted |= {"rotation": settable.count("frame"), "applied_force": settable.count("force")}
+            wanted["applied_moment"] = settable.count("moment")
+            for name, (unit, text) in INPUTS.items():
+                if wanted[name]:
+                    begin = known["ends"][end]["position"] if name == "position" else np.zeros(3)
+                    self.vector(end, name, unit, text, np.array(begin))
+            for name, (unit, text) in OUTPUTS.items():
+                self.vector(end, name, unit, text, None)
+        if self._winch:
+            text = "rate at which line is paid out at the end of a step; negative: taken in"
+            what = {"causality": Fmi3Causality.input, "variability": Fmi3Variability.continuous, "unit": "m/s"}
+            self.register_variable(Float64("payout_rate", description=text, **what))  # type: ignore[attr-defined]
+        if known["payout"]:
+            self.output("length", "m", "unstretched length that is out", lambda: self.cable.length)
+        self.tensions("", "", "along the cable")
+
+    @property
+    def cable(self) -> Simulation:
+        """The simulation."""
+        found: Simulation = self.simulation
+        return found
+
+    def begun(self) -> Simulation:
+        """The cable at its start."""
+        found = Simulation(load_scene(self._folder / SCENE), self.output_file or None)
+        self._frames = found.frames()
+        return found
+
+    def value_of(self, part: str, name: str) -> Floats:
+        """An output (3,) of an end; NaN: of a step that has failed."""
+        k, cable = ENDS.index(part), self.cable
+        if name == "node_position":
+            return cable.state.position[-k]
+        if name == "node_velocity":
+            return cable.state.velocity[-k]
+        try:
+            forces = cable.forces()
+        except ValueError as error:  # an exception here would end the master
+            self.log(str(error), Fmi3Status.warning)  # type: ignore[attr-defined]
+            return np.full(3, np.nan)
+        return forces[k] if name == "force" else forces[2 + k]
+
+    def tension_of(self, line: str) -> Floats:
+        """Tension along the cable."""
+        return self.cable.tension()
+
+    def apply(self, step: float) -> None:
+        """Hand the inputs to the cable."""
+        values = self._values
+        if self._winch:
+            self.cable.set_payout(self.payout_rate)
+        for k, end in enumerate(ENDS):
+            placed, turn = self.placed(end, step), values.get(f"{end}.rotation")
+            frame = None if turn is None else rotation(turn) @ self._frames[k]
+            if placed is not None or frame is not None:
+                place, speed = placed or (None, None)
+                self.cable.set_end(end, place, speed, frame)
+            force, moment = values.get(f"{end}.applied_force"), values.get(f"{end}.applied_moment")
+            if force is not None:
+                self.cable.set_force(end, force, moment)
+
+
+class LinesUnit(SceneUnit):
+    """The same of several lines, whose fixed points are set."""
+
+    def register_parts(self, known: dict[str, Any]) -> None:
+        """Of every point its place, velocity and force, with inputs of those that may be set; tensions of lines."""
+        self._points = [name for name, point in known["points"].items() if point["settable"]]
+        for point, of in known["points"].items():
+            for name in ("position", "velocity") if of["settable"] else ():
+                unit, text = INPUTS[name]
+                begin = np.array(of["position"] if name == "position" else np.zeros(3))
+                self.vector(point, name, unit, text.replace("the end at", "the point at"), begin)
+            for name, text in OF_POINTS.items():
+                self.vector(point, name, OUTPUTS[name][0], text, None)
+        for line in known["lines"]:
+            self.tensions(line, f"{line}.", f"along line {line}")
+
+    @property
+    def lines(self) -> SystemSimulation:
+        """The simulation."""
+        found: SystemSimulation = self.simulation
+        return found
+
+    def begun(self) -> SystemSimulation:
+        """The lines at their start."""
+        return SystemSimulation(load_system(self._folder / SCENE), self.output_file or None)
+
+    def value_of(self, part: str, name: str) -> Floats:
+        """An output (3,) of a point; NaN: a step has failed, and nothing was saved before it."""
+        if self.lines.closed:
+            return np.full(3, np.nan)
+        point = self.lines.point(part)
+        return {"force": point.force, "node_position": point.position, "node_velocity": point.velocity}[name]
+
+    def tension_of(self, line: str) -> Floats:
+        """Tension along a line.  ValueError: the simulation is over."""
+        if self.lines.closed:
+            raise ValueError("the simulation is over: there are no tensions")
+        return self.lines.tension(line)
+
+    def apply(self, step: float) -> None:
+        """Hand the inputs to the points."""
+        for name in self._points:
+            placed = self.placed(name, step)
+            assert placed is not None
+            self.lines.set_point(name, *placed)

@@ -26,7 +26,7 @@ Tables = Mapping[str, Any]
 Kind = Literal["physics", "not worked out", "several lines"]
 # Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
 USE, SYSTEM, LINE = "use", "system", "line"
-Use = Literal["", "motion", "stepped", "changed loads", "fmu"]
+Use = Literal["", "motion", "stepped", "changed loads"]
 LEAVE_OUT = "leave it out"
 ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
@@ -364,7 +364,6 @@ STEPPED = Feature("steps from outside", "hybrid.Simulation", _used("stepped"))
 CHANGED_LOADS = Feature(
     "loads that change in mid-run", "hybrid resume --set KEY=VALUE", _used("changed loads", "settings")
 )
-FMU = Feature("co-simulation (FMU)", "hybrid.export_fmu", _used("fmu", "lines"))
 
 # Of one cable alone, by keys that several lines do not have.
 ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
@@ -510,10 +509,6 @@ REFUSALS: tuple[Refusal, ...] = (
         CHANGED_LOADS, SEVERAL_LINES, "several lines",
         "the result is of several lines: they go on with the loads they have", "nothing to change",
         "run the changed scene from its start",
-    ),
-    Refusal(
-        FMU, SEVERAL_LINES, "several lines", "a unit is of one cable, whose ends are set from outside",
-        "one cable, with `cable` and `ends`", "hybrid.SystemSimulation steps several lines in Python",
     ),
     *(
         Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)

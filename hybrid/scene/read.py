@@ -160,7 +160,7 @@ def _parsed(text: str, file: str, overrides: Sequence[str]) -> tuple[Scene, list
 def one_cable(scene: Scene | System, renamed: list[RenamedKey], file: str = "") -> tuple[Scene, list[RenamedKey]]:
     """The same; SceneError if it is of several lines, which is not what is asked for."""
     if not isinstance(scene, Scene):
-        fix = "hybrid.run, static, plan and SystemSimulation take several lines; hybrid.load_system reads them"
+        fix = "hybrid.run, static, plan and Simulation take several lines; hybrid.load_system reads them"
         raise SceneError(
             [Complaint("lines", f"{len(scene.lines)} lines", "one cable, with `cable` and `ends`", fix)], file
         )

@@ -24,8 +24,9 @@ from hybrid.model.driven_end import DrivenEnd
 from hybrid.model.resolution import first_resolution
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.read import SceneLike, as_scene
-from hybrid.scene.schema import missing_time
+from hybrid.scene.read import SceneLike, as_scene_or_system
+from hybrid.scene.schema import Scene, missing_time
+from hybrid.scene.system import System
 from hybrid.simulation.case import Case
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.direct_steps import DirectSteps
@@ -33,6 +34,7 @@ from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.layer_mesh import layered
 from hybrid.simulation.stepped import CableState, Saved, Triple, in_space, iterations_allowed, one_thread, tension_now
 from hybrid.simulation.stepped_ends import STILL, SteppedEnds
+from hybrid.simulation.system_stepping import SystemSimulation
 from hybrid.simulation.transient import StepFailed
 from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
@@ -50,6 +52,7 @@ NUMBER = (int, float, np.integer, np.floating)
 class Simulation(SteppedEnds):
     """A cable in motion that is stepped from outside; a context manager.
 
+    Of several lines it is a `hybrid.SystemSimulation`, whose points are set in place of ends.
     scene: as of `hybrid.run`; its time table gives the step (without one, steps follow the motion) and the duration,
     beyond which nothing is computed.  output: the HDF5 file to write; None keeps the result in memory.  criterion: as
     of `hybrid.run`.  Constructing it finds the start that the scene asks for, a static equilibrium perhaps, and nothing
@@ -61,12 +64,20 @@ class Simulation(SteppedEnds):
     Raises SceneError, ResultError and ComputationError as `hybrid.run` does.
     """
 
+    def __new__(cls, scene: SceneLike | System, *args: Any, **more: Any) -> Any:
+        read = as_scene_or_system(scene)
+        if not isinstance(read, Scene):
+            return SystemSimulation(read, *args, **more)
+        made = super().__new__(cls)
+        made.scene = read
+        return made
+
     def __init__(
-        self, scene: SceneLike, output: str | Path | None = None, *, overwrite: bool = True,
+        self, scene: SceneLike | System, output: str | Path | None = None, *, overwrite: bool = True,
         criterion: UserCriterion | None = None, most_iterations: int | None = None,
     ) -> None:  # fmt: skip
         self._most = iterations_allowed(most_iterations)
-        found = in_space(as_scene(scene))
+        found = in_space(self.scene)  # which was read to tell what is to be stepped
         self.scene = found.model_copy(update={"contact": found.contact.of_ends_that_are_set()})
         if self.scene.time is None:
             raise SceneError([missing_time(self.scene)])

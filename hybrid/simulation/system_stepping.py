@@ -12,13 +12,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.state.report import FORCE_A
 from hybrid.kernels.state.state import Floats
 from hybrid.model.driven_end import FRAME, TURN, DrivenEnd
 from hybrid.scene.combinations import refuse_use
-from hybrid.scene.points import FreePoint
-from hybrid.scene.read import as_scene_or_system, scene_text
+from hybrid.scene.points import FixedPoint
+from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import missing_time
 from hybrid.scene.system import System
 from hybrid.simulation.stepped import CableState, Triple, one_thread, triple
@@ -48,15 +49,19 @@ class SystemSimulation:
 
     scene: several lines, as of `hybrid.run`; its time table gives the longest step and the duration, beyond which
     nothing is computed.  output: the HDF5 file to write; None keeps the result in memory.  Constructing it finds the
-    equilibrium that the motion starts from.  One thread at a time.  Raises SceneError, ResultError and
-    ComputationError as `hybrid.run` does.
+    equilibrium that the motion starts from.  criterion: as of `hybrid.run`.  One thread at a time.  Raises SceneError,
+    ResultError and ComputationError as `hybrid.run` does.
     """
 
-    def __init__(self, scene: System | str | Path | Mapping[str, Any], output: str | Path | None = None, *,
-                 overwrite: bool = True) -> None:  # fmt: skip
+    def __init__(
+        self, scene: SceneLike | System, output: str | Path | None = None, *, overwrite: bool = True,
+        criterion: UserCriterion | None = None, most_iterations: int | None = None,
+    ) -> None:  # fmt: skip
         found = as_scene_or_system(scene)
         if not isinstance(found, System):
             raise TypeError("scene: expected several lines; hybrid.Simulation steps one cable")
+        if most_iterations is not None:
+            raise TypeError("most_iterations: steps of several lines are made until they have converged; leave it out")
         if found.time is None:
             raise SceneError([missing_time(found)])
         refuse_use(found, "stepped")
@@ -73,7 +78,7 @@ class SystemSimulation:
             self._stack.enter_context(locked(self._target))
         self._closed = False
         try:
-            self._run = SystemRun(found, self._target, scene_text(found), moves=True)
+            self._run = SystemRun(found, self._target, scene_text(found), moves=True, criterion=criterion)
             self._run.begin_motion()
         except LineFailed as failed:
             raise self._fail(failed) from None
@@ -103,10 +108,9 @@ class SystemSimulation:
         self._check_open()
         if not isinstance(name, str) or name not in self._driven:
             self._check_point(name)
-            point = self.scene.points[name]
-            if isinstance(point, FreePoint) or self.scene.body_of(name) is not None:
+            if not isinstance(self.scene.points[name], FixedPoint):
                 raise ValueError(f"points.{name} is free or on a body: only fixed points are set")
-            if getattr(point, "motion", None) is not None:
+            if not self.settable(name):
                 raise ValueError(f"points.{name} has a motion in the scene: leave it out to set the point from outside")
             model = self._run.model
             self._driven[name] = [
@@ -114,6 +118,12 @@ class SystemSimulation:
                 for line, end in self.scene.lines_at(name)
             ]
         self._next[name] = triple(position, "position"), STILL if velocity is None else triple(velocity, "velocity")
+
+    def settable(self, name: str) -> bool:
+        """Whether `set_point` moves a point: it is fixed, and has no motion in the scene."""
+        self._check_point(name)
+        point = self.scene.points[name]
+        return isinstance(point, FixedPoint) and point.motion is None
 
     @one_thread
     def advance(self, until: float) -> float:
@@ -251,6 +261,23 @@ class SystemSimulation:
         k = self._line(name)
         model, x = self._run.model.models[k], self._run.state.lines[k]
         return CableState(self.t, model.line.s.copy(), x.r.copy(), x.v.copy(), x.T.copy(), model.zones)
+
+    @one_thread
+    def tension(self, name: str) -> Floats:
+        """Tension (ns,) N of a line now at the points of the result, recovered between cells and at the ends as
+
+        written there; `line(name).tension` is that of the cells, and costs less.
+        """
+        k, run = self._line(name), self._run
+        run.ends_of_now()
+        line, state = run.lines[k], run.state.lines[k]
+        seen = line.observer.look(line.state_for_output(run.t, run.solver.lines[k].ends, state, run.solver.work[k]))
+        return np.array(seen.tension[:, 0])
+
+    @property
+    def closed(self) -> bool:
+        """Whether the simulation is over, and its result written."""
+        return self._closed
 
     @one_thread
     def forces(self, name: str) -> tuple[Floats, Floats]:

@@ -84,6 +84,60 @@ def test_steps_are_taken_again_from_a_saved_state(unit: Path, tmp_path: Path) ->
         cable.freeFMUState(saved)
 
 
+LINES = """
+environment: {fluid: {density: 1025}}
+points:
+  foot: {position: [-40, 0, -30]}
+  ship: {position: [40, 0, 0]}
+  tug: {position: [0, 30, 0], motion: {heave: {amplitude: 0.2, period: 4}, ramp: 2}}
+  buoy: {initial_guess: [0, 0, -2], mass: 300, volume: 0.5, drag_area: 1}
+lines:
+  leg: {start: foot, end: buoy, sections: [&rope {length: 50, mass: 5, diameter: 0.05, axial_stiffness: 1e6}], mesh: {cells: 8}}
+  hose: {start: ship, end: buoy, sections: [{<<: *rope, length: 42}], mesh: {cells: 8}}
+  tow: {start: tug, end: buoy, sections: [{<<: *rope, length: 35}], mesh: {cells: 8}}
+time: {duration: 2, step: 0.05}
+"""
+
+
+def test_several_lines_are_a_unit_whose_points_are_set(tmp_path: Path) -> None:
+    """Forces, places and tensions are those of `hybrid.Simulation`; steps are taken again from a saved state."""
+    (tmp_path / "lines.yaml").write_text(LINES)
+    unit = hybrid.export_fmu(tmp_path / "lines.yaml", tmp_path / "lines.fmu")
+    same = hybrid.Simulation(tmp_path / "lines.yaml")
+    assert isinstance(same, hybrid.SystemSimulation)
+    with running(unit, tmp_path / "open") as (lines, number):
+        inputs = {x.rsplit(".", 1)[0] for x in number if x.endswith(".position.x") and ".node_" not in x}
+        assert inputs == {"foot.position", "ship.position"}
+
+        def go(k: int, height: float) -> list[float]:
+            lines.setFloat64([number["ship.position.z"], number["ship.velocity.z"]], [height, 0.04 * k])
+            step(lines, k)
+            names = [
+                *(f"ship.force.{x}" for x in "xyz"),
+                *(f"buoy.node_position.{x}" for x in "xyz"),
+                "tow.tension_max",
+            ]
+            return list(lines.getFloat64([number[x] for x in names]))
+
+        for k in range(6):
+            there = go(k, 0.001 * k**2)
+            same.set_point("ship", [40, 0, 0.001 * k**2], [0, 0, 0.04 * k])
+            same.set_point("foot", [-40, 0, -30])
+            same.advance(0.05 * (k + 1))
+        ship, buoy = same.point("ship"), same.point("buoy")
+        assert there == pytest.approx([*ship.force, *buoy.position, same.tension("tow").max()], rel=1e-12)
+        saved = lines.getFMUState()
+        one, _ = go(6, 0.03), lines.setFMUState(saved)
+        two, _ = go(6, 0.02), lines.setFMUState(saved)
+        assert go(6, 0.03) == one != two
+        lines.freeFMUState(saved)
+    tow = same.tension("tow").max()
+    result = same.result()
+    assert result.times[-1] == pytest.approx(0.3) and tow == pytest.approx(
+        result.lines["tow"].tension[-1].max(), rel=1e-12
+    )
+
+
 def test_a_frame_turns_by_a_rotation_vector(tmp_path: Path) -> None:
     scene = hybrid.parse_scene(ROD)
     unit = hybrid.export_fmu(scene, tmp_path / "rod.fmu")

@@ -51,6 +51,13 @@ def system(duration: float = 1.0) -> hybrid.SystemSimulation:
     return hybrid.SystemSimulation(data | {"time": {"duration": duration, "step": 0.05}})
 
 
+def test_what_is_of_one_cable_is_said() -> None:
+    data = next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene
+    data = data.model_copy(update={"time": hybrid.scene.analysis.Time(duration=1.0, step=0.05)})
+    with pytest.raises(TypeError, match="most_iterations"):
+        hybrid.Simulation(data, most_iterations=3)
+
+
 def uses_of_a_system(s: hybrid.SystemSimulation) -> Iterator[Callable[[], Any]]:
     for x in NO_TIMES:
         yield lambda x=x: s.advance(x)

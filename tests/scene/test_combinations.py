@@ -86,7 +86,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.FOLLOWING_CELLS, c.SEVERAL_LINES): ({ONE + "model": FOLLOWING["model"]}, ""),
     (c.SETTLED_FRICTION, c.SEVERAL_LINES): ({ONE + "initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
     (c.CHANGED_LOADS, c.SEVERAL_LINES): ({}, "changed loads"),
-    (c.FMU, c.SEVERAL_LINES): ({}, "fmu"),
 }  # fmt: skip
 BY_SCHEMA = [x for x in REFUSALS if isinstance(x.feature.places, Absent)]
 OF_ARRAYS = [c.RELEASED_TWIST]
