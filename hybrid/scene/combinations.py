@@ -352,9 +352,6 @@ LAYERS = Feature("cells to a boundary layer", "resolution.cells_per_layer",
 ACCURACY = Feature("accuracy", "accuracy", _accuracy)
 ERRORS = Feature("estimated errors", "output.errors", _errors)
 CHOSEN_STEPS = Feature("steps that follow the motion", "time.tolerance, or no time.step", _chosen_steps)
-SETTLED_FRICTION = Feature("friction that has settled in the equilibrium", "initial.friction",
-                           _asks("initial", "friction",
-                                 lambda x: getattr(x, "friction", "neglected") != "neglected"))  # fmt: skip
 CLAMPED_CONNECTION = Feature("a clamped connection", "lines.NAME.connections", _clamped)
 BREAKS_OFF_CLAMP = Feature("a break at a clamp", "break_at", _breaks_off_clamp)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
@@ -500,10 +497,6 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal(
         FOLLOWING_CELLS, SEVERAL_LINES, "several lines", "cells of several lines have lengths that stay", fix=ALONE
-    ),
-    Refusal(
-        SETTLED_FRICTION, SEVERAL_LINES, "several lines", "friction is neglected in every equilibrium of several lines",
-        "neglected",
     ),
     Refusal(
         CHANGED_LOADS, SEVERAL_LINES, "several lines",

@@ -146,7 +146,7 @@ def _untwisted(model: Model, line: Line, start: State) -> State:
 
 
 def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equilibrium:
-    settle = _settling(scene)
+    settle = settling(scene)
     slack = model.slack == "warn" and not quick
 
     def keeps_turns(state: State) -> bool:
@@ -162,10 +162,10 @@ def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equil
 
 def _settles(scene: Scene, model: Model, t: float) -> bool:
     """Whether friction holds the cable where it starts, so that no other start will do."""
-    return bool(model.line.bits & FRICTION) and (bool(_settling(scene)) or not model.ends.at(t).held.any())
+    return bool(model.line.bits & FRICTION) and (bool(settling(scene)) or not model.ends.at(t).held.any())
 
 
-def _settling(scene: Scene) -> str:
+def settling(scene: Scene) -> str:
     """How friction is to settle, as of `solve_statics`: a shape that the scene gives is where the line was laid."""
     asked = scene.initial
     if not isinstance(asked, StaticStart) or asked.friction != "settled":

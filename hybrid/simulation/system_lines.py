@@ -201,7 +201,7 @@ class LineResult:
         """
         line = self.model.line
         self.diagnostics.found_by(found.pushed, slack_cell(x, state), state)
-        if line.bits & FRICTION:
+        if line.bits & FRICTION and self.number not in found.with_friction:
             text = "this equilibrium of several lines is the one without friction on the seabed"
             self.events.event(0.0, 0.0, self.model.length, "static friction neglected", text)
         touches = found.settled and bool(self.books.touch[:1].any())

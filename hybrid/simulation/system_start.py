@@ -10,14 +10,21 @@ import numpy as np
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.junctions.bodies import NUMBERS
 from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
+from hybrid.kernels.state.forces import FRICTION
 from hybrid.kernels.state.state import Floats
 from hybrid.model.system import SystemModel, balanced_places, starts_between
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
-from hybrid.simulation.equilibrium import count_turns
+from hybrid.simulation.equilibrium import count_turns, settling
 from hybrid.simulation.system_contact_equilibrium import settle, solve_with_contact
 from hybrid.solve.joined import JoinedLine, SystemState, joined_ends
-from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
+from hybrid.solve.system_statics import (
+    LineFailed,
+    Start,
+    SystemEquilibrium,
+    settled_with_friction,
+    solve_system_statics,
+)
 
 # Equilibria until the water around members is that of the place found, and what of the largest wetted part, velocity
 # and acceleration there counts as the same.
@@ -27,12 +34,17 @@ MOST_ROUNDS, SAME_WATER = 40, 1e-8
 FAR = 3.0
 
 
-def equilibrium_of_system(system: System, model: SystemModel, t: float) -> SystemEquilibrium:
-    """Equilibrium with the loads of time t (s; infinity: of full size).  ComputationError: none is found."""
+def equilibrium_of_system(system: System, model: SystemModel, t: float, friction: bool = True) -> SystemEquilibrium:
+    """Equilibrium with the loads of time t (s; infinity: of full size).  ComputationError: none is found.
+
+    friction: whether it settles on the bed, of lines that ask for that.
+    """
     try:
         numbers = model.body_numbers(t)
         found = solve_with_contact(model, joined_lines(model, t), numbers, lambda: _starts(system, model))
         _keep_turns(model, t, found)
+        if friction:
+            found = _with_friction(model, t, found, numbers)
         if not any(body.members for body in model.bodies):
             return found
         part, before = 1.0, None
@@ -78,7 +90,24 @@ def solve_from(
     lines = joined_lines(model, t)
     if found.settled:
         return _keep_turns(model, t, settle(model, lines, bodies, start, near=True))
+    if found.with_friction:
+        ways = dict.fromkeys(found.with_friction, "start")
+        return _keep_turns(model, t, settled_with_friction(lines, len(model.free), bodies, ways, found, start))
     return _keep_turns(model, t, solve_system_statics(lines, len(model.free), bodies, iter([(name, start)])))
+
+
+def _with_friction(model: SystemModel, t: float, found: SystemEquilibrium, bodies: Floats) -> SystemEquilibrium:
+    """The equilibrium in which friction on the bed has settled, of lines whose scene asks for that."""
+    ways = {
+        k: way
+        for k, (name, x) in enumerate(zip(model.names, model.models, strict=True))
+        if x.line.bits & FRICTION and (way := settling(model.scenes[name]))
+    }
+    if not ways or found.settled:
+        return found
+    first = SystemState([x.start for x in model.models], model.body_places)
+    lines = joined_lines(model, t)
+    return _keep_turns(model, t, settled_with_friction(lines, len(model.free), bodies, ways, found, first))
 
 
 def _keep_turns(model: SystemModel, t: float, found: SystemEquilibrium) -> SystemEquilibrium:

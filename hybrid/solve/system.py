@@ -468,9 +468,11 @@ class SystemSolver:
         taken = self._solve(task, states, states)
         states.bodies[:, PLACE:FRAME] += self.body_work[:, U : U + 3]
         states.bodies[:, V:] = 0.0
-        for work, state in zip(self.work, states.lines, strict=True):
+        for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
             state.r[:] += work.u
             state.vd[:], state.wd[:] = 0.0, 0.0  # of the springs
+            if x.line.bits & FRICTION:
+                state.slip[:] = x.sea.slid
         return taken
 
     def newton(self, start: SystemState) -> tuple[SystemTaken, SystemState]:

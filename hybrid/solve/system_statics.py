@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -15,7 +15,9 @@ from hybrid.kernels.state.state import NO_ADDRESS, Floats
 from hybrid.solve.contact_statics import damped, stop
 from hybrid.solve.flaws import fold_text, lowest_tension, slack_text
 from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
+from hybrid.solve.laid import laid_on_bed
 from hybrid.solve.statics import CALM, HARDENING, LIMP, NEARLY_STIFF, PUSHED, RELAXING_STEPS, SOFT_BED, nudged
+from hybrid.solve.stepper import Stepper
 from hybrid.solve.system import SystemSolver
 
 
@@ -30,6 +32,7 @@ class SystemEquilibrium:
     residual: float
     solver: SystemSolver  # whose reports are those of the solution
     settled: bool = False  # True where a damped motion with contact led there
+    with_friction: frozenset[int] = frozenset()  # numbers of the lines of which friction on the bed took part
 
     @property
     def pushed(self) -> bool:
@@ -90,6 +93,53 @@ def solve_system_statics(
         if these:  # the last way, a damped motion, is that of a real line
             raise _failed(lines, these[-1].taken, these[-1].states, path)
     raise AssertionError("one of the ways has failed with the first way's outcome")
+
+
+def settled_with_friction(
+    lines: Sequence[JoinedLine], points: int, bodies: Floats, ways: Mapping[int, str], found: SystemEquilibrium,
+    first: SystemState,
+) -> SystemEquilibrium:  # fmt: skip
+    """The equilibrium with friction on the bed of the lines named in `ways`, by number, as of one cable.
+
+    ways: "pull": laid along the equilibrium without friction (`found`) without tension, then pulled tight, all such
+    lines together; "start", and where that fails: at rest after a damped motion from the first shapes.  LineFailed.
+    """
+    kept = [x.line.bits & ~WAVES & ~(0 if k in ways else FRICTION) for k, x in enumerate(lines)]
+    rough = [x._replace(line=x.line._replace(bits=bits)) for x, bits in zip(lines, kept, strict=True)]
+    solver, path, total = SystemSolver(rough, points, bodies), list(found.path), found.iterations
+    attempts: list[tuple[str, Callable[[], SystemState]]] = []
+    if all(way == "pull" for way in ways.values()):
+        how = "pulled tight against friction from where lines lay without tension"
+        attempts.append((how, lambda: _laid(solver, ways, found.state)))
+    attempts.append(("settled with friction from the first shapes", lambda: _stuck(solver, points, ways, first)))
+    failed = list[tuple[SystemTaken, SystemState]]()
+    for how, start in attempts:
+        taken, states = solver.newton(start())
+        total += taken.iterations
+        path.append(f"{how}: {taken.outcome.cause if taken.outcome else 'found'} ({total} iterations in all)")
+        if taken.outcome == Outcome.OK:
+            residual = solver.evaluate_forces(states, solver.anchor).residual
+            return SystemEquilibrium(states, tuple(path), total, residual, solver, with_friction=frozenset(ways))
+        failed.append((taken, states))
+    raise _failed(rough, *failed[0], path)
+
+
+def _laid(solver: SystemSolver, ways: Iterable[int], states: SystemState) -> SystemState:
+    """The states with these lines laid on the bed without tension, their ends where they are."""
+    out = states.copy()
+    for k in ways:
+        x = solver.lines[k]
+        out.lines[k] = laid_on_bed(x.line, x.sea, x.ends, out.lines[k])  # type: ignore[index]
+    return out
+
+
+def _stuck(solver: SystemSolver, points: int, ways: Iterable[int], first: SystemState) -> SystemState:
+    """Where a damped motion comes to rest from the first shapes, in which friction holds what it can of these lines."""
+    out = first.copy()
+    for k in ways:
+        x = solver.lines[k]
+        Stepper(x.line, x.length, x.scale).static_friction(x.sea, x.ends, out.lines[k])
+    return _relax(solver, points, out)[0]
 
 
 class _Attempt(NamedTuple):

@@ -85,3 +85,57 @@ def test_compression_that_friction_holds_is_told_and_does_not_stop_the_run() -> 
     told = [event for event in result.events if event.kind == "slack"]
     assert told and "friction holds it on the seabed" in told[0].text
     assert -MU * WEIGHT * 5.0 < result.tension.min() < 0.0
+
+
+def as_lines(scene: dict[str, Any]) -> dict[str, Any]:
+    """The same chain as a system of one line."""
+    (section,), ends = scene["cable"]["sections"], scene["ends"]
+    points = {name: {k: x for k, x in end.items() if k != "kind"} for name, end in ends.items()}
+    line = {"start": "start", "end": "end", "sections": [section]}
+    line |= {key: scene[key] for key in ("mesh", "model", "initial")}
+    output = {key: x for key, x in scene["output"].items() if key != "exact"}
+    same = {key: scene[key] for key in ("environment", "time")}
+    return same | {"points": points, "lines": {"chain": line}, "output": output}
+
+
+@pytest.mark.parametrize("model", ["catenary", "adaptive"])
+def test_a_line_of_several_has_the_friction_of_the_cable(model: str) -> None:
+    """In the equilibrium and in the motion from there; zones that move come to rest with friction from the rod's."""
+    scene = chain(cells=100, time={"duration": 1.0, "step": 0.05}, output={"every": 0.5, "points": 141, "exact": True})
+    scene["ends"]["end"]["motion"] = {"heave": {"amplitude": 1.0, "period": 6.0}, "ramp": 3.0}
+    if model == "adaptive":
+        scene["model"] = {"kind": "adaptive", "hold_time": 0.5}
+        scene["cable"]["sections"][0]["bending_stiffness"] = 1e4
+    cable, lines = hybrid.run(hybrid.validate_scene(scene)), hybrid.run(as_lines(scene))
+    line = lines.lines["chain"]
+    assert "friction" in lines.attributes["static_path"] and line.tension[0].min() < 1e-2 * line.tension[0].max()
+    assert np.abs(line.position - cable.position).max() < 1e-9 * 700.0
+    assert np.abs(line.tension - cable.tension).max() < 1e-7 * cable.tension.max()
+    assert np.abs(line.tension[0] - cable.tension[0]).max() < 1e-9 * cable.tension.max()
+    assert [*line.zones] == [*cable.zones]
+    assert "static friction neglected" not in {event.kind for event in line.events}
+
+
+def test_a_buoy_on_lines_with_settled_friction_stays_where_it_is() -> None:
+    """Soft lines slide: tension falls by mu w along the bed, to nothing at the anchors; without friction it does not."""
+    (section,) = chain(length=430.0, stiffness=5e6)["cable"]["sections"]
+    feet = {f"foot{k}": {"position": [400 * math.cos(2.1 * k), 400 * math.sin(2.1 * k), 0]} for k in range(3)}
+    buoy = {"initial_guess": [0, 0, 85], "mass": 2e5, "volume": 560.0, "drag_area": 20, "force": [3e4, 0, 0]}
+    line = {"end": "buoy", "sections": [section], "mesh": {"cells": 100}, "model": "catenary"}
+    scene = {
+        "environment": chain()["environment"], "points": feet | {"buoy": buoy},
+        "lines": {f"leg{k}": line | {"start": foot, "initial": {"kind": "equilibrium", "friction": "settled"}}
+                  for k, foot in enumerate(feet)},
+        "time": {"duration": 10.0, "step": 0.1}, "output": {"every": 5.0, "points": 101},
+    }  # fmt: skip
+    found = hybrid.run(scene)
+    place = found["points/buoy/position"]
+    assert np.abs(place - place[0]).max() < 1e-7
+    for leg in found.lines.values():
+        assert np.abs(leg.position - leg.position[0]).max() < 1e-6
+        low, high = np.searchsorted(leg.tension[0], [0.1 * leg.tension[0].max(), 0.3 * leg.tension[0].max()])
+        slope = np.diff(leg.tension[0][low:high]) / np.diff(leg.s[low:high])
+        assert leg.tension[0, 0] < 1e-3 * leg.tension[0].max() and slope == pytest.approx(MU * WEIGHT, rel=1e-4)
+    for each in scene["lines"].values():  # type: ignore[attr-defined]
+        each["initial"] = {"kind": "equilibrium"}
+    assert min(leg.tension[-1].min() for leg in hybrid.static(scene).lines.values()) > 5e4
