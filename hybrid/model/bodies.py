@@ -39,9 +39,10 @@ def frame_of(rotation: tuple[float, float, float]) -> Floats:
 
 
 def angles_of(frame: Floats) -> Floats:
-    """Roll, pitch and yaw (3,) deg of axes (3, 3)."""
-    roll, pitch = np.arctan2(frame[2, 1], frame[2, 2]), np.arcsin(np.clip(-frame[2, 0], -1.0, 1.0))
-    return np.degrees([roll, pitch, np.arctan2(frame[1, 0], frame[0, 0])])
+    """Roll, pitch and yaw (..., 3) deg of axes (..., 3, 3)."""
+    x, z = frame[..., 0, :], frame[..., 2, :]
+    roll, pitch = np.arctan2(z[..., 1], z[..., 2]), np.arcsin(np.clip(-z[..., 0], -1.0, 1.0))
+    return np.degrees(np.stack([roll, pitch, np.arctan2(frame[..., 1, 0], x[..., 0])], axis=-1))
 
 
 def loads_of(given: tuple[GivenLoad, ...]) -> tuple[EndLoad, ...]:

@@ -41,7 +41,7 @@ class Quantities:
         self.pipes = Pipes(scene) if any(x.pipe is not None for x in scene.cable.sections) else None
         self._scene, self._begin = whole_scene(scene)
         self._seabed = scene.environment.seabed is not None
-        # nodes (m+1, 3) m and radii of cells (m,) m of other lines at this moment, by name
+        # nodes (nb, m+1, 3) m and radii of cells (m,) m of other lines in the outputs that are looked at, by name
         self.others: dict[str, tuple[Floats, Floats]] = {}
         # (n, 2) m, of the excursions in their order; NaN until there is a touchdown
         self.first = np.array([
@@ -128,14 +128,14 @@ class Quantities:
 
     def _clearance(self, q: Quantity, what: int, v: Observation) -> Floats:
         if q.other is not None:
-            b, rb = self.others[q.other]
+            there, rb = self.others[q.other]
         else:
             other = q.path if q.path is not None else (q.point,)
-            b, rb = np.array(other, float), np.full(max(len(other) - 1, 1), 0.5 * q.diameter)
+            there, rb = np.array(other, float)[None], np.full(max(len(other) - 1, 1), 0.5 * q.diameter)
         first, last, radius = self.cells(q, v)
         nodes, found = v.of_line("s", slice(None)), []
         for output, r in enumerate(v.r[first : last + 1].transpose(2, 0, 1)):
-            s = nodes[:, min(output, nodes.shape[1] - 1)]
+            s, b = nodes[:, min(output, nodes.shape[1] - 1)], there[min(output, len(there) - 1)]
             if q.normal is not None:
                 n = np.array(q.normal) / np.linalg.norm(q.normal)
                 height = (r - b[0]) @ n

@@ -172,7 +172,10 @@ class SystemOutput(Table):
         default={},
         description="further quantities over time by name: forces and angles at ends, touchdown, layback, clearance",
     )
-    exact: Truth = Field(default=True, description="steps end at outputs, of several lines always: true")
+    exact: Truth = Field(
+        default=False,
+        description="steps end at outputs; else an output within a step is interpolated in time, to second order",
+    )
     criteria: Truth = Field(
         default=False, description="also write the criteria of lines whose zones move, as fields over time and s"
     )
@@ -180,13 +183,6 @@ class SystemOutput(Table):
         default=None,
         description="estimate how wrong the result is, by mesh and time step; absent: where an accuracy is asked",
     )
-
-    @model_validator(mode="after")
-    def _steps_end_at_outputs(self) -> SystemOutput:
-        if not self.exact:
-            expected = "true, because outputs of several lines are those of steps"
-            refuse([Finding(("exact",), expected, "leave it out, or write `exact: true`", "false")])
-        return self
 
 
 class System(Table):

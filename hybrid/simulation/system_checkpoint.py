@@ -33,6 +33,7 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
     body_work = run.solver.body_work[:, :SPRING]
     return {
         "t": run.t, "steps": run.steps, "last": run.last_step, "rho": run.last_rho, "loaded": run.loaded,
+        "interval": run.interval, "worked": run.loop.worked[1, :, :SPRING],
         "leg": [*run.leg], "cpu": run.cpu, "dry": sorted(run.dry), "bodies": run.state.bodies, "body_work": body_work,
         "lines": lines, "broken": [*run.failures.broken], "rest": run.rest,
         "control": run.loop.control(),
@@ -50,6 +51,8 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     # It took members as at the first guess, and rotations were within half a turn of 0.
     older = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "rotations": run.rotations.last}
     older["rho"] = run.system.require_time().rho_inf
+    complete = "interval" in saved  # else steps ended at outputs
+    older |= {"interval": 0.0, "worked": run.loop.worked[1, :, :SPRING]}
     saved = older | dict(saved)
     saved["zones"] = zones_of_today(saved["zones"])
     near = [x.number for x in run.lines if "self_contact" in _of(saved, x.name) and not x.touches]
@@ -66,6 +69,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         if name in template["zones"]:
             line["envelope"] = None  # of other meshes as well
         line["report"] = np.full_like(line["report"], np.inf)  # it may have numbers that are not finite
+        line["before"]["report"] = line["report"]
         if "self_contact" in line:
             line["self_contact"] = None  # as many places of friction as there are
     found = matched(dict(saved), template)
@@ -76,6 +80,9 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     run.start_from(found["rest"])
     run.make_solver()
     set_state(run, found)
+    if not complete:
+        for line in run.lines:
+            line.impose_now()
 
 
 def _of(saved: Mapping[str, Any], name: str) -> Mapping[str, Any]:
@@ -101,6 +108,8 @@ def of_today(lines: Any, template: Mapping[str, Any]) -> Any:
             line = line | {"report": np.pad(report, (0, REPORT_SIZE - report.size))}
         if mine is not None and "torsion" in mine:
             line = {"torsion": mine["torsion"]} | line
+        if mine is not None:
+            line = {"before": mine["before"]} | line
         if mine is not None and isinstance(line.get("noted"), dict):
             line = line | {"noted": mine["noted"] | line["noted"]}
         found[name] = line
@@ -119,11 +128,12 @@ def zones_of_today(zones: Any) -> Any:
 
 def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
     """Be as when `checkpoint` was called, of a run with the same things broken, without a look at its form."""
-    run.stand_at(found["t"], found["steps"], found["last"], found["rho"])
+    run.stand_at(found["t"], found["steps"], found["last"], found["rho"], found["interval"])
     run.loaded = found["loaded"]
     run.leg, run.dry, run.cpu = (found["leg"][0], found["leg"][1]), set(found["dry"]), found["cpu"]
     run.loop.take_control(found["control"])
     run.state.bodies[:], run.solver.body_work[:, :SPRING] = found["bodies"], found["body_work"]
+    run.loop.worked[0], run.loop.worked[1, :, :SPRING] = run.solver.body_work, found["worked"]
     run.quantities.restore(found["quantities"])
     run.rotations.last[:] = found["rotations"]
     for line, x, work, state in zip(run.lines, run.solver.lines, run.solver.work, run.state.lines, strict=True):

@@ -33,11 +33,13 @@ from hybrid.kernels.state.books import (
     STIFF,
     STORED,
     STRETCHED,
+    VARIES,
     Books,
     blank_books,
+    sample_size,
 )
 from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one
+from hybrid.kernels.state.state import Batch, Floats, State, Work
 from hybrid.model.build import Model
 from hybrid.model.output_points import output_points
 from hybrid.model.sections import section_changes
@@ -54,7 +56,7 @@ from hybrid.simulation.run_sample import COMPARED
 from hybrid.simulation.self_watch import LineWatch, diameters, least_bending
 from hybrid.simulation.time_loop import FORCE_COLUMNS
 from hybrid.solve.joined import JoinedLine
-from hybrid.solve.run import no_extremes
+from hybrid.solve.run import batch_of_rows, no_extremes
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_flaws import slack_cell
@@ -65,6 +67,8 @@ from hybrid.store.writer import Recorder
 
 # Outputs of a line that wait for one another: quantities of all of them are computed together.
 WAITING = 64
+# Both ends of a line count as held in its outputs, by their points.
+HELD = np.ones(2, np.int8)
 # Of the length: ends that are so near to where they were have not been moved.
 SAME_PLACE = 1e-9
 # Flags of a step (kernels.state.books), and bits of kernels.contact.self_distance.
@@ -161,7 +165,7 @@ class LineResult:
         books, base = blank_books(line.h.size), self.model.always.astype(np.int64)
         books.loaded[:] = self.model.loaded_ends
         books.clock[[LEAST_PEAK, RELEASE_START, RELEASE_END]] = np.inf
-        books.counts[STIFF] = self.model.inextensible
+        books.counts[STIFF], books.counts[VARIES] = self.model.inextensible, self.model.layout is not None
         books.clock[RHO] = self.scene.time.rho_inf if self.scene.time is not None else 0.0
         return books._replace(
             strains=np.zeros((nodes, 3)), marks=marks, right=right, start=begin.copy(), base=base,
@@ -169,6 +173,18 @@ class LineResult:
             extremes=no_extremes(nodes + marked.size),
             touch=self._blank_touch(),
         )  # fmt: skip
+
+    @property
+    def sample_size(self) -> int:
+        """Numbers of an output of the line as it is."""
+        line = self.model.line
+        return sample_size(line.h.size, self.model.layout is not None, len(line.torsion), self.books.touch.size > 0)
+
+    def make_room(self, rows: int) -> None:
+        """Room for so many samples of the line as it is; what is there is gone."""
+        shape = (rows, self.sample_size)
+        if self.books.samples.shape != shape:
+            self.books = self.books._replace(samples=np.zeros(shape))
 
     def _blank_touch(self) -> Floats:
         return np.zeros((3, self.model.line.s.size if self.touches else 0))
@@ -295,17 +311,17 @@ class LineResult:
             detail = stretch_text(self.model, state) if stop[0] == Outcome.OVERSTRETCHED else ""
             raise LineFailed(self.number, stop[0], t, float(self.model.line.s[stop[1]]), detail)
 
-    def state_for_output(self, t: float, ends: Ends, state: State, work: Work) -> Batch:
-        """A state at t (s) as outputs are made of it; both ends count as held, by their points."""
-        held = ends._replace(held=np.ones(2, np.int8), position=state.r[[0, -1]])
-        touch = self.books.touch[0] if self.books.touch.size else None
-        return batch_of_one(t, held, state, work.report.copy(), self.books.work[0], self.model.sea.values, touch)
+    def sampled(self, count: int) -> Batch:
+        """The outputs that steps have sampled, as many as there are in the buffer; in arrays of their own."""
+        line, books = self.model.line, self.books
+        rows, varies = books.samples[:count].copy(), self.model.layout is not None
+        return batch_of_rows(rows, line.h.size, HELD, varies, len(line.torsion), books.touch.shape[1])[0]
 
     def output(self, batch: Batch) -> None:
-        """Record a state."""
+        """Record states."""
         self._waiting.append(batch)
-        varies = self.model.layout is not None  # stiffness and lengths, which outputs are made with, change with time
-        if len(self._waiting) >= WAITING or not self._moves or varies:
+        full = sum(len(x.t) for x in self._waiting) >= WAITING
+        if full or not self._moves or self.observer.writes_criteria:
             self.write_down()
 
     def write_down(self) -> None:
@@ -316,12 +332,14 @@ class LineResult:
         if not self._waiting:
             return
         waiting, self._waiting = self._waiting, []
-        batch = Batch(*(np.concatenate(x) for x in zip(*waiting, strict=True)))
+        batch = waiting[0]
+        if len(waiting) > 1:
+            batch = Batch(*(np.concatenate(x) for x in zip(*waiting, strict=True)))
         seen = self.observer.look(batch)
         ratios = None
-        if self.observer.writes_criteria:  # of a line whose outputs do not wait
+        if self.observer.writes_criteria:  # of a line whose outputs do not wait: those of one step
             assert self.manager is not None
-            ratios = self.manager.largest_ratios(self.observer.grid.s)[None]
+            ratios = np.repeat(self.manager.largest_ratios(self.observer.grid.s)[None], len(batch.t), axis=0)
         values = self.observer.values_of(seen, ratios)
         self.recorder.save_batch(batch.t.copy(), values, self.observer.zone_rows)
         if not self._moves:
@@ -344,6 +362,11 @@ class LineResult:
     def wait_again(self, kept: tuple[Sequence[Batch], Sequence[Floats], float | None]) -> None:
         """Let that wait which `waiting` has returned, and nothing else."""
         self._waiting, self._log, self.observer.first_energy = [*kept[0]], [*kept[1]], kept[2]
+
+    def impose_now(self) -> None:
+        """Outputs within the next step begin with what the ends impose now."""
+        ends = self.model.ends.values
+        self.books.imposed[0] = np.hstack([ends.position, ends.frame, ends.spin, ends.force, ends.moment])
 
     # --- the file -----------------------------------------------------------------------------------
 
@@ -376,7 +399,11 @@ class LineResult:
         books, answers = self.books, answers_of(work.torsion)
         return {
             "work": books.work[0].copy(), "power": books.power[0].copy(), "stored": float(books.clock[STORED]),
-            "report": work.report.copy(), "envelope": self.envelope.checkpoint(books.extremes), 
+            "report": work.report.copy(), "envelope": self.envelope.checkpoint(books.extremes),
+            "before": {
+                "imposed": books.imposed[0].copy(), "report": books.report[1].copy(),
+                "tension": books.tension[0].copy(), "twist": books.twist[0].copy(), "touch": books.touch[:1].copy(),
+            },
             "noted": self.diagnostics.checkpoint(books),
             "ends": self.model.ends.checkpoint(), "first_energy": self.observer.first_energy or 0.0,
             **({"torsion": {name: x.copy() for name, x in answers.items()}} if answers else {}),
@@ -387,7 +414,10 @@ class LineResult:
         """Go on at t (s) as `checkpoint` has written; joints: as of `JoinedLine`.  ValueError: that cannot be."""
         books, model = self.books, self.model
         books.work[0], books.power[0], books.clock[STORED] = saved["work"], saved["power"], saved["stored"]
-        work.report[:] = saved["report"]
+        work.report[:] = books.report[0] = saved["report"]
+        before = saved["before"]  # what outputs within the next step are made of
+        books.imposed[0], books.report[1], books.tension[0] = (before[x] for x in ("imposed", "report", "tension"))
+        books.twist[0], books.touch[:1] = before["twist"], before["touch"]
         for name, x in answers_of(work.torsion).items():
             x[:] = saved["torsion"][name]
         self.envelope.restore(saved["envelope"], books.extremes)

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.junctions.bodies import DONE, FRAME, KINETIC, LINES, PLACE, POTENTIAL, V, W
+from hybrid.kernels.run.system_sampling import (
+    SAMPLE_AXES,
+    SAMPLE_DONE,
+    SAMPLE_ENERGIES,
+    SAMPLE_LINES,
+    SAMPLE_PLACE,
+    SAMPLE_V,
+    SAMPLE_W,
+)
 from hybrid.kernels.state.report import FORCE_A, MOMENT_A
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Batch, Floats
 from hybrid.model.bodies import angles_of
 from hybrid.model.system import SystemModel
 from hybrid.outputs.probes import elevation, elevation_field
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.points import Fairlead, FreePoint, Point
 from hybrid.scene.system import System
-from hybrid.solve.joined import SystemState
-from hybrid.solve.system import SystemSolver
 from hybrid.store.format import Field
 
 WORKS = ("lines", "damping", "loads")
@@ -69,46 +75,70 @@ def gauges_of(system: System) -> Floats:
     return np.array(system.output.elevation or (), float).reshape(-1, 2)
 
 
-def values_of(
-    system: System, model: SystemModel, solver: SystemSolver, state: SystemState, t: float
-) -> dict[str, Any]:  # fmt: skip
-    """The values of all fields for a state at t (s) and the forces that the solver has found for it."""
-    values: dict[str, Any] = {}
-    if system.output.elevation:
-        sea = model.models[0].sea.values  # of the time t, as of every line
-        values["elevation"] = elevation(sea, gauges_of(system), sea.now[None])[0]
+class Sampled(NamedTuple):
+    """Outputs of a system: nb states of its lines and bodies."""
+
+    lines: Sequence[Batch]
+    bodies: Floats  # (nb, B, BODY_SAMPLE) of kernels.run.system_sampling
+
+    @property
+    def t(self) -> Floats:
+        """Times (nb,), s; an array of one's own."""
+        return self.lines[0].t.copy()
+
+    def frame(self, body: int) -> Floats:
+        """Axes (nb, 3, 3) of a body, as columns."""
+        return self.bodies[:, body, SAMPLE_AXES:SAMPLE_V].reshape(-1, 3, 3)
+
+    def spin(self, body: int) -> Floats:
+        """Its angular velocity (nb, 3) 1/s, inertial."""
+        return times(self.frame(body), self.bodies[:, body, SAMPLE_W:SAMPLE_LINES])
+
+
+def times(frames: Floats, x: Floats) -> Floats:
+    """Frames (nb, 3, 3) times vectors (nb, 3), or one (3,): the same bits for each, however many there are."""
+    return np.asarray(frames[..., 0] * x[..., :1] + frames[..., 1] * x[..., 1:2] + frames[..., 2] * x[..., 2:])
+
+
+def values_of(system: System, model: SystemModel, seen: Sampled) -> dict[str, Floats]:
+    """The values (nb, ...) of all fields for outputs."""
+    values: dict[str, Floats] = {}
+    t, count = seen.t, len(seen.bodies)
+    if system.output.elevation:  # the sea is that of every line
+        values["elevation"] = elevation(model.models[0].sea.values, gauges_of(system), seen.lines[0].sea_now)
     pulls: dict[str, list[tuple[Floats, Floats, Floats]]] = {name: [] for name in system.bodies}
+    none = np.zeros((count, 3))
     for name, point in system.points.items():
         at = [(model.names.index(line), -(end == "end")) for line, end in system.lines_at(name)]
         here = [(line, node) for line, node in at if (line, -node) not in model.loose]
-        position, velocity = _place(model, state, point, at[0], here)
+        position, velocity = _place(model, seen, point, at[0], here)
         values[f"points/{name}/position"], values[f"points/{name}/velocity"] = position, velocity
         if isinstance(point, FreePoint):
             if name in model.rigid:
-                row = state.bodies[len(model.bodies) + model.rigid.index(name)]
-                values[f"points/{name}/rotation"] = angles_of(row[FRAME:V].reshape(3, 3))
+                frames = seen.frame(len(model.bodies) + model.rigid.index(name))
+                values[f"points/{name}/rotation"] = angles_of(frames)
             continue
-        reports = [(solver.work[k].report, FORCE_A - 3 * node) for k, node in here]
-        values[f"points/{name}/force"] = force = sum((r[f : f + 3] for r, f in reports), np.zeros(3))
-        moment = clamp_moment(system, model, solver, name)
+        reports = [(seen.lines[k].report, FORCE_A - 3 * node) for k, node in here]
+        values[f"points/{name}/force"] = force = sum((r[:, f : f + 3] for r, f in reports), none)
+        moment = _clamp_moment(system, model, seen, name)
         if moment is not None:
             values[f"points/{name}/moment"] = moment
         if system.body_of(name) is not None:
-            pulls[point.body].append((position, force, np.zeros(3) if moment is None else moment))  # type: ignore[union-attr]
+            pulls[point.body].append((position, force, none if moment is None else moment))  # type: ignore[union-attr]
     for name, known in model.known.items():
-        position, velocity, frame, spin = known.at(t)
-        assert frame is not None
-        force = sum((f for _, f, _ in pulls[name]), np.zeros(3))
-        moment = sum((np.cross(place - position, f) + m for place, f, m in pulls[name]), np.zeros(3))
+        found = [known.at(x) for x in t]
+        position, velocity, frame, spin = (np.array(x) for x in zip(*found, strict=True))
+        force = sum((f for _, f, _ in pulls[name]), none)
+        moment = sum((np.cross(place - position, f) + m for place, f, m in pulls[name]), none)
         values |= _of_body(name, position, frame, velocity, spin, force, moment)
-    for body, row, work in zip(model.bodies, state.bodies, solver.body_work, strict=False):
-        R, at_body = row[FRAME:V].reshape(3, 3), f"bodies/{body.name}"
-        force, moment = work[LINES : LINES + 3].copy(), work[LINES + 3 : LINES + 6].copy()
-        values |= _of_body(
-            body.name, row[PLACE:FRAME].copy(), R, row[V : V + 3].copy(), R @ row[W : W + 3], force, moment
-        )
-        values[f"{at_body}/energy/kinetic"], values[f"{at_body}/energy/potential"] = work[KINETIC], work[POTENTIAL]
-        values |= {f"{at_body}/work/{key}": work[DONE + k] for k, key in enumerate(WORKS)}
+    for k, body in enumerate(model.bodies):
+        x, at_body = seen.bodies[:, k], f"bodies/{body.name}"
+        force, moment = x[:, SAMPLE_LINES : SAMPLE_LINES + 3], x[:, SAMPLE_LINES + 3 : SAMPLE_ENERGIES]
+        place, velocity = x[:, SAMPLE_PLACE:SAMPLE_AXES], x[:, SAMPLE_V:SAMPLE_W]
+        values |= _of_body(body.name, place, seen.frame(k), velocity, seen.spin(k), force, moment)
+        for o, energy in enumerate(("kinetic", "potential"), SAMPLE_ENERGIES):
+            values[f"{at_body}/energy/{energy}"] = x[:, o].copy()
+        values |= {f"{at_body}/work/{work}": x[:, o].copy() for o, work in enumerate(WORKS, SAMPLE_DONE)}
     return values
 
 
@@ -124,12 +154,11 @@ class Rotations:
         self.names = list(begin)
         self.last = np.array(list(begin.values())).reshape(-1, 3)  # (n, 3) deg
 
-    def go_on(self, values: dict[str, Any]) -> None:
-        """Put in place of the rotations in `values` the same ones, deg, that are nearest to those of the last call."""
+    def go_on(self, values: dict[str, Floats]) -> None:
+        """Put in place of the rotations (nb, 3) in `values` the same ones, deg, each nearest to the one before it."""
         for k, name in enumerate(self.names):
-            if name in values:
-                self.last[k] = nearest_angles(values[name], self.last[k])
-                values[name] = self.last[k].copy()
+            for row in values.get(name, ()):
+                row[:] = self.last[k] = nearest_angles(row, self.last[k])
 
 
 def nearest_angles(angles: Floats, before: Floats) -> Floats:
@@ -142,40 +171,46 @@ def nearest_angles(angles: Floats, before: Floats) -> Floats:
     return min(both, key=lambda x: float(((x - before) ** 2).sum()))
 
 
-def clamp_moment(system: System, model: SystemModel, solver: SystemSolver, point: str) -> Floats | None:
-    """Moment (3,) N m of the lines that are clamped at a point, about it; None: there are none."""
+def _clamp_moment(system: System, model: SystemModel, seen: Sampled, point: str) -> Floats | None:
+    """Moment (nb, 3) N m of the lines that are clamped at a point, about it; None: there are none."""
     here = system.clamped_at(point)
     if not here:
         return None
-    moment = np.zeros(3)
+    moment = np.zeros((len(seen.bodies), 3))
     for line, end in here:
-        if (model.names.index(line), int(end == "end")) in model.loose:
+        k = model.names.index(line)
+        if (k, int(end == "end")) in model.loose:
             continue
-        report = solver.work[model.names.index(line)].report
-        moment += report[MOMENT_A : MOMENT_A + 3] if end == "start" else -report[MOMENT_A + 3 : MOMENT_A + 6]
+        report = seen.lines[k].report
+        moment += report[:, MOMENT_A : MOMENT_A + 3] if end == "start" else -report[:, MOMENT_A + 3 : MOMENT_A + 6]
     return moment
 
 
 def _place(
-    model: SystemModel, state: SystemState, point: Point, first: tuple[int, int], here: Sequence[tuple[int, int]]
+    model: SystemModel, seen: Sampled, point: Point, first: tuple[int, int], here: Sequence[tuple[int, int]]
 ) -> tuple[Floats, Floats]:
-    """Position and velocity of a point; first: line and node that began there, here: those that are still there."""
+    """Positions and velocities (nb, 3) of a point; first: line and node that began there, here: those still there."""
     if here:
         line, node = here[0]
-        return state.lines[line].r[node].copy(), state.lines[line].v[node].copy()
-    for body, row in zip(model.bodies, state.bodies, strict=False):
+        return seen.lines[line].r[:, node].copy(), seen.lines[line].v[:, node].copy()
+    for k, body in enumerate(model.bodies):
         if isinstance(point, Fairlead) and point.body == body.name:
-            R = row[FRAME:V].reshape(3, 3)
-            arm = R @ np.array(point.place)
-            return row[PLACE:FRAME] + arm, row[V : V + 3] + np.cross(R @ row[W : W + 3], arm)
+            x = seen.bodies[:, k]
+            arm = times(seen.frame(k), np.array(point.place))
+            velocity = x[:, SAMPLE_V:SAMPLE_W] + np.cross(seen.spin(k), arm)
+            return x[:, SAMPLE_PLACE:SAMPLE_AXES] + arm, velocity
     line, node = first
-    ends = model.models[line].ends
-    return ends.values.position[-node].copy(), ends.velocity[-node].copy()
+    ends, found = model.models[line].ends, []
+    for t in seen.t:
+        ends.at(t)
+        found.append((ends.values.position[-node].copy(), ends.velocity[-node].copy()))
+    position, velocity = (np.array(x) for x in zip(*found, strict=True))
+    return position, velocity
 
 
 def _of_body(
     name: str, position: Floats, frame: Floats, velocity: Floats, spin: Floats, force: Floats, moment: Floats
-) -> dict[str, Any]:
+) -> dict[str, Floats]:
     keys = ("position", "rotation", "velocity", "angular_velocity", "force", "moment")
     found = (position, angles_of(frame), velocity, spin, force, moment)
     return {f"bodies/{name}/{key}": np.array(x) for key, x in zip(keys, found, strict=True)}

@@ -115,17 +115,17 @@ class SystemQuantities:
         """Limits by name."""
         return limits_of(self._wanted)
 
-    def values(self, states: Mapping[str, Batch], lines: Mapping[str, LineResult]) -> dict[str, float]:
-        """Values of one output, from the states of the lines and what is recorded of them, by name."""
-        out: dict[str, float] = {}
+    def values(self, states: Mapping[str, Batch], lines: Mapping[str, LineResult]) -> dict[str, Floats]:
+        """Values (nb,) of outputs, from the states of the lines and what is recorded of them, by name."""
+        out: dict[str, Floats] = {}
         for name, (found, probes) in self._of_line.items():
             found.others = {
-                q.other: (states[q.other].r[0], self._radii(lines[q.other]))
+                q.other: (states[q.other].r, self._radii(lines[q.other]))
                 for q in found.wanted.values()
                 if q.other is not None
             }
             seen = lines[name].observer.look(self._seen(name, states[name]))
-            out |= {key: float(probe.value(seen)[0]) for key, probe in probes.items()}
+            out |= {key: np.array(probe.value(seen)) for key, probe in probes.items()}
         return out
 
     def _seen(self, name: str, states: Batch) -> Batch:

@@ -14,8 +14,8 @@ import numpy as np
 from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
-from hybrid.kernels.junctions.bodies import FRAME, PLACE, V
 from hybrid.kernels.machine.cache import cache_folder
+from hybrid.kernels.run.system_sampling import SAMPLE_AXES, SAMPLE_PLACE
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.forces import SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Moves, state_for
@@ -48,14 +48,14 @@ from hybrid.simulation.system_contact import (
     refuse_within_itself,
 )
 from hybrid.simulation.system_failures import Failures
-from hybrid.simulation.system_lines import LineResult, LineStep
-from hybrid.simulation.system_points import Rotations, fields_of, gauges_of, values_of
+from hybrid.simulation.system_lines import WAITING, LineResult, LineStep
+from hybrid.simulation.system_points import Rotations, Sampled, fields_of, gauges_of, times, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, named
 from hybrid.simulation.system_zones import SystemZones, managers_for, zones_at_rest
 from hybrid.simulation.time_loop import SAME_STOP, WORK, apart, falls_on
 from hybrid.solve.joined import SystemState, SystemTaken
-from hybrid.solve.run import ROWS
+from hybrid.solve.run import MOST_SAMPLED, ROWS
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_statics import LineFailed
 from hybrid.solve.system_steps import SystemSteps
@@ -98,7 +98,6 @@ class SystemRun:
         self.resolution = self.model.resolution
         one = self.resolution.one
         follow = (one.step, one.shortest) if moves and one.local is not None else ()
-        self.loop = SystemSteps(system.require_time().rho_inf if moves else 0.0, *follow)
         names = self.model.names
         guesses = system.guesses
         known = self.model.scenes
@@ -106,6 +105,8 @@ class SystemRun:
         self.times = output_times(self.scenes[0]) if moves else []
         if moves and one.every > 1:  # a run to compare with has as many times fewer
             self.times = [*self.times[one.every - 1 : -1 : one.every], self.times[-1]]
+        rho = system.require_time().rho_inf if moves else 0.0
+        self.loop = SystemSteps(rho, [0.0, *self.times], *follow)
         self.found, managers = None, _NO_ZONES
         if source is None:
             with at_once():
@@ -171,11 +172,16 @@ class SystemRun:
         """Its spectral radius."""
         return float(self.loop.clock[b.LAST_RHO])
 
-    def stand_at(self, t: float, steps: int, last_step: float, last_rho: float) -> None:
+    @property
+    def interval(self) -> float:
+        """What the step took (s) that led to the state, of which outputs within the next are made, too; 0: unknown."""
+        return float(self.loop.clock[b.NOW] - self.loop.clock[b.PREVIOUS])
+
+    def stand_at(self, t: float, steps: int, last_step: float, last_rho: float, interval: float) -> None:
         """Be between two steps, at t (s)."""
         clock = self.loop.clock
         clock[b.NOW], clock[b.LAST_DT], clock[b.LAST_RHO], self.loop.counts[b.STEPS] = t, last_step, last_rho, steps
-        self.loop.stand_between()
+        self.loop.stand_between(interval, self.resolution.one.step)
         self._logged = clock_now() - self._begin
 
     # --- the file -----------------------------------------------------------------------------------
@@ -271,34 +277,48 @@ class SystemRun:
         for (t, s_a, s_b, kind, _), text in sorted(noted, key=lambda event: event[0][0]):
             self.recorder.event(t, s_a, s_b, kind, text)
 
-    def _output(self, solver: SystemSolver) -> None:
-        """Record points, bodies and lines as they are."""
-        seen = {
-            line.name: line.state_for_output(self.t, x.ends, state, work)
-            for line, x, state, work in zip(self.lines, solver.lines, self.state.lines, solver.work, strict=True)
-        }
-        if self.target is not None:
-            values = values_of(self.system, self.model, solver, self.state, self.t)
-            self.rotations.go_on(values)
-            values |= self.quantities.values(seen, {line.name: line for line in self.lines})
-            self.recorder.save(self.t, values, [("lines", 0.0, 0.0)])
-        self._look_for_dry_bodies()
-        for line in self.lines:
-            line.output(seen[line.name])
+    def _output(self) -> None:
+        """Record points, bodies and lines as they are, where an output is due."""
+        while not self.loop.sample():
+            self._record_samples()
+        self._record_samples()
 
-    def _look_for_dry_bodies(self) -> None:
+    def _record_samples(self) -> None:
+        """Record what has been sampled of points, bodies and lines."""
+        count = int(self.loop.counts[b.SAMPLES])
+        if not count:
+            return
+        self.loop.counts[b.SAMPLES] = 0
+        states = [line.sampled(count) for line in self.lines]
+        seen = Sampled(states, self.loop.body_samples[:count])
+        if self.target is not None:
+            values = values_of(self.system, self.model, seen)
+            self.rotations.go_on(values)
+            by_name = {line.name: x for line, x in zip(self.lines, states, strict=True)}
+            values |= self.quantities.values(by_name, {line.name: line for line in self.lines})
+            self.recorder.save_batch(seen.t, values, [("lines", 0.0, 0.0)])
+        self._look_for_dry_bodies(seen)
+        for line, x in zip(self.lines, states, strict=True):
+            line.output(x)
+
+    def _look_for_dry_bodies(self, seen: Sampled) -> None:
         """An event where a body that counts as submerged has risen out of the water."""
         fluid = self.system.environment.fluid
         if fluid is None or fluid.surface is None:
             return
-        for body, row in zip(self.model.bodies, self.state.bodies, strict=False):
+        for k, body in enumerate(self.model.bodies):
             given = self.system.free_bodies[body.name]
-            centre = row[PLACE:FRAME] + row[FRAME:V].reshape(3, 3) @ np.array(given.centre_of_buoyancy)
-            above = float(centre[2]) - fluid.surface
-            if given.volume and above > 0.0 and body.name not in self.dry:
+            if not given.volume or body.name in self.dry:
+                continue
+            arm = times(seen.frame(k), np.array(given.centre_of_buoyancy, float))
+            centre = seen.bodies[:, k, SAMPLE_PLACE:SAMPLE_AXES] + arm
+            above = centre[:, 2] - fluid.surface
+            if (above > 0.0).any():
+                first = int((above > 0.0).argmax())
                 self.dry.add(body.name)
-                text = f"body {body.name}: the centre of its volume is {above:.4g} m above the surface, but all of its"
-                self.recorder.event(self.t, 0.0, 0.0, "body out of water", f"{text} buoyancy still lifts it")
+                text = f"body {body.name}: the centre of its volume is {above[first]:.4g} m above the surface, but"
+                text += " all of its buoyancy still lifts it"
+                self.recorder.event(float(seen.t[first]), 0.0, 0.0, "body out of water", text)
 
     def _close(self, status: str, message: str) -> None:
         """Close all, with the events of the lines in the result of the points too."""
@@ -315,13 +335,16 @@ class SystemRun:
         """Record the equilibrium that was found."""
         assert self.found is not None
         try:
-            solver = self.found.solver
+            self.solver = solver = self.found.solver
             refuse_within_itself(self.model, self.found, moves=False)
+            self._make_room(solver)
             solver.keep_books([line.books for line in self.lines])
             solver.evaluate_forces(self.state, 0.0)
             for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
                 line.note_equilibrium(x, state, None, self.found, self.turned)
-            self._output(solver)
+            self.take_other()
+            self.loop.attach(solver, self.state, self.other)
+            self._output()
             text = f"equilibrium: {self.found.summary}; residual force {self.found.residual:.2g} N"
             self._close("complete", text)
         except LineFailed as failed:
@@ -366,6 +389,7 @@ class SystemRun:
         contacts = [line.touch_itself(self.t) for line in self.lines]
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts)
+        self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])
         if self.zones is not None:
             self.zones.look_ahead()
@@ -374,6 +398,13 @@ class SystemRun:
         asks = any(body.members is not None for body in self.model.bodies)
         self._asks = b.ASK_BEFORE if asks else 0  # whether Python stirs the water around members before every try
         self._moved, self._loaded = [], np.nan
+
+    def _make_room(self, solver: SystemSolver) -> None:
+        """Room for samples of the lines and bodies as they are."""
+        rows = max(1, min(WAITING, MOST_SAMPLED // sum(line.sample_size for line in self.lines)))
+        for line in self.lines:
+            line.make_room(rows)
+        self.loop.make_room(rows, len(solver.body_work))
 
     def take_other(self) -> None:
         """Room for the state after the next step, of lines as they are now."""
@@ -399,30 +430,39 @@ class SystemRun:
             line.note_equilibrium(x, state, 0.0, self.found, self.turned)
             line.diagnostics.scheme(time.rho_inf)
             line.diagnostics.watch(line.books.clock)
-        self._output(self.solver)
+        self.take_other()
+        self._attach()
+        self._output()
         self.gather_events()
-        self.other, self._between = self.state.copy(), True
+        self._between = True
         self.keep()
         self._logged = clock_now() - self._begin
 
     def stops(self) -> list[float]:
-        """Times (s) at which a step ends: outputs, and where loads jump."""
+        """Times (s) at which a step ends: where loads jump, the end, and outputs if that is asked."""
         time = self.system.require_time()
         given = [*(m.ends.breaks for m in self.model.models), self.model.breaks]
         self._breaks = sorted({x for each in (*given, self.failures.times) for x in each if x < time.duration})
-        return apart([*self.times, *self._breaks], self.t, self.resolution.one.step)
+        outputs = self.times if self.system.output.exact else self.times[-1:]
+        return apart([*outputs, *self._breaks], self.t, self.resolution.one.step)
 
     def go_to(self, stop: float, look: Callable[[], None] = lambda: None) -> None:
         """Steps to `stop` (s), with what is due there; look: called there, and about ten times a second."""
         loop, step = self.loop, self.resolution.one.step
         first, done = self.leg
         parts = equal_parts(stop - first, step)
-        loop.begin_leg(stop, first, done, parts)
-        while self.t < stop:
+        if abs(first + done * (stop - first) / parts - self.t) > SAME_STOP * step:  # those steps end here
+            first, done, parts = self.t, 0, equal_parts(stop - self.t, step)
+        self.leg = (first, done)
+        whole = abs(stop - first - parts * step) <= SAME_STOP * step  # the same bits, wherever the next stop is
+        loop.begin_leg(stop, first, done, parts, step if whole else (stop - first) / parts)
+        arrived = not self.t < stop
+        while not arrived:
             self._between = False
             self._attach()
             code = loop.go()
             self.state, self.other = loop.states
+            self._record_samples()
             if code == b.TRYING:
                 self._prepare(float(loop.clock[b.TRY_END]))
             elif code == b.TRIED:
@@ -435,20 +475,16 @@ class SystemRun:
                 if code == b.STEPPED:
                     self.ends_of_now()
                     self._after_step(step)
-                self._go_on_leg(stop, parts)
-                if self.t >= stop:
+                if loop.controlled or self.t >= loop.clock[b.UNTIL]:
+                    self.leg = (self.leg[0], int(loop.counts[b.LEG_PART]))
+                arrived = self.t >= stop and loop.counts[b.PHASE] != b.SAMPLE
+                if arrived:
                     self._arrive(stop, step)
-                self._between = bool(loop.counts[b.PHASE] in (b.BEGIN_STEP, b.END_STEP))
+                self._between = arrived or loop.counts[b.PHASE] == b.BEGIN_STEP
                 if code == b.PAUSED:
                     loop.set_quota(LOOK if loop.counts[b.ASKS] else ROWS)
-                if code == b.PAUSED or self.t >= stop:
+                if code == b.PAUSED or arrived:
                     look()
-
-    def _go_on_leg(self, stop: float, parts: int) -> None:
-        """Where equal steps to a stop are."""
-        done = int(self.loop.counts[b.LEG_PART])
-        if self.loop.controlled or self.loop.clock[b.NOW] >= self.loop.clock[b.UNTIL]:
-            self.leg = (self.leg[0], done) if done < parts else (stop, 0)
 
     def _attach(self) -> None:
         """Steps lead from the state of now, with ends that move as they do now."""
@@ -545,16 +581,18 @@ class SystemRun:
 
     def _arrive(self, stop: float, step: float) -> None:
         """What is due at a stop (s): other loads, and an output."""
-        jumps, outputs = falls_on(stop, self._breaks, step), falls_on(stop, self.times, step)
-        if jumps or outputs:
+        if falls_on(stop, self._breaks, step):
             self.ends_of_now()
-        if jumps:
             self.loaded = self.t
             for model in self.model.models:
                 model.ends.set_loads(self.t)
             self._restart()
-        if outputs:
-            self._output(self.solver)
+            self.leg = (stop, 0)
+        if self.system.output.exact:
+            self.leg = (stop, 0)
+        if self.loop.due:
+            self._attach()
+            self._output()
 
     def finish(self, status: str = "complete", message: str = "") -> None:
         """Write what waits, and close the file."""

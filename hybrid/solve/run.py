@@ -300,25 +300,37 @@ class CompiledRun:
 
     def batch_of(self, rows: Floats, cells: int, ends: Ends) -> Batch:
         """Rows (n, size) of samples of a line of so many cells, as views; ends: as of `samples`."""
-        at, count = 0, len(rows)
+        touching, varies = self.books.touch.shape[1], bool(self.count[b.VARIES])
+        batch, self.sampled_errors = batch_of_rows(rows, cells, ends.held, varies, len(self.state.turn), touching)
+        return batch
 
-        def take(*shape: int) -> Floats:
-            nonlocal at
-            begin, at = at, at + math.prod(shape)
-            return rows[:, begin:at].reshape(count, *shape)
 
-        t, sea, position, frame = take(), take(4), take(2, 3), take(2, 9)
-        spin, force, moment, report, work = take(2, 3), take(2, 3), take(2, 3), take(REPORT_SIZE), take(b.WORKS)
-        r, v, vd = take(cells + 1, 3), take(cells + 1, 3), take(cells + 1, 3)
-        e, T, a1, w = take(cells, 3), take(cells), take(cells, 3), take(cells)
-        h, kb = (take(cells), take(cells + 1, 3)) if self.count[b.VARIES] else (NOT_VARYING, NOT_VARYING)
-        turn = take(len(self.state.turn), 3)
-        touch = take(self.books.touch.shape[1])
-        held = np.repeat(ends.held[None], count, axis=0)
-        self.sampled_errors = rows[:, at:]
-        return Batch(
-            t, r, v, vd, e, T, a1, w, held, position, frame, spin, force, moment, report, work, sea, h, kb, turn, touch,
-        )  # fmt: skip
+def batch_of_rows(
+    rows: Floats, cells: int, held: np.ndarray, varies: bool, zones: int, touching: int
+) -> tuple[Batch, Floats]:
+    """Samples (n, size) of a line as views (kernels.state.books.sample_size), and the columns behind them.
+
+    held: (2,) as `Ends` has it; varies: whether they have lengths and stiffness; zones: that a torque passes through;
+    touching: N+1, or 0 where the line does not touch itself.
+    """
+    at, count = 0, len(rows)
+
+    def take(*shape: int) -> Floats:
+        nonlocal at
+        begin, at = at, at + math.prod(shape)
+        return rows[:, begin:at].reshape(count, *shape)
+
+    t, sea, position, frame = take(), take(4), take(2, 3), take(2, 9)
+    spin, force, moment, report, work = take(2, 3), take(2, 3), take(2, 3), take(REPORT_SIZE), take(b.WORKS)
+    r, v, vd = take(cells + 1, 3), take(cells + 1, 3), take(cells + 1, 3)
+    e, T, a1, w = take(cells, 3), take(cells), take(cells, 3), take(cells)
+    h, kb = (take(cells), take(cells + 1, 3)) if varies else (NOT_VARYING, NOT_VARYING)
+    turn, touch = take(zones, 3), take(touching)
+    ends = np.repeat(held[None], count, axis=0)
+    batch = Batch(
+        t, r, v, vd, e, T, a1, w, ends, position, frame, spin, force, moment, report, work, sea, h, kb, turn, touch,
+    )  # fmt: skip
+    return batch, rows[:, at:]
 
 
 def no_extremes(columns: int) -> Floats:

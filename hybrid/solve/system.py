@@ -403,6 +403,7 @@ class SystemSolver:
             contact.settle(states.lines[k], x.ends, report)
             added = (report[NET_A : NET_A + 6] - before).reshape(2, 3)
             books.power[0, :2] -= np.einsum("ij,ij->i", added, books.velocity)
+            books.report[0] = report
 
     def _around(self, x: JoinedLine, state: State, work: Work) -> None:
         if x.line.bits & WAVES:

@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Outcome
+from hybrid.kernels.junctions.bodies import WORK
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run.system import book_system_step, solve_system
-from hybrid.kernels.run.system_run import CUT_LINE, LINE, blank_steps_job, run_system
+from hybrid.kernels.run.system_run import CUT_LINE, LINE, blank_steps_job, run_system, sample_system
+from hybrid.kernels.run.system_sampling import BODY_SAMPLE
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import Floats, Moves
+from hybrid.kernels.step.sampling import SAME_TIME
 from hybrid.kernels.step.step_law import FIRST, WARY
 from hybrid.solve import run as one_line
 from hybrid.solve.joined import SystemState, SystemTaken
@@ -26,13 +29,19 @@ MOST_LOGGED = 2_000_000
 class SystemSteps:
     """Steps of all lines of a system. Lengths follow errors where a largest one is given, else they are equal."""
 
-    def __init__(self, rho: float, largest: float = 0.0, shortest: float = 0.0) -> None:
-        """rho: spectral radius of the scheme; largest, shortest: s, of steps that follow their errors; 0: none do."""
+    def __init__(self, rho: float, outputs: Sequence[float] = (), largest: float = 0.0, shortest: float = 0.0) -> None:
+        """rho: spectral radius of the scheme; outputs: s, their times, which increase; largest, shortest: s, of steps
+
+        that follow their errors; 0: none do.
+        """
+        self.outputs = np.array(outputs, float)
+        self.body_samples, self.worked = np.zeros((0, 0, BODY_SAMPLE)), np.zeros((3, 0, WORK))
         self.clock, self.counts = np.zeros(b.CLOCK_SIZE), np.zeros(b.COUNT_SIZE, np.int64)
         self.lines = np.zeros(2, np.int64)
         self._job, self._states, self._cells = Table(blank_steps_job), (SystemState([]), SystemState([])), 0
         self._log, self.seen = np.zeros((0, 0, len(b.LOG))), np.zeros(0, np.int64)
         self._solver: SystemSolver | None = None
+        self._first: np.ndarray | None = None  # a job of the solver, until the kernels of its steps are known
         self._waves = 0
         clock = self.clock
         clock[b.RHO], clock[b.ALLOWED], clock[b.TOLERANCE], clock[b.ERROR_RATIO] = rho, np.inf, 1.0, 1.0
@@ -58,12 +67,23 @@ class SystemSteps:
         jobs = solver.take_turns(self._states)
         self._cells = sum(x.line.h.size for x in solver.lines)
         self._waves = max((len(x.sea.waves) for x in solver.lines), default=0)
+        self.worked[0] = solver.body_work
         self._job.bind(
-            clock=self.clock, counts=counts, lines=self.lines, seen=self.seen, log=self._log,
+            outputs=self.outputs, bodies=self.body_samples, worked=self.worked, clock=self.clock, counts=counts,
+            lines=self.lines, seen=self.seen, log=self._log,
             limits=np.array([REACH * solver.length, MOST_ITERATIONS, solver.arm]),
-            solver=solve_system.address(jobs["even"]), book=book_system_step.address(jobs["even"]), **jobs,
+            sampler=sample_system.address(self._job.numbers), **jobs,
         )  # fmt: skip
+        self._first = jobs["even"]
         return True
+
+    def make_room(self, rows: int, bodies: int) -> None:
+        """Room for so many samples of bodies, for lines that have changed: of the step before nothing is known."""
+        if self.body_samples.shape[:2] != (rows, bodies):
+            self.body_samples = np.zeros((rows, bodies, BODY_SAMPLE))
+            self.worked = np.zeros((3, bodies, WORK))
+            self._job.bind(bodies=self.body_samples, worked=self.worked)
+        self.clock[b.PREVIOUS] = self.clock[b.NOW]
 
     def move(self, solver: SystemSolver, moves: Sequence[Moves]) -> None:
         """The ends of the lines move so from now on, by their kernels."""
@@ -82,10 +102,10 @@ class SystemSteps:
 
     # --- steps ---------------------------------------------------------------------------------------
 
-    def begin_leg(self, stop: float, first: float, done: int, parts: int) -> None:
-        """Steps are to end at `stop` (s): in so many equal parts since `first` (s), of which some are done."""
+    def begin_leg(self, stop: float, first: float, done: int, parts: int, length: float) -> None:
+        """Steps are to end at `stop` (s): in so many parts of a length (s) since `first` (s), some of them done."""
         clock, counts = self.clock, self.counts
-        clock[b.STOP], clock[b.LEG_BEGIN], clock[b.LEG_STEP] = stop, first, (stop - first) / max(parts, 1)
+        clock[b.STOP], clock[b.LEG_BEGIN], clock[b.LEG_STEP] = stop, first, length
         counts[b.LEG_PART], counts[b.LEG_PARTS] = done, parts
 
     def set_quota(self, most: int) -> None:
@@ -95,7 +115,20 @@ class SystemSteps:
 
     def go(self) -> int:
         """Go on until a code of kernels.state.books."""
+        if self._first is not None:
+            self._job.bind(solver=solve_system.address(self._first), book=book_system_step.address(self._first))
+            self._first = None
         return int(run_system(self._job.numbers))
+
+    @property
+    def due(self) -> bool:
+        """Whether an output is due at the state as it is."""
+        at, near = self.counts[b.OUTPUT], SAME_TIME * self.clock[b.LEG_STEP]
+        return bool(at < self.outputs.size and self.outputs[at] <= self.clock[b.NOW] + near)
+
+    def sample(self) -> bool:
+        """Sample the outputs that are due at the state as it is; False: there is no room for all of them."""
+        return bool(sample_system(self._job.numbers))
 
     def try_again(self) -> None:
         """The try is made once more: what it was made with has changed."""
@@ -114,9 +147,15 @@ class SystemSteps:
             self.clock[b.NEXT_DT] = max(self.clock[b.NEXT_DT] / FIRST, self.clock[b.SHORTEST])
             self.clock[b.ERROR_RATIO] = 1.0
 
-    def stand_between(self) -> None:
-        """No step is under way, and none is to be written down."""
-        self.counts[b.PHASE], self.counts[b.ROWS] = b.BEGIN_STEP, 0
+    def stand_between(self, interval: float, step: float) -> None:
+        """No step is under way, and none is to be written down, no output is due.
+
+        interval: s, that the last step took, 0: of that nothing is known; step: s, the usual one.
+        """
+        clock, counts = self.clock, self.counts
+        clock[b.PREVIOUS] = clock[b.NOW] - interval
+        counts[b.PHASE], counts[b.ROWS], counts[b.SAMPLES] = b.BEGIN_STEP, 0, 0
+        counts[b.OUTPUT] = np.searchsorted(self.outputs, clock[b.NOW] + SAME_TIME * step, side="right")
 
     def rows(self) -> Floats:
         """Rows (n, L, len(LOG)) of steps since the last call; the next steps overwrite them."""

@@ -38,7 +38,9 @@ def bridle(**tables: Any) -> dict[str, Any]:
             "east": {"start": "float", "end": "east", "sections": [LEG]},
             "tow": {"start": "float", "end": "winch", "sections": [LEG | {"length": 45, "bending_stiffness": 300}]},
         },
-        "time": {"duration": 4.0}, "accuracy": {"position": "1%", "tension": "1%"}, "output": {"every": 0.5, "points": 11},
+        "time": {"duration": 4.0}, "accuracy": {"position": "1%", "tension": "1%"},
+        # within steps the tension of `east`, wrong by 0.01 %, would change 2.2 times as much by finer runs as by coarser
+        "output": {"every": 0.5, "points": 11, "exact": True},
     } | tables  # fmt: skip
 
 

@@ -59,22 +59,17 @@ def test_a_place_on_no_line_is_refused_where_it_is(history: Any, where: str) -> 
         both({}, {"history": history})
 
 
-def test_steps_end_at_outputs() -> None:
-    """Whether that is said or not: outputs are no multiples of steps here, and the motion is that of the cable."""
-    said, silent = ({"every": 0.13, "history": {"one": [7.0]}} | x for x in ({"exact": True}, {}))
-    cable, system = both({"every": 0.13, "history": [7.0], "exact": True}, said)
-    _, other = both({"every": 0.13, "history": [7.0], "exact": True}, silent)
-    inexact, _ = both({"every": 0.13, "history": [7.0]}, silent)
+@pytest.mark.parametrize("exact", [False, True])
+def test_outputs_within_steps_are_those_of_the_cable(exact: bool) -> None:
+    """Outputs are no multiples of steps here: steps end at them if that is asked, else they are interpolated."""
+    asked = {"every": 0.13, "exact": exact}
+    cable, system = both(asked | {"history": [7.0]}, asked | {"history": {"one": [7.0]}})
     line = system.lines["one"]
-    assert np.array_equal(line.times, cable.times) and np.array_equal(line.position, other.lines["one"].position)
-    assert np.isin(line.times[1:], line.steps["t"]).all()
-    assert np.abs(line.tension - cable.tension).max() < 1e-8 * cable.tension.max()
-    assert np.abs(line.tension - inexact.tension).max() > 1e-6 * cable.tension.max()
-
-
-def test_outputs_within_steps_are_refused() -> None:
-    with pytest.raises(SceneError, match="outputs of several lines are those of steps"):
-        both({}, {"exact": False})
+    assert np.array_equal(line.times, cable.times) and np.isin(line.times[1:], line.steps["t"]).all() == exact
+    for name in ("tension", "position", "velocity", "reaction_start", "reaction_end", "work/end", "energy/kinetic"):
+        assert np.abs(line[name] - cable[name]).max() < 1e-8 * np.abs(cable[name]).max(), name
+    assert np.abs(system["points/high/position"] - line.position[:, -1]).max() < 1e-12
+    assert np.abs(system["points/high/force"] + line["reaction_end"]).max() < 1e-9 * cable.tension.max()
 
 
 @pytest.mark.parametrize("compute", [hybrid.run, hybrid.static])

@@ -52,7 +52,7 @@ from hybrid.kernels.state.report import (
     SLACKEST,
     SLACKEST_CELL,
 )
-from hybrid.kernels.step.accept import watch
+from hybrid.kernels.step.accept import impose_now, keep_past, watch
 from hybrid.kernels.step.generalized_alpha import Scheme, scheme
 from hybrid.kernels.step.job import call_quantities, read
 from hybrid.kernels.step.newton import (
@@ -266,6 +266,7 @@ def end_lines(tables, joints, floors, s, task, good):
 
 @inner
 def keep_report(books, report):
+    """The report of the state as it is, from which steps go on."""
     for k in range(report.shape[0]):
         books.report[0, k] = report[k]
 
@@ -294,8 +295,9 @@ def begin_books(tables, joints, t):
             report[SELF_CONTACT_ENERGY] = ask_contact(job.contact, job.contact_table, REST)
         move_joints(job, joints[l, START], joints[l, END])
         find_powers(line, job.ends, books.velocity, new, report, books.power[0])
+        keep_report(books, report)
+        impose_now(job.ends, books.imposed)
         if books.extremes.shape[1] > 0:
-            keep_report(books, report)
             first_strains(line, job.ends, new, books)
             note_extremes(line, sea, job.ends, new, books, t)
         note_quantities(tables[l], job, t)
@@ -314,10 +316,8 @@ def keep_books(tables, joints, dt, t):
         book_work(line, dt, report, books)
         if books.base.shape[0] > 0:
             books.counts[FLAGS] |= watch(line, job.ends, job.old, new, books, report, t, dt)
-        for i in range(books.touch.shape[1]):
-            books.touch[0, i] = books.touch[2, i]
+        keep_past(line, job.ends, job.old, books, report)
         if books.extremes.shape[1] > 0:
-            keep_report(books, report)
             note_extremes(line, job.sea, job.ends, new, books, t)
         note_quantities(tables[l], job, t)
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN
+from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, WORK
 from hybrid.kernels.junctions.system_job import (
     BEFORE,
     CA,
@@ -34,6 +34,7 @@ from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.powers import pull
 from hybrid.kernels.run.run import watch_itself
 from hybrid.kernels.run.system import error_ratio
+from hybrid.kernels.run.system_sampling import BODY_SAMPLE, is_due, keep_bodies, sample_now, sample_within
 from hybrid.kernels.state.books import (
     ASK_BEFORE,
     ASK_STEPS,
@@ -50,6 +51,7 @@ from hybrid.kernels.state.books import (
     CUT_BY_ERROR,
     CUT_BY_NEWTON,
     CUT_BY_TURN,
+    EARLIER_DT,
     END_STEP,
     FAILED,
     FLAGS,
@@ -69,6 +71,7 @@ from hybrid.kernels.state.books import (
     RHO,
     RHO_BEFORE,
     ROWS,
+    SAMPLE,
     SHORTEST,
     SOLVE,
     STEP_BEFORE,
@@ -118,9 +121,13 @@ class StepsJob(NamedTuple):
     log: Floats  # (rows, L, len(LOG))
     loads: Floats  # (K, 8) as kernels.state.state.Moves.loads, of the bodies of which one grows or follows a table
     history: Floats  # (H, 4) likewise
+    outputs: Floats  # s, times of all outputs
+    bodies: Floats  # (rows, B, BODY_SAMPLE) samples of bodies; those of lines are in their books
+    worked: Floats  # (3, B, WORK) of bodies: now, before the last step, before the step before
     solver: int = 0  # address of kernels.run.system.solve_system
     marcher: int = 0  # of the kernel that solves a step of one line
     book: int = 0  # of book_system_step
+    sampler: int = 0  # of sample_system
 
 
 def no_loads() -> tuple[Floats, Floats]:
@@ -133,11 +140,29 @@ def blank_steps_job() -> StepsJob:
     none, log = np.zeros(1, np.int64), np.zeros((1, 1, len(LOG)))
     clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
     lone = np.zeros((1, 1), np.int64)
-    return StepsJob(none, none, none, none, none, lone, none, clock, counts, np.zeros(3), none, none, log, *no_loads())
+    return StepsJob(
+        none,
+        none,
+        none,
+        none,
+        none,
+        lone,
+        none,
+        clock,
+        counts,
+        np.zeros(3),
+        none,
+        none,
+        log,
+        *no_loads(),
+        np.zeros(0),
+        np.zeros((1, 1, BODY_SAMPLE)),
+        np.zeros((3, 1, WORK)),
+    )
 
 
 read_steps = reader(blank_steps_job())
-call_step, call_book = caller((0, 0, 0.0, 0, 0)), caller(0)
+call_step, call_book, call_sample = caller((0, 0, 0.0, 0, 0)), caller(0), caller(0)
 
 
 @inner
@@ -267,7 +292,9 @@ def accept(steps, system):
     """The step that was tried is taken: clock, log, and what there is to look at."""
     clock, counts = steps.clock, steps.counts
     dt, residual = clock[TRY_END] - clock[NOW], largest_residual(system, steps.limits[OF_ARM])
+    clock[EARLIER_DT] = clock[LAST_DT] if clock[NOW] > clock[PREVIOUS] else 0.0
     clock[PREVIOUS], clock[NOW], clock[LAST_DT] = clock[NOW], clock[TRY_END], dt
+    keep_bodies(steps.worked, system.work)
     counts[PARITY] = 1 - counts[PARITY]
     counts[STEPS] += 1
     counts[ITERATIONS] = counts[TRIES]
@@ -283,14 +310,27 @@ def accept(steps, system):
         steps.seen[l] = watch_itself(job, job.new)
         flags |= job.books.counts[FLAGS] | steps.seen[l]
     counts[ROWS] += 1
-    counts[WASTED], counts[FLAGS], counts[PHASE] = 0, flags, END_STEP
+    counts[WASTED], counts[FLAGS], counts[PHASE] = 0, flags, SAMPLE
 
 
 @inner
-def between_steps(steps):
-    """The phases before a try; -1 when one is to be made, else what to return."""
+def between_steps(steps, table):
+    """The phases before a try; -1 when one is to be made, else what to return.
+
+    Outputs within the step are sampled before Python looks at it, those on its end after that, and at a stop by Python.
+    """
     clock, counts = steps.clock, steps.counts
+    if counts[PHASE] == SAMPLE:
+        if is_due(steps, -1) and call_sample(steps.sampler, table) == 0:
+            return PAUSED
+        counts[PHASE] = END_STEP
+        if counts[FLAGS] != 0 or counts[ASKS] & ASK_STEPS:
+            return STEPPED
     if counts[PHASE] == END_STEP:
+        if not clock[NOW] < clock[STOP]:
+            return AT_STOP
+        if is_due(steps, 1) and call_sample(steps.sampler, table) == 0:
+            return PAUSED
         counts[PHASE] = BEGIN_STEP if counts[CONTROLLED] or clock[NOW] >= clock[UNTIL] else TRY
     if counts[PHASE] == BEGIN_STEP:
         if not clock[NOW] < clock[STOP]:
@@ -311,12 +351,27 @@ def between_steps(steps):
 
 
 @kernel
+def sample_system(table):
+    """Sample the outputs that are due: within the last step where that comes next, else those at the state of now.
+
+    Returns 0 where the buffers are full before the last of them, else 1.
+    """
+    steps = read_steps(table)
+    own = steps.even
+    if steps.counts[PARITY]:
+        own = steps.odd
+    if steps.counts[PHASE] == SAMPLE:
+        return sample_within(steps, read_system(own))
+    return sample_now(steps, read_system(own))
+
+
+@kernel
 def run_system(table):
     """Steps of all lines until a code of kernels.state.books is returned."""
     steps = read_steps(table)
     counts = steps.counts
     while True:
-        code = between_steps(steps)
+        code = between_steps(steps, table)
         if code >= 0:
             return code
         own = steps.even
@@ -337,5 +392,3 @@ def run_system(table):
         if verdict > 0:
             call_book(steps.book, own)
             accept(steps, system)
-            if counts[FLAGS] != 0 or counts[ASKS] & ASK_STEPS:
-                return STEPPED

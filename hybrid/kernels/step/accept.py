@@ -153,16 +153,23 @@ def collapses(clock, count, dt):
 
 
 @inner
-def keep_imposed(ends, imposed):
-    """What the ends impose now, and what they did before the step."""
+def impose_now(ends, imposed):
+    """What the ends impose now."""
     for k in range(2):
-        for j in range(21):
-            imposed[1, k, j] = imposed[0, k, j]
         for j in range(9):
             imposed[0, k, 3 + j] = ends.frame[k, j]
         for j in range(3):
             imposed[0, k, j], imposed[0, k, 12 + j] = ends.position[k, j], ends.spin[k, j]
             imposed[0, k, 15 + j], imposed[0, k, 18 + j] = ends.force[k, j], ends.moment[k, j]
+
+
+@inner
+def keep_imposed(ends, imposed):
+    """What the ends impose now, and what they did before the step."""
+    for k in range(2):
+        for j in range(21):
+            imposed[1, k, j] = imposed[0, k, j]
+    impose_now(ends, imposed)
 
 
 @inner
@@ -177,6 +184,20 @@ def keep_end_twist(line, old, books):
 
 
 @inner
+def keep_past(line, ends, old, books, report):
+    """What outputs within the step that was taken are made of, beside its states, and with that of the steps before."""
+    for j in range(report.shape[0]):
+        books.report[2, j], books.report[1, j], books.report[0, j] = books.report[1, j], books.report[0, j], report[j]
+    for c in range(old.T.shape[0]):
+        books.tension[1, c], books.tension[0, c] = books.tension[0, c], old.T[c]
+    for i in range(books.touch.shape[1]):
+        books.touch[1, i], books.touch[0, i] = books.touch[0, i], books.touch[2, i]
+    keep_imposed(ends, books.imposed)
+    if not line.bits & PLANAR:
+        keep_end_twist(line, old, books)
+
+
+@inner
 def accept(line, ends, old, new, books, work, end, dt):
     """The step that was tried is taken: clock, books and log."""
     clock, count, report = books.clock, books.counts, work.report
@@ -185,17 +206,9 @@ def accept(line, ends, old, new, books, work, end, dt):
     clock[PREVIOUS], clock[NOW], clock[LAST_DT], clock[LAST_RHO] = clock[NOW], end, dt, report[USED_RHO]
     count[STEPS] += 1
     count[ITERATIONS] = count[TRIES]
-    for j in range(report.shape[0]):
-        books.report[2, j], books.report[1, j], books.report[0, j] = books.report[1, j], books.report[0, j], report[j]
-    for c in range(old.T.shape[0]):
-        books.tension[1, c], books.tension[0, c] = books.tension[0, c], old.T[c]
-    for i in range(books.touch.shape[1]):
-        books.touch[1, i], books.touch[0, i] = books.touch[0, i], books.touch[2, i]
+    keep_past(line, ends, old, books, report)
     for j in range(books.power.shape[1]):
         books.power[1, j] = books.power[0, j]
-    keep_imposed(ends, books.imposed)
-    if not line.bits & PLANAR:
-        keep_end_twist(line, old, books)
     find_powers(line, ends, books.velocity, new, report, books.power[0])
     book_work(line, dt, report, books)
     for z in range(new.turn.shape[0]):

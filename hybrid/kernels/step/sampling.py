@@ -293,6 +293,31 @@ def sample_model_error(model_error, x, row, at):
 
 
 @inner
+def sample_state(line, old, new, books, where, row):
+    """The state at a time within the last step as a row; where: that time (s), the part of the step before it, the
+
+    length of the step (s), and that of the step before as a part of it, as k of `parabola`.  The sea is that of the time.
+    """
+    _, x, dt, k = where
+    sample_nodes(old, new, x, dt, row)
+    sample_cells(line, old, new, x, dt, k, books.tension, row)
+    if x < 1.0 and not line.bits & PLANAR:
+        sample_end_twist(line, old, new, books.imposed, x, k, books.twist, row)
+    at = HEAD + 9 * new.r.shape[0] + 8 * new.T.shape[0]
+    if books.counts[VARIES]:
+        sample_line(line, row)
+        at += line.h.shape[0] + line.kb.size
+    for z in range(new.turn.shape[0]):
+        for j in range(3):
+            row[at + j] = x * new.turn[z, j] + (1.0 - x) * old.turn[z, j]
+        at += 3
+    for i in range(books.touch.shape[1]):
+        row[at + i] = x * books.touch[0, i] + (1.0 - x) * books.touch[1, i]
+    at += books.touch.shape[1]
+    sample_model_error(books.model_error, x, row, at)
+
+
+@inner
 def sample_step(line, sea, old, new, books):
     """Sample the outputs that fall into the last step; False: the buffer is full before the last of them."""
     clock, count, outputs = books.clock, books.counts, books.outputs
@@ -308,22 +333,7 @@ def sample_step(line, sea, old, new, books):
         sea_at(t, sea)
         row, k = books.samples[count[SAMPLES]], clock[EARLIER_DT] / dt if x < 1.0 else 0.0
         sample_head(sea, books, x, dt, k, t, row)
-        sample_nodes(old, new, x, dt, row)
-        sample_cells(line, old, new, x, dt, k, books.tension, row)
-        if x < 1.0 and not line.bits & PLANAR:
-            sample_end_twist(line, old, new, books.imposed, x, k, books.twist, row)
-        at = HEAD + 9 * new.r.shape[0] + 8 * new.T.shape[0]
-        if count[VARIES]:
-            sample_line(line, row)
-            at += line.h.shape[0] + line.kb.size
-        for z in range(new.turn.shape[0]):
-            for j in range(3):
-                row[at + j] = x * new.turn[z, j] + (1.0 - x) * old.turn[z, j]
-            at += 3
-        for i in range(books.touch.shape[1]):
-            row[at + i] = x * books.touch[0, i] + (1.0 - x) * books.touch[1, i]
-        at += books.touch.shape[1]
-        sample_model_error(books.model_error, x, row, at)
+        sample_state(line, old, new, books, (t, x, dt, k), row)
         count[SAMPLES] += 1
         count[OUTPUT] += 1
     return True
