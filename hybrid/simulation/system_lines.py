@@ -39,7 +39,7 @@ from hybrid.kernels.state.books import (
     sample_size,
 )
 from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.state.state import Batch, Floats, State, Work
+from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one
 from hybrid.model.build import Model
 from hybrid.model.output_points import output_points
 from hybrid.model.sections import section_changes
@@ -316,6 +316,12 @@ class LineResult:
         line, books = self.model.line, self.books
         rows, varies = books.samples[:count].copy(), self.model.layout is not None
         return batch_of_rows(rows, line.h.size, HELD, varies, len(line.torsion), books.touch.shape[1])[0]
+
+    def state_now(self, t: float, ends: Ends, state: State, work: Work) -> Batch:
+        """The state at t (s), now, as an output that is made of it."""
+        held = ends._replace(held=HELD, position=state.r[[0, -1]])
+        touch = self.books.touch[0] if self.books.touch.size else None
+        return batch_of_one(t, held, state, work.report, self.books.work[0], self.model.sea.values, touch)
 
     def output(self, batch: Batch) -> None:
         """Record states."""

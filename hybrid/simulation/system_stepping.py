@@ -271,7 +271,7 @@ class SystemSimulation:
         k, run = self._line(name), self._run
         run.ends_of_now()
         line, state = run.lines[k], run.state.lines[k]
-        seen = line.observer.look(line.state_for_output(run.t, run.solver.lines[k].ends, state, run.solver.work[k]))
+        seen = line.observer.look(line.state_now(run.t, run.solver.lines[k].ends, state, run.solver.work[k]))
         return np.array(seen.tension[:, 0])
 
     @property
