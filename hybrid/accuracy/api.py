@@ -32,7 +32,6 @@ from hybrid.model.resolution import (
     wants_errors,
     wants_survey,
 )
-from hybrid.scene.combinations import refuse_use
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
@@ -87,7 +86,6 @@ def run(
     if not isinstance(scene, Scene):
         return _several_lines(scene, output, overwrite, progress, criterion)
     check_motions(scene)
-    refuse_use(scene, "motion")
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError(NO_ZONES)
     chosen = criterion is None and model_is_free(scene)  # most often rods, which need least to be compiled

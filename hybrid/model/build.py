@@ -164,9 +164,10 @@ def build(
     resolution = resolution or first_resolution(scene)
     layout, s, zones = _nodes(scene, cable, resolution, mesh)
     paid = None
+    to_compare = payout_of(scene) is not None and resolution.fineness < first_resolution(scene).fineness
     if layout is not None and payout_of(scene) is not None and follows_curvature(scene):
         whole = line_on(cable, layout.base, layout.finest.rod)
-        paid = payout_plan(scene, whole, zones, partial(_following_parts, scene, resolution=resolution))
+        paid = payout_plan(scene, whole, zones, partial(_following_parts, scene, resolution=resolution), to_compare)
         assert paid is not None
         layout = paid.first_layout
         s = layout.nodes
@@ -209,7 +210,7 @@ def build(
         attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
         on_base=LineOnBase(cable, layout.base) if layout is not None else None,
         plane=plane, follows_error=follows,
-        payout=paid or payout_plan(scene, line, zones),
+        payout=paid or payout_plan(scene, line, zones, to_compare=to_compare),
     )  # fmt: skip
 
 

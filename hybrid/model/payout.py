@@ -228,11 +228,13 @@ class PayoutPlan:
 
 
 def payout_plan(
-    scene: Scene, line: Line, zones: tuple[Zone, ...], parts: Callable[[Material, Floats], np.ndarray] | None = None
-) -> PayoutPlan | None:
+    scene: Scene, line: Line, zones: tuple[Zone, ...], parts: Callable[[Material, Floats], np.ndarray] | None = None,
+    to_compare: bool = False,
+) -> PayoutPlan | None:  # fmt: skip
     """What a scene's line consists of that is paid out; None: its length stays.  SceneError: it cannot be done.
 
-    line: of base cells, where cells follow the curvature; parts: (n,) finest cells of those between nodes (n+1,) m.
+    line: of base cells, where cells follow the curvature; parts: (n,) finest cells of those between nodes (n+1,) m;
+    to_compare: whether this is a coarser run than the scene asks for, by which errors are estimated.
     """
     payout = payout_of(scene)
     if payout is None:
@@ -256,6 +258,9 @@ def payout_plan(
     least = -np.inf if payout.from_outside or payout.winch is not None else least_length(law, length)
     ride = riding_nodes(scene, line, s, least - s[min(near + FEWEST_CELLS, s.size - 1)])
     fewest = FEWEST_CELLS + ride
+    if near + fewest >= s.size and to_compare:  # with a finer run: fewer nodes ride on longer cells
+        ride = max(s.size - 1 - near - FEWEST_CELLS, 0)
+        fewest = FEWEST_CELLS + ride
     if near + fewest >= s.size:
         place = fixed if side else length - fixed
         what = "last" if side else "first"

@@ -26,7 +26,7 @@ Tables = Mapping[str, Any]
 Kind = Literal["physics", "not worked out", "several lines"]
 # Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
 USE, SYSTEM, LINE = "use", "system", "line"
-Use = Literal["", "motion", "stepped", "changed loads"]
+Use = Literal["", "stepped", "changed loads"]
 LEAVE_OUT = "leave it out"
 ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
@@ -255,25 +255,6 @@ def _self_contact(tables: Tables) -> Iterator[Place]:
     return iter([("contact", "self")] if "contact" in tables and tables["contact"].self else [])
 
 
-def _accuracy(tables: Tables) -> Iterator[Place]:
-    moves = tables.get("accuracy") is not None and tables.get("time") is not None
-    return iter([("accuracy",)] if moves else [])
-
-
-def _errors(tables: Tables) -> Iterator[Place]:
-    moves = "output" in tables and tables["output"].errors and tables.get("time") is not None
-    return iter([("output", "errors")] if moves else [])
-
-
-def _chosen_steps(tables: Tables) -> Iterator[Place]:
-    """Steps of which no length is given matter once a motion is computed: an equilibrium and a plan have none."""
-    time = tables.get("time")
-    if time is not None and time.tolerance is not None:
-        yield "time", "tolerance"
-    elif time is not None and time.step is None and tables.get(USE) in ("motion", "stepped"):
-        yield "time", "step"
-
-
 def _clamped(tables: Tables) -> Iterator[Place]:
     held = tables.get("connections")
     for end in ("start", "end"):
@@ -349,9 +330,6 @@ TWISTED_RELEASE = Feature("release of an end", "ends.end.release_at", lambda tab
 TWISTED_CATENARY = Feature("a catenary zone that carries torque there", "model", lambda tables: ())
 LAYERS = Feature("cells to a boundary layer", "resolution.cells_per_layer",
                  _asks("resolution", "cells_per_layer", lambda x: True))  # fmt: skip
-ACCURACY = Feature("accuracy", "accuracy", _accuracy)
-ERRORS = Feature("estimated errors", "output.errors", _errors)
-CHOSEN_STEPS = Feature("steps that follow the motion", "time.tolerance, or no time.step", _chosen_steps)
 CLAMPED_CONNECTION = Feature("a clamped connection", "lines.NAME.connections", _clamped)
 BREAKS_OFF_CLAMP = Feature("a break at a clamp", "break_at", _breaks_off_clamp)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
@@ -464,17 +442,6 @@ REFUSALS: tuple[Refusal, ...] = (
         UNTWISTED,
     ),
     Refusal(LAYERS, PAYOUT, "not worked out", f"{PAID}, and its cells are given", fix="place cells by `mesh`"),
-    Refusal(
-        CHOSEN_STEPS, PAYOUT, "not worked out", f"{PAID}: no error is estimated",
-        "a fixed step, in s, and no tolerance",
-        "give `step: ...` (s) in time, without a tolerance, and halve it to see its error; the equilibrium alone: "
-        "hybrid static FILE",
-    ),
-    Refusal(
-        ACCURACY, PAYOUT, "not worked out", f"{PAID}, of which no error is estimated",
-        fix="leave it out; halve time.step to see its error",
-    ),
-    Refusal(ERRORS, PAYOUT, "not worked out", f"{PAID}, of which no error is estimated", "false"),
     Refusal(
         CHANGED_LOADS, PAYOUT, "not worked out", "the line is paid out", "nothing to change",
         "run the changed scene from its start",

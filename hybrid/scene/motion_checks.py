@@ -209,7 +209,17 @@ def shortest_period(ends: Ends, environment: Environment | None) -> float:
             from hybrid.scene.vessel_record import motion_record
 
             times.append(shortest_in(motion_record(motion, end.held_position, end.held_tangent is not None)))
+    times += [over for begin, over in _winch_ramps(ends)]
     return min(times, default=math.inf)
+
+
+def _winch_ramps(ends: Ends) -> Iterator[tuple[float, float]]:
+    """Begin and length, s, of the ramps of rates at which line is paid out, and of tensions that winches hold."""
+    for payout in (getattr(end, "payout", None) for end in ends.both):
+        if payout is not None and payout.ramp is not None:
+            yield from ((t, payout.ramp) for t in (payout.begin, payout.until) if t is not None)
+        if payout is not None and payout.winch is not None:
+            yield payout.winch.begin, payout.winch.ramp
 
 
 def stationary_from(scene: Scene) -> tuple[float, float] | None:
@@ -249,6 +259,7 @@ def ramp_ends(scene: Scene) -> list[float]:
     times = [m.ramp for _, _, m in _motions(ends)] + [t for m in moves for t in (m.begin, m.begin + m.over)]
     times += [getattr(x, "ramp", None) for x in ((fluid.current, fluid.waves) if fluid is not None else ())]
     times += [load.ramp for end in ends.both for load in end.loads]
+    times += [t for begin, over in _winch_ramps(ends) for t in (begin, begin + over)]
     return [t for t in times if t] + turning_times(ends)
 
 

@@ -12,7 +12,7 @@ from hybrid.kernels.laws.axial_law import SHIFT, stretch_energy
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.reel import reel as p
 from hybrid.kernels.reel import winch as w
-from hybrid.kernels.reel.payout import fit_line, iterate, lengthen, pay_out, stand_still
+from hybrid.kernels.reel.payout import fit_line, iterate, lengthen, limit_next_step, pay_out, stand_still
 from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, put_places
 from hybrid.kernels.reel.reel import MovingZones, Reel, blank_reel, blank_reel_job
 from hybrid.kernels.run.payout_run import energy_of
@@ -400,6 +400,10 @@ class PayingOut:
             self.law = law
             self.reel = self.reel._replace(law=law)
             self.table.bind(reel=self.reel)
+
+    def limit_step(self) -> None:
+        """Of steps that follow the motion: the next one is no longer than the law of the length allows."""
+        limit_next_step(self.table.numbers)
 
     def lengthen(self) -> None:
         """The line as it is at the time of its run."""

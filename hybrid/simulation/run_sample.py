@@ -139,13 +139,17 @@ def reach_of(position: Outputs) -> Reach:
 
 
 def compared_cells(model: Model, fineness: float = 0.0, cells: float = np.inf) -> int:
-    """Cells by which meshes of one scene are compared: of zones that move, their base cells.
+    """Cells by which meshes of one scene are compared: of zones that move, their base cells; at the start, of a line
+
+    that is paid out.
 
     fineness: of cells that follow the curvature, 0: they do not.  All that sets their lengths goes with it, and their
     number with the steps as well, over which contact edges go: it counts as `OF_FOLLOWING` at fineness 1.  cells: how
     many there are in most outputs; where nearly all are base cells, which stay, a finer run is
     no finer, and counts as one.
     """
+    if model.payout is not None and not fineness:
+        return int(model.payout.begun.size) - 1
     if model.layout is None:
         return model.cells
     base = int(model.layout.rod.size)

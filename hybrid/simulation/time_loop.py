@@ -333,8 +333,9 @@ class TimeLoop:
             self._keep_ratios(count)
             ratios, self._ratios = np.array(self._ratios[:count]), self._ratios[count:]
         if run.payout is not None:
+            shift = run.correction.shift(errors, batch) if run.correction is not None else None
             there, seen, zones = run.payout.look(observer, model, batch)
-            self._save(there, seen, there.values_of(seen, ratios), zones)
+            self._save(there, seen, there.values_of(seen, ratios, shift), zones)
             observer.first_energy = there.first_energy
             return
         shift = run.correction.shift(errors, batch) if run.correction is not None else None

@@ -322,6 +322,8 @@ class Transient:
         """The next steps end at `stop` (s)."""
         clock, count = self.run.clock, self.run.count
         clock[b.STOP] = stop
+        if count[b.CONTROLLED] and self.payout is not None:
+            self.payout.limit_step()
         if not count[b.CONTROLLED] and stop > clock[b.NOW]:
             step, whole = self.resolution.step, stop - float(clock[b.LEG_BEGIN])
             count[b.LEG_PARTS] = n = parts(whole, step)

@@ -31,6 +31,7 @@ from hybrid.kernels.reel.paid_length import (
     eased,
     find_length,
     growing,
+    length_at,
     node,
     prepare,
     put_balance_on,
@@ -41,6 +42,7 @@ from hybrid.kernels.reel.payout_balance import find_balance
 from hybrid.kernels.reel.reel import (
     ACCELERATION,
     DUE,
+    FEWEST_STEPS,
     FLUX,
     FLUX_BEFORE,
     LENGTH,
@@ -158,6 +160,19 @@ def put_riding_on(line, sea, ends, state, reel):
 
 
 @inner
+def sum_of_balance(reel, t):
+    """The sum, N, of the forces that balance the neighbours of the last new node, at t.
+
+    Where the cells at the fairlead are those that have changed, the force of the line on it is that much too large.
+    """
+    part, x, y, z = eased(reel, t), 0.0, 0.0, 0.0
+    if part > 0.0:
+        for i in range(reel.balance.shape[0]):
+            x, y, z = x + reel.balance[i, 0], y + reel.balance[i, 1], z + reel.balance[i, 2]
+    return part * x, part * y, part * z
+
+
+@inner
 def force_of_fairlead(reel, report, more):
     """Force of the line on the fairlead, N, of the material there, and where it stands in the report."""
     at = FORCE_B if end_of(reel) else FORCE_A
@@ -172,14 +187,15 @@ def pull_at(force, slope):
 
 
 @inner
-def correct_force(line, sea, ends, state, velocity, reel, report):
-    """The report of a state: the half cell at the fairlead has the velocity and the acceleration of the material.
+def correct_force(line, sea, ends, state, velocity, reel, report, t):
+    """The report of a state at t: the half cell at the fairlead has the velocity and the acceleration of the material.
 
     What the end does of power by the difference is kept in the numbers of the reel, to be taken back.  Returns the
     pull of the line there, N.
     """
     numbers = reel.numbers
     more, slope = of_material(line, sea, ends, state, reel, line.h.shape[0])
+    more = sub(more, sum_of_balance(reel, t))
     force, at = force_of_fairlead(reel, report, more)
     report[at], report[at + 1], report[at + 2] = force
     for j in range(3):
@@ -274,6 +290,22 @@ def work_of_balance(old, new, reel, t, dt):
 
 
 @inner
+def limit_step(reel, clock):
+    """The next step, if it follows the motion, is so short that a new cell has its length before the next node enters.
+
+    Of a winch that holds a tension the rate and its growth now tell what comes in a step, else the law of the length.
+    """
+    dt, numbers, fastest = clock[b.NEXT_DT], reel.numbers, 1e-12
+    if reel.winch[TENSION] > 0.0:
+        fastest = max(fastest, abs(numbers[RATE]) + abs(numbers[ACCELERATION]) * clock[b.LAST_DT])
+    else:
+        length, rate, _ = length_at(reel.law, clock[b.NOW])
+        later, then, _ = length_at(reel.law, clock[b.NOW] + dt)
+        fastest = max(fastest, abs(rate), abs(then), abs(later - length) / dt)
+    clock[b.NEXT_DT] = max(min(dt, reel.rest_length[0] / (FEWEST_STEPS * fastest)), clock[b.SHORTEST])
+
+
+@inner
 def note_pull(reel, t, pull):
     """What the pull is when the brake of a winch opens: the last one before."""
     if t <= reel.winch[BEGIN]:
@@ -300,7 +332,7 @@ def pay_out(table):
         tried = job.old if count[b.PARITY] else job.new
         take_riding_off(line, reel)
         take_balance_off(line, reel)
-        pull = correct_force(line, job.sea, job.ends, tried, job.velocity, reel, job.report)
+        pull = correct_force(line, job.sea, job.ends, tried, job.velocity, reel, job.report, clock[b.TRY_END])
         note_pull(reel, clock[b.TRY_END], pull)
         leave_to_reel(line, job.zones, reel)
         return 0
@@ -313,6 +345,8 @@ def pay_out(table):
     job.work[0, end_of(reel)] += book(line, before, state, reel, clock[b.LAST_DT])
     job.work[0, b.ZONES] += work_of_balance(before, state, reel, clock[b.NOW], clock[b.LAST_DT])
     remember(line, reel)
+    if count[b.CONTROLLED]:
+        limit_step(reel, clock)
     last = reel.true[growing(line, reel)]
     numbers[DUE] = 1.0 if last > numbers[LONGEST] or last < numbers[SHORTEST] else 0.0
     return 1 if numbers[DUE] > 0.0 or at_its_end(winch) else 0
@@ -342,6 +376,7 @@ def iterate(table):
     )
     apart = end_of(reel) == 0 or g < n - 1  # the cell that grows is not the last one of the line
     more, slope = of_material(line, job.sea, job.ends, state, reel, n)
+    more = sub(more, sum_of_balance(reel, t))
     force, _ = force_of_fairlead(reel, job.report, more)
     if apart:
         answer, more_pull = answer_of_cell(
@@ -387,17 +422,25 @@ def lengthen(table):
 
 
 @kernel
+def limit_next_step(table):
+    """`limit_step`, after another law of the length."""
+    job = read(table)
+    limit_step(job.reel, job.clock)
+
+
+@kernel
 def stand_still(table):
     """The same for a state that no step has led to: the line at clock[NOW], and the force of its fairlead."""
     job = read(table)
     find_length(job.reel, job.clock[b.NOW])
     prepare(job.line, job.reel, job.clock[b.NOW])
     state = job.new if job.counts[b.PARITY] else job.old
-    pull = correct_force(job.line, job.sea, job.ends, state, job.velocity, job.reel, job.report)
-    note_pull(job.reel, job.clock[b.NOW], pull)
-    remember(job.line, job.reel)
     if job.reel.stage[UNBALANCED] > 0.0:
         put_riding_on(job.line, job.sea, job.ends, state, job.reel)
         find_balance(job.line, job.sea, job.ends, state, job.reel)
         take_riding_off(job.line, job.reel)
         job.reel.stage[UNBALANCED] = 0.0
+    t = job.clock[b.NOW]
+    pull = correct_force(job.line, job.sea, job.ends, state, job.velocity, job.reel, job.report, t)
+    note_pull(job.reel, t, pull)
+    remember(job.line, job.reel)

@@ -24,7 +24,9 @@ from hybrid.kernels.reel.reel import (
     EASING,
     ENTERS,
     FAR,
+    FEWEST_STEPS,
     LEAVES,
+    LENGTH,
     LONGEST,
     PLACE,
     SHORTEST,
@@ -38,9 +40,6 @@ from hybrid.kernels.state import books as b
 from hybrid.kernels.state.forces import PLANAR
 from hybrid.kernels.state.state import Floats, Line, State, blank_line, blank_state
 from hybrid.kernels.step.generalized_alpha import lead
-
-# Steps over which new cells get their true lengths, at most and at least.
-MOST_STEPS, FEWEST_STEPS = 40, 8
 
 
 class CarryJob(NamedTuple):
@@ -292,10 +291,26 @@ def let_lack(job, flow, c, true, grows, rises, kept, span):
 
 
 @inner
+def crossing_time(job, g):
+    """Time, s, in which a wave of the tension before the fairlead, or of the weight if that is more, crosses the line."""
+    line, n, pull, mass = job.line, job.line.h.shape[0], job.state.T[cell(job.line, job.reel, g)], 0.0
+    weight = 0.0
+    for i in range(n + 1):
+        weight += abs(line.force[i, 2])
+        mass += line.mass[i]
+    pull = max(pull, weight)
+    return math.sqrt(mass * job.reel.numbers[LENGTH] / pull) if pull > 0.0 else math.inf
+
+
+@inner
 def span_of(job, flow, g):
-    """Time, s, over which a new cell gets its length."""
+    """Time, s, over which a new cell gets its length: what half of it takes to come, and no more than waves take.
+
+    It does not go by the steps unless they are long: the shorter, the more a new node would kick.
+    """
     dt, h = job.clock[b.LAST_DT], job.nodes[g + 1] - job.nodes[g]
-    return max(min(MOST_STEPS * dt, 0.5 * h / max(abs(flow.rate), 1e-12)), FEWEST_STEPS * dt, 1e-9)
+    slowly = min(crossing_time(job, g), 0.5 * h / max(abs(flow.rate), 1e-12))
+    return max(slowly, FEWEST_STEPS * dt, 1e-9)
 
 
 @inner

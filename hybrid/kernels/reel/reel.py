@@ -24,6 +24,9 @@ from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_lin
 
 # Parts of a cell: a node enters when that much of the cell after it is out, and leaves when only that much is left.
 ENTERS, LEAVES = 0.85, 0.35
+# Steps over which new cells get their true lengths, at least; steps that follow the motion are so short that these have
+# passed when the next node enters.
+FEWEST_STEPS = 8
 # Numbers of a reel.
 (
     LENGTH, RATE, ACCELERATION,  # L, c and the rate of c at the end of the try
