@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hybrid.exports.api import export
     from hybrid.interop.moordyn import export_moordyn, import_moordyn
     from hybrid.modal.api import modes
+    from hybrid.modal.response import response
     from hybrid.scene.read import load_scene, load_system, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
     from hybrid.scene.system import System
@@ -80,6 +81,7 @@ _HOME = {
     "plot_zone_map": ("hybrid.view.quantities", "plot_zone_map"),
     "plot_zones": ("hybrid.view.plots", "plot_zones"),
     "report": ("hybrid.view.report", "write_report"),
+    "response": ("hybrid.modal.response", "response"),
     "resume": ("hybrid.accuracy.api", "resume"),
     "run": ("hybrid.accuracy.api", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
@@ -129,6 +131,7 @@ __all__ = [
     "plot_zone_map",
     "plot_zones",
     "report",
+    "response",
     "resume",
     "run",
     "scene_text",

@@ -18,7 +18,7 @@ FLOORS = (
     {
         "studies": (0.05, "many runs, other programs"),
         "couple": (1.1, "FMU"),
-        "modal": (2.15, "natural modes"),
+        "modal": (2.15, "modes, response to a sea"),
         "live": (3.2, "page for the browser"),
     },
     {"accuracy": (0.5, "passes, errors, choice of model")},

@@ -19,6 +19,7 @@ import typer
 
 import hybrid
 import hybrid.cli.modes_command  # registers its command
+import hybrid.cli.response_command
 import hybrid.cli.result_commands
 import hybrid.cli.statistics_command
 import hybrid.cli.study_command

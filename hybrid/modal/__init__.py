@@ -1,1 +1,1 @@
-"""Vibrations about an equilibrium: natural modes of any network of lines, points and bodies."""
+"""Vibrations about an equilibrium of any network: natural modes, and the response to a sea."""

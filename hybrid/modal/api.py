@@ -16,6 +16,7 @@ from hybrid.kernels.junctions.bodies import FRAME, MASS, V
 from hybrid.kernels.state.state import Floats
 from hybrid.modal.eigen import Eigen, lowest_modes
 from hybrid.modal.matrices import LinearLine, LinearNetwork, linear_network
+from hybrid.model.build import Model
 from hybrid.model.resolution import Resolution
 from hybrid.model.system import SystemResolution
 from hybrid.scene.base import Table
@@ -143,22 +144,42 @@ def _found(asked: Scene | System, cells: float, count: int, near: float | None, 
 
     They are more than `count`: what nothing holds is told apart from them, such as lines that turn about their axis.
     """
-    solver, states, names, points, bodies = _line(asked, cells) if isinstance(asked, Scene) else _system(asked, cells)
-    network = linear_network(solver, states, names, sticks)
-    count += 2 + len(names) + 3 * network.bodies
+    rest = equilibrium_of(asked, cells)
+    network = linear_network(rest.solver, rest.states, rest.names, sticks)
+    count += 2 + len(rest.names) + 3 * network.bodies
     eigen = lowest_modes(network, count, None if near is None else 2.0 * math.pi / near)
     axes = tuple(
         (row[FRAME:V].reshape(3, 3), numbers[MASS : MASS + 36].reshape(6, 6))
-        for row, numbers in zip(states.bodies, solver.bodies, strict=True)
+        for row, numbers in zip(rest.states.bodies, rest.solver.bodies, strict=True)
     )
-    return _Found(network, eigen, points, bodies, axes)
+    return _Found(network, eigen, rest.points, rest.bodies, axes)
 
 
-_Rest = tuple[SystemSolver, SystemState, tuple[str, ...], tuple[str, ...], tuple[str, ...]]
+@dataclass(frozen=True)
+class Rest:
+    """The equilibrium of a scene as a network, of one line or of several; points and bodies by name, those that are
+
+    free, and models of the lines.
+    """
+
+    solver: SystemSolver
+    states: SystemState
+    names: tuple[str, ...]
+    models: tuple[Model, ...]
+    points: tuple[str, ...] = ()
+    bodies: tuple[str, ...] = ()
 
 
-def _line(scene: Scene, cells: float) -> _Rest:
-    """The equilibrium of one line, as a system of one."""
+def equilibrium_of(asked: Scene | System, cells: float = 1.0) -> Rest:
+    """The equilibrium on the usual mesh, or on one whose cells are so many times as long.
+
+    SceneError: a line touches itself in it; ComputationError: there is none.
+    """
+    return _of_line(asked, cells) if isinstance(asked, Scene) else _of_system(asked, cells)
+
+
+def _of_line(scene: Scene, cells: float) -> Rest:
+    """One line, as a system of one."""
     case = StaticCase(scene)
     resolution: Resolution = resolution_at_rest(case)
     model, found = case.at_rest(resolution.coarser(cells=cells) if cells > 1.0 else resolution)
@@ -167,11 +188,11 @@ def _line(scene: Scene, cells: float) -> _Rest:
     x = JoinedLine(
         model.line, model.sea.at(np.inf), model.ends.at(np.inf), model.length, model.tension_scale, -np.inf, (-1, -1)
     )  # fmt: skip
-    return SystemSolver([x], 0), SystemState([found.state]), ("cable",), (), ()
+    return Rest(SystemSolver([x], 0), SystemState([found.state]), ("cable",), (model,))
 
 
-def _system(system: System, cells: float) -> _Rest:
-    """The equilibrium of several lines."""
+def _of_system(system: System, cells: float) -> Rest:
+    """Several lines."""
     resolution = SystemResolution.first(system)
     if cells > 1.0:
         resolution = replace(resolution, lines={k: x.coarser(cells=cells) for k, x in resolution.lines.items()})
@@ -180,7 +201,10 @@ def _system(system: System, cells: float) -> _Rest:
     if run.found.settled:
         _refuse_contact("lines")
     bodies = (*(body.name for body in run.model.bodies), *run.model.rigid)
-    return run.found.solver, run.state, tuple(run.model.names), tuple(run.model.free), bodies
+    found = run.found.solver  # which knows neither waves nor friction
+    lines = [x._replace(line=model.line) for x, model in zip(found.lines, run.model.models, strict=True)]
+    solver = SystemSolver(lines, len(found.net), found.bodies)
+    return Rest(solver, run.state, tuple(run.model.names), run.model.models, tuple(run.model.free), bodies)
 
 
 def _refuse_contact(where: str) -> None:

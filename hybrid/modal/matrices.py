@@ -59,7 +59,7 @@ class LinearLine:
     mass: sparse.csr_array
     free: np.ndarray
     net: Floats  # (2, 3) N, that each end passes to what it is joined to
-    turned: Floats  # (2, 6, 5 (N+1)) N, N m, .. what turns of an end's frame do, from the left; zeros: it carries none
+    turned: Floats  # (2, 3, 5 (N+1)) N, N m, .. what turns of an end's frame do, from the left; zeros: it carries none
     held_moment: Floats  # (2, 3, 3) N m/rad, moment that the frame of an end resists a turn with
 
     @property
@@ -138,23 +138,23 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool) -> LinearL
 
     sticks: whether friction holds it elastically where it lies on the bed, as before it slides; else there is none.
     """
-    line, count = _in_space(x.line, state, sticks), x.line.s.size
+    line, count = in_space(x.line, state, sticks), x.line.s.size
     if line.bits & FRICTION:
         friction_axes(x.sea, state.r, state.e, np.zeros_like(state.slip))
     held, joined = x.ends.held.copy(), [x.joints[k] >= 0 for k in (0, 1)]
     held[joined] = 0
     ends = x.ends._replace(held=held)
     base = np.zeros((count, SIZE * WIDTH))
-    report = _rows(line, x, ends, state, ANCHOR, base)
+    rows_at_rest(line, x, ends, state, (0.0, ANCHOR), base)
     forces = -base.reshape(count, SIZE, WIDTH)[[0, -1], 1:4, -1]
     # the largest stiffness over mass: neither drowns in the other's round-off
     diagonal = np.abs(np.stack([base[:, (1 + k) * WIDTH + 11 + k] for k in range(3)], axis=1)).max(axis=1)
     high = float((diagonal / np.maximum(line.mass, 1e-300)).max()) or 1.0
     more = np.zeros_like(base)
-    _rows(line, x, ends, state, high, more)
+    rows_at_rest(line, x, ends, state, (0.0, high), more)
     mass = (more - base) / (high - ANCHOR)
     base -= ANCHOR * mass
-    K, M = _sparse(base), _sparse(mass)
+    K, M = sparse_rows(base), sparse_rows(mass)
     K = K - sparse.diags_array(_spin_springs(line))  # what turns freely about its axis is a motion that costs nothing
     if line.torsion.size:
         K = K + _through_zones(line)
@@ -167,13 +167,13 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool) -> LinearL
     turned, moments = np.zeros((2, 3, SIZE * count)), np.zeros((2, 3, 3))
     for k in (0, 1):
         if x.seats[k, TURNS] != 0.0:
-            turned[k], moments[k] = _by_turn(line, x, ends, state, k, report)
+            turned[k], moments[k] = by_turn(line, x, ends, state, k)
     return LinearLine(
         name, line, state, K, M, free.ravel(), forces, turned, moments
     )  # fmt: skip
 
 
-def _in_space(line: Line, state: State, sticks: bool) -> Line:
+def in_space(line: Line, state: State, sticks: bool) -> Line:
     """The line in space, without what makes no stiffness; ropes are as stiff as they are to quick motions."""
     ck = line.ck
     if line.law.size:
@@ -183,18 +183,18 @@ def _in_space(line: Line, state: State, sticks: bool) -> Line:
     return line._replace(bits=line.bits & ~off, law_at=NO_ADDRESS, ck=ck)
 
 
-def _rows(line: Line, x: JoinedLine, ends: Ends, state: State, ca: float, rows: Floats) -> Floats:
-    """Fill the block rows of a state at rest; its report."""
+def rows_at_rest(line: Line, x: JoinedLine, ends: Ends, state: State, c: tuple[float, float], rows: Floats) -> Floats:
+    """Fill the block rows of a state at rest with c_v (1/s) and c_a (1/s^2), in the sea of x; its report."""
     work = entry.workspace_of(line)._replace(rows=rows, torsion=no_torsion())
     still = state.copy()
     for rate in (still.v, still.a, still.vd, still.w, still.wa, still.wd, still.slip):
         rate[:] = 0.0
     plain = line._replace(torsion=line.torsion[:0])
-    entry.assembly(plain, x.sea, ends, still._replace(turn=still.turn[:0]), 0.0, ca, work)
+    entry.assembly(plain, x.sea, ends, still._replace(turn=still.turn[:0]), *c, work)
     return work.report
 
 
-def _sparse(rows: Floats) -> sparse.csr_array:
+def sparse_rows(rows: Floats) -> sparse.csr_array:
     """A (5 (N+1), 5 (N+1)) of block rows: balances and spins with the opposite sign, so that it is symmetric."""
     n = rows.shape[0]
     blocks = rows.reshape(n, SIZE, WIDTH)[:, :, :-1].copy()
@@ -234,7 +234,7 @@ def _through_zones(line: Line) -> sparse.csr_array:
     return entries.matrix(size, size)
 
 
-def _by_turn(line: Line, x: JoinedLine, ends: Ends, state: State, k: int, report: Floats) -> tuple[Floats, Floats]:
+def by_turn(line: Line, x: JoinedLine, ends: Ends, state: State, k: int) -> tuple[Floats, Floats]:
     """What turns of the frame of end k do: (3, 5 (N+1)) to the balances of nodes and spins, (3, 3) to its own moment.
 
     By differences, so that every law of the element counts.
@@ -247,7 +247,7 @@ def _by_turn(line: Line, x: JoinedLine, ends: Ends, state: State, k: int, report
             frames = ends.frame.copy()
             frames[k] = (_rotation(sign * FRAME_TURN * np.eye(3)[axis]) @ frame).ravel()
             rows = np.zeros((count, SIZE * WIDTH))
-            report = _rows(line, x, ends._replace(frame=frames), state, ANCHOR, rows)
+            report = rows_at_rest(line, x, ends._replace(frame=frames), state, (0.0, ANCHOR), rows)
             right = rows.reshape(count, SIZE, WIDTH)[:, :, -1].copy()  # minus the balance, minus the spin's
             right[:, 0] = 0.0
             forces[axis] += sign * right.ravel() / (2.0 * FRAME_TURN)
@@ -294,11 +294,11 @@ def linear_network(solver: SystemSolver, states: SystemState, names: Sequence[st
             b = joint - points
             first = own + 3 * points + 6 * b
             arm = states.bodies[b, FRAME:V].reshape(3, 3) @ joined.fairleads[k]
-            by_turn = -_hat(arm)
+            shifted = -_hat(arm)
             for c in range(3):
                 entries.add(rows[c], first + c, 1.0)
                 for d in range(3):
-                    entries.add(rows[c], first + 3 + d, by_turn[c, d])
+                    entries.add(rows[c], first + 3 + d, shifted[c, d])
             f = x.net[k]
             extra.append((b, x.held_moment[k] - _hat(f) @ _hat(arm)))
             if x.turned[k].any():
@@ -333,11 +333,11 @@ def _couplings(
     for l, b, forces in given:
         whole = np.zeros((place.shape[0], 3))
         whole[at[l] : at[l + 1]] = forces.T
-        by_turn = place.T @ whole  # (q, 3): forces on q that hold it while the frame turns
-        rows = np.flatnonzero(by_turn.any(axis=1))
+        forces_on = place.T @ whole  # (q, 3): forces on q that hold it while the frame turns
+        rows = np.flatnonzero(forces_on.any(axis=1))
         columns = first + 6 * b + 3 + np.arange(3)
         block = sparse.csr_array(
-            (by_turn[rows].ravel(), (np.repeat(rows, 3), np.tile(columns, rows.size))), shape=(size, size)
+            (forces_on[rows].ravel(), (np.repeat(rows, 3), np.tile(columns, rows.size))), shape=(size, size)
         )
         out = out + block + block.T
     return out
@@ -361,9 +361,9 @@ def _of_bodies(
     entries = _Entries()
     for b in range(len(solver.bodies)):
         K = _own_stiffness(solver, states, b)
-        for other, by_turn in extra:
+        for other, stiffness in extra:
             if other == b:
-                K[3:, 3:] += by_turn
+                K[3:, 3:] += stiffness
         for c, d in zip(*np.nonzero(K), strict=True):
             entries.add(first + 6 * b + c, first + 6 * b + d, K[c, d])
     return entries.matrix(size, size)

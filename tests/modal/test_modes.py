@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
-from hybrid.modal.api import _found, _system
+from hybrid.modal.api import _found, equilibrium_of
 from hybrid.modal.matrices import linear_network
 from hybrid.scene.read import as_scene_or_system
 
@@ -228,10 +228,11 @@ def test_moored_body():
 def test_joints_give_way_as_the_solver_says():
     """(K + ca M)^-1 at points and bodies is the compliance that the junctions of the solver have from its factors."""
     system = as_scene_or_system(PIPE)
-    solver, states, names, points, bodies = _system(system, 1.0)
-    network = linear_network(solver, states, names, False)
-    m = 3 * len(points) + 6 * len(bodies)
-    assert (len(points), len(bodies)) == (1, 1)
+    rest = equilibrium_of(system)
+    solver, states = rest.solver, rest.states
+    network = linear_network(solver, states, rest.names, False)
+    m = 3 * len(rest.points) + 6 * len(rest.bodies)
+    assert (len(rest.points), len(rest.bodies)) == (1, 1)
     for ca in (0.0, 0.5):
         theirs = solver.compliance(states, max(ca, solver.anchor))
         A = (network.stiffness + network.skew + max(ca, solver.anchor) * network.mass).toarray()

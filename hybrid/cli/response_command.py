@@ -1,0 +1,96 @@
+"""The command response: what a stationary sea does to a scene, linear about its equilibrium."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+import hybrid
+from hybrid.cli.app import Json, Quiet, SceneFile, Settings, UsageError, app, flag, load_either, session
+
+if TYPE_CHECKING:
+    from hybrid.modal.response import LineResponse, Response
+
+
+MOTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
+LEAST = 1e-6  # of the largest: smaller motions are those of round-off
+
+
+@app.command()
+def response(
+    scene: SceneFile, settings: Settings = None,
+    hours: Annotated[float, typer.Option(metavar="H", help="Largest values of so many hours.")] = 3.0,
+    smooth: Annotated[bool, flag("--smooth", help="Without friction of the bed, which else holds the line.")] = False,
+    check: Annotated[float | None, typer.Option(metavar="S", help="Compare with a run in time of so many s.")] = None,
+    quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Standard deviations and largest values in the waves of a scene, by frequency, without a run in time."""
+    if not 0.0 < hours < np.inf:
+        raise UsageError(f"--hours: {hours:g} is no time; give a number above 0, such as 3")
+    with session(as_json, quiet) as console:
+        found = hybrid.response(load_either(console, scene, settings), friction=not smooth, check=check)
+        rows = _rows(found, hours)
+        console.show(lambda: _table(found, rows, hours))
+        for name, (here, there) in found.checks.items():
+            console.note(f"{name}: standard deviation {here:.4g}, in a run of {check:g} s {there:.4g}")
+        for note in found.notes:
+            console.note(f"note: {note}")
+        console.json(
+            "response", valid=found.valid, notes=list(found.notes), hours=hours, rows=rows, checks=dict(found.checks)
+        )
+
+
+def _rows(found: Response, hours: float) -> list[dict[str, Any]]:
+    """One for each quantity at the place where it varies most."""
+    rows = []
+    for name, line in found.lines.items():
+        of = f"{name} " if len(found.lines) > 1 else ""
+        rows.append(_row(line, f"{of}tension", "tension", line.middle, line.mean_tension, "N", hours))
+        if (line.mean_curvature > 0.0).any():
+            rows.append(_row(line, f"{of}curvature", "curvature", line.s, line.mean_curvature, "1/m", hours))
+        most = line.deviation("position").max()
+        for k, axis in enumerate("xyz"):
+            deviation = line.deviation("position")[:, k]
+            at = int(deviation.argmax())
+            if deviation[at] < LEAST * most:
+                continue
+            mean = line.mean_position[at, k]
+            row = {"quantity": f"{of}{axis}", "unit": "m", "s": line.s[at], "mean": mean, "deviation": deviation[at]}
+            row["period"] = line.period("position")[at, k]
+            row["largest"] = mean + line.most_probable("position", hours)[at, k]
+            rows.append({key: x if isinstance(x, str) else float(x) for key, x in row.items()})
+    for kind, parts, axes in (("point", found.points, "xyz"), ("body", found.bodies, MOTIONS)):
+        for name, x in parts.items():
+            for k, axis in enumerate(axes):
+                unit = "deg" if k > 2 else "m"
+                size = float(np.sqrt(0.5 * (np.abs(x[:, k]) ** 2).sum())) * (180.0 / np.pi if k > 2 else 1.0)
+                rows.append({"quantity": f"{kind} {name} {axis}", "unit": unit, "deviation": size})
+    return rows
+
+
+def _row(
+    line: LineResponse, label: str, name: str, s: Any, mean: Any, unit: str, hours: float
+) -> dict[str, Any]:  # fmt: skip
+    deviation = line.deviation(name)
+    at = int(deviation.argmax())
+    return {
+        "quantity": label, "unit": unit, "s": float(s[at]), "mean": float(mean[at]), "deviation": float(deviation[at]),
+        "period": float(line.period(name)[at]), "largest": float(mean[at] + line.most_probable(name, hours)[at]),
+    }  # fmt: skip
+
+
+def _table(found: Response, rows: list[dict[str, Any]], hours: float) -> Any:
+    from rich.table import Table
+
+    title = f"{found.title or 'response'}, where each varies most"
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 2), min_width=len(title))
+    table.add_column("quantity")
+    for name in ("s (m)", "mean", "standard deviation", "mean period (s)", f"MPM in {hours:g} h"):
+        table.add_column(name, justify="right")
+    table.add_column("unit")
+    for row in rows:
+        cells = [f"{row[key]:.4g}" if key in row else "" for key in ("s", "mean", "deviation", "period", "largest")]
+        table.add_row(row["quantity"], *cells, row["unit"])
+    return table

@@ -1,0 +1,149 @@
+"""What excites a line about its equilibrium, by frequency: waves that pass, and motions of its ends.
+
+Everything is  Re(X exp(-i w t)),  so that velocities are -i w X and accelerations -w^2 X.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
+from hybrid.kernels.laws.water import wave_kinematics
+from hybrid.kernels.state.forces import DRAG, FLOW, SURFACE, WAVES
+from hybrid.kernels.state.state import LANES, RIDES, Floats, Line, Sea, State
+from hybrid.model.build import Model
+
+# The block rows of a line at rest in a sea.
+RowsOf = Callable[[Sea], Floats]
+# Amplitude, m, of the wave by which loads are differentiated, as a part of its length.
+SMALL_WAVE = 1e-6
+# Frequencies that agree within this part are one.
+SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """Loads on a line at one frequency, 1/s, complex amplitudes.
+
+    forces: (N+1, 3) N, of the waves but for drag; water: (N+1, 3) m/s, its velocity at the nodes; shifts: (2, 3) m and
+    turns: (2, 3) rad of the ends.
+    """
+
+    omega: float
+    forces: Floats
+    water: Floats
+    shifts: Floats
+    turns: Floats
+
+
+def frequencies_of(models: tuple[Model, ...]) -> Floats:
+    """All frequencies (F,) 1/s that excite lines, increasing."""
+    found = [np.zeros(0)]
+    for model in models:
+        if model.line.bits & WAVES or _follows(model):
+            found.append(model.sea.values.waves[:, 1])
+        found.append(model.ends.moves().harmonics[:, 3])
+    every = np.unique(np.concatenate(found))
+    if not every.size:
+        return every
+    return np.asarray(every[np.concatenate([[True], np.diff(every) > SAME * every[1:]])])
+
+
+def _follows(model: Model) -> bool:
+    return bool(model.ends.moves().follows.any())
+
+
+def refuse_motions(models: tuple[Model, ...], names: tuple[str, ...]) -> None:
+    """SceneError for ends whose motion is no sum of harmonics."""
+    for model, name in zip(models, names, strict=True):
+        moves = model.ends.moves()
+        what = ""
+        if (moves.file[:, 1] > moves.file[:, 0]).any():
+            what = "a motion from a file"
+        elif moves.velocity.any() or moves.travel[:, 4].any():
+            what = "an end that travels"
+        if what:
+            expected = "motions that are sums of harmonics, of which a response by frequency is known"
+            raise SceneError([Complaint(f"motion of {name}", what, expected, "hybrid run computes it in time")])
+
+
+def excitations_of(model: Model, line: Line, state: State, omegas: Floats, rows_of: RowsOf) -> list[Excitation]:
+    """Loads on a line (in space) about its equilibrium, at each of the frequencies.
+
+    rows_of(sea): fills and gives the block rows of the state in that sea.
+    """
+    moves, sea = model.ends.moves(), model.sea.values
+    waves = sea.waves if line.bits & WAVES or _follows(model) else sea.waves[:0]
+    count, out = line.s.size, []
+    for omega in omegas:
+        forces, water = np.zeros((count, 3), complex), np.zeros((count, 3), complex)
+        shifts, turns = np.zeros((2, 3), complex), np.zeros((2, 3), complex)
+        for wave in waves[np.abs(waves[:, 1] - omega) <= SAME * omega]:
+            size = wave[0] * np.exp(1j * wave[4])
+            if line.bits & WAVES:
+                by_wave, speed = _of_wave(line, sea, state, wave, rows_of)
+                forces, water = forces + size * by_wave, water + size * speed
+            for k in (0, 1):
+                if moves.follows[k]:
+                    place = moves.position[k]
+                    shifts[k, 2] += size * np.exp(1j * (wave[2] * place[0] + wave[3] * place[1]))
+        for k, axis, amplitude, w, phase in moves.harmonics:
+            if abs(w - omega) > SAME * omega:
+                continue
+            size, end = 1j * amplitude * np.exp(-1j * phase), int(k)
+            if axis < 3:
+                shifts[end, int(axis)] += size
+                continue
+            turn = size * np.eye(3)[int(axis) - 3]
+            turns[end] += turn
+            if moves.fairlead[end, RIDES]:
+                arm = moves.frame[end].reshape(3, 3) @ moves.fairlead[end, 1:4]
+                shifts[end] += np.cross(turn, arm)
+        out.append(Excitation(float(omega), forces, water, shifts, turns))
+    return out
+
+
+def _of_wave(line: Line, sea: Sea, state: State, wave: Floats, rows_of: RowsOf) -> tuple[Floats, Floats]:
+    """Forces (N+1, 3) N but drag, and velocities (N+1, 3) m/s of the water, by a wave of amplitude 1 m and phase 0."""
+    small = SMALL_WAVE * 2.0 * np.pi / wave[5]
+    one, still = wave[None].copy(), np.zeros_like(state.r)
+    found = []
+    for amplitude, phase in ((0.0, 0.0), (small, 0.0), (small, -0.5 * np.pi)):  # none; its cosine; its sine
+        one[0, 0], one[0, 4] = amplitude, phase
+        there = sea._replace(
+            waves=one, now=np.array([0.0, sea.now[1], 1.0, 0.0]), flow=np.zeros((line.s.size, 7)),
+            lanes=np.zeros((12, LANES)),
+        )  # fmt: skip
+        wave_kinematics(there, state.r, still)
+        forces = -rows_of(there).reshape(-1, SIZE, WIDTH)[:, 1:4, -1]
+        found.append(np.concatenate([forces, there.flow[:, :3]], axis=1))
+    both = ((found[1] - found[0]) + 1j * (found[2] - found[0])) / small
+    return both[:, :3], both[:, 3:]
+
+
+def half_cells(line: Line, sea: Sea, state: State) -> tuple[np.ndarray, Floats, Floats, Floats, Floats]:
+    """Of every half cell: its node (H,), direction (H, 3), drag across and along it (H,) N s^2/m^2 as far as it is wet,
+    and the current there (H, 3) m/s; bodies at nodes are not among them."""
+    n = line.h.size
+    d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+    node = np.concatenate([np.arange(n), np.arange(1, n + 1)])
+    cell = np.concatenate([np.arange(n), np.arange(n)])
+    wet = np.ones(2 * n)
+    if line.bits & SURFACE:
+        z = state.r[node, 2] + 0.25 * np.concatenate([state.e[:, 2], -state.e[:, 2]])
+        wet = np.clip((sea.surface - z) / np.maximum(line.diameter[cell], 1e-300) + 0.5, 0.0, 1.0)
+    drag = bool(line.bits & DRAG)
+    cn, ct = ((wet * x[cell] if drag else np.zeros(2 * n)) for x in (line.drag_n, line.drag_t))
+    return node, d[cell], cn, ct, current_at(line, sea, state.r[node])
+
+
+def current_at(line: Line, sea: Sea, places: Floats) -> Floats:
+    """The fully grown current (n, 3) m/s at places (n, 3)."""
+    if not line.bits & FLOW:
+        return np.zeros((len(places), 3))
+    part = float(sea.now[1])
+    return part * np.column_stack([np.interp(places[:, 2], sea.z, sea.current[:, k]) for k in range(3)])

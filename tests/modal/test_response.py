@@ -1,0 +1,189 @@
+"""Response by frequency against closed forms, and against runs in time."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import hybrid
+from hybrid.cli.commands import app
+from hybrid.modal.drag import across, along, size_deviation
+
+REGULAR = {"kind": "regular", "height": 1.0, "period": 7.0, "ramp": 10, "depth": 100}
+STORM = {"kind": "jonswap", "significant_height": 4.0, "peak_period": 12.0, "direction": 30, "ramp": 10, "depth": 100}
+
+
+def hung(waves=None, motion=None, model="catenary", end=(6, 0, -5.15), cells=60, **section):
+    """A line of 60 m in water, between a place 65 m down and one 5 m down."""
+    line = {
+        "length": 60.0, "mass": 30.0, "diameter": 0.1, "axial_stiffness": 5e6, "bending_stiffness": 2e3,
+        "torsional_stiffness": 1e3, "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
+    } | section  # fmt: skip
+    fluid = {"density": 1025, "surface": 0} | ({"waves": waves} if waves else {})
+    held = {"kind": "pinned", "position": list(end)} | ({"motion": motion} if motion else {})
+    return {
+        "environment": {"fluid": fluid},
+        "cable": {"sections": [{k: x for k, x in line.items() if x is not None}]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, -65]}, "end": held},
+        "initial": "equilibrium",
+        "model": model,
+        "mesh": {"cells": cells},
+        "time": {"duration": 10.0, "step": 0.1},
+    }
+
+
+def test_linear_drag_of_a_normal_velocity():
+    """sqrt(8/pi) sigma along one direction, 1.87997 sigma in all; with a mean of one sigma 2.33326."""
+    one, both = np.diag([1.0, 1e-14])[None], np.eye(2)[None]
+    still, flow = np.zeros((1, 2)), np.array([[1.0, 0.0]])
+    assert across(still, one)[0, 0, 0] == pytest.approx(math.sqrt(8.0 / math.pi), rel=2e-3)
+    assert across(still, both)[0] == pytest.approx(1.87997 * np.eye(2), abs=1e-4)
+    assert across(flow, one)[0, 0, 0] == pytest.approx(2.33326, rel=2e-3)
+    assert across(np.zeros((1, 3)), np.eye(3)[None])[0, 0, 0] == pytest.approx(4 / 3 * math.sqrt(8 / math.pi), rel=5e-3)
+    np.testing.assert_allclose(along(np.array([0.0, 1.0]), np.ones(2)), [1.59577, 2.33326], rtol=1e-5)
+    # of the size of a vector: Rayleigh's, and that along the mean where this is large
+    found = size_deviation(np.array([0.0, 50.0]), np.repeat(both, 2, axis=0))
+    np.testing.assert_allclose(found, [math.sqrt(2.0 - math.pi / 2.0), 1.0], rtol=1e-3)
+
+
+def test_bar_that_is_moved_at_its_end():
+    """EA k cot(k L) of a bar of 100 m, EA 1e7 N, 10 kg/m at 10 rad/s: 64209.3 N/m; order two."""
+    off = []
+    for cells in (25, 50):
+        tables = {
+            "environment": {"gravity": 0.0},
+            "cable": {"sections": [{"length": 100.0, "mass": 10.0, "axial_stiffness": 1e7}]},
+            "ends": {
+                "start": {"kind": "pinned", "position": [0, 0, 0]},
+                "end": {
+                    "kind": "pinned", "position": [100.1, 0, 0],
+                    "motion": {"surge": {"amplitude": 0.01, "period": 2.0 * math.pi / 10.0}, "ramp": 1.0},
+                },
+            },
+            "initial": "equilibrium", "model": "catenary", "mesh": {"cells": cells},
+        }  # fmt: skip
+        line = hybrid.response(tables).lines["cable"]
+        assert line.f == pytest.approx([10.0 / (2.0 * math.pi)])
+        # the tension of the last cell is that of its middle
+        k = 0.01
+        exact = 1e7 * k * math.cos(k * (100.0 - 50.0 / cells)) / math.sin(k * 100.0)
+        off.append(abs(abs(line.tension[0, -1]) / 0.01 / exact - 1.0))
+    assert off[1] < 5e-4 and 1.8 < math.log2(off[0] / off[1]) < 2.2
+
+
+def compare(tables, duration, seeds=(1,), step=0.05, late=0.25):
+    """Standard deviations of tension at five places by frequency, and the mean of those of runs."""
+    response = hybrid.response(tables)
+    line = response.lines["cable"]
+    places = [3.0, 15.0, 30.0, 45.0, 57.0]
+    there = []
+    for seed in seeds:
+        data = json.loads(json.dumps(tables))
+        if "waves" in data["environment"]["fluid"] and data["environment"]["fluid"]["waves"]["kind"] == "jonswap":
+            data["environment"]["fluid"]["waves"]["seed"] = seed
+        data |= {"time": {"duration": duration, "step": step}, "output": {"every": 0.25, "points": places}}
+        result = hybrid.run(data)
+        there.append(result.tension[result.times > late * duration].std(axis=0))
+    return response, np.interp(places, line.middle, line.deviation("tension")), np.mean(there, axis=0)
+
+
+def test_a_moved_end_as_in_time():
+    motion = {"surge": {"amplitude": 0.05, "period": 7.0}, "ramp": 10.0}
+    response, here, there = compare(hung(motion=motion), 150.0)
+    np.testing.assert_allclose(here, there, rtol=5e-3)
+    assert response.valid and response.rounds < 10
+
+
+def test_a_rod_that_a_clamp_turns_as_in_time():
+    """The frame of an end that pitches bends the rod beside it."""
+    tables = hung(model="rod", cells=80, damping=0.3, bending_stiffness=2e5)
+    tables["ends"]["end"] = {
+        "kind": "clamped", "position": [6, 0, -5.15], "tangent": [0.1, 0, 1],
+        "motion": {"pitch": {"amplitude": 0.5, "period": 5.0}, "ramp": 10.0},
+    }  # fmt: skip
+    line = hybrid.response(tables).lines["cable"]
+    tables |= {"time": {"duration": 60.0, "step": 0.02}, "output": {"every": 0.1, "points": [50.0, 58.0, 60.0]}}
+    result = hybrid.run(tables)
+    there = result.curvature[result.times > 30.0].std(axis=0)
+    here = np.interp([50.0, 58.0, 60.0], line.s, line.deviation("curvature"))
+    np.testing.assert_allclose(here, there, rtol=0.03)
+
+
+def test_one_line_of_a_system_is_the_cable():
+    """In a sea; and turned about the vertical with its waves."""
+    one = hybrid.response(hung(STORM))
+    tables = hung(STORM)
+    line = {
+        "start": "a",
+        "end": "b",
+        "sections": tables["cable"]["sections"],
+        "model": "catenary",
+        "mesh": {"cells": 60},
+    }
+    points = {"a": {"kind": "fixed", "position": [0, 0, -65]}, "b": {"kind": "fixed", "position": [6, 0, -5.15]}}
+    several = hybrid.response({"environment": tables["environment"], "points": points, "lines": {"l": line}})
+    turned = hung(STORM | {"direction": 120}, end=(0, 6, -5.15))
+    for other in (several.lines["l"], hybrid.response(turned).lines["cable"]):
+        for name in ("tension", "curvature"):
+            ours = one.lines["cable"].deviation(name)
+            np.testing.assert_allclose(other.deviation(name), ours, rtol=1e-6, atol=1e-7 * ours.max())
+
+
+@pytest.mark.slow
+def test_a_storm_as_in_hours_of_it():
+    """The mean of six hours: 610, 613, 616, 632, 650 N."""
+    response, here, there = compare(hung(STORM), 3600.0, seeds=range(1, 7), step=0.15, late=0.05)
+    print(here, there)
+    np.testing.assert_allclose(here, there, rtol=0.03)
+    assert response.valid
+
+
+def test_spectrum_and_extremes():
+    line = hybrid.response(hung(STORM)).lines["cable"]
+    spectrum = line.spectrum("tension")
+    np.testing.assert_allclose(spectrum.moment(0), line.deviation("tension") ** 2, rtol=1e-12)
+    period = line.period("tension")[30]
+    assert 6.0 < period < 13.0
+    largest = line.most_probable("tension", hours=3.0)[30] / line.deviation("tension")[30]
+    assert largest == pytest.approx(math.sqrt(2.0 * math.log(3.0 * 3600.0 / period)), rel=1e-12)
+    damage = line.damage({"kind": "T-N", "log_a": 3.0, "m": 3.0}, strength=1e5)
+    assert damage.shape == (60,) and (damage > 0.0).all()
+    single = hybrid.response(hung(REGULAR)).lines["cable"]
+    np.testing.assert_allclose(single.most_probable("tension"), math.sqrt(2.0) * single.deviation("tension"), rtol=1e-9)
+
+
+def test_where_it_is_not_valid():
+    motion = {"heave": {"amplitude": 1.5, "period": 4.0}, "ramp": 10.0}
+    found = hybrid.response(hung(motion=motion, end=(30, 0, -20)))
+    assert not found.valid and any("below zero for" in x and "s = " in x for x in found.notes)
+    bed = hung({key: x for key, x in STORM.items() if key != "depth"}, cells=40)
+    bed["environment"]["seabed"] = {"z": -65, "stiffness": 5e4}
+    bed["ends"]["end"] = {"kind": "pinned", "position": [52, 0, -45], "motion": motion}
+    assert any("lift off the bed" in x for x in hybrid.response(bed).notes)
+
+
+def test_what_is_refused():
+    with pytest.raises(hybrid.SceneError, match="waves, or ends that move as harmonics"):
+        hybrid.response(hung())
+    travel = {"travel": {"by": [1, 0, 0], "over": 10.0}}
+    with pytest.raises(hybrid.SceneError, match="sums of harmonics"):
+        hybrid.response(hung(REGULAR, motion=travel))
+
+
+def test_the_command_and_its_check(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    motion = {"surge": {"amplitude": 0.05, "period": 7.0}, "ramp": 10.0}
+    (tmp_path / "hung.yaml").write_text(hybrid.scene_text(hybrid.validate_scene(hung(motion=motion))))
+    told = CliRunner().invoke(app, ["response", "hung.yaml", "--check", "100", "--json"])
+    assert told.exit_code == 0, told.output
+    (line,) = [x for x in map(json.loads, told.output.splitlines()) if "rows" in x]
+    assert line["valid"]
+    (tension,) = [x for x in line["rows"] if x["quantity"] == "tension"]
+    here, there = line["checks"]["tension"]
+    assert tension["deviation"] == pytest.approx(here, rel=0.01) and here == pytest.approx(there, rel=0.02)
+    told = CliRunner().invoke(app, ["response", "hung.yaml"])
+    assert "standard deviation" in told.output and "MPM in 3 h" in told.output
