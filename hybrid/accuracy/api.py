@@ -241,7 +241,7 @@ def _move_lines(
             assert not isinstance(target, MemoryTarget), "errors are written into a file"
             from hybrid.accuracy.system_errors import write_system_errors
 
-            def compare(other: System, memory: io.BytesIO) -> None:
+            def compare(other: System, memory: MemoryTarget) -> None:
                 run_system(other, memory, scene_text(other), reporter, stopped, name=ESTIMATION, criterion=criterion)
 
             write_system_errors(system, target, compare)

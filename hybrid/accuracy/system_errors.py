@@ -26,8 +26,9 @@ from hybrid.model.system import build_system
 from hybrid.scene.base import Invalid
 from hybrid.scene.system import System
 from hybrid.store.amend import amend_lines
+from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.format import Field
-from hybrid.store.reader import Result, open_result
+from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.records import not_converged_attribute
 
 # What is compared, and under which names errors of it are kept; of vectors the size.
@@ -43,7 +44,7 @@ DOUBTFUL = 2.0
 NOTHING = 1e-4
 FAILED = "no error figure"
 
-Compute = Callable[[System, io.BytesIO], None]
+Compute = Callable[[System, MemoryTarget], None]
 # Why there is no coarser run to compare with, by its cause.
 TOO_COARSE = {
     "mesh": "line {1} has too few cells for a run with half of them to compare with; mesh: at least 8 to a section",
@@ -91,13 +92,13 @@ def write_system_errors(system: System, target: Path | io.BytesIO, compute: Comp
             other = given
             for again in ("", " again"):
                 try:
-                    other, memory = make(other), io.BytesIO()
+                    other, memory = make(other), MemoryTarget()
                     compute(other, memory)
                 except (ComputationError, Invalid):
                     if not again:
                         raise
                     break
-                found[cause + again] = open_result(memory)
+                found[cause + again] = written_result(memory)
     except ComputationError as error:
         failed = f"a coarser run to compare with stopped: {str(error).splitlines()[0]}"
     except Invalid as error:  # half of few cells, or twice a long step, is no scene
@@ -151,8 +152,9 @@ def _errors_of(line: Result, others: Mapping[str, Result]) -> tuple[dict[str, Fl
 
 def _change(fine: Result, coarse: Result, name: str) -> Floats:
     """What a quantity of a finer run is more than that of a coarser one, at the outputs of the finer one."""
-    at = np.array([int(np.abs(fine.times - t).argmin()) for t in coarse.times])
-    return _at_times(fine.times, fine.times[at], fine[name][at] - coarse[name])
+    times = fine.times
+    at = np.array([int(np.abs(times - t).argmin()) for t in coarse.times])
+    return _at_times(times, times[at], fine[name][at] - coarse[name])
 
 
 def _at_times(t: Floats, known: Floats, values: Floats) -> Floats:
