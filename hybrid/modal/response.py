@@ -45,6 +45,11 @@ FEWER, LEAST_FREQUENCIES = 4, 12
 # mean tension by the stretch of swinging, of the standard deviation of tension; length that lifts off or touches down.
 SLACK_SHARE, TURN, STRETCH, LIFTS = 1e-3, 0.2, 0.25, 0.02
 HOURS = 3.0
+# Of sigma^2: standard deviation of what linear drag leaves of |u| u, sqrt(3 - 8/pi) in still water, sqrt(2) in a
+# current that is faster than the motion.
+LEFT_STILL, LEFT_IN_FLOW = math.sqrt(3.0 - 8.0 / math.pi), math.sqrt(2.0)
+# Part by which that may change a deviation of curvature of at least this part of the largest.
+BY_HARMONICS, OF_LARGEST = 0.1, 0.2
 # Part by which a run in time may differ before that is told: short runs of a sea differ by as much.
 MOST_APART = 0.15
 VARIES = ("position", "tension", "curvature", "curvature_across")
@@ -141,8 +146,12 @@ class Response:
 
     @property
     def valid(self) -> bool:
-        """Whether nothing speaks against it."""
+        """Whether nothing speaks against any of it."""
         return not self.notes
+
+    def valid_for(self, name: str) -> bool:
+        """Whether nothing speaks against a quantity: what is said of curvature alone is no doubt of others."""
+        return not any("curvature at s" not in x or name.startswith("curvature") for x in self.notes)
 
 
 def response(scene: SceneLike | System, friction: bool = True, check: float | None = None) -> Response:
@@ -210,6 +219,7 @@ class _Loaded:
         motion = 0.0 * water if start else -1j * self.omegas[which, None, None] * self.q[which, :, 1:4]
         relative = math.sqrt(len(self.omegas) / which.size) * (water - motion)  # (F, N+1, 3)
         blocks = np.zeros((self.line.s.size, 3, 3))
+        self.left = np.zeros(self.line.s.size)  # N, what linear drag leaves of the quadratic one, standard deviation
         factor = HARMONIC if len(self.omegas) == 1 else 1.0
         used = (self.cn > 0.0) | (self.ct > 0.0)
         if used.any():
@@ -218,6 +228,9 @@ class _Loaded:
             un = np.einsum("fhi,hmi->fhm", u, axes)
             covariance = 0.5 * np.einsum("fhm,fhn->hmn", un, un.conj()).real
             mean = np.einsum("hi,hmi->hm", self.current[used], axes)
+            square = np.linalg.eigvalsh(covariance)[:, -1]
+            part = np.minimum(np.linalg.norm(mean, axis=1) / np.sqrt(np.maximum(square, 1e-300)), 1.0)
+            np.add.at(self.left, node, self.cn[used] * square * (LEFT_STILL + part * (LEFT_IN_FLOW - LEFT_STILL)))
             B = np.einsum("hmi,hmn,hnj->hij", axes, across(mean, covariance), axes) * self.cn[used][:, None, None]
             ut = np.einsum("fhi,hi->fh", u, d)
             t = along(np.einsum("hi,hi->h", self.current[used], d), np.sqrt(0.5 * (np.abs(ut) ** 2).sum(axis=0)))
@@ -410,7 +423,7 @@ class _Linear:
         for x in self.lines:
             name = f"line {x.name}: " if len(self.lines) > 1 else ""
             found = x.result()
-            for doubt in (_slack, _swing, _touchdown):
+            for doubt in (_slack, _swing, _touchdown, _harmonics):
                 yield from (f"{name}not valid: {text}" for text in doubt(x, found))
 
 
@@ -461,4 +474,21 @@ def _touchdown(x: _Loaded, found: LineResponse) -> Iterator[str]:
         yield (
             f"about {crosses:.3g} m of line lift off the bed and come down on it, which contact as it is at rest does "
             "not show: tension and curvature there are doubtful"
+        )
+
+
+def _harmonics(x: _Loaded, found: LineResponse) -> Iterator[str]:
+    """Where the harmonics of quadratic drag bend the line as much as its motion does; tension hardly hears of them."""
+    deviation = found.deviation("curvature")
+    length = np.linalg.norm(x.linear.state.e, axis=1)
+    share = 0.5 * (np.append(length, 0.0) + np.append(0.0, length))
+    pull = np.maximum(np.interp(found.s, found.middle, found.mean_tension), 1e-300)
+    bend = x.left / (share * pull)  # of a string whose load varies slowly: the most that it can be
+    counts = deviation >= OF_LARGEST * deviation.max()
+    more = np.where(counts, np.hypot(1.0, bend / np.maximum(deviation, 1e-300)) - 1.0, 0.0)
+    k = int(more.argmax())
+    if more[k] > BY_HARMONICS:
+        yield (
+            f"curvature at s = {found.s[k]:.4g} m: harmonics of the drag, which linear drag leaves out, may add up to "
+            f"{100.0 * more[k]:.2g} % to its standard deviation of {deviation[k]:.3g} 1/m"
         )
