@@ -17,6 +17,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.modal.eigen import Eigen, lowest_modes
 from hybrid.modal.matrices import LinearLine, LinearNetwork, linear_network
 from hybrid.model.build import Model
+from hybrid.model.payout import payout_of
 from hybrid.model.resolution import Resolution
 from hybrid.model.system import SystemResolution
 from hybrid.scene.base import Table
@@ -122,7 +123,7 @@ def modes(scene: SceneLike | System, count: int = 10, near: float | None = None,
     shapes = [_Shape(fine, int(k)) for k in chosen]
     found = [x.mode(_error(fine, coarse, int(k))) for k, x in zip(chosen, shapes, strict=True)]
     free = [_Shape(fine, int(k)).what for k in np.flatnonzero(~costly & ~unstable)]
-    notes = [*_doubts(fine, int(unstable.sum()), free, chosen), *_meetings(asked, found)]
+    notes = [*of_first_length(asked), *_doubts(fine, int(unstable.sum()), free, chosen), *_meetings(asked, found)]
     lines = fine.network.lines
     shift = fine.network.unit_shifts()
     whole = np.einsum("ij,ij->j", shift, fine.network.mass @ shift)
@@ -356,6 +357,13 @@ def _error(fine: _Found, coarse: _Found, k: int) -> float | None:
 
 
 # --- what is to be known ------------------------------------------------------------------------
+
+
+def of_first_length(asked: Scene | System) -> list[str]:
+    """What is to be known of a line that is paid out."""
+    if not isinstance(asked, Scene) or payout_of(asked) is None:
+        return []
+    return ["the line is paid out: all of this is of its first length, to which it does not return"]
 
 
 def _doubts(found: _Found, unstable: int, free: list[str], chosen: np.ndarray) -> Iterator[str]:

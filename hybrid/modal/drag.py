@@ -15,6 +15,8 @@ from hybrid.kernels.state.state import Floats
 
 # Directions and radii of rules for the normal distribution: in a plane, and on axes in space.
 ANGLES, RADII, POINTS = 40, 4, 10
+# Standard deviations beyond which a normal velocity is its mean.
+FAR = 30.0
 # Of a single harmonic: 8/(3 pi) of its amplitude in place of sqrt(8/pi) of its standard deviation.
 HARMONIC = 8.0 / (3.0 * math.pi) * math.sqrt(2.0) / math.sqrt(8.0 / math.pi)
 
@@ -56,9 +58,10 @@ def along(mean: Floats, deviation: Floats) -> Floats:
     """2 E|u| (n,) for one component."""
     from scipy.special import erf
 
-    s = np.maximum(deviation, 1e-300)
-    gauss = s * math.sqrt(2.0 / math.pi) * np.exp(-0.5 * np.minimum((mean / s) ** 2, 1400.0))
-    return np.asarray(2.0 * (gauss + mean * erf(mean / (s * math.sqrt(2.0)))))
+    s = np.maximum(deviation, 1e-30)
+    ratio = np.clip(mean / s, -FAR, FAR)
+    gauss = s * math.sqrt(2.0 / math.pi) * np.exp(-0.5 * ratio**2)
+    return np.asarray(2.0 * (gauss + mean * erf(ratio / math.sqrt(2.0))))
 
 
 def size_deviation(mean: Floats, covariance: Floats) -> Floats:

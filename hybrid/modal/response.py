@@ -26,7 +26,7 @@ from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.junctions.bodies import DAMPING, FRAME, PIECES, V
 from hybrid.kernels.state.forces import BODIES, DRAG, SEABED, WAVES
 from hybrid.kernels.state.state import Floats, Line, Sea
-from hybrid.modal.api import Rest, equilibrium_of
+from hybrid.modal.api import Rest, equilibrium_of, of_first_length
 from hybrid.modal.check import compared
 from hybrid.modal.drag import HARMONIC, across, along, size_deviation
 from hybrid.modal.excitation import Excitation, current_at, excitations_of, frequencies_of, half_cells, refuse_motions
@@ -175,7 +175,11 @@ def response(scene: SceneLike | System, friction: bool = True, check: float | No
     run = _Linear(rest, omegas, friction)
     rounds = run.settle()
     lines = {x.name: x.result() for x in run.lines}
-    notes = [*run.notes(), *([] if rounds < ROUNDS else [f"linear drag has not settled in {ROUNDS} rounds"])]
+    notes = [
+        *of_first_length(asked),
+        *run.notes(),
+        *([] if rounds < ROUNDS else [f"linear drag has not settled in {ROUNDS} rounds"]),
+    ]
     checks = {} if check is None else compared(asked, lines, check)
     off = {name: there for name, (here, there) in checks.items() if abs(here - there) > MOST_APART * there}
     notes += [
@@ -490,5 +494,5 @@ def _harmonics(x: _Loaded, found: LineResponse) -> Iterator[str]:
     if more[k] > BY_HARMONICS:
         yield (
             f"curvature at s = {found.s[k]:.4g} m: harmonics of the drag, which linear drag leaves out, may add up to "
-            f"{100.0 * more[k]:.2g} % to its standard deviation of {deviation[k]:.3g} 1/m"
+            f"{100.0 * more[k]:.0f} % to its standard deviation of {deviation[k]:.3g} 1/m"
         )

@@ -312,3 +312,12 @@ def test_the_command(tmp_path, monkeypatch):
     (line,) = [x for x in map(json.loads, told.output.splitlines()) if x.get("event", x.get("kind")) == "modes"]
     assert [round(x["period"], 3) for x in line["modes"]] == [2.0, 1.257]
     assert _found(sag(40), 1.0, 2, None, True).eigen.missed == 0
+
+
+def test_a_line_that_is_paid_out_has_those_of_its_first_length():
+    end = pinned(0, 0, 0, payout={"rate": 0.2, "ramp": 2.0})
+    section = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e6}
+    made = scene(section, end, {"kind": "free"}, "catenary", 20, G, time={"duration": 5.0, "step": 0.05})
+    found = hybrid.modes(made, 2)
+    assert omega(found)[0] == pytest.approx(2.404826 / 2.0 * math.sqrt(G / 10.0), rel=5e-3)
+    assert any("of its first length" in x for x in found.notes)
