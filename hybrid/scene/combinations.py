@@ -442,10 +442,6 @@ REFUSALS: tuple[Refusal, ...] = (
         UNTWISTED,
     ),
     Refusal(LAYERS, PAYOUT, "not worked out", f"{PAID}, and its cells are given", fix="place cells by `mesh`"),
-    Refusal(
-        CHANGED_LOADS, PAYOUT, "not worked out", "the line is paid out", "nothing to change",
-        "run the changed scene from its start",
-    ),
     # --- several lines ---
     Refusal(
         BREAKS_OFF_CLAMP, CLAMPED_CONNECTION, "not worked out",

@@ -17,8 +17,11 @@ from hybrid.simulation.zone_switching import on_layout
 def change_loads(run: Transient, scene: Scene) -> None:
     """Other loads, and other motions of the ends, from now on; the cable stays what it is and where it is."""
     old, monitor, state = run.model, run.plane_monitor, run.state.copy()
-    model = build(scene, run.resolution, old.mesh)
-    if run.switching is not None:
+    if run.payout is not None:
+        model = run.payout.on(replace(build(scene, run.resolution), layout=old.layout), run.payout.length)
+    else:
+        model = build(scene, run.resolution, old.mesh)
+    if run.switching is not None and run.payout is None:
         model = on_layout(model, run.switching.manager.layout)
     model = released_as(model, old.ends.released, run.t)
     model.line.h[:], model.line.kb[:] = old.line.h, old.line.kb  # what is on its way goes on

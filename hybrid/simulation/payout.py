@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,16 @@ from hybrid.kernels.laws.axial_law import SHIFT, stretch_energy
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.reel import reel as p
 from hybrid.kernels.reel import winch as w
-from hybrid.kernels.reel.payout import fit_line, iterate, lengthen, limit_next_step, pay_out, stand_still
+from hybrid.kernels.reel.payout import (
+    fit_line,
+    iterate,
+    lengthen,
+    limit_next_step,
+    pay_out,
+    put_forces_on,
+    stand_still,
+    take_forces_off,
+)
 from hybrid.kernels.reel.payout_nodes import blank_carry_job, carry_node, put_places
 from hybrid.kernels.reel.reel import MovingZones, Reel, blank_reel, blank_reel_job
 from hybrid.kernels.run.payout_run import energy_of
@@ -97,6 +107,11 @@ class PayingOut:
         run.pay_out(self.table, pay_out.address(numbers), iterate.address(numbers) if asks else 0)
 
     @property
+    def length(self) -> float:
+        """Length, m, that is out."""
+        return float(self.reel.numbers[p.LENGTH])
+
+    @property
     def material(self) -> int:
         """Nodes that are out, but for the fairlead and those that ride with it."""
         return int(self.reel.true.size) - self.rides
@@ -127,6 +142,15 @@ class PayingOut:
     def stand_still(self) -> None:
         """The line as it is now, and the force of its fairlead in the report of a state that no step has led to."""
         stand_still(self.table.numbers)
+
+    @contextmanager
+    def forces_on(self) -> Iterator[None]:
+        """While accelerations are found: the line with what acts on it because its length changes."""
+        put_forces_on(self.table.numbers)
+        try:
+            yield
+        finally:
+            take_forces_off(self.table.numbers)
 
     @property
     def lengthening(self) -> Floats:
@@ -172,7 +196,7 @@ class PayingOut:
             here = on_other_parts(model.layout, model.layout.there, of_base, parts) if plan.follows else None
             model = replace(model, layout=model.layout._replace(rod=model.layout.rod[of_base], parts=parts, here=here))
         self.count, material = self.count + more_nodes, self.material + more_nodes
-        length = float(old.numbers[p.LENGTH])
+        length = self.length
         changed = self.on(model, length)
         if changed.layout is not None:
             self._nodes = plan.nodes_of(changed.layout)
@@ -217,7 +241,7 @@ class PayingOut:
         """A model whose zones move, and whose nodes are where they are now."""
         assert model.layout is not None
         self.lengthen()
-        length = float(self.reel.numbers[p.LENGTH])
+        length = self.length
         layout = self.plan.layout(self.count, length, model.layout.rod, model.layout.here)
         on_base = LineOnBase(self.plan.held_as(model.cable), layout.base)
         return replace(model, layout=layout, on_base=on_base, zones=layout.zones, length=length)

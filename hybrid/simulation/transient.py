@@ -8,6 +8,7 @@ here, and nothing decides that a healthy step was the last: simulation.time_loop
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -278,9 +279,10 @@ class Transient:
         if self.payout is not None:
             self.payout.stand_still()
             lengthening = self.payout.lengthening
-        taken = self.stepper.consistent_accelerations(
-            self.model.sea.at(self.t), ends.at(self.t), acceleration, self.state, force, lengthening
-        )
+        with self.payout.forces_on() if self.payout is not None else nullcontext():
+            taken = self.stepper.consistent_accelerations(
+                self.model.sea.at(self.t), ends.at(self.t), acceleration, self.state, force, lengthening
+            )
         if taken.outcome != Outcome.OK:
             raise StepFailed(Tried(taken.outcome, taken.iterations, taken.correction, taken.where), 0.0)
         run.move(ends.moves())

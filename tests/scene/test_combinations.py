@@ -70,7 +70,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.CURLED, c.PAID_OUT_ROD): (CURVED | PAID, ""),
     (c.TORQUE_OF_TENSION, c.PAYOUT): (TORQUE | PAID, ""),
     (c.LAYERS, c.PAYOUT): (PAID | {"resolution": {"cells_per_layer": 2}}, ""),
-    (c.CHANGED_LOADS, c.PAYOUT): (PAID, "changed loads"),
     (c.BREAKS_OFF_CLAMP, c.CLAMPED_CONNECTION): (CLAMPED | {"points.b.break_at": {"time": 2}}, ""),
     (c.CLAMPED_TO_FREE, c.MOVING_ZONES): (
         CLAMPED | {ONE + "model": {"kind": "adaptive"}, "points.b": {"body": "buoy", "place": [0, 0, 0]},

@@ -384,10 +384,6 @@ def test_a_resume_does_not_pay_out_more_than_the_result_has_points_for(tmp_path:
     hybrid.run(hanging({"rate": 0.5, "ramp": 2.0}, 5.0), output=tmp_path / "a.h5")
     with pytest.raises(SceneError, match="longest"):
         hybrid.resume(tmp_path / "a.h5", until=10.0)
-    scene = hanging({"rate": 0.5, "ramp": 2.0, "longest": 50.0}, 5.0)
-    hybrid.run(scene, output=tmp_path / "b.h5")
-    with pytest.raises(SceneError, match="paid out"):
-        hybrid.resume(tmp_path / "b.h5", settings=["ends.start.force=[1, 0, 0]"], until=10.0)
 
 
 def test_a_length_set_from_python_is_that_of_the_scene() -> None:

@@ -429,6 +429,22 @@ def limit_next_step(table):
 
 
 @kernel
+def put_forces_on(table):
+    """On the line of now: forces of nodes that ride, and those that balance the neighbours of the last new node."""
+    job = read(table)
+    put_balance_on(job.line, job.reel, job.clock[b.NOW])
+    put_riding_on(job.line, job.sea, job.ends, job.new if job.counts[b.PARITY] else job.old, job.reel)
+
+
+@kernel
+def take_forces_off(table):
+    """The line without them."""
+    job = read(table)
+    take_riding_off(job.line, job.reel)
+    take_balance_off(job.line, job.reel)
+
+
+@kernel
 def stand_still(table):
     """The same for a state that no step has led to: the line at clock[NOW], and the force of its fairlead."""
     job = read(table)
