@@ -423,7 +423,9 @@ def combinations() -> Iterator[str]:
     yield ""
     yield (
         "Pairs that are refused, each with what to do instead.  *Physics* cannot be otherwise; *several lines* is what "
-        "one cable can and several cannot yet; the rest is not worked out."
+        "one cable can and several cannot yet; the rest is not worked out.  All other pairs of some thirty features "
+        "are computed as they stand, turned and mirrored, and as a system of one line "
+        "(`pytest tests/combinations -m slow`)."
     )
     yield ""
     yield "| this | beside this | because |  |"

@@ -188,7 +188,7 @@ def _several_lines(
     criterion: UserCriterion | None = None,
 ) -> Result:
     """The motion of several lines, or, with progress None, their equilibrium."""
-    from hybrid.accuracy.system_accuracy import is_refined, refine_system
+    from hybrid.accuracy.system_accuracy import is_refined, refine_system, system_with_layers
     from hybrid.simulation.system_run import static_system
 
     refined = is_refined(system, moves=progress is not None)
@@ -198,7 +198,8 @@ def _several_lines(
             assert not isinstance(target, MemoryTarget)
             refine_system(system, target, ProgressReporter(None, 1.0), lambda: False, moves=False)
         elif progress is None:
-            static_system(system, target, partial(scene_text, system))
+            resolution = system_with_layers(system, False, ProgressReporter(None, 1.0), lambda: False)
+            static_system(system, target, partial(scene_text, system), resolution)
         else:
             _move_lines(system, target, progress, criterion=criterion)
     return written_result(target)
@@ -209,7 +210,7 @@ def _move_lines(
     criterion: UserCriterion | None = None,
 ) -> None:  # fmt: skip
     """Compute the motion of several lines; source: the result to go on with."""
-    from hybrid.accuracy.system_accuracy import is_refined, refine_system
+    from hybrid.accuracy.system_accuracy import is_refined, refine_system, system_with_layers
     from hybrid.simulation.system_run import run_system
 
     if criterion is not None and not system.adaptive:
@@ -225,9 +226,12 @@ def _move_lines(
                     assert not isinstance(target, MemoryTarget), "errors are written into a file"
                     refine_system(system, target, reporter, stopped, source, notes=notes, criterion=criterion)
                     return
+                resolution = None
+                if source is None:
+                    resolution = system_with_layers(system, True, reporter, stopped, criterion)
                 run_system(
-                    system, target, scene_text(system), reporter, stopped, source, pending=pending, notes=notes,
-                    criterion=criterion,
+                    system, target, scene_text(system), reporter, stopped, source, resolution=resolution,
+                    pending=pending, notes=notes, criterion=criterion,
                 )  # fmt: skip
                 break
             except ComputationError as error:

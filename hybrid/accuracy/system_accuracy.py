@@ -78,6 +78,8 @@ def is_refined(system: System, moves: bool) -> bool:
     scenes = [system.scene_of(name) for name in system.lines]
     if not any(wants_errors(x) for x in scenes):
         return False
+    if any(x.resolution is not None for x in system.lines.values()):
+        return True
     open_steps = moves and system.require_time().controlled
     if not moves or open_steps or any(leaves_bending_out(x) for x in system.lines.values()):
         return True
@@ -145,7 +147,7 @@ class SystemPasses:
         """The result, as fine as it takes, with its errors; source: a result to go on with."""
         first, result = self._goes_on(source) if source is not None else (None, None)
         if first is None:
-            resolution = first = self._surveyed(SystemResolution.first(self.system))
+            resolution = first = self.surveyed(SystemResolution.first(self.system))
             self._expect(first)
             result = self._record(resolution, self.target, RESULT, found=_tree(first))
         else:
@@ -211,7 +213,7 @@ class SystemPasses:
             self._touches |= touch_unasked(self.system, result)
             return {n: sample_of(line, resolution.lines[n], models[n], cpu) for n, line in result.lines.items()}
 
-    def _surveyed(self, first: SystemResolution) -> SystemResolution:
+    def surveyed(self, first: SystemResolution) -> SystemResolution:
         """With cells where a coarse run shows that they should be."""
         free = [name for name, scene in self.scenes.items() if wants_survey(scene)]
         if not free:
@@ -441,6 +443,20 @@ def _elsewhere(resolution: Resolution) -> RunSample:
 
 def _tree(resolution: SystemResolution) -> Tree:
     return {name: resolution_tree(x) for name, x in resolution.lines.items()}
+
+
+def system_with_layers(
+    system: System, moves: bool, reporter: ProgressReporter, interrupted: Callable[[], bool],
+    criterion: UserCriterion | None = None,
+) -> SystemResolution | None:  # fmt: skip
+    """How finely a system is computed whose lines say how many cells their layers have and ask for no errors.
+
+    A coarse run shows the layers, as of one cable.  None: none says so.
+    """
+    if all(x.resolution is None for x in system.lines.values()):
+        return None
+    passes = SystemPasses(system, io.BytesIO(), moves, reporter, interrupted, criterion=criterion)
+    return passes.surveyed(SystemResolution.first(system))
 
 
 def refine_system(

@@ -95,12 +95,12 @@ def tables_of(scene: Table, use: Use = "") -> Iterator[dict[str, Any]]:
         yield tables
         return
     for name, line in tables["lines"].items():
-        own = {key: getattr(line, key) for key in ("connections", "mesh", "contact", "initial")}
+        own = {key: getattr(line, key) for key in ("connections", "mesh", "resolution", "contact", "initial")}
         yield tables | own | {"model": line.chosen_model, "cable": line.cable, SYSTEM: scene, LINE: name}
 
 
 # What the tables of a line have, whose keys are below the line in a scene of several.
-_OF_LINE = ("connections", "mesh", "contact", "initial", "model")
+_OF_LINE = ("connections", "mesh", "resolution", "contact", "initial", "model")
 
 
 def _placed(tables: Tables, at: Place) -> Place:
@@ -344,9 +344,6 @@ CHANGED_LOADS = Feature(
 ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
     {"System": ("dimension",)}, "leave it out: several lines are computed in space"
 ))  # fmt: skip
-LAYERS_OF_ONE = Feature("cells to a boundary layer", "resolution", Absent(
-    {"System": ("resolution",)}, "cells of several lines are given: lines.NAME.mesh"
-))  # fmt: skip
 OTHER_STARTS = Feature("starts other than equilibrium", "initial", Absent(
     {"System": ("initial",)}, "several lines start in equilibrium, found from initial_guess of points and bodies"
 ))  # fmt: skip
@@ -469,7 +466,7 @@ REFUSALS: tuple[Refusal, ...] = (
     *(
         Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)
         for x in (
-            ONE_PLANE, LAYERS_OF_ONE, OTHER_STARTS, WINCH
+            ONE_PLANE, OTHER_STARTS, WINCH
         )
         if isinstance(x.places, Absent)
     ),

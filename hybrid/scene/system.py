@@ -21,6 +21,7 @@ from hybrid.scene.analysis import (
     Equilibrium,
     Mesh,
     Model,
+    Resolution,
     RodModel,
     Time,
 )
@@ -93,6 +94,9 @@ class JoinedLine(Table):
         description="rod, catenary, zones of both that stay, or adaptive; absent: rod where it bends, else catenary",
     )
     mesh: Mesh | None = Field(default=None, description="how the line is cut into cells; absent: chosen")
+    resolution: Resolution | None = Field(
+        default=None, description="how fine the cells are that the program places; absent: as the accuracy asks"
+    )
     contact: Contact = Field(
         default=Contact(), description="whether the line touches itself in a run, as of one cable, and its friction"
     )
@@ -192,6 +196,7 @@ class System(Table):
         "ends": "a scene of several lines has points, at which its lines end",
         "model": "each line has its own: lines.NAME.model",
         "mesh": "each line has its own: lines.NAME.mesh",
+        "resolution": "each line has its own: lines.NAME.resolution",
         "contact": "each line has its own, for itself: lines.NAME.contact; lines do not touch each other",
         "solver": "leave it out: every scene is solved by elimination",
     }
@@ -389,7 +394,8 @@ class System(Table):
         tables: dict[str, Any] = {
             "title": f"{self.title}, line {name}" if self.title else f"line {name}", "environment": self.environment,
             "cable": line.cable, "ends": Ends(**ends), "initial": initial, "model": line.chosen_model,
-            "mesh": line.mesh, "contact": line.contact, "accuracy": self._accuracy_of(line),
+            "mesh": line.mesh, "resolution": line.resolution, "contact": line.contact,
+            "accuracy": self._accuracy_of(line),
         }  # fmt: skip
         if self.time is not None:
             tables["time"] = self.time

@@ -145,7 +145,7 @@ def _of_system(system: System, name: str, found: Finding) -> Finding:
     line, at = system.lines[name], found.at
     if at[:1] == ("cable",):
         at = ("lines", name, *at[1:])
-    elif at[:1] in (("model",), ("mesh",)) or (at[:1] == ("accuracy",) and line.accuracy is not None):
+    elif at[:1] in (("model",), ("mesh",), ("resolution",)) or (at[:1] == ("accuracy",) and line.accuracy is not None):
         at = ("lines", name, *at)
     elif at[:2] == ("output", "history"):
         at = (*at[:2], name, *at[2:])

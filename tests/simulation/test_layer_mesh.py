@@ -134,3 +134,34 @@ def test_zones_that_move_have_the_mesh_of_rods() -> None:
         assert rods.mesh[-1].s.size > 105
         assert np.array_equal(moving.mesh[-1].s, rods.mesh[-1].s)
         assert any(zone.kind == "catenary" for zone in moving.zones[-1])
+
+
+def test_layers_of_a_line_of_several_have_the_cells_of_the_cable(tmp_path: Path) -> None:
+    """As many to sqrt(EI/T) beside its clamp, by a coarse run of the system; at rest, in motion, resumed to the bit."""
+    section = {"length": 100, "mass": 5, "diameter": 0.05, "axial_stiffness": 1e7, "bending_stiffness": 300,
+               "drag": {"normal": 1.2}}  # fmt: skip
+    end = {"position": [80, 0, 10], "motion": {"heave": {"amplitude": 0.5, "period": 6}, "ramp": 6}}
+    held = {"tangent": [1, 0, 0], "normal": [0, 1, 0]}
+    common = {"environment": {"fluid": {"density": 1025}}, "time": {"duration": 2.0, "step": 0.125}}
+    line = {"model": "rod", "resolution": {"cells_per_layer": 6}}
+    start = {"kind": "clamped", "position": [0, 0, 0]} | held
+    cable = common | line | {
+        "cable": {"sections": [section]}, "ends": {"start": start, "end": {"kind": "pinned"} | end},
+        "initial": "equilibrium", "output": {"every": 0.5, "exact": True},
+    }  # fmt: skip
+    lines = {"riser": line | {"start": "a", "end": "b", "connections": {"start": held}, "sections": [section]}}
+    system = common | {"points": {"a": {"position": [0, 0, 0]}, "b": end}, "lines": lines, "output": {"every": 0.5}}
+    for compute in (hybrid.static, hybrid.run):
+        one, several = compute(cable), compute(system).lines["riser"]
+        assert np.abs(several["mesh/s"] - one["mesh/s"]).max() < 1e-9 * 100
+        assert np.abs(several.position - one.position).max() < 1e-9 * 100
+    fade = np.sqrt(300 / one.tension[:, 0].mean())
+    assert 6 < fade / np.diff(one["mesh/s"])[0] < 15  # 100 equal cells would be 0.5
+    hybrid.run(system, tmp_path / "whole.h5").close()
+    short = {"time": {"duration": 1.0, "step": 0.125}}
+    hybrid.run(system | short, tmp_path / "part.h5").close()
+    hybrid.resume(tmp_path / "part.h5", until=2.0).close()
+    with hybrid.open(tmp_path / "part.h5") as part:
+        assert part.lines["riser"].times[-1] == 2.0 and part.status == "complete"
+    with pytest.raises(hybrid.SceneError, match=r"lines\.riser\.resolution"):
+        hybrid.Simulation(system)
