@@ -257,6 +257,7 @@ class SystemRun:
         if not (new or self.recorder.due):
             return
         begin = monotonic()
+        self._record_samples()
         self.write_log()
         self.ends_of_now()
         for line in self.lines:
@@ -462,7 +463,8 @@ class SystemRun:
             self._attach()
             code = loop.go()
             self.state, self.other = loop.states
-            self._record_samples()
+            if code in (b.STEPPED, b.FAILED) or self.zones is not None or loop.is_half_full:
+                self._record_samples()  # of lines as they were until now
             if code == b.TRYING:
                 self._prepare(float(loop.clock[b.TRY_END]))
             elif code == b.TRIED:
@@ -479,6 +481,7 @@ class SystemRun:
                     self.leg = (self.leg[0], int(loop.counts[b.LEG_PART]))
                 arrived = self.t >= stop and loop.counts[b.PHASE] != b.SAMPLE
                 if arrived:
+                    self._record_samples()
                     self._arrive(stop, step)
                 self._between = arrived or loop.counts[b.PHASE] == b.BEGIN_STEP
                 if code == b.PAUSED:
@@ -597,12 +600,12 @@ class SystemRun:
     def finish(self, status: str = "complete", message: str = "") -> None:
         """Write what waits, and close the file."""
         self.write_log()
-        for line in self.lines:
+        for write in (self._record_samples, *(line.write_down for line in self.lines)):
             if status == "complete":
-                line.write_down()
+                write()
             else:
                 with suppress(LineFailed):
-                    line.write_down()
+                    write()
         if status != "failed":
             self.keep(last=True)
         self._close(status, message or f"{self.steps} steps")

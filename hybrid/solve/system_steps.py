@@ -126,6 +126,11 @@ class SystemSteps:
         at, near = self.counts[b.OUTPUT], SAME_TIME * self.clock[b.LEG_STEP]
         return bool(at < self.outputs.size and self.outputs[at] <= self.clock[b.NOW] + near)
 
+    @property
+    def is_half_full(self) -> bool:
+        """Whether half of the samples that there is room for wait, or more."""
+        return bool(2 * self.counts[b.SAMPLES] >= len(self.body_samples) - 1)
+
     def sample(self) -> bool:
         """Sample the outputs that are due at the state as it is; False: there is no room for all of them."""
         return bool(sample_system(self._job.numbers))
