@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.kernels.run import payout_run
+from hybrid.simulation.payout_nodes import NodeChanges
 from hybrid.simulation.transient import Transient
 from hybrid.solve.run import CompiledRun
 from tests.simulation.test_payout import clamped, kicks
@@ -76,6 +78,59 @@ def test_cost_of_paying_out(monkeypatch: pytest.MonkeyPatch) -> None:
     _, _, steps, *_, paid = compiled.values()
     print(f"compiled steps alone, per cell and step, against a fixed line's: {paid / steps:.2f}")
     assert joined < alone
+
+
+NODES = {
+    "zones stay": ("catenary", {}),
+    "tension over strain by a table": ("catenary", {"tension_strain": [[0, 0], [0.05, 1e5], [0.09, 2e5]]}),
+    "zones that move": ({"kind": "adaptive", "tolerance": 1e-3, "hold_time": 1.0}, {"bending_stiffness": 500.0}),
+    "cells that follow": (
+        {"kind": "adaptive", "tolerance": 1e-3, "hold_time": 1.0, "curvature_error": 0.05, "rod_cell": 1.0},
+        {"bending_stiffness": 500.0},
+    ),
+}
+
+
+def test_cost_of_a_node(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processor time of a node that enters a line of 100 cells and more, alone: median of a run, least of three runs."""
+    taken: list[float] = []
+
+    compiled: list[float] = []
+
+    def timed(change: Any, taken: list[float]) -> Any:
+        def wrapped(self: Any) -> None:
+            begin = time.process_time_ns()
+            change(self)
+            taken.append(1e-6 * (time.process_time_ns() - begin))
+
+        return wrapped
+
+    def only_steps(self: NodeChanges) -> int:
+        code = int(self._run.go())
+        self.sync()
+        return code
+
+    monkeypatch.setattr(Transient, "_change_length", timed(Transient._change_length, taken))
+    monkeypatch.setattr(payout_run, "change_paid", timed(payout_run.change_paid, compiled))
+    monkeypatch.setattr(NodeChanges, "go", only_steps)
+    for name, (model, section) in NODES.items():
+        scene = sagging(True, 37.5).model_dump(mode="json", exclude_none=True)
+        scene["model"] = model
+        scene["cable"]["sections"][0] |= section
+        if "tension_strain" in section:
+            del scene["cable"]["sections"][0]["axial_stiffness"]
+        each, alone = [], []
+        for _ in range(4):
+            taken.clear()
+            compiled.clear()
+            hybrid.run(scene)
+            each.append(median(taken))
+            alone.append(median(compiled) if compiled else np.nan)
+        within = (
+            f", {min(alone[1:]):.3f} ms of it compiled, which is all inside the loop" if compiled else ", in Python"
+        )
+        print(f"{name}: {min(each[1:]):.2f} ms a node, of {len(taken)}{within}")
+        assert not compiled or min(alone[1:]) < 0.3
 
 
 # Ripple: the largest difference, %, of the pull at the winch from a line of 160 cells before neighbours of a new node were
