@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from hybrid.accuracy.run_forecast import plan
     from hybrid.adapt.user_criterion import NodeState
     from hybrid.couple.fmu_export import export_fmu
+    from hybrid.design.sensitivity import sensitivity
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.exports.api import export
     from hybrid.interop.moordyn import export_moordyn, import_moordyn
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from hybrid.store.reader import open_result as open
     from hybrid.store.study_file import open_study
     from hybrid.studies.levels import trade_levels
-    from hybrid.studies.sensitivity import sensitivity
     from hybrid.studies.study import case_of as study_case
     from hybrid.studies.study import study
     from hybrid.studies.tradeoff import trade
@@ -85,7 +85,7 @@ _HOME = {
     "resume": ("hybrid.accuracy.api", "resume"),
     "run": ("hybrid.accuracy.api", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
-    "sensitivity": ("hybrid.studies.sensitivity", "sensitivity"),
+    "sensitivity": ("hybrid.design.sensitivity", "sensitivity"),
     "static": ("hybrid.accuracy.api", "static"),
     "stiffness": ("hybrid.simulation.system_stiffness", "stiffness"),
     "study": ("hybrid.studies.study", "study"),

@@ -36,6 +36,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "interop": ("errors", "scene"),
     "modal": (*COMPUTING, "simulation", "accuracy"),
     "studies": (*COMPUTING, "simulation", "accuracy", "view"),
+    "design": (*COMPUTING, "simulation", "accuracy", "modal", "studies"),
     "couple": (*COMPUTING, "simulation", "accuracy", "interop"),
     "live": (*COMPUTING, "simulation", "accuracy", "view"),
     "cli": (
@@ -49,15 +50,27 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "couple",
         "live",
         "modal",
+        "design",
         "__init__",
     ),
-    "__init__": (*COMPUTING, "simulation", "accuracy", "modal", "view", "exports", "interop", "studies", "couple"),
+    "__init__": (
+        *COMPUTING,
+        "simulation",
+        "accuracy",
+        "modal",
+        "design",
+        "view",
+        "exports",
+        "interop",
+        "studies",
+        "couple",
+    ),
     "__main__": ("cli",),
 }
 
 # Packages from outside that only these rooms may import.
 ONLY = {
-    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "simulation", "accuracy", "modal", "view", "exports", "studies"),
+    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "simulation", "accuracy", "modal", "design", "view", "exports", "studies"),
     "numba": ("kernels",),
     "h5py": ("store", "exports"),
     "matplotlib": ("view",),

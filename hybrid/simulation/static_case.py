@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from hybrid.errors import Complaint, ComputationError, SceneError
 from hybrid.kernels.laws.seabed import stored
-from hybrid.kernels.state.forces import SEABED, SELF_CONTACT
+from hybrid.kernels.run.entry import assembly, workspace_of
+from hybrid.kernels.state.forces import SEABED, SELF_CONTACT, WAVES
 from hybrid.kernels.state.report import REPORT_SIZE, SEABED_ENERGY
 from hybrid.kernels.state.state import Floats, State, batch_of_one
 from hybrid.model.bending_reference import NO_DOUBT
@@ -115,6 +117,20 @@ class StaticCase:
     def at_rest(self, resolution: Resolution) -> tuple[Model, Equilibrium]:
         """Model and equilibrium, for whoever looks at more of it than its outputs."""
         return self._equilibrium(resolution)[:2]
+
+    def values_at(
+        self, model: Model, state: State, found: Equilibrium, places: Sequence[float]
+    ) -> tuple[Floats, dict[str, Floats]]:
+        """Arc lengths, the nodes and `places` (m), and all that is recorded there of a state of a model at rest; found:
+        the equilibrium beside which it is."""
+        s = np.unique(np.concatenate([model.line.s, places]))
+        report = np.zeros(REPORT_SIZE)
+        ends, sea = model.ends.at(np.inf), model.sea.at(np.inf)
+        work = workspace_of(model.line)
+        assembly(model.line._replace(bits=model.line.bits & ~WAVES), sea, ends, state, 0.0, 0.0, work)
+        report[:] = work.report
+        values, _, _ = _values(model, replace(found, state=state, report=report), self.observer(model, at=s))
+        return s, {name: np.asarray(x) for name, x in values.items()}
 
     def first_shape(self, resolution: Resolution) -> tuple[Model, State]:
         """Model and state of an equilibrium, which are kept for a result of this resolution that comes next."""

@@ -1,0 +1,72 @@
+"""The command sensitivity: what results at rest answer to the numbers of a scene."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import hybrid
+from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, load, session, words
+
+if TYPE_CHECKING:
+    from hybrid.design.sensitivity import Derivative
+    from hybrid.scene.schema import Scene
+
+
+@app.command()
+def sensitivity(
+    scene: SceneFile, settings: Settings = None,
+    of: Annotated[
+        Any, typer.Option("--of", metavar="RESULT,..", parser=words, help="Results such as tension@0, max curvature.")
+    ] = None,
+    by: Annotated[
+        Any, typer.Option("--by", metavar="KEY,..", parser=words, help="Numbers; else all of the sections.")
+    ] = None,
+    quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Derivatives and elasticities (% by %) of the equilibrium of a cable by the numbers of its scene."""
+    with session(as_json, quiet) as console:
+        asked = load(console, scene, settings)
+        found = hybrid.sensitivity(asked, of or _results(asked), by or _numbers(asked))
+        console.show(lambda: _table(found))
+        for x in found:
+            console.json("derivative", **x._asdict())
+
+
+def _results(scene: Scene) -> list[str]:
+    """What engineers ask first."""
+    names = ["tension@0", f"tension@{scene.length:g}"]
+    return [*names, "max curvature"] if scene.model.kind != "catenary" else names
+
+
+def _numbers(scene: Scene) -> list[str]:
+    """All numbers of the sections that are not 0."""
+    out = []
+    for i, section in enumerate(scene.cable.sections):
+        for name, value in section.model_dump().items():
+            if isinstance(value, float) and value != 0.0 and name != "max_strain":
+                out.append(f"cable.sections[{i}].{name}")
+    return out
+
+
+def _table(found: list[Derivative]) -> Any:
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 2))
+    table.add_column("result")
+    table.add_column("value", justify="right")
+    table.add_column("by")
+    for name in ("value", "derivative", "error", "% by %"):
+        table.add_column(name, justify="right")
+    results = list(dict.fromkeys(x.of for x in found))
+    for result in results:
+        rows = [x for x in found if x.of == result]
+        rows.sort(key=lambda x: -abs(x.elasticity) if math.isfinite(x.elasticity) else 0.0)
+        for k, x in enumerate(rows):
+            head = (x.of, f"{x.result:.5g}") if k == 0 else ("", "")
+            error = "not known" if x.error is None else f"{x.error:.1g}"
+            elastic = f"{x.elasticity:.3g}" if math.isfinite(x.elasticity) else ""
+            table.add_row(*head, x.by, f"{x.number:.5g}", f"{x.derivative:.5g}", error, elastic)
+    return table

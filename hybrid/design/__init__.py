@@ -1,0 +1,1 @@
+"""Design: what results answer to the numbers of a scene."""

@@ -1,0 +1,123 @@
+"""Derivatives at rest against closed forms, differences of equilibria, and each other."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import hybrid
+from hybrid.cli.commands import app
+
+G = 9.81
+
+
+def scene(section, start, end, model, cells, environment=None, **more):
+    return {
+        "environment": {"gravity": G} | (environment or {}),
+        "cable": {"sections": section if isinstance(section, list) else [section]},
+        "ends": {"start": start, "end": end},
+        "initial": "equilibrium",
+        "model": model,
+        "mesh": {"cells": cells},
+    } | more
+
+
+def pinned(*place):
+    return {"kind": "pinned", "position": list(place)}
+
+
+def test_a_hanging_line():
+    """Tension at the top m g L + F, and the length L + (m g L/2 + F) L/EA: all derivatives in closed form."""
+    m, L, EA, F = 5.0, 40.0, 1e6, 300.0
+    section = {"length": L, "mass": m, "axial_stiffness": EA}
+    tables = scene(section, pinned(0, 0, 0), {"kind": "free", "force": [0, 0, -F]}, "catenary", 20)
+    keys = [f"cable.sections[0].{x}" for x in ("mass", "length", "axial_stiffness")]
+    found = {
+        (x.of, x.by.rsplit(".")[-1]): x for x in hybrid.sensitivity(tables, ["reaction_start.z", "position.z@40"], keys)
+    }
+    top = {name: found["reaction_start.z", name] for name in ("mass", "length", "axial_stiffness")}
+    assert top["mass"].derivative == pytest.approx(G * L, rel=1e-9)
+    assert top["length"].derivative == pytest.approx(G * m, rel=1e-9)
+    assert abs(top["axial_stiffness"].derivative) < 1e-12
+    assert top["mass"].elasticity == pytest.approx(m * G * L / (m * G * L + F), rel=1e-9)
+    tip = {name: found["position.z@40", name].derivative for name in ("mass", "axial_stiffness")}
+    assert tip["mass"] == pytest.approx(-G * L * L / 2.0 / EA, rel=1e-6)
+    assert tip["axial_stiffness"] == pytest.approx((m * G * L / 2.0 + F) * L / EA**2, rel=1e-6)
+
+
+def test_a_cantilever():
+    """Its tip sinks by w L^4/8EI: d(tip)/dEI = w L^4/8EI^2; order two, and the error figure has the size of the error."""
+    w, L, EI = 0.02, 2.0, 5.0
+    section = {"length": L, "mass": w / G, "bending_stiffness": EI, "torsional_stiffness": EI}
+    start = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}
+    exact, off = w * L**4 / 8.0 / EI**2, []
+    for cells in (20, 40):
+        tables = scene(section, start, {"kind": "free"}, "rod", cells)
+        (found,) = hybrid.sensitivity(tables, ["position.z@2"], ["cable.sections[0].bending_stiffness"])
+        off.append(abs(found.derivative / exact - 1.0))
+        assert found.elasticity == pytest.approx(-1.0, rel=1e-4)
+        assert 0.5 * off[-1] < found.error / exact < 3.0 * off[-1] + 1e-6
+    assert 1.8 < math.log2(off[0] / off[1]) < 2.2
+
+
+SEA = {"fluid": {"density": 1025, "current": [0.3, 0.1, 0]}, "seabed": {"z": -100, "stiffness": 5e3}}
+LINE = {
+    "length": 250.0, "mass": 20.0, "diameter": 0.05, "axial_stiffness": 2e8, "bending_stiffness": 2e3,
+    "torsional_stiffness": 2e3, "drag": {"normal": 1.2},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("model", ["catenary", "rod"])
+def test_differences_of_equilibria_on_the_bed(model):
+    """Of a line that touches down in a current."""
+    tables = scene(LINE, pinned(0, 0, -100), pinned(205, 0, 0), model, 100, SEA)
+    keys = [f"cable.sections[0].{x}" for x in ("mass", "diameter", "axial_stiffness")] + [
+        "environment.seabed.stiffness"
+    ]
+    of = ["tension@250", "position.z@125", "reaction_end.x", *(["max curvature"] if model == "rod" else [])]
+    found = hybrid.sensitivity(tables, of, keys)
+    made = hybrid.validate_scene(tables)
+    for key in keys:
+        (number,) = {x.number for x in found if x.by == key}
+        both = []
+        for part in (1.0 + 1e-4, 1.0 - 1e-4):
+            changed = hybrid.parse_scene(hybrid.scene_text(made), overrides=[f"{key}={number * part!r}"])
+            both.append([x.result for x in hybrid.sensitivity(changed, of, keys[:1])])
+        slope = (np.array(both[0]) - both[1]) / (2e-4 * number)
+        ours = np.array([x.derivative for x in found if x.by == key])
+        np.testing.assert_allclose(ours, slope, rtol=2e-5)
+
+
+def test_what_is_refused():
+    tables = scene(LINE, pinned(0, 0, -100), pinned(205, 0, 0), "catenary", 40, SEA)
+    key = "cable.sections[0].mass"
+    for of, by, words in (
+        ("tension", key, "a place or an extreme"),
+        ("tension@999", key, "between 0 and 250 m"),
+        ("tensoin@0", key, "one of .*tension"),
+        ("tension@0", "cable.sections[3].mass", "a key of the scene"),
+        ("tension@0", "model", "a number"),
+    ):
+        with pytest.raises(hybrid.SceneError, match=words):
+            hybrid.sensitivity(tables, [of], [by])
+    with pytest.raises(hybrid.SceneError, match="zones that move"):
+        hybrid.sensitivity(tables | {"model": "adaptive"}, ["tension@0"], [key])
+
+
+def test_the_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tables = scene(LINE, pinned(0, 0, -100), pinned(205, 0, 0), "catenary", 40, SEA)
+    (tmp_path / "line.yaml").write_text(hybrid.scene_text(hybrid.validate_scene(tables)))
+    told = CliRunner().invoke(app, ["sensitivity", "line.yaml", "--of", "tension@250"])
+    assert told.exit_code == 0, told.output
+    lines = [x for x in told.output.splitlines() if "cable.sections[0]." in x]
+    assert "length" in lines[0] and len(lines) == 6  # the strongest first
+    told = CliRunner().invoke(
+        app, ["sensitivity", "line.yaml", "--of", "tension@250", "--by", "ends.end.position[0]", "--json"]
+    )
+    (row,) = [x for x in map(json.loads, told.output.splitlines()) if "elasticity" in x]
+    assert row["elasticity"] == pytest.approx(5.4, abs=0.3)
