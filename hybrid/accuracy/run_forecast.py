@@ -134,9 +134,10 @@ def _measured(scene: Scene, found: Plan) -> Plan:
     seconds, most = _of_passes(scene, setup, motion, duration / output_interval(scene), found)
     if scene.contact.self:  # by name: the first steps show nothing of it
         seconds, most = seconds + (TOUCHING - 1.0) * motion, most + (MOST_TOUCHING - 1.0) * motion
-    mesh = tables.mesh_of(build(case.scene, resolution))
+    model = build(case.scene, resolution)
+    payout = model.payout.forecast(duration) if model.payout is not None else None
     return replace(
-        found, **mesh, contents=with_accuracy(found.contents, scene, case.reach),
+        found, **tables.mesh_of(model), payout=payout, contents=with_accuracy(found.contents, scene, case.reach),
         seconds=survey + seconds, most_seconds=survey + most, measured=True, steps=round(steps),
         step=min(resolution.step, duration / steps), chosen=choice.kind,
     )  # fmt: skip

@@ -178,3 +178,12 @@ def test_an_accuracy_is_asked_and_met() -> None:
     true = off(result, hybrid.run(finer))
     assert true < 0.14  # of 14 m that the line moves
     assert 0.7 < float(np.max(result.errors["total/position"])) / true < 3.0
+
+
+def test_a_plan_tells_the_cells_of_the_longest_line_as_of_the_first() -> None:
+    """Cells of a catenary are alike, and its plan has those that a pre-run has shown to be enough."""
+    scene = {k: x for k, x in sagging("catenary", 2e6).items() if k != "mesh"} | {"time": {"duration": 20.0}}
+    hybrid.run(scene)  # compiles
+    plan = hybrid.plan(scene)
+    assert plan.measured and plan.payout is not None
+    assert plan.payout.cells / sum(plan.cells) == pytest.approx(plan.payout.longest / plan.payout.first, rel=0.15)
