@@ -266,6 +266,22 @@ def test_a_criterion_of_ones_own_asks_for_the_rods_of_the_cable() -> None:
     assert np.abs(line["work/zones"] - one["work/zones"]).max() < 1e-6 * np.abs(one["work/zones"]).max()
 
 
+@pytest.mark.slow
+def test_a_criterion_of_ones_own_beside_an_accuracy() -> None:
+    """The result is that of the cable, and its errors, of runs that the criterion was asked in as well, nearly."""
+    cable, system = (x | {"accuracy": {"position": "5 cm", "tension": "5%"}} for x in slackening(duration=0.6))
+
+    def criterion(look: hybrid.NodeState) -> np.ndarray:
+        return np.where((look.s > 20) & (look.s < 30) & (look.t > 0.2), 1.5, 0.0)
+
+    one, line = hybrid.run(cable, criterion=criterion), hybrid.run(system, criterion=criterion).lines["rope"]
+    assert [*line.zones] == [*one.zones]
+    assert np.abs(line.position - one.position).max() < 1e-9 * 60
+    for cause in ("mesh", "time", "total"):
+        name = f"errors/{cause}/position"
+        assert line[name].max() == pytest.approx(one[name].max(), rel=0.2), name
+
+
 def test_a_criterion_sees_the_line_that_it_is_asked_for() -> None:
     """And asks for rods in that alone; where no zones move there is nothing to ask for."""
     short = mooring(time={"duration": 0.3, "step": 0.02})
