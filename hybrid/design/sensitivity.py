@@ -26,6 +26,7 @@ from hybrid.model.build import Model, build
 from hybrid.model.resolution import Resolution
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.analysis import Equilibrium
+from hybrid.scene.combinations import refuse_use
 from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene_text
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.static_case import StaticCase
@@ -79,6 +80,7 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None) -> Any:
     if not isinstance(asked, Scene):
         expected = "one cable: derivatives of several lines are not worked out"
         raise SceneError([Complaint("lines", f"{len(asked.lines)} lines", expected, "differences of two equilibria")])
+    refuse_use(asked, "about rest", given="derivatives")
     if isinstance(asked.initial, Equilibrium) and asked.initial.friction == "settled":
         fix = "leave initial.friction out, or write neglected"
         raise SceneError(

@@ -21,6 +21,7 @@ from hybrid.model.payout import payout_of
 from hybrid.model.resolution import Resolution
 from hybrid.model.system import SystemResolution
 from hybrid.scene.base import Table
+from hybrid.scene.combinations import refuse_use
 from hybrid.scene.motion_tables import Harmonic
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import Scene
@@ -174,8 +175,9 @@ class Rest:
 def equilibrium_of(asked: Scene | System, cells: float = 1.0) -> Rest:
     """The equilibrium on the usual mesh, or on one whose cells are so many times as long.
 
-    SceneError: a line touches itself in it; ComputationError: there is none.
+    SceneError: a line touches itself in it, or there are obstacles; ComputationError: there is none.
     """
+    refuse_use(asked, "about rest", given="modes")
     return _of_line(asked, cells) if isinstance(asked, Scene) else _of_system(asked, cells)
 
 

@@ -32,6 +32,7 @@ from hybrid.model.line import line_on, spins_freely
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
+from hybrid.model.obstacles import least_cells, obstacle_bits
 from hybrid.model.payout import PayoutPlan, payout_of, payout_plan, shorter_behind_clamp
 from hybrid.model.plane import in_plane, planar
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, mesh_is_free
@@ -186,7 +187,7 @@ def build(
     slack_scale = tension_scale(scene, sections, False, fastest)
     bed = scene.environment.seabed
     touch = 0 if bed is None else SEABED | (FRICTION if rubs(bed) else 0)
-    touch |= contact_bits(scene)
+    touch |= contact_bits(scene) | obstacle_bits(scene)
     moves = layout is not None
     line = line_on(cable, s, rod, touch, sections_turn=not moves or spins_freely(cable), comes_and_goes=moves)
 
@@ -305,7 +306,7 @@ def _placed(
         return dense.nodes(sorted({*bounds.tolist(), *cuts}), resolution.fineness), zones
     if free:
         twisted = twist_rate(scene, cable, 0.5 * (cable.bounds[1:] + cable.bounds[:-1])).max() if carries else 0.0
-        number = max(usual, twisted * scene.length / TWIST)
+        number = max(usual, twisted * scene.length / TWIST, least_cells(scene))
         cells = max(round(number * resolution.fineness), FEWEST_CELLS * len(plans))
         return place_nodes(plans, cuts, None, None, cells)
     if mesh is not None and mesh.nodes is not None:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from hybrid.kernels.march.zone_torque import COMPLIANCE, FREE
-from hybrid.kernels.state.forces import FRICTION, PLANAR, ROTARY, SEABED
+from hybrid.kernels.state.forces import FRICTION, PLANAR, ROTARY, TOUCHES
 from hybrid.kernels.state.state import Floats, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.ends import first_director
@@ -37,7 +37,7 @@ def coarser(model: Model) -> Model | None:
         kept[np.linspace(a, b, max(2, round((b - a) / FEWER)) + 1).astype(int) if b - a > 1 else [a, b]] = True
     at = np.flatnonzero(kept)
     rod = line.spin[at[:-1]] == 1
-    bits, turns = line.bits & (SEABED | FRICTION), bool(line.bits & ROTARY)
+    bits, turns = line.bits & (TOUCHES | FRICTION), bool(line.bits & ROTARY)
     if at.size == line.s.size:  # every node stays, as beside so many point loads
         return None
     new = line_on(cable, line.s[at], rod, bits, sections_turn=turns)

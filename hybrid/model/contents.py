@@ -8,10 +8,12 @@ from itertools import pairwise
 from math import inf
 
 from hybrid.errors import OF_AN_END
+from hybrid.kernels.laws.obstacles import STIFFNESS
 from hybrid.kernels.mesh.criteria import CRITERIA
 from hybrid.kernels.state.forces import DRAG, FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Line
 from hybrid.model.mesh import Zone
+from hybrid.model.obstacles import obstacle_rows
 from hybrid.model.plausibility import implausible
 from hybrid.model.resolution import (
     Reach,
@@ -180,6 +182,14 @@ def _idle(scene: Scene, line: Line) -> Iterator[Entry]:
         yield Entry(IDLE, False, f"{why} to what it carries", event="ignored")
 
 
+def _obstacles(scene: Scene) -> Iterator[Entry]:
+    """Each obstacle, with how stiff it is."""
+    for (name, x), row in zip(scene.obstacles.items(), obstacle_rows(scene), strict=True):
+        why = "given" if x.stiffness else "so that it lies at most a twentieth of its diameter deep at rest"
+        text = f"obstacle {name}: {x.kind}, {row[STIFFNESS]:.3g} N/m per m, friction {x.friction:g}"
+        yield Entry(text, True, f"obstacles.{name}; stiffness: {why}")
+
+
 def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) -> tuple[Entry, ...]:
     """What is on and by which key, what is off and what would switch it on; flat: whether it is in a plane."""
     kinds = {z.kind for z in zones}
@@ -227,6 +237,7 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
         if loose is not None:
             why = f"no effect: the catenary zone s = {loose.s_a:g} to {loose.s_b:g} m passes no torque on; a rod does"
         entries.append(Entry(what, loose is None, why, event="torque neglected" if loose is not None else ""))
+    entries += _obstacles(scene)
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
         moving = end.prescribed_motion is not None
         spring = f", by a spring of {end.spring:g} N m/rad" if end.spring < inf else ""

@@ -29,6 +29,8 @@ def in_plane(scene: Scene, start: State, others: list[tuple[str, State]], ends: 
         return None, Entry(WHAT, False, "dimension: 3")
     if scene.contact.self:
         return None, Entry(WHAT, False, "contact.self: contact of the line with itself is computed in space")
+    if scene.obstacles:
+        return None, Entry(WHAT, False, "obstacles: contact with obstacles is computed in space")
     asked = scene.dimension == 2
     tolerance = TYPED if asked else EXACT
     found, findings = plane_of(scene.environment, scene.cable, scene.ends, scene.initial, tolerance)

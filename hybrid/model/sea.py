@@ -9,6 +9,7 @@ import numpy as np
 from hybrid.kernels.laws.bed import HEIGHTS
 from hybrid.kernels.state.state import Floats, Sea, no_sea, with_waves
 from hybrid.model.ends import rise
+from hybrid.model.obstacles import obstacle_rows
 from hybrid.model.scales import pressing
 from hybrid.scene.schema import (
     CurrentProfile,
@@ -35,15 +36,16 @@ LOWEST, HIGHEST = 0.3, 6.0
 class Surroundings:
     """Evaluates the sea at a time into the arrays of `Sea` (overwritten by the next call)."""
 
-    def __init__(self, values: Sea) -> None:
-        self.values = values
+    def __init__(self, values: Sea, names: tuple[str, ...] = ()) -> None:
+        """names: of obstacles."""
+        self.values, self.names = values, names
         self.at(np.inf)
 
     def on(self, cells: int) -> Surroundings:
         """The same sea around a line of another number of cells."""
         axis, slip, slid, bed = (np.zeros((cells + 1, 3)) for _ in range(4))
         values = self.values._replace(flow=np.zeros((cells + 1, 7)), axis=axis, slip=slip, slid=slid, bed=bed)
-        return Surroundings(values)
+        return Surroundings(values, self.names)
 
     def at(self, t: float) -> Sea:
         """The sea at t; t = infinity asks for what stays: the current fully grown, and no waves."""
@@ -93,7 +95,13 @@ def surroundings(scene: Scene, cells: int) -> Surroundings:
         if rubs(bed):
             friction = np.array([bed.friction.axial, bed.friction.lateral]) if bed.friction else np.zeros(2)
             sea = sea._replace(friction=friction, slip_length=slip_length(scene, bed))
-    return Surroundings(sea._replace(ramps=np.array([current_ramp or 0.0, wave_ramp or 0.0])))
+    if scene.obstacles:
+        sea = sea._replace(obstacles=obstacle_rows(scene))
+        if not (bed is not None and rubs(bed)):
+            sea = sea._replace(
+                friction=np.zeros(2), slip_length=1.0
+            )  # of the bed: friction of obstacles is in their rows
+    return Surroundings(sea._replace(ramps=np.array([current_ramp or 0.0, wave_ramp or 0.0])), tuple(scene.obstacles))
 
 
 def rubs(bed: Seabed | None) -> bool:

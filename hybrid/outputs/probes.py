@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid.kernels.march.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twist
-from hybrid.kernels.state.forces import MAY_TOUCH, PLANAR, SEABED, SELF_CONTACT
+from hybrid.kernels.state.forces import MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import NEAR
@@ -102,7 +102,7 @@ PROBES: dict[str, Probe] = {
     "energy/stretch": Probe("J", "energy of stretching", (), lambda v: v.energies["stretch"]),
     "energy/bending": Probe("J", "energy of bending", (), lambda v: v.energies["bending"], "rod"),
     "energy/contact": Probe(
-        "J", "energy stored by the seabed under the cable", (), lambda v: v.energies["contact"], "seabed"
+        "J", "energy stored by the seabed and by obstacles", (), lambda v: v.energies["contact"], "seabed obstacles"
     ),
     "energy/self_contact": Probe(
         "J", "energy of contact of the line with itself", (), lambda v: v.energies["self_contact"], "self_contact"
@@ -119,8 +119,8 @@ WORK = {
     "stiffness_damping": "work of stiffness-proportional damping",
     "added_mass": "work of the added mass",
     "waves": "work of the pressure of waves, and of buoyancy at the surface",
-    "contact": "work of the damping of the seabed",
-    "friction": "work of friction on the seabed, and of the line on itself",
+    "contact": "work of the damping of the seabed and of obstacles",
+    "friction": "work of friction on the seabed, on obstacles, and of the line on itself",
     "zones": "energy that zones, and cells at a winch, put in or take out when they change, and of torque where a "
     "catenary bends without it",
     "scheme": "energy change that no work accounts for: the time scheme's own (negative: dissipated)",
@@ -212,6 +212,7 @@ class Observer:
         has |= (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
         has |= {"link"} if holds_twist(line) and not line.bits & PLANAR else set()
         has |= {"payout"} if payout else set()
+        has |= {"obstacles"} if line.bits & OBSTACLES else set()
         has |= {"self_contact"} if line.bits & (SELF_CONTACT | MAY_TOUCH * with_work) else set()
         self._probes = {
             name: p

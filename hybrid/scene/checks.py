@@ -37,6 +37,7 @@ from hybrid.scene.analysis import (
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.cable import Cable, Contact, Environment
 from hybrid.scene.ends import Clamped, Ends, Free, Pinned
+from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.quantities import of_one_line
 from hybrid.scene.start_checks import SAME_LENGTH
@@ -169,6 +170,22 @@ def _touches_itself(cable: Cable, contact: Contact) -> Iterator[Finding]:
         if section.diameter is None:
             expected = "a number > 0, in m, which parts of the cable keep apart (contact.self)"
             yield Finding(("cable", "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
+
+
+def _touches_obstacles(cable: Cable, obstacles: Obstacles, ends: Ends) -> Iterator[Finding]:
+    """A line that touches obstacles has a radius, and its ends are outside of them."""
+    if not obstacles:
+        return
+    for i, section in enumerate(cable.sections):
+        if section.diameter is None:
+            expected = "a number > 0, in m, with which the cable touches obstacles"
+            yield Finding(("cable", "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
+    for key, places in (("position", ends.held()), ("initial_guess", ends.initial_guesses())):
+        for end, place in places.items():
+            for name, x in obstacles.items():
+                if x.distance(place) < 0.0:
+                    expected = f"a place outside of obstacles.{name}, in which it lies {-x.distance(place):.3g} m deep"
+                    yield Finding(("ends", end, key), expected, "move it, or the obstacle")
 
 
 def _accuracy_has_errors(accuracy: Accuracy | None, output: Output) -> Iterator[Finding]:
@@ -330,6 +347,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _moment_is_there,
     _in_a_plane,
     _touches_itself,
+    _touches_obstacles,
     _turns_are_held,
     _axes_are_given,
     _mesh_spans,

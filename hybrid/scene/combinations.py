@@ -26,7 +26,7 @@ Tables = Mapping[str, Any]
 Kind = Literal["physics", "not worked out", "several lines"]
 # Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
 USE, SYSTEM, LINE = "use", "system", "line"
-Use = Literal["", "stepped", "changed loads"]
+Use = Literal["", "stepped", "changed loads", "about rest"]
 LEAVE_OUT = "leave it out"
 ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
@@ -280,6 +280,16 @@ def _breaks_off_clamp(tables: Tables) -> Iterator[Place]:
             yield "points", point, "break_at"
 
 
+def _obstacles(tables: Tables) -> Iterator[Place]:
+    return iter([("obstacles",)] if tables.get("obstacles") else [])
+
+
+def _other_diameters(tables: Tables) -> Iterator[Place]:
+    """Sections that are not as thick as the first one."""
+    known = [(at, x.diameter) for at, x in _sections(tables) if x.diameter is not None]
+    return ((*at, "diameter") for at, diameter in known if diameter != known[0][1])
+
+
 def _several(tables: Tables) -> Iterator[Place]:
     return iter([("lines",)] if SYSTEM in tables else [])
 
@@ -334,7 +344,18 @@ CLAMPED_CONNECTION = Feature("a clamped connection", "lines.NAME.connections", _
 BREAKS_OFF_CLAMP = Feature("a break at a clamp", "break_at", _breaks_off_clamp)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
 CLAMPED_TO_FREE = Feature("a line that is clamped to a free point or body", "lines.NAME.connections", _clamped_to_free)
+OBSTACLES = Feature("fixed obstacles", "obstacles", _obstacles)
+DIAMETERS = Feature("sections of several diameters", "diameter", _other_diameters)
+ACCURACY = Feature("accuracy", "accuracy", lambda tables: iter([("accuracy",)] if tables.get("accuracy") else []))
+ERRORS = Feature("estimated errors", "output.errors", _asks("output", "errors", lambda x: getattr(x, "errors", None)))
+CHOSEN_STEPS = Feature("steps that an accuracy chooses", "no time.step",
+                       _asks("time", "step", lambda x: x.step is None and x.tolerance is None))  # fmt: skip
+SETTLED_FRICTION = Feature("friction that has settled in the equilibrium", "initial.friction",
+                           _asks("initial", "friction",
+                                 lambda x: getattr(x, "friction", "neglected") != "neglected"))  # fmt: skip
 
+ABOUT_REST = Feature("natural modes, response to a sea, derivatives at rest", "hybrid modes, response, sensitivity",
+                     _used("about rest"))  # fmt: skip
 STEPPED = Feature("steps from outside", "hybrid.Simulation", _used("stepped"))
 CHANGED_LOADS = Feature(
     "loads that change in mid-run", "hybrid resume --set KEY=VALUE", _used("changed loads", "settings")
@@ -346,6 +367,9 @@ ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
 ))  # fmt: skip
 OTHER_STARTS = Feature("starts other than equilibrium", "initial", Absent(
     {"System": ("initial",)}, "several lines start in equilibrium, found from initial_guess of points and bodies"
+))  # fmt: skip
+OBSTACLES_OF_ONE = Feature("fixed obstacles", "obstacles", Absent(
+    {"System": ("obstacles",)}, "leave it out: one cable, with `cable` and `ends`, touches obstacles"
 ))  # fmt: skip
 WINCH = Feature("line that is paid out", "payout", Absent(
     {x: ("payout",) for x in ("FixedPoint", "FreePoint", "Fairlead", "JoinedLine")},
@@ -415,6 +439,45 @@ REFUSALS: tuple[Refusal, ...] = (
         LAYERS, STEPPED, "not worked out",
         "a cable that is stepped from outside has no coarse run that shows its layers", fix="place cells by `mesh`",
     ),
+    # --- obstacles ---
+    Refusal(
+        PLANE, OBSTACLES, "not worked out", "contact with obstacles ({key}) is computed in space", "3 or nothing",
+        "leave it out",
+    ),
+    Refusal(
+        MOVING_ZONES, OBSTACLES, "not worked out",
+        "there are obstacles ({key}), and no criterion looks at what they do to a catenary",
+        "rod, catenary or zones", "write `model: rod`",
+    ),
+    Refusal(PAYOUT, OBSTACLES, "not worked out", "nodes that enter and leave do not know of obstacles ({key})"),
+    Refusal(
+        DIAMETERS, OBSTACLES, "not worked out", "a line that touches obstacles ({key}) has one diameter",
+        "the diameter of the first section", "give all sections one diameter, or leave {key} out",
+    ),
+    Refusal(
+        CHOSEN_STEPS, OBSTACLES, "not worked out", "there are obstacles ({key}), beside which no error is estimated",
+        "a step, in s, or a tolerance, in m",
+        "give `step: ...` (s) in time, and halve it to see its error",
+    ),
+    Refusal(
+        ACCURACY, OBSTACLES, "not worked out", "there are obstacles ({key}), beside which no error is estimated",
+        fix="leave it out; halve time.step and the cells to see their error",
+    ),
+    Refusal(
+        ERRORS, OBSTACLES, "not worked out", "there are obstacles ({key}), beside which no error is estimated", "false"
+    ),
+    Refusal(
+        SETTLED_FRICTION, OBSTACLES, "not worked out",
+        "friction on obstacles ({key}) is neglected in every equilibrium", "neglected",
+    ),
+    Refusal(
+        LAYERS, OBSTACLES, "not worked out", "there are obstacles ({key}), of which the coarse run knows no layers",
+        fix="place cells by `mesh`",
+    ),
+    Refusal(
+        ABOUT_REST, OBSTACLES, "not worked out", "there are obstacles ({key}), whose contact opens and closes",
+        "a line that touches the seabed at most", "hybrid run computes it in time",
+    ),
     # --- line that is paid out ---
     Refusal(
         PAYOUT_AT_START, PAYOUT_AT_END, "not worked out", "line is paid out at ends.end", fix="leave one out"
@@ -466,7 +529,7 @@ REFUSALS: tuple[Refusal, ...] = (
     *(
         Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)
         for x in (
-            ONE_PLANE, OTHER_STARTS, WINCH
+            ONE_PLANE, OTHER_STARTS, OBSTACLES_OF_ONE, WINCH
         )
         if isinstance(x.places, Absent)
     ),

@@ -40,6 +40,7 @@ from hybrid.scene.checks import contradictions
 from hybrid.scene.end_loads import Load
 from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned
 from hybrid.scene.motion_tables import Harmonic, Motion, Travel
+from hybrid.scene.obstacles import CylinderObstacle, Obstacles, PlaneObstacle, SphereObstacle
 from hybrid.scene.sea import (
     Current,
     CurrentPoint,
@@ -68,6 +69,7 @@ __all__ = [
     "Current",
     "CurrentPoint",
     "CurrentProfile",
+    "CylinderObstacle",
     "Damping",
     "Drag",
     "End",
@@ -89,6 +91,7 @@ __all__ = [
     "Motion",
     "Output",
     "Pinned",
+    "PlaneObstacle",
     "Points",
     "PowerLawCurrent",
     "RegularWaves",
@@ -98,6 +101,7 @@ __all__ = [
     "Scene",
     "Seabed",
     "Section",
+    "SphereObstacle",
     "Straight",
     "Swivel",
     "Table",
@@ -121,14 +125,17 @@ class Scene(Table):
     environment: Environment = Field(default=Environment(), description="what acts on the cable from outside")
     cable: Cable = Field(description="what the cable is made of")
     contact: Contact = Field(default=Contact(), description="what the cable touches beside the seabed")
+    obstacles: Obstacles = Field(
+        default={}, description="fixed obstacles by name that the cable touches: planes, spheres, cylinders"
+    )
     ends: Ends = Field(description="how the ends are held, moved and loaded")
     initial: Initial = Field(description="where the cable is at t = 0")
     model: Model = Field(
-        default_factory=lambda data: usual_model(data.get("cable")),
+        default_factory=lambda data: usual_model(data.get("cable"), data.get("obstacles")),
         description="where the cable is a rod and where a catenary; absent, or adaptive alone: of a cable with bending "
         "stiffness that of rod, catenary and adaptive which costs least by a pre-run, where an accuracy is asked and "
         "no mesh given, else adaptive (absent: rod, if it bends differently in two directions or has a rotary_inertia, "
-        "tension_strain or dynamic_stiffness); of others catenary",
+        "tension_strain or dynamic_stiffness, or there are obstacles); of others catenary",
     )
     mesh: Mesh | None = Field(default=None, description="how the cable is cut into cells; absent: chosen")
     resolution: Resolution | None = Field(

@@ -14,15 +14,17 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.laws.obstacles import KIND, RADIUS, ROUND, depths_in_obstacles
 from hybrid.kernels.march.resolution_checks import lowest
 from hybrid.kernels.run.entry import sharpest
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
-from hybrid.kernels.state.forces import FRICTION, PLANAR, SEABED, SELF_FRICTION
+from hybrid.kernels.state.forces import FRICTION, OBSTACLES, PLANAR, SEABED, SELF_FRICTION
 from hybrid.kernels.state.report import BEND, TWIST_NODE
 from hybrid.kernels.state.state import Batch, Ends, Floats, State, ends_in, state_in
 from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.model.build import Model
+from hybrid.model.obstacles import CELLS_PER_RADIUS
 from hybrid.outputs.joined_lines import JoinedObservation, Output
 from hybrid.outputs.observation import Observation
 from hybrid.simulation.doubtful_outputs import Bounds, doubtful, kinks_at
@@ -41,6 +43,8 @@ OFF = 0.02
 KINK = 0.35
 # Depth in the seabed, as a part of the line's length, that no bed of real soil allows.
 SUNK = 0.01
+# Of its radius: from how near an obstacle on a line counts as on it.
+TOUCHING = 0.01
 # Energy that the scheme creates, as a part of what work, fall and start have put in: beyond the first it is
 # noted (a healthy run stays below 1 %), at the second the motion is the scheme's own and the run stops.
 GAIN_NOTED, GAIN_STOPS = 0.05, 1.0
@@ -71,11 +75,19 @@ LET_GO = 0.01
 NOWHERE: Floats = np.zeros((0, 3))
 # What a checkpoint holds of it as plain values.
 REMEMBERED = (
-    "_bend", "_twist", "_slack", "_fold", "_sunk", "_off", "_gain", "_loss", "_rested", "_left_out", "_jump",
-    "_put_in", "_potential", "_alive", "_loop", "_writhe", "_writhes", "_section", "_kink",
+    "_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_off", "_gain", "_loss", "_rested",
+    "_left_out", "_jump", "_put_in", "_potential", "_alive", "_loop", "_writhe", "_writhes", "_section", "_kink",
 )  # fmt: skip
-# What checkpoints of 0.6 files may lack of it: loops, changes of section, and kinks at joints, were not watched.
-UNWATCHED = {"_loop": 1.0, "_writhe": np.nan, "_writhes": LOOP, "_section": False, "_kink": KINK}
+# What checkpoints of 0.6 files may lack of it: what was not watched then.
+UNWATCHED = {
+    "_loop": 1.0,
+    "_writhe": np.nan,
+    "_writhes": LOOP,
+    "_section": False,
+    "_kink": KINK,
+    "_within": 1.0,
+    "_round": False,
+}
 
 Stop = tuple[Outcome, int] | None
 
@@ -128,6 +140,7 @@ class Diagnostics:
         self._bend = self._twist = UNRESOLVED
         self._slack = model.slack_floor
         self._fold, self._sunk = UNRESOLVED, SUNK * model.length
+        self._within, self._round = 1.0, False
         self._off = OFF * model.length
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
         self._rested = self._left_out = self._section = False
@@ -182,6 +195,8 @@ class Diagnostics:
         if self._model.line.bits & FRICTION and not found.with_friction:
             text = "this equilibrium is the one without friction: say `initial: {kind: equilibrium, friction: settled}`"
             where = f"{text} for one that lies where it was laid"
+            if self._model.line.bits & OBSTACLES:
+                where = "this equilibrium is the one without friction: a run with damping that comes to rest has it"
             self.events.event(0.0, 0.0, self._model.length, "static friction neglected", where)
         if self._model.line.bits & SELF_FRICTION and found.touch.any():
             text = "this equilibrium is the one without friction where the line touches itself"
@@ -401,6 +416,39 @@ class Diagnostics:
                     where = f"{text}: is its stiffness in N/m per m of cable?"
                     self.note(float(batch.t[k]), node, "deep in the seabed", where)
                     self._sunk = 3.0 * float(depth[k, node])
+
+        if line.bits & OBSTACLES:
+            self._obstacles(batch)
+
+    def _obstacles(self, batch: Batch) -> None:
+        """A line that lies deep in an obstacle or has passed through it, and cells that do not follow its radius."""
+        line, sea = self._model.line, self._model.sea
+        rows = sea.values.obstacles
+        longest = np.maximum(np.append(line.h, 0.0), np.append(0.0, line.h))
+        for t, r in zip(batch.t.tolist(), batch.r, strict=True):
+            within = depths_in_obstacles(rows, r)
+            which, node = (int(i) for i in np.unravel_index(np.argmax(within), within.shape))
+            if within[which, node] > self._within:
+                text = (
+                    f"the line is {within[which, node]:.2g} of its radii deep in obstacle {sea.names[which]} at s = "
+                    f"{line.s[node]:g} m, or has passed through it between two nodes: make obstacles."
+                    f"{sea.names[which]}.stiffness larger, time.step smaller or add cells"
+                )
+                self.note(t, node, "deep in an obstacle", text)
+                self._within = 3.0 * float(within[which, node])
+            if self._round:
+                continue
+            coarse = (within > -TOUCHING) & (CELLS_PER_RADIUS * longest > 1.01 * rows[:, RADIUS, None])
+            coarse &= (rows[:, KIND] == ROUND)[:, None]
+            if coarse.any():
+                which, node = (int(i) for i in np.argwhere(coarse)[0])
+                name, radius = sea.names[which], rows[which, RADIUS]
+                text = (
+                    f"cells of {longest[node]:.2g} m lie on obstacle {name} at s = {line.s[node]:g} m, whose radius is "
+                    f"{radius:.2g} m: cells of {radius / CELLS_PER_RADIUS:.2g} m would follow it"
+                )
+                self.note(t, node, "unresolved bend", text)
+                self._round = True
 
     def _note_fold(self, t: float, turn: Floats) -> None:
         node = int(np.argmax(turn)) + 1

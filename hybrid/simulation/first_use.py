@@ -47,7 +47,7 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     beside = _beside_solver(scene, static)
     tables = scene.environment, scene.cable, scene.ends, scene.initial
     leaves = plane_of(*tables, TYPED if scene.dimension == 2 else EXACT)[1]
-    in_space = scene.dimension == 3 or scene.contact.self or bool(leaves)
+    in_space = scene.dimension == 3 or scene.contact.self or bool(scene.obstacles) or bool(leaves)
     if scene.dimension is None and MODEL_ERROR in beside:
         in_space = True  # what leaving bending out does is followed in space
     turned = any(load.what == "moment" for end in scene.ends.both for load in end.loads)
@@ -144,11 +144,11 @@ def payout_kernels() -> tuple[Any, ...]:
 
 
 def _compile_outputs(model: Model) -> None:
-    from hybrid.kernels.laws.seabed import stored
+    from hybrid.kernels.laws.obstacles import stored_energy
     from hybrid.kernels.watch.observed_outputs import observe_outputs
 
     observe_outputs(np.zeros((0, 0), np.int64))
-    stored(model.line, model.sea.values, model.start.r)
+    stored_energy(model.line, model.sea.values, model.start.r)
 
 
 def _compile_zones(scene: Scene, model: Model) -> None:

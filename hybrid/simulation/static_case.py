@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from hybrid.errors import Complaint, ComputationError, SceneError
-from hybrid.kernels.laws.seabed import stored
+from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.run.entry import assembly, workspace_of
-from hybrid.kernels.state.forces import SEABED, SELF_CONTACT, WAVES
+from hybrid.kernels.state.forces import SEABED, SELF_CONTACT, TOUCHES, WAVES
 from hybrid.kernels.state.report import REPORT_SIZE, SEABED_ENERGY
 from hybrid.kernels.state.state import Floats, State, batch_of_one
 from hybrid.model.bending_reference import NO_DOUBT
@@ -179,8 +179,8 @@ def _values(
         correction = Correction(model)
         correction.begin(ends, found.state, at_rest=True, with_friction=found.with_friction)
     report = found.report.copy()
-    if model.line.bits & SEABED:
-        report[SEABED_ENERGY] = stored(model.line, sea, found.state.r)
+    if model.line.bits & TOUCHES:
+        report[SEABED_ENERGY] = stored_energy(model.line, sea, found.state.r)
     batch = batch_of_one(0.0, ends, found.state, report, np.zeros(len(POWERS)), sea)
     if found.touch.size:
         batch = batch._replace(touch=found.touch[None])

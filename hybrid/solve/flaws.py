@@ -6,8 +6,9 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.laws.obstacles import depths_in_obstacles
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held
-from hybrid.kernels.state.forces import BODIES, FRICTION, SEABED
+from hybrid.kernels.state.forces import BODIES, FRICTION, OBSTACLES, SEABED
 from hybrid.kernels.state.state import Floats, Line, Sea, State
 
 # A line that lies this part of its length, and this many onsets of contact, under the bed has gone through it.
@@ -31,8 +32,8 @@ def lowest_tension(line: Line, sea: Sea, state: State) -> tuple[float, int]:
 def flaw_of_line(line: Line, sea: Sea, state: State, length: float, floor: float) -> tuple[Outcome, int]:
     """What makes a state no equilibrium of a line, or OK, and the cell or node.
 
-    SLACK: a catenary is not under a tension of more than `floor` (N).  BURIED: deep in the bed.  FOLDED: a rod
-    stands on a fold.
+    SLACK: a catenary is not under a tension of more than `floor` (N).  BURIED: deep in the bed or an obstacle.
+    FOLDED: a rod stands on a fold.
     """
     tension, cell = lowest_tension(line, sea, state)
     if not tension > floor:
@@ -41,6 +42,10 @@ def flaw_of_line(line: Line, sea: Sea, state: State, length: float, floor: float
         deep = planes_under(sea, state.r)[1] - 0.5 * sea.onset
         if deep.max() > max(BURIED * length, BURIED_ONSETS * sea.onset):
             return Outcome.BURIED, int(np.argmax(deep))
+    if line.bits & OBSTACLES:
+        within = depths_in_obstacles(sea.obstacles, state.r).max(axis=0)
+        if within.max() > 1.0:
+            return Outcome.BURIED, int(np.argmax(within))
     turns = np.where(_pressed(line, state), folds(line, state), 0.0)
     if turns.max() > FOLDED:
         return Outcome.FOLDED, int(np.argmax(turns))

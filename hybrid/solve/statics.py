@@ -11,12 +11,24 @@ import numpy as np
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import Limits
-from hybrid.kernels.state.forces import AXIAL_LAW, FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
+from hybrid.kernels.state.forces import (
+    AXIAL_LAW,
+    FLOW,
+    FRICTION,
+    MASS_DAMPING,
+    OBSTACLES,
+    PLANAR,
+    ROTARY,
+    SEABED,
+    TOUCHES,
+    WAVES,
+)
 from hybrid.kernels.state.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
 from hybrid.kernels.step.step import friction_axes
 from hybrid.solve.flaws import flaw_of_line, fold_text, lowest_tension
 from hybrid.solve.laid import laid_on_bed
+from hybrid.solve.softened import softened, softest_obstacles
 from hybrid.solve.stability import Stability, is_judged
 from hybrid.solve.stepper import Stepper
 from hybrid.solve.workspaces import workspace_of
@@ -184,6 +196,7 @@ def _eased(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, int
     """
     line, sea, state = solver.line, solver.sea, start
     softest = min(1.0, sea.onset / (SOFT_BED * solver.length)) if line.bits & SEABED else 1.0
+    softest = min(softest, softest_obstacles(sea.obstacles, SOFT_BED * solver.length))
     grown = float(sea.now[1])
     outcome, where, done, part, steps = Outcome.OK, -1, -1.0, 1.0, 0
     while done < 1.0 and part > 1e-3:
@@ -192,7 +205,7 @@ def _eased(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, int
         soft = softest ** (1.0 - x)
         now = sea.now.copy()
         now[1] = x * grown
-        easy = sea._replace(stiffness=sea.stiffness * soft, onset=sea.onset / soft, now=now)
+        easy = softened(sea, soft)._replace(now=now)
         limp = line._replace(kb=line.kb * LIMP ** (1.0 - x))
         last = goal >= 1.0
         outcome, where, found = solver.newton(line if last else limp, ends, state, sea=None if last else easy)
@@ -203,7 +216,11 @@ def _eased(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, int
             part *= 0.5
             if done < 0.0 and part <= 0.5:
                 break
-    eased = [what for bit, what in ((SEABED, "a soft seabed"), (FLOW, "no current")) if line.bits & bit]
+    eased = [
+        what
+        for bit, what in ((SEABED, "a soft seabed"), (OBSTACLES, "soft obstacles"), (FLOW, "no current"))
+        if line.bits & bit
+    ]
     eased += ["little bending"] if line.element.any() else []
     return f"from {', '.join(eased)} in {steps} steps", outcome, where, state
 
@@ -302,7 +319,7 @@ def _attempts(
 
     first = noted((f"Newton from {shape}", *solver.newton(solver.line, ends, start)))
     yield first
-    if solver.line.bits & (SEABED | FLOW):
+    if solver.line.bits & (TOUCHES | FLOW):
         yield noted(_eased(solver, ends, start))
     for name, other in others:
         yield noted((f"Newton from {name}", *solver.newton(solver.line, ends, other)))

@@ -12,11 +12,12 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.kernels.algebra.block_elimination import solve_again
 from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.laws.seabed import normal_forces, stored
+from hybrid.kernels.laws.obstacles import stored_energy
+from hybrid.kernels.laws.seabed import normal_forces
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import NO_PUSH, Limits, block_rows, out_of_balance
-from hybrid.kernels.state.forces import FRICTION, PLANAR, SEABED, WAVES
+from hybrid.kernels.state.forces import FRICTION, PLANAR, TOUCHES, WAVES
 from hybrid.kernels.state.report import (
     FORCE_A,
     LOCAL_ERROR,
@@ -177,8 +178,8 @@ class Stepper:
         if force is not None:
             for at in (FORCE_A, NET_A):
                 work.report[at : at + 6] += (force[[0, -1]] * (ends.held[:, None] != 0)).ravel()
-        if self.line.bits & SEABED:
-            self.work.report[SEABED_ENERGY] = stored(self.line, sea, state.r)
+        if self.line.bits & TOUCHES:
+            self.work.report[SEABED_ENERGY] = stored_energy(self.line, sea, state.r)
             state.bed[:] = sea.bed
         self.told = self.work.report.tolist()
         return Taken(Outcome.OK, 1, 0.0, -1, self.told[RESIDUAL])
@@ -191,7 +192,7 @@ class Stepper:
         if self.line.bits & FRICTION:
             friction_axes(sea, state.r, state.e, state.slip)
         entry.assembly(self.line, sea, ends, state, 0.0, HEAVY, self.work)
-        if self.line.bits & SEABED:
-            self.work.report[SEABED_ENERGY] = stored(self.line, sea, state.r)
+        if self.line.bits & TOUCHES:
+            self.work.report[SEABED_ENERGY] = stored_energy(self.line, sea, state.r)
             state.bed[:] = sea.bed
         self.told = self.work.report.tolist()

@@ -76,6 +76,10 @@ FEATURES: dict[str, tuple[Tables, str]] = {
         {S + "dynamic_stiffness": {"constant": 2e5, "per_tension": 10.0, "relaxation_time": 100}}, "stretch",
     ),
     "contact": ({"contact.self": True}, "contact"),
+    "obstacle": (
+        {"obstacles": {"pipe": {"kind": "cylinder", "at": [4, 0, -2], "axis": [0.1, 1, 0.05], "radius": 0.8,
+                                "friction": 0.3}}}, "obstacles",
+    ),
     "chosen steps": ({"time.tolerance": 1e-4, "time.step": None}, "time"),
 }  # fmt: skip
 
@@ -98,7 +102,19 @@ def scene_of(*names: str) -> Tables:
 
 # --- the same said otherwise --------------------------------------------------------------------
 
-POLAR = ("position", "tangent", "normal", "current", "force", "thrust", "by", "initial_guess", "direction")
+POLAR = (
+    "position",
+    "tangent",
+    "normal",
+    "current",
+    "force",
+    "thrust",
+    "by",
+    "initial_guess",
+    "direction",
+    "at",
+    "axis",
+)
 
 
 def seen_by(M: Matrix, tables: Tables) -> Tables:
@@ -162,7 +178,7 @@ def as_system(tables: Tables) -> Tables | None:
     for name, (key, end) in zip("ab", ends.items(), strict=True):
         end = dict(end)
         kind = end.pop("kind")
-        if kind == "guided" or {"payout", "moment"} & {*end}:
+        if kind == "guided" or {"payout", "moment"} & {*end} or "obstacles" in found:
             return None
         if kind == "clamped":
             keys = {"tangent", "normal", "turns", "swivel", "bend_stiffness"} & {*end}

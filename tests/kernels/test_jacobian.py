@@ -21,6 +21,7 @@ from hybrid.kernels.state.forces import (
     FLOW,
     FRICTION,
     MASS_DAMPING,
+    OBSTACLES,
     ROTARY,
     SEABED,
     STIFFNESS_DAMPING,
@@ -31,6 +32,14 @@ from hybrid.kernels.state.state import Ends, Line, Sea, blank_state
 
 N = 7
 CV, CA = 3.0, 7.0
+# A plane, a sphere, an endless cylinder and one with round ends that the line of `random_case` runs through: kind, place,
+# axis, radius, half length, strand, friction, stiffness, damping, onset, elastic travel.
+OBSTACLES_THERE = np.array([
+    [0, 0.0, 0.0, -3.0, 0.6, 0.0, 0.8, 0.1, 0.0, 0.1, 0.2, 2.0, 0.3, 40.0, 0.3],
+    [1, 2.0, 1.0, 0.5, 0.0, 0.0, 1.0, 2.0, 0.0, 0.1, 0.5, 3.0, 0.4, 50.0, 0.4],
+    [1, 4.0, -1.0, 1.0, 0.0, 0.8, 0.6, 1.5, np.inf, 0.1, 0.4, 4.0, 0.2, 50.0, 3.0],
+    [1, 5.0, 2.0, -1.5, 0.6, 0.0, 0.8, 1.5, 1.0, 0.1, 0.0, 2.0, 0.5, 60.0, 0.2],
+])  # fmt: skip
 ZONES = {
     "rod": [1] * (N + 1),
     "catenary": [0] * (N + 1),
@@ -41,7 +50,7 @@ ZONES = {
 LAND = DRAG | ADDED_MASS | MASS_DAMPING | STIFFNESS_DAMPING | ROTARY
 BITS = [
     0, DRAG, ADDED_MASS, MASS_DAMPING, STIFFNESS_DAMPING, ROTARY, LAND, DRAG | FLOW, WAVES | ADDED_MASS | DRAG, SURFACE,
-    BODIES | FLOW, SEABED, SEABED | FRICTION, 2047,
+    BODIES | FLOW, SEABED, SEABED | FRICTION, 2047, OBSTACLES, OBSTACLES | SEABED | FRICTION,
 ]  # fmt: skip
 
 
@@ -96,7 +105,7 @@ def random_sea(g):
     return Sea(
         z=np.array([-9.0, 9.0]), current=g.normal(size=(2, 3)), waves=np.zeros((0, 6)), depth=np.inf, surface=0.3,
         now=np.array([0.0, 0.7, 1.0, 0.0]), ramps=np.zeros(2), normal=normal, offset=0.2,
-            bed_x=np.zeros(0), bed_y=np.zeros(0), bed_heights=np.zeros((0, 4)), stiffness=3.0, damping=0.5, onset=50.0,
+            bed_x=np.zeros(0), bed_y=np.zeros(0), bed_heights=np.zeros((0, 4)), stiffness=3.0, damping=0.5, onset=50.0, obstacles=OBSTACLES_THERE,
         friction=np.array([0.3, 0.6]), slip_length=0.4, flow=0.1 * g.normal(size=(N + 1, 7)), lanes=np.zeros((10, 16)),
         axis=axis / np.linalg.norm(axis, axis=1)[:, None], slip=slip, slid=np.zeros((N + 1, 3)), bed=np.zeros((N + 1, 3)),
     )  # fmt: skip

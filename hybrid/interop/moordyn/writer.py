@@ -197,6 +197,9 @@ class _Writer:
         if bed is not None and bed.slope is not None and any(bed.slope):
             expected = "a level bed, which a deck has"
             self._refuse("environment.seabed.slope", bed.slope, expected, "leave slope out, for a comparison")
+        if getattr(self.scene, "obstacles", None):
+            given = ", ".join(self.scene.obstacles)
+            self._refuse("obstacles", given, "none: a deck has no obstacles", "leave them out, for a comparison")
 
     def _options(self) -> Iterator[tuple[str, float]]:
         environment, bed = self.scene.environment, self.scene.environment.seabed

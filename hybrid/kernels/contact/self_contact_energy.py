@@ -28,7 +28,7 @@ from hybrid.kernels.march.energies import observe
 from hybrid.kernels.march.powers import find_powers
 from hybrid.kernels.march.zone_torque import twist_energy
 from hybrid.kernels.state.books import NOW, RATES, STORED, TRY_END
-from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, SEABED
+from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, TOUCHES
 from hybrid.kernels.state.report import (
     CONTACT_WORK,
     FRICTION_WORK,
@@ -104,7 +104,7 @@ def work_of_try(line, ends, contact, velocity, before, state, work, clock):
     for k in range(RATES):
         done += half * (before[k] + contact.power[k])
         missed += half * abs(contact.power[k] - before[k])
-    if line.bits & SEABED:
+    if line.bits & TOUCHES:
         done += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock[STORED] + report[FRICTION_WORK]
     for i in range(work.u.shape[0]):
         for k in range(3):

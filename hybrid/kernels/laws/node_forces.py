@@ -9,10 +9,22 @@ from __future__ import annotations
 from hybrid.kernels.algebra.rotations import add, dot, get3, madd, mat_vec, mscale, outer, scale, sub
 from hybrid.kernels.laws.bed import bed_before, bed_beside, bed_under
 from hybrid.kernels.laws.loads import body_drag, half_cell_added_mass, half_cell_drag
+from hybrid.kernels.laws.obstacles import obstacle_forces
 from hybrid.kernels.laws.seabed import contact, friction, pressure
 from hybrid.kernels.laws.water import current_at, wetted, wetted_stretch
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
+from hybrid.kernels.state.forces import (
+    ADDED_MASS,
+    BODIES,
+    DRAG,
+    FLOW,
+    FRICTION,
+    MASS_DAMPING,
+    OBSTACLES,
+    SEABED,
+    SURFACE,
+    WAVES,
+)
 from hybrid.kernels.state.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_POWER, MASS_DAMPING_POWER, WAVE_POWER
 
 WATER = DRAG | ADDED_MASS | SURFACE | WAVES | BODIES
@@ -211,6 +223,11 @@ def node_loads(line, sea, i, r, u, state, before, after, cv, ca, report):
     if line.bits & SEABED:
         x = (r[i, 0] + u[i, 0], r[i, 1] + u[i, 1], r[i, 2] + u[i, 2])
         touches, f, Df, L, R = seabed_forces(line, sea, i, x, u, v, state.e, cv, report)
+        if touches:
+            F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
+    if line.bits & OBSTACLES:
+        x = (r[i, 0] + u[i, 0], r[i, 1] + u[i, 1], r[i, 2] + u[i, 2])
+        touches, f, Df, L, R = obstacle_forces(line, sea, i, x, u, v, state.e, cv)
         if touches:
             F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
     return F, D, GL, GR

@@ -9,7 +9,7 @@ from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.march.zone_torque import FIRST, LAST
 from hybrid.kernels.state.books import CONTACT, FRICTION, RATES, STORED, WORKS
-from hybrid.kernels.state.forces import SEABED, SELF_CONTACT
+from hybrid.kernels.state.forces import SELF_CONTACT, TOUCHES
 from hybrid.kernels.state.report import (
     ADDED_MASS_POWER,
     CONTACT_WORK,
@@ -74,7 +74,7 @@ def book_work(line, dt, report, books):
     half = 0.5 * dt
     for k in range(RATES):
         work[0, k] += half * (power[1, k] + power[0, k])
-    if line.bits & SEABED:
+    if line.bits & TOUCHES:
         work[0, CONTACT] += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock[STORED]
         work[0, FRICTION] += report[FRICTION_WORK]
         clock[STORED] = report[SEABED_ENERGY]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.laws.end_motion import ends_at, sea_at
-from hybrid.kernels.laws.seabed import stored
+from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
@@ -21,7 +21,7 @@ from hybrid.kernels.mesh.zone_step import AGE, KNOWN, RECENT_AGE, RELAXING, STRA
 from hybrid.kernels.mesh.zone_transfer import carry_push
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, blank_books
-from hybrid.kernels.state.forces import FRICTION, SEABED, WAVES
+from hybrid.kernels.state.forces import FRICTION, TOUCHES, WAVES
 from hybrid.kernels.state.report import SEABED_ENERGY
 from hybrid.kernels.state.state import Floats, Line, Sea, State, Work, blank_line, blank_state, no_sea, no_work
 from hybrid.kernels.step.job import read
@@ -260,8 +260,8 @@ def after_forces(table):
     """The books go on from a report of the state as it is."""
     job = read(table)
     report, clock, count = job.work.report, job.books.clock, job.books.counts
-    if job.line.bits & SEABED:
-        report[SEABED_ENERGY] = stored(job.line, job.sea, job.old.r)
+    if job.line.bits & TOUCHES:
+        report[SEABED_ENERGY] = stored_in_contact(job.line, job.sea, job.old.r)
         for i in range(job.sea.bed.shape[0]):
             for j in range(3):
                 job.old.bed[i, j] = job.sea.bed[i, j]

@@ -10,7 +10,7 @@ import numpy as np
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
 from hybrid.kernels.laws.axial_law import stretch_energy
 from hybrid.kernels.laws.cell import chord
-from hybrid.kernels.laws.seabed import stored
+from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.laws.tension_torque import stretch_factor, torque_beside
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
@@ -20,7 +20,7 @@ from hybrid.kernels.mesh.cell_lengths import arc_less_chord
 from hybrid.kernels.mesh.stiffness_ramp import shares, soften
 from hybrid.kernels.mesh.zone_step import LETTING_GO, SHARE, Zones, blank_zones
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_transfer, old_cell, put3, transfer_state
-from hybrid.kernels.state.forces import AXIAL_LAW, PLANAR, SEABED
+from hybrid.kernels.state.forces import AXIAL_LAW, PLANAR, TOUCHES
 from hybrid.kernels.state.state import Ends, Floats, Sea, no_ends, no_sea
 
 # Numbers of a switch: J, J, s, 1 where lengths were on their way.
@@ -71,7 +71,7 @@ def energy(line, sea, ends, state, zones):
         total += stretch_energy(line, state)
     for i in range(state.r.shape[0]):
         total -= dot(get3(line.force, i), get3(state.r, i))
-    return total + stored(line, sea, state.r) if line.bits & SEABED else total
+    return total + stored_in_contact(line, sea, state.r) if line.bits & TOUCHES else total
 
 
 @inner

@@ -36,13 +36,13 @@ from hybrid.kernels.junctions.junctions import (
     place_ends,
 )
 from hybrid.kernels.junctions.system_job import DT, TIME, read_system, task_of
-from hybrid.kernels.laws.seabed import stored
+from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller
 from hybrid.kernels.march.configuration import first_bad, measure, update
 from hybrid.kernels.march.powers import book_work, find_powers
 from hybrid.kernels.state.books import FLAGS, NOW, RATES, RHO, RHO_BEFORE, SHORTEST, STEP_BEFORE, STORED, TRY_END
-from hybrid.kernels.state.forces import FRICTION, SEABED
+from hybrid.kernels.state.forces import FRICTION, TOUCHES
 from hybrid.kernels.state.report import (
     LOCAL_ERROR,
     RESIDUAL,
@@ -285,8 +285,8 @@ def begin_books(tables, joints, t):
     for l in range(tables.shape[0]):
         job = read(tables[l])
         line, sea, new, books, report = job.line, job.sea, job.new, job.books, job.work.report
-        if line.bits & SEABED:
-            report[SEABED_ENERGY] = stored(line, sea, new.r)
+        if line.bits & TOUCHES:
+            report[SEABED_ENERGY] = stored_in_contact(line, sea, new.r)
             books.clock[STORED] = report[SEABED_ENERGY]
             for i in range(new.r.shape[0]):
                 new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)

@@ -27,6 +27,10 @@ AXIAL_LAW = 16384
 # No force: the line may come to touch itself, which is computed from where it comes near itself on.
 MAY_TOUCH = 32768
 
+# Contact with fixed obstacles (hybrid.kernels.laws.obstacles); what the line is pressed on by, bed or obstacles.
+OBSTACLES = 65536
+TOUCHES = SEABED | OBSTACLES
+
 FORCES = {
     "drag": (DRAG, "velocity, direction; environment.fluid and sections[].drag, or drag_area of modules"),
     "added mass": (ADDED_MASS, "acceleration, direction; environment.fluid and sections[].added_mass, or of modules"),
@@ -39,6 +43,7 @@ FORCES = {
     "drag, added mass or wetting of bodies": (BODIES, "velocity, acceleration; cable.attachments, ends of kind body"),
     "seabed contact": (SEABED, "height and its rate; environment.seabed"),
     "seabed friction": (FRICTION, "travel along the seabed; environment.seabed.friction"),
+    "contact with obstacles": (OBSTACLES, "distance and its rate; obstacles"),
     "contact of the line with itself": (SELF_CONTACT, "distance of its parts; contact.self"),
     "friction of the line on itself": (SELF_FRICTION, "travel of its parts along each other; contact.friction"),
 }

@@ -30,6 +30,9 @@ NO_LAW: Floats = np.zeros((0, 7))
 NO_TABLE: Floats = np.zeros((0, 3))
 NO_SLOW: Floats = np.zeros(0)
 NO_ADDRESS: NDArray[np.int64] = np.zeros(0, np.int64)
+# Numbers of an obstacle (kernels.laws.obstacles has them).
+OBSTACLE = 15
+NO_OBSTACLES: Floats = np.zeros((0, OBSTACLE))
 
 
 class Line(NamedTuple):
@@ -169,12 +172,13 @@ class Sea(NamedTuple):
     onset: float  # m, penetration over which contact sets in
     friction: Floats  # (2,) axial and lateral coefficient
     slip_length: float  # m, elastic travel before a touching cable slides
+    obstacles: Floats  # (M, OBSTACLE) fixed obstacles (kernels.laws.obstacles); empty: there are none
     flow: Floats  # (N+1, 7) velocity and acceleration of the waves at the nodes, and their elevation there
     lanes: Floats  # (10 + 2 W, LANES) what kernels.laws.water needs for LANES nodes at a time
     axis: Floats  # (N+1, 3) direction of the cable in the plane of the seabed
     slip: Floats  # (N+1, 3) m, elastic travel at the start of the step
     slid: Floats  # (N+1, 3) m, at its end
-    bed: Floats  # (N+1, 3) N, force of the seabed on the nodes
+    bed: Floats  # (N+1, 3) N, force of the seabed and of obstacles on the nodes
 
 
 class State(NamedTuple):
@@ -190,8 +194,8 @@ class State(NamedTuple):
     w: Floats  # (N,) 1/s, spin rate about the chord
     wa: Floats  # (N,) 1/s2, algorithmic spin acceleration
     wd: Floats  # (N,) 1/s2, true spin acceleration
-    slip: Floats  # (N+1, 3) m, elastic travel of friction on the seabed
-    bed: Floats  # (N+1, 3) N, force of the seabed
+    slip: Floats  # (N+1, 3) m, elastic travel of friction on the seabed and on obstacles
+    bed: Floats  # (N+1, 3) N, force of the seabed and of obstacles
     # (K, 3) of zones that a torque passes through: turn of the frame after the zone against that before it, counted
     # beyond half a turn (rad), torque (N m), power that the torque gains because the zone bends without it (W)
     turn: Floats = NO_TURN
@@ -349,7 +353,7 @@ def no_sea(n_cells: int) -> Sea:
     return Sea(
         np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), nan, nan, np.array([0.0, 1.0, 1.0, 0.0]), np.zeros(2),
         np.array([0.0, 0.0, 1.0]), nan, np.zeros(0), np.zeros(0), np.zeros((0, 4)), nan, nan, nan, np.full(2, nan), nan,
-        np.zeros((n_cells + 1, 7)), np.zeros((10, LANES)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
+        NO_OBSTACLES, np.zeros((n_cells + 1, 7)), np.zeros((10, LANES)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
     )  # fmt: skip
 
 

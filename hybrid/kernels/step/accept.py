@@ -70,7 +70,7 @@ from hybrid.kernels.state.books import (
     WHERE,
     ZONES,
 )
-from hybrid.kernels.state.forces import PLANAR, SEABED, SELF_FRICTION
+from hybrid.kernels.state.forces import PLANAR, SELF_FRICTION, TOUCHES
 from hybrid.kernels.state.report import (
     BEND,
     LOCAL_ERROR,
@@ -308,7 +308,7 @@ def end_step(line, state, clock, count):
     if not (count[CONTROLLED] or clock[NOW] >= clock[UNTIL]):
         count[PHASE] = TRY
         return
-    if count[REPEATS] > 0 and line.bits & SEABED:
+    if count[REPEATS] > 0 and line.bits & TOUCHES:
         settle_impact(state, clock[UNTIL] - clock[BEGIN])
     if count[REPEATS] > 0 and line.bits & SELF_FRICTION:
         settle_spins(state, clock[UNTIL] - clock[BEGIN])

@@ -9,13 +9,13 @@ from hybrid.kernels.algebra.block_elimination_plane import KEPT, TRIPLE
 from hybrid.kernels.algebra.rotations import dot, get3, spin_about
 from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.obstacles import normal_at, passes, stored_in_contact
 from hybrid.kernels.laws.out_of_plane import step_out_of_plane
-from hybrid.kernels.laws.seabed import stored
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.configuration import carry_director
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held, sharpest_in_plane, sharpest_in_space
-from hybrid.kernels.state.forces import FRICTION, ROTARY, SEABED, WAVES
+from hybrid.kernels.state.forces import FRICTION, OBSTACLES, ROTARY, TOUCHES, WAVES
 from hybrid.kernels.state.report import (
     BEND,
     BEND_NODE,
@@ -37,6 +37,8 @@ from hybrid.kernels.step.generalized_alpha import weights
 # A step in which a chord turns (or is predicted to turn) by more than this, in rad, is repeated in parts; so is one in
 # which a cell spins by more against the next one.
 LARGEST_STEP_TURN = 1.0
+# What counts as a turn too large: a node that goes through an obstacle, or deep into it.
+THROUGH = 2.0 * LARGEST_STEP_TURN
 
 
 @inner
@@ -149,18 +151,18 @@ def find_rates(space, line, sea, old, new, u, s):
 
 
 @inner
-def seabed_work(line, sea, old, new, u, report):
-    """Work of the seabed in the step, and what it stores."""
+def contact_work(line, sea, old, new, u, report):
+    """Work of the seabed and of obstacles in the step, and what they store."""
     for i in range(u.shape[0]):  # force times way: bounded by the energy of a blow, however short the step is not
         b = (0.5 * (old.bed[i, 0] + sea.bed[i, 0]), 0.5 * (old.bed[i, 1] + sea.bed[i, 1]),
              0.5 * (old.bed[i, 2] + sea.bed[i, 2]))  # fmt: skip
         ui = get3(u, i)
-        normal, _ = bed_under(sea, get3(new.r, i))
+        normal = normal_at(line, sea, get3(new.r, i))
         along = dot(normal, ui) * dot(normal, b)
         report[CONTACT_WORK] += along
         report[FRICTION_WORK] += dot(b, ui) - along
         new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
-    report[SEABED_ENERGY] = stored(line, sea, new.r)
+    report[SEABED_ENERGY] = stored_in_contact(line, sea, new.r)
 
 
 @inner
@@ -249,8 +251,8 @@ def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, s
     _, _, _, _, part = weights(task.rho, task.rho_before, task.before / dt)
     report[LOCAL_ERROR], report[LOCAL_ERROR_NODE] = part * dt * dt * change, place
     report[USED_RHO] = task.rho
-    if line.bits & SEABED:
-        seabed_work(line, sea, old, new, u, report)
+    if line.bits & TOUCHES:
+        contact_work(line, sea, old, new, u, report)
     if plane is not None:
         if was.shape[0] > 0:
             n, A = was.shape[0], work.X
@@ -261,4 +263,8 @@ def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, s
         spun, cell = largest_spin(line, ends, old, new, s)
         if not spun < LARGEST_STEP_TURN:
             return spun, cell
+        if line.bits & OBSTACLES:
+            node = passes(sea, old.r, u)
+            if node >= 0:
+                return THROUGH, min(node, old.T.shape[0] - 1)
     return largest_turn(old.e, u)

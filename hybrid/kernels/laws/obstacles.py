@@ -1,0 +1,311 @@
+"""Fixed obstacles that a line touches: planes, spheres, cylinders.
+
+A cylinder of finite length ends in half spheres, so that a sphere is one of no length: the distance of a point to it
+is that to a stretch of its axis, less the radius.  A cell presses on the obstacle as on the bed (kernels.laws.seabed):
+the penetration is linear between its nodes, and the force per length has a potential.
+
+    symbol   meaning                                                              shape  unit   frame
+    d        distance of the centreline to the surface moved out by the radius
+             of the strand                                                        -      m
+    n        its gradient, the outward normal                                     3      -      inertial
+    K        gradient of n, (1 - nn^T - aa^T)/rho beside a cylinder of axis a,
+             (1 - nn^T)/rho about its ends and a sphere, 0 of a plane             9      1/m    inertial
+    p        penetration, o/2 - d with o the onset of contact                     -      m
+    N        force on a node along n                                              -      N
+    q        elastic travel of friction: the way of the node along the surface    3      m      inertial
+
+Friction acts on the centreline: mu N at most, against the travel, whatever its direction.  A node that touches several
+surfaces has one travel, of which each surface takes the part along itself; what is kept of it lies along all of them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybrid.kernels.algebra.rotations import add, dot, get3, madd, mat_vec, mscale, outer, scale, sub
+from hybrid.kernels.laws.bed import bed_under
+from hybrid.kernels.laws.seabed import G1, G2, contact, pieces, stored
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SEABED
+from hybrid.kernels.state.state import Floats
+
+# Columns of Sea.obstacles: kind; place (m); unit axis of a cylinder, unit normal of a plane; radius of the surface moved
+# out by the strand's (m; of a plane how far it is moved out); half the length of the cylinder (m; infinite: endless; 0: a
+# sphere); radius of the strand (m); friction; stiffness (N/m per m), damping (N s/m per m), onset (m), elastic travel (m).
+KIND, PLACE, AXIS, RADIUS, HALF_LENGTH, STRAND, MU, STIFFNESS, DAMPING, ONSET_OF, SLIP = (
+    0,
+    1,
+    4,
+    7,
+    8,
+    9,
+    10,
+    11,
+    12,
+    13,
+    14,
+)
+FLAT, ROUND = 0.0, 1.0
+Z3 = (0.0, 0.0, 0.0)
+Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+E9 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+@inner
+def beside(rows, k, x):
+    """d and n of obstacle k at a point, 1/rho and the axis without curvature there (0: there is none)."""
+    a = (rows[k, AXIS], rows[k, AXIS + 1], rows[k, AXIS + 2])
+    w = (x[0] - rows[k, PLACE], x[1] - rows[k, PLACE + 1], x[2] - rows[k, PLACE + 2])
+    t = dot(w, a)
+    if rows[k, KIND] == FLAT:
+        return t - rows[k, RADIUS], a, 0.0, a
+    half = rows[k, HALF_LENGTH]
+    along = min(max(t, -half), half)
+    y = sub(w, scale(along, a))
+    rho = math.sqrt(dot(y, y))
+    if not rho > 1e-12 * rows[k, RADIUS]:  # on the axis any direction leads out
+        y = (1.0 - a[0] * a[0], -a[0] * a[1], -a[0] * a[2])
+        if not dot(y, y) > 0.1:
+            y = (-a[1] * a[0], 1.0 - a[1] * a[1], -a[1] * a[2])
+        rho = math.sqrt(dot(y, y))
+        return -rows[k, RADIUS], scale(1.0 / rho, y), 0.0, a
+    if along != t or half == 0.0:
+        a = Z3
+    return rho - rows[k, RADIUS], scale(1.0 / rho, y), 1.0 / rho, a
+
+
+@inner
+def bent(hollow, n, a, y):
+    """K y of a surface."""
+    s, t = dot(n, y), dot(a, y)
+    return (
+        hollow * (y[0] - s * n[0] - t * a[0]),
+        hollow * (y[1] - s * n[1] - t * a[1]),
+        hollow * (y[2] - s * n[2] - t * a[2]),
+    )
+
+
+@inner
+def gradient_of_normal(hollow, n, a):
+    """K of a surface."""
+    if hollow == 0.0:
+        return Z9
+    return mscale(hollow, madd(E9, mscale(-1.0, madd(outer(n, n), outer(a, a)))))
+
+
+@inner
+def grip(t, n, K, N, mu, sl):
+    """Friction on a node pressed by N after the way t: f, df/dN, df/dx, and the travel that is left after sliding.
+
+    x: place of the node, with which t moves on and n turns by K dx.
+    """
+    w = dot(n, t)
+    q = sub(t, scale(w, n))
+    size = math.sqrt(dot(q, q))
+    c = 1.0 / sl if size <= sl else 1.0 / size
+    g = scale(-mu * c, q)
+    # dq/dx = 1 - n (n + K t)^T - w K; beyond sl the direction of q alone counts
+    A = madd(E9, mscale(-1.0, madd(outer(n, add(n, mat_vec(K, t))), mscale(w, K))))
+    if size > sl:
+        d = scale(c, q)
+        A = madd(A, mscale(-1.0, outer(d, sub(d, scale(w, mat_vec(K, d))))))
+        q = scale(sl * c, q)
+    return scale(N, g), g, mscale(-mu * c * N, A), q
+
+
+@inner
+def half_cell(rows, k, x, p, pd, e, v, h, cv):
+    """Contact of the half cell towards a neighbour at x + e with velocity v: N, dN/dp, dN/dpd, dN/d(place there).
+
+    p, pd: penetration of the node at x and its rate.
+    """
+    d, m, hollow, a = beside(rows, k, add(x, e))
+    o = rows[k, ONSET_OF]
+    po = 0.5 * o - d
+    if not (p > 0.0 or po > 0.0):
+        return 0.0, 0.0, 0.0, Z3
+    f, f0, f1, g0, g1 = contact(p, po, pd, -dot(m, v), h, rows[k, STIFFNESS], rows[k, DAMPING], o)
+    slope = scale(-(f1 + cv * g1), m)
+    if g1 != 0.0:
+        slope = sub(slope, scale(g1, bent(hollow, m, a, v)))
+    return f, f0, g0, slope
+
+
+@kernel  # called for every node of a scene that has obstacles
+def obstacle_forces(line, sea, i, x, u, v, e, cv):
+    """Contact and friction of obstacles at node i: whether there are any, F, D, GL, GR (chord before, after)."""
+    rows = sea.obstacles
+    F, D, GL, GR = Z3, Z9, Z9, Z9
+    lies = False
+    if line.bits & SEABED:
+        lies = sea.bed[i, 0] != 0.0 or sea.bed[i, 1] != 0.0 or sea.bed[i, 2] != 0.0
+    t, vi = add(get3(sea.slip, i), get3(u, i)), get3(v, i)
+    kept = get3(sea.slid, i) if lies else t
+    touches, rubs = False, False
+    for k in range(rows.shape[0]):
+        d, n, hollow, a = beside(rows, k, x)
+        p, pd = 0.5 * rows[k, ONSET_OF] - d, -dot(n, vi)
+        N = DN = 0.0
+        L, R, dN = Z3, Z3, Z3
+        if i > 0:
+            f, f0, g0, L = half_cell(rows, k, x, p, pd, scale(-1.0, get3(e, i - 1)), get3(v, i - 1), line.h[i - 1], cv)
+            N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(hollow, n, a, vi)))
+        if i < line.h.shape[0]:
+            f, f0, g0, R = half_cell(rows, k, x, p, pd, get3(e, i), get3(v, i + 1), line.h[i], cv)
+            N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(hollow, n, a, vi)))
+        dN = add(dN, scale(-DN, n))
+        if N == 0.0 and DN == 0.0:
+            continue
+        touches = True
+        K = gradient_of_normal(hollow, n, a)
+        slope = n
+        F, D = add(F, scale(N, n)), madd(D, mscale(N, K))
+        if line.bits & FRICTION and rows[k, MU] > 0.0 and N > 0.0:
+            f, g, Df, _ = grip(t, n, K, N, rows[k, MU], rows[k, SLIP])
+            F, D, slope = add(F, f), madd(D, Df), add(n, g)
+            _, _, _, kept = grip(kept, n, K, N, rows[k, MU], rows[k, SLIP])
+            rubs = True
+        # the neighbours lie at x - e before and x + e after: what they add by x they add by the chords too
+        before, after = outer(slope, L), outer(slope, R)
+        D = madd(D, madd(outer(slope, dN), madd(before, after)))
+        GL, GR = madd(GL, mscale(-1.0, before)), madd(GR, after)
+    if not rubs and not lies:
+        kept = Z3
+    sea.slid[i, 0], sea.slid[i, 1], sea.slid[i, 2] = kept
+    if not line.bits & SEABED:
+        sea.bed[i, 0], sea.bed[i, 1], sea.bed[i, 2] = F
+    elif touches:
+        sea.bed[i, 0], sea.bed[i, 1], sea.bed[i, 2] = add(get3(sea.bed, i), F)
+    return touches, F, D, GL, GR
+
+
+@inner
+def depth_in(rows, k, r, i):
+    """p of node i in obstacle k."""
+    d, _, _, _ = beside(rows, k, (r[i, 0], r[i, 1], r[i, 2]))
+    return 0.5 * rows[k, ONSET_OF] - d
+
+
+@kernel
+def stored_on_obstacles(line, sea, r):
+    """Energy (J) that obstacles have stored against the line."""
+    rows, energy = sea.obstacles, 0.0
+    for k in range(rows.shape[0]):
+        stiffness, o = rows[k, STIFFNESS], rows[k, ONSET_OF]
+        p1 = depth_in(rows, k, r, 0)
+        for i in range(line.h.shape[0]):
+            p0, p1 = p1, depth_in(rows, k, r, i + 1)
+            if p0 <= 0.0 and p1 <= 0.0:
+                continue
+            xb, xc = pieces(p0, p1, o)
+            for a, b in ((0.0, xb), (xb, xc), (xc, 1.0)):
+                w = 0.5 * line.h[i] * (b - a)
+                if w <= 0.0:
+                    continue
+                for g in (G1, G2):
+                    p = p0 + (a + g * (b - a)) * (p1 - p0)
+                    if p >= o:
+                        energy += w * stiffness * (0.5 * p * (p - o) + o * o / 6.0)
+                    elif p > 0.0:
+                        energy += w * stiffness * p * p * p / (6.0 * o)
+    return energy
+
+
+@inner
+def stored_in_contact(line, sea, r):
+    """Energy (J) that the bed and obstacles have stored against the line."""
+    energy = 0.0
+    if line.bits & SEABED:
+        energy = stored(line, sea, r)
+    if line.bits & OBSTACLES:
+        energy += stored_on_obstacles(line, sea, r)
+    return energy
+
+
+@kernel
+def stored_energy(line, sea, r):
+    """The same for Python."""
+    return stored_in_contact(line, sea, r)
+
+
+@inner
+def normal_at(line, sea, x):
+    """Normal at x of what is pressed on most deeply there, the bed or an obstacle."""
+    n, deep = bed_under(sea, x)
+    if line.bits & OBSTACLES:
+        if not line.bits & SEABED:
+            deep = -math.inf
+        for k in range(sea.obstacles.shape[0]):
+            d, m, _, _ = beside(sea.obstacles, k, x)
+            p = 0.5 * sea.obstacles[k, ONSET_OF] - d
+            if p > deep:
+                n, deep = m, p
+    return n
+
+
+@kernel
+def passes(sea, r, u):
+    """The first node that a step leads deeper into an obstacle than by the strand's radius, or through it; -1: none.
+
+    r: (N+1, 3) m, before the step; u: its displacements.
+    """
+    rows = sea.obstacles
+    for i in range(u.shape[0]):
+        x, y = get3(r, i), get3(u, i)
+        for k in range(rows.shape[0]):
+            before, _, _, _ = beside(rows, k, x)
+            after, _, _, _ = beside(rows, k, add(x, y))
+            least = after
+            if rows[k, KIND] == ROUND:
+                a = (rows[k, AXIS], rows[k, AXIS + 1], rows[k, AXIS + 2])
+                w = sub(x, (rows[k, PLACE], rows[k, PLACE + 1], rows[k, PLACE + 2]))
+                z, b = y, w
+                if rows[k, HALF_LENGTH] > 0.0:  # where the way is nearest to the line of the axis
+                    z, b = sub(y, scale(dot(y, a), a)), sub(w, scale(dot(w, a), a))
+                square = dot(z, z)
+                if square > 0.0:
+                    part = min(max(-dot(z, b) / square, 0.0), 1.0)
+                    between, _, _, _ = beside(rows, k, add(x, scale(part, y)))
+                    least = min(least, between)
+            if least < min(before, 0.0) - rows[k, STRAND]:
+                return i
+    return -1
+
+
+# --- for Python ---------------------------------------------------------------------------------------
+
+
+def distances(rows: Floats, x: Floats) -> Floats:
+    """Distances (M, n) m of points x (n, 3) m to the surfaces of obstacles, moved out by the strand's radius."""
+    out = np.empty((len(rows), len(x)))
+    for k, row in enumerate(rows):
+        a, w = row[AXIS : AXIS + 3], x - row[PLACE : PLACE + 3]
+        t = w @ a
+        if row[KIND] == FLAT:
+            out[k] = t - row[RADIUS]
+        else:
+            y = w - np.clip(t, -row[HALF_LENGTH], row[HALF_LENGTH])[:, None] * a
+            out[k] = np.linalg.norm(y, axis=1) - row[RADIUS]
+    return out
+
+
+# Parts of a chord at which its distance is looked at; of the radius of an obstacle, how deep a chord may cut it.
+PARTS, CUTS = 8, 0.125
+
+
+def depths_in_obstacles(rows: Floats, r: Floats) -> Floats:
+    """How deep (M, N+1) the nodes r (N+1, 3) m and the cells after them lie in obstacles, over what they may.
+
+    Nodes: by the radius of the strand; cells, whose ends may lie on an obstacle that they cut, by an eighth of its radius
+    more.  Beyond 1 a line is in what is solid, or has passed through it.
+    """
+    strand = rows[:, STRAND, None]
+    found = -distances(rows, r) / strand
+    x = np.linspace(0.0, 1.0, PARTS + 1)[1:-1, None, None]
+    points = ((1.0 - x) * r[:-1] + x * r[1:]).reshape(-1, 3)
+    within = -distances(rows, points).reshape(len(rows), PARTS - 1, len(r) - 1).max(axis=1)
+    cut = np.where(within > 0.0, within / (strand + CUTS * rows[:, RADIUS, None]), -np.inf)
+    found[:, :-1] = np.maximum(found[:, :-1], cut)
+    return np.asarray(found)

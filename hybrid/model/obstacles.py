@@ -1,0 +1,80 @@
+"""Obstacles of a scene as numbers: where they are, and how stiff."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybrid.kernels.laws.obstacles import (
+    AXIS,
+    DAMPING,
+    FLAT,
+    HALF_LENGTH,
+    KIND,
+    MU,
+    ONSET_OF,
+    PLACE,
+    RADIUS,
+    ROUND,
+    SLIP,
+    STIFFNESS,
+    STRAND,
+)
+from hybrid.kernels.state.forces import FRICTION, OBSTACLES
+from hybrid.kernels.state.state import NO_OBSTACLES, Floats
+from hybrid.model.scales import tension_scale
+from hybrid.model.sections import merged_sections
+from hybrid.scene.base import unit
+from hybrid.scene.obstacles import CylinderObstacle, PlaneObstacle
+from hybrid.scene.schema import Scene
+
+# How deep a line lies in an obstacle under what the scene asks for, where it follows its radius and where it touches it
+# at a point, the onset of contact, and the elastic travel of friction, as parts of its diameter.
+DEPTH, DEPTH_AT_POINT, ONSET, TRAVEL = 0.02, 0.05, 0.01, 0.01
+# Cells to the radius of an obstacle where the program places them, and the most cells that this makes of a line.
+CELLS_PER_RADIUS, MOST_CELLS = 4.0, 2000
+
+
+def obstacle_bits(scene: Scene) -> int:
+    """Bits of kernels.state.forces that the obstacles of a scene ask for."""
+    if not scene.obstacles:
+        return 0
+    return OBSTACLES | (FRICTION if any(x.friction for x in scene.obstacles.values()) else 0)
+
+
+def strand_radius(scene: Scene) -> float:
+    """Radius of the line that touches obstacles, m."""
+    return 0.5 * max(x.diameter or 0.0 for x in scene.cable.sections)
+
+
+def obstacle_rows(scene: Scene) -> Floats:
+    """(M, OBSTACLE) of the obstacles of a scene, in its order, as kernels.laws.obstacles has them."""
+    rows = np.zeros((len(scene.obstacles), NO_OBSTACLES.shape[1]))
+    if not len(rows):
+        return NO_OBSTACLES
+    strand = strand_radius(scene)
+    weight = max(x.mass for x in scene.cable.sections) * (scene.environment.gravity or 1.0)
+    pull = tension_scale(scene, merged_sections(scene.cable.sections), False)
+    for row, x in zip(rows, scene.obstacles.values(), strict=True):
+        row[PLACE : PLACE + 3], row[STRAND] = x.at, strand
+        row[KIND], row[RADIUS], over = ROUND, strand, scene.length
+        if isinstance(x, PlaneObstacle):
+            row[KIND], row[AXIS : AXIS + 3] = FLAT, unit(x.normal)
+        else:
+            row[RADIUS] = over = x.radius + strand
+            row[AXIS : AXIS + 3] = unit(x.axis) if isinstance(x, CylinderObstacle) else (0.0, 0.0, 1.0)
+        if isinstance(x, CylinderObstacle):
+            row[HALF_LENGTH] = math.inf if x.length is None else 0.5 * x.length
+        # a string under a tension T that half of T presses on a point of a bed of stiffness k: T/2 = 2 sqrt(k T) depth
+        at_point = pull / (4.0 * 2.0 * DEPTH_AT_POINT * strand) ** 2
+        stiffness = max((weight + pull / over) / (2.0 * DEPTH * strand), at_point)
+        row[MU], row[STIFFNESS], row[DAMPING] = x.friction, x.stiffness or stiffness, x.damping
+        row[ONSET_OF], row[SLIP] = 2.0 * ONSET * strand, 2.0 * TRAVEL * strand
+    return rows
+
+
+def least_cells(scene: Scene) -> float:
+    """Cells that a line has at least whose cells follow the radii of obstacles."""
+    radii = [x.radius + strand_radius(scene) for x in scene.obstacles.values() if not isinstance(x, PlaneObstacle)]
+    return min(CELLS_PER_RADIUS * scene.length / min(radii), MOST_CELLS) if radii else 0.0
