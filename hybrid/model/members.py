@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.junctions.bodies import FRAME, PLACE, A, V, W
-from hybrid.kernels.laws.members import ALONG, CM, CN, CT, MIDDLE, PIECE, PUSH, WATER, WET
-from hybrid.kernels.laws.water import wave_kinematics
+from hybrid.kernels.junctions.bodies import STATE
+from hybrid.kernels.junctions.members_water import blank_members_job, stir_members
+from hybrid.kernels.laws.members import ALONG, CM, CN, CT, MIDDLE, PIECE, WET
+from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.state import Floats
 from hybrid.model.sea import Surroundings
 from hybrid.scene.bodies import FreeBody
@@ -42,7 +43,13 @@ class Members:
         """pieces, sizes: of `pieces_of`."""
         self.pieces, self._sizes = pieces, sizes
         self._sea = around.on(len(pieces) - 1)
-        self._still = np.zeros((len(pieces), 3))
+        self._sea.values = self._sea.values._replace(now=self._sea.values.now.copy())
+        self._job, self._state, self._asked = Table(blank_members_job), np.zeros(STATE), np.zeros((2, 1))
+        places, still = np.zeros((2, len(pieces), 3))
+        self._job.bind(
+            sea=self._sea.values, pieces=pieces, sizes=sizes, places=places, still=still, state=self._state,
+            dt=self._asked[0], waves=self._asked[1],
+        )  # fmt: skip
 
     def added_mass(self, row: Floats) -> Floats:
         """(6, 6) about the origin in axes of the body, of the pieces as far as they are wet in a row of a state."""
@@ -59,20 +66,11 @@ class Members:
 
         state has dt (s) before.
         """
-        R = row[FRAME:V].reshape(3, 3)
-        arms = self.pieces[:, MIDDLE:ALONG] @ R.T
-        middle = row[PLACE:FRAME] + dt * row[V : V + 3] + 0.5 * dt * dt * row[A : A + 3]
-        r = middle + arms + dt * np.cross(R @ row[W : W + 3], arms)
-        sea = self._sea.at(t)
-        level = np.full(len(r), sea.surface if np.isfinite(sea.surface) else np.inf)
-        out[:, WATER:PIECE] = 0.0
-        for k in range(3):
-            out[:, WATER + k] = sea.now[1] * np.interp(r[:, 2], sea.z, sea.current[:, k])
-        if len(sea.waves) and np.isfinite(t):
-            wave_kinematics(sea, np.ascontiguousarray(r), self._still)
-            out[:, WATER:PUSH] += sea.flow[:, :3]
-            out[:, PUSH:PIECE] = sea.flow[:, 3:6]
-            level += sea.flow[:, 6]
-        up = np.abs((self.pieces[:, ALONG:CN] @ R.T)[:, 2])
-        high = up * self._sizes[:, 1] + np.sqrt(np.maximum(1.0 - up * up, 0.0)) * self._sizes[:, 2]
-        out[:, WET] = np.clip((level - r[:, 2]) / high + 0.5, 0.0, 1.0)
+        self._sea.at(t)
+        self._state[:], self._asked[:, 0] = row, (dt, np.isfinite(t))
+        stir_members(self.into(out).numbers)
+
+    def into(self, out: Floats) -> Table:
+        """Arguments of kernels.junctions.members_water.stir_members, which writes into `out` (n, PIECE)."""
+        self._job.bind(out=out)
+        return self._job

@@ -11,6 +11,7 @@ import numpy as np
 from hybrid.kernels.junctions.bodies import FORCE, FRAME, LEVEL, LIFT, MOMENT, NUMBERS, PLACE, STATE, STIFFNESS, V
 from hybrid.kernels.junctions.carried_frames import SEAT, TURNS, WITH_BODY, WITH_POINT
 from hybrid.kernels.laws.members import PIECE
+from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.bodies import BodyModel, FairleadMotion, KnownMotion, body_model, frame_of, loads_of
 from hybrid.model.build import Model, build
@@ -133,6 +134,14 @@ class SystemModel:
         for body, state, row in zip(self.bodies, bodies, out, strict=False):
             if body.members is not None:
                 body.members.stir(t, state, dt, row[NUMBERS : body.numbers.size].reshape(-1, PIECE))
+
+    def members_of(self, out: Floats) -> dict[int, Table]:
+        """Of bodies that have members, by their numbers: what tells the water around these into their numbers `out`."""
+        found = {}
+        for k, (body, row) in enumerate(zip(self.bodies, out, strict=False)):
+            if body.members is not None:
+                found[k] = body.members.into(row[NUMBERS : body.numbers.size].reshape(-1, PIECE))
+        return found
 
 
 def build_system(system: System, resolution: SystemResolution | None = None) -> SystemModel:

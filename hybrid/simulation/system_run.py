@@ -396,8 +396,7 @@ class SystemRun:
             self.zones.look_ahead()
         if self.loop.controlled:
             self.solver.allowed[:] = self.resolution.allowed
-        asks = any(body.members is not None for body in self.model.bodies)
-        self._asks = b.ASK_BEFORE if asks else 0  # whether Python stirs the water around members before every try
+        self.loop.stir(self.model.members_of(self.solver.bodies))
         self._moved, self._loaded = [], np.nan
 
     def _make_room(self, solver: SystemSolver) -> None:
@@ -492,7 +491,7 @@ class SystemRun:
     def _attach(self) -> None:
         """Steps lead from the state of now, with ends that move as they do now."""
         loop, solver = self.loop, self.solver
-        loop.counts[b.ASKS] = self._asks
+        loop.counts[b.ASKS] = 0
         if self.zones is not None:
             loop.counts[b.ASKS] = b.ASK_BEFORE | b.ASK_TRIES | b.ASK_STEPS
             loop.clock[b.ALLOWED] = self.zones.longest

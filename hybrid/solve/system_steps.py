@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import WORK
+from hybrid.kernels.junctions.members_water import stir_members
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run.system import book_system_step, solve_system
 from hybrid.kernels.run.system_run import CUT_LINE, LINE, blank_steps_job, run_system, sample_system
@@ -93,6 +94,16 @@ class SystemSteps:
     def load(self, loads: Floats, history: Floats) -> None:
         """Bodies are loaded so from now on: as Moves.loads and history, of rows of bodies."""
         self._job.bind(loads=loads, history=history)
+
+    def stir(self, members: Mapping[int, Table]) -> None:
+        """Bodies of these numbers have members, whose water is told by these tables."""
+        if not members:
+            self._job.bind(stirrer=0)
+            return
+        tables = np.array([x.numbers for x in members.values()])
+        self._job.bind(
+            members=tables, with_members=np.array([*members], np.int64), stirrer=stir_members.address(tables[0])
+        )  # fmt: skip
 
     @property
     def states(self) -> tuple[SystemState, SystemState]:

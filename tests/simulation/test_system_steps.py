@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_system_resume import spar
 
 import hybrid
 from hybrid.kernels.state import books
@@ -134,27 +135,38 @@ TOWED = {
 }  # fmt: skip
 
 
-def test_bodies_are_moved_and_loaded_in_compiled_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where Python moves and loads them before every try, which it does for bodies with members alone."""
+def in_waves() -> dict[str, Any]:
+    """A body with a member through the surface, which current and waves move."""
+    scene = spar()
+    waves = {"kind": "regular", "height": 3, "period": 8, "ramp": 2}
+    scene["environment"]["fluid"] = scene["environment"]["fluid"] | {"waves": waves}
+    return scene | {"time": {"duration": 4.0, "step": 0.1}}
+
+
+@pytest.mark.parametrize("scene, body", [(TOWED, "buoy"), (in_waves(), "spar")])
+def test_bodies_are_moved_and_loaded_in_compiled_steps(
+    scene: dict[str, Any], body: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where Python moves and loads them, and stirs the water around their members, before every try."""
     prepared: list[float] = []
-    prepare, make_solver = system_run.SystemRun._prepare, system_run.SystemRun.make_solver
+    prepare, attach = system_run.SystemRun._prepare, system_run.SystemRun._attach
 
     def note(run: Any, t: float) -> None:
         prepared.append(t)
         prepare(run, t)
 
     def ask(run: Any) -> None:
-        make_solver(run)
-        run._asks = books.ASK_BEFORE
+        attach(run)
+        run.loop.counts[books.ASKS] |= books.ASK_BEFORE
 
     monkeypatch.setattr(system_run.SystemRun, "_prepare", note)
-    compiled = hybrid.run(TOWED)
+    compiled = hybrid.run(scene)
     assert not prepared
-    monkeypatch.setattr(system_run.SystemRun, "make_solver", ask)
-    asked = hybrid.run(TOWED)
+    monkeypatch.setattr(system_run.SystemRun, "_attach", ask)
+    asked = hybrid.run(scene)
     assert len(prepared) >= 40
     for key in ("position", "rotation"):
-        here, there = (x[f"bodies/buoy/{key}"] for x in (compiled, asked))
+        here, there = (x[f"bodies/{body}/{key}"] for x in (compiled, asked))
         assert np.ptp(there, axis=0).max() > 0.01 and np.abs(here - there).max() <= 1e-9 * np.abs(there).max(), key
     for name, line in compiled.lines.items():
         for key in ("position", "velocity", "tension", "work/end"):

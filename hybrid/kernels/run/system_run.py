@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, WORK
+from hybrid.kernels.junctions.bodies import FORCE, LINES, MOMENT, OWN, STATE, WORK
+from hybrid.kernels.junctions.members_water import read_members
 from hybrid.kernels.junctions.system_job import (
     BEFORE,
     CA,
@@ -124,10 +125,13 @@ class StepsJob(NamedTuple):
     outputs: Floats  # s, times of all outputs
     bodies: Floats  # (rows, B, BODY_SAMPLE) samples of bodies; those of lines are in their books
     worked: Floats  # (3, B, WORK) of bodies: now, before the last step, before the step before
+    members: NDArray[np.int64]  # (M, ..) tables of kernels.junctions.members_water.MembersJob, of bodies with members
+    with_members: NDArray[np.int64]  # (M,) and which bodies these are
     solver: int = 0  # address of kernels.run.system.solve_system
     marcher: int = 0  # of the kernel that solves a step of one line
     book: int = 0  # of book_system_step
     sampler: int = 0  # of sample_system
+    stirrer: int = 0  # of kernels.junctions.members_water.stir_members; 0: no body has members
 
 
 def no_loads() -> tuple[Floats, Floats]:
@@ -158,11 +162,14 @@ def blank_steps_job() -> StepsJob:
         np.zeros(0),
         np.zeros((1, 1, BODY_SAMPLE)),
         np.zeros((3, 1, WORK)),
+        lone,
+        none,
     )
 
 
 read_steps = reader(blank_steps_job())
-call_step, call_book, call_sample = caller((0, 0, 0.0, 0, 0)), caller(0), caller(0)
+call_step, call_book = caller((0, 0, 0.0, 0, 0)), caller(0)
+call_sample, call_stir = caller(0), caller(0)
 
 
 @inner
@@ -196,6 +203,19 @@ def load_bodies(bodies, loads, history, t):
         load = load_at(t, loads[j], history)
         for i in range(3):
             bodies[b, o + i] += part * load[i]
+
+
+@inner
+def stir_water(steps, system):
+    """The water around members of bodies at the end of the try, where they go on from the state of now."""
+    clock = steps.clock
+    for m in range(steps.members.shape[0] if steps.stirrer != 0 else 0):
+        job, row = read_members(steps.members[m]), system.old[steps.with_members[m]]
+        for k in range(STATE):
+            job.state[k] = row[k]
+        job.dt[0], job.waves[0] = clock[TRY_END] - clock[NOW], 1.0
+        sea_at(clock[TRY_END], job.sea)
+        call_stir(steps.stirrer, steps.members[m])
 
 
 @inner
@@ -382,6 +402,7 @@ def run_system(table):
             if not counts[ASKS] & ASK_BEFORE:
                 move_lines(system, steps.clock[TRY_END])
                 load_bodies(system.bodies, steps.loads, steps.history, steps.clock[TRY_END])
+                stir_water(steps, system)
             try_step(steps, system)
             counts[PHASE] = JUDGE
             if counts[ASKS] & ASK_TRIES:
