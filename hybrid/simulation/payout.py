@@ -233,9 +233,25 @@ class PayingOut:
     @property
     def changing(self) -> np.ndarray:
         """(N,) bool, cells whose length changes because line is paid out."""
-        reel = self.reel
-        found = (np.arange(reel.true.size) >= self.material - 1) | (reel.since > -np.inf)
+        return self._changing_on(self.reel)
+
+    def _changing_on(self, reel: Reel) -> np.ndarray:
+        """The same of another reel."""
+        found = (np.arange(reel.true.size) >= reel.true.size - self.rides - 1) | (reel.since > -np.inf)
         return found if self.plan.side else found[::-1]
+
+    def _fitting_chords(self, reel: Reel, line: Line, e: Floats, T: Floats, h: Floats, ck: Floats) -> Floats:
+        """Chords (nb, N, 3) as long as their cells (nb, N) m are under their tensions T, where lengths change.
+
+        Those within a step are between its ends, where the length that is out need not be; the stretch would be off.
+        """
+        if line.law.size:
+            return e
+        at, out = np.flatnonzero(self._changing_on(reel)), e.copy()
+        size = np.linalg.norm(out[:, at], axis=2)
+        more = h[:, at] * (1.0 + ck[:, at] * T[:, at]) / size
+        out[:, at] *= np.where(np.abs(more - 1.0) > ROUND_OFF, more, 1.0)[:, :, None]  # at its ends they fit
+        return out
 
     def as_now(self, model: Model) -> Model:
         """A model whose zones move, and whose nodes are where they are now."""
@@ -304,7 +320,8 @@ class PayingOut:
             varied["h"][:, kept], varied["kb"][:, nodes] = h[:, kept], kb[:, nodes]
         there = observer.on_varied(line, model.sea.values, zones[0], varied["s"])
         there.first_energy = observer.first_energy
-        return there, there.look(batch._replace(h=varied["h"], kb=varied["kb"]), varied), zones[1:]
+        e = self._fitting_chords(self.reel, model.line, batch.e, batch.T, varied["h"], varied["ck"])
+        return there, there.look(batch._replace(e=e, h=varied["h"], kb=varied["kb"]), varied), zones[1:]
 
     def _lines_of(
         self, line: Line, reel: Reel, batch: Batch, moving: tuple[Zone, ...] | None = None
@@ -336,8 +353,9 @@ class PayingOut:
         of_each = [x.ndim > 0 and len(x) == batch.t.size for x in fields]
         for k, (then, zones) in enumerate(self._lines_of(line, reel, batch)):
             arrays: dict[str, Any] = {name: getattr(then, name).copy() for name in VARIES}
-            rows = [x[k : k + 1] if each else x for x, each in zip(fields, of_each, strict=True)]
-            found.append(Output(then._replace(**arrays), zones, Batch._make(rows)))
+            own = Batch._make(x[k : k + 1] if each else x for x, each in zip(fields, of_each, strict=True))
+            e = self._fitting_chords(reel, line, own.e, own.T, arrays["h"][None], arrays["ck"][None])
+            found.append(Output(then._replace(**arrays), zones, own._replace(e=e)))
         return found
 
     # --- checkpoints ------------------------------------------------------------------------------
