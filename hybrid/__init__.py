@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from hybrid.accuracy.run_forecast import plan
     from hybrid.adapt.user_criterion import NodeState
     from hybrid.couple.fmu_export import export_fmu
+    from hybrid.design.seek import seek
     from hybrid.design.sensitivity import sensitivity
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.exports.api import export
@@ -85,6 +86,7 @@ _HOME = {
     "resume": ("hybrid.accuracy.api", "resume"),
     "run": ("hybrid.accuracy.api", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
+    "seek": ("hybrid.design.seek", "seek"),
     "sensitivity": ("hybrid.design.sensitivity", "sensitivity"),
     "static": ("hybrid.accuracy.api", "static"),
     "stiffness": ("hybrid.simulation.system_stiffness", "stiffness"),
@@ -135,6 +137,7 @@ __all__ = [
     "resume",
     "run",
     "scene_text",
+    "seek",
     "sensitivity",
     "static",
     "stiffness",

@@ -21,6 +21,7 @@ import hybrid
 import hybrid.cli.modes_command  # registers its command
 import hybrid.cli.response_command
 import hybrid.cli.result_commands
+import hybrid.cli.seek_command
 import hybrid.cli.sensitivity_command
 import hybrid.cli.statistics_command
 import hybrid.cli.study_command

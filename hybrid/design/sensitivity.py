@@ -86,9 +86,9 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None) -> Any:
         raise SceneError(
             [Complaint("initial.friction", "settled", "a rest that does not depend on the way to it", fix)]
         )
-    wanted = [_parsed(x, asked.length) for x in of]
-    numbers = [_number(asked, key) for key in by]
-    fine, coarse = (_Base(asked, cells, wanted) for cells in (1.0, 2.0))
+    wanted = [parse_result(x, asked.length) for x in of]
+    numbers = [number_of(asked, key) for key in by]
+    fine, coarse = (AtRest(asked, cells, wanted) for cells in (1.0, 2.0))
     out = []
     for key, number in zip(by, numbers, strict=True):
         found, rough = fine.by(key, number), coarse.by(key, number)
@@ -101,14 +101,14 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None) -> Any:
     return out
 
 
-class _Wanted(NamedTuple):
+class Wanted(NamedTuple):
     extreme: str
     name: str
     axis: str
     at: float | None
 
 
-def _parsed(text: str, length: float) -> _Wanted:
+def parse_result(text: str, length: float) -> Wanted:
     found = NAME.match(text)
     expected = "NAME@S, NAME.x@S, max NAME or min NAME, such as tension@0 or max curvature"
     if found is None:
@@ -120,10 +120,10 @@ def _parsed(text: str, length: float) -> _Wanted:
         raise SceneError([Complaint("of", text, expected, "a number of metres behind @")]) from None
     if s is not None and not 0.0 <= s <= length:
         raise SceneError([Complaint("of", text, f"an arc length between 0 and {length:g} m", f"{name}@{length:g}")])
-    return _Wanted(extreme or "", name, axis or "", s)
+    return Wanted(extreme or "", name, axis or "", s)
 
 
-def _number(scene: Scene, key: str) -> float:
+def number_of(scene: Scene, key: str) -> float:
     """The value of a key."""
     value: Any = scene.model_dump(mode="python")
     for part in re.findall(r"[^.\[\]]+", key):
@@ -137,16 +137,16 @@ def _number(scene: Scene, key: str) -> float:
     return float(value)
 
 
-def _changed(scene: Scene, key: str, value: float) -> Scene:
-    found, _ = parse_either(scene_text(scene), overrides=[f"{key}={value!r}"])
+def changed_scene(scene: Scene, key: str, value: float) -> Scene:
+    found, _ = parse_either(scene_text(scene), overrides=[f"{key}={float(value)!r}"])
     assert isinstance(found, Scene)
     return found
 
 
-class _Base:
+class AtRest:
     """The equilibrium on one mesh, its factors, and the values of results."""
 
-    def __init__(self, scene: Scene, cells: float, wanted: Sequence[_Wanted]) -> None:
+    def __init__(self, scene: Scene, cells: float, wanted: Sequence[Wanted]) -> None:
         case = StaticCase(scene)
         resolution: Resolution = resolution_at_rest(case)
         self.scene, self.wanted = case.scene, wanted
@@ -167,12 +167,16 @@ class _Base:
         self.factors = splu(sparse.csc_array(linear.stiffness[self.free][:, self.free]))
         self.values = self._results(self.model, self.state)
 
+    def number(self, key: str) -> float:
+        """The value of a key of the scene."""
+        return number_of(self.scene, key)
+
     def _joined(self, model: Model) -> JoinedLine:
         sea, ends = model.sea.at(np.inf), model.ends.at(np.inf)
         return JoinedLine(model.line, sea, ends, model.length, model.tension_scale, -np.inf, (-1, -1))
 
     def _with(self, key: str, value: float) -> Model:
-        model = build(_changed(self.scene, key, value), self.resolution)
+        model = build(changed_scene(self.scene, key, value), self.resolution)
         if model.line.s.size != self.model.line.s.size:
             detail = f"{key}: a change of it changes the number of cells; give `mesh: {{cells: ..}}`"
             raise ComputationError(Outcome.NOT_CONVERGED, None, None, detail)
@@ -216,13 +220,15 @@ class _Base:
         values = self.case.values_at(model, state, self.found, [x.at for x in self.wanted if x.at is not None])
         return np.array([self._result(x, *values) for x in self.wanted])
 
-    def _result(self, wanted: _Wanted, s: Floats, values: dict[str, Floats]) -> float:
+    def _result(self, wanted: Wanted, s: Floats, values: dict[str, Floats]) -> float:
         if wanted.name not in values:
             names = ", ".join(sorted(x for x in values if "/" not in x))
             raise SceneError([Complaint("of", wanted.name, f"one of {names}", "tension@0")])
         value, dims = np.asarray(values[wanted.name], float), PROBES[wanted.name].dims if wanted.name in PROBES else ()
         if dims[-1:] == ("xyz",):
             value = value[..., AXES.index(wanted.axis)] if wanted.axis else np.linalg.norm(value, axis=-1)
+        if "edge" in dims:  # where contact begins and ends: the last of them
+            value = np.append(np.nan, value[np.isfinite(value)])[-1]
         if "s" not in dims:
             return float(value)
         if wanted.extreme:

@@ -121,3 +121,40 @@ def test_the_command(tmp_path, monkeypatch):
     )
     (row,) = [x for x in map(json.loads, told.output.splitlines()) if "elasticity" in x]
     assert row["elasticity"] == pytest.approx(5.4, abs=0.3)
+
+
+def test_length_and_place_for_a_tension_and_a_height():
+    """Two numbers for two results; the equilibrium with them has these."""
+    tables = scene(LINE, pinned(0, 0, -100), pinned(205, 0, 0), "catenary", 60, SEA)
+    targets = {"tension@240": 25e3, "touchdown": 140.0}
+    found = hybrid.seek(tables, targets, ["cable.sections[0].length", "ends.end.position[0]"])
+    assert found.equilibria < 12
+    result = hybrid.static(found.scene)
+    edges = np.asarray(result.touchdown[-1])
+    assert edges[np.isfinite(edges)][-1] == pytest.approx(140.0, abs=1e-4)
+    assert found.results == pytest.approx(targets, rel=1e-7)
+    assert found.scene.cable.length == found.numbers["cable.sections[0].length"]
+
+
+def test_what_cannot_be_reached_is_said():
+    section = {"length": 40.0, "mass": 5.0, "axial_stiffness": 1e6}
+    tables = scene(section, pinned(0, 0, 0), {"kind": "free", "force": [0, 0, -300.0]}, "catenary", 10)
+    with pytest.raises(hybrid.ComputationError, match=r"reaction_start.z comes to 2262, not 5000"):
+        hybrid.seek(tables, {"reaction_start.z": 5000.0}, ["cable.sections[0].axial_stiffness"])
+    with pytest.raises(hybrid.SceneError, match="as many keys as targets"):
+        hybrid.seek(tables, {"reaction_start.z": 5000.0}, [])
+    (length,) = hybrid.seek(tables, {"reaction_start.z": 5000.0}, ["cable.sections[0].length"]).numbers.values()
+    assert length == pytest.approx(4700.0 / 5.0 / G, rel=1e-7)
+
+
+def test_the_command_seek(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tables = scene(LINE, pinned(0, 0, -100), pinned(205, 0, 0), "catenary", 40, SEA)
+    (tmp_path / "line.yaml").write_text(hybrid.scene_text(hybrid.validate_scene(tables)))
+    asked = ["seek", "line.yaml", "--target", "tension@240=25000", "--by", "cable.sections[0].length", "-o", "new.yaml"]
+    told = CliRunner().invoke(app, asked)
+    assert told.exit_code == 0, told.output
+    assert "25000" in told.output and "cable.sections[0].length" in told.output
+    found = hybrid.load_scene(tmp_path / "new.yaml").cable.length
+    assert hybrid.static(tmp_path / "new.yaml", None).tension.max() > 25000 and 255 < found < 275
+    assert CliRunner().invoke(app, ["seek", "line.yaml", "--target", "tension", "--by", "x"]).exit_code == 2
