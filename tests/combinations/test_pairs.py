@@ -77,12 +77,10 @@ REFUSED_AS_SYSTEM = {("body", "two stiffnesses")}
 BY_STEPS = {("release", "chosen steps"): 1e-4}
 
 
-def answer(tables: Tables, exact: bool = False) -> hybrid.Result | str:
-    """The motion of a scene, of a system that of its line; why it cannot be computed.  exact: steps end at outputs."""
-    if exact:
-        tables = tables | {"output": tables["output"] | {"exact": True}}
+def answer(tables: Tables) -> hybrid.Result | str:
+    """The motion of a scene, whose steps end at outputs, of a system that of its line; why it cannot be computed."""
     try:
-        found = hybrid.run(tables)
+        found = hybrid.run(tables | {"output": tables["output"] | {"exact": True}})
     except (SceneError, ComputationError) as error:
         return f"{type(error).__name__} {getattr(error, 'outcome', '')}"
     return found.lines["one"] if found.lines else found
@@ -94,7 +92,7 @@ def differ(names: Sequence[str], said: Callable[[Tables], Tables | None]) -> str
     other = said(scene)
     if other is None or refusal(scene) or refusal(other):
         return ""
-    one, two = answer(scene, exact=True), answer(other, exact=said is turned)
+    one, two = answer(scene), answer(other)
     if isinstance(one, str) or isinstance(two, str):
         told = [x if isinstance(x, str) else "computed" for x in (one, two)]
         refused = said is as_system and tuple(names) in REFUSED_AS_SYSTEM
