@@ -178,6 +178,14 @@ def test_cells_that_do_not_follow_a_radius_are_said() -> None:
     assert "cells of 0.028 m" in said[0].text
 
 
+def test_a_line_that_sinks_into_a_soft_obstacle_is_said() -> None:
+    tables = falling(0.01)
+    tables["obstacles"]["pipe"]["stiffness"] = 50.0
+    said = [e for e in ran(tables).events if e.kind == "deep in an obstacle"]
+    assert said
+    assert "obstacles.pipe.stiffness" in said[0].text
+
+
 def test_the_program_places_cells_that_follow_a_radius() -> None:
     tables = falling(0.01)
     del tables["mesh"]
