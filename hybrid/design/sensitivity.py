@@ -80,7 +80,6 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None) -> Any:
     if not isinstance(asked, Scene):
         expected = "one cable: derivatives of several lines are not worked out"
         raise SceneError([Complaint("lines", f"{len(asked.lines)} lines", expected, "differences of two equilibria")])
-    refuse_use(asked, "about rest", given="derivatives")
     if isinstance(asked.initial, Equilibrium) and asked.initial.friction == "settled":
         fix = "leave initial.friction out, or write neglected"
         raise SceneError(
@@ -147,6 +146,7 @@ class AtRest:
     """The equilibrium on one mesh, its factors, and the values of results."""
 
     def __init__(self, scene: Scene, cells: float, wanted: Sequence[Wanted]) -> None:
+        refuse_use(scene, "about rest", given="derivatives")
         case = StaticCase(scene)
         resolution: Resolution = resolution_at_rest(case)
         self.scene, self.wanted = case.scene, wanted

@@ -219,6 +219,8 @@ def test_modes_and_derivatives_beside_obstacles_are_refused() -> None:
         hybrid.modes(hybrid.validate_scene(over_pipe()))
     with pytest.raises(SceneError, match="opens and closes"):
         hybrid.sensitivity(hybrid.validate_scene(over_pipe()), ["tension@0"], ["cable.sections[0].length"])
+    with pytest.raises(SceneError, match="opens and closes"):
+        hybrid.seek(hybrid.validate_scene(over_pipe()), {"tension@0": 100.0}, ["cable.sections[0].length"])
 
 
 def test_a_line_on_obstacles_has_one_diameter_that_is_given() -> None:
