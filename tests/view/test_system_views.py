@@ -281,6 +281,7 @@ def test_a_stopped_run_is_drawn(tmp_path: Path) -> None:
     target = tmp_path / "part.h5"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("hybrid.simulation.progress.REPORT_EVERY", -1.0)
+        patch.setattr("hybrid.solve.run.CELL_STEPS", 1)  # a step a call
         with pytest.raises(KeyboardInterrupt):
             hybrid.run(spar(), target, progress=stop)
     with hybrid.open(target) as part:
