@@ -1,4 +1,4 @@
-"""Cells that change between two steps of a run without Python's help: on arrays with room for the most there can be.
+"""Cells, and kinds of cells, that change between two steps of a run without Python's help: on arrays with room for all.
 
 Two sets of arrays take turns: a change goes from one to the other (mesh.cell_changes), and the tables of the run get
 the numbers of the other one.  What Python has of the line is made anew when the run comes back to it (`sync`).
@@ -57,6 +57,8 @@ from hybrid.solve.stepper import HEAVY
 if TYPE_CHECKING:
     from hybrid.simulation.transient import Transient
 
+# Steps from which on the tables pay where cells stay: they are made in the time of so many.
+PAYS_FROM = 100
 # Of the tables of a run, what depends on the cells.
 IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
 IN_ZONES = ("line", "sea", "old", "new", "zones")
@@ -66,7 +68,7 @@ MOST_WAITING, MOST_PLACES = 256, 20_000
 
 
 class CellChanges:
-    """Changes of the cells of a run (`Transient`) whose rods stay what they are."""
+    """Changes of the cells of a run (`Transient`), and of what is rod."""
 
     alone = True  # whether cells change without a return to Python
 
@@ -125,9 +127,14 @@ class CellChanges:
 
     @staticmethod
     def applies(owner: Transient) -> bool:
-        """Whether a run's cells can change so: nothing asks Python on the way."""
+        """Whether a run's cells, or their kinds, can change so: nothing asks Python on the way.
+
+        Of a short run whose cells stay Python changes the kinds, to the same bits: there it takes less than the tables.
+        """
         switching, model, run = owner.switching, owner.model, owner.run
-        if switching is None or not (switching.compiled and switching.zones.clock[z.SHARE] > 0.0):
+        if switching is None or not switching.compiled:
+            return False
+        if not switching.zones.clock[z.SHARE] > 0.0 and owner.steps < PAYS_FROM:
             return False
         if owner.payout is not None:
             return False
@@ -387,7 +394,8 @@ class CellChanges:
         """Other zones, of which Python's model knows nothing yet, and the energy, J, that is booked for it."""
         switching, manager, t = self._switching, self._switching.manager, self._run.t
         switching.zones.next_rod[:] = change.rod
-        z.plan_next(switching.table.numbers)
+        if self._follows:
+            z.plan_next(switching.table.numbers)
         for k, clamp in enumerate(switching.clamps(self._owner.model.ends.at(t))):
             self._held[k] = clamp is not None
             if clamp is not None:

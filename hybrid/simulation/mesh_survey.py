@@ -12,7 +12,14 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.mesh_grading import AT_PLACE, LAYER, SAMPLES, Grading, grading, layers
 from hybrid.model.model_costs import Demand
-from hybrid.model.resolution import Reach, Resolution, for_motion, is_irregular, requested_accuracy
+from hybrid.model.resolution import (
+    Reach,
+    RequestedAccuracy,
+    Resolution,
+    for_motion,
+    is_irregular,
+    requested_accuracy,
+)
 from hybrid.model.sections import limits_along
 from hybrid.scene.accuracy import ROUGHEST
 from hybrid.scene.motion_checks import stationary_from
@@ -27,6 +34,8 @@ PERIODS = 100
 # bench/test_bench_irregular.py take about three times as long and are hardly better; with 0.9 largest forces are wrong
 # without an event.  Chosen on these ten.
 OFTEN = 0.98
+# Share of an error of curvature, moment or tension along the line that catenaries may make where a model is chosen.
+OF_ALONG = 0.5
 
 
 def survey_resolution(resolution: Resolution) -> Resolution:
@@ -46,6 +55,12 @@ def with_survey(resolution: Resolution, scene: Scene, survey: Survey | None) -> 
     if survey is None:
         return resolution
     return replace(for_motion(resolution, scene, survey.reach), grading=survey.grading(), bends=survey.bends)
+
+
+def allowed(scene: Scene, survey: Survey) -> float:
+    """Error of position, m, up to which bending may be left out, by what a scene asks of values along the line."""
+    asked = requested_accuracy(scene)
+    return survey.tolerance(asked) if asked is not None else np.inf
 
 
 def asks_along(scene: Scene) -> bool:
@@ -147,6 +162,23 @@ class Survey:
         cell = np.interp(self.demand.s, 0.5 * (line.s[1:] + line.s[:-1]), line.h)
         stiff = self._square > 0.0
         return np.where(stiff, np.maximum(1.0, 0.5 * cell / np.sqrt(np.where(stiff, self._square, 1.0))), 1.0)
+
+    def tolerance(self, asked: RequestedAccuracy) -> float:
+        """Error of position, m, up to which bending may be left out for what is asked of values along the line.
+
+        A catenary lacks what curvature changes by within sqrt(EI/T), and has EI curvature^2/2 of tension too much.
+        Where this is more than a share of what is asked the line must be rod; infinite where it is so nowhere.
+        """
+        demand, must = self.demand, np.zeros(self.demand.s.size, bool)
+        sharpest = np.maximum(demand.curvature, np.maximum(*self._beside())) + self._jumps() * (
+            1.0 - 1.0 / self._smeared
+        )
+        if np.isfinite(self.bends):
+            must |= self._jumps() > OF_ALONG * self.bends * demand.curvature.max()
+        if asked.of_tension:
+            less = 0.5 * self._square * demand.least * sharpest**2
+            must |= less > OF_ALONG * asked.of_tension * demand.largest.max()
+        return float(np.min(OF_ALONG * (self._square * sharpest)[must], initial=np.inf))
 
     def grading(self) -> Grading:
         """Cells of a line whose zones stay what they are, those of the pre-run."""

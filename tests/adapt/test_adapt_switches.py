@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from adapt_scenes import CELL, DWELL, LENGTH, changes, comes, goes, output_at, ran, sagging
+from adapt_scenes import CELL, DWELL, LENGTH, SCENES, changes, comes, goes, output_at, ran, sagging
 from problems import Scene, pinned, scene
 
 import hybrid
+from hybrid.simulation import cell_changes
 
 BUSY = ["deep", "bend", "point", "edge"]
 PULLS = ("end_force_start", "end_force_end")
@@ -164,3 +165,18 @@ def test_what_switches_does_not_move():
         if k + 1 < len(result.times):
             jump = np.linalg.norm(r[k + 1] - 2 * r[k] + r[k - 1], axis=1)
             assert jump.max() < 20.0 * 0.02**2, (t, int(jump.argmax()) * CELL)
+
+
+@pytest.mark.parametrize("name", ["edge", "bend"])
+def test_compiled_reviews_and_switches_are_those_of_python(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the last bit: zones, states and energies at all outputs, and what events say; curvature to round-off."""
+    found = []
+    for pays_from in (0, 10**9):
+        monkeypatch.setattr(cell_changes, "PAYS_FROM", pays_from)
+        found.append(hybrid.run(SCENES[name]()))
+    one, other = found
+    assert changes(one) and one.events == other.events
+    assert all(a == b for a, b in zip(one.zones, other.zones, strict=True))
+    for field in ("position", "velocity", "tension", "work/zones", "work/scheme"):
+        assert (one[field] == other[field]).all(), field
+    assert np.abs(one.curvature - other.curvature).max() < 1e-12 * one.curvature.max()

@@ -165,3 +165,11 @@ def test_the_plan_predicts_the_number_of_runs():
     assert (hybrid.plan(fixed).runs, hybrid.plan(fixed).most_runs) == (4, 4)
     result = hybrid.run(TAUT)
     assert plan.runs - 1 <= result.attributes["effort_runs"] <= plan.most_runs
+
+
+def test_curvature_that_is_asked_rules_catenaries_out_beforehand() -> None:
+    """Not after a run of them: within sqrt(EI/T) of where contact ends they lack more than is asked."""
+    asked = ["model=adaptive", "mesh=null", "accuracy={position: 1%, tension: 1%, curvature: 3%}", "time.duration=8"]
+    result = hybrid.run(hybrid.load_scene(Path(__file__).parents[2] / "examples" / "touchdown.yaml", asked))
+    (why,) = (x.text for x in result.events if x.kind == "model chosen")
+    assert kind_of(result) == "rod" and "catenary is no choice: criterion bend" in why
