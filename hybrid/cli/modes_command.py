@@ -59,17 +59,14 @@ def _table(found: Modes) -> Any:
     from rich.table import Table
 
     title = f"{found.title or 'modes'}: {len(found.modes)} modes on {found.cells} cells"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 2), min_width=len(title))
-    for name in ("mode", "period (s)", "error (s)", "Hz"):
-        table.add_column(name, justify="right")
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1), min_width=min(len(title), 80))
+    for name in ("", "period (s)", "error (s)"):
+        table.add_column(name, justify="right", no_wrap=True)
     table.add_column("moves, by kinetic energy")
-    for name in "xyz":
-        table.add_column(f"mass {name} (%)", justify="right")
+    table.add_column("mass x, y, z (%)", justify="right", no_wrap=True)
     for k, x in enumerate(found.modes, start=1):
         parts = [f"{word} {100.0 * part:.0f} %" for word, part in x.energy.items() if part >= LEAST][:SHOWN]
-        masses = [
-            f"{100.0 * m / all_of:.1f}" if all_of > 0.0 else "" for m, all_of in zip(x.mass, found.mass, strict=True)
-        ]
+        masses = [100.0 * m / a if a > 0.0 else 0.0 for m, a in zip(x.mass, found.mass, strict=True)]
         error = "not known" if x.error is None else f"{x.error:.2g}"
-        table.add_row(str(k), f"{x.period:.5g}", error, f"{x.frequency:.4g}", ", ".join(parts), *masses)
+        table.add_row(str(k), f"{x.period:.5g}", error, ", ".join(parts), "  ".join(f"{m:4.1f}" for m in masses))
     return table

@@ -85,11 +85,11 @@ def _table(found: Response, rows: list[dict[str, Any]], hours: float) -> Any:
     from rich.table import Table
 
     title = f"{found.title or 'response'}, where each varies most"
-    table = Table(title=title, title_justify="left", box=None, padding=(0, 2), min_width=len(title))
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1), min_width=min(len(title), 80))
     table.add_column("quantity")
-    for name in ("s (m)", "mean", "standard deviation", "mean period (s)", f"MPM in {hours:g} h"):
-        table.add_column(name, justify="right")
-    table.add_column("unit")
+    for name in ("s (m)", "mean", "standard\ndeviation", "mean\nperiod (s)", f"MPM\nin {hours:g} h"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
     for row in rows:
         cells = [f"{row[key]:.4g}" if key in row else "" for key in ("s", "mean", "deviation", "period", "largest")]
         table.add_row(row["quantity"], *cells, row["unit"])

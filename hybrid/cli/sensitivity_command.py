@@ -30,7 +30,7 @@ def sensitivity(
     with session(as_json, quiet) as console:
         asked = load(console, scene, settings)
         found = hybrid.sensitivity(asked, of or _results(asked), by or _numbers(asked))
-        console.show(lambda: _table(found))
+        console.show(lambda: _tables(found))
         for x in found:
             console.json("derivative", **x._asdict())
 
@@ -51,22 +51,23 @@ def _numbers(scene: Scene) -> list[str]:
     return out
 
 
-def _table(found: list[Derivative]) -> Any:
+def _tables(found: list[Derivative]) -> Any:
+    """One for each result, what it answers to most first."""
+    from rich.console import Group
     from rich.table import Table
 
-    table = Table(box=None, padding=(0, 2))
-    table.add_column("result")
-    table.add_column("value", justify="right")
-    table.add_column("by")
-    for name in ("value", "derivative", "error", "% by %"):
-        table.add_column(name, justify="right")
-    results = list(dict.fromkeys(x.of for x in found))
-    for result in results:
+    tables = []
+    for result in dict.fromkeys(x.of for x in found):
         rows = [x for x in found if x.of == result]
         rows.sort(key=lambda x: -abs(x.elasticity) if math.isfinite(x.elasticity) else 0.0)
-        for k, x in enumerate(rows):
-            head = (x.of, f"{x.result:.5g}") if k == 0 else ("", "")
+        title = f"{result}: {rows[0].result:.6g}"
+        table = Table(title=title, title_justify="left", box=None, padding=(0, 1), min_width=len(title))
+        table.add_column("by")
+        for name in ("value", "derivative", "error", "% by %"):
+            table.add_column(name, justify="right", no_wrap=True)
+        for x in rows:
             error = "not known" if x.error is None else f"{x.error:.1g}"
             elastic = f"{x.elasticity:.3g}" if math.isfinite(x.elasticity) else ""
-            table.add_row(*head, x.by, f"{x.number:.5g}", f"{x.derivative:.5g}", error, elastic)
-    return table
+            table.add_row(x.by, f"{x.number:.5g}", f"{x.derivative:.5g}", error, elastic)
+        tables.append(table)
+    return Group(*tables)

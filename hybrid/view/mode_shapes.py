@@ -9,14 +9,17 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hybrid.view.matplotlib_import import import_matplotlib
+from hybrid.view.figure import Axis, Item, Line, Page, Panel
 from hybrid.view.save import save_figure
-from hybrid.view.style import GREY, INK, NORMAL, SMALL, colour_of
+from hybrid.view.style import GREY, colour_of
 
-COLUMNS, WIDE, HIGH = 3, 2.7, 2.2  # panels beside each other, and the size of one in inches
+COLUMNS, WIDE, HIGH = 3, 2.8, 2.5  # panels beside each other, and the size of one in inches
 # Views are from this azimuth beside the widest direction of the lines, and from this height, deg.
 AZIMUTH, HEIGHT = 35.0, 20.0
 SWING = 0.12  # of the largest extent of the scene: the largest shift that is drawn
+FACTS = (
+    "grey: at rest; blue: one end of the swing, and the other, dashed; shifts are not to scale, twists are not shown"
+)
 
 
 class DrawnMode(Protocol):
@@ -42,37 +45,39 @@ class DrawnModes(Protocol):
 
 
 def plot_modes(found: DrawnModes, target: Path) -> None:
-    """Draw every mode in a panel of its own, all from the same side; shifts are not to scale, twists not shown."""
-    import_matplotlib()
-    from matplotlib.figure import Figure
+    """Draw every mode in a panel of its own, all from the same side, as PNG, PDF or SVG."""
+    from hybrid.view.matplotlib_backend import draw_page
 
+    save_figure(draw_page(_page(found)), target)
+
+
+def _page(found: DrawnModes) -> Page:
     view = _view(found.position)
     places = {name: np.asarray(r) @ view.T for name, r in found.position.items()}
     every = np.concatenate(list(places.values()))
     extent = np.ptp(np.concatenate([np.asarray(r) for r in found.position.values()]), axis=0)
     size = SWING * max(float(extent.max()), 1e-9)
-    rows = math.ceil(max(len(found.modes), 1) / COLUMNS)
-    columns = min(COLUMNS, max(len(found.modes), 1))
-    figure = Figure(figsize=(WIDE * columns, HIGH * rows + 0.4), layout="constrained")
-    figure.suptitle(found.title, fontsize=NORMAL + 1, color=INK)
-    axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axis in axes[len(found.modes) :]:
-        axis.set_visible(False)
-    for k, (axis, mode) in enumerate(zip(axes, found.modes, strict=False), start=1):
+    span = [(float(x.min()) - 1.5 * size, float(x.max()) + 1.5 * size) for x in every.T]
+    blue, panels = colour_of("catenary"), {}
+    for k, mode in enumerate(found.modes, start=1):
+        items: list[Item] = []
         for name, at in places.items():
             moved = size * np.asarray(mode.shifts[name]) @ view.T
-            axis.plot(at[:, 0], at[:, 1], color=GREY, lw=0.8)
-            axis.plot(*(at + moved).T, color=colour_of("catenary"), lw=1.2)
-            axis.plot(*(at - moved).T, color=colour_of("catenary"), lw=0.7, ls=(0, (3, 2)))
-        axis.set_title(f"{k}: {mode.period:.4g} s, {mode.what}", fontsize=SMALL, color=INK)
-        axis.set_aspect("equal")
-        span = np.ptp(every, axis=0).max() * 0.5 + 1.5 * size
-        middle = 0.5 * (every.max(axis=0) + every.min(axis=0))
-        tall = max(float(np.ptp(every[:, 1])) * 0.5 + 1.5 * size, 0.35 * span)
-        axis.set_xlim(middle[0] - span, middle[0] + span)
-        axis.set_ylim(middle[1] - tall, middle[1] + tall)
-        axis.set_axis_off()
-    save_figure(figure, target)
+            items.append(Line(at[:, 0], at[:, 1], colour=GREY, width=0.8))
+            for sign, look in ((-1.0, {"width": 0.8, "dash": "dash"}), (1.0, {})):
+                swung = at + sign * moved
+                items.append(Line(swung[:, 0], swung[:, 1], colour=blue, **look))  # type: ignore[arg-type]
+        title = f"{k}: {mode.period:.4g} s, {mode.what}"
+        panels[str(k)] = Panel(str(k), title, Axis("", "m", *span[0]), Axis("", "m", *span[1]), items, aspect=1.0)
+    if not panels:
+        return Page(found.title or "(no title)", "", empty="no mode")
+    columns = min(COLUMNS, len(panels))
+    rows = math.ceil(len(panels) / columns)
+    keys = [*panels, *["."] * (rows * columns - len(panels))]
+    mosaic = [keys[columns * row : columns * (row + 1)] for row in range(rows)]
+    return Page(
+        found.title or "(no title)", FACTS, 1, panels, mosaic, size=(max(WIDE * columns, 5.6), HIGH * rows + 0.6)
+    )
 
 
 def _view(position: Mapping[str, Any]) -> Any:
