@@ -136,6 +136,9 @@ def payout_kernels() -> tuple[Any, ...]:
         payout.fit_line,
         payout.stand_still,
         payout.lengthen,
+        payout.limit_next_step,
+        payout.put_forces_on,
+        payout.take_forces_off,
         payout_nodes.carry_node,
     )
     line = payout_run.change_line, payout_run.fit_changed, payout_run.book_change, payout_run.renew_run

@@ -71,7 +71,7 @@ def test_no_cells_are_spent_on_the_layer_of_a_hinge() -> None:
 def test_runs_are_compared_by_their_fineness() -> None:
     """Base cells are as many at any fineness; where there are hardly any others a finer run is no finer."""
     zones = layout(np.linspace(0.0, 10.0, 21), 8, "R" * 20)
-    model = type("Model", (), {"layout": zones, "cells": 160})
+    model = type("Model", (), {"layout": zones, "cells": 160, "payout": None})
     fine, coarse = compared_cells(model, 1.5, 31.0), compared_cells(model, 0.75)
     assert fine == 2 * coarse
     assert compared_cells(model, 1.5, 22.0) < coarse

@@ -64,7 +64,7 @@ def rougher(resolution: Resolution) -> Resolution:
 @pytest.fixture
 def rough(monkeypatch: pytest.MonkeyPatch) -> None:
     """First results that are far too coarse for what is asked, so that finer ones follow."""
-    one, several = passes.Passes._surveyed, system_accuracy.SystemPasses._surveyed
+    one, several = passes.Passes._surveyed, system_accuracy.SystemPasses.surveyed
 
     def of_one(self: passes.Passes, resolution: Resolution) -> tuple[Any, Resolution]:
         choice, found = one(self, resolution)
@@ -75,7 +75,7 @@ def rough(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(system_run, "LOOK", 1)
     monkeypatch.setattr(passes.Passes, "_surveyed", of_one)
-    monkeypatch.setattr(system_accuracy.SystemPasses, "_surveyed", of_several)
+    monkeypatch.setattr(system_accuracy.SystemPasses, "surveyed", of_several)
 
 
 def fixed() -> dict[str, Any]:
