@@ -305,7 +305,8 @@ def test_catenaries_that_come_near_themselves_become_rods() -> None:
 
 
 def test_it_resumes_bit_for_bit_with_zones_that_move(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, stopping = hybrid.validate_scene(closing("adaptive")), Stopping(monkeypatch)
+    """On 160 cells: with 100, rods everywhere and zones alike let go of each other before it is stopped at 5 s."""
+    scene, stopping = hybrid.validate_scene(closing("adaptive", mesh={"cells": 160})), Stopping(monkeypatch)
     with hybrid.run(scene, tmp_path / "whole.h5", progress=stopping) as whole:
         assert np.interp([5.0, 5.2], whole.times, whole["energy/self_contact"]).all()
     assert went_on(scene, tmp_path / "run.h5", stopping, [500, 20]) == 2
