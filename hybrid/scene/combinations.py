@@ -354,7 +354,7 @@ SETTLED_FRICTION = Feature("friction that has settled in the equilibrium", "init
                            _asks("initial", "friction",
                                  lambda x: getattr(x, "friction", "neglected") != "neglected"))  # fmt: skip
 
-ABOUT_REST = Feature("natural modes, response to a sea, derivatives at rest", "hybrid modes, response, sensitivity",
+ABOUT_REST = Feature("natural modes, response to a sea, derivatives at rest", "hybrid modes",
                      _used("about rest"))  # fmt: skip
 STEPPED = Feature("steps from outside", "hybrid.Simulation", _used("stepped"))
 CHANGED_LOADS = Feature(

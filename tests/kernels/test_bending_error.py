@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_jacobian import BITS, CA, CV, ZONES, N, assembled, random_case
+from test_jacobian import CA, CV, WITHOUT_OBSTACLES, ZONES, N, assembled, random_case
 
 import hybrid
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW, solve_again
@@ -80,7 +80,7 @@ def rate_rows(line, sea, ends, st, q):
     return (J @ np.column_stack([np.zeros(N + 1), q]).ravel()).reshape(N + 1, 5)
 
 
-@pytest.mark.parametrize("bits", BITS)
+@pytest.mark.parametrize("bits", WITHOUT_OBSTACLES)
 @pytest.mark.parametrize("seed", range(3))
 def test_history_of_a_catenary_is_the_matrix_own(bits, seed):
     """Every force's own rates, to round-off: a force that `rates` has forgotten would show."""

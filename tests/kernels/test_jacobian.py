@@ -52,6 +52,9 @@ BITS = [
     0, DRAG, ADDED_MASS, MASS_DAMPING, STIFFNESS_DAMPING, ROTARY, LAND, DRAG | FLOW, WAVES | ADDED_MASS | DRAG, SURFACE,
     BODIES | FLOW, SEABED, SEABED | FRICTION, 2047, OBSTACLES, OBSTACLES | SEABED | FRICTION,
 ]  # fmt: skip
+# Scenes with obstacles are in space, without zones that move and without estimated errors (hybrid.scene.combinations):
+# the march in the plane and the error of neglecting bending know no obstacles.
+WITHOUT_OBSTACLES = [bits for bits in BITS if not bits & OBSTACLES]
 
 
 def random_case(seed, element, bits, held=(0, 0)):

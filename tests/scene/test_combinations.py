@@ -39,6 +39,8 @@ LINES: dict[str, Any] = {
 SECTION, END, ONE = "cable.sections.0.", "ends.end.", "lines.one."
 TORQUE = {SECTION + "tension_torque": 1e-3}
 SWIVEL = {"cable.attachments": [{"kind": "swivel", "at": 5}], END + "normal": [0, 1, 0]}
+BALL: dict[str, Any] = {"obstacles": {"ball": {"kind": "sphere", "at": [4, 0, -9], "radius": 1}}}
+THICKER = {"cable.sections": [x | y for x in CABLE["cable"]["sections"] for y in ({}, {"diameter": 0.05})]}
 PAID: dict[str, Any] = {END + "payout": {"rate": 0.1, "ramp": 1.0}}
 MOVING = {"model": {"kind": "adaptive"}}
 FOLLOWING = {"model": {"kind": "adaptive", "curvature_error": 0.05}}
@@ -63,6 +65,16 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.SHORTEST_CELLS, c.STAYING_CELLS): ({"model": {"kind": "adaptive", "rod_cell": 0.1}}, ""),
     (c.LAYERS, c.FOLLOWING_CELLS): ({"resolution": {"cells_per_layer": 2}} | FOLLOWING, ""),
     (c.LAYERS, c.STEPPED): ({"resolution": {"cells_per_layer": 2}}, "stepped"),
+    (c.PLANE, c.OBSTACLES): (BALL | {"dimension": 2}, ""),
+    (c.MOVING_ZONES, c.OBSTACLES): (BALL | MOVING, ""),
+    (c.PAYOUT, c.OBSTACLES): (BALL | PAID, ""),
+    (c.DIAMETERS, c.OBSTACLES): (BALL | THICKER, ""),
+    (c.CHOSEN_STEPS, c.OBSTACLES): (BALL | {"time": {"duration": 3.0}}, ""),
+    (c.ACCURACY, c.OBSTACLES): (BALL | {"accuracy": "3%"}, ""),
+    (c.ERRORS, c.OBSTACLES): (BALL | {"output.errors": True}, ""),
+    (c.SETTLED_FRICTION, c.OBSTACLES): (BALL | {"initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
+    (c.LAYERS, c.OBSTACLES): (BALL | {"resolution": {"cells_per_layer": 2}}, ""),
+    (c.ABOUT_REST, c.OBSTACLES): (BALL, "about rest"),
     (c.PAYOUT_AT_START, c.PAYOUT_AT_END): (PAID | {"ends.start.payout": {"rate": 0.1, "ramp": 1.0}}, ""),
     (c.RELEASE_AT_WINCH, c.PAYOUT): (PAID | {END + "release_at": {"time": 2}}, ""),
     (c.STIFFNESS_DAMPING, c.PAYOUT): (PAID | {SECTION + "damping": {"stiffness": 0.01}}, ""),

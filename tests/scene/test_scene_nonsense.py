@@ -106,6 +106,16 @@ ends: {start: {kind: pinned, position: [0.0, 0.0, -10.0]}, end: {kind: pinned, p
 initial: {kind: equilibrium}
 model: {kind: catenary}
 """
+OBSTRUCTED = """\
+cable: {sections: [{length: 10.0, mass: 1.0, diameter: 0.02}]}
+ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
+obstacles:
+  wall: {at: [0.0, 3.0, 0.0], normal: [0.0, -1.0, 0.0]}
+  ball: {kind: sphere, at: [0.0, 0.0, -20.0], radius: 1.0, friction: 0.3}
+  roller: {at: [2.0, 0.0, -5.0], axis: [0.0, 1.0, 0.0], radius: 0.5, damping: 10.0}
+initial: {kind: equilibrium}
+model: {kind: catenary}
+"""
 PAYOUTS = {
     "rate": "rate: 0.5, begin: 1.0, ramp: 2.0, until: 8.0, longest: 60.0, reel: [{length: 30.0, mass: 2.0}]",
     "rates": "rates: [[0.0, 0.0], [5.0, 1.0], [9.0, -0.5]]",
@@ -116,6 +126,7 @@ TEXTS = (
     {name: WOUND.replace("PAYOUT", payout) for name, payout in PAYOUTS.items()}
     | {
         "loaded": LOADED,
+        "obstructed": OBSTRUCTED,
         "uneven": UNEVEN,
         "adaptive": ADAPTIVE,
         "everything": EVERYTHING,
@@ -303,6 +314,7 @@ def _negative(name: str, path: tuple[str | int, ...]) -> None:
         or "tension_strain" in keys
         or keys == ["initial", "friction"]
         or keys[:2] == ["initial", "points"]
+        or (keys[0] == "obstacles" and keys[-1] in ("at", "axis", "normal"))
         or ballast
     ):
         found = complaints(_put(TEXTS[name], dict(_places(TEXTS[name]))[path], "-7.25"))
