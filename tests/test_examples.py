@@ -209,13 +209,14 @@ def ran_as(model: str, name: str) -> hybrid.Result:
 
 
 # Rods (m) in equilibrium and at the end, the share of the line that is rod on the mean, and changes of zones in all.
+# On the mesh that rods everywhere would have: bounds are its nodes, and a zone changes by single cells of it.
 PLANS: dict[str, tuple[list[tuple[float, float]], list[tuple[float, float]], float, int]] = {
-    "s_tether": ([(14, 47), (55, 60)], [(11, 48), (55, 60)], 0.69, 6),
-    "rov_tether": ([(65, 80)], [(65, 80)], 0.10, 0),
-    "touchdown": ([], [(85, 120)], 0.119, 11),
-    "laying": ([(0, 186.667)], [(0, 213.333)], 0.26, 11),
-    "slack_on_seabed": ([(0, 17.5)], [(0, 30)], 0.91, 11),
-    "irregular_sea": ([], [(18.333, 41.667)], 0.141, 70),
+    "s_tether": ([(14.4, 46.641), (55.468, 60)], [(0, 3), (12, 46.641), (55.468, 60)], 0.69, 6),
+    "rov_tether": ([(68.089, 80)], [(65.859, 81.138)], 0.10, 3),
+    "touchdown": ([], [(82.5, 117.5)], 0.116, 17),
+    "laying": ([(0, 184)], [(0, 200)], 0.25, 27),
+    "slack_on_seabed": ([(0, 17.1)], [(0, 30)], 0.91, 15),
+    "irregular_sea": ([], [(19, 41)], 0.158, 114),
 }
 
 
@@ -237,19 +238,28 @@ def test_the_plan_of_an_example_is_what_it_was(name: str) -> None:
 
 @pytest.mark.parametrize("name, period", [("s_tether", 7.0), ("touchdown", 8.0)])
 def test_zones_breathe_with_the_heave_and_do_not_flicker(name: str, period: float) -> None:
-    """In the last three periods: no changes any more, and nothing has ever changed back within dwell.
+    """In the last three periods: no changes any more, and nothing has ever changed back within dwell, but for one cell.
 
-    The dwell time is a quarter of the time of a transverse wave, 20 steps at least.
+    The dwell time is a quarter of the time of a transverse wave, 20 steps at least.  It holds rods back that go, not
+    those that come: of the touchdown one cell, calm for its 2 s, is a rod again 1.6 s later (27.1 s and 28.7 s), while
+    the heave settles.  That happens once; the line stays within 5 mm of rods (4.4 mm).
     """
     result = ran(name)
     changes = [e for e in result.events if e.kind in ZONE_EVENTS]
     assert not [e for e in changes if e.t > result.times[-1] - 3 * period]
     dwell = 20 * 0.05 if name == "s_tether" else 20 * 0.1
     goes = ("merge", "shrink")
+    back = []
     for a in changes:
         for b in changes:
             reversed_ = (a.kind in goes) != (b.kind in goes) and 0.0 < b.t - a.t < dwell
-            assert not (reversed_ and a.s_a < b.s_b and b.s_a < a.s_b), (a, b)
+            if reversed_ and a.s_a < b.s_b and b.s_a < a.s_b:
+                back.append((a, b))
+    assert len(back) == (name == "touchdown"), back
+    for a, b in back:
+        assert a.kind == "shrink" and b.kind == "grow" and b.t - a.t > 1.5 and b.t < 4 * period, (a, b)
+        rods = ran_as("rod", name)
+        assert np.linalg.norm(result.position - rods.position, axis=2).max() < 5e-3
 
 
 def test_s_tether_needs_bending_where_it_is_nearly_slack() -> None:
@@ -289,7 +299,9 @@ def test_rov_is_kept_quiet_by_the_float() -> None:
     assert ship == pytest.approx(2.0, abs=0.01)
     assert float_ == pytest.approx(0.29, rel=0.05)
     assert vehicle == pytest.approx(0.005, abs=0.002)
-    assert result.tension.min() > 30 and not result.events  # just below the float, where its lift is gone
+    assert result.tension.min() > 30  # just below the float, where its lift is gone
+    assert all(e.kind == "grow" and e.t < 12 for e in result.events)  # as the heave sets in
+    assert np.linalg.norm(result.position - ran_as("rod", "rov_tether").position, axis=2).max() < 0.01  # 5 mm
     top = result.tension[settled(result, 84.0), 0]
     assert (top.min(), top.max()) == pytest.approx((157, 246), rel=0.02)
 
@@ -340,7 +352,8 @@ def test_touchdown_as_hybrid_is_that_of_the_rod() -> None:
 
 
 def test_laid_cable_hangs_straight_at_the_critical_angle() -> None:
-    result = hybrid.static(hybrid.load_scene(EXAMPLES / "laying.yaml"))
+    """On cells of 1 m: on the 100 of 8 m that it has by itself the bend is 30 m wide, with rods everywhere as well."""
+    result = hybrid.static(hybrid.load_scene(EXAMPLES / "laying.yaml", ["mesh.cells=800"]))
     w = 9.81 * (1.5 - 1025 * math.pi / 4 * 0.03**2)
     q = 2 * w / (1025 * 1.2 * 0.03) / 2.0**2  # Hc^2/V^2
     critical = math.acos(math.sqrt(1 + q * q / 4) - q / 2)
@@ -386,8 +399,11 @@ def test_slack_cable_lies_in_a_bight_that_friction_holds() -> None:
 
 
 def test_buoy_follows_an_irregular_sea() -> None:
-    """The sea of this seed, at this place and for 180 s only; over 1000 s 4 std is 1.94 m, the header says."""
-    result = ran("irregular_sea")
+    """The sea of this seed, at this place and for 180 s only; over 1000 s 4 std is 1.94 m, the header says.
+
+    On 240 cells: on the 100 that it has by itself the least tension is 483 N, with rods everywhere 480 N.
+    """
+    result = changed("irregular_sea", "mesh.cells=240")
     late = settled(result, 20.0)
     z = result.position[late, -1, 2]
     assert 4 * z.std() == pytest.approx(2.0, rel=0.15)
