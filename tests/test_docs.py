@@ -65,6 +65,8 @@ def test_readme_commands_run(clone: Path, monkeypatch: pytest.MonkeyPatch, capsy
         "trade",
         "resume",
         "import",
+        "modes",
+        "response",
     }
     for arguments in found:
         with pytest.raises(SystemExit) as left:
