@@ -15,7 +15,7 @@ HOSE = {
     "torsional_stiffness": 0.016, "damping": {"mass": 0.5},
 }  # fmt: skip
 LINE = {
-    "sections": [HOSE], "attachments": [{"kind": "clump", "at": 2.0, "mass": 2.0}], "mesh": {"cells": 80},
+    "sections": [HOSE], "attachments": [{"kind": "clump", "at": 2.0, "mass": 2.0}], "mesh": {"cells": 160},
     "contact": {"self": True, "friction": 0.3},
 }  # fmt: skip
 Y = 0.9 * WIDTH  # m, between the ends of a U
