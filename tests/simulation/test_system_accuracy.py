@@ -134,7 +134,8 @@ def fine_rods() -> hybrid.Result:
 )
 def test_errors_of_leaving_bending_out_against_fine_rods(bends: dict[str, Any], asked: dict[str, Any]) -> None:
     scene = bridle(**asked)
-    scene["output"] = {"every": 0.2, "points": 31, "errors": True}
+    # at outputs within steps the figure of the tension of `tow` is 3.2 times its error
+    scene["output"] = {"every": 0.2, "points": 31, "errors": True, "exact": True}
     if "accuracy" not in asked:
         del scene["accuracy"]
     for line in scene["lines"].values():
