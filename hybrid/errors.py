@@ -98,6 +98,7 @@ EVENTS_BY_WEIGHT = (
     "tension above limit",
     "tension below limit",
     "unresolved bend",
+    "unresolved slack bend",
     "accuracy missed",
     "no error figure",
     "error uncertain",

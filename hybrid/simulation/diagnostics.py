@@ -31,6 +31,7 @@ from hybrid.simulation.doubtful_outputs import Bounds, doubtful, kinks_at
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.hockling_watch import LOOP, note_hockling, note_loops
 from hybrid.simulation.section_layers import ASKEW, hidden_layer, layer_text
+from hybrid.simulation.slack_bends import TURNS, too_long_for_weight, turns_by_weight, weight_text
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium
 
@@ -77,6 +78,7 @@ NOWHERE: Floats = np.zeros((0, 3))
 REMEMBERED = (
     "_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_off", "_gain", "_loss", "_rested",
     "_left_out", "_jump", "_put_in", "_potential", "_alive", "_loop", "_writhe", "_writhes", "_section", "_kink",
+    "_weight",
 )  # fmt: skip
 # What checkpoints of 0.6 files may lack of it: what was not watched then.
 UNWATCHED = {
@@ -87,6 +89,7 @@ UNWATCHED = {
     "_kink": KINK,
     "_within": 1.0,
     "_round": False,
+    "_weight": False,
 }
 
 Stop = tuple[Outcome, int] | None
@@ -143,7 +146,7 @@ class Diagnostics:
         self._within, self._round = 1.0, False
         self._off = OFF * model.length
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
-        self._rested = self._left_out = self._section = False
+        self._rested = self._left_out = self._section = self._weight = False
         self._jump = SNAP * model.tension_scale  # N
         self._put_in = self._potential = self._alive = 0.0  # J
         self._kink = KINK
@@ -271,12 +274,14 @@ class Diagnostics:
         else:
             finer = 0.3 * first / bend
             how = f"the bend at the end s = {s:g} m is sharper than the mesh"
+        return f"{how}: curvature and moment are wrong there; cells of {finer:.2g} m would do ({self._asks(cell)})"
+
+    def _asks(self, cell: int, fixed: str = "`mesh.nodes` or `ratio`") -> str:
+        """The keys that make cells shorter; fixed: those of cells that stay."""
         layout, paid = self._model.layout, self._model.payout
-        follows = layout is not None and layout.parts.max() > 1
-        ask = "`model.rod_cell`" if follows else "`mesh.nodes` or `ratio`"
         if layout is not None and paid is not None and paid.follows and layout.parts[layout.base_of_cell[cell]] == 1:
-            ask = "`mesh.cells`: those at the winch stay whole"
-        return f"{how}: curvature and moment are wrong there; cells of {finer:.2g} m would do ({ask})"
+            return "`mesh.cells`: those at the winch stay whole"
+        return "`model.rod_cell`" if layout is not None and layout.parts.max() > 1 else fixed
 
     def scheme(self, rho: float) -> None:
         """A time scheme that damps nothing."""
@@ -377,6 +382,7 @@ class Diagnostics:
         return Bounds(
             self._fold, self._off, self._kink, self._sunk, self._bend <= UNRESOLVED,
             np.inf if self._rested else PRESSED, model.length, tuple(model.attached),
+            None if self._weight else model.cable,
         )  # fmt: skip
 
     def loops(self, t: Floats, values: Mapping[str, Floats], s: Floats) -> None:
@@ -406,6 +412,8 @@ class Diagnostics:
             text = layer_text(layer, float(line.s[layer.node]), rod)
             self.note(float(batch.t[layer.output]), layer.node, "unresolved change of section", text)
             self._section = True
+        if not self._weight:
+            self._bends_by_weight(seen)
         if line.bits & SEABED:
             sea = self._model.sea.values
             depth = planes_under(sea, batch.r.reshape(-1, 3))[1].reshape(batch.r.shape[:2]) - 0.5 * sea.onset
@@ -511,6 +519,25 @@ class Diagnostics:
                 self.note(float(batch.t[k]), node, "unresolved bend", text)
                 self._bend = 1.5 * UNRESOLVED
                 return
+
+    def _bends_by_weight(self, seen: Observation) -> None:
+        """Bends of a rod almost without tension that are shorter than its cells."""
+        line, batch = self._model.line, seen.batch
+        nodes, l, limits = too_long_for_weight(self._model.cable, line)
+        if not nodes.size:
+            return
+        turns = turns_by_weight(line, seen, nodes, limits)
+        bent = np.flatnonzero(turns.max(axis=0) > TURNS)
+        if bent.size:
+            k, worst = int(bent[0]), int(np.argmax(turns[:, bent[0]]))
+            node, at = int(nodes[worst]), nodes[turns[:, k] > TURNS]
+            longest = float(line.h[node - 1 : node + 1].max())
+            text = weight_text(
+                float(l[worst]), float(line.s[node]), longest, float(turns[worst, k]), self._asks(node, "`mesh.cells`")
+            )
+            s_a, s_b = float(line.s[at[0] - 1]), float(line.s[at[-1] + 1])
+            self.events.event(float(batch.t[k]), s_a, s_b, "unresolved slack bend", text)
+            self._weight = True
 
     def tension(self, t: float, state: State) -> None:
         """Catenary cells without tension, where friction holds them or the scene asks to go on with them."""

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.state.forces import SEABED
 from hybrid.kernels.state.state import Floats
+from hybrid.model.material import Material
 from hybrid.outputs.joined_lines import JoinedObservation
+from hybrid.simulation.slack_bends import TURNS, too_long_for_weight, turns_by_weight
 
 
 class Bounds(NamedTuple):
@@ -27,6 +29,7 @@ class Bounds(NamedTuple):
     pressed: float  # of EI/L, N m: what a rod carries that may buckle; infinite: that is not watched
     length: float  # m
     attached: tuple[float, ...]  # m, where point loads are
+    cable: Material | None  # of which bends by weight within less than a cell are watched; None: they are not
 
 
 def kinks_at(joints: NDArray[np.int64], bends: Floats, lengths: Floats) -> Floats:
@@ -57,6 +60,11 @@ def doubtful(seen: JoinedObservation, values: Mapping[str, Floats], bounds: Boun
         found[np.searchsorted(seen.begin, joints[kinked], side="right") - 1] = True
     if bounds.layers:
         found |= bool(bounds.attached) | seen.has_element(0) | seen.has_element(1)
+    if bounds.cable is not None:
+        nodes, _, limits = too_long_for_weight(bounds.cable, line)
+        if nodes.size:
+            bent = turns_by_weight(line, seen, nodes, limits)[:, 0] > TURNS
+            found[np.searchsorted(seen.begin, nodes[bent], side="right") - 1] = True
     if line.bits & SEABED:
         found |= np.maximum.reduceat(seen.depth[:, 0], begin) - 0.5 * seen.sea.onset > bounds.sunk
     if np.isfinite(bounds.pressed) and line.spin.any():

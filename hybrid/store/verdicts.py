@@ -51,6 +51,7 @@ DOUBTS: Doubtful = {
     "out of plane": (ALL, "dimension: 3"),
     "unresolved twist": (TORQUE, "more mesh.cells"),
     "unresolved bend": (BENDING, "cells as short as its note says"),
+    "unresolved slack bend": (BENDING, "cells as short as its note says"),
     "kink at joint": (BENDING, "a border of the zones elsewhere, or model: rod"),
     "unresolved change of section": (BENDING, "accuracy: {curvature: 5%}, with model: rod"),
     "deep in the seabed": (ALL, "check seabed.stiffness, in N/m per m"),

@@ -1,0 +1,55 @@
+"""Bends that weight makes where a rod carries almost no tension, within less than a cell.
+
+    symbol   meaning                                                             unit
+    EI       bending stiffness about the weaker axis                             N m2
+    w        submerged weight                                                    N/m
+    l        (EI/w)^(1/3), over which a cable without tension bends by weight    m
+
+Where the tension is below EI/l^2, bending and weight alone form the line, over l.  A cell that is longer than l and
+turns against the next shows no more than the mean of the bend: its curvature is too small, and the length of line that
+bends too great.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.kernels.state.state import Floats, Line
+from hybrid.model.build import LEAST_WEIGHT
+from hybrid.model.material import Material
+from hybrid.outputs.observation import Observation
+
+# rad, from one cell to the next: less is the sag of a line that lies or hangs almost straight.
+TURNS = 0.05
+# Cells that show the bend, as a part of l.
+SHOWS = 0.25
+
+
+def too_long_for_weight(cable: Material, line: Line) -> tuple[np.ndarray, Floats, Floats]:
+    """Nodes (K,) between two cells of a rod of which one is longer than l; there l (K,) m and EI/l^2 (K,) N."""
+    rod = (line.spin[:-1] == 1) & (line.spin[1:] == 1) & (line.element[1:-1] == 1)
+    between = np.flatnonzero(rod & (line.h[:-1] > 0.0) & (line.h[1:] > 0.0))
+    piece = cable.piece(0.5 * (line.s[:-1] + line.s[1:]))
+    length = cable.bending_length(LEAST_WEIGHT * 9.81 * cable.mass)[piece]
+    EI = cable.weakest_bending[piece]
+    l = np.minimum(length[between], length[between + 1])
+    longer = (np.maximum(line.h[between], line.h[between + 1]) > l) & (l > 0.0)
+    between, l = between[longer], l[longer]
+    return between + 1, l, np.minimum(EI[between], EI[between + 1]) / l**2
+
+
+def turns_by_weight(line: Line, seen: Observation, nodes: np.ndarray, limits: Floats) -> Floats:
+    """Turns (K, nb) rad at nodes (K,) beyond the natural bend, 0 where the tension exceeds limits (K,) N."""
+    chord = np.linalg.norm(seen.d[nodes] - seen.d[nodes - 1], axis=1)  # 2 sin(x/2) of a turn by x
+    turn = 2.0 * np.arcsin(0.5 * chord) - np.linalg.norm(line.k0[nodes, :2], axis=1)[:, None]
+    slack = np.minimum(seen.T[nodes - 1], seen.T[nodes]) < limits[:, None]
+    return np.where(slack, turn, 0.0)
+
+
+def weight_text(l: float, s: float, h: float, turn: float, ask: str) -> str:
+    """Text of the event at s (m) between cells of h (m) that turn by so much (rad)."""
+    return (
+        f"the cable bends under its own weight at s = {s:g} m, where tension is nearly none, within about {l:.2g} m, "
+        f"less than its cell of {h:.2g} m ({np.degrees(turn):.0f} deg to the next cell): curvature and moment are "
+        f"wrong there, tension is less sure; cells of {SHOWS * l:.2g} m would do ({ask}, or `accuracy: {{curvature: 5%}}`)"
+    )
