@@ -11,7 +11,7 @@ import hybrid
 from hybrid.cli.app import Json, Quiet, SceneFile, Settings, UsageError, app, flag, load_either, session
 
 if TYPE_CHECKING:
-    from hybrid.modal.response import LineResponse, Response
+    from hybrid.modal.response_results import LineResponse, Response
 
 
 MOTIONS = ("x", "y", "z", "roll", "pitch", "yaw")

@@ -66,8 +66,7 @@ def _tables(found: list[Derivative]) -> Any:
         for name in ("value", "derivative", "error", "% by %"):
             table.add_column(name, justify="right", no_wrap=True)
         for x in rows:
-            error = "not known" if x.error is None else f"{x.error:.1g}"
             elastic = f"{x.elasticity:.3g}" if math.isfinite(x.elasticity) else ""
-            table.add_row(x.by, f"{x.number:.5g}", f"{x.derivative:.5g}", error, elastic)
+            table.add_row(x.by, f"{x.number:.5g}", f"{x.derivative:.5g}", f"{x.error:.1g}", elastic)
         tables.append(table)
     return Group(*tables)

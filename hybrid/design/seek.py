@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybrid.design.sensitivity import AtRest, changed_scene, parse_result
+from hybrid.design.sensitivity import AtRest, cable_of, changed_scene, parse_result
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
-from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.read import SceneLike
 from hybrid.scene.schema import Scene
 
 # Rounds at most, and the part of a target within which it is met; a number changes by this part of itself a round at
@@ -39,7 +39,7 @@ def seek(scene: SceneLike, targets: Mapping[str, float], by: Sequence[str]) -> S
     keeps its sign.  SceneError: what has no derivative, more or fewer numbers than targets; ComputationError: they are
     not reached, with how near it came.
     """
-    asked = as_scene(scene)
+    asked = cable_of(scene)
     if len(by) != len(targets) or not by:
         expected = f"as many keys as targets ({len(targets)})"
         raise SceneError([Complaint("by", f"{len(by)} keys", expected, "one number for each target")])

@@ -25,10 +25,9 @@ from hybrid.modal.matrices import ANCHOR, linear_line, rows_at_rest
 from hybrid.model.build import Model, build
 from hybrid.model.resolution import Resolution
 from hybrid.outputs.probes import PROBES
-from hybrid.scene.analysis import Equilibrium
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene_text
-from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.scene.schema import Scene
 from hybrid.simulation.static_case import StaticCase
 from hybrid.solve.joined import JoinedLine
 from hybrid.studies.sensitivity import Influence
@@ -46,7 +45,7 @@ AXES = "xyz"
 
 class Derivative(NamedTuple):
     """What one result answers to one number: value of the result, of the number, derivative in their units, elasticity
-    (per cent by per cent; NaN where one of them is 0), and the error of the derivative by the mesh, None: not known."""
+    (per cent by per cent; NaN where one of them is 0), and the error of the derivative by the mesh."""
 
     of: str
     by: str
@@ -54,7 +53,7 @@ class Derivative(NamedTuple):
     number: float
     derivative: float
     elasticity: float
-    error: float | None
+    error: float
 
 
 @overload
@@ -76,15 +75,7 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None) -> Any:
     """
     if by is None:
         return of_study(scene, of)
-    asked = as_scene_or_system(scene)
-    if not isinstance(asked, Scene):
-        expected = "one cable: derivatives of several lines are not worked out"
-        raise SceneError([Complaint("lines", f"{len(asked.lines)} lines", expected, "differences of two equilibria")])
-    if isinstance(asked.initial, Equilibrium) and asked.initial.friction == "settled":
-        fix = "leave initial.friction out, or write neglected"
-        raise SceneError(
-            [Complaint("initial.friction", "settled", "a rest that does not depend on the way to it", fix)]
-        )
+    asked = cable_of(scene)
     wanted = [parse_result(x, asked.length) for x in of]
     numbers = [number_of(asked, key) for key in by]
     fine, coarse = (AtRest(asked, cells, wanted) for cells in (1.0, 2.0))
@@ -100,7 +91,18 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None) -> Any:
     return out
 
 
+def cable_of(scene: SceneLike) -> Scene:
+    """The scene of one cable; SceneError: it is of several lines."""
+    asked = as_scene_or_system(scene)
+    if isinstance(asked, Scene):
+        return asked
+    refuse_use(asked, "derivatives", given="hybrid sensitivity")
+    raise AssertionError("derivatives of several lines are refused by the table")
+
+
 class Wanted(NamedTuple):
+    """A result in parts: `max` or `min` of a quantity or "", its name, its component or "", and its place, m."""
+
     extreme: str
     name: str
     axis: str
@@ -108,6 +110,7 @@ class Wanted(NamedTuple):
 
 
 def parse_result(text: str, length: float) -> Wanted:
+    """The parts of a result such as `position.z@125` of a cable of length m; SceneError: it is none."""
     found = NAME.match(text)
     expected = "NAME@S, NAME.x@S, max NAME or min NAME, such as tension@0 or max curvature"
     if found is None:
@@ -137,6 +140,7 @@ def number_of(scene: Scene, key: str) -> float:
 
 
 def changed_scene(scene: Scene, key: str, value: float) -> Scene:
+    """The scene with another number at a key."""
     found, _ = parse_either(scene_text(scene), overrides=[f"{key}={float(value)!r}"])
     assert isinstance(found, Scene)
     return found
@@ -146,14 +150,10 @@ class AtRest:
     """The equilibrium on one mesh, its factors, and the values of results."""
 
     def __init__(self, scene: Scene, cells: float, wanted: Sequence[Wanted]) -> None:
-        refuse_use(scene, "about rest", given="derivatives")
         case = StaticCase(scene)
         resolution: Resolution = resolution_at_rest(case)
         self.scene, self.wanted = case.scene, wanted
-        if isinstance(self.scene.model, AdaptiveModel):
-            expected = "rods, catenaries or fixed zones, whose cells stay what they are"
-            fix = "write `model: rod`, or give `accuracy` and let the program choose"
-            raise SceneError([Complaint("model", "zones that move", expected, fix)])
+        refuse_use(self.scene, "derivatives", given="hybrid sensitivity")  # with the model that accuracy has chosen
         self.resolution = resolution.coarser(cells=cells) if cells > 1.0 else resolution
         self.case = case
         self.model, found = case.at_rest(self.resolution)

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.state.forces import DRAG, FLOW, SURFACE, WAVES
 from hybrid.kernels.state.state import LANES, RIDES, Floats, Line, Sea, State
 from hybrid.model.build import Model
+from hybrid.scene.combinations import RESPONSE_TO_MOTION
 
 # The block rows of a line at rest in a sea.
 RowsOf = Callable[[Sea], Floats]
@@ -67,8 +67,7 @@ def refuse_motions(models: tuple[Model, ...], names: tuple[str, ...]) -> None:
         elif moves.velocity.any() or moves.travel[:, 4].any():
             what = "an end that travels"
         if what:
-            expected = "motions that are sums of harmonics, of which a response by frequency is known"
-            raise SceneError([Complaint(f"motion of {name}", what, expected, "hybrid run computes it in time")])
+            raise RESPONSE_TO_MOTION.error(f"motion of {name}", what)
 
 
 def excitations_of(model: Model, line: Line, state: State, omegas: Floats, rows_of: RowsOf) -> list[Excitation]:

@@ -16,6 +16,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.scene.analysis import AdaptiveModel, RodModel, RodZone, ZonesModel
 from hybrid.scene.base import Finding, Place, Table, dotted
 from hybrid.scene.cable import Cable, Section
+from hybrid.scene.end_loads import Load
 from hybrid.scene.ends import Clamped, Ends, Pinned
 from hybrid.scene.payout import Payout
 from hybrid.scene.start_checks import SAME_LENGTH
@@ -26,7 +27,7 @@ Tables = Mapping[str, Any]
 Kind = Literal["physics", "not worked out", "several lines"]
 # Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
 USE, SYSTEM, LINE = "use", "system", "line"
-Use = Literal["", "stepped", "changed loads", "about rest"]
+Use = Literal["", "stepped", "changed loads", "about rest", "response", "derivatives"]
 LEAVE_OUT = "leave it out"
 ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
@@ -290,12 +291,25 @@ def _other_diameters(tables: Tables) -> Iterator[Place]:
     return ((*at, "diameter") for at, diameter in known if diameter != known[0][1])
 
 
+def _changing_loads(tables: Tables) -> Iterator[Place]:
+    """Forces and moments on ends, points and bodies that follow a history or end at a time."""
+    ends: Ends | None = tables.get("ends")
+    holders: list[tuple[Place, Any]] = [(("ends", x), end) for x, end in ends.named().items()] if ends else []
+    if SYSTEM in tables:
+        holders = [((key, x), one) for key in ("points", "bodies") for x, one in getattr(tables[SYSTEM], key).items()]
+    for at, holder in holders:
+        for name in ("force", "moment", "thrust"):
+            load = getattr(holder, name, None)
+            if isinstance(load, Load) and (load.value is None or load.until is not None):
+                yield (*at, name)
+
+
 def _several(tables: Tables) -> Iterator[Place]:
     return iter([("lines",)] if SYSTEM in tables else [])
 
 
-def _used(use: Use, at: str = "") -> Callable[[Tables], Iterator[Place]]:
-    return lambda tables: iter([(at or use,)] if tables.get(USE) == use else [])
+def _used(*uses: Use, at: str = "") -> Callable[[Tables], Iterator[Place]]:
+    return lambda tables: iter([(at or tables[USE],)] if tables.get(USE) in uses else [])
 
 
 # --- features -----------------------------------------------------------------------------------
@@ -355,10 +369,15 @@ SETTLED_FRICTION = Feature("friction that has settled in the equilibrium", "init
                                  lambda x: getattr(x, "friction", "neglected") != "neglected"))  # fmt: skip
 
 ABOUT_REST = Feature("natural modes, response to a sea, derivatives at rest", "hybrid modes",
-                     _used("about rest"))  # fmt: skip
+                     _used("about rest", "derivatives"))  # fmt: skip
+RESPONSE = Feature("response to a sea", "hybrid response", _used("response"))
+DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("derivatives"))
+CHANGING_LOADS = Feature("loads that change in time", "ends.end.force.history", _changing_loads)
+OTHER_MOTIONS = Feature("motions that are no sum of harmonics", "motion.file, motion.travel", lambda tables: ())
+MEMBERS = Feature("free bodies with members", "bodies.NAME.members", lambda tables: ())
 STEPPED = Feature("steps from outside", "hybrid.Simulation", _used("stepped"))
 CHANGED_LOADS = Feature(
-    "loads that change in mid-run", "hybrid resume --set KEY=VALUE", _used("changed loads", "settings")
+    "loads that change in mid-run", "hybrid resume --set KEY=VALUE", _used("changed loads", at="settings")
 )
 
 # Of one cable alone, by keys that several lines do not have.
@@ -379,6 +398,14 @@ WINCH = Feature("line that is paid out", "payout", Absent(
 RELEASED_TWIST = Refusal(
     TWISTED_RELEASE, TWISTED_CATENARY, "not worked out", "a torque passes through it into catenary zones",
     fix="give the end swivel: true, or write model: rod",
+)  # fmt: skip
+RESPONSE_TO_MOTION = Refusal(
+    OTHER_MOTIONS, RESPONSE, "physics", "a response by frequency is of motions that are sums of harmonics",
+    "harmonics", "hybrid run computes it in time",
+)  # fmt: skip
+RESPONSE_OF_MEMBERS = Refusal(
+    MEMBERS, RESPONSE, "not worked out", "their drag and wetting are no part of a response by frequency",
+    "bodies without members", "hybrid run computes them in time",
 )  # fmt: skip
 PAID = "line is paid out ({key})"
 REFUSALS: tuple[Refusal, ...] = (
@@ -477,6 +504,25 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         ABOUT_REST, OBSTACLES, "not worked out", "there are obstacles ({key}), whose contact opens and closes",
         "a line that touches the seabed at most", "hybrid run computes it in time",
+    ),
+    # --- response and derivatives ---
+    RESPONSE_TO_MOTION,
+    RESPONSE_OF_MEMBERS,
+    Refusal(
+        CHANGING_LOADS, RESPONSE, "physics", "the equilibrium of a response by frequency has loads that stay",
+        "a constant load", "give value: [x, y, z]; hybrid run computes one that changes, in time",
+    ),
+    Refusal(
+        DERIVATIVES, SEVERAL_LINES, "several lines", "there are several lines ({key}), whose derivatives are missing",
+        "one cable", "take differences of two equilibria",
+    ),
+    Refusal(
+        DERIVATIVES, MOVING_ZONES, "not worked out", "zones move ({key}), and a number may change where they are",
+        "rods, catenaries or fixed zones", "write `model: rod`, or give `accuracy` and let the program choose",
+    ),
+    Refusal(
+        DERIVATIVES, SETTLED_FRICTION, "physics", "friction has settled ({key}), and how depends on the way there",
+        "a rest without friction", "leave initial.friction out, or write neglected",
     ),
     # --- line that is paid out ---
     Refusal(

@@ -51,5 +51,6 @@ def weight_text(l: float, s: float, h: float, turn: float, ask: str) -> str:
     return (
         f"the cable bends under its own weight at s = {s:g} m, where tension is nearly none, within about {l:.2g} m, "
         f"less than its cell of {h:.2g} m ({np.degrees(turn):.0f} deg to the next cell): curvature and moment are "
-        f"wrong there, tension is less sure; cells of {SHOWS * l:.2g} m would do ({ask}, or `accuracy: {{curvature: 5%}}`)"
+        f"wrong there, tension is less sure; cells of {SHOWS * l:.2g} m would do ({ask}, or `accuracy: {{curvature: "
+        "5%}`)"
     )

@@ -104,8 +104,25 @@ def test_what_is_refused():
     ):
         with pytest.raises(hybrid.SceneError, match=words):
             hybrid.sensitivity(tables, [of], [by])
-    with pytest.raises(hybrid.SceneError, match="zones that move"):
+    with pytest.raises(hybrid.SceneError, match="zones move"):
         hybrid.sensitivity(tables | {"model": "adaptive"}, ["tension@0"], [key])
+
+
+@pytest.mark.parametrize("what", ["several lines", "friction has settled"])
+def test_what_no_derivative_is_known_of(what):
+    tables = scene(LINE, pinned(0, 0, -100), pinned(205, 0, 0), "catenary", 40, SEA)
+    if what == "several lines":
+        points = {"a": {"position": [0, 0, -100]}, "b": {"position": [205, 0, 0]}}
+        line = {"start": "a", "end": "b", "sections": [LINE], "mesh": {"cells": 40}, "model": "catenary"}
+        tables = {"environment": tables["environment"], "points": points, "lines": {"cable": line}}
+    else:
+        tables["environment"] = SEA | {"seabed": SEA["seabed"] | {"friction": 0.5}}
+        tables["initial"] = {"kind": "equilibrium", "friction": "settled"}
+    key = "lines.cable.sections[0].mass" if what == "several lines" else "cable.sections[0].mass"
+    with pytest.raises(hybrid.SceneError, match=what):
+        hybrid.sensitivity(tables, ["tension@0"], [key])
+    with pytest.raises(hybrid.SceneError, match=what):
+        hybrid.seek(tables, {"tension@0": 1e3}, [key])
 
 
 def test_the_command(tmp_path, monkeypatch):

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 import hybrid
 from hybrid.cli.commands import app
 from hybrid.modal.drag import across, along, size_deviation
+from hybrid.scene.combinations import RESPONSE_OF_MEMBERS, RESPONSE_TO_MOTION
 
 REGULAR = {"kind": "regular", "height": 1.0, "period": 7.0, "ramp": 10, "depth": 100}
 STORM = {"kind": "jonswap", "significant_height": 4.0, "peak_period": 12.0, "direction": 30, "ramp": 10, "depth": 100}
@@ -170,8 +171,21 @@ def test_what_is_refused():
     with pytest.raises(hybrid.SceneError, match="waves, or ends that move as harmonics"):
         hybrid.response(hung())
     travel = {"travel": {"by": [1, 0, 0], "over": 10.0}}
-    with pytest.raises(hybrid.SceneError, match="sums of harmonics"):
+    with pytest.raises(hybrid.SceneError, match=RESPONSE_TO_MOTION.why):
         hybrid.response(hung(REGULAR, motion=travel))
+    body = {
+        "initial_guess": [0, 0, -30], "mass": 800.0, "inertia": [900.0, 900.0, 40.0], "volume": 4.0,
+        "members": [{"start": [0, 0, -2], "end": [0, 0, 2], "diameter": 0.5, "drag": 1.0}],
+    }  # fmt: skip
+    line = {"start": "anchor", "end": "under", "sections": hung()["cable"]["sections"], "mesh": {"cells": 10}}
+    held = {
+        "environment": {"fluid": {"density": 1025, "surface": 0, "waves": STORM}},
+        "points": {"anchor": {"position": [0, 0, -95]}, "under": {"body": "float", "place": [0, 0, -2]}},
+        "bodies": {"float": body},
+        "lines": {"hung": line},
+    }
+    with pytest.raises(hybrid.SceneError, match=RESPONSE_OF_MEMBERS.why):
+        hybrid.response(held)
 
 
 def test_the_command_and_its_check(tmp_path, monkeypatch):
@@ -187,3 +201,28 @@ def test_the_command_and_its_check(tmp_path, monkeypatch):
     assert tension["deviation"] == pytest.approx(here, rel=0.01) and here == pytest.approx(there, rel=0.02)
     told = CliRunner().invoke(app, ["response", "hung.yaml"])
     assert "deviation" in told.output and "in 3 h" in told.output
+
+
+@pytest.mark.parametrize(
+    "load", [{"history": [[0, 0, 0, -50], [60, 0, 0, 900]]}, {"value": [0, 0, 900], "until": 30.0}]
+)
+def test_loads_that_change_in_time_are_refused(load):
+    scene = hung(STORM)
+    scene["ends"]["end"] = {"kind": "free", "force": load}
+    with pytest.raises(hybrid.SceneError, match=r"ends.end.force(.|\n)*loads that stay"):
+        hybrid.response(scene)
+    section = scene["cable"]["sections"]
+    lines = {"hung": {"start": "anchor", "end": "top", "sections": section, "mesh": {"cells": 20}, "model": "catenary"}}
+    points = {
+        "anchor": {"kind": "fixed", "position": [0, 0, -65]},
+        "top": {"kind": "free", "initial_guess": [0, 0, -5], "force": load},
+    }
+    system = {"environment": scene["environment"], "points": points, "lines": lines, "time": scene["time"]}
+    with pytest.raises(hybrid.SceneError, match=r"points.top.force(.|\n)*loads that stay"):
+        hybrid.response(system)
+
+
+def test_a_load_that_grows_is_that_of_the_equilibrium():
+    scene = hung(STORM)
+    scene["ends"]["end"] = {"kind": "free", "force": {"value": [0, 0, 20000], "ramp": 5.0}}
+    assert hybrid.response(scene).lines["cable"].mean_tension[-1] == pytest.approx(20000, rel=0.01)

@@ -75,6 +75,12 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.SETTLED_FRICTION, c.OBSTACLES): (BALL | {"initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
     (c.LAYERS, c.OBSTACLES): (BALL | {"resolution": {"cells_per_layer": 2}}, ""),
     (c.ABOUT_REST, c.OBSTACLES): (BALL, "about rest"),
+    (c.CHANGING_LOADS, c.RESPONSE): (
+        {"ends.end": {"kind": "free", "force": {"value": [1, 0, 0], "until": 2}}}, "response"
+    ),
+    (c.DERIVATIVES, c.SEVERAL_LINES): ({}, "derivatives"),
+    (c.DERIVATIVES, c.MOVING_ZONES): (MOVING, "derivatives"),
+    (c.DERIVATIVES, c.SETTLED_FRICTION): ({"initial": {"kind": "equilibrium", "friction": "settled"}}, "derivatives"),
     (c.PAYOUT_AT_START, c.PAYOUT_AT_END): (PAID | {"ends.start.payout": {"rate": 0.1, "ramp": 1.0}}, ""),
     (c.RELEASE_AT_WINCH, c.PAYOUT): (PAID | {END + "release_at": {"time": 2}}, ""),
     (c.STIFFNESS_DAMPING, c.PAYOUT): (PAID | {SECTION + "damping": {"stiffness": 0.01}}, ""),
@@ -95,7 +101,7 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.CHANGED_LOADS, c.SEVERAL_LINES): ({}, "changed loads"),
 }  # fmt: skip
 BY_SCHEMA = [x for x in REFUSALS if isinstance(x.feature.places, Absent)]
-OF_ARRAYS = [c.RELEASED_TWIST]
+OF_ARRAYS = [c.RELEASED_TWIST, c.RESPONSE_TO_MOTION, c.RESPONSE_OF_MEMBERS]
 
 
 def _scene(changes: dict[str, Any], several: bool) -> Scene | System:

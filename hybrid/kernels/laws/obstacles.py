@@ -26,7 +26,7 @@ import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, madd, mat_vec, mscale, outer, scale, sub
 from hybrid.kernels.laws.bed import bed_under
-from hybrid.kernels.laws.seabed import G1, G2, contact, pieces, stored
+from hybrid.kernels.laws.seabed import contact, stored, with_cell
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SEABED
 from hybrid.kernels.state.state import Floats
@@ -197,19 +197,8 @@ def stored_on_obstacles(line, sea, r):
         p1 = depth_in(rows, k, r, 0)
         for i in range(line.h.shape[0]):
             p0, p1 = p1, depth_in(rows, k, r, i + 1)
-            if p0 <= 0.0 and p1 <= 0.0:
-                continue
-            xb, xc = pieces(p0, p1, o)
-            for a, b in ((0.0, xb), (xb, xc), (xc, 1.0)):
-                w = 0.5 * line.h[i] * (b - a)
-                if w <= 0.0:
-                    continue
-                for g in (G1, G2):
-                    p = p0 + (a + g * (b - a)) * (p1 - p0)
-                    if p >= o:
-                        energy += w * stiffness * (0.5 * p * (p - o) + o * o / 6.0)
-                    elif p > 0.0:
-                        energy += w * stiffness * p * p * p / (6.0 * o)
+            if p0 > 0.0 or p1 > 0.0:
+                energy = with_cell(energy, p0, p1, line.h[i], stiffness, o)
     return energy
 
 

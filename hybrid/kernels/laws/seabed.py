@@ -124,6 +124,23 @@ def normal_forces(line, sea, r, N):
             N[i] += line.footing[i] * pressure(0.0, p0, p0, 0.0, 0.0, sea.stiffness, sea.damping, o)[0]
 
 
+@inner
+def with_cell(energy, p0, p1, h, k, o):
+    """Energy and what a cell of h (m) has stored between depths p0 and p1 (m) of its ends, J."""
+    xb, xc = pieces(p0, p1, o)
+    for a, b in ((0.0, xb), (xb, xc), (xc, 1.0)):
+        w = 0.5 * h * (b - a)
+        if w <= 0.0:
+            continue
+        for g in (G1, G2):
+            p = p0 + (a + g * (b - a)) * (p1 - p0)
+            if p >= o:
+                energy += w * k * (0.5 * p * (p - o) + o * o / 6.0)
+            elif p > 0.0:
+                energy += w * k * p * p * p / (6.0 * o)
+    return energy
+
+
 @kernel
 def stored(line, sea, r):
     """Energy (J) that the bed has stored under the line."""
@@ -138,19 +155,8 @@ def stored(line, sea, r):
                 energy += line.footing[i] * k * p * p * p / (6.0 * o)
     for i in range(line.h.shape[0]):
         p0, p1 = depth_of(sea, r, i), depth_of(sea, r, i + 1)
-        if p0 <= 0.0 and p1 <= 0.0:
-            continue
-        xb, xc = pieces(p0, p1, o)
-        for a, b in ((0.0, xb), (xb, xc), (xc, 1.0)):
-            w = 0.5 * line.h[i] * (b - a)
-            if w <= 0.0:
-                continue
-            for g in (G1, G2):
-                p = p0 + (a + g * (b - a)) * (p1 - p0)
-                if p >= o:
-                    energy += w * k * (0.5 * p * (p - o) + o * o / 6.0)
-                elif p > 0.0:
-                    energy += w * k * p * p * p / (6.0 * o)
+        if p0 > 0.0 or p1 > 0.0:
+            energy = with_cell(energy, p0, p1, line.h[i], k, o)
     return energy
 
 

@@ -145,26 +145,9 @@ def blank_steps_job() -> StepsJob:
     clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
     lone = np.zeros((1, 1), np.int64)
     return StepsJob(
-        none,
-        none,
-        none,
-        none,
-        none,
-        lone,
-        none,
-        clock,
-        counts,
-        np.zeros(3),
-        none,
-        none,
-        log,
-        *no_loads(),
-        np.zeros(0),
-        np.zeros((1, 1, BODY_SAMPLE)),
-        np.zeros((3, 1, WORK)),
-        lone,
-        none,
-    )
+        none, none, none, none, none, lone, none, clock, counts, np.zeros(3), none, none, log, *no_loads(),
+        np.zeros(0), np.zeros((1, 1, BODY_SAMPLE)), np.zeros((3, 1, WORK)), lone, none,
+    )  # fmt: skip
 
 
 read_steps = reader(blank_steps_job())

@@ -1,0 +1,167 @@
+"""One line of a linear network in the sea: what excites it, its linear drag, and its motion at every frequency."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
+from hybrid.kernels.state.forces import BODIES, DRAG, WAVES
+from hybrid.kernels.state.state import Floats, Line, Sea
+from hybrid.modal.drag import HARMONIC, across, along
+from hybrid.modal.excitation import Excitation, current_at, excitations_of, half_cells
+from hybrid.modal.matrices import ANCHOR, LinearLine, by_turn, rows_at_rest, sparse_rows
+from hybrid.modal.response_results import LineResponse
+from hybrid.model.build import Model
+from hybrid.solve.joined import JoinedLine
+
+# Of sigma^2: standard deviation of what linear drag leaves of |u| u, sqrt(3 - 8/pi) in still water, sqrt(2) in a
+# current that is faster than the motion.
+LEFT_STILL, LEFT_IN_FLOW = math.sqrt(3.0 - 8.0 / math.pi), math.sqrt(2.0)
+STRAIGHT = 1e-9  # 1/m: less is no bend
+AWRY = (0.3, 0.9, 0.4)  # along no axis
+
+
+class LoadedLine:
+    """One line, its drag, and what excites it."""
+
+    def __init__(self, x: JoinedLine, linear: LinearLine, model: Model, omegas: Floats) -> None:
+        self.name, self.linear, self.x = linear.name, linear, x
+        self.line, state, self.sea = linear.line, linear.state, model.sea.at(np.inf)
+        count, calm = self.line.s.size, _without_drag(self.line)
+
+        def rows_of(sea: Sea) -> Floats:
+            rows = np.zeros((count, SIZE * WIDTH))
+            wet = calm._replace(bits=calm.bits | WAVES)
+            rows_at_rest(wet, x._replace(sea=sea), x.ends, state, (0.0, ANCHOR), rows)
+            return rows
+
+        self.excited: list[Excitation] = excitations_of(model, x.line, state, omegas, rows_of)
+        still, moving = np.zeros((count, SIZE * WIDTH)), np.zeros((count, SIZE * WIDTH))
+        rows_at_rest(calm, x, x.ends, state, (0.0, ANCHOR), still)
+        rows_at_rest(calm, x, x.ends, state, (1.0, ANCHOR), moving)
+        self.damping = sparse_rows(moving - still)  # of the sections and of the bed
+        self.node, self.d, self.cn, self.ct, self.current = half_cells(self.line, self.sea, state)
+        e1 = np.cross(self.d, np.eye(3)[np.abs(self.d).argmin(axis=1)])
+        e1 /= np.linalg.norm(e1, axis=1)[:, None]
+        self.axes = np.stack([e1, np.cross(self.d, e1)], axis=1)  # (H, 2, 3)
+        self.point_drag = np.nan_to_num(self.line.point_drag) if self.line.bits & BODIES else np.zeros(count)
+        self.q = np.zeros((len(omegas), count, SIZE), complex)
+        self.omegas = omegas
+        self.blocks = np.zeros((count, 3, 3))
+
+    def drag_blocks(self, which: np.ndarray, start: bool) -> Floats:
+        """Linear drag (N+1, 3, 3) N s/m of every node, by the motion found last at some frequencies, which stand for
+        all; start: by the water alone."""
+        water = np.stack([self.excited[f].water for f in which])
+        motion = 0.0 * water if start else -1j * self.omegas[which, None, None] * self.q[which, :, 1:4]
+        relative = math.sqrt(len(self.omegas) / which.size) * (water - motion)  # (F, N+1, 3)
+        blocks = np.zeros((self.line.s.size, 3, 3))
+        self.left = np.zeros(self.line.s.size)  # N, what linear drag leaves of the quadratic one, standard deviation
+        factor = HARMONIC if len(self.omegas) == 1 else 1.0
+        used = (self.cn > 0.0) | (self.ct > 0.0)
+        if used.any():
+            node, d, axes = self.node[used], self.d[used], self.axes[used]
+            u = relative[:, node]
+            un = np.einsum("fhi,hmi->fhm", u, axes)
+            covariance = 0.5 * np.einsum("fhm,fhn->hmn", un, un.conj()).real
+            mean = np.einsum("hi,hmi->hm", self.current[used], axes)
+            square = np.linalg.eigvalsh(covariance)[:, -1]
+            part = np.minimum(np.linalg.norm(mean, axis=1) / np.sqrt(np.maximum(square, 1e-300)), 1.0)
+            np.add.at(self.left, node, self.cn[used] * square * (LEFT_STILL + part * (LEFT_IN_FLOW - LEFT_STILL)))
+            B = np.einsum("hmi,hmn,hnj->hij", axes, across(mean, covariance), axes) * self.cn[used][:, None, None]
+            ut = np.einsum("fhi,hi->fh", u, d)
+            t = along(np.einsum("hi,hi->h", self.current[used], d), np.sqrt(0.5 * (np.abs(ut) ** 2).sum(axis=0)))
+            B += (self.ct[used] * t)[:, None, None] * d[:, :, None] * d[:, None, :]
+            np.add.at(blocks, node, factor * B)
+        at = np.flatnonzero(self.point_drag)
+        if at.size:
+            u = relative[:, at]
+            covariance = 0.5 * np.einsum("fni,fnj->nij", u, u.conj()).real
+            flow = current_at(self.line, self.sea, self.linear.r[at])
+            blocks[at] += factor * self.point_drag[at][:, None, None] * across(flow, covariance)
+        return blocks
+
+    def full_damping(self) -> sparse.csr_array:
+        """Over the unknowns of all blocks."""
+        n = self.line.s.size
+        i = SIZE * np.arange(n)[:, None, None] + 1 + np.arange(3)[None, :, None]
+        j = SIZE * np.arange(n)[:, None, None] + 1 + np.arange(3)[None, None, :]
+        shape = self.blocks.shape
+        drag = sparse.csr_array(
+            (self.blocks.ravel(), (np.broadcast_to(i, shape).ravel(), np.broadcast_to(j, shape).ravel())),
+            shape=(SIZE * n, SIZE * n),
+        )
+        return self.damping + drag
+
+    def loads(self, which: np.ndarray, C: sparse.csr_array) -> Floats:
+        """Right-hand sides (5 (N+1), F): forces of the water, and motions of held ends."""
+        n, excited = self.line.s.size, [self.excited[f] for f in which]
+        w = self.omegas[which]
+        force, held = np.zeros((n, SIZE, which.size), complex), np.zeros((n, SIZE, which.size), complex)
+        for f, x in enumerate(excited):
+            force[:, 1:4, f] = x.forces
+            for k in (0, 1):
+                held[-k, 1:4, f] += x.shifts[k]
+        water = np.stack([x.water for x in excited], axis=2)
+        force[:, 1:4] += np.einsum("nij,njf->nif", self.blocks, water)
+        out = force.reshape(n * SIZE, -1)
+        if held.any():
+            moved = held.reshape(n * SIZE, -1)
+            K, M = self.linear.stiffness, self.linear.mass
+            out = out - (K @ moved - (M @ moved) * w**2 - 1j * (C @ moved) * w)
+        for k in (0, 1):
+            turns = np.stack([x.turns[k] for x in excited], axis=1)
+            if turns.any() and self.line.element[-k]:
+                out = out - self.turned[k].T @ turns
+        return out
+
+    @cached_property
+    def turned(self) -> tuple[Floats, ...]:
+        """(3, 5 (N+1)) of each end, what its frame does to the line when it turns."""
+        ends = [by_turn(self.line, self.x, self.x.ends, self.linear.state, k)[0] for k in (0, 1)]
+        return tuple(ends)
+
+    def take(self, which: np.ndarray, q: Floats) -> None:
+        """Keep the motion (F, N+1, 5) at some frequencies, with that of the ends that are held in it."""
+        self.q[which] = q
+        for f in which:
+            for k in (0, 1):
+                if self.x.joints[k] < 0 and self.x.ends.held[k]:
+                    self.q[f, -k, 1:4] = self.excited[f].shifts[k]
+
+    def result(self) -> LineResponse:
+        """Amplitudes of what users ask for."""
+        state, q = self.linear.state, self.q
+        l = np.linalg.norm(state.e, axis=1)
+        d = state.e / l[:, None]
+        de = np.diff(q[:, :, 1:4], axis=1)
+        dd = (de - np.einsum("fni,ni->fn", de, d)[:, :, None] * d) / l[:, None]
+        frames = self.x.ends.frame.reshape(2, 3, 3)[:, :, 2]  # tangents that clamps hold
+        turns = np.stack([x.turns for x in self.excited])
+        held = [np.cross(turns[:, k], frames[k])[:, None] for k in (0, 1)]
+        before, after = np.vstack([frames[:1], d]), np.vstack([d, frames[1:]])
+        change = np.concatenate([dd, held[1]], axis=1) - np.concatenate([held[0], dd], axis=1)
+        length = np.concatenate([[0.5 * l[0]], 0.5 * (l[1:] + l[:-1]), [0.5 * l[-1]]])
+        bend, change = (after - before) / length[:, None], change / length[:, None]
+        for k in (0, 1):
+            if not self.line.element[-k]:
+                bend[-k], change[:, -k] = 0.0, 0.0
+        size = np.linalg.norm(bend, axis=1)
+        t = self.linear.t
+        first = np.where(size[:, None] > STRAIGHT, bend / np.maximum(size, 1e-300)[:, None], np.cross(t, AWRY))
+        first -= np.einsum("ni,ni->n", first, t)[:, None] * t
+        first /= np.maximum(np.linalg.norm(first, axis=1), 1e-300)[:, None]
+        axes = np.stack([first, np.cross(t, first)], axis=1)
+        kappa = np.einsum("fni,nki->fnk", change, axes)
+        return LineResponse(
+            self.line.s.copy(), 0.5 * (self.line.s[1:] + self.line.s[:-1]), self.omegas / (2.0 * np.pi), q[:, :, 1:4],
+            q[:, 1:, 0], kappa[:, :, 0], kappa[:, :, 1], state.r.copy(), state.T.copy(), size,
+        )  # fmt: skip
+
+
+def _without_drag(line: Line) -> Line:
+    return line._replace(bits=line.bits & ~DRAG, point_drag=0.0 * line.point_drag)

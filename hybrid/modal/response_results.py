@@ -1,0 +1,113 @@
+"""What a response by frequency has found: amplitudes of each line, with deviations, spectra, extremes and fatigue."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hybrid.kernels.state.state import Floats
+from hybrid.modal.drag import size_deviation
+from hybrid.statistics.fatigue import Curve, curve_of, dirlik_damage
+
+HOURS = 3.0
+VARIES = ("position", "tension", "curvature", "curvature_across")
+
+
+@dataclass(frozen=True)
+class LineSpectrum:
+    """Power at single frequencies: f (F,) Hz, power (F, ...) in unit squared, half the squares of amplitudes."""
+
+    f: Floats
+    power: Floats
+
+    def moment(self, n: int) -> Floats:
+        """Sum of f^n power (...), unit squared times Hz^n."""
+        return np.asarray(np.tensordot(self.f**n, self.power, axes=1))
+
+
+@dataclass(frozen=True)
+class LineResponse:
+    """Response of one line: mean and complex amplitudes at every frequency.
+
+    s: (N+1,) m; middle: (N,) m, of the cells; f: (F,) Hz.  Amplitudes of exp(-2 pi i f t): position (F, N+1, 3) m,
+    tension (F, N) N, curvature (F, N+1) 1/m in the plane in which the line is bent at rest, and curvature_across it.
+    Means: (N+1, 3), (N,), (N+1,).
+    """
+
+    s: Floats
+    middle: Floats
+    f: Floats
+    position: Floats
+    tension: Floats
+    curvature: Floats
+    curvature_across: Floats
+    mean_position: Floats
+    mean_tension: Floats
+    mean_curvature: Floats
+
+    def spectrum(self, name: str) -> LineSpectrum:
+        """Power by frequency of position (F, N+1, 3), tension (F, N), curvature or curvature_across (F, N+1)."""
+        if name not in VARIES:
+            raise ValueError(f"{name!r}: one of {', '.join(VARIES)}")
+        return LineSpectrum(self.f, 0.5 * np.abs(getattr(self, name)) ** 2)
+
+    def deviation(self, name: str) -> Floats:
+        """Standard deviation, in the unit of the quantity; of `curvature` that of its size, with what is across."""
+        if name != "curvature":
+            return np.sqrt(self.spectrum(name).moment(0))
+        both = np.stack([self.curvature, self.curvature_across], axis=2)
+        covariance = 0.5 * np.einsum("fnk,fnl->nkl", both, both.conj()).real
+        return size_deviation(self.mean_curvature, covariance)
+
+    def period(self, name: str) -> Floats:
+        """Mean period between up-crossings, s."""
+        spectrum = self.spectrum(name)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.sqrt(spectrum.moment(0) / spectrum.moment(2)))
+
+    def most_probable(self, name: str, hours: float = HOURS) -> Floats:
+        """Most probable largest deviation from the mean in so many hours of a Gaussian process; never more than all
+
+        amplitudes together.
+        """
+        period = self.period(name)
+        cycles = np.maximum(3600.0 * hours / np.where(period > 0.0, period, np.inf), 1.0)
+        together = np.abs(getattr(self, name)).sum(axis=0)
+        return np.minimum(self.deviation(name) * np.sqrt(2.0 * np.log(cycles)), together)
+
+    def damage(self, curve: str | Mapping[str, float | str] | Curve, strength: float, hours: float = HOURS) -> Floats:
+        """Fatigue damage (N,) of the tension by Dirlik's law, with a T-N curve over a strength (N)."""
+        found = curve_of(curve)
+        spectrum = self.spectrum("tension")
+        scaled: Any = LineSpectrum(spectrum.f, spectrum.power / strength**2)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.nan_to_num(dirlik_damage(scaled, found, 3600.0 * hours))
+
+
+@dataclass(frozen=True)
+class Response:
+    """Response of a scene: by the name of a line (`cable` of a scene of one); notes say where it is not valid.
+
+    points: (F, 3) m and bodies: (F, 6) m, rad by name, complex amplitudes.  checks: of a run in time, by quantity where
+    it varies most, the standard deviation here and there.
+    """
+
+    title: str
+    lines: Mapping[str, LineResponse]
+    points: Mapping[str, Floats]
+    bodies: Mapping[str, Floats]
+    rounds: int
+    checks: Mapping[str, tuple[float, float]]
+    notes: tuple[str, ...]
+
+    @property
+    def valid(self) -> bool:
+        """Whether nothing speaks against any of it."""
+        return not self.notes
+
+    def valid_for(self, name: str) -> bool:
+        """Whether nothing speaks against a quantity: what is said of curvature alone is no doubt of others."""
+        return not any("curvature at s" not in x or name.startswith("curvature") for x in self.notes)

@@ -1,0 +1,93 @@
+"""Where the motion of a line is too large for a response that is linear: every such place is told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.special import ndtr
+
+from hybrid.kernels.state.forces import SEABED
+from hybrid.modal.loaded_line import LoadedLine
+from hybrid.modal.response_results import LineResponse
+
+# Parts of the motion beyond which the line is not linear: share of time that it would be slack; turn of a chord, rad;
+# mean tension by the stretch of swinging, of the standard deviation of tension; length that lifts off or touches down.
+SLACK_SHARE, TURN, STRETCH, LIFTS = 1e-3, 0.2, 0.25, 0.02
+# Part by which what linear drag leaves out may change a deviation of curvature of at least this part of the largest.
+BY_HARMONICS, OF_LARGEST = 0.1, 0.2
+
+
+def doubts_of(x: LoadedLine) -> Iterator[str]:
+    """Each place where the motion of a line is not small, in words."""
+    found = x.result()
+    for doubt in (_slack, _swing, _touchdown, _harmonics):
+        yield from doubt(x, found)
+
+
+def _slack(x: LoadedLine, found: LineResponse) -> Iterator[str]:
+    """Where tension would be below zero."""
+    tension, deviation = found.mean_tension, found.deviation("tension")
+    slack = ndtr(-tension / np.maximum(deviation, 1e-300))
+    k = int(slack.argmax())
+    if slack[k] > SLACK_SHARE:
+        yield (
+            f"at s = {found.middle[k]:.4g} m the tension of {tension[k]:.4g} N has a standard deviation of "
+            f"{deviation[k]:.4g} N: it would be below zero for {100.0 * slack[k]:.2g} % of the time"
+        )
+
+
+def _swing(x: LoadedLine, found: LineResponse) -> Iterator[str]:
+    """Where chords turn so far that their squares count: by themselves, and by the length that they take."""
+    d = x.linear.state.e / np.linalg.norm(x.linear.state.e, axis=1)[:, None]
+    l = np.linalg.norm(x.linear.state.e, axis=1)
+    de = np.diff(found.position, axis=1)
+    de = de - np.einsum("fni,ni->fn", de, d)[:, :, None] * d
+    square = 0.5 * (np.abs(de) ** 2).sum(axis=(0, 2)) / l**2
+    k = int(square.argmax())
+    if square[k] > TURN**2:
+        yield f"at s = {found.middle[k]:.4g} m the line turns by {math.sqrt(square[k]):.2g} rad (standard deviation)"
+    compliance = float((x.line.h * x.line.ck).sum())
+    deviation = found.deviation("tension")
+    if compliance > 0.0:
+        pull = 0.5 * float((square * l).sum()) / compliance
+        at = int(deviation.argmin())
+        if pull > STRETCH * deviation[at]:
+            yield (
+                f"swinging alone stretches the line, which would take {pull:.3g} N in the mean where the standard "
+                f"deviation of the tension is {deviation[at]:.3g} N (s = {found.middle[at]:.4g} m)"
+            )
+
+
+def _touchdown(x: LoadedLine, found: LineResponse) -> Iterator[str]:
+    """What of the line lifts off the bed or comes down on it."""
+    if not x.line.bits & SEABED or not x.sea.stiffness > 0.0:
+        return
+    gap = found.mean_position @ x.sea.normal - x.sea.offset
+    up = np.sqrt(0.5 * (np.abs(found.position @ x.sea.normal) ** 2).sum(axis=0))
+    share = np.append(x.line.h, x.line.h[-1])
+    # the length over which a motion of two standard deviations crosses the bed
+    crosses = float(share[2.0 * up > np.abs(gap)].sum())
+    if crosses > LIFTS * float(x.line.s[-1]):
+        yield (
+            f"about {crosses:.3g} m of line lift off the bed and come down on it, which contact as it is at rest does "
+            "not show: tension and curvature there are doubtful"
+        )
+
+
+def _harmonics(x: LoadedLine, found: LineResponse) -> Iterator[str]:
+    """Where the harmonics of quadratic drag bend the line as much as its motion does; tension hardly hears of them."""
+    deviation = found.deviation("curvature")
+    length = np.linalg.norm(x.linear.state.e, axis=1)
+    share = 0.5 * (np.append(length, 0.0) + np.append(0.0, length))
+    pull = np.maximum(np.interp(found.s, found.middle, found.mean_tension), 1e-300)
+    bend = x.left / (share * pull)  # of a string whose load varies slowly: the most that it can be
+    counts = deviation >= OF_LARGEST * deviation.max()
+    more = np.where(counts, np.hypot(1.0, bend / np.maximum(deviation, 1e-300)) - 1.0, 0.0)
+    k = int(more.argmax())
+    if more[k] > BY_HARMONICS:
+        yield (
+            f"curvature at s = {found.s[k]:.4g} m: harmonics of the drag, which linear drag leaves out, may add up to "
+            f"{100.0 * more[k]:.0f} % to its standard deviation of {deviation[k]:.3g} 1/m"
+        )
