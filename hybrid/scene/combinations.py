@@ -167,6 +167,11 @@ def _curls(section: Section) -> bool:
     return section.intrinsic_curvature is not None and any(section.intrinsic_curvature)
 
 
+def _directed(section: Section) -> bool:
+    """Whether a section bends otherwise in another direction about its axis."""
+    return section.anisotropic or (_curls(section) and any((section.intrinsic_curvature or ())[:2]))
+
+
 def _winches(tables: Tables) -> Iterator[tuple[Place, Payout]]:
     ends: Ends | None = tables.get("ends")
     for name, end in ends.named().items() if ends is not None else ():
@@ -308,6 +313,11 @@ def _several(tables: Tables) -> Iterator[Place]:
     return iter([("lines",)] if SYSTEM in tables else [])
 
 
+def _either(*features: Feature) -> Callable[[Tables], Iterator[Place]]:
+    """Where one of several features is asked for, which are refused for one reason."""
+    return lambda tables: (at for x in features for at in x.places(tables))
+
+
 def _used(*uses: Use, at: str = "") -> Callable[[Tables], Iterator[Place]]:
     return lambda tables: iter([(at or tables[USE],)] if tables.get(USE) in uses else [])
 
@@ -336,13 +346,16 @@ STIFFNESS_DAMPING = Feature("damping proportional to stiffness", "damping.stiffn
                             _in_sections("damping", "stiffness",
                                          of=lambda x: x.damping is not None and x.damping.stiffness))  # fmt: skip
 SWIVEL = Feature("swivels on the line", "attachments: kind: swivel", _swivels)
-SWIVEL_IN_BEAM = Feature("swivels beside sections of two bending stiffnesses", "attachments: kind: swivel",
-                         _swivels_beside(lambda x: x.anisotropic))  # fmt: skip
-SWIVEL_IN_CURL = Feature("swivels beside curved sections", "attachments: kind: swivel",
-                         _swivels_beside(lambda x: _curls(x) and any(x.intrinsic_curvature[:2])))  # type: ignore[index]  # fmt: skip
+DIRECTED = Feature(
+    "sections that have a direction about their axis", "bending_stiffness: [EI_1, EI_2], intrinsic_curvature",
+    _either(TWO_STIFFNESSES, CURLED),
+)  # fmt: skip
+SWIVEL_BESIDE = Feature("swivels beside such sections", "attachments: kind: swivel", _swivels_beside(_directed))
 PIPE_CURLED = Feature("stress of a pipe", "pipe",
                       _in_sections("pipe", of=lambda x: x.pipe is not None and _curls(x)))  # fmt: skip
 TURNS = Feature("turns at an end", "ends.end.turns", _turns)
+TORSION = Feature("turns at an end, torque of tension", "ends.end.turns, tension_torque",
+                  _either(TURNS, TORQUE_OF_TENSION))  # fmt: skip
 PLANE = Feature("a plane", "dimension: 2", _plane)
 SELF_CONTACT = Feature("contact of a line with itself", "contact.self", _self_contact)
 PAYOUT = Feature("line that is paid out", "ends.end.payout", _paid_out)
@@ -372,8 +385,8 @@ ABOUT_REST = Feature("natural modes, response to a sea, derivatives at rest", "h
                      _used("about rest", "derivatives"))  # fmt: skip
 RESPONSE = Feature("response to a sea", "hybrid response", _used("response"))
 DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("derivatives"))
-CHANGING_LOADS = Feature("loads that change in time", "ends.end.force.history", _changing_loads)
-OTHER_MOTIONS = Feature("motions that are no sum of harmonics", "motion.file, motion.travel", lambda tables: ())
+OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change in time",
+                        "motion.file, motion.travel, force.history", _changing_loads)  # fmt: skip
 MEMBERS = Feature("free bodies with members", "bodies.NAME.members", lambda tables: ())
 STEPPED = Feature("steps from outside", "hybrid.Simulation", _used("stepped"))
 CHANGED_LOADS = Feature(
@@ -400,8 +413,8 @@ RELEASED_TWIST = Refusal(
     fix="give the end swivel: true, or write model: rod",
 )  # fmt: skip
 RESPONSE_TO_MOTION = Refusal(
-    OTHER_MOTIONS, RESPONSE, "physics", "a response by frequency is of motions that are sums of harmonics",
-    "harmonics", "hybrid run computes it in time",
+    OTHER_MOTIONS, RESPONSE, "physics", "a response by frequency is of what is constant or a sum of harmonics",
+    "harmonics, and loads that stay", "hybrid run computes it in time",
 )  # fmt: skip
 RESPONSE_OF_MEMBERS = Refusal(
     MEMBERS, RESPONSE, "not worked out", "their drag and wetting are no part of a response by frequency",
@@ -420,9 +433,9 @@ REFUSALS: tuple[Refusal, ...] = (
         "nothing or 0", "leave it out, or write `model: rod`",
     ),
     Refusal(
-        TORQUE_OF_TENSION, PLANE, "physics", "dimension is 2 and there is no torsion", "nothing or 0", IN_SPACE
+        TORSION, PLANE, "physics", "dimension is 2 and there is no torsion", "nothing or 0",
+        f"leave it out, or {IN_SPACE}",
     ),
-    Refusal(TURNS, PLANE, "physics", "dimension is 2 and there is no torsion", "0", f"leave it out, or {IN_SPACE}"),
     Refusal(
         PLANE, SELF_CONTACT, "physics", "contact of the cable with itself leads out of a plane", "3 or nothing",
         "or leave contact.self out",
@@ -432,14 +445,11 @@ REFUSALS: tuple[Refusal, ...] = (
         "leave it out, or leave {key} out",
     ),
     Refusal(
-        SWIVEL_IN_BEAM, TWO_STIFFNESSES, "not worked out",
-        "a section beside it has a bending_stiffness of two numbers, and its two sides turn against each other",
-        "a place between sections of one bending_stiffness", "put a short section with one bending_stiffness around it",
-    ),
-    Refusal(
-        SWIVEL_IN_CURL, CURLED, "not worked out",
-        "a section beside it has an intrinsic_curvature, and its two sides turn against each other",
-        "a place between straight sections", "put a short section without intrinsic_curvature around it",
+        SWIVEL_BESIDE, DIRECTED, "not worked out",
+        "a section beside it bends otherwise in another direction about its axis, and its two sides turn against "
+        "each other",
+        "a place between straight sections of one bending_stiffness",
+        "put a short straight section with one bending_stiffness around it",
     ),
     Refusal(
         CURLED, PIPE_CURLED, "not worked out", "the stress of a pipe is that of its curvature from straight (pipe)",
@@ -508,10 +518,6 @@ REFUSALS: tuple[Refusal, ...] = (
     # --- response and derivatives ---
     RESPONSE_TO_MOTION,
     RESPONSE_OF_MEMBERS,
-    Refusal(
-        CHANGING_LOADS, RESPONSE, "physics", "the equilibrium of a response by frequency has loads that stay",
-        "a constant load", "give value: [x, y, z]; hybrid run computes one that changes, in time",
-    ),
     Refusal(
         DERIVATIVES, SEVERAL_LINES, "several lines", "there are several lines ({key}), whose derivatives are missing",
         "one cable", "take differences of two equilibria",

@@ -53,12 +53,10 @@ CLAMPED = {ONE + "connections": {"end": {"kind": "clamped", "tangent": [1, 0, 0]
 EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.TWO_STIFFNESSES, c.MOVING_ZONES): (TWO | MOVING, ""),
     (c.ROTARY_INERTIA, c.MOVING_ZONES): ({SECTION + "rotary_inertia": 1e-3} | MOVING, ""),
-    (c.TORQUE_OF_TENSION, c.PLANE): (TORQUE | {"dimension": 2}, ""),
-    (c.TURNS, c.PLANE): ({END + "turns": 2, "dimension": 2}, ""),
+    (c.TORSION, c.PLANE): (TORQUE | {"dimension": 2}, ""),
     (c.PLANE, c.SELF_CONTACT): ({"dimension": 2, "contact": {"self": True}}, ""),
     (c.SWIVEL, c.TURNS): (SWIVEL | {END + "turns": 2}, ""),
-    (c.SWIVEL_IN_BEAM, c.TWO_STIFFNESSES): (SWIVEL | TWO, ""),
-    (c.SWIVEL_IN_CURL, c.CURLED): (SWIVEL | CURVED, ""),
+    (c.SWIVEL_BESIDE, c.DIRECTED): (SWIVEL | TWO, ""),
     (c.CURLED, c.PIPE_CURLED): (CURVED | {SECTION + "pipe": {"wall": 0.002, "modulus": 2e11}}, ""),
     (c.STRETCH_LAW, c.TORQUE_OF_TENSION): (ROPE | TORQUE, ""),
     (c.TORQUE_OF_TENSION, c.FOLLOWING_CELLS): (TORQUE | FOLLOWING, ""),
@@ -75,7 +73,7 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.SETTLED_FRICTION, c.OBSTACLES): (BALL | {"initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
     (c.LAYERS, c.OBSTACLES): (BALL | {"resolution": {"cells_per_layer": 2}}, ""),
     (c.ABOUT_REST, c.OBSTACLES): (BALL, "about rest"),
-    (c.CHANGING_LOADS, c.RESPONSE): (
+    (c.OTHER_MOTIONS, c.RESPONSE): (
         {"ends.end": {"kind": "free", "force": {"value": [1, 0, 0], "until": 2}}}, "response"
     ),
     (c.DERIVATIVES, c.SEVERAL_LINES): ({}, "derivatives"),
@@ -101,7 +99,12 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.CHANGED_LOADS, c.SEVERAL_LINES): ({}, "changed loads"),
 }  # fmt: skip
 BY_SCHEMA = [x for x in REFUSALS if isinstance(x.feature.places, Absent)]
-OF_ARRAYS = [c.RELEASED_TWIST, c.RESPONSE_TO_MOTION, c.RESPONSE_OF_MEMBERS]
+# Other examples of pairs whose one reason is that of several features.
+OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
+    ((c.TORSION, c.PLANE), {END + "turns": 2, "dimension": 2}, ""),
+    ((c.SWIVEL_BESIDE, c.DIRECTED), SWIVEL | CURVED, ""),
+)
+OF_ARRAYS = [c.RELEASED_TWIST, c.RESPONSE_OF_MEMBERS]
 
 
 def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
@@ -123,10 +126,11 @@ def test_every_refusal_has_an_example() -> None:
     assert set(pairs) == {*EXAMPLES, *((x.feature, x.beside) for x in (*BY_SCHEMA, *OF_ARRAYS))}
 
 
-@pytest.mark.parametrize("pair", EXAMPLES, ids=_id)
-def test_it_is_refused_with_its_reason_and_remedy(pair: tuple[c.Feature, c.Feature]) -> None:
+@pytest.mark.parametrize(("pair", "changes", "use"), [*((k, *x) for k, x in EXAMPLES.items()), *OTHERS], ids=_id)
+def test_it_is_refused_with_its_reason_and_remedy(
+    pair: tuple[c.Feature, c.Feature], changes: dict[str, Any], use: Use
+) -> None:
     """With the reason, what to do and, where the scene alone asks for both, the line of the file."""
-    changes, use = EXAMPLES[pair]
     refusal = next(x for x in REFUSALS if (x.feature, x.beside) == pair)
     with pytest.raises(SceneError) as told:
         refuse_use(_scene(changes, _of_several(pair)), use, "asked")
