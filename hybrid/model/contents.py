@@ -11,7 +11,7 @@ from hybrid.errors import OF_AN_END
 from hybrid.kernels.laws.obstacles import STIFFNESS
 from hybrid.kernels.mesh.criteria import CRITERIA
 from hybrid.kernels.state.forces import DRAG, FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.state.state import Line
+from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.mesh import Zone
 from hybrid.model.obstacles import obstacle_rows
 from hybrid.model.plausibility import implausible
@@ -182,9 +182,9 @@ def _idle(scene: Scene, line: Line) -> Iterator[Entry]:
         yield Entry(IDLE, False, f"{why} to what it carries", event="ignored")
 
 
-def _obstacles(scene: Scene) -> Iterator[Entry]:
-    """Each obstacle, with how stiff it is."""
-    for (name, x), row in zip(scene.obstacles.items(), obstacle_rows(scene), strict=True):
+def obstacle_entries(scene: Scene, rows: Floats) -> Iterator[Entry]:
+    """Each obstacle of a scene, with how stiff it is; rows: (M, OBSTACLE) of them."""
+    for (name, x), row in zip(scene.obstacles.items(), rows, strict=True):
         why = "given" if x.stiffness else "so that it lies at most a twentieth of its diameter deep at rest"
         text = f"obstacle {name}: {x.kind}, {row[STIFFNESS]:.3g} N/m per m, friction {x.friction:g}"
         yield Entry(text, True, f"obstacles.{name}; stiffness: {why}")
@@ -237,7 +237,7 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
         if loose is not None:
             why = f"no effect: the catenary zone s = {loose.s_a:g} to {loose.s_b:g} m passes no torque on; a rod does"
         entries.append(Entry(what, loose is None, why, event="torque neglected" if loose is not None else ""))
-    entries += _obstacles(scene)
+    entries += obstacle_entries(scene, obstacle_rows(scene))
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
         moving = end.prescribed_motion is not None
         spring = f", by a spring of {end.spring:g} N m/rad" if end.spring < inf else ""

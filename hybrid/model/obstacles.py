@@ -48,14 +48,22 @@ def strand_radius(scene: Scene) -> float:
     return 0.5 * max(x.diameter or 0.0 for x in scene.cable.sections)
 
 
-def obstacle_rows(scene: Scene) -> Floats:
-    """(M, OBSTACLE) of the obstacles of a scene, in its order, as kernels.laws.obstacles has them."""
+def pull_on_obstacles(scene: Scene) -> float:
+    """The tension, N, with which a line of a scene lies on obstacles."""
+    return tension_scale(scene, merged_sections(scene.cable.sections), False)
+
+
+def obstacle_rows(scene: Scene, pull: float | None = None) -> Floats:
+    """(M, OBSTACLE) of the obstacles of a scene, in its order, as kernels.laws.obstacles has them.
+
+    pull: N, tension with which the line lies on them; None: what the scene asks for.
+    """
     rows = np.zeros((len(scene.obstacles), NO_OBSTACLES.shape[1]))
     if not len(rows):
         return NO_OBSTACLES
     strand = strand_radius(scene)
     weight = max(x.mass for x in scene.cable.sections) * (scene.environment.gravity or 1.0)
-    pull = tension_scale(scene, merged_sections(scene.cable.sections), False)
+    pull = pull_on_obstacles(scene) if pull is None else pull
     for row, x in zip(rows, scene.obstacles.values(), strict=True):
         row[PLACE : PLACE + 3], row[STRAND] = x.at, strand
         row[KIND], row[RADIUS], over = ROUND, strand, scene.length

@@ -24,10 +24,11 @@ from hybrid.model.clamps import (
     untwisted,
     with_clamps,
 )
-from hybrid.model.contents import IDLE
+from hybrid.model.contents import IDLE, obstacle_entries
 from hybrid.model.ends import EndLoad
 from hybrid.model.first_state import first_state
 from hybrid.model.initial_shape import dead_loads, hung
+from hybrid.model.obstacles import obstacle_rows, pull_on_obstacles
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
@@ -171,6 +172,8 @@ def build_system(system: System, resolution: SystemResolution | None = None) -> 
     maker = _Lines(system, joined, bodies, resolution)
     maker.turn_points()
     models = [maker.model(name) for name in system.lines]
+    if system.obstacles:
+        models = _on_obstacles(system, models, made)
     if _takes_current(system, models):
         models = [replace(x, contents=tuple(e for e in x.contents if e.what != IDLE)) for x in models]
     known = maker.known
@@ -184,6 +187,24 @@ def build_system(system: System, resolution: SystemResolution | None = None) -> 
         np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
         maker.seats, known, maker.scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
     )  # fmt: skip
+
+
+def _on_obstacles(system: System, models: Sequence[Model], bodies: Sequence[BodyModel]) -> list[Model]:
+    """The models with obstacles as stiff as the pull of all lines, points and bodies asks for: a line that is cut lies
+    on them as it does in one piece."""
+    pulls = [pull_on_obstacles(system.scene_of(name, system.carried(name))) for name in system.lines]
+    for body in bodies:
+        row = np.zeros(NUMBERS)
+        body.load(np.inf, 0.0, row)
+        pulls.append(float(np.linalg.norm(row[FORCE : FORCE + 3]) + abs(body.numbers[LIFT])))
+    found = []
+    for name, x in zip(system.lines, models, strict=True):
+        scene, rows = system.scene_of(name), x.sea.values.obstacles
+        before = {e.what for e in obstacle_entries(scene, rows)}
+        rows[:] = obstacle_rows(scene, sum(pulls))
+        kept = tuple(e for e in x.contents if e.what not in before)
+        found.append(replace(x, contents=(*kept, *obstacle_entries(scene, rows))))
+    return found
 
 
 def _takes_current(system: System, models: Sequence[Model]) -> bool:

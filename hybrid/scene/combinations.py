@@ -400,9 +400,6 @@ ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
 OTHER_STARTS = Feature("starts other than equilibrium", "initial", Absent(
     {"System": ("initial",)}, "several lines start in equilibrium, found from initial_guess of points and bodies"
 ))  # fmt: skip
-OBSTACLES_OF_ONE = Feature("fixed obstacles", "obstacles", Absent(
-    {"System": ("obstacles",)}, "leave it out: one cable, with `cable` and `ends`, touches obstacles"
-))  # fmt: skip
 WINCH = Feature("line that is paid out", "payout", Absent(
     {x: ("payout",) for x in ("FixedPoint", "FreePoint", "Fairlead", "JoinedLine")},
     "leave it out: lines of several keep their lengths; one cable, with `cable` and `ends`, can be paid out",
@@ -581,7 +578,7 @@ REFUSALS: tuple[Refusal, ...] = (
     *(
         Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)
         for x in (
-            ONE_PLANE, OTHER_STARTS, OBSTACLES_OF_ONE, WINCH
+            ONE_PLANE, OTHER_STARTS, WINCH
         )
         if isinstance(x.places, Absent)
     ),

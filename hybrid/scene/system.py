@@ -33,6 +33,7 @@ from hybrid.scene.combinations import instead
 from hybrid.scene.connections import ClampedConnection, Connections
 from hybrid.scene.end_loads import GivenLoad
 from hybrid.scene.ends import Clamped, End, Ends, Pinned, Triple
+from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.points import Failure, Fairlead, FixedPoint, FreePoint, Name, Point
 from hybrid.scene.quantities import Quantities
 from hybrid.scene.schema import Scene, missing_time
@@ -208,6 +209,9 @@ class System(Table):
         default={}, description="rigid bodies by name, with fairleads among the points"
     )
     lines: dict[Name, JoinedLine] = Field(min_length=1, description="lines by name, each between two points")
+    obstacles: Obstacles = Field(
+        default={}, description="fixed obstacles by name that every line touches: planes, spheres, cylinders"
+    )
     time: Time | None = Field(default=None, description="how long to compute; absent: statics only")
     accuracy: AskedAccuracy | None = Field(
         default=None,
@@ -394,7 +398,7 @@ class System(Table):
         tables: dict[str, Any] = {
             "title": f"{self.title}, line {name}" if self.title else f"line {name}", "environment": self.environment,
             "cable": line.cable, "ends": Ends(**ends), "initial": initial, "model": line.chosen_model,
-            "mesh": line.mesh, "resolution": line.resolution, "contact": line.contact,
+            "mesh": line.mesh, "resolution": line.resolution, "contact": line.contact, "obstacles": self.obstacles,
             "accuracy": self._accuracy_of(line),
         }  # fmt: skip
         if self.time is not None:

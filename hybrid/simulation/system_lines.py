@@ -38,7 +38,7 @@ from hybrid.kernels.state.books import (
     blank_books,
     sample_size,
 )
-from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, OBSTACLES, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one
 from hybrid.model.build import Model
 from hybrid.model.output_points import output_points
@@ -218,7 +218,8 @@ class LineResult:
         line = self.model.line
         self.diagnostics.found_by(found.pushed, slack_cell(x, state), state)
         if line.bits & FRICTION and self.number not in found.with_friction:
-            text = "this equilibrium of several lines is the one without friction on the seabed"
+            under = "obstacles" if line.bits & OBSTACLES else "the seabed"
+            text = f"this equilibrium of several lines is the one without friction on {under}"
             self.events.event(0.0, 0.0, self.model.length, "static friction neglected", text)
         touches = found.settled and bool(self.books.touch[:1].any())
         if line.bits & SELF_FRICTION and touches:

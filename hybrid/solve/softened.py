@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from hybrid.kernels.laws.obstacles import KIND, ONSET_OF, RADIUS, ROUND, STIFFNESS
-from hybrid.kernels.state.state import Floats, Sea
+from hybrid.kernels.state.forces import OBSTACLES, SEABED
+from hybrid.kernels.state.state import Line, Sea
 
-# Of its radius: how deep a line may lie in a round obstacle where a continuation begins.
-SOFT = 0.5
+# How deep a continuation lets a line lie first in the bed, of its length, and in a round obstacle, of its radius.
+SOFT_BED, SOFT = 0.05, 0.5
 
 
 def softened(sea: Sea, part: float) -> Sea:
@@ -17,9 +18,10 @@ def softened(sea: Sea, part: float) -> Sea:
     return sea._replace(stiffness=sea.stiffness * part, onset=sea.onset / part, obstacles=rows)
 
 
-def softest_obstacles(rows: Floats, deep: float) -> float:
-    """The part of the stiffness of obstacles (M, OBSTACLE) at which lines lie deep in them; deep: in planes, m."""
-    if not len(rows):
-        return 1.0
-    depth = [SOFT * row[RADIUS] if row[KIND] == ROUND else deep for row in rows]
-    return min(1.0, *(float(row[ONSET_OF]) / x for row, x in zip(rows, depth, strict=True)))
+def softest(line: Line, sea: Sea, length: float) -> float:
+    """The part of the stiffness of bed and obstacles at which a line of this length (m) lies as deep as it may."""
+    soft = sea.onset / (SOFT_BED * length) if line.bits & SEABED else 1.0
+    for row in sea.obstacles if line.bits & OBSTACLES else ():
+        deep = SOFT * row[RADIUS] if row[KIND] == ROUND else SOFT_BED * length
+        soft = min(soft, float(row[ONSET_OF]) / deep)
+    return min(1.0, soft)

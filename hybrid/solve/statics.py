@@ -28,7 +28,7 @@ from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, Stat
 from hybrid.kernels.step.step import friction_axes
 from hybrid.solve.flaws import flaw_of_line, fold_text, lowest_tension
 from hybrid.solve.laid import laid_on_bed
-from hybrid.solve.softened import softened, softest_obstacles
+from hybrid.solve.softened import softened, softest
 from hybrid.solve.stability import Stability, is_judged
 from hybrid.solve.stepper import Stepper
 from hybrid.solve.workspaces import workspace_of
@@ -49,7 +49,6 @@ PUSH, TURN = 1e-2, 0.1  # the push off an unstable equilibrium: of the length pe
 # Of the length: unstable equilibria that are nearer than this are one; the most of them that a line is pushed off.
 SAME, MOST_PUSHES = 1e-3, 12
 RELAXING_STEPS = 2000  # of the pseudo-transient, at most
-SOFT_BED = 0.05  # of the length: how deep a cable may rest in the seabed where a continuation begins
 LIMP = 1e-3  # part of the bending stiffness there
 GYRATION = 0.02  # of the length: radius of gyration lent to the spin of a line that settles
 CALM = 1e-4  # of the length: movement in a step below which Newton is tried again
@@ -195,14 +194,13 @@ def _eased(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, int
     A part of the way that fails is halved.
     """
     line, sea, state = solver.line, solver.sea, start
-    softest = min(1.0, sea.onset / (SOFT_BED * solver.length)) if line.bits & SEABED else 1.0
-    softest = min(softest, softest_obstacles(sea.obstacles, SOFT_BED * solver.length))
+    soft_first = softest(line, sea, solver.length)
     grown = float(sea.now[1])
     outcome, where, done, part, steps = Outcome.OK, -1, -1.0, 1.0, 0
     while done < 1.0 and part > 1e-3:
         goal = min(1.0, done + part)
         x = max(goal, 0.0)
-        soft = softest ** (1.0 - x)
+        soft = soft_first ** (1.0 - x)
         now = sea.now.copy()
         now[1] = x * grown
         easy = softened(sea, soft)._replace(now=now)

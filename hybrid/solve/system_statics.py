@@ -10,13 +10,14 @@ import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.junctions.bodies import DAMPING, MASS, V
-from hybrid.kernels.state.forces import AXIAL_LAW, FLOW, FRICTION, SEABED, WAVES
+from hybrid.kernels.state.forces import AXIAL_LAW, FLOW, FRICTION, TOUCHES, WAVES
 from hybrid.kernels.state.state import NO_ADDRESS, Floats
 from hybrid.solve.contact_statics import damped, stop
 from hybrid.solve.flaws import fold_text, lowest_tension, slack_text
 from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
 from hybrid.solve.laid import laid_on_bed
-from hybrid.solve.statics import CALM, HARDENING, LIMP, NEARLY_STIFF, PUSHED, RELAXING_STEPS, SOFT_BED, nudged
+from hybrid.solve.softened import softened, softest
+from hybrid.solve.statics import CALM, HARDENING, LIMP, NEARLY_STIFF, PUSHED, RELAXING_STEPS, nudged
 from hybrid.solve.stepper import Stepper
 from hybrid.solve.system import SystemSolver
 
@@ -65,8 +66,8 @@ def solve_system_statics(
 ) -> SystemEquilibrium:
     """Equilibrium of a system without friction; starts: shapes to begin with, with their names, made when asked for.
 
-    Tries Newton from each start; then, over a seabed or in a current, from a soft bed and no current on; then a damped
-    motion to rest.  Raises LineFailed when none arrives at lines under tension.
+    Tries Newton from each start; then, over a seabed, on obstacles or in a current, from soft ones and no current on;
+    then a damped motion to rest.  Raises LineFailed when none arrives at lines under tension.
     """
     bits = FRICTION | WAVES
     solver = SystemSolver([x._replace(line=x.line._replace(bits=x.line.bits & ~bits)) for x in lines], points, bodies)
@@ -173,7 +174,7 @@ def _attempts(solver: SystemSolver, points: int, starts: Iterable[Start]) -> Ite
     for name, start in starts:
         given.append((name, start))
         yield _Attempt(f"Newton from {name}", *solver.newton(start))
-    if any(x.line.bits & (SEABED | FLOW) or x.line.element[[0, -1]].any() for x in solver.lines):
+    if any(x.line.bits & (TOUCHES | FLOW) or x.line.element[[0, -1]].any() for x in solver.lines):
         for name, start in given:
             tried = _eased(solver, points, start)
             yield tried._replace(how=f"{tried.how}, from {name}")
@@ -196,12 +197,10 @@ def _attempts(solver: SystemSolver, points: int, starts: Iterable[Start]) -> Ite
 
 
 def _easier(x: JoinedLine, part: float) -> JoinedLine:
-    """A line over a softer bed, in less current and with less bending; part: 0 the easiest to 1."""
+    """A line over a softer bed and softer obstacles, in less current, with less bending; part: 0 the easiest to 1."""
     now = x.sea.now.copy()
     now[1] *= part
-    softest = min(1.0, x.sea.onset / (SOFT_BED * x.length)) if x.line.bits & SEABED else 1.0
-    soft = softest ** (1.0 - part)
-    sea = x.sea._replace(stiffness=x.sea.stiffness * soft, onset=x.sea.onset / soft, now=now)
+    sea = softened(x.sea, softest(x.line, x.sea, x.length) ** (1.0 - part))._replace(now=now)
     return x._replace(sea=sea, line=x.line._replace(kb=x.line.kb * LIMP ** (1.0 - part)))
 
 
@@ -222,7 +221,7 @@ def _eased(solver: SystemSolver, points: int, start: SystemState) -> _Attempt:
         else:
             part *= 0.5
         if done >= 1.0 or part < 1e-3 or (done < 0.0 and part <= 0.5):
-            how = f"from a soft seabed, no current and little bending in {steps} steps"
+            how = f"from a soft seabed, soft obstacles, no current and little bending in {steps} steps"
             return _Attempt(how, taken, states, last)
 
 

@@ -178,7 +178,7 @@ def as_system(tables: Tables) -> Tables | None:
     for name, (key, end) in zip("ab", ends.items(), strict=True):
         end = dict(end)
         kind = end.pop("kind")
-        if kind == "guided" or {"payout", "moment"} & {*end} or "obstacles" in found:
+        if kind == "guided" or {"payout", "moment"} & {*end}:
             return None
         if kind == "clamped":
             keys = {"tangent", "normal", "turns", "swivel", "bend_stiffness"} & {*end}
