@@ -30,7 +30,7 @@ from hybrid.model.initial_shape import (
 from hybrid.model.layout import Layout, of_rods
 from hybrid.model.line import line_on, spins_freely
 from hybrid.model.line_on_base import LineOnBase
-from hybrid.model.material import Material, material
+from hybrid.model.material import STIFFENER_CELLS, Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
 from hybrid.model.obstacles import least_cells, obstacle_bits
 from hybrid.model.payout import PayoutPlan, payout_of, payout_plan, shorter_behind_clamp
@@ -38,7 +38,7 @@ from hybrid.model.plane import in_plane, planar
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, mesh_is_free
 from hybrid.model.scales import tension_scale
 from hybrid.model.sea import Surroundings, rubs, surroundings
-from hybrid.model.sections import merged_sections
+from hybrid.model.sections import merged_sections, stiffeners_of
 from hybrid.model.self_reach import contact_bits
 from hybrid.scene.motion_checks import prescribed_twist
 from hybrid.scene.schema import (
@@ -164,6 +164,8 @@ def build(
     cable = material(scene)
     resolution = resolution or first_resolution(scene)
     layout, s, zones = _nodes(scene, cable, resolution, mesh)
+    if stiffeners_of(scene):
+        cable = material(scene, s if layout is None else layout.base)
     paid = None
     to_compare = payout_of(scene) is not None and resolution.fineness < first_resolution(scene).fineness
     if layout is not None and payout_of(scene) is not None and follows_curvature(scene):
@@ -293,6 +295,32 @@ def _placed(
     usual: int,
 ) -> tuple[Floats, tuple[Zone, ...]]:  # fmt: skip
     """Nodes and zones; usual: cells of a line whose scene does not say."""
+    s, zones = _placed_by_mesh(scene, cable, plans, cuts, resolution, usual)
+    if scene.mesh is not None and scene.mesh.nodes is not None:
+        return s, zones
+    return _dense_in_stiffeners(scene, s, resolution.fineness), zones
+
+
+def _dense_in_stiffeners(scene: Scene, s: Floats, fineness: float) -> Floats:
+    """Nodes (N+1,) m with evenly split cells where stiffeners have fewer than they need."""
+    stiffeners = stiffeners_of(scene)
+    if not stiffeners:
+        return s
+    middle, h = 0.5 * (s[:-1] + s[1:]), np.diff(s)
+    longest = np.full(h.size, np.inf)
+    for x in stiffeners:
+        inside = (middle > x.range[0]) & (middle < x.range[1])
+        longest[inside] = np.minimum(longest[inside], (x.range[1] - x.range[0]) / (STIFFENER_CELLS * fineness))
+    parts = np.maximum(np.ceil(h / longest - 1e-9), 1).astype(int)
+    new = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(s[:-1], s[1:], parts, strict=True)]
+    return np.concatenate([*new, s[-1:]])
+
+
+def _placed_by_mesh(
+    scene: Scene, cable: Material, plans: tuple[ZonePlan, ...], cuts: Sequence[float], resolution: Resolution,
+    usual: int,
+) -> tuple[Floats, tuple[Zone, ...]]:  # fmt: skip
+    """The same, where stiffeners are no more than changes of section."""
     mesh, free = scene.mesh, mesh_is_free(scene)
     carries = all(plan.kind == "rod" for plan in plans)
     if free and resolution.grading is not None:
@@ -331,6 +359,7 @@ def _layout(scene: Scene, cable: Material, cuts: Sequence[float], resolution: Re
     if mesh_is_free(scene):
         base, _ = place_nodes(whole, cuts, None, None, FOLLOWING_BASE)
         assert model.curvature_error is not None
+        base = _dense_in_stiffeners(scene, base, max(finer, 1.0))
         base = shorter_behind_clamp(scene, cable, base, model.curvature_error, finer)
     else:
         base, _ = _placed(scene, cable, whole, cuts, resolution, FOLLOWING_CELLS)

@@ -23,15 +23,18 @@ from hybrid.model.sections import (
     merged_sections,
     modules_of,
     rotary_inertia,
+    stiffeners_of,
     swivels,
     torsional_stiffness,
 )
-from hybrid.scene.schema import Scene, Section
+from hybrid.scene.schema import BendStiffener, Scene, Section
 
 # The tension below which bending counts as much as tension, in (EI w^2)^(1/3): there a cable bends under its weight as
 # much as its tension straightens it.  A cable without weight or stiffness has a least one, as a part of the scale.
 TENSION_FLOOR, LEAST_TENSION = 0.2, 1e-6
 
+# Pieces of a bend stiffener whose mesh nobody knows yet: least cells over its length, at fineness 1.
+STIFFENER_CELLS = 20
 # Of its height, from which on the added mass of a body without mass counts in full.
 LEAST_DRAUGHT = 0.05
 SMALLEST_BODY = 0.01  # m, over which a body without volume and drag passes through the surface
@@ -50,7 +53,8 @@ class StretchLaw(NamedTuple):
 class Material:
     """A cable per metre.  K pieces, P points; SI units; material axes (a1, a2, tangent) for B and kappa."""
 
-    bounds: Floats  # (K+1,) m, arc lengths between which everything is constant
+    bounds: Floats  # (K+1,) m, arc lengths between which everything is constant; in stiffeners, of cells
+    edges: Floats  # (E,) m, those inside at which a node must lie: where sections, modules and stiffeners begin and end
     mass: Floats  # (K,) kg/m, with modules
     weight: Floats  # (K,) N/m, downwards, less the buoyancy that does not depend on the surface
     ck: Floats  # (K,) 1/N
@@ -132,7 +136,7 @@ class Material:
     @property
     def cuts(self) -> list[float]:
         """Arc lengths at which a node must lie."""
-        return sorted({*self.bounds[1:-1].tolist(), *self.at[(self.at > 0.0) & (self.at < self.bounds[-1])].tolist()})
+        return sorted({*self.edges.tolist(), *self.at[(self.at > 0.0) & (self.at < self.bounds[-1])].tolist()})
 
 
 def tension_floor(EI: Floats, w: Floats, scale: float) -> Floats:
@@ -143,29 +147,70 @@ def tension_floor(EI: Floats, w: Floats, scale: float) -> Floats:
     return np.asarray(np.maximum(TENSION_FLOOR * np.cbrt(EI * w**2), LEAST_TENSION * scale))
 
 
-def material(scene: Scene) -> Material:
-    """The cable of a scene."""
+def material(scene: Scene, nodes: Floats | None = None) -> Material:
+    """The cable of a scene; nodes: (N+1,) m, of the mesh, whose cells are the pieces of stiffeners."""
     sections = merged_sections(scene.cable.sections)
     ends = np.concatenate([[0.0], np.cumsum([x.length for x in sections])])
     length, near = float(ends[-1]), 1e-9 * float(ends[-1])
-    modules = list(modules_of(scene))
-    edges = [*ends.tolist(), *(x for m in modules for x in m.range)]
-    bounds = [0.0]
-    for x in sorted(min(x, length) for x in edges):
-        if x - bounds[-1] > near:
-            bounds.append(x)
-    bounds[-1] = length
+    modules, stiffeners = list(modules_of(scene)), stiffeners_of(scene)
+    edges = _apart([*ends.tolist(), *(x for m in (*modules, *stiffeners) for x in m.range)], length, near)
+    bounds = _apart([*edges, *(x for m in stiffeners for x in _pieces_of(m, nodes, length))], length, near)
     middle = 0.5 * (np.array(bounds[:-1]) + np.array(bounds[1:]))
     of = [sections[int(i)] for i in np.clip(np.searchsorted(ends, middle) - 1, 0, len(sections) - 1)]
     out = _bare(scene, np.array(bounds), of)
+    out.edges = np.array(edges[1:-1])
     for m in modules:
         on = (middle > m.range[0]) & (middle < m.range[1])
         out.mass[on] += m.mass
         out.weight[on] += m.mass * scene.environment.gravity
+    _stiffen(out, scene, middle)
     if scene.environment.fluid is not None:
         _wetted(out, scene, of, middle)
     _points(out, scene)
     return out
+
+
+def _apart(places: list[float], length: float, near: float) -> list[float]:
+    """Arc lengths from 0 to the length, rising, of which no two are nearer to each other than `near`, all in m."""
+    found = [0.0]
+    for x in sorted(min(x, length) for x in places):
+        if x - found[-1] > near:
+            found.append(x)
+    found[-1] = length
+    return found
+
+
+def _pieces_of(stiffener: BendStiffener, nodes: Floats | None, length: float) -> list[float]:
+    """Arc lengths, m, between which its stiffness is taken as constant: the nodes of the mesh, or even parts."""
+    a, b = (min(x, length) for x in stiffener.range)
+    x: Floats = np.linspace(a, b, STIFFENER_CELLS + 1) if nodes is None else nodes
+    return [float(s) for s in x[(x > a) & (x < b)]]
+
+
+def _stiffen(out: Material, scene: Scene, middle: Floats) -> None:
+    """Bending stiffness, mass and rotary inertia of stiffeners on pieces with their middles (K,) m."""
+    for x in stiffeners_of(scene):
+        for k in np.flatnonzero((middle > x.range[0]) & (middle < x.range[1])):
+            s, density = float(middle[k]), x.density or 0.0
+            out.B[k, :2] += x.stiffness(_stiff_at(x, out.bounds[k], out.bounds[k + 1]))
+            out.mass[k] += density * x.area(s)
+            out.weight[k] += density * x.area(s) * scene.environment.gravity
+            if out.polar[k] > 0.0:  # the section has an inertia of its own
+                out.rotary[k] += density * x.second_moment(s)
+                out.polar[k] += 2.0 * density * x.second_moment(s)
+
+
+def _stiff_at(stiffener: BendStiffener, a: float, b: float) -> float:
+    """Arc length, m, whose stiffness a piece [a, b] has: its middle, or the end of the stiffener if that is its own.
+
+    The largest bend is that of a clamp, where half a cell has all of it: with the stiffness in the middle of the cell
+    it would be of first order in the cells; what the cell turns by is off by the square of its length.
+    """
+    low, high = stiffener.range
+    near = 1e-6 * (b - a)
+    if a <= low + near < b < high - near:
+        return low
+    return high if low + near < a and b >= high - near else 0.5 * (a + b)
 
 
 def stretch_law(section: Section) -> StretchLaw | None:
@@ -181,7 +226,7 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
     unasked: dict[str, Any] = {name: np.full(k, np.nan) for name in PER_LENGTH if name not in OF_SECTIONS}
     start, end = scene.ends.both
     out = Material(
-        bounds=bounds,
+        bounds=bounds, edges=bounds[1:-1],
         mass=np.array([x.mass for x in of], float),
         weight=np.array([x.mass * gravity for x in of], float),
         ck=np.array([mean_compliance(x) for x in of]),
@@ -216,9 +261,13 @@ def _wetted(out: Material, scene: Scene, of: list[Section], middle: Floats) -> N
     fluid, gravity = scene.environment.fluid, scene.environment.gravity
     assert fluid is not None
     rho = fluid.density
-    width = out.outer_diameter
+    width = out.outer_diameter.copy()
+    volume, area, extra = 0.25 * np.pi * width**2, np.zeros(len(of)), np.zeros(len(of))
+    for x in stiffeners_of(scene):
+        for k in np.flatnonzero((middle > x.range[0]) & (middle < x.range[1])):
+            width[k] = max(width[k], x.outer(float(middle[k])))
+            volume[k] += x.area(float(middle[k])) if x.density is not None else 0.0
     disc = 0.25 * np.pi * width**2
-    volume, area, extra = disc.copy(), np.zeros(len(of)), np.zeros(len(of))
     for m in modules_of(scene):
         on = (middle > m.range[0]) & (middle < m.range[1])
         volume[on] += m.volume_in(rho, gravity)

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybrid.kernels.state.state import Floats
 from hybrid.model.sections import section_changes
-from hybrid.scene.schema import Modules, RodZone, Scene, ZonesModel
+from hybrid.scene.schema import RodZone, Scene, Spread, ZonesModel
 
 # Part of the length below which two places are one.
 NEAR = 1e-9
@@ -44,11 +44,12 @@ def output_points(scene: Scene, longest: float | None = None, at_start: bool = F
 def jump_points(scene: Scene) -> tuple[float, ...]:
     """Arc lengths (m) inside the cable where quantities may have two values, one on each side.
 
-    Point loads, changes of section, ends of modules, joints of rod and catenary in zones that stay where they are.
+    Point loads, changes of section, ends of modules and stiffeners, joints of rod and catenary in zones that stay where
+    they are.
     """
     found = [*section_changes(scene)]
     for item in scene.cable.attachments:
-        found += list(item.range) if isinstance(item, Modules) else [item.at]
+        found += list(item.range) if isinstance(item, Spread) else [item.at]
     if isinstance(scene.model, ZonesModel):
         zones = scene.model.zones
         ends = accumulate(next(iter(zone.model_dump().values())) for zone in zones)

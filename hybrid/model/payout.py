@@ -19,7 +19,7 @@ from hybrid.model.material import Material, material
 from hybrid.model.mesh import MOST_CELLS, Zone
 from hybrid.model.payout_law import extremes, law_of, least_length, lengths_at, refuse
 from hybrid.scene.payout import Payout
-from hybrid.scene.schema import AdaptiveModel, Modules, Scene, Section
+from hybrid.scene.schema import AdaptiveModel, Scene, Section, Spread
 
 # The fewest cells that may be left.
 FEWEST_CELLS = 4
@@ -382,7 +382,7 @@ def whole_scene(scene: Scene) -> tuple[Scene, float]:
     more = sum(x.length for x in sections) - scene.length
     attached = []
     for x in scene.cable.attachments:
-        moved = {"range": (x.range[0] + more, x.range[1] + more)} if isinstance(x, Modules) else {"at": x.at + more}
+        moved = {"range": (x.range[0] + more, x.range[1] + more)} if isinstance(x, Spread) else {"at": x.at + more}
         attached.append(x.model_copy(update=moved))
     changed = {"sections": tuple(sections[::-1]), "attachments": tuple(attached)}
     return scene.model_copy(update={"cable": scene.cable.model_copy(update=changed)}), -more

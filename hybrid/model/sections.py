@@ -7,7 +7,18 @@ from itertools import accumulate
 
 import numpy as np
 
-from hybrid.scene.schema import Body, Clump, Damping, Float, Modules, Scene, Section, Swivel
+from hybrid.scene.schema import (
+    BendStiffener,
+    Body,
+    Clump,
+    Damping,
+    Float,
+    Modules,
+    Scene,
+    Section,
+    Spread,
+    Swivel,
+)
 
 # Limits that a section may have and that only reports ask for: unit, what it is, the stricter one of two.
 SECTION_LIMITS: dict[str, tuple[str, str, np.ufunc]] = {
@@ -65,8 +76,14 @@ def limits_along(scene: Scene, s: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def weakest_bending(scene: Scene, s: np.ndarray) -> np.ndarray:
-    """The smaller bending stiffness (ns,) N m^2 at arc lengths s (m); at a seam that of the weaker section."""
-    return _along(scene, s, [min(bending_stiffness(x)) for x in scene.cable.sections], np.fmin)
+    """The smaller bending stiffness (ns,) N m^2 at arc lengths s (m), with stiffeners; at a seam the weaker one."""
+    found = _along(scene, s, [min(bending_stiffness(x)) for x in scene.cable.sections], np.fmin)
+    near, length = 1e-9 * scene.length, scene.length
+    for x in stiffeners_of(scene):
+        a, b = x.range
+        inside = (s > a + near if a > near else s >= 0.0) & (s < b - near if b < length - near else s <= length)
+        found[inside] += [x.stiffness(float(at)) for at in s[inside]]
+    return found
 
 
 def outer_diameter(scene: Scene, s: np.ndarray) -> np.ndarray:
@@ -117,7 +134,7 @@ def weight(section: Section, scene: Scene) -> float:
 def attachments_at(scene: Scene) -> Iterator[tuple[float, Float | Clump | Swivel | Body]]:
     """Everything that sits at a point of the line, with its arc length, m: floats, clumps, bodies at the ends."""
     for x in scene.cable.attachments:
-        if not isinstance(x, Modules):
+        if not isinstance(x, Spread):
             yield x.at, x
     for at, end in ((0.0, scene.ends.start), (scene.length, scene.ends.end)):
         if isinstance(end, Body):
@@ -136,18 +153,29 @@ def modules_of(scene: Scene) -> Iterator[Modules]:
             yield x
 
 
+def stiffeners_of(scene: Scene) -> list[BendStiffener]:
+    """Bend stiffeners on the line."""
+    return [x for x in scene.cable.attachments if isinstance(x, BendStiffener)]
+
+
 def attached_weights(scene: Scene) -> list[float]:
     """Weight in water of every attachment and end body, N, positive downwards."""
     fluid, gravity = scene.environment.fluid, scene.environment.gravity
     density = fluid.density if fluid else 0.0
 
-    def sinks(x: Float | Clump | Swivel | Modules | Body) -> float:
+    def sinks(x: Float | Clump | Swivel | Spread | Body) -> float:
         return gravity * (x.mass - (density * x.volume_in(density, gravity) if fluid else 0.0))
 
     points = [sinks(x) for _, x in attachments_at(scene)]
-    return points + [sinks(m) * (m.range[1] - m.range[0]) for m in modules_of(scene)]
+    spread = (x for x in scene.cable.attachments if isinstance(x, Spread))
+    return points + [sinks(x) * (x.range[1] - x.range[0]) for x in spread]
 
 
 def section_changes(scene: Scene) -> tuple[float, ...]:
-    """Arc lengths (m) inside the cable where one section ends and the next begins."""
-    return tuple(accumulate(x.length for x in merged_sections(scene.cable.sections)[:-1]))
+    """Arc lengths (m) inside the cable where bending stiffness jumps: between sections, at the ends of stiffeners."""
+    found = [*accumulate(x.length for x in merged_sections(scene.cable.sections)[:-1])]
+    near = 1e-9 * scene.length
+    for edge in (edge for x in stiffeners_of(scene) for edge in x.range):
+        if near < edge < scene.length - near and all(abs(edge - s) > near for s in found):
+            found.append(edge)
+    return tuple(sorted(found))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from hybrid.scene.attachments import Clump, Float, Modules, Swivel, sphere_diameter
+from hybrid.scene.attachments import BendStiffener, Clump, Float, Modules, Spread, Swivel, sphere_diameter
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.cable import USUAL_DENSITIES, Cable, Environment
 from hybrid.scene.ends import Body, Ends
@@ -32,8 +32,8 @@ def attachments_on_cable(cable: Cable) -> Iterator[Finding]:
     """Attachments beyond the end of the cable."""
     length = cable.length
     for i, item in enumerate(cable.attachments):
-        place: Place = ("range", 1) if isinstance(item, Modules) else ("at",)
-        if (item.range[1] if isinstance(item, Modules) else item.at) > length * (1 + SAME_LENGTH):
+        place: Place = ("range", 1) if isinstance(item, Spread) else ("at",)
+        if (item.range[1] if isinstance(item, Spread) else item.at) > length * (1 + SAME_LENGTH):
             expected = f"an arc length between 0 and {length:.8g} m, the cable's length"
             fix = "move it onto the cable, or make the cable longer (cable.sections)"
             yield Finding(("cable", "attachments", i, *place), expected, fix)
@@ -57,6 +57,8 @@ def attachments_in_fluid(environment: Environment, cable: Cable) -> Iterator[Fin
         here: Place = ("cable", "attachments", i)
         if isinstance(item, Clump | Swivel):
             yield from _needs_fluid(here, item, environment)
+        elif isinstance(item, BendStiffener):
+            continue
         elif environment.fluid is None:
             fix = f"{_WATER}; what only weighs is kind: clump"
             yield Finding((*here, "kind"), "a fluid, because nothing floats without one", fix, item.kind)
@@ -105,7 +107,11 @@ def densities(environment: Environment, cable: Cable, ends: Ends) -> Iterator[Fi
     fluid = environment.fluid
     if fluid is None:
         return
-    named: list[tuple[Place, Hung]] = [(("cable", "attachments", i), item) for i, item in enumerate(cable.attachments)]
+    named: list[tuple[Place, Hung]] = [
+        (("cable", "attachments", i), item)
+        for i, item in enumerate(cable.attachments)
+        if not isinstance(item, BendStiffener)  # its density is given
+    ]
     named += [(("ends", name), body) for name, body in ends.bodies().items()]
     for here, item in named:
         if environment.gravity == 0.0 and getattr(item, "buoyancy", None) is not None:

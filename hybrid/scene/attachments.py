@@ -1,9 +1,10 @@
-"""What hangs on the cable or sits in it: floats, clumps and swivels at points, modules over stretches."""
+"""What hangs on the cable or sits in it: at points floats, clumps, swivels; over stretches modules and stiffeners."""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from itertools import pairwise
+from typing import Annotated, Literal, Self
 
 from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
 
@@ -15,6 +16,7 @@ from hybrid.scene.base import (
     NonNegativePair,
     Number,
     Positive,
+    PositivePair,
     Table,
     by_kind,
     refuse,
@@ -118,7 +120,19 @@ class Swivel(Table):
         return self.height if self.height is not None else sphere_diameter(self.volume)
 
 
-class Modules(Table):
+class Spread(Table):
+    """What lies over a stretch of the cable."""
+
+    range: NonNegativePair = Field(description="[from, to], the arc lengths between which it sits [m]")
+
+    @model_validator(mode="after")
+    def _is_a_stretch(self) -> Self:
+        if self.range[0] >= self.range[1]:
+            refuse([Finding(("range",), "two arc lengths, the smaller first, in m", "write [from, to]")])
+        return self
+
+
+class Modules(Spread):
     """Buoyancy modules, fairings or ballast, spread evenly over a stretch; everything per metre of cable."""
 
     kind: Literal["modules"] = Field(default="modules", description="spread over a stretch")
@@ -145,11 +159,102 @@ class Modules(Table):
         return _volume_in(self, density, gravity)
 
     @model_validator(mode="after")
-    def _one_measure_and_a_stretch(self) -> Modules:
+    def _one_measure(self) -> Modules:
         _either(self)
-        if self.range[0] >= self.range[1]:
-            refuse([Finding(("range",), "two arc lengths, the smaller first, in m", "write [from, to]")])
         return self
+
+
+StiffnessRow = Annotated[tuple[NonNegative, NonNegative], Field(description="[m from the start of the range, N m^2]")]
+
+
+class BendStiffener(Spread):
+    """A sleeve around the cable that adds bending stiffness, and takes no tension and no torque."""
+
+    kind: Literal["bend_stiffener"] = Field(
+        default="bend_stiffener", description="stiffens the cable against bending over a stretch"
+    )
+    diameters: PositivePair | None = Field(
+        default=None, description="outer diameters at both ends of the range, linear between them [m]"
+    )
+    bore: Positive | None = Field(default=None, description="inner diameter, with diameters [m]")
+    modulus: Positive | None = Field(default=None, description="Young's modulus, with diameters [Pa]")
+    density: Annotated[Positive, Field(le=25_000)] | None = Field(
+        default=None,
+        description="density of its material, with diameters, for mass and buoyancy; absent: neither [kg/m^3]",
+    )
+    added_stiffness: Annotated[tuple[StiffnessRow, ...], Field(min_length=2)] | None = Field(
+        default=None,
+        description="instead of diameters: rows [arc length from the start of the range, bending stiffness that it "
+        "adds], linear between them, over the whole range [m, N m^2]",
+    )
+
+    @property
+    def mass(self) -> float:
+        """Mass per length in air [kg/m], mean over the range."""
+        return (self.density or 0.0) * self._mean_area
+
+    def volume_in(self, density: float, gravity: float) -> float:
+        """Displaced volume per length [m^3/m], mean over the range, whatever the fluid."""
+        return self._mean_area if self.density is not None else 0.0
+
+    @property
+    def _mean_area(self) -> float:
+        a, b = self.range  # the area is a parabola
+        return (self.area(a) + 4.0 * self.area(0.5 * (a + b)) + self.area(b)) / 6.0
+
+    def outer(self, s: float) -> float:
+        """Outer diameter [m] at an arc length s [m]; 0 where it is given by its stiffness alone."""
+        if self.diameters is None:
+            return 0.0
+        (a, b), (first, last) = self.range, self.diameters
+        return first + (last - first) * (s - a) / (b - a)
+
+    def area(self, s: float) -> float:
+        """Cross-section [m^2] of its material at s [m]."""
+        return 0.25 * math.pi * (self.outer(s) ** 2 - self.bore**2) if self.bore is not None else 0.0
+
+    def second_moment(self, s: float) -> float:
+        """Second moment of area [m^4] of its material at s [m]."""
+        return math.pi / 64.0 * (self.outer(s) ** 4 - self.bore**4) if self.bore is not None else 0.0
+
+    def stiffness(self, s: float) -> float:
+        """Bending stiffness [N m^2] that it adds at s [m]."""
+        if self.added_stiffness is None:
+            return (self.modulus or 0.0) * self.second_moment(s)
+        x = s - self.range[0]
+        for (a, low), (b, high) in pairwise(self.added_stiffness):
+            if x <= b:
+                return low + (high - low) * (x - a) / (b - a)
+        return self.added_stiffness[-1][1]
+
+    @model_validator(mode="after")
+    def _one_description(self) -> BendStiffener:
+        cone = {"diameters": "m, at both ends", "bore": "m", "modulus": "Pa"}
+        if self.added_stiffness is not None:
+            given = [key for key in (*cone, "density") if getattr(self, key) is not None]
+            if given:
+                why = "nothing, because added_stiffness says how stiff it is"
+                refuse([Finding((given[0],), why, "leave one of the two out; modules over the same range have mass")])
+            self._rows_cover_the_range()
+            return self
+        missing = [Finding((key,), f"a number ({unit}), or added_stiffness", f"add `{key}: ...` ({unit})")
+                   for key, unit in cone.items() if getattr(self, key) is None]  # fmt: skip
+        if missing:
+            refuse(missing)
+        assert self.diameters is not None and self.bore is not None
+        if min(self.diameters) < self.bore:
+            expected = f"at least the bore, {self.bore:g} m, at both ends"
+            refuse([Finding(("diameters",), expected, "give outer diameters, in m")])
+        return self
+
+    def _rows_cover_the_range(self) -> None:
+        rows, length = self.added_stiffness or (), self.range[1] - self.range[0]
+        at = [x for x, _ in rows]
+        if not all(a < b for a, b in pairwise(at)):
+            refuse([Finding(("added_stiffness",), "arc lengths that rise", "sort the rows, and leave double ones out")])
+        if at[0] != 0.0 or abs(at[-1] - length) > 1e-9 * self.range[1]:
+            expected = f"rows from 0 to {length:.8g} m, the length of the range"
+            refuse([Finding(("added_stiffness",), expected, "arc lengths are counted from the start of the range")])
 
 
 def _volume_in(attachment: Float | Modules, density: float, gravity: float) -> float:
@@ -171,7 +276,8 @@ Attachment = Annotated[
     Annotated[Float, Tag("<float>")]
     | Annotated[Clump, Tag("<clump>")]
     | Annotated[Swivel, Tag("<swivel>")]
-    | Annotated[Modules, Tag("<modules>")],
+    | Annotated[Modules, Tag("<modules>")]
+    | Annotated[BendStiffener, Tag("<bend_stiffener>")],
     Discriminator(by_kind),
-    Kinds(("float", "clump", "swivel", "modules"), usual=("float",)),
+    Kinds(("float", "clump", "swivel", "modules", "bend_stiffener"), usual=("float",)),
 ]

@@ -278,6 +278,7 @@ Direction = Annotated[
     Words("a direction [x, y, z], not all zero"),
 ]
 Pair = Annotated[tuple[Number, Number], Before(numbers(2)), Words("two numbers")]
+PositivePair = Annotated[tuple[Positive, Positive], Before(numbers(2)), Words("two numbers > 0")]
 NonNegativePair = Annotated[tuple[NonNegative, NonNegative], Before(numbers(2)), Words("two numbers >= 0")]
 
 

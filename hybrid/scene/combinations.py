@@ -220,10 +220,18 @@ def _turns(tables: Tables) -> Iterator[Place]:
             yield (*at, "turns")
 
 
-def _swivels(tables: Tables) -> Iterator[Place]:
-    cable: Cable | None = tables.get("cable")
-    items = cable.attachments if cable is not None else ()
-    return (("cable", "attachments", i, "kind") for i, x in enumerate(items) if x.kind == "swivel")
+def _attached(kind: str) -> Callable[[Tables], Iterator[Place]]:
+    """Attachments of a kind."""
+
+    def find(tables: Tables) -> Iterator[Place]:
+        cable: Cable | None = tables.get("cable")
+        items = cable.attachments if cable is not None else ()
+        return (("cable", "attachments", i, "kind") for i, x in enumerate(items) if x.kind == kind)
+
+    return find
+
+
+_swivels = _attached("swivel")
 
 
 def _swivels_beside(of: Callable[[Section], Any]) -> Callable[[Tables], Iterator[Place]]:
@@ -345,6 +353,7 @@ STRETCH_LAW = Feature("tension over strain by a table or a rope's law", "tension
 STIFFNESS_DAMPING = Feature("damping proportional to stiffness", "damping.stiffness",
                             _in_sections("damping", "stiffness",
                                          of=lambda x: x.damping is not None and x.damping.stiffness))  # fmt: skip
+STIFFENER = Feature("bend stiffeners", "attachments: kind: bend_stiffener", _attached("bend_stiffener"))
 SWIVEL = Feature("swivels on the line", "attachments: kind: swivel", _swivels)
 DIRECTED = Feature(
     "sections that have a direction about their axis", "bending_stiffness: [EI_1, EI_2], intrinsic_curvature",
@@ -541,6 +550,10 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal(
         SWIVEL, PAYOUT, "not worked out", PAID, "no swivel", "leave it out: a pinned end turns freely"
+    ),
+    Refusal(
+        STIFFENER, PAYOUT, "not worked out", f"{PAID}, and the stiffness of its cells changes at the winch alone",
+        "no bend stiffener", LEAVE_OUT,
     ),
     Refusal(
         CURLED, PAID_OUT_ROD, "not worked out", "a rod is paid out ({key}), which is straight there",

@@ -33,7 +33,7 @@ from hybrid.scene.analysis import (
     ZonesModel,
     usual_model,
 )
-from hybrid.scene.attachments import Attachment, Clump, Float, Modules, Swivel
+from hybrid.scene.attachments import Attachment, BendStiffener, Clump, Float, Modules, Spread, Swivel
 from hybrid.scene.base import Table, Text, Vector, refuse
 from hybrid.scene.cable import AddedMass, Cable, Contact, Damping, Drag, Environment, Fluid, Section
 from hybrid.scene.checks import contradictions
@@ -59,6 +59,7 @@ __all__ = [
     "AdaptiveModel",
     "AddedMass",
     "Attachment",
+    "BendStiffener",
     "Body",
     "Cable",
     "CatenaryModel",
@@ -102,6 +103,7 @@ __all__ = [
     "Seabed",
     "Section",
     "SphereObstacle",
+    "Spread",
     "Straight",
     "Swivel",
     "Table",

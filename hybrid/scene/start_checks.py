@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from hybrid.scene.analysis import Equilibrium, Initial, Points, Straight, Time
+from hybrid.scene.attachments import Spread
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import Ends, Triple
@@ -151,7 +152,7 @@ def net_weight(environment: Environment, cable: Cable, ends: Ends) -> tuple[floa
     masses = [(s.mass * s.length, math.pi / 4 * d * d * s.length) for s, d in zip(cable.sections, widths, strict=True)]
     for item in cable.attachments:
         if density > 0.0 and gravity > 0.0:  # without, attachments that float are refused elsewhere
-            length = item.range[1] - item.range[0] if item.kind == "modules" else 1.0
+            length = item.range[1] - item.range[0] if isinstance(item, Spread) else 1.0
             masses.append((item.mass * length, item.volume_in(density, gravity) * length))
         elif item.kind in ("clump", "swivel"):
             masses.append((item.mass, item.volume))

@@ -66,6 +66,10 @@ FEATURES: dict[str, tuple[Tables, str]] = {
     ),
     "clump": ({"cable.attachments": [{"kind": "clump", "at": 5.0, "mass": 2.0}]}, "items"),
     "swivel": ({"cable.attachments": [{"kind": "swivel", "at": 5.0}]}, "items"),
+    "stiffener": (
+        {"cable.attachments": [{"kind": "bend_stiffener", "range": [0, 1.5], "diameters": [0.09, 0.04], "bore": 0.03,
+                                "modulus": 7e7, "density": 1100}]}, "items",
+    ),
     "stiffness damping": ({S + "damping": {"mass": 0.5, "stiffness": 0.01}}, "damping"),
     "two stiffnesses": ({S + "bending_stiffness": [20.0, 8.0]}, "bending"),
     "rotary inertia": ({S + "rotary_inertia": 2e-3}, "rotary"),
@@ -157,7 +161,10 @@ def exchanged(tables: Tables) -> Tables:
             a, b, c = section["intrinsic_curvature"]
             section["intrinsic_curvature"] = [-a, b, c]
     for item in found["cable"].get("attachments", ()):
-        item["at"] = LENGTH - item["at"]
+        if "range" in item:
+            item["range"], item["diameters"] = [LENGTH - x for x in item["range"]][::-1], item["diameters"][::-1]
+        else:
+            item["at"] = LENGTH - item["at"]
     model = found["model"]
     if isinstance(model, dict):
         model.get("zones", []).reverse()

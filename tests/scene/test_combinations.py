@@ -83,6 +83,10 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.RELEASE_AT_WINCH, c.PAYOUT): (PAID | {END + "release_at": {"time": 2}}, ""),
     (c.STIFFNESS_DAMPING, c.PAYOUT): (PAID | {SECTION + "damping": {"stiffness": 0.01}}, ""),
     (c.SWIVEL, c.PAYOUT): (SWIVEL | PAID, ""),
+    (c.STIFFENER, c.PAYOUT): (
+        {"cable.attachments": [{"kind": "bend_stiffener", "range": [0, 2], "added_stiffness": [[0, 90], [2, 10]]}]}
+        | PAID, ""
+    ),
     (c.CURLED, c.PAID_OUT_ROD): (CURVED | PAID, ""),
     (c.TORQUE_OF_TENSION, c.PAYOUT): (TORQUE | PAID, ""),
     (c.LAYERS, c.PAYOUT): (PAID | {"resolution": {"cells_per_layer": 2}}, ""),

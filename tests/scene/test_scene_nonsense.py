@@ -63,6 +63,16 @@ ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
 initial: {kind: equilibrium}
 model: {kind: catenary}
 """
+STIFFENERS = """\
+cable:
+  sections: [{length: 10.0, mass: 1.0, bending_stiffness: 2.0}]
+  attachments:
+    - {kind: bend_stiffener, range: [0.0, 2.0], diameters: [0.4, 0.2], bore: 0.15, modulus: 7.0e+7, density: 1150.0}
+    - {kind: bend_stiffener, range: [7.0, 10.0], added_stiffness: [[0.0, 10.0], [3.0, 50.0]]}
+ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
+initial: {kind: equilibrium}
+model: {kind: rod}
+"""
 SWIVELS = """\
 environment: {fluid: {density: 1025.0}}
 cable:
@@ -137,6 +147,7 @@ TEXTS = (
         "touching": TOUCHING,
         "twisted": TWISTED,
         "swivels": SWIVELS,
+        "stiffeners": STIFFENERS,
         "ropes": ROPES,
         "measured": MEASURED,
         "piped": PIPED,
@@ -240,7 +251,8 @@ def test_nonsense_for_a_value_in_python(nonsense: Any) -> None:
         table = data
         for part in path[:-1]:
             table = table[part]
-        if nonsense is None and isinstance(path[-1], str) and path[-1] not in REQUIRED:
+        optional = path[-1] not in REQUIRED or ("attachments" in path and path[-1] == "density")  # of a stiffener
+        if nonsense is None and isinstance(path[-1], str) and optional:
             continue  # None is how Python says that a key is absent
         table[path[-1]] = nonsense
         with pytest.raises(SceneError) as caught:

@@ -294,6 +294,10 @@ class _Writer:
                 fix = "give their mass, volume and drag to a section of that length"
                 self._refuse(f"{where}[{i}]", "modules", "a clump or a float, which a deck has as points", fix)
                 continue
+            if item.kind == "bend_stiffener":
+                fix = "give its bending stiffness to short sections of that length"
+                self._refuse(f"{where}[{i}]", "bend stiffener", "a clump or a float, which a deck has as points", fix)
+                continue
             s = next((x for x in (*bounds, *found) if abs(x - item.at) <= 1e-9 * bounds[-1]), item.at)
             if s in (0.0, bounds[-1]):
                 self._refuse(f"{where}[{i}]", f"at {s:g} m", "nothing at an end", "give it to the body or point there")
