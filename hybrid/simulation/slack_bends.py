@@ -49,8 +49,7 @@ def turns_by_weight(line: Line, seen: Observation, nodes: np.ndarray, limits: Fl
 def weight_text(l: float, s: float, h: float, turn: float, ask: str) -> str:
     """Text of the event at s (m) between cells of h (m) that turn by so much (rad)."""
     return (
-        f"the cable bends under its own weight at s = {s:g} m, where tension is nearly none, within about {l:.2g} m, "
-        f"less than its cell of {h:.2g} m ({np.degrees(turn):.0f} deg to the next cell): curvature and moment are "
-        f"wrong there, tension is less sure; cells of {SHOWS * l:.2g} m would do ({ask}, or `accuracy: {{curvature: "
-        "5%}`)"
+        f"weight bends the slack cable within {l:.2g} m at s = {s:g} m, on a cell of {h:.2g} m "
+        f"({np.degrees(turn):.0f} deg to the next): curvature and moment are wrong there; cells of {SHOWS * l:.2g} m "
+        f"would do ({ask}, or `accuracy: {{curvature: 5%}}`)"
     )

@@ -24,7 +24,7 @@ title: a wire that swings
 environment: {gravity: 9.81}
 cable:
   sections:
-    - {length: 2.0, mass: 1.0, axial_stiffness: 1.0e5, bending_stiffness: 0.01, damping: 1.0}
+    - {length: 2.0, mass: 1.0, axial_stiffness: 1.0e5, bending_stiffness: 0.1, damping: 1.0}
 ends:
   start: {kind: pinned, position: [0, 0, 0]}
   end: {kind: free, force: {value: [5, 0, 0], until: 0.02}}
