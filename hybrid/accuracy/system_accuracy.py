@@ -128,6 +128,7 @@ class SystemPasses:
             name: LineController(
                 requested_accuracy(scene), Free(mesh_is_free(scene), self._steps_free, zones_are_free(scene)), moves,
                 _elsewhere, _elsewhere, irregular=moves and is_irregular(scene),
+                from_rest=not (moves and system.starts_as_placed),
             )
             for name, scene in self.scenes.items()
         }  # fmt: skip

@@ -125,6 +125,19 @@ Initial = Annotated[
     Kinds(("straight", "points", "equilibrium"), usual=("equilibrium",)),
 ]
 
+# The same of a line of several, whose keys without a kind are of the search of the equilibrium.
+LineInitial = Annotated[
+    Annotated[Straight, Tag("<straight>")]
+    | Annotated[Points, Tag("<points>")]
+    | Annotated[Equilibrium, Tag("<equilibrium>")],
+    Discriminator(by_kind),
+    Kinds(
+        ("straight", "points", "equilibrium"),
+        usual=("equilibrium",),
+        implied=tuple((key, "equilibrium") for key in ("points", "guess", "direction", "friction")),
+    ),
+]
+
 
 # --- which model where -------------------------------------------------------------------------
 

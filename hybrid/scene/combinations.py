@@ -406,9 +406,6 @@ CHANGED_LOADS = Feature(
 ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
     {"System": ("dimension",)}, "leave it out: several lines are computed in space"
 ))  # fmt: skip
-OTHER_STARTS = Feature("starts other than equilibrium", "initial", Absent(
-    {"System": ("initial",)}, "several lines start in equilibrium, found from initial_guess of points and bodies"
-))  # fmt: skip
 WINCH = Feature("line that is paid out", "payout", Absent(
     {x: ("payout",) for x in ("FixedPoint", "FreePoint", "Fairlead", "JoinedLine")},
     "leave it out: lines of several keep their lengths; one cable, with `cable` and `ends`, can be paid out",
@@ -591,7 +588,7 @@ REFUSALS: tuple[Refusal, ...] = (
     *(
         Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)
         for x in (
-            ONE_PLANE, OTHER_STARTS, WINCH
+            ONE_PLANE, WINCH
         )
         if isinstance(x.places, Absent)
     ),

@@ -53,8 +53,10 @@ def too_short(cable: Cable, distance: float) -> str | None:
     )
 
 
-def span(cable: Cable, ends: Ends) -> Iterator[Finding]:
+def span(cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
     """Two held ends that the cable does not join, or a body placed out of its reach."""
+    if isinstance(initial, Straight) and not all(end.is_placed for end in ends.both):
+        return  # one of them is a point that moves, where the straight line ends
     held, near = ends.held(), ends.initial_guesses()
     fix = "a longer cable or closer ends"
     if cable.inextensible:

@@ -19,10 +19,13 @@ from hybrid.scene.analysis import (
     AdaptiveModel,
     CatenaryModel,
     Equilibrium,
+    Initial,
+    LineInitial,
     Mesh,
     Model,
     Resolution,
     RodModel,
+    Straight,
     Time,
 )
 from hybrid.scene.attachments import Attachment
@@ -104,10 +107,11 @@ class JoinedLine(Table):
     accuracy: AskedAccuracy | None = Field(
         default=None, description="how wrong the result of this line may be; absent: as `accuracy` of the system"
     )
-    initial: Equilibrium = Field(
+    initial: LineInitial = Field(
         default=Equilibrium(),
-        description="shape of the line that the search of the equilibrium starts from: guess, or points, a polyline "
-        "that is shifted to the first places of its ends; absent: hung between these",
+        description="straight or along a polyline, as of one cable, where all lines start so, or the shape that the "
+        "search of the equilibrium starts from: guess, or points, a polyline that is shifted to the first places of "
+        "its ends; absent: hung between these",
     )
     break_at: LineFailure | None = Field(
         default=None,
@@ -134,9 +138,9 @@ class JoinedLine(Table):
         return self
 
 
-def _between(initial: Equilibrium, ends: Mapping[str, End]) -> Equilibrium:
+def _between(initial: Initial, ends: Mapping[str, End]) -> Initial:
     """A first shape whose ends are where the points are first, the rest in between shifted along."""
-    if initial.points is None:
+    if isinstance(initial, Straight) or initial.points is None:
         return initial
     points = initial.points
     way = [0.0, *accumulate(math.dist(a, b) for a, b in pairwise(points))]
@@ -197,6 +201,7 @@ class System(Table):
         "ends": "a scene of several lines has points, at which its lines end",
         "model": "each line has its own: lines.NAME.model",
         "mesh": "each line has its own: lines.NAME.mesh",
+        "initial": "each line has its own: lines.NAME.initial",
         "resolution": "each line has its own: lines.NAME.resolution",
         "contact": "each line has its own, for itself: lines.NAME.contact; lines do not touch each other",
         "solver": "leave it out: every scene is solved by elimination",
@@ -224,6 +229,21 @@ class System(Table):
     def adaptive(self) -> tuple[str, ...]:
         """Names of the lines whose zones move."""
         return tuple(name for name, line in self.lines.items() if isinstance(line.model, AdaptiveModel))
+
+    @property
+    def starts_as_placed(self) -> bool:
+        """Whether the motion starts where the scene has lines, points and bodies, at rest, and not in equilibrium."""
+        return any(not isinstance(line.initial, Equilibrium) for line in self.lines.values())
+
+    def searched(self) -> System:
+        """The same, whose shapes at the start are those from which the equilibrium is searched for."""
+        if not self.starts_as_placed:
+            return self
+        lines = {
+            name: line.model_copy(update={"initial": Equilibrium(points=getattr(line.initial, "points", None))})
+            for name, line in self.lines.items()
+        }
+        return self.model_copy(update={"lines": lines})
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -392,7 +412,7 @@ class System(Table):
                     position=place, tangent=held[0], normal=held[1], turns=clamp.turns, swivel=clamp.swivel,
                     bend_stiffness=clamp.bend_stiffness, motion=motion,
                 )  # fmt: skip
-        initial = _between(line.initial, ends)
+        initial = line.initial if self.starts_as_placed else _between(line.initial, ends)
         if places is not None:
             return (scene or self.scene_of(name)).model_copy(update={"ends": Ends(**ends), "initial": initial})
         tables: dict[str, Any] = {
@@ -423,7 +443,7 @@ class System(Table):
         names = {"start": line.start, "end": line.end}
         places = {key: self.first_place(name) for key, name in names.items()}
         distance = math.dist(places["start"], places["end"])
-        part = REACHED * line.cable.length / distance if distance > 0.0 else 1.0
+        part = REACHED * line.cable.length / distance if distance > 0.0 and not self.starts_as_placed else 1.0
         for key, other in (("end", "start"), ("start", "end")):
             if part < 1.0 and self.is_joined(names[key]):
                 (x, y, z), (a, b, c) = places[key], places[other]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
+from hybrid.scene.analysis import Equilibrium, Straight
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.checks import elevation_has_waves
@@ -30,6 +31,7 @@ def system_findings(system: System) -> Iterator[Iterator[Finding]]:
     yield _unknown_names(system)
     yield _refused_combinations(system)
     yield chain(_lonely_points(system), _floating_groups(system))
+    yield _start_findings(system)
     yield connection_findings(system)
     yield chain.from_iterable(_body_findings(system, name) for name in system.bodies)
     yield chain.from_iterable(_moment_findings(system, name) for name in system.points)
@@ -92,6 +94,19 @@ def _floating_groups(system: System) -> Iterator[Finding]:
             yield Finding(("bodies", name), expected, "let one of its lines end at a fixed point", "nothing holds it")
 
 
+def _start_findings(system: System) -> Iterator[Finding]:
+    """Lines of which some start in equilibrium and others do not, and a velocity that points do not have."""
+    placed = [name for name, line in system.lines.items() if not isinstance(line.initial, Equilibrium)]
+    for name, line in system.lines.items() if placed else ():
+        if isinstance(line.initial, Equilibrium):
+            expected = f"straight or points, because line {placed[0]} starts so, and nothing is in equilibrium then"
+            fix = "say so of every line; points and bodies start at rest where initial_guess has them"
+            yield Finding(("lines", name, "initial"), expected, fix, "equilibrium")
+        elif isinstance(line.initial, Straight) and any(line.initial.velocity or ()):
+            expected = "rest, because the points of the line start at rest"
+            yield Finding(("lines", name, "initial", "velocity"), expected, "leave velocity out")
+
+
 def _body_findings(system: System, name: str) -> Iterator[Finding]:
     """What is wrong with the motion of a body, or with what is given to act on it."""
     body, still = system.bodies[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
@@ -145,7 +160,9 @@ def _of_system(system: System, name: str, found: Finding) -> Finding:
     line, at = system.lines[name], found.at
     if at[:1] == ("cable",):
         at = ("lines", name, *at[1:])
-    elif at[:1] in (("model",), ("mesh",), ("resolution",)) or (at[:1] == ("accuracy",) and line.accuracy is not None):
+    elif at[:1] in (("model",), ("mesh",), ("resolution",), ("initial",)) or (
+        at[:1] == ("accuracy",) and line.accuracy is not None
+    ):
         at = ("lines", name, *at)
     elif at[:2] == ("output", "history"):
         at = (*at[:2], name, *at[2:])

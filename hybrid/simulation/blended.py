@@ -41,11 +41,16 @@ def note_blended(scene: Scene, events: EventLog) -> None:
         events.event(0.0, s, s, "motion blended in", text)
 
 
-def rotate_ends_in(scene: Scene, model: Model, state: State, events: EventLog) -> None:
-    """Tangents that the initial shape does not have are reached smoothly, and an event says so."""
+def rotate_ends_in(
+    scene: Scene, model: Model, state: State, events: EventLog, held: tuple[bool, bool] = (True, True)
+) -> None:
+    """Tangents that the initial shape does not have are reached smoothly, and an event says so.
+
+    held: whether the start and the end are held, and not on what moves by the lines.
+    """
     e = state.e
     d = (e[0] / np.linalg.norm(e[0]), e[-1] / np.linalg.norm(e[-1]))
-    which = [bool(model.line.element[0]), bool(model.line.element[-1])]
+    which = [bool(model.line.element[-k]) and held[k] for k in (0, 1)]
     duration = min(model.time_scale, 0.5 * scene.require_time().duration)
     for k, angle in model.ends.bring_in(d, which, duration):
         s = float(model.line.s[-k])

@@ -18,29 +18,35 @@ from hybrid.simulation.contact_equilibrium import contact_of
 from hybrid.simulation.contact_start import GIVEN_UP, given_up
 from hybrid.simulation.self_watch import deepest_text
 from hybrid.solve.contact_statics import contact_energy
-from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
+from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.system_statics import LineFailed
 
 if TYPE_CHECKING:
     from hybrid.simulation.system_run import SystemRun
 
+# Where lines are that are said to be within themselves.
+WITHOUT_CONTACT, AT_START = "in the equilibrium, which is found without contact", "at the start"
 
-def refuse_within_itself(system: SystemModel, found: SystemEquilibrium, moves: bool) -> None:
-    """SceneError: a line for which contact is asked is within itself in the equilibrium without contact of the system,
 
-    and so in every start from which a damped motion with contact could lead to another one.
+def refuse_within_itself(
+    system: SystemModel, lines: Sequence[JoinedLine], state: SystemState, moves: bool, where: str = WITHOUT_CONTACT
+) -> None:
+    """SceneError: a line for which contact is asked is within itself at the start; where: what that is.
+
+    In an equilibrium without contact so is every start from which a damped motion with contact could lead to another.
     moves: whether a motion begins there, which may begin in contact; an equilibrium alone must be apart.
     """
-    if found.settled:
-        return
-    for name, model, x, state in zip(system.names, system.models, found.solver.lines, found.state.lines, strict=True):
+    for name, model, x, one in zip(system.names, system.models, lines, state.lines, strict=True):
         if not model.line.bits & SELF_CONTACT:
             continue
         contact = contact_of(model)
-        energy = contact_energy(x.line, x.sea, x.ends, state, contact)
+        energy = contact_energy(x.line, x.sea, x.ends, one, contact)
         if energy == 0.0 or (moves and math.isfinite(energy)):
             continue
-        given = f"self: true, and in the equilibrium, which is found without contact, {deepest_text(contact, model)}"
-        expected = "a first shape in which the line is apart, for a damped motion with contact to lead to rest"
+        given = f"self: true, and {where}, {deepest_text(contact, model)}"
+        expected = "a start in which the line is apart"
+        if where == WITHOUT_CONTACT:
+            expected = "a first shape in which the line is apart, for a damped motion with contact to lead to rest"
         fix = f"lines.{name}.initial: {{points: [...]}}, such as a wide U, a smaller diameter, or leave contact out"
         raise SceneError([Complaint(f"lines.{name}.contact", given, expected, fix)])
 

@@ -117,7 +117,7 @@ class LineResult:
         self, number: int, name: str, scene: Scene, model: Model, found: SystemEquilibrium | None, state: State,
         outputs: int, target: Target | None = None, pending: str = "",
     ) -> None:  # fmt: skip
-        """number: of the line in its system; found: the equilibrium that it starts from, None: it goes on; state: from
+        """number: of the line in its system; found: the equilibrium that it starts from, None: it has none; state: from
 
         which displacements count; outputs: after the first, 0 of an equilibrium; target: of the system, None: it is
         only to be compared with; pending: as of the run.
@@ -148,8 +148,6 @@ class LineResult:
         self._touching = model  # for whose cells that is
         self._waiting: list[Batch] = []
         self._log: list[Floats] = []
-        if found is not None:
-            self.diagnostics.begin()
 
     def _own_books(self, state: State) -> Books:
         """Books that keep the extremes of all steps; displacements count from a state."""
@@ -240,6 +238,10 @@ class LineResult:
             text = f"the line rests with a twist of {turns:+.2g} turns, and what it is clamped to may turn back"
             where = f"{text}: begin nearer to rest (initial_guess, initial_rotation), unless it is meant"
             self.events.event(0.0, 0.0, self.model.length, "several equilibria", where)
+        self.note_start(x, state, t)
+
+    def note_start(self, x: JoinedLine, state: State, t: float | None) -> None:
+        """What a first state leaves open, be it an equilibrium or not."""
         self.judge(t, sharpest(x.line, x.ends, state), state)
         if self._itself.look(t or 0.0, state, self.events.event) & NEARS:
             self.meets_itself(t or 0.0, 0.0)

@@ -41,6 +41,7 @@ from hybrid.simulation.system_checkpoint import (
     restore,
 )
 from hybrid.simulation.system_contact import (
+    AT_START,
     begin_contact,
     begin_where_near,
     end_contact,
@@ -51,13 +52,13 @@ from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_lines import WAITING, LineResult, LineStep
 from hybrid.simulation.system_points import Rotations, Sampled, fields_of, gauges_of, times, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
-from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, named
-from hybrid.simulation.system_zones import SystemZones, managers_for, zones_at_rest
+from hybrid.simulation.system_start import begin_as_placed, equilibrium_of_system, joined_lines, named
+from hybrid.simulation.system_zones import SystemZones, managers_for, zones_as_placed, zones_at_rest
 from hybrid.simulation.time_loop import SAME_STOP, WORK, apart, falls_on
 from hybrid.solve.joined import SystemState, SystemTaken
 from hybrid.solve.run import MOST_SAMPLED, ROWS
 from hybrid.solve.system import SystemSolver
-from hybrid.solve.system_statics import LineFailed
+from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
 from hybrid.solve.system_steps import SystemSteps
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target, Text
 from hybrid.store.checkpoint import read_checkpoint
@@ -107,29 +108,35 @@ class SystemRun:
             self.times = [*self.times[one.every - 1 : -1 : one.every], self.times[-1]]
         rho = system.require_time().rho_inf if moves else 0.0
         self.loop = SystemSteps(rho, [0.0, *self.times], *follow)
-        self.found, managers = None, _NO_ZONES
-        if source is None:
+        self.found: SystemEquilibrium | None = None
+        managers, self._begins = _NO_ZONES, source is None  # whether there is a start, and no checkpoint
+        scenes = dict(zip(names, self.scenes, strict=True))
+        if source is not None:
+            blank = [state_for(x.line) for x in self.model.models]
+            self.state = SystemState(blank, np.zeros_like(self.model.body_places))
+            managers = managers_for(scenes, self.model, criterion)
+        elif moves and system.starts_as_placed:
+            self.model, managers = zones_as_placed(scenes, self.model, criterion)
+            self.state = SystemState([x.start for x in self.model.models], self.model.body_places).copy()
+        else:
             with at_once():
                 self.found = equilibrium_of_system(system, self.model, 0.0 if moves else np.inf)
                 if system.adaptive:
-                    scenes = dict(zip(names, self.scenes, strict=True))
                     start = zones_at_rest(scenes, self.model, self.found, 0.0 if moves else np.inf, criterion)
                     self.model, self.found, managers = start
-            self.state: SystemState = self.found.state.copy()
-            self.start_from(self.found.state.bodies)
-        else:
-            blank = [state_for(x.line) for x in self.model.models]
-            self.state = SystemState(blank, np.zeros_like(self.model.body_places))
-            managers = managers_for(dict(zip(names, self.scenes, strict=True)), self.model, criterion)
-            self.start_from(self.model.body_places)
+            self.state = self.found.state.copy()
+        self.start_from(self.state.bodies if self._begins else self.model.body_places)
         self.lines = [
             LineResult(k, name, scene, model, self.found, state, len(self.times), target, pending)
             for k, (name, scene, model, state) in enumerate(
                 zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
             )
         ]
+        if self._begins:
+            for line in self.lines:
+                line.diagnostics.begin()
         self.rotations = Rotations(system, self.model)
-        self.quantities = SystemQuantities(system, dict(zip(names, self.scenes, strict=True)))
+        self.quantities = SystemQuantities(system, scenes)
         if moves and target is not None:
             self.quantities.keep_ranges(self.lines)
         self.cpu = 0.0  # s, of the processor, in earlier parts of the run
@@ -197,12 +204,13 @@ class SystemRun:
 
     def _new_recorder(self, text: Text) -> Recorder | ArrayRecorder:
         """The result of the points and bodies, with those of the lines in it."""
-        assert self.found is not None and self.target is not None
+        assert self.target is not None
         attributes: dict[str, str | float | int] = {
             "title": self.system.title, "cells": self.model.cells, "lines": len(self.model.names),
-            "length": sum(x.length for x in self.model.models), "static_path": self.found.summary,
-            "static_residual": self.found.residual,
+            "length": sum(x.length for x in self.model.models),
         }  # fmt: skip
+        if self.found is not None:
+            attributes |= {"static_path": self.found.summary, "static_residual": self.found.residual}
         on_bodies = {x: point.body for x, point in self.system.points.items() if isinstance(point, Fairlead)}
         if self._pending:
             attributes[PENDING] = self._pending
@@ -337,7 +345,8 @@ class SystemRun:
         assert self.found is not None
         try:
             self.solver = solver = self.found.solver
-            refuse_within_itself(self.model, self.found, moves=False)
+            if not self.found.settled:
+                refuse_within_itself(self.model, solver.lines, self.state, moves=False)
             self._make_room(solver)
             solver.keep_books([line.books for line in self.lines])
             solver.evaluate_forces(self.state, 0.0)
@@ -359,7 +368,7 @@ class SystemRun:
     def record_motion(self, reporter: ProgressReporter, interrupted: Callable[[], bool]) -> None:
         """Compute the motion and record it; KeyboardInterrupt after `interrupted`, with the file complete till then."""
         try:
-            if self.found is not None:
+            if self._begins:
                 self.begin_motion()
 
             def look() -> None:
@@ -413,9 +422,13 @@ class SystemRun:
     def begin_motion(self) -> None:
         """Make the start ready for steps, and record it."""
         time = self.system.require_time()
+        if self.found is None:
+            begin_as_placed(self.model, self.scenes, self.state, [line.events for line in self.lines])
         self.make_solver()
-        assert self.found is not None
-        refuse_within_itself(self.model, self.found, moves=True)
+        if self.found is None:
+            refuse_within_itself(self.model, self.solver.lines, self.state, True, AT_START)
+        elif not self.found.settled:
+            refuse_within_itself(self.model, self.solver.lines, self.state, True)
         begin_where_near(self)
         for kind, text in self._notes:
             self.recorder.event(0.0, 0.0, 0.0, kind, text)
@@ -427,7 +440,10 @@ class SystemRun:
             for body in (x for x in self.model.bodies if x.members is None):
                 self.recorder.event(0.0, 0.0, 0.0, "waves on body neglected", f"body {body.name}: {text}")
         for line, x, state in zip(self.lines, self.solver.lines, self.state.lines, strict=True):
-            line.note_equilibrium(x, state, 0.0, self.found, self.turned)
+            if self.found is not None:
+                line.note_equilibrium(x, state, 0.0, self.found, self.turned)
+            else:
+                line.note_start(x, state, 0.0)
             line.diagnostics.scheme(time.rho_inf)
             line.diagnostics.watch(line.books.clock)
         self.take_other()

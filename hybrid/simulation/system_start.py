@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -14,10 +14,14 @@ from hybrid.kernels.state.forces import FRICTION
 from hybrid.kernels.state.state import Floats
 from hybrid.model.system import SystemModel, balanced_places, starts_between
 from hybrid.scene.points import Fairlead
+from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
+from hybrid.simulation.blended import rotate_ends_in
 from hybrid.simulation.equilibrium import count_turns, settling
+from hybrid.simulation.events import EventLog
 from hybrid.simulation.system_contact_equilibrium import settle, solve_with_contact
 from hybrid.solve.joined import JoinedLine, SystemState, joined_ends
+from hybrid.solve.stepper import Stepper
 from hybrid.solve.system_statics import (
     LineFailed,
     Start,
@@ -133,6 +137,7 @@ def _same_water(there: Floats, taken: Floats) -> bool:
 def _starts(system: System, model: SystemModel) -> Iterator[Start]:
     """Shapes from which the equilibrium is looked for."""
     yield "lines hung between the first places", SystemState([x.start for x in model.models], model.body_places)
+    system = system.searched()
     places = balanced_places(system, model)
     if places is not None and len(model.places) + len(model.body_places):
         yield "lines hung between places that balance", SystemState(*starts_between(system, *places, model))
@@ -149,6 +154,19 @@ def joined_lines(model: SystemModel, t: float) -> list[JoinedLine]:
             )
         )  # fmt: skip
     return lines
+
+
+def begin_as_placed(
+    model: SystemModel, scenes: Sequence[Scene], state: SystemState, events: Sequence[EventLog]
+) -> None:
+    """Make a start that is no equilibrium ready, of each line as of one cable: clamps that its shape does not fit are
+
+    reached smoothly, and what lies still on the seabed has the friction that keeps it there.
+    """
+    for x, joints, scene, one, log in zip(model.models, model.joints, scenes, state.lines, events, strict=True):
+        rotate_ends_in(scene, x, one, log, (joints[0] < 0, joints[1] < 0))
+        stepper = Stepper(x.line, x.length, x.tension_scale)
+        stepper.static_friction(x.sea.at(0.0), joined_ends(x.ends.at(0.0), joints), one)
 
 
 def named(failed: LineFailed, model: SystemModel, first: str = "") -> ComputationError:

@@ -112,7 +112,8 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
 def _equilibrium(system: System, model: SystemModel) -> SystemEquilibrium:
     """Under full loads, without friction.  SceneError: a line that contact is asked for is within itself in it."""
     found = equilibrium_of_system(system, model, np.inf, friction=False)
-    refuse_within_itself(model, found, moves=False)
+    if not found.settled:
+        refuse_within_itself(model, found.solver.lines, found.state, moves=False)
     return found
 
 

@@ -28,7 +28,7 @@ from hybrid.model.coarsen import picked
 from hybrid.model.system import SystemModel
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.contact_equilibrium import nearness
-from hybrid.simulation.initial_zones import MOST_ROUNDS, STRICTER, manager_for
+from hybrid.simulation.initial_zones import MOST_ROUNDS, STRICTER, manager_for, zones_without_equilibrium
 from hybrid.simulation.system_contact import renew_solver
 from hybrid.simulation.system_start import solve_from
 from hybrid.simulation.zone_switching import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, note_change, on_layout
@@ -91,6 +91,16 @@ def zones_at_rest(
         manager.held, manager.tolerance = True, allowed[k]
         _take_rods(manager, model.models[k])
     return Start(model, found, managers)
+
+
+def zones_as_placed(
+    scenes: Mapping[str, Scene], model: SystemModel, criterion: UserCriterion | None
+) -> tuple[SystemModel, dict[int, DomainManager]]:
+    """Zones of a start that is no equilibrium, as of one cable: rod, but for what a line wants to be catenary."""
+    managers, models = managers_for(scenes, model, criterion), [*model.models]
+    for k, manager in managers.items():
+        models[k] = zones_without_equilibrium(models[k], manager)
+    return replace(model, models=tuple(models)), managers
 
 
 def _take_rods(manager: DomainManager, model: Model) -> None:

@@ -41,6 +41,8 @@ ZONES = {"kind": "zones", "zones": [{"rod": 4, "cells": 4}, {"catenary": 4, "cel
 ADAPTIVE = {"kind": "adaptive", "hold_time": 0.1, "force_rod": [[4, 8]]}
 PAYOUT = {"rate": 0.2, "ramp": 0.2}
 TABLE = [[0.0, 0.0], [0.002, 100.0], [0.01, 1000.0], [0.1, 20000.0]]
+# 12 m from end to end, above the bed.
+POLYLINE = [[0, 0, 0], [3, 1.5, 1], [6.5, 2.5, 0.7551831916861387], [10, 0, 3]]
 # By name: what the scene gets, and which keys it decides: two features that decide the same are no pair.
 FEATURES: dict[str, tuple[Tables, str]] = {
     "catenary": ({"model": "catenary"}, "model"),
@@ -52,7 +54,8 @@ FEATURES: dict[str, tuple[Tables, str]] = {
     "swivel at a clamp": ({START: CLAMP | {"swivel": True}}, "start"),
     "turns": ({START: CLAMP, END: FAR | {"turns": 0.7}}, "start end"),
     "free end": ({END: {"kind": "free", "force": [40, 3, 30]}}, "end"),
-    "body": ({END: {"kind": "body", "mass": 3.0, "initial_guess": [4, 0, -10], "thrust": [8, 2, 0]}}, "end bed"),
+    "body": ({END: {"kind": "body", "mass": 3.0, "initial_guess": [4, 0, -10], "thrust": [8, 2, 0]}}, "end bed place"),
+    "points": ({"initial": {"kind": "points", "points": POLYLINE}}, "rest place"),
     "payout": ({END + ".payout": PAYOUT, END + ".motion": None}, "end"),
     "release": ({END + ".release_at": {"time": 0.25}}, "end"),
     "water": ({"environment.fluid": WATER} | DRAG, "sea"),
@@ -71,9 +74,10 @@ FEATURES: dict[str, tuple[Tables, str]] = {
                                 "modulus": 7e7, "density": 1100}]}, "items",
     ),
     "stiffness damping": ({S + "damping": {"mass": 0.5, "stiffness": 0.01}}, "damping"),
-    "two stiffnesses": ({S + "bending_stiffness": [20.0, 8.0]}, "bending"),
+    # Pinned at both ends and not at rest, a line with a direction about its axis has none that the scene gives.
+    "two stiffnesses": ({S + "bending_stiffness": [20.0, 8.0]}, "bending rest"),
     "rotary inertia": ({S + "rotary_inertia": 2e-3}, "rotary"),
-    "curved": ({S + "intrinsic_curvature": [0.05, 0.03, 0.02]}, "curved"),
+    "curved": ({S + "intrinsic_curvature": [0.05, 0.03, 0.02]}, "curved rest"),
     "torque of tension": ({S + "tension_torque": 2e-3}, "torque"),
     "table": ({S + "tension_strain": TABLE, S + "axial_stiffness": None}, "stretch"),
     "rope": (
@@ -128,6 +132,8 @@ def seen_by(M: Matrix, tables: Tables) -> Tables:
     def walk(key: str, x: Any) -> Any:
         if isinstance(x, dict):
             return {k: walk(k, y) for k, y in x.items()}
+        if key == "points" and isinstance(x, list):
+            return (np.array(x, float) @ M.T).tolist()
         if key in POLAR and isinstance(x, list):
             return (M @ np.array(x, float)).tolist()
         if key == "direction":  # of waves, deg
@@ -165,6 +171,8 @@ def exchanged(tables: Tables) -> Tables:
             item["range"], item["diameters"] = [LENGTH - x for x in item["range"]][::-1], item["diameters"][::-1]
         else:
             item["at"] = LENGTH - item["at"]
+    if isinstance(found["initial"], dict):
+        found["initial"]["points"].reverse()
     model = found["model"]
     if isinstance(model, dict):
         model.get("zones", []).reverse()
@@ -177,8 +185,8 @@ def as_system(tables: Tables) -> Tables | None:
     """The scene as a system of one line; None: several lines have no key for what it has."""
     found = deepcopy(tables)
     cable, ends = found.pop("cable"), found.pop("ends")
-    found.pop("initial")
     line: Tables = {"start": "a", "end": "b", "model": found.pop("model"), "contact": found.pop("contact")} | cable
+    line["initial"] = found.pop("initial")
     if "mesh" in found:
         line["mesh"] = found.pop("mesh")
     found["points"] = points = {}

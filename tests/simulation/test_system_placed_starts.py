@@ -1,0 +1,125 @@
+"""Several lines that start straight or along polylines, at rest where the scene has them, and not in equilibrium."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bits import FEW_STEPS, Stopping, differences
+from scipy.optimize import brentq
+
+import hybrid
+import hybrid.simulation.system_run
+from hybrid.errors import SceneError
+from tests.problems import tables_with
+
+EA, LENGTH, MASS, GRAVITY = 4e4, 4.0, 60.0, 9.81
+SECTION = {"length": LENGTH, "mass": 0.01, "axial_stiffness": EA, "bending_stiffness": 1e3, "diameter": 0.02}
+DOWN = {"kind": "straight", "direction": [0, 0, -1]}
+
+
+def between_springs(**changes: Any) -> dict[str, Any]:
+    """A weight between two light rods, one above it and one below, both straight and without tension at first."""
+    line = {"sections": [SECTION], "initial": DOWN, "mesh": {"cells": 2}, "model": "rod"}
+    scene = {
+        "environment": {"gravity": GRAVITY},
+        "points": {"top": {"position": [0, 0, 0]}, "foot": {"position": [0, 0, -2 * LENGTH]},
+                   "weight": {"initial_guess": [0, 0, -LENGTH], "mass": MASS}},
+        "lines": {"upper": {"start": "top", "end": "weight"} | line, "lower": {"start": "weight", "end": "foot"} | line},
+        "time": {"duration": 0.6, "step": 0.002, "rho_inf": 1.0}, "output": {"every": 0.02},
+    }  # fmt: skip
+    return dict(tables_with(scene, changes))
+
+
+def test_a_weight_let_go_between_two_springs_oscillates_about_its_rest() -> None:
+    """z = -g/w^2 (1 - cos w t), w^2 = 2 EA/(L m); the rods have 1e-3 of its mass, a third of which moves with it."""
+    result = hybrid.run(between_springs())
+    w = np.sqrt(2.0 * EA / (LENGTH * (MASS + 2.0 * LENGTH * SECTION["mass"] / 3.0)))
+    sink = GRAVITY / w**2 * (1.0 - np.cos(w * result.times))
+    moved = result["points/weight/position"][:, 2] + LENGTH
+    assert 1.2 < w * result.times[-1] / (2.0 * np.pi) < 3.0
+    assert np.abs(moved + sink).max() < 2e-3 * sink.max()
+    assert np.abs(result.lines["upper"]["tension"][:, 0] - EA * sink / LENGTH).max() < 5e-3 * EA * sink.max() / LENGTH
+    assert not {"static_path", "static_residual"} & {*result.attributes}
+
+
+def test_an_inextensible_rope_let_go_level_falls_and_swings_as_one_cable() -> None:
+    """The end is a free point with a mass: the same motion as of one cable with a body."""
+    section = {"length": LENGTH, "mass": 0.5, "diameter": 0.02}
+    rest = {"environment": {"gravity": GRAVITY}, "time": {"duration": 0.5, "step": 0.005}}
+    level = {"kind": "straight", "direction": [1, 0.2, 0]}
+    tip = (LENGTH * np.array([1, 0.2, 0]) / np.hypot(1, 0.2)).tolist()
+    cable = hybrid.run(rest | {
+        "cable": {"sections": [section]}, "initial": level, "model": "catenary", "mesh": {"cells": 8},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "body", "mass": 3.0}},
+    })  # fmt: skip
+    lines = hybrid.run(rest | {
+        "points": {"a": {"position": [0, 0, 0]}, "b": {"initial_guess": tip, "mass": 3.0}},
+        "lines": {"one": {"start": "a", "end": "b", "sections": [section], "initial": level, "model": "catenary",
+                          "mesh": {"cells": 8}}},
+    })  # fmt: skip
+    assert cable.position[-1, -1, 2] < -0.2 * LENGTH
+    assert np.abs(lines.lines["one"].position - cable.position).max() < 1e-9 * LENGTH
+
+
+def test_a_run_from_such_a_start_goes_on_bit_for_bit_and_steps_from_outside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    stopping = Stopping(monkeypatch)
+    scene = between_springs(**{"lines.upper.model": "adaptive", "output.exact": True, "time.duration": 0.2})
+    whole, part = tmp_path / "whole.h5", tmp_path / "part.h5"
+    hybrid.run(scene, whole, progress=stopping)
+    stopping.left = stopping.heard // 2
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(scene, part, progress=stopping)
+    stopping.left = -1
+    hybrid.resume(part, progress=stopping)
+    assert differences(whole, part) == []
+    with hybrid.Simulation(scene) as stepped:
+        for t in np.arange(1, 11) * 0.02:
+            stepped.advance(float(t))
+    found, asked = stepped.result(), hybrid.open(whole)
+    assert np.abs(found["points/weight/position"] - asked["points/weight/position"]).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"lines.lower.initial": None}, "line upper starts so"),
+        ({"lines.upper.initial": DOWN | {"velocity": [1, 0, 0]}}, "the points of the line start at rest"),
+        ({"lines.upper.initial": {"kind": "straight", "direction": [1, 0, 0]}}, "lines.upper.initial.direction"),
+        ({"lines.lower.initial": {"kind": "points", "points": [[0, 0, -4], [0, 0, -7.9]]}}, "lines.lower.initial"),
+    ],
+)
+def test_what_contradicts_is_refused_at_its_key(changes: dict[str, Any], told: str) -> None:
+    with pytest.raises(SceneError, match=told):
+        hybrid.run(between_springs(**changes))
+
+
+def test_such_a_start_is_where_the_search_of_a_rest_begins() -> None:
+    """Of the same scene the equilibrium alone: the weight hangs from two strings, 2 T cos(angle) = m g."""
+    away, down = 2.0, np.sqrt(LENGTH**2 - 2.0**2)
+    section = SECTION | {"bending_stiffness": None}
+    line = {"sections": [section], "mesh": {"cells": 2}, "model": "catenary"}
+    lines = {
+        name: line | {"start": name, "end": "weight", "initial": {"kind": "straight", "direction": [side * away, 0, -down]}}
+        for name, side in (("west", 1), ("east", -1))
+    }  # fmt: skip
+    result = hybrid.static({
+        "environment": {"gravity": GRAVITY},
+        "points": {"west": {"position": [-away, 0, 0]}, "east": {"position": [away, 0, 0]},
+                   "weight": {"initial_guess": [0, 0, -down], "mass": MASS}},
+        "lines": lines,
+    })  # fmt: skip
+
+    def missing(z: float) -> float:
+        long = np.hypot(away, z)
+        return 2.0 * EA * (long / LENGTH - 1.0) * z / long - (MASS + LENGTH * SECTION["mass"]) * GRAVITY
+
+    found = -result["points/weight/position"][-1, 2]
+    assert found == pytest.approx(brentq(missing, down, 2.0 * down, xtol=1e-12), rel=1e-6)
+    assert found > down + 1e-2
