@@ -157,7 +157,7 @@ def _strain_of_moment(view: Observation, node: Integers, cell: Integers) -> Floa
     inner = np.where(cell == node, cell + 1, cell)
     hn = view.of_line("hn", inner)[:, None]
     B = view.stiffness(inner) * hn
-    k0 = line.k0[inner][..., None] / hn
+    k0 = view.of_line("k0", inner) / hn
     a1, d, M = view.directors(cell), view.d[cell], view.node_moment[node]
     body = np.stack([dot(a1, M), dot(cross(d, a1), M), dot(d, M) + torque], axis=1)
     if line.tension_twist.size:

@@ -202,14 +202,6 @@ def holds_rod(model: Any, end: str, length: float) -> bool:
     return isinstance(model, RodModel) or isinstance(zone, RodZone)
 
 
-def _rod_at_winch(tables: Tables) -> Iterator[Place]:
-    """Winches that a rod leaves, or may leave."""
-    if "model" in tables and "cable" in tables:
-        for at, _ in _winches(tables):
-            if holds_rod(tables["model"], str(at[1]), tables["cable"].length):
-                yield at
-
-
 def _turns(tables: Tables) -> Iterator[Place]:
     ends: Ends | None = tables.get("ends")
     for name, end in ends.named().items() if ends else ():
@@ -370,7 +362,6 @@ SELF_CONTACT = Feature("contact of a line with itself", "contact.self", _self_co
 PAYOUT = Feature("line that is paid out", "ends.end.payout", _paid_out)
 PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout", _paid_out_at("start"))
 PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out_at("end"))
-PAID_OUT_ROD = Feature("a rod that is paid out", "ends.end.payout", _rod_at_winch)
 RELEASE_AT_WINCH = Feature("release of the end at the winch", "ends.end.release_at", _release_at_winch)
 TWISTED_RELEASE = Feature("release of an end", "ends.end.release_at", lambda tables: ())
 TWISTED_CATENARY = Feature("a catenary zone that carries torque there", "model", lambda tables: ())
@@ -449,8 +440,8 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal(
         SWIVEL_BESIDE, DIRECTED, "not worked out",
-        "a section beside it bends otherwise in another direction about its axis, and its two sides turn against "
-        "each other",
+        "a section beside it has a bending_stiffness of two numbers or an intrinsic_curvature, and its two sides turn "
+        "against each other",
         "a place between straight sections of one bending_stiffness",
         "put a short straight section with one bending_stiffness around it",
     ),
@@ -546,15 +537,8 @@ REFUSALS: tuple[Refusal, ...] = (
         fix="leave it out; damping.mass can stay",
     ),
     Refusal(
-        SWIVEL, PAYOUT, "not worked out", PAID, "no swivel", "leave it out: a pinned end turns freely"
-    ),
-    Refusal(
         STIFFENER, PAYOUT, "not worked out", f"{PAID}, and the stiffness of its cells changes at the winch alone",
         "no bend stiffener", LEAVE_OUT,
-    ),
-    Refusal(
-        CURLED, PAID_OUT_ROD, "not worked out", "a rod is paid out ({key}), which is straight there",
-        fix="leave it out, or take a catenary there",
     ),
     Refusal(
         TORQUE_OF_TENSION, PAYOUT, "not worked out", f"{PAID} and its twist is not known then", "nothing or 0",

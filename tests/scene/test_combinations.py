@@ -82,12 +82,10 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.PAYOUT_AT_START, c.PAYOUT_AT_END): (PAID | {"ends.start.payout": {"rate": 0.1, "ramp": 1.0}}, ""),
     (c.RELEASE_AT_WINCH, c.PAYOUT): (PAID | {END + "release_at": {"time": 2}}, ""),
     (c.STIFFNESS_DAMPING, c.PAYOUT): (PAID | {SECTION + "damping": {"stiffness": 0.01}}, ""),
-    (c.SWIVEL, c.PAYOUT): (SWIVEL | PAID, ""),
     (c.STIFFENER, c.PAYOUT): (
         {"cable.attachments": [{"kind": "bend_stiffener", "range": [0, 2], "added_stiffness": [[0, 90], [2, 10]]}]}
         | PAID, ""
     ),
-    (c.CURLED, c.PAID_OUT_ROD): (CURVED | PAID, ""),
     (c.TORQUE_OF_TENSION, c.PAYOUT): (TORQUE | PAID, ""),
     (c.LAYERS, c.PAYOUT): (PAID | {"resolution": {"cells_per_layer": 2}}, ""),
     (c.BREAKS_OFF_CLAMP, c.CLAMPED_CONNECTION): (CLAMPED | {"points.b.break_at": {"time": 2}}, ""),

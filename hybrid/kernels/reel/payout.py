@@ -213,18 +213,24 @@ def correct_force(line, sea, ends, state, velocity, reel, report, t):
 
 
 @inner
-def strain_before(line, state, i, k):
-    """Strain of the element at node i, from what has no stress, squared and weighed with the stiffness k."""
+def bend_that_came(line, state, i, k, before):
+    """Twice the energy, J, that a change k of its stiffness (N m) and one of its strain without load make of the element
+    at node i, bent as it is; before: (9,) of `Reel.before`.
+
+    With x the strain now and d what it was more before:  (kb + k) x^2 - kb (x + d)^2 = k x^2 - kb (2 x + d) d.
+    """
     da, _, _ = chord(get3(state.e, i - 1))
     db, _, _ = chord(get3(state.e, i))
     turn = log_rotation(relative_rotation(frame(get3(state.a1, i - 1), da), frame(get3(state.a1, i), db)))
-    x = sub(turn, get3(line.k0, i))
-    return k[0] * x[0] * x[0] + k[1] * x[1] * x[1] + k[2] * x[2] * x[2]
+    x, d = sub(turn, get3(line.k0, i)), sub(get3(line.k0, i), (before[6], before[7], before[8]))
+    straight = before[3] * (2.0 * x[0] + d[0]) * d[0] + before[4] * (2.0 * x[1] + d[1]) * d[1]
+    straight += before[5] * (2.0 * x[2] + d[2]) * d[2]
+    return k[0] * x[0] * x[0] + k[1] * x[1] * x[1] + k[2] * x[2] * x[2] - straight
 
 
 @inner
 def remember(line, reel):
-    """Lengths, and mass, weight and stiffness of the nodes that change, for the next step."""
+    """Lengths, and mass, weight, stiffness and bend without load of the nodes that change, for the next step."""
     n, before = line.h.shape[0], reel.before
     for c in range(n):
         before[c, 0] = line.h[c]
@@ -232,7 +238,7 @@ def remember(line, reel):
         i = node(line, reel, j)
         before[i, 1], before[i, 2] = line.mass[i], line.force[i, 2]
         for k in range(3):
-            before[i, 3 + k] = line.kb[i, k]
+            before[i, 3 + k], before[i, 6 + k] = line.kb[i, k], line.k0[i, k]
     reel.numbers[FLUX_BEFORE] = reel.numbers[FLUX]
 
 
@@ -272,7 +278,8 @@ def book(line, old, new, reel, dt):
         if j < n and line.element[i]:
             more = (line.kb[i, 0] - before[i, 3], line.kb[i, 1] - before[i, 4], line.kb[i, 2] - before[i, 5])
             if more[0] != 0.0 or more[1] != 0.0 or more[2] != 0.0:
-                booked += 0.25 * (strain_before(line, old, i, more) + strain_before(line, new, i, more))
+                then = before[i]
+                booked += 0.25 * (bend_that_came(line, old, i, more, then) + bend_that_came(line, new, i, more, then))
     return booked
 
 
