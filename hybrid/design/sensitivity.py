@@ -29,6 +29,7 @@ from hybrid.scene.combinations import refuse_use
 from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.static_case import StaticCase
+from hybrid.simulation.zone_switching import on_layout
 from hybrid.solve.joined import JoinedLine
 from hybrid.studies.sensitivity import Influence
 from hybrid.studies.sensitivity import sensitivity as of_study
@@ -176,7 +177,9 @@ class AtRest:
         return JoinedLine(model.line, sea, ends, model.length, model.tension_scale, -np.inf, (-1, -1))
 
     def _with(self, key: str, value: float) -> Model:
-        model = build(changed_scene(self.scene, key, value), self.resolution)
+        model, here = build(changed_scene(self.scene, key, value), self.resolution), self.model.layout
+        if model.layout is not None and here is not None and np.array_equal(model.layout.parts, here.parts):
+            model = on_layout(model, model.layout._replace(rod=here.rod, here=here.here))  # zones stay what they are
         if model.line.s.size != self.model.line.s.size:
             detail = f"{key}: a change of it changes the number of cells; give `mesh: {{cells: ..}}`"
             raise ComputationError(Outcome.NOT_CONVERGED, None, None, detail)

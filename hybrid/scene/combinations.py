@@ -517,10 +517,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "one cable", "take differences of two equilibria",
     ),
     Refusal(
-        DERIVATIVES, MOVING_ZONES, "not worked out", "zones move ({key}), and a number may change where they are",
-        "rods, catenaries or fixed zones", "write `model: rod`, or give `accuracy` and let the program choose",
-    ),
-    Refusal(
         DERIVATIVES, SETTLED_FRICTION, "physics", "friction has settled ({key}), and how depends on the way there",
         "a rest without friction", "leave initial.friction out, or write neglected",
     ),

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
+from hybrid.design.sensitivity import changed_scene
 
 G = 9.81
 
@@ -104,8 +105,32 @@ def test_what_is_refused():
     ):
         with pytest.raises(hybrid.SceneError, match=words):
             hybrid.sensitivity(tables, [of], [by])
-    with pytest.raises(hybrid.SceneError, match="zones move"):
-        hybrid.sensitivity(tables | {"model": "adaptive"}, ["tension@0"], [key])
+
+
+@pytest.mark.parametrize("cells", [{}, {"curvature_error": 0.02}])
+def test_zones_that_move_stay_where_they_were_found(cells):
+    """Of a line that bends at its clamp: differences of equilibria whose zones are the same, and near those of rods."""
+    clamp = {"kind": "clamped", "position": [0, 0, -60], "tangent": [1, 0, 0]}
+    adaptive = {"kind": "adaptive", "force_rod": [[0, 60]]} | cells
+    tables = scene(LINE, clamp, pinned(205, 0, 0), adaptive, 100, SEA)
+    of, made = ["tension@0", "position.z@100", "max curvature"], hybrid.validate_scene(tables)
+    keys = [f"cable.sections[0].{x}" for x in ("mass", "bending_stiffness")]
+    found = hybrid.sensitivity(tables, of, keys)
+    rods = hybrid.sensitivity(tables | {"model": "rod"}, of, keys)
+    for key in keys:
+        (number,) = {x.number for x in found if x.by == key}
+        both, zones = [], set()
+        for part in (1.0 + 1e-4, 1.0 - 1e-4):
+            changed = changed_scene(made, key, number * part)
+            rest = hybrid.static(changed)
+            zones.add(tuple(rest.zones[0]))
+            both.append([x.result for x in hybrid.sensitivity(changed, of, keys[:1])])
+        assert len(zones) == 1 and {x.kind for x in rest.zones[0]} == {"rod", "catenary"}
+        slope = (np.array(both[0]) - both[1]) / (2e-4 * number)
+        ours, theirs = (np.array([x.derivative for x in each if x.by == key]) for each in (found, rods))
+        np.testing.assert_allclose(ours, slope, rtol=1e-4)
+        np.testing.assert_allclose(ours[1:], theirs[1:], rtol=0.05)
+        assert not np.allclose(ours, theirs, rtol=1e-8)
 
 
 @pytest.mark.parametrize("what", ["several lines", "friction has settled"])
