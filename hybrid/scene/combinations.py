@@ -455,10 +455,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "axial_stiffness alone", "give axial_stiffness alone",
     ),
     Refusal(
-        TORQUE_OF_TENSION, FOLLOWING_CELLS, "not worked out", "cells follow the curvature (model.curvature_error)",
-        "nothing or 0", "leave curvature_error out",
-    ),
-    Refusal(
         SHORTEST_CELLS, STAYING_CELLS, "physics", "rods and catenaries have the cells of one mesh, which stay",
         fix="leave it out and give mesh.cells or mesh.nodes, or write curvature_error for cells that follow",
     ),

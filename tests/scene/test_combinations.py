@@ -59,7 +59,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.SWIVEL_BESIDE, c.DIRECTED): (SWIVEL | TWO, ""),
     (c.CURLED, c.PIPE_CURLED): (CURVED | {SECTION + "pipe": {"wall": 0.002, "modulus": 2e11}}, ""),
     (c.STRETCH_LAW, c.TORQUE_OF_TENSION): (ROPE | TORQUE, ""),
-    (c.TORQUE_OF_TENSION, c.FOLLOWING_CELLS): (TORQUE | FOLLOWING, ""),
     (c.SHORTEST_CELLS, c.STAYING_CELLS): ({"model": {"kind": "adaptive", "rod_cell": 0.1}}, ""),
     (c.LAYERS, c.FOLLOWING_CELLS): ({"resolution": {"cells_per_layer": 2}} | FOLLOWING, ""),
     (c.LAYERS, c.STEPPED): ({"resolution": {"cells_per_layer": 2}}, "stepped"),

@@ -138,13 +138,39 @@ def test_what_it_needs(change, where):
     ("more", "words"),
     [
         ({"dimension": 2}, "tension_torque"),
-        ({"model": {"kind": "adaptive", "curvature_error": 0.05}}, "cells follow the curvature"),
     ],
 )
 def test_what_it_does_not_go_with(more, words):
     model = more.pop("model", "rod")
     with pytest.raises(hybrid.SceneError, match=words):
         hanging(model, "guided", 500.0, **more)
+
+
+def test_cells_that_follow_the_curvature_carry_it():
+    """A sagging tether that is moved: torque of 400 rods, on cells that change, and positions as near as without it."""
+    clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -1], "normal": [0, 1, 0]}
+    far = clamp | {"position": [20, 0, 4], "tangent": [1, 0, 1.2],
+                   "motion": {"travel": {"by": [3, 2, 1], "over": 2.0}}}  # fmt: skip
+    follows = {"kind": "adaptive", "curvature_error": 0.02}
+
+    def run(model, cells, torque):
+        tether = section(length=30.0, mass=3.0, bending_stiffness=40.0, tension_torque=torque, damping={"mass": 0.2})
+        return hybrid.run({
+            "environment": {"gravity": G}, "cable": {"sections": [tether]}, "ends": {"start": clamp, "end": far},
+            "initial": "equilibrium", "contact": {"self": False}, "model": model, "mesh": {"cells": cells},
+            "time": {"duration": 3.0, "step": 0.02}, "output": {"every": 0.5, "points": 31},
+        })  # fmt: skip
+
+    fine, plain = run("rod", 400, 5e-3), run("rod", 400, 0.0)
+    found, without = run(follows, 40, 5e-3), run(follows, 40, 0.0)
+    largest, stays = np.abs(fine["torque"]).max(), run({"kind": "adaptive"}, 100, 5e-3)
+    off, of_others = (np.abs(x["torque"] - fine["torque"]).max() for x in (found, stays))
+    assert off < 1.2 * of_others < 0.05 * largest  # as near as zones on cells that stay
+    assert np.abs(plain["torque"]).max() < 0.1 * largest
+    apart, apart_without = (np.abs(x.position - y.position).max() for x, y in ((found, fine), (without, plain)))
+    assert apart < 1.2 * apart_without < 1e-2
+    changes, of_plain = (abs(x["work/zones"][-1]) for x in (found, without))
+    assert changes < 1.2 * of_plain < 1.0
 
 
 def test_a_line_that_is_paid_out_refuses_it():
