@@ -163,11 +163,11 @@ def attached_weights(scene: Scene) -> list[float]:
     fluid, gravity = scene.environment.fluid, scene.environment.gravity
     density = fluid.density if fluid else 0.0
 
-    def sinks(x: Float | Clump | Swivel | Spread | Body) -> float:
+    def sinks(x: Float | Clump | Swivel | Modules | BendStiffener | Body) -> float:
         return gravity * (x.mass - (density * x.volume_in(density, gravity) if fluid else 0.0))
 
     points = [sinks(x) for _, x in attachments_at(scene)]
-    spread = (x for x in scene.cable.attachments if isinstance(x, Spread))
+    spread = (x for x in scene.cable.attachments if isinstance(x, Modules | BendStiffener))
     return points + [sinks(x) * (x.range[1] - x.range[0]) for x in spread]
 
 
