@@ -100,7 +100,8 @@ def seated(seat: Floats, axes: Floats) -> tuple[Triple, Triple]:
 def with_clamps(model: Model, clamped: Line, ends: Sequence[int]) -> Model:
     """The model with the elements that another line has at these ends, and its zones that a torque passes through."""
     line = model.line
-    new = {name: getattr(line, name).copy() for name in ("element", "kb", "k0", "hn")}
+    names = ("element", "kb", "k0", "hn", *(("bend_law",) if line.bend_law.size else ()))
+    new = {name: getattr(line, name).copy() for name in names}
     for k in ends:
         for name, values in new.items():
             values[-k] = getattr(clamped, name)[-k]

@@ -199,12 +199,12 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
     entries.append(Entry("axial compliance", any(extensible), "sections[].axial_stiffness"))
     if any(x.tension_strain is not None for x in scene.cable.sections):
         entries.append(Entry("tension over strain by a table", True, "sections[].tension_strain"))
+    if any(x.moment_curvature is not None for x in scene.cable.sections):
+        entries.append(Entry("moment over curvature by a table", True, "sections[].moment_curvature"))
     if any(x.dynamic_stiffness is not None for x in scene.cable.sections):
         entries.append(Entry("stiffness that depends on speed and mean tension", True, "sections[].dynamic_stiffness"))
     if "rod" in kinds:
-        assumed = [
-            i for i, x in enumerate(scene.cable.sections) if x.torsional_stiffness is None and x.bending_stiffness
-        ]
+        assumed = [i for i, x in enumerate(scene.cable.sections) if x.torsional_stiffness is None and x.initial_bending]
         if assumed:
             which = ", ".join(f"sections[{i}]" for i in assumed)
             entries.append(

@@ -9,7 +9,7 @@ from hybrid.kernels.laws.axial_law import SHIFT, follow_law
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH
 from hybrid.kernels.mesh.zone_line import Cable, blank_line_job, fill_line
-from hybrid.kernels.state.forces import AXIAL_LAW, BODIES, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING
+from hybrid.kernels.state.forces import AXIAL_LAW, BENDING_LAW, BODIES, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.state.state import (
     NO_ADDRESS,
     NO_LAW,
@@ -23,6 +23,7 @@ from hybrid.kernels.state.state import (
     no_work,
     state_for,
 )
+from hybrid.model.bending_tables import bend_law
 from hybrid.model.material import Material
 
 lines = Packed(blank_line, given=("bits", "plane", "torsion", *TENSION_TORQUE))
@@ -43,6 +44,8 @@ def line_on(
         inertia = ABOUT_CHORDS if comes_and_goes else WITH_SECTIONS
     if material.curves is not None:
         bits |= AXIAL_LAW
+    if material.bends is not None:
+        bits |= BENDING_LAW
     return on_base(material, cable_on(material, s, bits, inertia), s, np.arange(rod.size), rod, bits)
 
 
@@ -64,6 +67,9 @@ def on_base(
     if material.curves is not None:
         law, law_table, law_at = axial_law(material, h, of)
         line = line._replace(law=law, law_table=law_table, law_at=law_at)
+    if material.bends is not None:
+        bent, table = bend_law(material, line, of)
+        line = line._replace(bend_law=bent, bend_table=table)
     return line
 
 

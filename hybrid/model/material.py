@@ -6,6 +6,7 @@ and end bodies sit at points.  `hybrid.model.line` puts a Material on nodes.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -22,12 +23,14 @@ from hybrid.model.sections import (
     mean_compliance,
     merged_sections,
     modules_of,
+    restrictors_of,
     rotary_inertia,
     stiffeners_of,
     swivels,
     torsional_stiffness,
 )
-from hybrid.scene.schema import BendStiffener, Scene, Section
+from hybrid.scene.schema import BendRestrictor, BendStiffener, Scene, Section
+from hybrid.scene.stretch import Curve, slopes, stiffened
 
 # The tension below which bending counts as much as tension, in (EI w^2)^(1/3): there a cable bends under its weight as
 # much as its tension straightens it.  A cable without weight or stiffness has a least one, as a part of the scale.
@@ -35,6 +38,7 @@ TENSION_FLOOR, LEAST_TENSION = 0.2, 1e-6
 
 # Pieces of a bend stiffener whose mesh nobody knows yet: least cells over its length, at fineness 1.
 STIFFENER_CELLS = 20
+LOCKED = 100.0  # bending stiffness of a restrictor that is locked, over that of the cable
 # Of its height, from which on the added mass of a body without mass counts in full.
 LEAST_DRAUGHT = 0.05
 SMALLEST_BODY = 0.01  # m, over which a body without volume and drag passes through the surface
@@ -85,6 +89,7 @@ class Material:
     curves: list[StretchLaw | None] | None = (
         None  # (K,) of pieces whose tension is no multiple of strain; None: no such
     )
+    bends: list[Curve | None] | None = None  # (K,) tables of moment over curvature; None: there are none
     tension_torque: Floats = field(default_factory=lambda: np.zeros(0))  # (K,) N m per N; empty: none anywhere
 
     @property
@@ -104,13 +109,32 @@ class Material:
 
     @property
     def mean_bending(self) -> Floats:
-        """(K,) N m2, mean EI of both axes: of models that do not know how a section lies (catenaries, criteria)."""
+        """(K,) N m2, mean EI of both axes, of a table its steepest: of models that do not know how a section lies, or
+
+        how far it bends (catenaries, criteria).
+        """
+        return self._of_tables(max, self.mean_initial_bending)
+
+    @property
+    def mean_initial_bending(self) -> Floats:
+        """(K,) N m2, mean EI of both axes without bend."""
         return np.asarray(self.B[:, :2].mean(axis=1))
 
     @property
     def weakest_bending(self) -> Floats:
-        """(K,) N m2, EI about the weaker axis: over the shortest length, which a mesh has to resolve, it bends."""
-        return np.asarray(self.B[:, :2].min(axis=1))
+        """(K,) N m2, EI about the weaker axis, of a table its flattest: over the shortest length, which a mesh has to
+
+        resolve, it bends.
+        """
+        return self._of_tables(min, np.asarray(self.B[:, :2].min(axis=1)))
+
+    def _of_tables(self, choose: Callable[[list[float]], float], plain: Floats) -> Floats:
+        """The chosen one of a table's stiffnesses (K,) N m2; `plain` where there is none."""
+        if self.bends is None:
+            return plain
+        return np.array(
+            [x if rows is None else choose(slopes(rows)) for rows, x in zip(self.bends, plain, strict=True)]
+        )
 
     @property
     def submerged_weight(self) -> Floats:
@@ -152,8 +176,8 @@ def material(scene: Scene, nodes: Floats | None = None) -> Material:
     sections = merged_sections(scene.cable.sections)
     ends = np.concatenate([[0.0], np.cumsum([x.length for x in sections])])
     length, near = float(ends[-1]), 1e-9 * float(ends[-1])
-    modules, stiffeners = list(modules_of(scene)), stiffeners_of(scene)
-    edges = _apart([*ends.tolist(), *(x for m in (*modules, *stiffeners) for x in m.range)], length, near)
+    modules, stiffeners, restrictors = list(modules_of(scene)), stiffeners_of(scene), restrictors_of(scene)
+    edges = _apart([*ends.tolist(), *(x for m in (*modules, *stiffeners, *restrictors) for x in m.range)], length, near)
     bounds = _apart([*edges, *(x for m in stiffeners for x in _pieces_of(m, nodes, length))], length, near)
     middle = 0.5 * (np.array(bounds[:-1]) + np.array(bounds[1:]))
     of = [sections[int(i)] for i in np.clip(np.searchsorted(ends, middle) - 1, 0, len(sections) - 1)]
@@ -164,6 +188,8 @@ def material(scene: Scene, nodes: Floats | None = None) -> Material:
         out.mass[on] += m.mass
         out.weight[on] += m.mass * scene.environment.gravity
     _stiffen(out, scene, middle)
+    if restrictors or any(x.moment_curvature for x in of):
+        out.bends = _bending_tables(out, restrictors, of, middle)
     if scene.environment.fluid is not None:
         _wetted(out, scene, of, middle)
     _points(out, scene)
@@ -198,6 +224,24 @@ def _stiffen(out: Material, scene: Scene, middle: Floats) -> None:
             if out.polar[k] > 0.0:  # the section has an inertia of its own
                 out.rotary[k] += density * x.second_moment(s)
                 out.polar[k] += 2.0 * density * x.second_moment(s)
+
+
+def _bending_tables(
+    out: Material, restrictors: list[BendRestrictor], of: list[Section], middle: Floats
+) -> list[Curve | None]:
+    """Tables of moment over curvature (K,) with what stiffeners add, and what locks beyond a curvature."""
+    found: list[Curve | None] = []
+    for section, EI, s in zip(of, out.mean_initial_bending, middle, strict=True):
+        own = float(np.mean(section.initial_bending or (0.0, 0.0)))
+        rows = section.moment_curvature
+        if rows is not None and own < EI:
+            rows = stiffened(rows, 0.0, float(EI) - own)
+        for x in restrictors:
+            if x.range[0] < s < x.range[1]:
+                rows = rows or ((0.0, 0.0), (1.0 / x.radius, float(EI) / x.radius))
+                rows = stiffened(rows, 1.0 / x.radius, x.locked_stiffness or LOCKED * own)
+        found.append(rows)
+    return found
 
 
 def _stiff_at(stiffener: BendStiffener, a: float, b: float) -> float:

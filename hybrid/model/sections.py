@@ -8,6 +8,7 @@ from itertools import accumulate
 import numpy as np
 
 from hybrid.scene.schema import (
+    BendRestrictor,
     BendStiffener,
     Body,
     Clump,
@@ -56,10 +57,8 @@ def mean_compliance(section: Section) -> float:
 
 
 def bending_stiffness(section: Section) -> tuple[float, float]:
-    b = section.bending_stiffness
-    if b is None:
-        return 0.0, 0.0
-    return b if isinstance(b, tuple) else (b, b)
+    """EI about both axes in N m^2, 0 where none is given; of a table that without bend."""
+    return section.initial_bending or (0.0, 0.0)
 
 
 def limits_along(scene: Scene, s: np.ndarray) -> dict[str, np.ndarray]:
@@ -158,6 +157,11 @@ def stiffeners_of(scene: Scene) -> list[BendStiffener]:
     return [x for x in scene.cable.attachments if isinstance(x, BendStiffener)]
 
 
+def restrictors_of(scene: Scene) -> list[BendRestrictor]:
+    """Bend restrictors on the line."""
+    return [x for x in scene.cable.attachments if isinstance(x, BendRestrictor)]
+
+
 def attached_weights(scene: Scene) -> list[float]:
     """Weight in water of every attachment and end body, N, positive downwards."""
     fluid, gravity = scene.environment.fluid, scene.environment.gravity
@@ -175,7 +179,7 @@ def section_changes(scene: Scene) -> tuple[float, ...]:
     """Arc lengths (m) inside the cable where bending stiffness jumps: between sections, at the ends of stiffeners."""
     found = [*accumulate(x.length for x in merged_sections(scene.cable.sections)[:-1])]
     near = 1e-9 * scene.length
-    for edge in (edge for x in stiffeners_of(scene) for edge in x.range):
+    for edge in (edge for x in (*stiffeners_of(scene), *restrictors_of(scene)) for edge in x.range):
         if near < edge < scene.length - near and all(abs(edge - s) > near for s in found):
             found.append(edge)
     return tuple(sorted(found))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.laws.bending_law import LAST_A, LAST_B, curvature_under
 from hybrid.kernels.march.zone_torque import TORQUE
 from hybrid.kernels.state.forces import PLANAR
 from hybrid.kernels.state.state import Floats, Line
@@ -147,6 +148,20 @@ def _twist_to_node(view: Observation, cell: Integers, inner: Integers) -> Floats
     return np.asarray((2.0 * view.line.tension_twist[cell] / h[cell])[:, None] * more)
 
 
+def _bend_by_table(line: Line, inner: Integers, side: Integers, moment: Floats, plain: Floats) -> Floats:
+    """Curvature (n, 2, outputs) under moments (n, 2, outputs) N m, on a side of the nodes inner (n,); `plain` where
+
+    there is no table.
+    """
+    out = plain.copy()
+    for j, i in enumerate(inner):
+        if line.bend_law[i, LAST_A] + line.bend_law[i, LAST_B] > 0.0:
+            M = np.hypot(moment[j, 0], moment[j, 1])
+            bent = [curvature_under(line, int(i), int(side[j]), float(x)) for x in M]
+            out[j] = moment[j] * np.divide(bent, M, out=np.zeros_like(M), where=M > 0.0)
+    return out
+
+
 def _strain_of_moment(view: Observation, node: Integers, cell: Integers) -> Floats:
     """Curvature and twist (n, 2, outputs) at rods' ends that carry given moments (at a joint that of its zone)."""
     line = view.line
@@ -164,6 +179,8 @@ def _strain_of_moment(view: Observation, node: Integers, cell: Integers) -> Floa
         k0 = k0 + np.zeros_like(body)
         k0[:, 2] -= (2.0 * line.tension_twist[cell] / line.h[cell])[:, None] * view.T[cell]
     k = k0 + np.divide(body, B, out=np.zeros_like(body), where=np.broadcast_to(B > 0, body.shape))
+    if line.bend_law.size:
+        k[:, :2] = k0[:, :2] + _bend_by_table(line, inner, np.sign(node - inner), body[:, :2], (k - k0)[:, :2])
     found = np.stack([np.hypot(k[:, 0], k[:, 1]), k[:, 2]], axis=1)
     found[line.element[inner] == 0] = 0.0
     return found

@@ -276,7 +276,7 @@ class AdaptiveModel(Table):
 def usual_model(cable: Any, obstacles: Any = None) -> RodModel | CatenaryModel | AdaptiveModel:
     """The model of a scene that names none: zones that move, if the cable can bend; a rod, if they cannot hold it."""
     sections = getattr(cable, "sections", ())
-    if not any(x.bending_stiffness is not None for x in sections):
+    if not any(x.initial_bending is not None for x in sections):
         return CatenaryModel()
     stays = any(x.anisotropic or x.turns or x.curve is not None for x in sections)
     return RodModel() if stays or obstacles else AdaptiveModel()

@@ -4,8 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import accumulate
 
-from hybrid.scene.attachments import BendStiffener, Clump, Float, Modules, Spread, Swivel, sphere_diameter
+from hybrid.scene.attachments import (
+    BendRestrictor,
+    BendStiffener,
+    Clump,
+    Float,
+    Modules,
+    Spread,
+    Swivel,
+    sphere_diameter,
+)
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.cable import USUAL_DENSITIES, Cable, Environment
 from hybrid.scene.ends import Body, Ends
@@ -39,6 +49,19 @@ def attachments_on_cable(cable: Cable) -> Iterator[Finding]:
             yield Finding(("cable", "attachments", i, *place), expected, fix)
 
 
+def restrictors_hold_what_bends(cable: Cable) -> Iterator[Finding]:
+    """Bend restrictors on sections without a bending stiffness, or of a radius that a table has not got beyond."""
+    ends = [*accumulate((x.length for x in cable.sections), initial=0.0)]
+    for i, item in enumerate(cable.attachments):
+        if not isinstance(item, BendRestrictor):
+            continue
+        for k, section in enumerate(cable.sections):
+            if ends[k] < item.range[1] and ends[k + 1] > item.range[0] and not section.weakest_bending:
+                expected = f"a bending stiffness of cable.sections[{k}], because what locks there bends until then"
+                fix = f"add cable.sections[{k}].bending_stiffness (N m^2)"
+                yield Finding(("cable", "attachments", i, "range"), expected, fix)
+
+
 def swivels_turn(cable: Cable) -> Iterator[Finding]:
     """Swivels where nothing turns about the cable."""
     near = SAME_LENGTH * cable.length
@@ -57,7 +80,7 @@ def attachments_in_fluid(environment: Environment, cable: Cable) -> Iterator[Fin
         here: Place = ("cable", "attachments", i)
         if isinstance(item, Clump | Swivel):
             yield from _needs_fluid(here, item, environment)
-        elif isinstance(item, BendStiffener):
+        elif isinstance(item, BendStiffener | BendRestrictor):
             continue
         elif environment.fluid is None:
             fix = f"{_WATER}; what only weighs is kind: clump"
@@ -110,7 +133,7 @@ def densities(environment: Environment, cable: Cable, ends: Ends) -> Iterator[Fi
     named: list[tuple[Place, Hung]] = [
         (("cable", "attachments", i), item)
         for i, item in enumerate(cable.attachments)
-        if not isinstance(item, BendStiffener)  # its density is given
+        if not isinstance(item, BendStiffener | BendRestrictor)  # a density is given, or nothing
     ]
     named += [(("ends", name), body) for name, body in ends.bodies().items()]
     for here, item in named:

@@ -272,12 +272,27 @@ def _either(attachment: Float | Modules) -> None:
         refuse([Finding(("buoyancy",), both, f"add `buoyancy: ...` (N{per}), the weight displaced minus its own")])
 
 
+class BendRestrictor(Spread):
+    """Half shells around the cable that lock at a bend radius, and let it bend freely until then."""
+
+    kind: Literal["bend_restrictor"] = Field(
+        default="bend_restrictor", description="locks the cable at a bend radius over a stretch"
+    )
+    radius: Positive = Field(description="bend radius of the axis of the cable at which it locks [m]")
+    locked_stiffness: Positive | None = Field(
+        default=None,
+        description="bending stiffness that it adds once it is locked; absent: a hundred times that of the cable "
+        "[N m^2]",
+    )
+
+
 Attachment = Annotated[
     Annotated[Float, Tag("<float>")]
     | Annotated[Clump, Tag("<clump>")]
     | Annotated[Swivel, Tag("<swivel>")]
     | Annotated[Modules, Tag("<modules>")]
-    | Annotated[BendStiffener, Tag("<bend_stiffener>")],
+    | Annotated[BendStiffener, Tag("<bend_stiffener>")]
+    | Annotated[BendRestrictor, Tag("<bend_restrictor>")],
     Discriminator(by_kind),
-    Kinds(("float", "clump", "swivel", "modules", "bend_stiffener"), usual=("float",)),
+    Kinds(("float", "clump", "swivel", "modules", "bend_stiffener", "bend_restrictor"), usual=("float",)),
 ]

@@ -13,6 +13,7 @@ from hybrid.scene.base import (
     NonNegative,
     NonNegativePair,
     Number,
+    Pair,
     PlainNumber,
     Positive,
     Table,
@@ -26,6 +27,7 @@ from hybrid.scene.stretch import (
     CurveFile,
     DynamicStiffness,
     TensionStrain,
+    bending_findings,
     interpolated,
     refuse_rows,
     rows_of,
@@ -249,8 +251,16 @@ class Section(Table):
         description="bending stiffness EI (modulus E x second moment of area), or [about a1, about a2]; needed in "
         "rod zones [N m^2]",
     )
+    moment_curvature: tuple[Pair, ...] | None = Field(
+        default=None,
+        description="instead of bending_stiffness: rows [curvature, bending moment] from [0, 0] on, both rising, "
+        "straight between them and beyond the last, the same about any axis, elastic; stiffness-proportional damping "
+        "is that of the first piece [1/m, N m]",
+    )
     torsional_stiffness: NonNegative | None = Field(
-        default=None, description="torsional stiffness GJ; absent: bending stiffness / 1.3 [N m^2]"
+        default=None,
+        description="torsional stiffness GJ; absent: bending stiffness / 1.3, of a table that of its first piece "
+        "[N m^2]",
     )
     tension_torque: Number | None = Field(
         default=None,
@@ -347,8 +357,19 @@ class Section(Table):
         return self.rotary_inertia is not None and self.rotary_inertia not in (0, (0, 0))
 
     @property
+    def initial_bending(self) -> tuple[float, float] | None:
+        """Bending stiffness [N m^2] about both axes, of a table that without bend; None if none is given."""
+        if self.moment_curvature is not None:
+            stiffness = slopes(self.moment_curvature)[0]
+            return stiffness, stiffness
+        b = self.bending_stiffness
+        return b if b is None or isinstance(b, tuple) else (b, b)
+
+    @property
     def weakest_bending(self) -> float | None:
-        """The smaller bending stiffness [N m^2], None if none is given."""
+        """The smaller bending stiffness [N m^2], of a table that of its softest piece; None if none is given."""
+        if self.moment_curvature is not None:
+            return min(slopes(self.moment_curvature))
         return min(self.bending_stiffness) if isinstance(self.bending_stiffness, tuple) else self.bending_stiffness
 
     @model_validator(mode="after")
@@ -404,6 +425,17 @@ class Section(Table):
                 expected = f"more than the largest static stiffness, {stiffest:.6g} N"
                 fix = "a rope answers stiffer to what is fast; are the two exchanged?"
                 refuse([Finding(("dynamic_stiffness", "constant"), expected, fix)])
+        return self
+
+    @model_validator(mode="after")
+    def _one_law_of_bending(self) -> Section:
+        if self.moment_curvature is None:
+            return self
+        if self.bending_stiffness is not None:
+            fix = "leave one of the two out"
+            refuse([Finding(("bending_stiffness",), "nothing, because moment_curvature says how it bends", fix)])
+        found = bending_findings(self.moment_curvature)
+        refuse(Finding(("moment_curvature", *x.at), x.expected, x.fix, x.given) for x in found)
         return self
 
     @model_validator(mode="after")

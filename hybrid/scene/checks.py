@@ -325,6 +325,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     start_checks.equilibrium_exists,
     sea_checks.fluid_density,
     attachment_checks.attachments_on_cable,
+    attachment_checks.restrictors_hold_what_bends,
     attachment_checks.swivels_turn,
     attachment_checks.attachments_in_fluid,
     attachment_checks.bodies_in_fluid,

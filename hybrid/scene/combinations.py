@@ -226,6 +226,11 @@ def _attached(kind: str) -> Callable[[Tables], Iterator[Place]]:
 _swivels = _attached("swivel")
 
 
+def _moment_tables(tables: Tables) -> Iterator[Place]:
+    yield from _in_sections("moment_curvature", of=lambda x: x.moment_curvature)(tables)
+    yield from _attached("bend_restrictor")(tables)
+
+
 def _swivels_beside(of: Callable[[Section], Any]) -> Callable[[Tables], Iterator[Place]]:
     """Swivels in or beside a section of which `of` is true."""
 
@@ -342,6 +347,9 @@ TORQUE_OF_TENSION = Feature("torque of tension", "tension_torque",
                             _in_sections("tension_torque", of=lambda x: x.tension_torque))  # fmt: skip
 STRETCH_LAW = Feature("tension over strain by a table or a rope's law", "tension_strain, dynamic_stiffness",
                       _stretch_laws)  # fmt: skip
+MOMENT_TABLE = Feature("moment over curvature by a table, bend restrictors", "moment_curvature, kind: bend_restrictor",
+                       _moment_tables)  # fmt: skip
+RESTRICTOR = Feature("bend restrictors", "attachments: kind: bend_restrictor", _attached("bend_restrictor"))
 STIFFNESS_DAMPING = Feature("damping proportional to stiffness", "damping.stiffness",
                             _in_sections("damping", "stiffness",
                                          of=lambda x: x.damping is not None and x.damping.stiffness))  # fmt: skip
@@ -420,6 +428,10 @@ REFUSALS: tuple[Refusal, ...] = (
         TWO_STIFFNESSES, MOVING_ZONES, "physics",
         "zones move (model), and a catenary does not know which way its sections lie",
         "one number", "give one number, or write `model: rod`",
+    ),
+    Refusal(
+        RESTRICTOR, TWO_STIFFNESSES, "not worked out", "a table of moment is the same about any axis ({key})",
+        "a section of one bending_stiffness", "give one number there",
     ),
     Refusal(
         ROTARY_INERTIA, MOVING_ZONES, "not worked out",
@@ -531,6 +543,10 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         STIFFENER, PAYOUT, "not worked out", f"{PAID}, and the stiffness of its cells changes at the winch alone",
         "no bend stiffener", LEAVE_OUT,
+    ),
+    Refusal(
+        MOMENT_TABLE, PAYOUT, "not worked out", f"{PAID}, and elements that change there have one bending stiffness",
+        "bending_stiffness alone", "give bending_stiffness alone",
     ),
     Refusal(
         TORQUE_OF_TENSION, PAYOUT, "not worked out", f"{PAID} and its twist is not known then", "nothing or 0",

@@ -33,7 +33,7 @@ from hybrid.scene.analysis import (
     ZonesModel,
     usual_model,
 )
-from hybrid.scene.attachments import Attachment, BendStiffener, Clump, Float, Modules, Spread, Swivel
+from hybrid.scene.attachments import Attachment, BendRestrictor, BendStiffener, Clump, Float, Modules, Spread, Swivel
 from hybrid.scene.base import Table, Text, Vector, refuse
 from hybrid.scene.cable import AddedMass, Cable, Contact, Damping, Drag, Environment, Fluid, Section
 from hybrid.scene.checks import contradictions
@@ -59,6 +59,7 @@ __all__ = [
     "AdaptiveModel",
     "AddedMass",
     "Attachment",
+    "BendRestrictor",
     "BendStiffener",
     "Body",
     "Cable",

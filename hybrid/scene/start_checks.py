@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from hybrid.scene.analysis import Equilibrium, Initial, Points, Straight, Time
-from hybrid.scene.attachments import Spread
+from hybrid.scene.attachments import BendRestrictor, Spread
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import Ends, Triple
@@ -153,6 +153,8 @@ def net_weight(environment: Environment, cable: Cable, ends: Ends) -> tuple[floa
     widths = [s.diameter or 0.0 for s in cable.sections]
     masses = [(s.mass * s.length, math.pi / 4 * d * d * s.length) for s, d in zip(cable.sections, widths, strict=True)]
     for item in cable.attachments:
+        if isinstance(item, BendRestrictor):
+            continue
         if density > 0.0 and gravity > 0.0:  # without, attachments that float are refused elsewhere
             length = item.range[1] - item.range[0] if isinstance(item, Spread) else 1.0
             masses.append((item.mass * length, item.volume_in(density, gravity) * length))

@@ -120,9 +120,34 @@ def refuse_rows(given: tuple[tuple[float, float], ...] | CurveFile, key: str) ->
         refuse(Finding((key, *x.at), x.expected, x.fix, x.given) for x in _findings(given))
 
 
+def bending_findings(rows: Curve) -> list[Finding]:
+    """What is wrong with a table of curvature and moment."""
+    if len(rows) < 2:
+        expected = "at least two rows [curvature, moment]"
+        return [Finding((), expected, "one number is bending_stiffness", f"{len(rows)} rows")]
+    if tuple(rows[0]) != (0.0, 0.0):
+        fix = "begin with [0, 0]: curvature is counted from that without moment, and is the same to either side"
+        return [Finding((0,), "no moment without curvature, [0, 0]", fix)]
+    for k, ((x, M), (y, N)) in enumerate(pairwise(rows), start=1):
+        if not y > x:
+            expected = f"a curvature above that of the row before, {x:g} 1/m"
+            return [Finding((k, 0), expected, "sort the rows; curvature comes first")]
+        if not N > M:
+            expected = f"a moment above that of the row before, {M:g} N m"
+            return [Finding((k, 1), expected, "sort the rows; a line that softens until it gives way has no answer")]
+    return []
+
+
 def slopes(rows: Curve) -> list[float]:
     """Stiffness (N) of each piece of a table."""
     return [(U - T) / (y - x) for (x, T), (y, U) in pairwise(rows)]
+
+
+def stiffened(rows: Curve, beyond: float, stiffness: float) -> Curve:
+    """A table of moment (N m) over curvature with a stiffness (N m^2) more from a curvature on (1/m)."""
+    last = rows[-1][0]
+    at = sorted({*(x for x, _ in rows), beyond, *([2.0 * beyond] if beyond >= last else [])})
+    return tuple((x, interpolated(rows, x) + stiffness * max(x - beyond, 0.0)) for x in at)
 
 
 def interpolated(rows: Curve, x: float, over_tension: bool = False) -> float:

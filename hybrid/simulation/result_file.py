@@ -165,7 +165,10 @@ def _limits(scene: Scene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
             unit, text, _ = SECTION_LIMITS[name]
             out.append((Field(f"{prefix}{name}", unit, f"{text}; NaN: none", s.shape, (dim,), nan_ok=True), values))
         if any(field.name == "torque" for field in observer.fields):
-            name, text = f"{prefix}bending_stiffness", "bending stiffness, the smaller one of two directions"
+            name, text = (
+                f"{prefix}bending_stiffness",
+                "bending stiffness (without bend), the smaller of two directions",
+            )
             out.append((Field(name, "N m^2", text, s.shape, (dim,)), weakest_bending(scene, s)))
             if np.isfinite(width := outer_diameter(scene, s)).any():
                 name, text = f"{prefix}diameter", "outer diameter; NaN: none given"

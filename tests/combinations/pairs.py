@@ -73,6 +73,11 @@ FEATURES: dict[str, tuple[Tables, str]] = {
         {"cable.attachments": [{"kind": "bend_stiffener", "range": [0, 1.5], "diameters": [0.09, 0.04], "bore": 0.03,
                                 "modulus": 7e7, "density": 1100}]}, "items",
     ),
+    "restrictor": ({"cable.attachments": [{"kind": "bend_restrictor", "range": [2, 5], "radius": 12}]}, "items"),
+    "moment table": (
+        {S + "moment_curvature": [[0, 0], [0.05, 1.0], [0.15, 2.0], [0.3, 8.0]], S + "bending_stiffness": None},
+        "bending",
+    ),
     "stiffness damping": ({S + "damping": {"mass": 0.5, "stiffness": 0.01}}, "damping"),
     # Pinned at both ends and not at rest, a line with a direction about its axis has none that the scene gives.
     "two stiffnesses": ({S + "bending_stiffness": [20.0, 8.0]}, "bending rest"),
@@ -168,7 +173,8 @@ def exchanged(tables: Tables) -> Tables:
             section["intrinsic_curvature"] = [-a, b, c]
     for item in found["cable"].get("attachments", ()):
         if "range" in item:
-            item["range"], item["diameters"] = [LENGTH - x for x in item["range"]][::-1], item["diameters"][::-1]
+            item["range"] = [LENGTH - x for x in item["range"]][::-1]
+            item.get("diameters", []).reverse()
         else:
             item["at"] = LENGTH - item["at"]
     if isinstance(found["initial"], dict):

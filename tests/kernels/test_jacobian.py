@@ -16,6 +16,7 @@ from hybrid.kernels.march.energies import observe
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace
 from hybrid.kernels.state.forces import (
     ADDED_MASS,
+    BENDING_LAW,
     BODIES,
     DRAG,
     FLOW,
@@ -154,6 +155,40 @@ def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
             soft = line.kb[i, 2] * line.element[i] + line.kb[i + 1, 2] * line.element[i + 1]
             exact[5 * i + 4, 5 * i + 4] += 1e-9 * soft
     assert np.abs(exact - numeric).max() < 1e-6 * np.abs(J).max()
+
+
+def with_tables(line):
+    """The line with two tables of moment, a spring at its start and, at one node, no twist: bends of 0.2 to 0.9 rad."""
+    rows = np.array([[0, 0, 0], [0.2, 0.4, 0.04], [0.5, 0.5, 0.175], [0, 0, 0], [0.3, 0.15, 0.0225], [0.6, 1.2, 0.225]])
+    law, half = np.zeros((N + 1, 7)), 0.5 * line.h
+    law[1:, :3] = np.column_stack([np.full(N, 0), np.full(N, 3), half])
+    law[:-1, 3:6] = np.column_stack([np.full(N, 3), np.full(N, 6), half])
+    law[0, 6] = 0.3
+    law[2, 3:5] = 0, 3
+    law[5] = 0.0
+    bend = law[:, 2] * 0.5 + law[:, 5] * np.where(law[:, 3] > 0, 2.0, 0.5) + law[:, 6]
+    kb = line.kb.copy()
+    kb[:, 0] = kb[:, 1] = 0.7 / np.where(bend > 0.0, bend, 1.0)  # on its way in: 0.7 of it
+    kb[4, 2], line.k0[4, :2] = 0.0, 0.0
+    return line._replace(kb=kb, bend_law=law, bend_table=rows, bits=line.bits | BENDING_LAW)
+
+
+@pytest.mark.parametrize("bits", [0, STIFFNESS_DAMPING, LAND])
+@pytest.mark.parametrize("seed", [3, 8])
+def test_jacobian_of_tables_of_moment(seed, bits):
+    """Between the points of the tables the derivative is exact, and moments are those of the energy."""
+    line, sea, ends, st = random_case(seed, ZONES["rod"], bits)
+    line = with_tables(line)
+    J, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
+    numeric, t = np.zeros_like(J), 1e-4
+    for j in range(J.shape[1]):
+        x = np.zeros(J.shape[1])
+        x[j] = t
+        f = [residual_at(line, sea, ends, st, (k * x).reshape(-1, 5)) for k in (-2, -1, 1, 2)]
+        numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
+    identity = [0, 5 * N + 4]
+    numeric[identity, identity] = 1.0
+    assert np.abs(J - numeric).max() < 1e-6 * np.abs(J).max()
 
 
 @pytest.mark.parametrize("bits", [0, STIFFNESS_DAMPING, LAND])

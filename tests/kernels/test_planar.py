@@ -8,7 +8,7 @@ import itertools
 
 import numpy as np
 import pytest
-from test_jacobian import CA, CV, WITHOUT_OBSTACLES, ZONES, random_case
+from test_jacobian import CA, CV, WITHOUT_OBSTACLES, ZONES, random_case, with_tables
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH, solve_again
 from hybrid.kernels.algebra.block_elimination_plane import KEPT, TRIPLE, WIDE, solve_again_planar
@@ -125,6 +125,19 @@ def test_both_marches_give_the_same_correction(zones, bits, held, seed):
     assert np.abs(told - said)[:22].max() < 1e-9 * np.abs(told).max()
 
 
+@pytest.mark.parametrize("bits", [0, forces.STIFFNESS_DAMPING])
+@pytest.mark.parametrize("seed", range(3))
+def test_both_marches_bend_by_the_same_tables(bits, seed):
+    line, *rest = flat_case(seed, ZONES["rod"], bits, (1, 0))
+    line, u = with_tables(line), np.zeros((N + 1, 3))
+    line.kb[4, 2] = 0.8
+    _, x, told = in_space(line, *rest, u)
+    _, y, said = in_plane(line, *rest, u)
+    assert np.abs(x[:, :4] - y[:, :4]).max() < 1e-8 * np.abs(x).max()
+    told[RESIDUAL : RESIDUAL_NODE + 1] = said[RESIDUAL : RESIDUAL_NODE + 1]
+    assert np.abs(told - said)[:22].max() < 1e-9 * np.abs(told).max()
+
+
 @pytest.mark.parametrize("held", [(0, 0), (1, 1), (1, 0)])
 @pytest.mark.parametrize("zones", ZONES)
 def test_kept_factors_solve_any_right_hand_side(zones, held):
@@ -209,6 +222,9 @@ def test_the_push_obeys_the_jacobian_across_the_plane(zones, seed):
     """One step of the push equals the linear answer of the march in space to it, frames and spins included."""
     bits = sum(getattr(forces, name) for name in ("DRAG", "ADDED_MASS", "MASS_DAMPING", "FLOW", "BODIES"))
     line, sea, ends, st = flat_case(seed, ZONES[zones], bits, (1, 0), anisotropic=seed > 1)
+    if zones == "rod" and seed == 1:
+        line = with_tables(line)
+        line.kb[4, 2] = 0.8
     st.vd[0] = st.v[0] = 0.0
     n, dt, rho = line.plane[2], 0.2, 0.5
     g = np.random.default_rng(seed)

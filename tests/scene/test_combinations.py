@@ -52,6 +52,9 @@ CLAMPED = {ONE + "connections": {"end": {"kind": "clamped", "tangent": [1, 0, 0]
 # By the pair: what makes a scene of CABLE, or of LINES, that has both, and what is done with it.
 EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.TWO_STIFFNESSES, c.MOVING_ZONES): (TWO | MOVING, ""),
+    (c.RESTRICTOR, c.TWO_STIFFNESSES): (
+        TWO | {"cable.attachments": [{"kind": "bend_restrictor", "range": [0, 2], "radius": 2}]}, ""
+    ),
     (c.ROTARY_INERTIA, c.MOVING_ZONES): ({SECTION + "rotary_inertia": 1e-3} | MOVING, ""),
     (c.TORSION, c.PLANE): (TORQUE | {"dimension": 2}, ""),
     (c.PLANE, c.SELF_CONTACT): ({"dimension": 2, "contact": {"self": True}}, ""),
@@ -83,6 +86,9 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.STIFFENER, c.PAYOUT): (
         {"cable.attachments": [{"kind": "bend_stiffener", "range": [0, 2], "added_stiffness": [[0, 90], [2, 10]]}]}
         | PAID, ""
+    ),
+    (c.MOMENT_TABLE, c.PAYOUT): (
+        {SECTION + "moment_curvature": [[0, 0], [0.1, 1], [0.2, 9]], SECTION + "bending_stiffness": None} | PAID, ""
     ),
     (c.TORQUE_OF_TENSION, c.PAYOUT): (TORQUE | PAID, ""),
     (c.LAYERS, c.PAYOUT): (PAID | {"resolution": {"cells_per_layer": 2}}, ""),

@@ -65,10 +65,13 @@ model: {kind: catenary}
 """
 STIFFENERS = """\
 cable:
-  sections: [{length: 10.0, mass: 1.0, bending_stiffness: 2.0}]
+  sections:
+    - {length: 6.0, mass: 1.0, bending_stiffness: 2.0}
+    - {length: 4.0, mass: 1.0, moment_curvature: [[0, 0], [0.1, 0.5], [0.5, 1.0]]}
   attachments:
     - {kind: bend_stiffener, range: [0.0, 2.0], diameters: [0.4, 0.2], bore: 0.15, modulus: 7.0e+7, density: 1150.0}
     - {kind: bend_stiffener, range: [7.0, 10.0], added_stiffness: [[0.0, 10.0], [3.0, 50.0]]}
+    - {kind: bend_restrictor, range: [3.0, 5.0], radius: 2.0, locked_stiffness: 500.0}
 ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
 initial: {kind: equilibrium}
 model: {kind: rod}
@@ -323,7 +326,7 @@ def _negative(name: str, path: tuple[str | int, ...]) -> None:
     if (
         keys[-1] in SIGNED
         or "depths" in keys
-        or "tension_strain" in keys
+        or {"tension_strain", "moment_curvature"} & {*keys}
         or keys == ["initial", "friction"]
         or keys[:2] == ["initial", "points"]
         or (keys[0] == "obstacles" and keys[-1] in ("at", "axis", "normal"))

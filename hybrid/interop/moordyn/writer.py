@@ -294,9 +294,11 @@ class _Writer:
                 fix = "give their mass, volume and drag to a section of that length"
                 self._refuse(f"{where}[{i}]", "modules", "a clump or a float, which a deck has as points", fix)
                 continue
-            if item.kind == "bend_stiffener":
+            if item.kind in ("bend_stiffener", "bend_restrictor"):
                 fix = "give its bending stiffness to short sections of that length"
-                self._refuse(f"{where}[{i}]", "bend stiffener", "a clump or a float, which a deck has as points", fix)
+                self._refuse(
+                    f"{where}[{i}]", item.kind.replace("_", " "), "a clump or a float, which a deck has as points", fix
+                )
                 continue
             s = next((x for x in (*bounds, *found) if abs(x - item.at) <= 1e-9 * bounds[-1]), item.at)
             if s in (0.0, bounds[-1]):
@@ -325,6 +327,10 @@ class _Writer:
             key = "dynamic_stiffness" if section.dynamic_stiffness is not None else "tension_strain"
             fix = "give axial_stiffness alone, at the tension you expect"
             self._refuse(f"{where}.{key}", "given", "one stiffness, which this export writes", fix)
+            return "none"
+        if section.moment_curvature is not None:
+            fix = "give bending_stiffness, at the curvature you expect"
+            self._refuse(f"{where}.moment_curvature", "given", "one stiffness, which this export writes", fix)
             return "none"
         if section.tension_torque:
             expected = "nothing or 0, because MoorDyn has no torsion"

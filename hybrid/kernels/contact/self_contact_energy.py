@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from hybrid.kernels.algebra.rotations import dot, frame, get3, get9, sub
 from hybrid.kernels.contact.self_contact_pairs import (
     BALANCE,
@@ -20,6 +22,7 @@ from hybrid.kernels.contact.self_contact_pairs import (
     TRIED_BALANCE,
     farthest_from_mean,
 )
+from hybrid.kernels.laws.bending_law import energy_share
 from hybrid.kernels.laws.cell import chord, turning
 from hybrid.kernels.laws.element import strain_of_element
 from hybrid.kernels.laws.tension_torque import couples
@@ -70,7 +73,8 @@ def energy_of_line(line, ends, state):
         if line.element[i]:
             kb, k0 = get3(line.kb, i), get3(line.k0, i)
             x = sub(strain_of_element(before, after, kb, k0), k0)
-            bent += 0.5 * (kb[0] * x[0] * x[0] + kb[1] * x[1] * x[1])
+            share = energy_share(line, i, math.sqrt(x[0] * x[0] + x[1] * x[1]))
+            bent += 0.5 * share * (kb[0] * x[0] * x[0] + kb[1] * x[1] * x[1])
             twisted += 0.5 * kb[2] * x[2] * x[2]
         before = after
     return moving + bent + twisted, longer

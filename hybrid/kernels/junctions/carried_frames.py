@@ -35,8 +35,9 @@ from hybrid.kernels.algebra.rotations import (
     vec_mat,
 )
 from hybrid.kernels.junctions.bodies import FRAME, START, N, W, matrix, vector
+from hybrid.kernels.laws.bending_law import bending_at, damped_bending_at
 from hybrid.kernels.laws.cell import chord, turning
-from hybrid.kernels.laws.element import after, angular_velocity, before, bending, damped_bending
+from hybrid.kernels.laws.element import after, angular_velocity, before
 from hybrid.kernels.laws.tension_torque import couples, rest_strain
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.state.forces import STIFFNESS_DAMPING
@@ -98,21 +99,21 @@ def end_moment(line, ends, state, k, cv, way):
         d1, D1 = turning(d, il, e1, cv)
         w, We, Wp = angular_velocity(d, d1, state.w[c], il, D1, cv)
         if k == 0:
-            M, C, Cd, _ = damped_bending(R, own, kb, k0, line.tau[c], spin, w)
+            M, C, Cd, _ = damped_bending_at(line, node, R, own, kb, k0, line.tau[c], spin, w)
             A, a = after(C, d, il)
             A, a = madd(A, mat_mat(Cd, We)), add(a, mat_vec(Cd, Wp))
             G = msub(mat_mat(Cd, msub(hat(sub(w, spin)), way)), madd(C, hat(M)))
         else:
-            M, C, Cd, _ = damped_bending(own, R, kb, k0, line.tau[c], w, spin)
+            M, C, Cd, _ = damped_bending_at(line, node, own, R, kb, k0, line.tau[c], w, spin)
             A, a = before(msub(C, mat_mat(Cd, hat(sub(spin, w)))), M, d, il)
             A, a = mscale(-1.0, madd(A, mat_mat(Cd, We))), sub((0.0, 0.0, 0.0), add(a, mat_vec(Cd, Wp)))
             G = madd(C, mat_mat(Cd, way))
     elif k == 0:
-        M, C = bending(R, own, kb, k0)
+        M, C = bending_at(line, node, R, own, kb, k0)
         A, a = after(C, d, il)
         G = mscale(-1.0, madd(C, hat(M)))
     else:
-        M, C = bending(own, R, kb, k0)
+        M, C = bending_at(line, node, own, R, kb, k0)
         A, a = before(C, M, d, il)
         A, a, G = mscale(-1.0, A), sub((0.0, 0.0, 0.0), a), C
     return M, A, a, G, d, il

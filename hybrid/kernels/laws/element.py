@@ -132,10 +132,10 @@ def swivel(Ra, Rb, stiffness):
 
 
 @inner
-def damped_swivel(Ra, Rb, stiffness, tau, wa, wb):
-    """As `damped_bending`, of a swivel: about the mean of both directions nothing is damped."""
+def damped_swivel(Ra, Rb, stiffness, k, wa, wb):
+    """As `damped_bending`, of a swivel with damping k, N m s: about the mean of both directions nothing is damped."""
     M, C = swivel(Ra, Rb, stiffness)
-    b, k = (Rb[2], Rb[5], Rb[8]), tau * stiffness
+    b = (Rb[2], Rb[5], Rb[8])
     t = (Ra[2] + b[0], Ra[5] + b[1], Ra[8] + b[2])
     size = 1.0 / math.sqrt(max(dot(t, t), 1e-24))
     t, y = scale(size, t), sub(wb, wa)
@@ -167,36 +167,35 @@ def bending(Ra, Rb, kb, k0):
 
 
 @inner
-def damped_bending(Ra, Rb, kb, k0, tau, wa, wb):
-    """As `bending` with the moment tau kb dk/dt added.
+def damped_bending(Ra, Rb, kb, kd, k0, wa, wb):
+    """As `bending` with the moment kd dk/dt added; kd: 3, N m s, tau times the stiffness.
 
     Returns M, C and Cd, where
     dM = C (dth_b - dth_a) + dth_a x M + Cd (dw_b - dw_a - dth_a x (w_b - w_a)),
     and the power that the damping takes out (W, positive).
     """
     if turns_freely(kb, k0):
-        return damped_swivel(Ra, Rb, kb[0], tau, wa, wb)
+        return damped_swivel(Ra, Rb, kb[0], kd[0], wa, wb)
     k = log_rotation(relative_rotation(Ra, Rb))
     g, g1 = jacobian_functions(dot(k, k))
     P = inverse_left_jacobian(k, g)
     y = vec_mat(sub(wb, wa), Ra)
     k1 = mat_vec(P, y)  # dk/dt
     n = (
-        kb[0] * (k[0] - k0[0] + tau * k1[0]),
-        kb[1] * (k[1] - k0[1] + tau * k1[1]),
-        kb[2] * (k[2] - k0[2] + tau * k1[2]),
+        kb[0] * (k[0] - k0[0]) + kd[0] * k1[0],
+        kb[1] * (k[1] - k0[1]) + kd[1] * k1[1],
+        kb[2] * (k[2] - k0[2]) + kd[2] * k1[2],
     )
     M = mat_vec(Ra, vec_mat(n, P))
-    loss = tau * (kb[0] * k1[0] * k1[0] + kb[1] * k1[1] * k1[1] + kb[2] * k1[2] * k1[2])
+    loss = kd[0] * k1[0] * k1[0] + kd[1] * k1[1] * k1[1] + kd[2] * k1[2] * k1[2]
 
     D = msub(d_double_cross(k, n, g, g1), mscale(0.5, hat(n)))
     PT = (P[0], P[3], P[6], P[1], P[4], P[7], P[2], P[5], P[8])
-    PTk = columns_scaled(PT, kb)
+    PTd = columns_scaled(PT, kd)
     # d(P y)/dk at fixed y: P y = y - k x y/2 + g k x (k x y)
     Dy = madd(d_double_cross(k, y, g, g1), mscale(0.5, hat(y)))
-    rate = madd((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), mscale(tau, Dy))
-    C = mat_mat(madd(D, mat_mat(PTk, rate)), P)
-    Cd = mscale(tau, mat_mat(PTk, P))
+    C = mat_mat(madd(madd(D, columns_scaled(PT, kb)), mat_mat(PTd, Dy)), P)
+    Cd = mat_mat(PTd, P)
     return M, mat_matT(mat_mat(Ra, C), Ra), mat_matT(mat_mat(Ra, Cd), Ra), loss
 
 

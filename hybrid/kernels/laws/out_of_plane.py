@@ -32,6 +32,7 @@ from hybrid.kernels.algebra.plane import (
     vector_in_plane,
 )
 from hybrid.kernels.algebra.rotations import jacobian_functions
+from hybrid.kernels.laws.bending_law import moment_share
 from hybrid.kernels.laws.loads import body_drag, half_cell_added_mass, half_cell_drag
 from hybrid.kernels.laws.water import current_at
 from hybrid.kernels.machine.compile import inner, kernel
@@ -149,8 +150,9 @@ def first_joint(line, ends, a1, d):
     k, k0 = stiffness_about_normal(plane, a1, 0, d, line.kb, line.k0, 0)
     ghost = end_chord(plane, ends.frame, 0)
     kappa = angle_between(ghost, d)
-    M = k * (kappa - k0)
-    C, _ = moment_stiffness(kappa, M, line.kb[0, 0] + line.kb[0, 1] - k, line.kb[0, 2], ghost)
+    share = moment_share(line, 0, abs(kappa - k0))
+    M = share * k * (kappa - k0)
+    C, _ = moment_stiffness(kappa, M, share * (line.kb[0, 0] + line.kb[0, 1] - k), line.kb[0, 2], ghost)
     return Joint(M, Z2, Z2, mat_vec2(C, (d[1], -d[0])), mat_vec2(C, d), line.kb[0, 2])
 
 
@@ -162,8 +164,9 @@ def joint_after(line, ends, a1, c, d, dn):
         return Joint(row_along_normal(plane, ends.moment, 1) if c + 1 == n else 0.0, Z2, Z2, Z2, Z2, 0.0)
     k, k0 = stiffness_about_normal(plane, a1, c, d, line.kb, line.k0, c + 1)
     kappa = angle_between(d, dn if c + 1 < n else end_chord(plane, ends.frame, 1))
-    M = k * (kappa - k0)
-    C, CJ = moment_stiffness(kappa, M, line.kb[c + 1, 0] + line.kb[c + 1, 1] - k, line.kb[c + 1, 2], d)
+    share = moment_share(line, c + 1, abs(kappa - k0))
+    M, out = share * k * (kappa - k0), share * (line.kb[c + 1, 0] + line.kb[c + 1, 1] - k)
+    C, CJ = moment_stiffness(kappa, M, out, line.kb[c + 1, 2], d)
     zn, pn = Z2, Z2
     if c + 1 < n:
         zn, pn = mat_vec2(C, (dn[1], -dn[0])), mat_vec2(C, dn)

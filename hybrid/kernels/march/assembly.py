@@ -26,8 +26,9 @@ from hybrid.kernels.algebra.rotations import (
     sub,
 )
 from hybrid.kernels.laws.axial_law import LOSS, SHIFT
+from hybrid.kernels.laws.bending_law import bending_at, damped_bending_at
 from hybrid.kernels.laws.cell import Chord, chord, damped_stretch, moment_force, pull, rotary_force, stretch, turning
-from hybrid.kernels.laws.element import after, angular_velocity, before, bending, damped_bending
+from hybrid.kernels.laws.element import after, angular_velocity, before
 from hybrid.kernels.laws.end_forces import note_end
 from hybrid.kernels.laws.node_forces import Z3, Z9, node_loads
 from hybrid.kernels.laws.tension_torque import (
@@ -139,12 +140,12 @@ def element_at_start(line, ends, state, cell, cv, couple, report):
         if line.bits & STIFFNESS_DAMPING:
             wb, We, Wp = angular_velocity(d, cell.d1, state.w[0], il, cell.D1, cv)
             rates, tau = (wb, We, Wp), line.tau[0]
-            M, C, Cd, loss = damped_bending(R, cell.R, kb, k0, line.tau[0], get3(ends.spin, 0), wb)
+            M, C, Cd, loss = damped_bending_at(line, 0, R, cell.R, kb, k0, tau, get3(ends.spin, 0), wb)
             A, a = after(C, d, il)
             A, a = madd(A, mat_mat(Cd, We)), add(a, mat_vec(Cd, Wp))
             report[STIFFNESS_DAMPING_POWER] += loss
         else:
-            M, C = bending(R, cell.R, kb, k0)
+            M, C = bending_at(line, 0, R, cell.R, kb, k0)
             A, a = after(C, d, il)
         if couple.shape[0] > 0:
             fixed = (get3(ends.spin, 0), Z9, Z3)
@@ -174,14 +175,14 @@ def element_after(line, ends, state, i, cell, following, cv, couple, report):
                 wb, We, Wp = angular_velocity(dn, following.d1, state.w[i + 1], iln, following.D1, cv)
                 tau = 0.5 * (tau + line.tau[i + 1])
             rates, rates_after = (wa, Wae, Wap), (wb, We, Wp)
-            M, C, Cd, loss = damped_bending(cell.R, following.R, kb, k0, tau, wa, wb)
+            M, C, Cd, loss = damped_bending_at(line, i + 1, cell.R, following.R, kb, k0, tau, wa, wb)
             A, a = after(C, dn, iln)
             A, a = madd(A, mat_mat(Cd, We)), add(a, mat_vec(Cd, Wp))
             B, b = before(msub(C, mat_mat(Cd, hat(sub(wb, wa)))), M, d, il)
             B, b = madd(B, mat_mat(Cd, Wae)), add(b, mat_vec(Cd, Wap))
             report[STIFFNESS_DAMPING_POWER] += loss
         else:
-            M, C = bending(cell.R, following.R, kb, k0)
+            M, C = bending_at(line, i + 1, cell.R, following.R, kb, k0)
             A, a = after(C, dn, iln)
             B, b = before(C, M, d, il)
         if couple.shape[0] > 0:

@@ -27,6 +27,7 @@ from hybrid.kernels.algebra.plane import (
     turning2,
 )
 from hybrid.kernels.laws.axial_law import LOSS, SHIFT
+from hybrid.kernels.laws.bending_law import has_bend_law, shares_of_stiffness
 from hybrid.kernels.laws.cell import Chord
 from hybrid.kernels.laws.end_forces import note_end
 from hybrid.kernels.laws.node_forces_plane import node_loads2
@@ -111,6 +112,15 @@ def cell_at(line, state, i, cv):
 
 
 @inner
+def elastic(line, i, k, bend):
+    """Moment of the element at node i under a bend (rad) from what has no stress, and its slope; k: N m, without bend."""
+    if not has_bend_law(line, i):
+        return k * bend, k
+    secant, more, _ = shares_of_stiffness(line, i, abs(bend))
+    return secant * k * bend, (secant + more) * k
+
+
+@inner
 def element_at_start(line, ends, state, cell, report):
     """The element between the start and the first cell."""
     plane = line.plane
@@ -119,8 +129,9 @@ def element_at_start(line, ends, state, cell, report):
         d, tau = cell.chord.d, cell.tau
         k, k0 = stiffness_about_normal(plane, state.a1, 0, d, line.kb, line.k0, 0)
         rate = cell.turn - row_along_normal(plane, ends.spin, 0) if line.bits & STIFFNESS_DAMPING else 0.0
-        M = k * (angle_between(end_chord(plane, ends.frame, 0), d) - k0 + tau * rate)
-        A = (k * (cell.g[0] + tau * cell.g1[0]), k * (cell.g[1] + tau * cell.g1[1]))
+        M, slope = elastic(line, 0, k, angle_between(end_chord(plane, ends.frame, 0), d) - k0)
+        M += k * tau * rate
+        A = (slope * cell.g[0] + k * tau * cell.g1[0], slope * cell.g[1] + k * tau * cell.g1[1])
         report[STIFFNESS_DAMPING_POWER] += k * tau * rate * rate
     return Element(M, A, Z2)
 
@@ -139,15 +150,15 @@ def element_after(line, ends, state, i, cell, following, report):
         if i + 1 == n:
             after, late = end_chord(plane, ends.frame, 1), cell.tau
             rate = row_along_normal(plane, ends.spin, 1) - cell.turn
-        M = angle_between(d, after) - k0
+        M, slope = elastic(line, i + 1, k, angle_between(d, after) - k0)
         if line.bits & STIFFNESS_DAMPING:
-            M += late * rate
+            M += k * late * rate
             report[STIFFNESS_DAMPING_POWER] += k * late * rate * rate
-        M *= k
-        B = (k * (g[0] + late * g1[0]), k * (g[1] + late * g1[1]))
+        late *= k
+        B = (slope * g[0] + late * g1[0], slope * g[1] + late * g1[1])
         if i + 1 < n:
             g, g1 = following.g, following.g1
-            A = (k * (g[0] + late * g1[0]), k * (g[1] + late * g1[1]))
+            A = (slope * g[0] + late * g1[0], slope * g[1] + late * g1[1])
     return Element(M, A, B)
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from hybrid.kernels.algebra.rotations import add, cross, dot, frame, get9, scale, sub
+from hybrid.kernels.laws.bending_law import bending_at, damped_bending_at, energy_share
 from hybrid.kernels.laws.cell import chord, turning
-from hybrid.kernels.laws.element import bending, damped_bending, strain_of_element
+from hybrid.kernels.laws.element import strain_of_element
 from hybrid.kernels.laws.tension_torque import couples, rest_strain, stretch_energy
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.assembly import get3
@@ -82,7 +85,8 @@ def observe(line, ends, e, v, a1, w, T, turn, M, strain, energy):
         kb, k0 = get3(line.kb, i), rest_strain(line, T, i)
         k = strain_of_element(Ra, Rb, kb, get3(line.k0, i))
         x = sub(k, k0)
-        energy[1] += 0.5 * (kb[0] * x[0] * x[0] + kb[1] * x[1] * x[1])
+        share = energy_share(line, i, math.sqrt(x[0] * x[0] + x[1] * x[1]))
+        energy[1] += 0.5 * share * (kb[0] * x[0] * x[0] + kb[1] * x[1] * x[1])
         energy[2] += 0.5 * kb[2] * x[2] * x[2]
         if coupled:
             torque = kb[2] * x[2]
@@ -90,8 +94,8 @@ def observe(line, ends, e, v, a1, w, T, turn, M, strain, energy):
                 energy[3] += stretch_of(line, e, i - 1, torque_before, torque)
         if line.bits & STIFFNESS_DAMPING:
             tau = 0.5 * (line.tau[max(i - 1, 0)] + line.tau[min(i, n - 1)])
-            m, _, _, _ = damped_bending(Ra, Rb, kb, k0, tau, wa, wb)
+            m, _, _, _ = damped_bending_at(line, i, Ra, Rb, kb, k0, tau, wa, wb)
         else:
-            m, _ = bending(Ra, Rb, kb, k0)
+            m, _ = bending_at(line, i, Ra, Rb, kb, k0)
         M[i, 0], M[i, 1], M[i, 2] = m
         strain[i, 0], strain[i, 1], strain[i, 2] = k

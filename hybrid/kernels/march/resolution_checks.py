@@ -6,6 +6,7 @@ import math
 
 from hybrid.kernels.algebra.plane import angle_between, chord2, end_chord, row_in_plane, stiffness_about_normal
 from hybrid.kernels.algebra.rotations import frame, get3, get9
+from hybrid.kernels.laws.bending_law import moment_share
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import strain_of_element
 from hybrid.kernels.laws.tension_torque import rest_strain
@@ -21,7 +22,8 @@ def strain_of(line, T, i, k, strains):
     """Curvature (1/m), bending moment and torque (N m) of the element at node i, whose log strain is k (rad)."""
     strains[i, 0] = math.sqrt(k[0] * k[0] + k[1] * k[1]) / line.hn[i]
     x, y = line.kb[i, 0] * (k[0] - line.k0[i, 0]), line.kb[i, 1] * (k[1] - line.k0[i, 1])
-    strains[i, 1] = math.sqrt(x * x + y * y)
+    bend = math.sqrt((k[0] - line.k0[i, 0]) ** 2 + (k[1] - line.k0[i, 1]) ** 2)
+    strains[i, 1] = moment_share(line, i, bend) * math.sqrt(x * x + y * y)
     strains[i, 2] = line.kb[i, 2] * (k[2] - rest_strain(line, T, i)[2])
 
 
@@ -42,7 +44,8 @@ def sharpest_in_plane(line, ends, e, T, a1, strains):
         x = abs(angle)
         if strains.shape[0] > 0:
             k, k0 = stiffness_about_normal(plane, a1, max(i - 1, 0), before if i > 0 else d, line.kb, line.k0, i)
-            strains[i, 0], strains[i, 1] = x / line.hn[i], abs(k * (angle - k0))
+            share = moment_share(line, i, abs(angle - k0))
+            strains[i, 0], strains[i, 1] = x / line.hn[i], share * abs(k * (angle - k0))
         if i == 0 or i == n:
             c = min(i, n - 1)
             stiffness = max(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]

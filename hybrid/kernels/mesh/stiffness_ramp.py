@@ -6,6 +6,9 @@ that some come in.  Times in paces of the manager.
 
 from __future__ import annotations
 
+import math
+
+from hybrid.kernels.laws.bending_law import energy_share
 from hybrid.kernels.machine.compile import inner, kernel
 
 # A rod begins with this part of its stiffness: with none its cells could spin freely.
@@ -69,14 +72,16 @@ def soften(part, stiff, kb):
 
 
 @kernel
-def freed(kb, part, stiff, before, after):
-    """Energy, J, that a step puts in whose stiffness kb is not what it was before, `part` of stiff.
+def freed(line, part, stiff, before, after):
+    """Energy, J, that a step puts in whose stiffness line.kb is not what it was before, `part` of stiff.
 
     before, after: strains (N+1, 3) rad at the two ends of the step, from what has no stress.
     """
     total = 0.0
     for i in range(part.size):
+        x = energy_share(line, i, math.sqrt(before[i, 0] ** 2 + before[i, 1] ** 2))
+        y = energy_share(line, i, math.sqrt(after[i, 0] ** 2 + after[i, 1] ** 2))
         for k in range(2):
-            more = kb[i, k] - part[i] * stiff[i, k]
-            total += more * (before[i, k] ** 2 + after[i, k] ** 2)
+            more = line.kb[i, k] - part[i] * stiff[i, k]
+            total += more * (x * before[i, k] ** 2 + y * after[i, k] ** 2)
     return 0.25 * total

@@ -338,7 +338,7 @@ def book(line, ends, before, state, dt, zones):
             find_strain(line, ends, before, zones, 0)
         find_strain(line, ends, state, zones, 1)
         shares(zones.grown, zones.leaving, zones.haste, 0.0, zones.kinds.base_of_cell, zones.share)
-        booked += freed(line.kb, zones.share, zones.stiff, zones.strain[0], zones.strain[1])
+        booked += freed(line, zones.share, zones.stiff, zones.strain[0], zones.strain[1])
         advance(zones.grown, zones.leaving, zones.haste, dt / z[PACE])
         flags[STRAINED], flags[COMING] = 1, is_coming(zones)
     else:

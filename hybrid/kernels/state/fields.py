@@ -29,9 +29,9 @@ class Field(NamedTuple):
     optional: bool = False  # whether a line may have none of it: then the array is empty
 
 
-def node(rule: int = OWN, columns: int = 0, kind: Any = np.float64) -> Field:
+def node(rule: int = OWN, columns: int = 0, kind: Any = np.float64, optional: bool = False) -> Field:
     """There is one for every node."""
-    return Field(True, rule, columns, kind)
+    return Field(True, rule, columns, kind, optional)
 
 
 def cell(rule: int = OWN, columns: int = 0, kind: Any = np.float64, optional: bool = False) -> Field:

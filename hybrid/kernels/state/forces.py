@@ -30,6 +30,8 @@ MAY_TOUCH = 32768
 # Contact with fixed obstacles (hybrid.kernels.laws.obstacles); what the line is pressed on by, bed or obstacles.
 OBSTACLES = 65536
 TOUCHES = SEABED | OBSTACLES
+# No force: moment that is no multiple of curvature (hybrid.kernels.laws.bending_law).
+BENDING_LAW = 131072
 
 FORCES = {
     "drag": (DRAG, "velocity, direction; environment.fluid and sections[].drag, or drag_area of modules"),

@@ -28,6 +28,8 @@ NO_TURNS: Floats = np.zeros((0, 0, 3))
 # Of a line whose tensions are multiples of strains (kernels.laws.axial_law has the columns).
 NO_LAW: Floats = np.zeros((0, 7))
 NO_TABLE: Floats = np.zeros((0, 3))
+# Of a line whose moments are multiples of curvature (kernels.laws.bending_law has the columns).
+NO_BEND_LAW: Floats = np.zeros((0, 7))
 NO_SLOW: Floats = np.zeros(0)
 NO_ADDRESS: NDArray[np.int64] = np.zeros(0, np.int64)
 # Numbers of an obstacle (kernels.laws.obstacles has them).
@@ -93,11 +95,14 @@ class Line(NamedTuple):
     # a cell by tension, rad/N; empty: there are none
     tension_torque: Annotated[Floats, cell(optional=True)] = NO_TENSION_TORQUE
     tension_twist: Annotated[Floats, cell(optional=True)] = NO_TENSION_TORQUE
+    # (N+1, 7) of elements whose moment is no multiple of bend (kernels.laws.bending_law); empty: there are none
+    bend_law: Annotated[Floats, node(columns=7, optional=True)] = NO_BEND_LAW
+    bend_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: curvature (1/m), moment (N m), energy per length
 
 
 FIELDS = fields_of(Line)
 # Of these there is one for every node; of all but what belongs to the whole line or to few, one for every node or cell.
-NODES_OF_LINE = tuple(name for name, x in FIELDS.items() if x.of_node)
+NODES_OF_LINE = tuple(name for name, x in FIELDS.items() if x.of_node and not x.optional)
 ALONG_LINE = tuple(name for name, x in FIELDS.items() if not x.optional)
 TENSION_TORQUE = ("tension_torque", "tension_twist")
 

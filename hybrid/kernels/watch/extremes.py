@@ -15,8 +15,8 @@ import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, frame, get3, get9, scale, sub
 from hybrid.kernels.laws.bed import bed_under
+from hybrid.kernels.laws.bending_law import bending_at, curvature_under, damped_bending_at, has_bend_law
 from hybrid.kernels.laws.cell import chord, turning
-from hybrid.kernels.laws.element import bending, damped_bending
 from hybrid.kernels.laws.seabed import pressure
 from hybrid.kernels.laws.tension_torque import rest_strain
 from hybrid.kernels.machine.compile import inner, kernel
@@ -120,9 +120,10 @@ def moment_at(line, state, i):
     kb, k0 = get3(line.kb, i), rest_strain(line, state.T, i)
     if line.bits & STIFFNESS_DAMPING:
         tau = 0.5 * (line.tau[i - 1] + line.tau[i])
-        m, _, _, _ = damped_bending(Ra, Rb, kb, k0, tau, rate_of_cell(state, i - 1), rate_of_cell(state, i))
+        before, after = rate_of_cell(state, i - 1), rate_of_cell(state, i)
+        m, _, _, _ = damped_bending_at(line, i, Ra, Rb, kb, k0, tau, before, after)
         return m
-    m, _ = bending(Ra, Rb, kb, k0)
+    m, _ = bending_at(line, i, Ra, Rb, kb, k0)
     return m
 
 
@@ -207,7 +208,9 @@ def at_rod_end(line, ends, state, i, side, passed):
     if line.element[j]:
         curvature = math.sqrt(line.k0[j, 0] ** 2 + line.k0[j, 1] ** 2) / line.hn[j]
         stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
-        if stiffness > 0.0:
+        if has_bend_law(line, j):
+            curvature += curvature_under(line, j, -side, moment)
+        elif stiffness > 0.0:
             curvature += moment / stiffness
     return curvature, moment, torque
 
@@ -240,6 +243,8 @@ def note_rod_end(line, ends, state, books, i, passed, t):
 @inner
 def beside_seam(line, books, i, j):
     """Curvature at the element of node i, where sections meet, on the side of its neighbour j."""
+    if has_bend_law(line, i):
+        return curvature_under(line, i, j - i, books.strains[i, 1])
     own = min(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
     stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
     x = books.strains[i, 0]
