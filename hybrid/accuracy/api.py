@@ -46,7 +46,7 @@ from hybrid.simulation.progress import (
     listener_of,
     tell_of_compiling,
 )
-from hybrid.simulation.restart import remaining_run, remaining_system
+from hybrid.simulation.restart import RemainingLines, remaining_run, remaining_system
 from hybrid.simulation.static_case import StaticCase
 from hybrid.store.array_recorder import MemoryTarget, Target
 from hybrid.store.hdf5_file import check_target
@@ -166,14 +166,14 @@ def resume(
     if target != path:
         check_target(target, True)
     with locked(path), locked(target if target != path else None):
-        system = remaining_system(path, until, settings, start)
-        if system is not None:
-            _move_lines(system, target, progress, path, criterion)
-            return open_result(target)
-        remaining = remaining_run(path, until, settings, start)
+        lines = remaining_system(path, until, settings, start)
+        remaining = remaining_run(path, until, settings, start) if lines is None else lines
         if remaining.anew and target == path:
             why = "a change before the checkpoint computes the run anew"
             raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
+        if isinstance(remaining, RemainingLines):
+            _move_lines(remaining.system, target, progress, path, criterion, remaining)
+            return open_result(target)
         case = Case(remaining.scene, criterion, remaining.changes, remaining.points)
         with _supervised(case, progress):
             Passes(case, target, path, remaining).compute()
@@ -188,7 +188,7 @@ def _several_lines(
     criterion: UserCriterion | None = None,
 ) -> Result:
     """The motion of several lines, or, with progress None, their equilibrium."""
-    from hybrid.accuracy.system_accuracy import is_refined, refine_system, system_with_layers
+    from hybrid.accuracy.system_accuracy import SystemPasses, is_refined, system_with_layers
     from hybrid.simulation.system_run import static_system
 
     refined = is_refined(system, moves=progress is not None)
@@ -196,7 +196,7 @@ def _several_lines(
     with locked(_path(output)):
         if progress is None and refined:
             assert not isinstance(target, MemoryTarget)
-            refine_system(system, target, ProgressReporter(None, 1.0), lambda: False, moves=False)
+            SystemPasses(system, target, False, ProgressReporter(None, 1.0), lambda: False).compute()
         elif progress is None:
             resolution = system_with_layers(system, False, ProgressReporter(None, 1.0), lambda: False)
             static_system(system, target, partial(scene_text, system), resolution)
@@ -207,11 +207,13 @@ def _several_lines(
 
 def _move_lines(
     system: System, target: Target, progress: bool | Listener, source: Path | None = None,
-    criterion: UserCriterion | None = None,
+    criterion: UserCriterion | None = None, remaining: RemainingLines | None = None,
 ) -> None:  # fmt: skip
-    """Compute the motion of several lines; source: the result to go on with."""
-    from hybrid.accuracy.system_accuracy import is_refined, refine_system, system_with_layers
-    from hybrid.simulation.system_run import run_system
+    """Compute the motion of several lines; source: the result to go on with; remaining: what is to be done with it."""
+    changes = remaining.changes if remaining is not None else ()
+    source = None if remaining is not None and remaining.anew else source
+    from hybrid.accuracy.system_accuracy import SystemPasses, is_refined, system_with_layers
+    from hybrid.simulation.system_run import Recording, run_system
 
     if criterion is not None and not system.adaptive:
         raise TypeError(NO_ZONES)
@@ -224,14 +226,16 @@ def _move_lines(
             try:
                 if is_refined(system, moves=True):
                     assert not isinstance(target, MemoryTarget), "errors are written into a file"
-                    refine_system(system, target, reporter, stopped, source, notes=notes, criterion=criterion)
+                    asked = SystemPasses(system, target, True, reporter, stopped, notes, criterion, changes)
+                    asked.compute(source)
                     return
                 resolution = None
                 if source is None:
                     resolution = system_with_layers(system, True, reporter, stopped, criterion)
+                recording = Recording(source=source, pending=pending, notes=notes)
                 run_system(
-                    system, target, scene_text(system), reporter, stopped, source, resolution=resolution,
-                    pending=pending, notes=notes, criterion=criterion,
+                    system, target, scene_text(system), reporter, stopped, resolution=resolution, recording=recording,
+                    criterion=criterion, changes=changes,
                 )  # fmt: skip
                 break
             except ComputationError as error:
@@ -246,7 +250,10 @@ def _move_lines(
             from hybrid.accuracy.system_errors import write_system_errors
 
             def compare(other: System, memory: MemoryTarget) -> None:
-                run_system(other, memory, scene_text(other), reporter, stopped, name=ESTIMATION, criterion=criterion)
+                text = scene_text(other)
+                run_system(
+                    other, memory, text, reporter, stopped, ESTIMATION, criterion=criterion, changes=changes
+                )  # fmt: skip
 
             write_system_errors(system, target, compare)
 

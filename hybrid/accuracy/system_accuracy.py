@@ -54,10 +54,11 @@ from hybrid.scene.read import scene_text
 from hybrid.scene.system import System
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution, with_survey
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
+from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import refused, resolution_from, resolution_tree
 from hybrid.simulation.run_sample import RunSample
 from hybrid.simulation.system_checkpoint import kept_resolution
-from hybrid.simulation.system_run import run_system, static_system
+from hybrid.simulation.system_run import Recording, run_system, static_system
 from hybrid.store.amend import amend_lines
 from hybrid.store.checkpoint import read_before
 from hybrid.store.comparison_recorder import ComparisonRecorder
@@ -114,10 +115,10 @@ class SystemPasses:
     def __init__(
         self, system: System, target: Path | io.BytesIO, moves: bool, reporter: ProgressReporter,
         interrupted: Callable[[], bool], notes: Sequence[tuple[str, str]] = (),
-        criterion: UserCriterion | None = None,
+        criterion: UserCriterion | None = None, changes: Sequence[LoadChange[System]] = (),
     ) -> None:  # fmt: skip
         """moves: whether its motion is computed, else its equilibrium; others as of `run_system`."""
-        self._of_results, self._criterion = notes, criterion
+        self._of_results, self._criterion, self._changes = notes, criterion, changes
         self.system, self.target, self.moves = system, target, moves
         self._replacement = Replacement(target)
         self.reporter, self.interrupted = reporter, interrupted
@@ -190,11 +191,10 @@ class SystemPasses:
         if target is None and self.moves and not self._touches:
             asked = system_without_contact(asked)
         if self.moves:
-            text, look = scene_text(asked), self.interrupted
-            pending, notes = ERROR_ESTIMATE, self._of_results
+            recording = Recording(True, source, found, ERROR_ESTIMATE, self._of_results)
             run = run_system(
-                asked, target, text, self.reporter, look, source, name, resolution, found, pending, notes,
-                self._criterion,
+                asked, target, scene_text(asked), self.reporter, self.interrupted, name, resolution, recording,
+                self._criterion, self._changes,
             )  # fmt: skip
         else:
             run = static_system(asked, target, scene_text(asked), resolution, ERROR_ESTIMATE)
@@ -458,12 +458,3 @@ def system_with_layers(
         return None
     passes = SystemPasses(system, io.BytesIO(), moves, reporter, interrupted, criterion=criterion)
     return passes.surveyed(SystemResolution.first(system))
-
-
-def refine_system(
-    system: System, target: Path | io.BytesIO, reporter: ProgressReporter, interrupted: Callable[[], bool],
-    source: Path | None = None, moves: bool = True, notes: Sequence[tuple[str, str]] = (),
-    criterion: UserCriterion | None = None,
-) -> None:  # fmt: skip
-    """Compute a system as finely as is asked, with its errors; arguments as of `SystemPasses` and `compute`."""
-    SystemPasses(system, target, moves, reporter, interrupted, notes, criterion).compute(source)

@@ -96,11 +96,11 @@ def resume(
 
         console.source = str(result)
         target, changed = console.will_write(output or result), settings or []
-        system = remaining_system(result.resolve(), until, changed, start)
-        if system is not None:
+        lines = remaining_system(result.resolve(), until, changed, start)
+        if lines is not None:
             from hybrid.cli.system_commands import resume_lines
 
-            resume_lines(console, system, result, target, plot, until=until, settings=changed, start=start)
+            resume_lines(console, lines.system, result, target, plot, until=until, settings=changed, start=start)
             return
         picture = picture_beside(target, plot)
         left = remaining_run(result.resolve(), until, changed, start)

@@ -141,7 +141,9 @@ class FairleadMotion:
         return place, speed, frame @ self._seat, spin
 
     def turn_from(self, frame: ArrayLike) -> None:
-        """Nothing: the frame is that of the body."""
+        """Seat the line so that its frame is this one, (3, 3), where the body is at rest."""
+        if self._seat is not None:
+            self._seat = self._body.axes.T @ np.asarray(frame)
 
     def terms(self) -> MotionTerms:
         """Those of its body, and where it is there."""

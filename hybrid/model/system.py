@@ -145,10 +145,12 @@ class SystemModel:
         return found
 
 
-def build_system(system: System, resolution: SystemResolution | None = None) -> SystemModel:
+def build_system(
+    system: System, resolution: SystemResolution | None = None, like: SystemModel | None = None
+) -> SystemModel:
     """Make the model that a system requires, with its points and bodies where the scene has them first.
 
-    resolution: how finely, None: as the scene asks for.
+    resolution: how finely, None: as the scene asks for; like: a model of the same lines, whose meshes are taken.
     Raises SceneError where a line cannot be meshed.
     """
     rigid = system.rigid
@@ -170,6 +172,8 @@ def build_system(system: System, resolution: SystemResolution | None = None) -> 
     joined = _joined(system, places, bodies)
     joint, fairleads = joined.joint, joined.fairleads
     maker = _Lines(system, joined, bodies, resolution)
+    if like is not None:
+        maker.meshes = {name: model.mesh for name, model in zip(like.names, like.models, strict=True)}
     maker.turn_points()
     models = [maker.model(name) for name in system.lines]
     if system.obstacles:
@@ -268,6 +272,7 @@ class _Lines:
         self._given, self._names, self._resolution = seats, list(system.lines), resolution.lines
         self.seats = np.zeros((len(self._names), 2, SEAT)) if seats is None else seats
         self._at_rigid = {end: x for p in system.rigid for end, x in directions_at_rigid(system, p).items()}
+        self.meshes: dict[str, Any] = {}  # of lines that have one already, as of `Model.mesh`
         self.scenes = dict(scenes)  # of lines, with their points where the system has them
         self.known: dict[str, KnownMotion] = {}  # motions of bodies, which are added when first asked for
 
@@ -306,7 +311,8 @@ class _Lines:
         return None if row is None else self.bodies[row, FRAME:V].reshape(3, 3)
 
     def _shape(self, name: str, directions: Mapping[str, Any] | None) -> Model:
-        return build(self._scene(name, (), directions), self._resolution[name], spare=False)
+        scene, mesh = self._scene(name, (), directions), self.meshes.get(name)
+        return build(scene, self._resolution[name], mesh, spare=False)
 
     def _scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> Scene:
         """The scene of a line between the places of its points; of one that is carried, with the point."""
@@ -347,7 +353,8 @@ class _Lines:
         model = self._shape(name, directions)
         carried = system.carried(name)
         if carried:
-            other = build(self._scene(name, carried, directions), self._resolution[name], like=model)
+            mesh = self.meshes.get(name)
+            other = build(self._scene(name, carried, directions), self._resolution[name], mesh, like=model)
             held = [k for k, end in enumerate(("start", "end")) if clamps[k] is not None]
             other = with_clamps(other, model.line, held)
             other.ends.values.frame[held] = model.ends.values.frame[held]

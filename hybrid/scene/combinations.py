@@ -27,7 +27,7 @@ Tables = Mapping[str, Any]
 Kind = Literal["physics", "not worked out", "several lines"]
 # Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
 USE, SYSTEM, LINE = "use", "system", "line"
-Use = Literal["", "stepped", "changed loads", "about rest", "response", "derivatives"]
+Use = Literal["", "stepped", "about rest", "response", "derivatives"]
 LEAVE_OUT = "leave it out"
 ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
@@ -323,8 +323,8 @@ def _either(*features: Feature) -> Callable[[Tables], Iterator[Place]]:
     return lambda tables: (at for x in features for at in x.places(tables))
 
 
-def _used(*uses: Use, at: str = "") -> Callable[[Tables], Iterator[Place]]:
-    return lambda tables: iter([(at or tables[USE],)] if tables.get(USE) in uses else [])
+def _used(*uses: Use) -> Callable[[Tables], Iterator[Place]]:
+    return lambda tables: iter([(tables[USE],)] if tables.get(USE) in uses else [])
 
 
 # --- features -----------------------------------------------------------------------------------
@@ -397,9 +397,6 @@ OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change
                         "motion.file, motion.travel, force.history", _changing_loads)  # fmt: skip
 MEMBERS = Feature("free bodies with members", "bodies.NAME.members", lambda tables: ())
 STEPPED = Feature("steps from outside", "hybrid.Simulation", _used("stepped"))
-CHANGED_LOADS = Feature(
-    "loads that change in mid-run", "hybrid resume --set KEY=VALUE", _used("changed loads", at="settings")
-)
 
 # Of one cable alone, by keys that several lines do not have.
 ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
@@ -571,11 +568,6 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal(
         FOLLOWING_CELLS, SEVERAL_LINES, "several lines", "cells of several lines have lengths that stay", fix=ALONE
-    ),
-    Refusal(
-        CHANGED_LOADS, SEVERAL_LINES, "several lines",
-        "the result is of several lines: they go on with the loads they have", "nothing to change",
-        "run the changed scene from its start",
     ),
     *(
         Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)

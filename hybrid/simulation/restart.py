@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from hybrid.errors import Complaint, ResultError, SceneError
-from hybrid.model.build import build
+from hybrid.model.build import Model, build
 from hybrid.model.ends import EndConditions
 from hybrid.model.output_points import OutputPoints
 from hybrid.model.payout import longest_out, winch_at, winch_side
 from hybrid.model.plan import output_interval
 from hybrid.model.resolution import Resolution
 from hybrid.model.self_reach import self_reach
-from hybrid.scene.combinations import refuse_use
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import parse_either, parse_scene, scene_text
 from hybrid.scene.schema import Scene
@@ -30,6 +30,7 @@ from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
 
 if TYPE_CHECKING:  # its tables take long to make
+    from hybrid.model.system import SystemResolution
     from hybrid.scene.system import System
 
 # What may be other from some time on: it acts from outside, and nothing of the cable's state hangs on it.
@@ -37,16 +38,24 @@ MAY_CHANGE = (
     "environment.fluid.current", "environment.fluid.waves", "time.duration",
     *(f"ends.{end}.{key}" for end in ("start", "end") for key in ("motion", "force", "thrust", "moment")),
 )  # fmt: skip
+MAY_CHANGE_OF_LINES = (
+    "environment.fluid.current", "environment.fluid.waves", "time.duration",
+    *(f"points.NAME.{key}" for key in ("motion", "force", "moment")),
+    *(f"bodies.NAME.{key}" for key in ("motion", "force", "moment")),
+)  # fmt: skip
 # Of the length, and of the length in the time of a transverse wave: what an end may jump by, and its velocity.
 SAME_PLACE, SAME_SPEED = 1e-6, 1e-3
 
 
+S = TypeVar("S")
+
+
 @dataclass(frozen=True)
-class LoadChange:
-    """From time t (s) on, this scene holds."""
+class LoadChange(Generic[S]):
+    """From time t (s) on, this scene, of one cable or of several lines, holds."""
 
     t: float
-    scene: Scene
+    scene: S
 
 
 @dataclass(frozen=True)
@@ -58,7 +67,7 @@ class RemainingRun:
     """
 
     scene: Scene
-    changes: tuple[LoadChange, ...]
+    changes: tuple[LoadChange[Scene], ...]
     resolution: Resolution
     before: Tree
     anew: bool
@@ -101,13 +110,23 @@ def remaining_run(
     return RemainingRun(scene, changes, resolution, {}, anew, reached, kept)
 
 
+class RemainingLines(NamedTuple):
+    """What is to be done with several lines; anew: from t = 0, and not from the checkpoint."""
+
+    system: System
+    changes: tuple[LoadChange[System], ...]
+    anew: bool
+
+
 def remaining_system(
     path: Path, until: float | None = None, settings: Sequence[str] = (), start: float | None = None
-) -> System | None:
-    """The scene of a result of several lines, if it is to go on until then; None: it is of one cable.
+) -> RemainingLines | None:
+    """What a result of several lines leaves to be done, as of `remaining_run`; None: it is of one cable.
 
     ResultError: nothing is left to do; SceneError: what is asked cannot be.
     """
+    from hybrid.simulation.system_checkpoint import kept_resolution
+
     with open_result(path) as result:
         if not result.lines:
             return None
@@ -116,19 +135,71 @@ def remaining_system(
             return None
         found = as_begun(found, result)
         done, reached = result.done, float(result.times[-1]) if len(result.times) else 0.0
-    if settings or start is not None:
-        refuse_use(found, "changed loads", given=", ".join(settings) or f"from {start:g} s")
-    if until is None:
+        changes = tuple(LoadChange(t, as_begun(_several(text), result)) for t, text in _told(path, result))
+    if start is not None and not settings:
+        raise _refused("from", f"{start:g} s", "a change from then on", "name it with --set KEY=VALUE")
+    if until is None and not settings:
         if done:
-            fix = "--until T goes on beyond its end"
+            fix = "--until T goes on beyond its end, --set KEY=VALUE --from T changes a load"
             raise ResultError(f"{path} is complete: there is nothing left to do\n    try:      {fix}")
-        return found
+        return RemainingLines(found, changes, False)
+    if until is not None:
+        found, changes = _longer_lines(found, changes, until, reached)
+    if not settings:
+        return RemainingLines(found, changes, False)
+    begin = reached if start is None else start
+    last = changes[-1] if changes else LoadChange(0.0, found)
+    changed = _several(scene_text(last.scene), settings)
+    end = changed.require_time().duration
+    if until is not None and end != until:
+        raise _refused("time.duration", f"{end:g} s", f"{until:g} s, as until says, or nothing", "say it once")
+    _check_lines(last, changed, kept_resolution(found, path), begin, end)
+    if end != found.require_time().duration:
+        found, changes = _longer_lines(found, changes, end, reached)
+    return RemainingLines(found, (*changes, LoadChange(begin, changed)), begin < reached)
+
+
+def _several(text: str, settings: Sequence[str] = ()) -> System:
+    """Several lines, which a text is known to be of."""
+    found, _ = parse_either(text, overrides=settings)
+    assert not isinstance(found, Scene)
+    return found
+
+
+def _longer_lines(
+    system: System, changes: Sequence[LoadChange[System]], until: float, reached: float
+) -> tuple[System, tuple[LoadChange[System], ...]]:
+    """As `_longer`, of several lines."""
     _refuse_what_is_no_later_time(until, reached, "hybrid.open(path).lines[name].at(t=...)")
-    data = found.model_dump(mode="json", exclude_none=True)
-    data["time"]["duration"] = until
-    data.setdefault("output", {})["every"] = output_interval(found)
-    longer, _ = parse_either(scene_text(type(found).model_validate(data)))
-    return None if isinstance(longer, Scene) else longer
+    _refuse_before_changes(changes, until)
+    every = output_interval(system)
+
+    def other(system: System) -> System:
+        data = system.model_dump(mode="json", exclude_none=True)
+        data["time"]["duration"] = until
+        data.setdefault("output", {})["every"] = every
+        return _several(scene_text(type(system).model_validate(data)))
+
+    return other(system), tuple(LoadChange(x.t, other(x.scene)) for x in changes)
+
+
+def _check_lines(
+    last: LoadChange[System], changed: System, resolution: SystemResolution, begin: float, end: float
+) -> None:
+    """As `_check`, of several lines: motions of held points and of bodies."""
+    from hybrid.model.system import build_system
+
+    _check_what_changes(last.t, begin, end, _differences(_plain(last.scene), _plain(changed)), MAY_CHANGE_OF_LINES)
+    before = build_system(last.scene, resolution)
+    after = build_system(changed, resolution, before)
+    for name, one, other, joints in zip(before.names, before.models, after.models, before.joints, strict=True):
+        other.ends.take_frames(one.ends)
+        for k, end_name in enumerate(("start", "end")):
+            if joints[k] < 0:
+                point = getattr(changed.lines[name], end_name)
+                body = changed.body_of(point)
+                where = f"bodies.{changed.points[point].body}" if body is not None else f"points.{point}"  # type: ignore[union-attr]
+                _refuse_jump(one, other, k, begin, f"{where}.motion")
 
 
 def as_begun(system: System, result: Result) -> System:
@@ -140,12 +211,12 @@ def as_begun(system: System, result: Result) -> System:
     return system.model_copy(update={"lines": lines})
 
 
-def changes_text(changes: Sequence[LoadChange]) -> str:
+def changes_text(changes: Sequence[LoadChange[Any]]) -> str:
     """Phases as JSON, for the file; empty if there are none."""
     return json.dumps([{"t": x.t, "scene": scene_text(x.scene)} for x in changes]) if changes else ""
 
 
-def _found(path: Path) -> tuple[Scene, tuple[LoadChange, ...], str, Tree, Checkpoint, OutputPoints]:
+def _found(path: Path) -> tuple[Scene, tuple[LoadChange[Scene], ...], str, Tree, Checkpoint, OutputPoints]:
     with opened(path) as file:
         before, point = read_before(file), read_checkpoint(file)
         with open_result(path) as result:
@@ -153,13 +224,17 @@ def _found(path: Path) -> tuple[Scene, tuple[LoadChange, ...], str, Tree, Checkp
             status = result.status
             with refused(path):
                 points = restored_points(result, longest_out(scene), scene.length if not winch_side(scene) else None)
-            try:
-                told = json.loads(result.changes_text or "[]")
-                changes = tuple(LoadChange(float(x["t"]), parse_scene(x["scene"])) for x in told)
-            except (ValueError, TypeError, KeyError) as error:
-                advice = f"    detail:   {error}\n    try:      run its scene again"
-                raise ResultError(f"{path} has changes that cannot be read\n{advice}") from None
+            changes = tuple(LoadChange(t, parse_scene(text)) for t, text in _told(path, result))
     return scene, changes, status, before, point, points
+
+
+def _told(path: Path, result: Result) -> list[tuple[float, str]]:
+    """Times (s) and scenes of the changes of a result; ResultError: they cannot be read."""
+    try:
+        return [(float(x["t"]), str(x["scene"])) for x in json.loads(result.changes_text or "[]")]
+    except (ValueError, TypeError, KeyError) as error:
+        advice = f"    detail:   {error}\n    try:      run its scene again"
+        raise ResultError(f"{path} has changes that cannot be read\n{advice}") from None
 
 
 def _refuse_what_is_no_later_time(until: float, reached: float, reading: str) -> None:
@@ -171,15 +246,20 @@ def _refuse_what_is_no_later_time(until: float, reached: float, reading: str) ->
         raise _refused("until", f"{until:g} s", expected, f"the file holds everything before: {reading}")
 
 
-def _longer(
-    scene: Scene, changes: Sequence[LoadChange], until: float, reached: float
-) -> tuple[Scene, tuple[LoadChange, ...]]:
-    """The same until another time, with outputs as often as before."""
-    _refuse_what_is_no_later_time(until, reached, "hybrid.open(path).at(t=...)")
+def _refuse_before_changes(changes: Sequence[LoadChange[Any]], until: float) -> None:
+    """SceneError if a run is to end before a change that was asked for."""
     later = [x.t for x in changes if x.t >= until]
     if later:
         fix = "a later end; a change that was asked for cannot be taken back"
         raise _refused("until", f"{until:g} s", f"a time after the change at {later[0]:g} s", fix)
+
+
+def _longer(
+    scene: Scene, changes: Sequence[LoadChange[Scene]], until: float, reached: float
+) -> tuple[Scene, tuple[LoadChange[Scene], ...]]:
+    """The same until another time, with outputs as often as before."""
+    _refuse_what_is_no_later_time(until, reached, "hybrid.open(path).at(t=...)")
+    _refuse_before_changes(changes, until)
     every = output_interval(scene)
 
     def other(scene: Scene) -> Scene:
@@ -196,32 +276,42 @@ def _longer(
     return out, tuple(LoadChange(x.t, other(x.scene)) for x in changes)
 
 
-def _check(last: LoadChange, changed: Scene, resolution: Resolution, begin: float, end: float) -> None:
+def _check(last: LoadChange[Scene], changed: Scene, resolution: Resolution, begin: float, end: float) -> None:
     """Refuse what cannot be other from `begin` on, and prescribed motions that would jump then."""
-    if not last.t <= begin < end:
-        fix = "a later end as well, --until T" if begin == end else ""
-        raise _refused("from", f"{begin:g} s", f"a time from {last.t:g} s on and before the end, {end:g} s", fix)
-    for where, value in _differences(_plain(last.scene), _plain(changed)):
-        if not any(where == x or where.startswith((f"{x}.", f"{x}[")) for x in MAY_CHANGE):
-            fix = "run the changed scene from its start"
-            raise _refused(where, value, f"one of {', '.join(MAY_CHANGE)}: a run in progress keeps the rest", fix)
-    refuse_use(changed, "changed loads", given="a change in mid-run")
+    _check_what_changes(last.t, begin, end, _differences(_plain(last.scene), _plain(changed)), MAY_CHANGE)
     check_motions(changed)
-    model = build(changed, resolution)
-    before, after = build(last.scene, resolution).ends, model.ends
-    after.take_frames(before)
+    before, after = build(last.scene, resolution), build(changed, resolution)
+    after.ends.take_frames(before.ends)
     for k, name in enumerate(("start", "end")):
-        held = bool(before.values.held[k])
-        one, other = (_place(ends, k, begin) for ends in (before, after))
-        apart, faster, turned, spun = (float(np.linalg.norm(a - b)) for a, b in zip(one, other, strict=True))
-        jumps = held and (apart > SAME_PLACE * model.length or faster > SAME_SPEED * model.length / model.time_scale)
-        if jumps or turned > SAME_PLACE or spun > SAME_SPEED / model.time_scale:
-            sizes = ((apart, "m"), (faster, "m/s"), (turned, "rad"), (spun, "rad/s"))
-            by = ", ".join(f"{x:.3g} {unit}" for x, unit in sizes if x > 1e-9)
-            given = f"one that jumps by {by} at t = {begin:g} s"
-            fix = "times count from the start of the run: travel {by, over, begin} starts from rest where the end is"
-            expected = "a motion that goes on where the one before it is"
-            raise _refused(f"ends.{name}.motion", given, expected, fix)
+        _refuse_jump(before, after, k, begin, f"ends.{name}.motion")
+
+
+def _check_what_changes(
+    since: float, begin: float, end: float, changed: Sequence[tuple[str, str]], allowed: Sequence[str]
+) -> None:
+    """SceneError: a change at `begin` is before the last one, `since`, or not before the end (s), or of what stays."""
+    if not since <= begin < end:
+        fix = "a later end as well, --until T" if begin == end else ""
+        raise _refused("from", f"{begin:g} s", f"a time from {since:g} s on and before the end, {end:g} s", fix)
+    for where, value in changed:
+        key = re.sub(r"^(points|bodies)\.[^.\[]+", r"\1.NAME", where)
+        if not any(key == x or key.startswith((f"{x}.", f"{x}[")) for x in allowed):
+            fix = "run the changed scene from its start"
+            raise _refused(where, value, f"one of {', '.join(allowed)}: a run in progress keeps the rest", fix)
+
+
+def _refuse_jump(before: Model, after: Model, k: int, t: float, where: str) -> None:
+    """SceneError: the motion of end k of a line, which stands at `where`, would jump at t (s)."""
+    held, length = bool(before.ends.values.held[k]), after.length
+    one, other = (_place(model.ends, k, t) for model in (before, after))
+    apart, faster, turned, spun = (float(np.linalg.norm(a - b)) for a, b in zip(one, other, strict=True))
+    jumps = held and (apart > SAME_PLACE * length or faster > SAME_SPEED * length / after.time_scale)
+    if jumps or turned > SAME_PLACE or spun > SAME_SPEED / after.time_scale:
+        sizes = ((apart, "m"), (faster, "m/s"), (turned, "rad"), (spun, "rad/s"))
+        by = ", ".join(f"{x:.3g} {unit}" for x, unit in sizes if x > 1e-9)
+        fix = "times count from the start of the run: travel {by, over, begin} starts from rest where the end is"
+        expected = "a motion that goes on where the one before it is"
+        raise _refused(where, f"one that jumps by {by} at t = {t:g} s", expected, fix)
 
 
 def _place(ends: EndConditions, k: int, t: float) -> tuple[np.ndarray, ...]:
@@ -230,7 +320,7 @@ def _place(ends: EndConditions, k: int, t: float) -> tuple[np.ndarray, ...]:
     return now.position[k].copy(), ends.velocity[k].copy(), now.frame[k].copy(), now.spin[k].copy()
 
 
-def _plain(scene: Scene) -> dict[str, Any]:
+def _plain(scene: Scene | System) -> dict[str, Any]:
     return dict(scene.model_dump(mode="json", exclude_none=True))
 
 

@@ -36,7 +36,7 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
         "interval": run.interval, "worked": run.loop.worked[1, :, :SPRING],
         "leg": [*run.leg], "cpu": run.cpu, "dry": sorted(run.dry), "bodies": run.state.bodies, "body_work": body_work,
         "lines": lines, "broken": [*run.failures.broken], "rest": run.rest,
-        "control": run.loop.control(),
+        "control": run.loop.control(), "changes": run.changed,
         "quantities": run.quantities.checkpoint(), "rotations": run.rotations.last.copy(),
         "zones": run.zones.checkpoint() if run.zones is not None else {},
     }  # fmt: skip
@@ -49,7 +49,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
             raise ValueError("broken: numbers of what has broken were expected")
         run.failures.again(saved["broken"])
     # It took members as at the first guess, and rotations were within half a turn of 0.
-    older = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "rotations": run.rotations.last}
+    older = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "rotations": run.rotations.last, "changes": 0}
     older["rho"] = run.system.require_time().rho_inf
     complete = "interval" in saved  # else steps ended at outputs
     older |= {"interval": 0.0, "worked": run.loop.worked[1, :, :SPRING]}
@@ -166,6 +166,16 @@ def kept_resolution(system: System, source: Path) -> SystemResolution:
         if len({(x.step, x.every, x.local is None) for x in found.values()}) > 1:
             raise ValueError("lines with other steps")
         return SystemResolution(found)
+
+
+def kept_changes(source: Path, most: int) -> int:
+    """How many changes of loads were made up to the checkpoint of a result; ResultError: more than `most`."""
+    with opened(source) as file, refused(source):
+        state = read_checkpoint(file).state
+        made = int(state.get("changes", 0)) if isinstance(state, Mapping) else 0  # not in files of an earlier program
+        if not 0 <= made <= most:
+            raise ValueError(f"changes: up to {most} were expected")
+        return made
 
 
 def files_of(system: System) -> dict[str, str]:

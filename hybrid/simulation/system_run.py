@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 from time import process_time as clock_now
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,12 +32,14 @@ from hybrid.simulation.collapse import COLLAPSE, CONTACT, GIVE_UP, collapse_text
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.progress import RESULT, ProgressReporter
+from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import refused, require_same
 from hybrid.simulation.result_file import places_of_elevation
 from hybrid.simulation.step_events import CUTS
 from hybrid.simulation.system_checkpoint import (
     content,
     files_of,
+    kept_changes,
     kept_resolution,
     other_program,
     restore,
@@ -50,6 +54,7 @@ from hybrid.simulation.system_contact import (
 )
 from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_lines import WAITING, LineResult, LineStep
+from hybrid.simulation.system_load_change import change_loads_of_lines, loaded_as, with_loads_of
 from hybrid.simulation.system_points import Rotations, Sampled, fields_of, gauges_of, times, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import begin_as_placed, equilibrium_of_system, joined_lines, named
@@ -73,29 +78,52 @@ _NO_ZONES: Mapping[int, DomainManager] = {}
 LOOK = 16
 
 
+class Recording(NamedTuple):
+    """What there is beside a run: around it, before it and after it.
+
+    kept: whether a file gets checkpoints; source: the result to go on with, from its checkpoint, in place of a start;
+    found: what was found before the run, for whoever goes on with its file; pending: what is to come when it is
+    complete (store.records); notes: events (kind, text) of the whole of the run.
+    """
+
+    kept: bool = False
+    source: Path | None = None
+    found: Tree | None = None
+    pending: str = ""
+    notes: Sequence[tuple[str, str]] = ()
+
+
+ALONE = Recording()
+
+
 class SystemRun:
     """One system, computed into a file or into memory."""
 
     def __init__(
-        self, system: System, target: Target | None, text: Text, moves: bool, kept: bool = False,
-        source: Path | None = None, resolution: SystemResolution | None = None, found: Tree | None = None,
-        pending: str = "", notes: Sequence[tuple[str, str]] = (), criterion: UserCriterion | None = None,
+        self, system: System, target: Target | None, text: Text, moves: bool,
+        resolution: SystemResolution | None = None, recording: Recording = ALONE,
+        criterion: UserCriterion | None = None, changes: Sequence[LoadChange[System]] = (),
     ) -> None:  # fmt: skip
         """target: None: the run is only to be compared with; text: the scene as YAML, or what makes it; moves: whether
 
-        its motion is wanted, else its equilibrium under full loads; kept: whether a file gets checkpoints; source: the
-        result to go on with, from its checkpoint, in place of a start; resolution: how finely, None: as the scene asks
-        for, or the checkpoint says; found: what was found before the run, for whoever goes on with its file; pending:
-        what is to come when it is complete (store.records); notes: events (kind, text) of the whole of the run;
-        criterion: one more for zones that move (adapt.user_criterion).
+        its motion is wanted, else its equilibrium under full loads; resolution: how finely, None: as the scene asks
+        for, or the checkpoint says; criterion: one more for zones that move (adapt.user_criterion); changes: loads and
+        motions of these systems hold from some time on.
         """
+        kept, source, found, pending, notes = recording
         self._before, self._pending, self._notes = found or {}, pending, notes
+        end = system.require_time().duration if moves else 0.0
+        self.changes = [replace(x, scene=with_loads_of(system, x.scene)) for x in changes if x.t < end]
         self.criterion = criterion
         self.system, self.target, self.moves = system, target, moves
         self.kept = kept and isinstance(target, Path)
+        self.changed = 0  # how many of the changes have been made
         if source is not None:
-            resolution = kept_resolution(system, source)
+            resolution, self.changed = kept_resolution(system, source), kept_changes(source, len(self.changes))
         self.model = build_system(system, resolution=resolution)
+        if self.changed:
+            self.system = self.changes[self.changed - 1].scene
+            self.model = loaded_as(self.model, self.system, 0.0)
         self.resolution = self.model.resolution
         one = self.resolution.one
         follow = (one.step, one.shortest) if moves and one.local is not None else ()
@@ -153,7 +181,7 @@ class SystemRun:
         self._begin = clock_now()
         self.recorder: Recorder | ArrayRecorder | DeferredRecorder | ComparisonRecorder = ComparisonRecorder()
         if source is not None:
-            self.recorder = self._go_on(source, text if isinstance(text, str) else text())
+            self.recorder = self._go_on(source, {"scene": text if isinstance(text, str) else text()} | self._told)
         elif target is not None:
             self.recorder = self._new_recorder(text)
 
@@ -221,23 +249,37 @@ class SystemRun:
         if isinstance(self.target, MemoryTarget):
             return ArrayRecorder(
                 self.target, grid_s=np.zeros(1), fields=fields, step_fields=(), attributes=attributes,
-                fixed=fixed, texts={"scene": text},
+                fixed=fixed, texts={"scene": text} | self._told,
                 parts={line.name: line.target for line in self.lines if line.target is not None},
             )  # fmt: skip
         recorder = Recorder(
             self.target, grid_s=np.zeros(1), fields=fields, step_fields=(), attributes=attributes, fixed=fixed,
-            texts={"scene": text if isinstance(text, str) else text()}, outputs=len(self.times) + 1, overwrite=True,
+            texts={"scene": text if isinstance(text, str) else text()} | self._told,
+            outputs=len(self.times) + 1, overwrite=True,
             before=self._before if self.kept else None, templates=cache_folder().parent, parts=self._parts,
         )  # fmt: skip
-        recorder.files = files_of(self.system)
+        recorder.files = self._files
         return recorder
 
-    def _go_on(self, source: Path, text: str) -> Recorder:
+    @property
+    def _told(self) -> dict[str, str]:
+        """What the file says of changes, if there are some."""
+        return {"changes": changes_text(self.changes)} if self.changes else {}
+
+    @property
+    def _files(self) -> dict[str, str]:
+        """Digests of the files of motions and loads, by path, of all that holds at some time."""
+        found = files_of(self.system)
+        for x in self.changes:
+            found |= files_of(x.scene)
+        return found
+
+    def _go_on(self, source: Path, texts: Mapping[str, str]) -> Recorder:
         """Be where the checkpoint of a result is, and write behind its rows; ResultError: that cannot be."""
         assert isinstance(self.target, Path)
         with opened(source) as file:
             point = read_checkpoint(file)
-            require_same(point, files_of(self.system), self.criterion, source)
+            require_same(point, self._files, self.criterion, source)
             self.make_solver()
             with refused(source):
                 restore(self, point.state)
@@ -248,9 +290,9 @@ class SystemRun:
             self.other, self._between = self.state.copy(), True
             fields = [*fields_of(self.system), *self.quantities.fields]
             recorder = Recorder.again(
-                file, self.target, fields, (), point, {"scene": text}, self._before, (), self._parts, self._pending
+                file, self.target, fields, (), point, texts, self._before, (), self._parts, self._pending
             )
-        recorder.files = files_of(self.system)
+        recorder.files = self._files
         if why := other_program(point):
             recorder.event(point.t, 0.0, 0.0, OTHER_PROGRAM, why)
         self._begin, self._checked = clock_now() - self.cpu, self.steps
@@ -377,6 +419,12 @@ class SystemRun:
                 if interrupted():
                     raise KeyboardInterrupt
 
+            for change in self.changes[self.changed :]:
+                for stop in self.stops(change.t):
+                    self.go_to(stop, look)
+                change_loads_of_lines(self, change.scene)
+                self.changed += 1
+                self.keep()
             for stop in self.stops():
                 self.go_to(stop, look)
             reporter(self.t, self.steps, 0, self.model.models[0].zones, True, self.touches)
@@ -454,13 +502,17 @@ class SystemRun:
         self.keep()
         self._logged = clock_now() - self._begin
 
-    def stops(self) -> list[float]:
-        """Times (s) at which a step ends: where loads jump, the end, and outputs if that is asked."""
-        time = self.system.require_time()
+    def stops(self, until: float | None = None) -> list[float]:
+        """Times (s) at which a step ends: where loads jump, the end, and outputs if that is asked.
+
+        until: s, the last of them; None: the end of the run.
+        """
+        end = self.system.require_time().duration if until is None else until
         given = [*(m.ends.breaks for m in self.model.models), self.model.breaks]
-        self._breaks = sorted({x for each in (*given, self.failures.times) for x in each if x < time.duration})
-        outputs = self.times if self.system.output.exact else self.times[-1:]
-        return apart([*outputs, *self._breaks], self.t, self.resolution.one.step)
+        self._breaks = sorted({x for each in (*given, self.failures.times) for x in each if x < end})
+        outputs = [x for x in self.times if x < end] if self.system.output.exact else []
+        last = self.times[-1] if until is None else until
+        return apart([*outputs, last, *self._breaks], self.t, self.resolution.one.step)
 
     def go_to(self, stop: float, look: Callable[[], None] = lambda: None) -> None:
         """Steps to `stop` (s), with what is due there; look: called there, and about ten times a second."""
@@ -589,10 +641,10 @@ class SystemRun:
         if self.zones is not None:
             self.zones.adapt()
         if self.failures.all and self.failures.due(step):
-            self._restart()
+            self.restart_steps()
             self.other = self.state.copy()
 
-    def _restart(self) -> None:
+    def restart_steps(self) -> None:
         """Loads, or what holds the lines, are others now: accelerations jump."""
         self._settle(self.solver)
         self.loop.restart()
@@ -604,7 +656,7 @@ class SystemRun:
             self.loaded = self.t
             for model in self.model.models:
                 model.ends.set_loads(self.t)
-            self._restart()
+            self.restart_steps()
             self.leg = (stop, 0)
         if self.system.output.exact:
             self.leg = (stop, 0)
@@ -684,28 +736,15 @@ class SystemRun:
 
 def run_system(
     system: System, target: Target | None, text: str, reporter: ProgressReporter,
-    interrupted: Callable[[], bool], source: Path | None = None, name: str = RESULT,
-    resolution: SystemResolution | None = None, found: Tree | None = None, pending: str = "",
-    notes: Sequence[tuple[str, str]] = (), criterion: UserCriterion | None = None,
+    interrupted: Callable[[], bool], name: str = RESULT, resolution: SystemResolution | None = None,
+    recording: Recording = ALONE, criterion: UserCriterion | None = None,
+    changes: Sequence[LoadChange[System]] = (),
 ) -> SystemRun:  # fmt: skip
-    """Compute the motion of a system into a file, into memory, or (target None) to be compared with.
+    """Compute the motion of a system into a file with checkpoints, into memory, or (target None) to be compared with.
 
-    source: what to go on with; name: of the pass;
-    resolution: how finely, None: as the scene asks for; found, pending, notes, criterion: as of `SystemRun`.
+    name: of the pass; resolution, recording, criterion, changes: as of `SystemRun`.
     """
-    run = SystemRun(
-        system,
-        target,
-        text,
-        moves=True,
-        kept=True,
-        source=source,
-        resolution=resolution,
-        found=found,
-        pending=pending,
-        notes=notes,
-        criterion=criterion,
-    )
+    run = SystemRun(system, target, text, True, resolution, recording._replace(kept=True), criterion, changes)
     reporter.begin(name, run.resolution.one)
     run.record_motion(reporter, interrupted)
     return run
@@ -715,6 +754,6 @@ def static_system(
     system: System, target: Target | None, text: Text, resolution: SystemResolution | None = None, pending: str = ""
 ) -> SystemRun:
     """Compute the equilibrium of a system under full loads; target, resolution, pending: as of `run_system`."""
-    run = SystemRun(system, target, text, moves=False, resolution=resolution, pending=pending)
+    run = SystemRun(system, target, text, False, resolution, Recording(pending=pending))
     run.record_equilibrium()
     return run

@@ -337,6 +337,14 @@ class SystemZones:
             model = x.switching.model
             x.switching.model = replace(model, line=change(model.line))
 
+    def take_loads(self) -> None:
+        """Go on with the models of the run, whose loads and motions are others on the same cells."""
+        for x in self.lines:
+            model = self._run.model.models[x.number]
+            assert x.full.layout is not None
+            x.full, x.switching.model = on_layout(model, x.full.layout), model
+            x.switching.manager.load(model.ends.moments)
+
     @property
     def numbers(self) -> list[int]:
         """Of the lines whose zones move."""

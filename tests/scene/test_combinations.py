@@ -102,7 +102,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
                    "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0]}}, ""
     ),
     (c.FOLLOWING_CELLS, c.SEVERAL_LINES): ({ONE + "model": FOLLOWING["model"]}, ""),
-    (c.CHANGED_LOADS, c.SEVERAL_LINES): ({}, "changed loads"),
 }  # fmt: skip
 BY_SCHEMA = [x for x in REFUSALS if isinstance(x.feature.places, Absent)]
 # Other examples of pairs whose one reason is that of several features.

@@ -158,8 +158,6 @@ def test_a_run_goes_on_beyond_its_end_as_if_it_had_been_that_long(tmp_path: Path
         hybrid.resume(tmp_path / "run.h5")
     with pytest.raises(SceneError, match="4 s"):
         hybrid.resume(tmp_path / "run.h5", until=2.0)
-    with pytest.raises(SceneError, match="several lines"):
-        hybrid.resume(tmp_path / "run.h5", until=8.0, settings=["environment.fluid.current=[0, 0, 0]"])
     hybrid.resume(tmp_path / "run.h5", tmp_path / "more.h5", until=8.0).close()
     with hybrid.open(tmp_path / "long.h5") as long, hybrid.open(tmp_path / "more.h5") as more:
         for name, line in long.lines.items():

@@ -1,0 +1,70 @@
+"""Other loads and other motions of points and bodies from some time of a run of several lines on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from hybrid.kernels.junctions.bodies import DONE, SPRING
+from hybrid.kernels.state.forces import SELF_CONTACT
+from hybrid.model.build import Model
+from hybrid.model.self_reach import touching
+from hybrid.model.system import SystemModel, build_system
+from hybrid.scene.system import System
+from hybrid.simulation.zone_switching import on_layout
+
+if TYPE_CHECKING:
+    from hybrid.simulation.system_run import SystemRun
+
+# Tables of a system in which loads and motions stand.
+LOADED = ("environment", "points", "bodies")
+
+
+def with_loads_of(system: System, other: System) -> System:
+    """A system with the loads and motions of another one, which has the same lines."""
+    return system.model_copy(update={name: getattr(other, name) for name in LOADED})
+
+
+def loaded_as(model: SystemModel, system: System, t: float) -> SystemModel:
+    """The same network from t (s) on with the loads and motions of a system; what is joined or loose stays so."""
+    other = build_system(system, model.resolution, model)
+    models = tuple(_line_as(*each, system, t) for each in zip(model.names, model.models, other.models, strict=True))
+    return replace(
+        model, models=models, bodies=other.bodies, known=other.known, scenes=other.scenes, moments=other.moments
+    )
+
+
+def _line_as(name: str, now: Model, later: Model, system: System, t: float) -> Model:
+    """The model of a line with other loads, on its cells of now, with what has come off it."""
+    if now.layout is not None:
+        later = on_layout(later, now.layout)
+    line = later.line
+    for values in ("h", "kb", "k0", "hn", "element", "spin"):
+        getattr(line, values)[:] = getattr(now.line, values)  # what is on its way goes on
+    line = line._replace(torsion=now.line.torsion)
+    if now.line.bits & SELF_CONTACT:
+        line = touching(line, system.lines[name].contact.friction)
+    later.ends.go_on_from(now.ends, t)
+    return replace(later, line=line)
+
+
+def change_loads_of_lines(run: SystemRun, system: System) -> None:
+    """Other loads, and other motions of points and bodies, from now on; lines stay what they are and where they are."""
+    run.ends_of_now()
+    for line in run.lines:
+        line.write_down()
+    run.gather_events()  # in the order in which they happen
+    run.system, run.model = system, loaded_as(run.model, system, run.t)
+    run.start_from(run.rest)
+    for line, model in zip(run.lines, run.model.models, strict=True):
+        line.follow(model)
+    if run.zones is not None:
+        run.zones.take_loads()
+    done = run.solver.body_work[:, DONE:SPRING].copy()
+    run.make_solver()
+    run.solver.body_work[:, DONE:SPRING] = done
+    run.take_other()
+    run.restart_steps()
+    others = "other loads act, or points and bodies move otherwise"
+    text = f"from t = {run.t:.6g} s on {others}, as `hybrid resume` was asked to"
+    run.recorder.event(run.t, 0.0, 0.0, "loads change", text)
