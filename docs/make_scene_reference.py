@@ -337,7 +337,8 @@ def words(schema: dict[str, Any]) -> str:
     if kind == "array":
         if "prefixItems" in schema:
             first = schema["prefixItems"][0]
-            return f"{schema['minItems']} {'rows' if first.get('type') == 'array' else 'numbers'}{bounds(first)}"
+            of = {"array": "rows", "string": "names"}.get(str(first.get("type")), "numbers")
+            return f"{schema['minItems']} {of}{bounds(first)}"
         least = schema.get("minItems", 0)
         return f"list of {words(schema['items'])}" + (f", at least {least}" if least > 1 else "")
     if kind in ("number", "integer"):

@@ -24,10 +24,11 @@ from hybrid.model.clamps import (
     untwisted,
     with_clamps,
 )
-from hybrid.model.contents import IDLE, obstacle_entries
+from hybrid.model.contents import IDLE, Entry, obstacle_entries
 from hybrid.model.ends import EndLoad
 from hybrid.model.first_state import first_state
 from hybrid.model.initial_shape import dead_loads, hung
+from hybrid.model.lines_contact import Touching, touching_of
 from hybrid.model.obstacles import obstacle_rows, pull_on_obstacles
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
@@ -83,6 +84,7 @@ class SystemModel:
     scenes: Mapping[str, Scene]  # of the lines by name, with their points where the system has them
     resolution: SystemResolution
     moments: tuple[tuple[EndLoad, ...], ...]  # that are given to each of the points in `rigid`
+    touching: Touching | None = None  # which lines touch each other
     loose: frozenset[tuple[int, int]] = frozenset()  # ends (line, 0 or 1) that have left their points
 
     @property
@@ -178,6 +180,9 @@ def build_system(
     models = [maker.model(name) for name in system.lines]
     if system.obstacles:
         models = _on_obstacles(system, models, made)
+    touching = touching_of(system, maker.scenes)
+    if touching is not None:
+        models = _with_contact(system, models, touching)
     if _takes_current(system, models):
         models = [replace(x, contents=tuple(e for e in x.contents if e.what != IDLE)) for x in models]
     known = maker.known
@@ -190,6 +195,7 @@ def build_system(
         tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends), places, made, maker.bodies,
         np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
         maker.seats, known, maker.scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
+        touching,
     )  # fmt: skip
 
 
@@ -208,6 +214,18 @@ def _on_obstacles(system: System, models: Sequence[Model], bodies: Sequence[Body
         rows[:] = obstacle_rows(scene, sum(pulls))
         kept = tuple(e for e in x.contents if e.what not in before)
         found.append(replace(x, contents=(*kept, *obstacle_entries(scene, rows))))
+    return found
+
+
+def _with_contact(system: System, models: Sequence[Model], touching: Touching) -> list[Model]:
+    """The models of lines that touch each other from the start."""
+    names, found = list(system.lines), list(models)
+    assert system.contact is not None
+    for k in touching.lines:
+        others = ", ".join(names[j] for j in touching.partners(k))
+        entry = Entry(f"contact with {others}, friction {system.contact.friction:g}", True, "contact")
+        x = found[k]
+        found[k] = replace(x, line=touching.bits(x.line), contents=(*x.contents, entry))
     return found
 
 

@@ -69,7 +69,7 @@ PROBES: dict[str, Probe] = {
     "contact": Probe("N/m", "force of the seabed per length, along its normal", _S, lambda v: v.contact, "seabed"),
     "self_contact": Probe(
         "N/m",
-        "force per length where the line touches itself, across both strands",
+        "force per length where the line touches itself or another line, across both strands",
         _S,
         lambda v: v.self_contact,
         "self_contact",
@@ -120,7 +120,7 @@ WORK = {
     "added_mass": "work of the added mass",
     "waves": "work of the pressure of waves, and of buoyancy at the surface",
     "contact": "work of the damping of the seabed and of obstacles",
-    "friction": "work of friction on the seabed, on obstacles, and of the line on itself",
+    "friction": "work of friction on the seabed, on obstacles, of the line on itself; work of lines that touch it",
     "zones": "energy that zones, and cells at a winch, put in or take out when they change, and of torque where a "
     "catenary bends without it",
     "scheme": "energy change that no work accounts for: the time scheme's own (negative: dissipated)",

@@ -107,6 +107,8 @@ _OF_LINE = ("connections", "mesh", "resolution", "contact", "initial", "model")
 def _placed(tables: Tables, at: Place) -> Place:
     """Where a key of the tables of a line is in the scene of several."""
     name = tables.get(LINE)
+    if at == ("contact",):  # of the system; of a line it has a key
+        return at
     if name is not None and at[:1] == ("cable",):
         return "lines", name, *at[1:]
     return ("lines", name, *at) if name is not None and at[0] in _OF_LINE else at
@@ -295,6 +297,12 @@ def _obstacles(tables: Tables) -> Iterator[Place]:
     return iter([("obstacles",)] if tables.get("obstacles") else [])
 
 
+def _lines_touch(tables: Tables) -> Iterator[Place]:
+    """A line of several that touches another one."""
+    if SYSTEM in tables and any(tables[LINE] in pair for pair in tables[SYSTEM].touching_pairs):
+        yield ("contact",)
+
+
 def _other_diameters(tables: Tables) -> Iterator[Place]:
     """Sections that are not as thick as the first one."""
     known = [(at, x.diameter) for at, x in _sections(tables) if x.diameter is not None]
@@ -380,6 +388,9 @@ BREAKS_OFF_CLAMP = Feature("a break at a clamp", "break_at", _breaks_off_clamp)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
 CLAMPED_TO_FREE = Feature("a line that is clamped to a free point or body", "lines.NAME.connections", _clamped_to_free)
 OBSTACLES = Feature("fixed obstacles", "obstacles", _obstacles)
+LINES_TOUCH = Feature("contact of lines with each other", "contact", _lines_touch)
+PUSHED = Feature("fixed obstacles, contact of lines with each other", "obstacles, contact",
+                 _either(OBSTACLES, LINES_TOUCH))  # fmt: skip
 DIAMETERS = Feature("sections of several diameters", "diameter", _other_diameters)
 ACCURACY = Feature("accuracy", "accuracy", lambda tables: iter([("accuracy",)] if tables.get("accuracy") else []))
 ERRORS = Feature("estimated errors", "output.errors", _asks("output", "errors", lambda x: getattr(x, "errors", None)))
@@ -420,6 +431,7 @@ RESPONSE_OF_MEMBERS = Refusal(
     "bodies without members", "hybrid run computes them in time",
 )  # fmt: skip
 PAID = "line is paid out ({key})"
+TOUCHES = "there are obstacles or lines that touch each other ({key})"
 REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         TWO_STIFFNESSES, MOVING_ZONES, "physics",
@@ -475,15 +487,10 @@ REFUSALS: tuple[Refusal, ...] = (
         LAYERS, STEPPED, "not worked out",
         "a cable that is stepped from outside has no coarse run that shows its layers", fix="place cells by `mesh`",
     ),
-    # --- obstacles ---
+    # --- obstacles, and other lines ---
     Refusal(
         PLANE, OBSTACLES, "not worked out", "contact with obstacles ({key}) is computed in space", "3 or nothing",
         "leave it out",
-    ),
-    Refusal(
-        MOVING_ZONES, OBSTACLES, "not worked out",
-        "there are obstacles ({key}), and no criterion looks at what they do to a catenary",
-        "rod, catenary or zones", "write `model: rod`",
     ),
     Refusal(PAYOUT, OBSTACLES, "not worked out", "nodes that enter and leave do not know of obstacles ({key})"),
     Refusal(
@@ -491,27 +498,29 @@ REFUSALS: tuple[Refusal, ...] = (
         "the diameter of the first section", "give all sections one diameter, or leave {key} out",
     ),
     Refusal(
-        CHOSEN_STEPS, OBSTACLES, "not worked out", "there are obstacles ({key}), beside which no error is estimated",
-        "a step, in s, or a tolerance, in m",
-        "give `step: ...` (s) in time, and halve it to see its error",
+        MOVING_ZONES, PUSHED, "not worked out",
+        f"{TOUCHES}, and no criterion looks at what that does to a catenary",
+        "rod, catenary or zones", "write `model: rod`",
     ),
     Refusal(
-        ACCURACY, OBSTACLES, "not worked out", "there are obstacles ({key}), beside which no error is estimated",
+        CHOSEN_STEPS, PUSHED, "not worked out", f"{TOUCHES}, beside which no error is estimated",
+        "a step, in s, or a tolerance, in m", "give `step: ...` (s) in time, and halve it to see its error",
+    ),
+    Refusal(
+        ACCURACY, PUSHED, "not worked out", f"{TOUCHES}, beside which no error is estimated",
         fix="leave it out; halve time.step and the cells to see their error",
     ),
+    Refusal(ERRORS, PUSHED, "not worked out", f"{TOUCHES}, beside which no error is estimated", "false"),
     Refusal(
-        ERRORS, OBSTACLES, "not worked out", "there are obstacles ({key}), beside which no error is estimated", "false"
+        SETTLED_FRICTION, PUSHED, "not worked out", f"{TOUCHES}, and their friction is neglected in every equilibrium",
+        "neglected",
     ),
     Refusal(
-        SETTLED_FRICTION, OBSTACLES, "not worked out",
-        "friction on obstacles ({key}) is neglected in every equilibrium", "neglected",
-    ),
-    Refusal(
-        LAYERS, OBSTACLES, "not worked out", "there are obstacles ({key}), of which the coarse run knows no layers",
+        LAYERS, PUSHED, "not worked out", f"{TOUCHES}, of which the coarse run knows no layers",
         fix="place cells by `mesh`",
     ),
     Refusal(
-        ABOUT_REST, OBSTACLES, "not worked out", "there are obstacles ({key}), whose contact opens and closes",
+        ABOUT_REST, PUSHED, "not worked out", f"{TOUCHES}, and contact opens and closes",
         "a line that touches the seabed at most", "hybrid run computes it in time",
     ),
     # --- response and derivatives ---

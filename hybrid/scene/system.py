@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from itertools import accumulate, pairwise
+from itertools import accumulate, combinations, pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
@@ -36,6 +36,7 @@ from hybrid.scene.combinations import instead
 from hybrid.scene.connections import ClampedConnection, Connections
 from hybrid.scene.end_loads import GivenLoad
 from hybrid.scene.ends import Clamped, End, Ends, Pinned, Triple
+from hybrid.scene.lines_contact import LinesContact
 from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.points import Failure, Fairlead, FixedPoint, FreePoint, Name, Point
 from hybrid.scene.quantities import Quantities
@@ -203,7 +204,6 @@ class System(Table):
         "mesh": "each line has its own: lines.NAME.mesh",
         "initial": "each line has its own: lines.NAME.initial",
         "resolution": "each line has its own: lines.NAME.resolution",
-        "contact": "each line has its own, for itself: lines.NAME.contact; lines do not touch each other",
         "solver": "leave it out: every scene is solved by elimination",
     }
 
@@ -214,6 +214,10 @@ class System(Table):
         default={}, description="rigid bodies by name, with fairleads among the points"
     )
     lines: dict[Name, JoinedLine] = Field(min_length=1, description="lines by name, each between two points")
+    contact: LinesContact | None = Field(
+        default=None,
+        description="which lines touch each other, with what friction; absent: none, they pass through each other",
+    )
     obstacles: Obstacles = Field(
         default={}, description="fixed obstacles by name that every line touches: planes, spheres, cylinders"
     )
@@ -254,6 +258,13 @@ class System(Table):
     def free_bodies(self) -> dict[str, FreeBody]:
         """The bodies that are free, by name, in order."""
         return {name: body for name, body in self.bodies.items() if isinstance(body, FreeBody)}
+
+    @property
+    def touching_pairs(self) -> list[tuple[str, str]]:
+        """Names of lines that touch each other, two each."""
+        if self.contact is None:
+            return []
+        return list(combinations(self.lines, 2)) if self.contact.between is None else list(self.contact.between)
 
     def first_place(self, point: str) -> Triple:
         """Where a point is held at rest, or first looked for [m]."""

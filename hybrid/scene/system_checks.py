@@ -33,6 +33,7 @@ def system_findings(system: System) -> Iterator[Iterator[Finding]]:
     yield chain(_lonely_points(system), _floating_groups(system))
     yield _start_findings(system)
     yield connection_findings(system)
+    yield _touching_findings(system)
     yield chain.from_iterable(_body_findings(system, name) for name in system.bodies)
     yield chain.from_iterable(_moment_findings(system, name) for name in system.points)
     yield chain.from_iterable(_line_findings(system, name) for name in system.lines)
@@ -52,6 +53,12 @@ def _unknown_names(system: System) -> Iterator[Finding]:
     for name, point in system.points.items():
         if isinstance(point, Fairlead):
             yield from _unknown(point.body, system.bodies, ("points", name, "body"), "body")
+    for i, pair in enumerate(system.contact.between or () if system.contact is not None else ()):
+        for k, name in enumerate(pair):
+            yield from _unknown(name, system.lines, ("contact", "between", i, k), "line")
+        if pair[0] == pair[1]:
+            expected = "two lines; whether a line touches itself is asked by lines.NAME.contact"
+            yield Finding(("contact", "between", i), expected, "name another line, or leave the pair out")
     for name in system.output.history:
         yield from _unknown(name, system.lines, ("output", "history", name), "line")
 
@@ -105,6 +112,18 @@ def _start_findings(system: System) -> Iterator[Finding]:
         elif isinstance(line.initial, Straight) and any(line.initial.velocity or ()):
             expected = "rest, because the points of the line start at rest"
             yield Finding(("lines", name, "initial", "velocity"), expected, "leave velocity out")
+
+
+def _touching_findings(system: System) -> Iterator[Finding]:
+    """Lines that touch others have a diameter, and there are others."""
+    if system.contact is not None and len(system.lines) == 1:
+        expected = "nothing, because there is one line; whether it touches itself is asked by lines.NAME.contact"
+        yield Finding(("contact",), expected, "leave it out")
+    for name in dict.fromkeys(x for pair in system.touching_pairs for x in pair):
+        for i, section in enumerate(system.lines[name].sections):
+            if section.diameter is None:
+                expected = "a number > 0, in m, which lines that touch each other keep apart (contact)"
+                yield Finding(("lines", name, "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
 
 
 def _body_findings(system: System, name: str) -> Iterator[Finding]:

@@ -48,9 +48,9 @@ def steps_cut_text(angle: float, step: float, most: float) -> str:
 
 
 def energy_gains_text(tries: int) -> str:
-    """Text of the event of steps that were repeated because contact of a line with itself created energy in them."""
+    """Text of the event of steps that were repeated because contact created energy in them."""
     return (
-        f"{tries} tries of steps, of a line that touches itself, were repeated with half the length, because the time "
+        f"{tries} tries of steps in contact of lines were repeated with half the length, because the time "
         f"scheme would have created energy in them; a shorter time.step needs fewer"
     )
 

@@ -39,6 +39,7 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
         "control": run.loop.control(), "changes": run.changed,
         "quantities": run.quantities.checkpoint(), "rotations": run.rotations.last.copy(),
         "zones": run.zones.checkpoint() if run.zones is not None else {},
+        **({} if run.shared is None else {"contact": run.shared.checkpoint(run.t), "met": [list(x) for x in run.met]}),
     }  # fmt: skip
 
 
@@ -62,6 +63,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     if run.zones is not None or near:
         run.make_solver()
     template = checkpoint(run) | {"dry": None, "broken": None, "control": None}
+    template |= {name: None for name in ("contact", "met") if name in template}  # as many places as there were
     saved = {"quantities": run.quantities.unknown(), **saved}  # nor did it keep ranges
     saved["quantities"] = run.quantities.of_today(saved["quantities"])
     saved["lines"] = of_today(saved.get("lines"), template["lines"])
@@ -132,6 +134,9 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
     run.loaded = found["loaded"]
     run.leg, run.dry, run.cpu = (found["leg"][0], found["leg"][1]), set(found["dry"]), found["cpu"]
     run.loop.take_control(found["control"])
+    if run.shared is not None:
+        run.shared.restore(found["contact"], run.t)
+        run.met = {(int(a), int(b)) for a, b in found["met"]}
     run.state.bodies[:], run.solver.body_work[:, :SPRING] = found["bodies"], found["body_work"]
     run.loop.worked[0], run.loop.worked[1, :, :SPRING] = run.solver.body_work, found["worked"]
     run.quantities.restore(found["quantities"])

@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING
 
 from hybrid.errors import Complaint, Outcome, SceneError
 from hybrid.kernels.state.books import ZONES
-from hybrid.kernels.state.forces import MAY_TOUCH, SELF_CONTACT
+from hybrid.kernels.state.forces import MAY_TOUCH
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.model.self_reach import touching, touching_no_more
 from hybrid.model.system import SystemModel
 from hybrid.simulation.contact_equilibrium import contact_of
 from hybrid.simulation.contact_start import GIVEN_UP, given_up
+from hybrid.simulation.lines_contact import pair_text
 from hybrid.simulation.self_watch import deepest_text
+from hybrid.simulation.system_contact_equilibrium import energy_between, touches_alone
 from hybrid.solve.contact_statics import contact_energy
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.system_statics import LineFailed
@@ -36,8 +38,10 @@ def refuse_within_itself(
     In an equilibrium without contact so is every start from which a damped motion with contact could lead to another.
     moves: whether a motion begins there, which may begin in contact; an equilibrium alone must be apart.
     """
-    for name, model, x, one in zip(system.names, system.models, lines, state.lines, strict=True):
-        if not model.line.bits & SELF_CONTACT:
+    if system.touching is not None:
+        _refuse_within_others(system, lines, state, moves, where)
+    for k, (name, model, x, one) in enumerate(zip(system.names, system.models, lines, state.lines, strict=True)):
+        if not touches_alone(system, k):
             continue
         contact = contact_of(model)
         energy = contact_energy(x.line, x.sea, x.ends, one, contact)
@@ -49,6 +53,21 @@ def refuse_within_itself(
             expected = "a first shape in which the line is apart, for a damped motion with contact to lead to rest"
         fix = f"lines.{name}.initial: {{points: [...]}}, such as a wide U, a smaller diameter, or leave contact out"
         raise SceneError([Complaint(f"lines.{name}.contact", given, expected, fix)])
+
+
+def _refuse_within_others(
+    system: SystemModel, lines: Sequence[JoinedLine], state: SystemState, moves: bool, where: str
+) -> None:
+    """The same of lines that touch each other."""
+    energy, shared = energy_between(system, lines, system.body_numbers(0.0), state)
+    if energy == 0.0 or (moves and math.isfinite(energy)):
+        return
+    given = f"and {where}, {pair_text(shared, system)}"
+    expected = "a start in which lines are apart"
+    if where == WITHOUT_CONTACT:
+        expected = "first shapes in which lines are apart, for a damped motion with contact to lead to rest"
+    fix = "lines.NAME.initial: {points: [...]} of a line that passes beside the other, or points farther apart"
+    raise SceneError([Complaint("contact", given, expected, fix)])
 
 
 def begin_where_near(run: SystemRun) -> None:

@@ -13,10 +13,12 @@ from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.system import SystemModel
 from hybrid.simulation.contact_equilibrium import KEPT, contact_of
+from hybrid.simulation.lines_contact import crossed, shared_of
 from hybrid.solve.contact_statics import contact_energy
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.system_contact_statics import settled_system
+from hybrid.solve.shared_contact import SharedContact
+from hybrid.solve.system_contact_statics import settled_system, touching_solver
 from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
 
 # Turns by which an equilibrium without contact may differ from its start, whose shape may have a writhe of its own.
@@ -26,16 +28,16 @@ OF_SHAPE = 0.5
 def solve_with_contact(
     model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, starts: Callable[[], Iterator[Start]]
 ) -> SystemEquilibrium:
-    """As `solve_system_statics`; of lines that contact is asked for, and that would touch themselves or have lost turns
-    of their ends, that to which a damped motion with contact leads from the first start that is apart; the last start
-    is the equilibrium without contact.
+    """As `solve_system_statics`; of lines that contact is asked for, and that would touch, have lost turns of their
+    ends or have passed through each other on the way from their first shapes, that to which a damped motion with
+    contact leads from the first start that is apart; the last start is the equilibrium without contact.
 
     starts: begins anew at every call.  An equilibrium within itself comes back where no start is apart.
     """
     try:
         found = solve_system_statics(lines, len(model.free), bodies, starts())
     except LineFailed as failed:
-        if not any(_touch(lines)) or (first := _first_apart(model, lines, starts())) is None:
+        if not any(_touch(lines)) or (first := _first_apart(model, lines, bodies, starts())) is None:
             raise
         try:
             return settle(model, lines, bodies, first)
@@ -44,11 +46,14 @@ def solve_with_contact(
             raise LineFailed(failed.line, failed.outcome, None, failed.s, tried) from None
     if not any(_touch(lines)):
         return found
-    lost = _has_lost(model, lines, found)
-    if not (lost or _largest_energy(model, lines, found.state)):
+    hung = SystemState([x.start for x in model.models])
+    lost = _has_lost(lines, hung, found)
+    if model.touching is not None:
+        lost = lost or crossed(model.touching, hung, found.state) is not None
+    if not (lost or _largest_energy(model, lines, bodies, found.state)):
         return found
     last: list[Start] = [] if lost else [("the equilibrium without contact", found.state)]
-    first = _first_apart(model, lines, chain(starts(), last))
+    first = _first_apart(model, lines, bodies, chain(starts(), last))
     return found if first is None else settle(model, lines, bodies, first)
 
 
@@ -60,9 +65,16 @@ def settle(
     return settled_system(lines, len(model.free), bodies.copy(), start, lambda: contacts_of(model), keeps, near)
 
 
-def contacts_of(model: SystemModel) -> list[SelfContact | None]:
-    """Contact without friction of each line that it is asked for."""
-    return [contact_of(x) if x.line.bits & SELF_CONTACT else None for x in model.models]
+def contacts_of(model: SystemModel) -> tuple[list[SelfContact | None], SharedContact | None]:
+    """Contact without friction of each line that it is asked for, and of lines with each other."""
+    own = [contact_of(x) if touches_alone(model, k) else None for k, x in enumerate(model.models)]
+    return own, shared_of(model)
+
+
+def touches_alone(model: SystemModel, number: int) -> bool:
+    """Whether contact is asked for of a line with itself, and not with others."""
+    others = model.touching.lines if model.touching is not None else ()
+    return bool(model.models[number].line.bits & SELF_CONTACT) and number not in others
 
 
 def energy_of(x: JoinedLine, model: Model, state: State) -> float:
@@ -74,20 +86,33 @@ def _touch(lines: Iterable[JoinedLine]) -> list[bool]:
     return [bool(x.line.bits & SELF_CONTACT) for x in lines]
 
 
-def _largest_energy(model: SystemModel, lines: Sequence[JoinedLine], state: SystemState) -> float:
+def _largest_energy(model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, state: SystemState) -> float:
     """Of all lines that contact is asked for, J."""
-    each = zip(lines, model.models, state.lines, strict=True)
-    return max(energy_of(*x) for x in each if x[0].line.bits & SELF_CONTACT)
+    each = enumerate(zip(lines, model.models, state.lines, strict=True))
+    found = [energy_of(*x) for k, x in each if touches_alone(model, k)]
+    if model.touching is not None:
+        found.append(energy_between(model, lines, bodies, state)[0])
+    return max(found)
 
 
-def _first_apart(model: SystemModel, lines: Sequence[JoinedLine], starts: Iterable[Start]) -> SystemState | None:
-    """The first start in which no line is within itself."""
-    return next((state for _, state in starts if math.isfinite(_largest_energy(model, lines, state))), None)
+def energy_between(
+    model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, state: SystemState
+) -> tuple[float, SharedContact]:
+    """Energy, J, of contact of lines with each other at rest, and that contact; infinite: they are in each other."""
+    solver = touching_solver(lines, len(model.free), bodies, lambda: ([], shared_of(model)))
+    assert solver.shared is not None
+    return solver.contact_energy(state), solver.shared
 
 
-def _has_lost(model: SystemModel, lines: Sequence[JoinedLine], found: SystemEquilibrium) -> bool:
+def _first_apart(
+    model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, starts: Iterable[Start]
+) -> SystemState | None:
+    """The first start in which no line is within itself, or another."""
+    return next((state for _, state in starts if math.isfinite(_largest_energy(model, lines, bodies, state))), None)
+
+
+def _has_lost(lines: Sequence[JoinedLine], hung: SystemState, found: SystemEquilibrium) -> bool:
     """Whether an equilibrium that knows no contact has lost turns, against its lines hung between first places."""
-    hung = SystemState([x.start for x in model.models])
     return bool(_keeps_turns(lines, hung, OF_SHAPE)(found.state)[1])
 
 

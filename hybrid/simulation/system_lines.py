@@ -144,6 +144,7 @@ class LineResult:
             self.recorder = recorder
         self.books = self._own_books(state)
         self.contact: SelfContact | None = None
+        self.shares = False  # whether its contact is computed with that of other lines
         self.manager: DomainManager | None = None  # of zones that move
         self._touching = model  # for whose cells that is
         self._waiting: list[Batch] = []
@@ -192,9 +193,14 @@ class LineResult:
         """Whether contact of the line with itself is computed."""
         return bool(self.model.line.bits & SELF_CONTACT)
 
+    @property
+    def _touched(self) -> str:
+        """What an event says of contact at rest."""
+        return "lines touch each other" if self.shares else "the line touches itself"
+
     def touch_itself(self, t: float) -> SelfContact | None:
         """Contact of the line as it is from t (s) on, which goes on with what there was; None: there is none."""
-        if not self.touches:
+        if not self.touches or self.shares:
             self.contact = None
             return None
         before, model, other = self.contact, self.model, self._touching.layout is not self.model.layout
@@ -221,14 +227,14 @@ class LineResult:
             self.events.event(0.0, 0.0, self.model.length, "static friction neglected", text)
         touches = found.settled and bool(self.books.touch[:1].any())
         if line.bits & SELF_FRICTION and touches:
-            text = "this equilibrium is the one without friction where the line touches itself"
+            text = f"this equilibrium is the one without friction where {self._touched}"
             where = f"{text}: a run with damping that comes to rest in contact has it"
             self.events.event(0.0, 0.0, self.model.length, "static friction neglected", where)
         why = "round-off of the bending of so short cells hides it" if self.number in found.solver.blurred else ""
         if turned and line.element.any():
             why = "a moment at a point is not conservative"
         if found.settled and (line.element.any() or touches):
-            there = "the line touches itself; " if touches else ""
+            there = f"{self._touched}; " if touches else ""
             why = f"{there}a damped motion with contact, without friction, led there"
         if why:
             text = f"the stability of this equilibrium is not judged, because {why}"

@@ -30,7 +30,9 @@ from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
 from hybrid.simulation.collapse import COLLAPSE, CONTACT, GIVE_UP, collapse_text
 from hybrid.simulation.deferred_recorder import DeferredRecorder
+from hybrid.simulation.events import energy_gains_text
 from hybrid.simulation.interrupts import at_once
+from hybrid.simulation.lines_contact import shared_of, tell_meetings
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import refused, require_same
@@ -62,6 +64,7 @@ from hybrid.simulation.system_zones import SystemZones, managers_for, zones_as_p
 from hybrid.simulation.time_loop import SAME_STOP, WORK, apart, falls_on
 from hybrid.solve.joined import SystemState, SystemTaken
 from hybrid.solve.run import MOST_SAMPLED, ROWS
+from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
 from hybrid.solve.system_steps import SystemSteps
@@ -163,6 +166,8 @@ class SystemRun:
         if self._begins:
             for line in self.lines:
                 line.diagnostics.begin()
+        self.shared: SharedContact | None = None  # contact of lines with each other
+        self.met: set[tuple[int, int]] = set()  # lines that have been said to touch
         self.rotations = Rotations(system, self.model)
         self.quantities = SystemQuantities(system, scenes)
         if moves and target is not None:
@@ -324,6 +329,7 @@ class SystemRun:
 
     def gather_events(self) -> None:
         """Record the events of the lines, in the result of the system with their names, as they happened."""
+        tell_meetings(self)
         noted = [(x, f"line {line.name}: {x[-1]}") for line in self.lines for x in line.take_events()]
         for (t, s_a, s_b, kind, _), text in sorted(noted, key=lambda event: event[0][0]):
             self.recorder.event(t, s_a, s_b, kind, text)
@@ -377,6 +383,8 @@ class SystemRun:
         for line in self.lines:
             for t, s_a, s_b, kind, text in line.close(self.t, status, message):
                 self.recorder.event(t, s_a, s_b, kind, f"line {line.name}: {text}")
+        if self.shared is not None and (tries := self.shared.given_up):
+            self.recorder.event(self.t, 0.0, 0.0, "steps cut", energy_gains_text(tries))
         self.recorder.replace(self.quantities.range_values())
         self.recorder.close(status, message)
 
@@ -444,9 +452,14 @@ class SystemRun:
     def make_solver(self) -> None:
         """A solver for the model as it is."""
         self.quantities.follow(self.model)
-        contacts = [line.touch_itself(self.t) for line in self.lines]
+        for line in self.lines:
+            line.shares = self.model.touching is not None and line.number in self.model.touching.lines
+        contacts, shared = [line.touch_itself(self.t) for line in self.lines], shared_of(self.model, rubs=True)
+        if shared is not None and self.shared is not None:
+            shared.restore(self.shared.checkpoint(self.t), self.t)
+        self.shared = shared
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
-        self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts)
+        self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts, shared)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])
         if self.zones is not None:
@@ -708,9 +721,14 @@ class SystemRun:
         detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
         if dt == 0.0:
             detail = "no accelerations are consistent with the shape and the loads"
-        if any(line.contact is not None and line.contact.touches for line in self.lines):
+        if self._in_contact:
             detail += CONTACT
         return LineFailed(taken.line, taken.outcome, self.t, self._place(solver, taken), detail)
+
+    @property
+    def _in_contact(self) -> bool:
+        """Whether a line touches itself, or another one, now."""
+        return any(x is not None and x.touches for x in (self.shared, *(line.contact for line in self.lines)))
 
     def _place(self, solver: SystemSolver, taken: SystemTaken) -> float | None:
         """Where (m) a step was worst; None: of no line."""
@@ -725,7 +743,7 @@ class SystemRun:
         number, where = self.loop.last_cut
         line = self.lines[max(number, 0)]
         s = float(line.model.line.s[min(max(where, 0), line.model.line.s.size - 1)]) if number >= 0 else 0.0
-        touches = any(x.contact is not None and x.contact.touches for x in self.lines)
+        touches = self._in_contact
         cuts, tiny = {cause: int(count[k]) for cause, k in CUTS.items()}, int(count[b.TINY_STEPS])
         text = collapse_text(tiny, self.last_step, float(clock[b.LONGEST]), cuts, s, touches)
         if tiny == MANY:

@@ -124,7 +124,8 @@ class _Job:
         """Largest force, N, that is left over at a node of the state, contact included; work.report is its report."""
         work = self.work
         work.u[:] = 0.0
-        residual, force = left_over(self.line, self.sea, self.ends, self.state, self.contact, anchor, work)
+        pushed = self.contact.force(self.state)
+        residual, force = left_over(self.line, self.sea, self.ends, self.state, pushed, anchor, work)
         for k in np.flatnonzero(self.ends.held):
             for at in (FORCE_A + 3 * k, NET_A + 3 * k):
                 work.report[at : at + 3] += force[k]
@@ -151,16 +152,16 @@ class Moving(Protocol):
 
 
 def left_over(
-    line: Line, sea: Sea, ends: Ends, state: State, contact: SelfContact, anchor: float, work: Work
+    line: Line, sea: Sea, ends: Ends, state: State, force: Floats, anchor: float, work: Work
 ) -> tuple[float, Floats]:
     """Largest force, N, that is left over at a node which nothing holds, contact included; forces (2, 3) N of contact
 
-    on the end nodes.  work: of the line, with u = 0, whose report becomes that of the state without contact.
+    on the end nodes.  force: (N+1, 3) N, of contact; work: of the line, with u = 0, whose report becomes that of the
+    state without contact.
     """
     rows = block_rows(line)
     if entry.assembly(line, sea, ends, state, 0.0, anchor, work._replace(rows=rows)) >= 0:
         return float("inf"), np.zeros((2, 3))
-    force = contact.force(state)
     left = out_of_balance(line, rows) + force
     left[[-k for k in (0, 1) if ends.held[k]]] = 0.0
     return float(np.abs(left).max()), force[[0, -1]]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybrid.kernels.contact.self_contact import blank_contact_job, contact_task
 from hybrid.kernels.contact.self_contact_friction import AT, GRIP, HELD, PIECE
-from hybrid.kernels.contact.self_contact_law import DISTANCE, FORCE, NORMAL, WX, WY, P, Q
+from hybrid.kernels.contact.self_contact_law import DISTANCE, FIRST, FORCE, LAST, NORMAL, WX, WY, P, Q
 from hybrid.kernels.contact.self_contact_pairs import (
     BALANCE,
     BEGUN,
@@ -35,6 +35,7 @@ from hybrid.kernels.contact.self_contact_pairs import (
     TRIED,
     TRIED_BALANCE,
     WIDEST,
+    Contact,
     blank_contact,
 )
 from hybrid.kernels.machine.binding import Table
@@ -59,61 +60,76 @@ def mean_beside(cells: Floats) -> Floats:
     return np.asarray(0.5 * (both[1:] + both[:-1]))
 
 
-class SelfContact:
-    """Contact of one line with itself; `table` and `call` are for the job of a run."""
+class Strand(NamedTuple):
+    """A line as contact takes it, at its nodes (N+1,)."""
 
-    def __init__(self, line: Line, width: Floats, bending: Floats, tension_scale: float, friction: float = 0.0) -> None:
-        """width: (N,) m, diameters of cells; bending: (N,) N m2, their stiffness, 0: none; tension_scale: N; friction:
+    width: Floats  # m
+    samples: Floats  # points of its pieces
+    stiff: Floats  # N, least size of the law
+    mass: Floats  # kg/m
+    rolls: float  # 1 where friction turns it about itself; 0: nothing holds its spin
 
-        its coefficient.
-        """
-        n = line.h.size
-        widths, pieces, bends = (mean_beside(x) for x in (width, np.diff(line.s), bending))
-        lengths = pieces.copy()
-        lengths[[1, -2]] = np.maximum(lengths[[1, -2]], 2.0 * np.diff(line.s)[[0, -1]])  # begin and end at the nodes
-        samples = np.maximum(np.ceil(lengths / (SPACING * widths)), 1)
-        contact = blank_contact(n, int(np.clip(2 * samples.sum(), LEAST_POINTS, MOST_POINTS)), friction > 0.0)
-        contact.width[:], contact.samples[:] = widths, samples
-        contact.stiff[:] = np.maximum(STIFFNESS * bends / contact.width**2, TENSION * tension_scale * (bends == 0.0))
-        contact.mass[:] = line.mass / pieces
-        contact.numbers[WIDEST], contact.numbers[FRICTION] = contact.width.max(), friction
-        contact.numbers[SINCE], contact.numbers[FADED], contact.numbers[QUIET] = np.nan, np.nan, np.inf
-        contact.numbers[NARROWEST] = contact.width.min()
-        contact.numbers[BEGUN], contact.numbers[LED] = np.nan, np.nan
-        holds_twist = (
-            line.spin.all()
-            and bool((line.element * line.kb[:, 2])[[0, -1]].any())
-            and bool(line.kb[line.element == 1, 2].all())
-        )
-        contact.numbers[ROLLS] = float(bool(line.bits & ROTARY) or holds_twist)
-        self.contact = contact
-        self._middles = 0.5 * (line.s[1:] + line.s[:-1])
+
+def strand_of(line: Line, width: Floats, bending: Floats, tension_scale: float) -> Strand:
+    """width: (N,) m, diameters of cells; bending: (N,) N m2, their stiffness, 0: none; tension_scale: N."""
+    widths, pieces, bends = (mean_beside(x) for x in (width, np.diff(line.s), bending))
+    lengths = pieces.copy()
+    lengths[[1, -2]] = np.maximum(lengths[[1, -2]], 2.0 * np.diff(line.s)[[0, -1]])  # begin and end at the nodes
+    holds_twist = (
+        line.spin.all()
+        and bool((line.element * line.kb[:, 2])[[0, -1]].any())
+        and bool(line.kb[line.element == 1, 2].all())
+    )
+    return Strand(
+        widths, np.maximum(np.ceil(lengths / (SPACING * widths)), 1),
+        np.maximum(STIFFNESS * bends / widths**2, TENSION * tension_scale * (bends == 0.0)),
+        line.mass / pieces, float(bool(line.bits & ROTARY) or holds_twist),
+    )  # fmt: skip
+
+
+def contact_of_strands(strands: Sequence[Strand], friction: float) -> Contact:
+    """What contact of lines works with, which stand one after the other; friction: the largest coefficient."""
+    samples = np.concatenate([x.samples for x in strands])
+    room = int(np.clip(2 * samples.sum(), LEAST_POINTS, MOST_POINTS))
+    contact = blank_contact(samples.size - 1, room, friction > 0.0, len(strands))
+    contact.samples[:] = samples
+    for name in ("width", "stiff", "mass"):
+        getattr(contact, name)[:] = np.concatenate([getattr(x, name) for x in strands])
+    of = np.repeat(np.arange(len(strands)), [x.width.size for x in strands])
+    contact.of[:], contact.rolls[:] = of, np.array([x.rolls for x in strands])[of]
+    beside = np.flatnonzero(np.diff(of))
+    contact.kind[beside], contact.kind[beside + 1] = LAST, FIRST
+    contact.tips[:, 0], contact.tips[:, 1] = np.append(0, beside + 1), np.append(beside, of.size - 1)
+    numbers = contact.numbers
+    numbers[WIDEST], numbers[NARROWEST], numbers[FRICTION] = contact.width.max(), contact.width.min(), friction
+    numbers[ROLLS] = contact.rolls.max()
+    numbers[[SINCE, FADED, BEGUN, LED]], numbers[QUIET] = np.nan, np.inf
+    return contact
+
+
+def forces_on_nodes(contact: Contact) -> Floats:
+    """Forces (N+1, 3) N of contact, as it was looked at last, on the nodes."""
+    out, rubs = np.zeros_like(contact.at), bool(contact.holds.size)
+    for k, row in enumerate(contact.points[: contact.counts[POINTS]]):
+        f = -row[FORCE] * row[NORMAL : NORMAL + 3]
+        f = f + contact.holds[k, HELD : HELD + 3] if rubs else f
+        p, q = int(row[P]), int(row[Q])
+        out[p - 1 : p + 2] += row[WX : WX + 3, None] * f
+        out[q - 1 : q + 2] -= row[WY : WY + 3, None] * f
+    return out
+
+
+class ContactBooks:
+    """What goes on from step to step of contact, of one line with itself or of several."""
+
+    def __init__(self, contact: Contact, middles: Floats) -> None:
+        """middles: (N,) m, arc lengths of the middles of cells."""
+        self.contact, self._middles = contact, middles
         self.call, self._touch = np.zeros(3, np.int64), np.zeros((3, 0))
-        self._job = Table(blank_contact_job())
 
     def forget(self) -> None:
         """What is computed next is no step: no speed with which strands meet, and no pairs kept of a step."""
         self.contact.numbers[SPEED], self.contact.numbers[KEEPS], self.call[NEAR] = 0.0, -1.0, 0
-
-    def energy(self) -> float:
-        """Energy, J, of contact where work.u has led the state of a run; infinite where strands are in each other."""
-        self.call[ASKED] = REST
-        energy: float = contact_task(self._table)
-        return energy
-
-    def settle(self, state: State, ends: Ends, report: Floats) -> float:
-        """Energy, J, of contact of the state of a run, on other cells now: what travels store counts from here.
-
-        It goes into the report of the state, and what contact does to ends that are held into their forces.
-        """
-        self._work.u[:] = 0.0
-        force, energy = self.force(state), self.energy()
-        self.contact.numbers[STORED] = self.contact.numbers[TRIED]
-        report[SELF_CONTACT_ENERGY] = energy
-        for k in np.flatnonzero(ends.held):  # 0 or 1: the first or the last node
-            for at in (FORCE_A + 3 * k, NET_A + 3 * k):
-                report[at : at + 3] += force[-k]
-        return energy
 
     @property
     def touches(self) -> bool:
@@ -126,43 +142,10 @@ class SelfContact:
         return float(self.contact.numbers[NARROWEST])
 
     @property
-    def deepest(self) -> tuple[int, int]:
-        """The nodes beside the nearest point of contact of those looked at last."""
-        points = self.contact.points[: self.contact.counts[POINTS]]
-        row = points[np.argmin(points[:, DISTANCE])]
-        return int(row[P]), int(row[Q])
-
-    @property
     def least_distance(self) -> float:
         """The least distance, m, of the points of contact looked at last."""
         points = self.contact.points[: self.contact.counts[POINTS]]
         return float(points[:, DISTANCE].min())
-
-    def force(self, state: State) -> Floats:
-        """Forces (N+1, 3) N of contact on the nodes of the state of a run.
-
-        Of friction that on the centre lines; the moments that belong to it come with the next step.
-        """
-        self._work.u[:] = 0.0
-        self.energy()
-        out, rubs = np.zeros_like(state.r), bool(self.contact.holds.size)
-        for k, row in enumerate(self.contact.points[: self.contact.counts[POINTS]]):
-            f = -row[FORCE] * row[NORMAL : NORMAL + 3]
-            f = f + self.contact.holds[k, HELD : HELD + 3] if rubs else f
-            p, q = int(row[P]), int(row[Q])
-            out[p - 1 : p + 2] += row[WX : WX + 3, None] * f
-            out[q - 1 : q + 2] -= row[WY : WY + 3, None] * f
-        return out
-
-    def look_ahead(self, horizon: float) -> Floats:
-        """From now on steps find how near nodes are to other parts of the line, or will be within `horizon`, s.
-
-        Returns where (N+1,): above 1, nearer than two diameters.
-        """
-        self.contact.numbers[HORIZON] = horizon
-        return self.contact.near
-
-    # --- what goes on from step to step ---------------------------------------------------------
 
     def changing(self) -> tuple[np.ndarray, ...]:
         """What steps change and later steps depend on."""
@@ -219,6 +202,65 @@ class SelfContact:
             grips = grips[: len(self.contact.grips)].copy()
             grips[:, PIECE] = np.clip(np.searchsorted(self._middles, grips[:, AT]), 1, self._middles.size - 1)
             self.contact.grips[: len(grips)], counts[GRIPS] = grips, len(grips)
+
+
+class SelfContact(ContactBooks):
+    """Contact of one line with itself; `table` and `call` are for the job of a run."""
+
+    def __init__(self, line: Line, width: Floats, bending: Floats, tension_scale: float, friction: float = 0.0) -> None:
+        """width: (N,) m, diameters of cells; bending: (N,) N m2, their stiffness, 0: none; tension_scale: N; friction:
+
+        its coefficient.
+        """
+        strand = strand_of(line, width, bending, tension_scale)
+        contact = contact_of_strands([strand], friction)
+        contact.rubs[:] = friction
+        super().__init__(contact, 0.5 * (line.s[1:] + line.s[:-1]))
+        self._job = Table(blank_contact_job())
+
+    def energy(self) -> float:
+        """Energy, J, of contact where work.u has led the state of a run; infinite where strands are in each other."""
+        self.call[ASKED] = REST
+        energy: float = contact_task(self._table)
+        return energy
+
+    def settle(self, state: State, ends: Ends, report: Floats) -> float:
+        """Energy, J, of contact of the state of a run, on other cells now: what travels store counts from here.
+
+        It goes into the report of the state, and what contact does to ends that are held into their forces.
+        """
+        self._work.u[:] = 0.0
+        force, energy = self.force(state), self.energy()
+        self.contact.numbers[STORED] = self.contact.numbers[TRIED]
+        report[SELF_CONTACT_ENERGY] = energy
+        for k in np.flatnonzero(ends.held):  # 0 or 1: the first or the last node
+            for at in (FORCE_A + 3 * k, NET_A + 3 * k):
+                report[at : at + 3] += force[-k]
+        return energy
+
+    @property
+    def deepest(self) -> tuple[int, int]:
+        """The nodes beside the nearest point of contact of those looked at last."""
+        points = self.contact.points[: self.contact.counts[POINTS]]
+        row = points[np.argmin(points[:, DISTANCE])]
+        return int(row[P]), int(row[Q])
+
+    def force(self, state: State) -> Floats:
+        """Forces (N+1, 3) N of contact on the nodes of the state of a run.
+
+        Of friction that on the centre lines; the moments that belong to it come with the next step.
+        """
+        self._work.u[:] = 0.0
+        self.energy()
+        return forces_on_nodes(self.contact)
+
+    def look_ahead(self, horizon: float) -> Floats:
+        """From now on steps find how near nodes are to other parts of the line, or will be within `horizon`, s.
+
+        Returns where (N+1,): above 1, nearer than two diameters.
+        """
+        self.contact.numbers[HORIZON] = horizon
+        return self.contact.near
 
     def follow(self, old: State, new: State) -> None:
         """The states from which and to which the next step leads, where they do not take turns."""

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from hybrid.errors import Outcome
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, WIDTH
+from hybrid.kernels.contact.self_contact import blank_contact_job
 from hybrid.kernels.junctions.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, VD, WA, WD, WORK, A, U, V, W, X
 from hybrid.kernels.junctions.carried_frames import ANSWER, SEAT, TURNS
 from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL
@@ -39,6 +40,7 @@ from hybrid.kernels.watch.named_quantities import note_quantities
 from hybrid.solve.contact_statics import left_over
 from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
 from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.stability import ANCHOR
 from hybrid.solve.statics import (
     BALANCED,
@@ -84,11 +86,12 @@ class SystemSolver:
 
     def __init__(
         self, lines: Sequence[JoinedLine], points: int, bodies: Floats = NO_BODIES,
-        contacts: Sequence[SelfContact | None] = (),
+        contacts: Sequence[SelfContact | None] = (), shared: SharedContact | None = None,
     ) -> None:  # fmt: skip
         """points: how many free points there are; bodies: (B, NUMBERS), what they are, read at every step; contacts: of
 
-        lines that touch themselves, in the order of the lines, None: of one that does not; empty: none does.
+        lines that touch themselves, in the order of the lines, None: of one that does not; empty: none does.  shared:
+        contact of lines that may touch each other, which have none of their own.
         Each point and body must be at an end of some line.
         """
         self.lines, self.bodies = tuple(lines), bodies
@@ -99,8 +102,9 @@ class SystemSolver:
         self._handed, self._follow = np.zeros((HANDED - 1, HANDED)), np.zeros((2, 6, 6))
         self._answers, self._turned = np.zeros((2, ANSWER)), np.zeros(COLUMNS)
         self.joints: NDArray[np.int64] = np.array([x.joints for x in lines], np.int64).reshape(-1, 2)
-        self._contacts = {k: x for k, x in enumerate(contacts) if x is not None}
-        self.work = [_room(x, k in self._contacts) for k, x in enumerate(lines)]
+        self._contacts, self.shared = {k: x for k, x in enumerate(contacts) if x is not None}, shared
+        touch = {*self._contacts, *(shared.lines if shared is not None else ())}
+        self.work = [_room(x, k in touch) for k, x in enumerate(lines)]
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
         self._floors = np.array([-np.inf if x.slackens else x.floor for x in lines])
         self.allowed = np.full(len(lines), np.inf)  # m, error of each line that a step may make; `ratio` follows
@@ -117,7 +121,7 @@ class SystemSolver:
         # Of each line two tables, as of the system: states that take turns lead from the one to the other and back.
         # Lines that are joined to nothing that moves with them are solved one by one: in tables with the task RUN.
         size, rows = blank.numbers.size, range(len(lines))
-        self.lone = [k for k in rows if not self._contacts and max(lines[k].joints) < 0]
+        self.lone = [k for k in rows if not touch and max(lines[k].joints) < 0]
         self.joined = [k for k in rows if k not in self.lone]
         self._numbers = np.zeros((2, len(lines), size), np.int64)
         self.lone_numbers = np.zeros((len(self.lone), size), np.int64)
@@ -177,14 +181,20 @@ class SystemSolver:
     def _touch(self) -> None:
         """Lines that touch themselves do so from now on, with the books as they are."""
         states = [state_for(x.line) for x in self.lines]
+        tables = np.zeros((len(self.lines), Table(blank_contact_job).numbers.size), np.int64)
+        shared = np.array([[-1, 0]] * len(self.lines), np.int64)
         for k, contact in self._contacts.items():
             both = states[k], states[k]
             numbers = contact.attach(self.lines[k].line, self.lines[k].ends, both, self.work[k], self.books[k])
             self.bind_line(k, contact=contact.call, contact_table=numbers)
+            tables[k], shared[k] = numbers, (k, 0)
+        if self.shared is not None:
+            self._share(tables, shared)
         nodes = sum(x.line.s.size for x in self.lines)
         room = {
             "gaps": np.zeros_like(self._gaps), "kept": np.zeros((nodes, SIZE)), "asked": self._at_rest,
-            "moved": np.zeros((len(self.bodies), 6)), "hessenberg": room_for_products(),
+            "moved": np.zeros((len(self.bodies), 6)), "hessenberg": room_for_products(), "shared": shared,
+            "contacts": tables,
         }  # fmt: skip
         for job, touching, numbers in zip(self._jobs, self._touching, self._numbers, strict=True):
             touching.bind(
@@ -195,6 +205,18 @@ class SystemSolver:
             )  # fmt: skip
             job.bind(touch=touch_system.address(touching.numbers), touch_table=touching.numbers)
 
+    def _share(self, tables: NDArray[np.int64], shared: NDArray[np.int64]) -> None:
+        """Lines that may touch each other do so; the last of them is asked, and goes into the tables of all contact."""
+        found = self.shared
+        assert found is not None
+        one, both = found.attach(self._numbers, self.joints, self.books)
+        for k, begin in zip(found.lines, found.begins.tolist(), strict=True):
+            self.bind_line(k, contact=found.beside)
+            shared[k] = found.last, begin
+        for table, numbers in zip(self._tables[found.last], both, strict=True):
+            table.bind(contact=found.call, contact_table=numbers)
+        tables[found.last] = one
+
     def keep_books(self, books: Sequence[Books]) -> None:
         """Keep powers, work and extremes of the lines in these books from now on."""
         self.books = list(books)
@@ -203,7 +225,7 @@ class SystemSolver:
             self.bind_line(
                 k, books=each, quantities=note_quantities.address(self._numbers[0, 0]) if asks else 0
             )  # fmt: skip
-        if self._contacts:
+        if self._contacts or self.shared is not None:
             self._touch()
 
     def take_turns(self, states: tuple[SystemState, SystemState]) -> dict[str, Any]:
@@ -230,7 +252,7 @@ class SystemSolver:
                 tables[parity].bind(old=old.lines[k], new=new.lines[k])
         for jobs in (self._jobs, self._joined_jobs):
             jobs[parity].bind(old=old.bodies, new=new.bodies)
-        if self._contacts:
+        if self._contacts or self.shared is not None:
             self._touching[parity].bind(old=old.bodies, new=new.bodies)
 
     def _solve(self, task: Task, old: SystemState, new: SystemState, t: float = 0.0) -> SystemTaken:
@@ -263,13 +285,20 @@ class SystemSolver:
         return max(*inside, turning, *(float(np.abs(x).max(initial=0.0)) for x in (net, left[:, :3])))
 
     def in_contact(self) -> list[int]:
-        """Lines that touch themselves in the states that were looked at last."""
-        return [k for k, contact in self._contacts.items() if contact.touches]
+        """Lines that touch themselves, or may touch others that do, in the states that were looked at last."""
+        shared = self.shared.lines if self.shared is not None and self.shared.touches else ()
+        return [*(k for k, contact in self._contacts.items() if contact.touches), *shared]
+
+    @property
+    def _touching_lines(self) -> set[int]:
+        """Numbers of the lines that touch themselves, or may touch others."""
+        return {*self._contacts, *(self.shared.lines if self.shared is not None else ())}
 
     @property
     def narrowest(self) -> float:
-        """The least diameter, m, of lines that touch themselves; infinite: none does."""
-        return min((self._contacts[k].narrowest for k in self.in_contact()), default=np.inf)
+        """The least diameter, m, of lines that touch; infinite: none does."""
+        found = [*self._contacts.values(), *([] if self.shared is None else [self.shared])]
+        return min((x.narrowest for x in found if x.touches), default=np.inf)
 
     def _proof(self, states: SystemState) -> float:
         """Largest force (N) that is left over at a node, a point or a body, with that of contact; reports follow."""
@@ -284,15 +313,32 @@ class SystemSolver:
         points = len(self.net)
         inside, net = [float(work.report[RESIDUAL]) for work in self.work], self.net.copy()
         left = self.body_work[:, OWN : OWN + 6] + self.body_work[:, LINES : LINES + 6]
+        pushed = {} if self.shared is None else self._push(states)
         for k in self.in_contact():
             x, work = self.lines[k], workspace_of(self.lines[k].line, keep=True)
-            inside[k], forces = left_over(x.line, x.sea, x.ends, states.lines[k], self._contacts[k], ca, work)
+            force = pushed[k] if k in pushed else self._contacts[k].force(states.lines[k])
+            inside[k], forces = left_over(x.line, x.sea, x.ends, states.lines[k], force, ca, work)
             for joint, force, arm in zip(x.joints, forces, self._arms[k], strict=True):
                 if 0 <= joint < points:
                     net[joint] += force
                 elif joint >= points:
                     left[joint - points] += np.concatenate([force, np.cross(arm, force)])
         return inside, net, left
+
+    def _push(self, states: SystemState) -> dict[int, Floats]:
+        """Forces (N+1, 3) N on lines that may touch each other, by number, in states at rest."""
+        assert self.shared is not None
+        self.turns = None
+        self._bind_states(0, states, states)
+        self.shared.rest_energy(self.work)
+        return self.shared.forces()
+
+    def contact_energy(self, states: SystemState) -> float:
+        """Energy, J, of contact of lines with each other in states at rest; infinite: they are in each other."""
+        assert self.shared is not None
+        self.turns = None
+        self._bind_states(0, states, states)
+        return self.shared.rest_energy(self.work)
 
     # --- motion -------------------------------------------------------------------------------------
 
@@ -346,7 +392,7 @@ class SystemSolver:
             ends = x.ends._replace(position=state.r[[0, -1]])
             self.bind_line(k, work=work._replace(gaps=gaps), ends=ends)
         self._at_rest[0] = 1
-        for k in self._contacts:
+        for k in self._touching_lines:
             self.books[k].clock[NOW] = t
         taken = self._solve(Task(CORRECTION, ca=HEAVY, limits=Limits(1.0, 1.0, 1)), states, states)
         self._at_rest[0] = 0
@@ -402,6 +448,19 @@ class SystemSolver:
             before = report[NET_A : NET_A + 6].copy()
             contact.settle(states.lines[k], x.ends, report)
             added = (report[NET_A : NET_A + 6] - before).reshape(2, 3)
+            books.power[0, :2] -= np.einsum("ij,ij->i", added, books.velocity)
+            books.report[0] = report
+        if self.shared is not None:
+            self._settle_shared()
+
+    def _settle_shared(self) -> None:
+        """The same of lines that may touch each other."""
+        assert self.shared is not None
+        before = {k: self.work[k].report[NET_A : NET_A + 6].copy() for k in self.shared.lines}
+        self.shared.settle_lines(self.work, [x.ends for x in self.lines])
+        for k, net in before.items():
+            books, report = self.books[k], self.work[k].report
+            added = (report[NET_A : NET_A + 6] - net).reshape(2, 3)
             books.power[0, :2] -= np.einsum("ij,ij->i", added, books.velocity)
             books.report[0] = report
 
@@ -465,6 +524,8 @@ class SystemSolver:
             self._around(x, state, work)
         for contact in self._contacts.values():
             contact.forget()
+        if self.shared is not None:
+            self.shared.forget()
         task = Task(EQUILIBRIUM, ca=self.anchor, limits=Limits(REACH * self.length, 1.0, MOST_ITERATIONS))
         taken = self._solve(task, states, states)
         states.bodies[:, PLACE:FRAME] += self.body_work[:, U : U + 3]

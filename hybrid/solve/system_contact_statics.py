@@ -20,11 +20,13 @@ from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.solve.contact_statics import MOST_SPIN, ROAD, calming, damped, stop
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.statics import nudged
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium, damped_bodies
 
-Contacts = Callable[[], Sequence[SelfContact | None]]
+# That of each line with itself (None: it has none), and of lines with each other, where these may touch.
+Contacts = Callable[[], tuple[Sequence[SelfContact | None], SharedContact | None]]
 
 
 class _Moving:
@@ -65,7 +67,7 @@ class _Moving:
 
 def touching_solver(lines: Sequence[JoinedLine], points: int, bodies: Floats, contacts: Contacts) -> SystemSolver:
     """A solver of lines with contact, whose steps are not held against their energy: what moves is damped."""
-    solver = SystemSolver(lines, points, bodies, contacts())
+    solver = SystemSolver(lines, points, bodies, *contacts())
     books = [blank_books(x.line.h.size)._replace(touch=np.zeros((3, x.line.s.size))) for x in lines]
     for each in books:
         each.clock[SHORTEST] = np.inf
@@ -86,9 +88,8 @@ def settled_system(
 ) -> SystemEquilibrium:  # fmt: skip
     """Equilibrium of a system with contact of lines with themselves, from a start that is at rest and apart.
 
-    points: how many free points there are; contacts: makes that of each line, without friction, None: of one that does
-    not touch itself; keeps_turns: a line that has lost turns in a state, and how many, empty: none has; near: Newton's
-    method is tried from the start itself first.
+    points: how many free points there are; contacts: makes contact, without friction; keeps_turns: a line that has lost
+    turns in a state, and how many, empty: none has; near: Newton's method is tried from the start itself first.
     LineFailed: the system does not come to rest, a line has lost turns, or ends with a catenary that is not taut.
     """
     smooth = [x._replace(line=x.line._replace(bits=x.line.bits & ~(WAVES | FRICTION | SELF_FRICTION))) for x in lines]

@@ -21,7 +21,7 @@ from hybrid.kernels.contact.self_contact_friction import (
     keep_grips,
     link_grips,
 )
-from hybrid.kernels.contact.self_contact_law import FORCE, WX, WY, P, Q, add_gradient
+from hybrid.kernels.contact.self_contact_law import FIRST, FORCE, LAST, WX, WY, P, Q, add_gradient
 from hybrid.kernels.contact.self_contact_pairs import (
     CALMS,
     ENERGY,
@@ -30,6 +30,8 @@ from hybrid.kernels.contact.self_contact_pairs import (
     FRESH,
     FRICTION,
     GRIPS,
+    HELD_BETWEEN,
+    HELD_WITHIN,
     HORIZON,
     KEEPS,
     LOOKS,
@@ -40,8 +42,8 @@ from hybrid.kernels.contact.self_contact_pairs import (
     QUIET,
     REMESHED,
     RETURNS,
-    ROLLS,
     SINCE,
+    SLIP_WITHIN,
     SLIP_WORK,
     SPEED,
     STALE,
@@ -146,7 +148,7 @@ def find_spins(line, contact, clock, near, old, new, u):
         for k in range(3):
             x[i, k] = u[i, k]
         x[i, 3] = 0.0
-        if i < line.h.shape[0] and line.spin[i] and contact.numbers[ROLLS] > 0.0:
+        if i < line.h.shape[0] and line.spin[i] and contact.rolls[i] > 0.0:
             ahead = dt * old.wa[i]
             x[i, 3] = dt * old.w[i] + 0.5 * dt * ahead + (new.w[i] - old.w[i] - ahead) / cv
 
@@ -157,12 +159,20 @@ def hold_points(line, contact):
     numbers = contact.numbers
     other = contact.counts[REMESHED] != 0
     numbers[SLIP_WORK], numbers[TRIED] = 0.0, 0.0
+    for l in range(contact.shares.shape[0]):
+        for j in (HELD_BETWEEN, HELD_WITHIN, SLIP_WITHIN):
+            contact.shares[l, j] = 0.0
     for k in range(contact.counts[POINTS]):
+        p, q = contact.of[int(contact.points[k, P])], contact.of[int(contact.points[k, Q])]
         work, energy = hold_point(
-            line, contact, numbers[FRICTION], contact.points[k], contact.holds[k], numbers[TRIES], other
+            line, contact, contact.rubs[p, q], contact.points[k], contact.holds[k], numbers[TRIES], other
         )
         numbers[SLIP_WORK] += work
         numbers[TRIED] += energy
+        contact.shares[p, HELD_WITHIN if p == q else HELD_BETWEEN] += 0.5 * energy
+        contact.shares[q, HELD_WITHIN if p == q else HELD_BETWEEN] += 0.5 * energy
+        if p == q:
+            contact.shares[p, SLIP_WITHIN] += work
 
 
 @inner
@@ -228,7 +238,7 @@ def charge(line, contact, counts):
 @inner
 def press(line, contact, touch, row):
     """Force across per length, N/m, at the nodes, into a row of `touch`: of both strands, as the seabed has it."""
-    n = line.h.shape[0]
+    n, kind = line.h.shape[0], contact.kind
     for i in range(n + 1):
         touch[row, i] = 0.0
     for k in range(contact.counts[POINTS]):
@@ -238,7 +248,7 @@ def press(line, contact, touch, row):
             touch[row, p - 1 + j] -= point[WX + j] * point[FORCE]
             touch[row, q - 1 + j] -= point[WY + j] * point[FORCE]
     for i in range(n + 1):
-        a, b = line.s[max(i - 1, 0)], line.s[min(i + 1, n)]
+        a, b = line.s[i if kind[i] == FIRST else i - 1], line.s[i if kind[i] == LAST else i + 1]
         touch[row, i] *= 2.0 / (b - a)
 
 

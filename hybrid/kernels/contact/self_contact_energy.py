@@ -117,15 +117,37 @@ def work_of_try(line, ends, contact, velocity, before, state, work, clock):
 
 
 @inner
+def is_judged(numbers):
+    """Whether a try is held against its energy: not where nothing is near, and vibrations of contact have been damped."""
+    return numbers[QUIET] < CALMS + RETURNS or numbers[ENERGY] > 0.0
+
+
+@inner
+def is_gain(contact, u, done, missed):
+    """Whether a try from the energy HAD to HAS, on the way u (m), has put in so much that it is repeated in halves.
+
+    done: J, work that accounts for it, which may be off by `missed`.
+    """
+    numbers = contact.numbers
+    most, gain = MOST_GAIN * numbers[LARGEST], numbers[HAS] - numbers[HAD] - done
+    gain = max(gain - missed, 0.0) if gain > 0.0 else min(gain + missed, 0.0)
+    numbers[TRIED_BALANCE] = numbers[BALANCE] + gain
+    if gain <= most and (gain <= 0.0 or numbers[TRIED_BALANCE] <= most):
+        return False
+    if not farthest_from_mean(u) > LEAST_TRAVEL * numbers[NARROWEST]:
+        return False
+    numbers[GAINED] += 1.0
+    return True
+
+
+@inner
 def puts_energy_in(line, ends, contact, books, clock, old, new, work):
     """Whether the try has put in so much energy that it has to be repeated in halves.
 
-    A line that is not near contact, and whose vibrations from it have been damped, is not judged: contact has excited
-    nothing.
     books: velocity (2, 3) m/s of the ends, powers (2, RATES) W and reports of the state now, as kernels.state.books has them.
     """
     numbers = contact.numbers
-    if not (numbers[QUIET] < CALMS + RETURNS or numbers[ENERGY] > 0.0):
+    if not is_judged(numbers):
         return False
     if numbers[BEGUN] != clock[NOW]:
         if numbers[LED] == clock[NOW]:
@@ -137,12 +159,4 @@ def puts_energy_in(line, ends, contact, books, clock, old, new, work):
     numbers[HAS] = energy_without_weight(line, ends, contact, new, work.report)
     numbers[LED] = clock[TRY_END]
     done, missed = work_of_try(line, ends, contact, books.velocity, books.power[0], new, work, clock)
-    most, gain = MOST_GAIN * numbers[LARGEST], numbers[HAS] - numbers[HAD] - done
-    gain = max(gain - missed, 0.0) if gain > 0.0 else min(gain + missed, 0.0)
-    numbers[TRIED_BALANCE] = numbers[BALANCE] + gain
-    if gain <= most and (gain <= 0.0 or numbers[TRIED_BALANCE] <= most):
-        return False
-    if not farthest_from_mean(work.u) > LEAST_TRAVEL * numbers[NARROWEST]:
-        return False
-    numbers[GAINED] += 1.0
-    return True
+    return is_gain(contact, work.u, done, missed)

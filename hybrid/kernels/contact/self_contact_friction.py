@@ -53,9 +53,9 @@ GRIP = 6
 
 
 @inner
-def arc_length(line, p, u):
+def arc_length(line, kind, p, u):
     """Arc length, m, at u of piece p."""
-    w = spline_weights(line.h.shape[0], p, u)
+    w = spline_weights(kind, p, u)
     return w[0] * line.s[p - 1] + w[1] * line.s[p] + w[2] * line.s[p + 1]
 
 
@@ -118,7 +118,7 @@ def directions(contact, row):
     p = int(row[P])
     n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
     at = contact.at
-    before, after = end_slopes(at, p)
+    before, after = end_slopes(contact.kind, at, p)
     t = slope(before, after, row[PLACE])
     size = math.sqrt(dot(t, t))
     t = sub(t, scale(dot(t, n), n))
@@ -136,8 +136,8 @@ def find_grip(line, contact, row, other_cells):
     two sample points away at most.
     """
     p, width = int(row[P]), contact.width[int(row[P])]
-    at = arc_length(line, p, row[PLACE])
-    foot = arc_length(line, int(row[Q]), row[FOOT_PLACE])
+    at = arc_length(line, contact.kind, p, row[PLACE])
+    foot = arc_length(line, contact.kind, int(row[Q]), row[FOOT_PLACE])
     along, across, least = 0.0, 0.0, FOLLOWED * width
     beside, within = (1, NEAREST) if other_cells else (0, SAME_PLACE)
     for piece in range(max(p - beside, 1), min(p + beside + 1, contact.heads.shape[0] - 1)):
@@ -224,8 +224,8 @@ def keep_grips(line, contact, count):
     """Write what is to be kept of the friction of `count` points into contact.fresh."""
     for k in range(count):
         row, hold, grip = contact.points[k], contact.holds[k], contact.fresh[k]
-        grip[PIECE], grip[AT] = row[P], arc_length(line, int(row[P]), row[PLACE])
-        grip[FOOT] = arc_length(line, int(row[Q]), row[FOOT_PLACE])
+        grip[PIECE], grip[AT] = row[P], arc_length(line, contact.kind, int(row[P]), row[PLACE])
+        grip[FOOT] = arc_length(line, contact.kind, int(row[Q]), row[FOOT_PLACE])
         grip[TRAVELLED], grip[TRAVELLED + 1], grip[KEPT_SPRING] = hold[TRAVEL], hold[TRAVEL + 1], row[SPRING]
 
 

@@ -6,6 +6,8 @@ middle of the cell before it to the middle of the cell after it, with a tangent 
     x(u) = a (1-u)^2/2 r_{p-1} + (1 - a (1-u)^2/2 - b u^2/2) r_p + b u^2/2 r_{p+1},    0 <= u <= 1
 
 with a = b = 1.  The first piece begins at the first node, with a = 2, and the last one ends at the last node, b = 2.
+Nodes of several lines stand one after the other; `kind` tells which is the FIRST of a line, or the LAST, or within it,
+and so has a piece.
 
 A point of contact is a sample point of one piece p and its foot on another piece q, where their distance d is smallest
 along q.  With J the derivative of x - y by the six nodes and n = (x - y)/d, the energy phi(d) of a point has the
@@ -25,28 +27,29 @@ from hybrid.kernels.machine.compile import inner
 # Distances, in diameters, at which the force of contact begins and becomes infinite: strands stay 0.94 to 1.02 apart.
 OUTER, INNER = 1.05, 0.85
 STICKS = 100.0  # spring of friction per length, of size/D^2: the force of contact has 50 to 200
+WITHIN, FIRST, LAST = 0, 1, 2  # kinds of nodes
 FOOT_STEPS = 30  # of Newton's method with bisection: it needs about 4
 FOOT_TOLERANCE = 1e-14
 
 
 @inner
-def end_factors(n, p):
-    """The factors a and b of piece p of the curve of n cells."""
-    return 2.0 if p == 1 else 1.0, 2.0 if p == n - 1 else 1.0
+def end_factors(kind, p):
+    """The factors a and b of piece p."""
+    return 2.0 if kind[p - 1] == FIRST else 1.0, 2.0 if kind[p + 1] == LAST else 1.0
 
 
 @inner
-def spline_weights(n, p, u):
-    """Weights of the three nodes of piece p of n - 1 at u."""
-    a, b = end_factors(n, p)
+def spline_weights(kind, p, u):
+    """Weights of the three nodes of piece p at u."""
+    a, b = end_factors(kind, p)
     before, after = 0.5 * a * (1.0 - u) * (1.0 - u), 0.5 * b * u * u
     return (before, 1.0 - before - after, after)
 
 
 @inner
-def end_slopes(r, p):
+def end_slopes(kind, r, p):
     """Derivatives by u of piece p at its beginning and at its end."""
-    a, b = end_factors(r.shape[0] - 1, p)
+    a, b = end_factors(kind, p)
     return scale(a, sub(get3(r, p), get3(r, p - 1))), scale(b, sub(get3(r, p + 1), get3(r, p)))
 
 
@@ -71,16 +74,16 @@ def slope(before, after, v):
 
 
 @inner
-def foot(r, q, x):
+def foot(kind, r, q, x):
     """Where x is nearest to piece q, 0 <= v <= 1, and -1 or 1 where that is its beginning or its end without being a
 
     smallest distance of the curve, else 0.
     """
-    before, after = end_slopes(r, q)
-    bend, n = sub(after, before), r.shape[0] - 1
+    before, after = end_slopes(kind, r, q)
+    bend = sub(after, before)
     # half the derivative of the square
-    at_start = dot(sub(spline_point(r, q, spline_weights(n, q, 0.0)), x), before)
-    at_end = dot(sub(spline_point(r, q, spline_weights(n, q, 1.0)), x), after)
+    at_start = dot(sub(spline_point(r, q, spline_weights(kind, q, 0.0)), x), before)
+    at_end = dot(sub(spline_point(r, q, spline_weights(kind, q, 1.0)), x), after)
     if at_start >= 0.0:
         return 0.0, -1
     if at_end < 0.0:
@@ -88,7 +91,7 @@ def foot(r, q, x):
     low, high = 0.0, 1.0
     v = at_start / (at_start - at_end)
     for _ in range(FOOT_STEPS):
-        away = sub(spline_point(r, q, spline_weights(n, q, v)), x)
+        away = sub(spline_point(r, q, spline_weights(kind, q, v)), x)
         along = slope(before, after, v)
         g = dot(away, along)
         if g < 0.0:
@@ -132,21 +135,20 @@ POINT = 25
 
 
 @inner
-def note_point(r, p, u, q, v, stays, width, size, weight, row):
+def note_point(kind, r, p, u, q, v, stays, width, size, weight, row):
     """Fill the row of a point at u of piece p, and its foot at v of piece q; returns its energy, J.
 
     weight: m, length that the point stands for; stays: whether the foot is kept at an end of the cable.
     """
-    n = r.shape[0] - 1
-    w, wy = spline_weights(n, p, u), spline_weights(n, q, v)
+    w, wy = spline_weights(kind, p, u), spline_weights(kind, q, v)
     away = sub(spline_point(r, p, w), spline_point(r, q, wy))
     d = math.sqrt(dot(away, away))
     energy, first, second = barrier(d, width, size)
     first, second = weight * first, weight * second
-    before, after = end_slopes(r, q)
+    before, after = end_slopes(kind, r, q)
     along, bend = slope(before, after, v), sub(after, before)
     row[P], row[Q] = p, q
-    a, b = end_factors(n, q)
+    a, b = end_factors(kind, q)
     rates = (a * (v - 1.0), a * (1.0 - v) - b * v, b * v)
     for k in range(3):
         row[WX + k], row[WY + k] = w[k], wy[k]

@@ -1,4 +1,8 @@
-"""Contact of a line with itself: the pairs of its pieces that are near, limits of corrections, points of contact."""
+"""Contact of lines with themselves and each other: pairs of pieces that are near, limits of corrections, points.
+
+The lines that may touch stand one after the other as one, their nodes and cells in rows; of one line alone there is
+that.  Between two lines is a cell that is none: no piece has it, and what follows another line is no way along a line.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +15,12 @@ from numpy.typing import NDArray
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.contact.self_contact_friction import GRIP, HOLD
 from hybrid.kernels.contact.self_contact_law import (
+    FIRST,
     INNER,
+    LAST,
     OUTER,
     POINT,
+    WITHIN,
     P,
     Q,
     end_factors,
@@ -64,7 +71,7 @@ LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of wh
     SLIP_WORK,  # J, of friction in the step
     HORIZON,  # s, for which it is foreseen how near the line comes to itself; 0: not asked
     KEEPS,  # m, for displacements up to which the pairs kept are all that there are; < 0: none are kept
-    ROLLS,  # 1 where friction turns strands about themselves; 0: nothing holds their spin, and it is left out
+    ROLLS,  # 1 where friction turns any line about itself (`rolls`)
     FADED,  # s, time up to which SPEED has faded; nan: it has not begun
     QUIET,  # steps since the last one that was near contact
     TRIES,  # of steps so far
@@ -75,6 +82,10 @@ LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of wh
     GAINED,  # tries that were given up because they put energy in
 ) = range(25)  # fmt: skip
 NUMBERS = 25
+# Of `shares`: energy of contact with other lines, and of a line with itself; in travels of friction likewise; work of
+# friction of a line on itself in the step.
+BETWEEN, WITHIN_LINE, HELD_BETWEEN, HELD_WITHIN, SLIP_WITHIN = range(5)
+SHARES = 5
 WATCH, COLLECT = -1, -2  # beside LIMIT and TOUCH: how near the line is to itself; keep pairs for all of a step
 # Of `counts`.  STALE: the tree is of other positions; REMESHED: the grips are of other cells; LOOKS: sample points, and
 # parts of pieces, that were looked at in the try; PRODUCTS: of GMRES in it.
@@ -84,7 +95,16 @@ FEW = 16  # sample points of a piece that are looked at without asking which may
 
 
 class Contact(NamedTuple):
-    """What contact works with; N cells, pieces 1 to N-1."""
+    """What contact works with; N cells, pieces 1 to N-1; L lines."""
+
+    kind: NDArray[np.int64]  # (N+1,) whether a node is the first or last of its line (self_contact_law)
+    of: NDArray[np.int64]  # (N+1,) the number of its line
+    rolls: Floats  # (N+1,) 1 where friction turns the line about itself; 0: nothing holds its spin, and it is left out
+    meets: NDArray[np.int64]  # (L, L) whether two lines, or a line and itself, may touch
+    rubs: Floats  # (L, L) coefficients of friction
+    joined: NDArray[np.int64]  # (L, 2) what the ends are joined to; those of the same number >= 0 are beside each other
+    tips: NDArray[np.int64]  # (L, 2) its first and last node
+    shares: Floats  # (L, SHARES) J, energy and work of contact: half of a point between two lines is of each
 
     width: Floats  # (N+1,) m, diameters of pieces
     samples: NDArray[np.int64]  # (N+1,) sample points of pieces
@@ -117,13 +137,20 @@ class Contact(NamedTuple):
     links: NDArray[np.int64]  # (C,) the next of the same piece
 
 
-def blank_contact(cells: int, points: int = 1, friction: bool = False) -> Contact:
-    """For a line of so many cells, with room for so many points of contact, with friction or without."""
+def blank_contact(cells: int, points: int = 1, friction: bool = False, lines: int = 1) -> Contact:
+    """For lines of so many cells, with room for so many points of contact, with friction or without.
+
+    Nodes are those of one line.
+    """
     z, nodes = np.zeros, cells + 1
     held, leaves = points if friction else 0, 1
     while leaves * LEAF < nodes:
         leaves *= 2
+    kind = z(nodes, np.int64)
+    kind[0], kind[-1] = FIRST, LAST
     return Contact(
+        kind=kind, of=z(nodes, np.int64), rolls=z(nodes), meets=np.ones((lines, lines), np.int64), rubs=z((lines, lines)),
+        joined=np.full((lines, 2), -1, np.int64), tips=z((lines, 2), np.int64), shares=z((lines, SHARES)),
         width=z(nodes), samples=np.ones(nodes, np.int64), stiff=z(nodes), mass=z(nodes), numbers=z(NUMBERS),
         counts=z(COUNTS, np.int64), tree=z((2 * leaves, 12)), stack=z((4 * DEPTH, 2), np.int64),
         pairs=z((PAIRS_OF_NODE * nodes, 2), np.int64), at=z((nodes, 3)),
@@ -136,16 +163,19 @@ def blank_contact(cells: int, points: int = 1, friction: bool = False) -> Contac
 
 
 @inner
-def hull(r, p, k):
+def hull(kind, r, p, k):
     """Coordinate k of the three points in whose triangle piece p lies."""
-    first = r[p - 1, k] if p == 1 else 0.5 * (r[p - 1, k] + r[p, k])
-    last = r[p + 1, k] if p == r.shape[0] - 2 else 0.5 * (r[p, k] + r[p + 1, k])
+    first = r[p - 1, k] if kind[p - 1] == FIRST else 0.5 * (r[p - 1, k] + r[p, k])
+    last = r[p + 1, k] if kind[p + 1] == LAST else 0.5 * (r[p, k] + r[p + 1, k])
     return first, r[p, k], last
 
 
 @inner
-def fill_tree(tree, r):
-    """Boxes of the pieces of nodes at r, a leaf for LEAF nodes."""
+def fill_tree(kind, tree, r):
+    """Boxes of the pieces of nodes at r, a leaf for LEAF nodes.
+
+    One that holds the end of a line beside another has all tangents: a line does not run on there.
+    """
     leaves, n = tree.shape[0] // 2, r.shape[0] - 1
     for q in range(leaves):
         leaf = leaves + q
@@ -153,6 +183,10 @@ def fill_tree(tree, r):
             tree[leaf, k], tree[leaf, 6 + k] = math.inf, math.inf
             tree[leaf, 3 + k], tree[leaf, 9 + k] = -math.inf, -math.inf
         for i in range(max(q * LEAF, 1), min((q + 1) * LEAF, n)):
+            if kind[i] != WITHIN:
+                for k in range(3):
+                    tree[leaf, 6 + k], tree[leaf, 9 + k] = -1.0, 1.0
+                continue
             for j in range(2):
                 e = sub(get3(r, i + j), get3(r, i + j - 1))
                 f = 1.0 / math.sqrt(dot(e, e))
@@ -160,19 +194,19 @@ def fill_tree(tree, r):
                     t = f * e[k]
                     tree[leaf, 6 + k], tree[leaf, 9 + k] = min(tree[leaf, 6 + k], t), max(tree[leaf, 9 + k], t)
             for k in range(3):
-                a, b, c = hull(r, i, k)
+                a, b, c = hull(kind, r, i, k)
                 tree[leaf, k] = min(tree[leaf, k], min(a, min(b, c)))
                 tree[leaf, 3 + k] = max(tree[leaf, 3 + k], max(a, max(b, c)))
     fill_parents(tree)
 
 
 @inner
-def hull_distance(r, p, q):
+def hull_distance(kind, r, p, q):
     """Distance, m, of the boxes of two pieces: at most their own, and the less the more a line lies across the axes."""
     square = 0.0
     for k in range(3):
-        a, b, c = hull(r, p, k)
-        d, e, f = hull(r, q, k)
+        a, b, c = hull(kind, r, p, k)
+        d, e, f = hull(kind, r, q, k)
         x = max(min(a, min(b, c)) - max(d, max(e, f)), min(d, min(e, f)) - max(a, max(b, c)))
         if x > 0.0:
             square += x * x
@@ -180,19 +214,19 @@ def hull_distance(r, p, q):
 
 
 @inner
-def chord_of(r, p):
+def chord_of(kind, r, p):
     """Where piece p begins and ends, and how far, m, it is from the line between these at most."""
-    x, y, z = hull(r, p, 0), hull(r, p, 1), hull(r, p, 2)
+    x, y, z = hull(kind, r, p, 0), hull(kind, r, p, 1), hull(kind, r, p, 2)
     a, b, c = (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
     bend = sub(add(a, c), scale(2.0, b))
     return a, c, 0.25 * math.sqrt(dot(bend, bend))
 
 
 @inner
-def least_distance(r, p, q):
+def least_distance(kind, r, p, q):
     """What two pieces are apart at least, m, however the line lies."""
-    a, c, bow = chord_of(r, p)
-    b, d, other = chord_of(r, q)
+    a, c, bow = chord_of(kind, r, p)
+    b, d, other = chord_of(kind, r, q)
     along, across = sub(c, a), sub(d, b)
     x, y = nearest_feet(a, along, b, across)
     away = sub(add(a, scale(x, along)), add(b, scale(y, across)))
@@ -200,15 +234,36 @@ def least_distance(r, p, q):
 
 
 @inner
-def may_touch(line, ends, width, p, q):
-    """Whether two pieces, p before q, are no neighbours, neither along the line nor from one held end to the other."""
-    n = line.h.shape[0]
-    between, window = line.s[q] - line.s[p], WINDOW * 0.5 * (width[p] + width[q])
+def are_beside(line, contact, p, q, window):
+    """Whether two pieces lie by ends that are joined to the same: neighbours along the network, as along a line."""
+    a, b = contact.of[p], contact.of[q]
+    for j in range(2):
+        for k in range(2):
+            if contact.joined[a, j] >= 0 and contact.joined[a, j] == contact.joined[b, k]:
+                if a == b and j == k:  # the way goes from one end to the other
+                    continue
+                m, n = contact.tips[a, j], contact.tips[b, k]
+                way = abs(line.s[p] - line.s[m]) + abs(line.s[q] - line.s[n])
+                if not (abs(p - m) + abs(q - n) > NEIGHBOURS and way > window):
+                    return True
+    return False
+
+
+@inner
+def may_touch(line, ends, contact, p, q):
+    """Whether two pieces, p before q, are no neighbours, neither along the lines nor from one held end to the other."""
+    n, of = line.h.shape[0], contact.of[p]
+    window = WINDOW * 0.5 * (contact.width[p] + contact.width[q])
+    if contact.meets[of, contact.of[q]] == 0:
+        return False
+    if of != contact.of[q]:
+        return not are_beside(line, contact, p, q, window)
+    between = line.s[q] - line.s[p]
     if not (q - p > NEIGHBOURS and between > window):
         return False
     if ends.held[0] != 0 and ends.held[1] != 0:
         return p + n - q > NEIGHBOURS and line.s[p] - line.s[0] + line.s[n] - line.s[q] > window
-    return True
+    return not are_beside(line, contact, p, q, window)
 
 
 @inner
@@ -229,12 +284,12 @@ def samples_in_block(count):
 
 
 @inner
-def is_beyond(r, n, p, begin, end, q, reach):
+def is_beyond(kind, r, p, begin, end, q, reach):
     """Whether the part of piece p between two places on it is farther than `reach`, m, from piece q, however these lie."""
-    a, c = spline_point(r, p, spline_weights(n, p, begin)), spline_point(r, p, spline_weights(n, p, end))
-    b = spline_point(r, p, spline_weights(n, p, 0.5 * (begin + end)))
+    a, c = spline_point(r, p, spline_weights(kind, p, begin)), spline_point(r, p, spline_weights(kind, p, end))
+    b = spline_point(r, p, spline_weights(kind, p, 0.5 * (begin + end)))
     bend = sub(b, scale(0.5, add(a, c)))
-    first, last, bow = chord_of(r, q)
+    first, last, bow = chord_of(kind, r, q)
     along, across = sub(c, a), sub(last, first)
     x, y = nearest_feet(a, along, first, across)
     away = sub(add(a, scale(x, along)), add(first, scale(y, across)))
@@ -242,12 +297,14 @@ def is_beyond(r, n, p, begin, end, q, reach):
 
 
 @inner
-def next_sample(contact, r, n, p, q, g, reach):
+def next_sample(contact, p, q, g, reach):
     """The sample point of piece p from g on that may be within `reach`, m, of piece q; their number: none is."""
-    count = contact.samples[p]
+    kind, r, count = contact.kind, contact.at, contact.samples[p]
     block = samples_in_block(count)
     if block < count:
-        while g < count and g % block == 0 and is_beyond(r, n, p, g / count, min(g + block, count) / count, q, reach):
+        while g < count and g % block == 0:
+            if not is_beyond(kind, r, p, g / count, min(g + block, count) / count, q, reach):
+                break
             g += block
     contact.counts[LOOKS] += 1
     return min(g, count)
@@ -256,20 +313,19 @@ def next_sample(contact, r, n, p, q, g, reach):
 @inner
 def limit_part(line, ends, contact, p, q, width, moved):
     """Shorten the part so that no sample point of piece p comes too near piece q by a difference of `moved`, m."""
-    r, numbers = contact.at, contact.numbers
-    n, count = line.h.shape[0], contact.samples[p]
+    kind, r, numbers, count = contact.kind, contact.at, contact.numbers, contact.samples[p]
     reach, g = INNER * width + numbers[PART] * moved / SAFE, -1
     while True:
-        g = next_sample(contact, r, n, p, q, g + 1, reach)
+        g = next_sample(contact, p, q, g + 1, reach)
         if g == count:
             return
-        x = spline_point(r, p, spline_weights(n, p, (g + 0.5) / count))
-        v, side = foot(r, q, x)
-        if side != 0 and 0 < q + side < n:
+        x = spline_point(r, p, spline_weights(kind, p, (g + 0.5) / count))
+        v, side = foot(kind, r, q, x)
+        if side != 0 and kind[q + side] == WITHIN:
             beside = q + side
-            if not may_touch(line, ends, contact.width, min(p, beside), max(p, beside)):
+            if not may_touch(line, ends, contact, min(p, beside), max(p, beside)):
                 continue
-        away = sub(x, spline_point(r, q, spline_weights(n, q, v)))
+        away = sub(x, spline_point(r, q, spline_weights(kind, q, v)))
         room = max(SAFE * (math.sqrt(dot(away, away)) - INNER * width), 0.0)
         if room < numbers[PART] * moved:
             numbers[PART] = room / moved
@@ -278,30 +334,36 @@ def limit_part(line, ends, contact, p, q, width, moved):
 @inner
 def gather(line, contact, p, q, width):
     """Keep the points of contact of piece p with their feet on piece q."""
-    r, counts, numbers = contact.at, contact.counts, contact.numbers
-    n, count, nearest = line.h.shape[0], contact.samples[p], OUTER * width
-    a, b = end_factors(n, p)
+    kind, r, counts, numbers = contact.kind, contact.at, contact.counts, contact.numbers
+    count, nearest = contact.samples[p], OUTER * width
+    before, after = end_factors(kind, p)
     fast = IMPACT * numbers[SPEED] * numbers[SPEED]
     size = 0.5 * (max(contact.stiff[p], fast * contact.mass[p]) + max(contact.stiff[q], fast * contact.mass[q]))
     g = -1
     while True:
-        g = next_sample(contact, r, n, p, q, g + 1, nearest)
+        g = next_sample(contact, p, q, g + 1, nearest)
         if g == count:
             return
         u = (g + 0.5) / count
-        x = spline_point(r, p, spline_weights(n, p, u))
-        v, side = foot(r, q, x)
-        if side != 0 and 0 < q + side < n:
+        x = spline_point(r, p, spline_weights(kind, p, u))
+        v, side = foot(kind, r, q, x)
+        if side != 0 and kind[q + side] == WITHIN:
             continue
-        away = sub(x, spline_point(r, q, spline_weights(n, q, v)))
+        away = sub(x, spline_point(r, q, spline_weights(kind, q, v)))
         if not dot(away, away) < nearest * nearest:
             continue
         if counts[POINTS] == contact.points.shape[0]:
             counts[OVERFLOW] = 1
             return
         row = contact.points[counts[POINTS]]
-        length = 0.5 * ((1.0 - u) * a * line.h[p - 1] + u * b * line.h[p]) / count  # half: each strand has points
-        numbers[ENERGY] += note_point(r, p, u, q, v, side != 0, width, size, length, row)
+        length = (
+            0.5 * ((1.0 - u) * before * line.h[p - 1] + u * after * line.h[p]) / count
+        )  # half: each strand has points
+        energy = note_point(kind, r, p, u, q, v, side != 0, width, size, length, row)
+        numbers[ENERGY] += energy
+        a, b = contact.of[p], contact.of[q]
+        contact.shares[a, WITHIN_LINE if a == b else BETWEEN] += 0.5 * energy
+        contact.shares[b, WITHIN_LINE if a == b else BETWEEN] += 0.5 * energy
         counts[POINTS] += 1
 
 
@@ -337,9 +399,9 @@ def keep_pair(contact, p, q, room):
 @inner
 def look_at_pair(line, ends, contact, phase, p, q):
     """What there is to do for pieces p < q whose boxes may be near: limit what is asked, or keep points of contact."""
-    if not may_touch(line, ends, contact.width, p, q):
+    if not may_touch(line, ends, contact, p, q):
         return
-    apart, width = hull_distance(contact.at, p, q), 0.5 * (contact.width[p] + contact.width[q])
+    apart, width = hull_distance(contact.kind, contact.at, p, q), 0.5 * (contact.width[p] + contact.width[q])
     if phase == COLLECT:
         keep_pair(contact, p, q, apart - OUTER * width)
     elif phase == WATCH:
@@ -349,7 +411,7 @@ def look_at_pair(line, ends, contact, phase, p, q):
         if SAFE * (apart - INNER * width) < contact.numbers[PART] * moved:
             limit_part(line, ends, contact, p, q, width, moved)
             limit_part(line, ends, contact, q, p, width, moved)
-        if apart - moved < OUTER * width and least_distance(contact.at, p, q) - moved < OUTER * width:
+        if apart - moved < OUTER * width and least_distance(contact.kind, contact.at, p, q) - moved < OUTER * width:
             contact.numbers[SPEED] = max(contact.numbers[SPEED], moved)
     elif apart < OUTER * width:
         gather(line, contact, p, q, width)
@@ -368,7 +430,7 @@ def look_at_pairs(line, ends, contact, phase):
     if phase == COLLECT:
         turned = max(TURNED, (OUTER + 2.0 * contact.numbers[KEEPS] / contact.numbers[NARROWEST]) / WINDOW)
     if contact.counts[STALE]:
-        fill_tree(tree, contact.at)
+        fill_tree(contact.kind, tree, contact.at)
         contact.counts[STALE] = 0
     stack[0, 0], stack[0, 1], top = 1, 1, 1
     while top > 0:
@@ -379,8 +441,9 @@ def look_at_pairs(line, ends, contact, phase):
         if a >= leaves:
             first, second = (a - leaves) * LEAF, (b - leaves) * LEAF
             for p in range(max(first, 1), min(first + LEAF, n)):
-                for q in range(max(second, p + NEIGHBOURS + 1), min(second + LEAF, n)):
-                    look_at_pair(line, ends, contact, phase, p, q)
+                for q in range(max(second, p + 1), min(second + LEAF, n)):
+                    if contact.kind[p] == WITHIN and contact.kind[q] == WITHIN:
+                        look_at_pair(line, ends, contact, phase, p, q)
             continue
         c, d = 2 * a, 2 * b
         stack[top, 0], stack[top, 1] = c, d
@@ -456,6 +519,8 @@ def find_points(line, ends, contact, gone):
     for k in range(counts[NODES]):
         contact.marks[contact.nodes[k]] = 0
     counts[POINTS], counts[NODES], counts[OVERFLOW], numbers[ENERGY] = 0, 0, 0, 0.0
+    for l in range(contact.shares.shape[0]):
+        contact.shares[l, BETWEEN], contact.shares[l, WITHIN_LINE] = 0.0, 0.0
     numbers[REACH] = OUTER * numbers[WIDEST]
     look_at_kept(line, ends, contact, TOUCH, gone)
     for k in range(counts[POINTS]):

@@ -47,7 +47,7 @@ def respond(line, ends, contact, work, with_gradient):
         held = (i == 0 and ends.held[0] != 0) or (i == last and ends.held[1] != 0)
         for j in range(3):
             b[i, 1 + j] = 0.0 if held else y[i, j]
-        b[i, 4] = y[i, 3] * contact.numbers[ROLLS]
+        b[i, 4] = y[i, 3] * contact.rolls[i]
     good = solve_again(work.X, work.W, b, contact.z)
     for k in range(count):
         i = contact.nodes[k]

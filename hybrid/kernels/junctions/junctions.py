@@ -339,3 +339,14 @@ def correct_all(system, points, m):
         if not solve_back(job.work.X, columns, system.first[l], low, high, q, start >= 0, place, x, end >= 0):
             return l
     return -1
+
+
+@inner
+def move_joints(job, start, end):
+    """Velocity of the ends that are joined to points, for the powers; that of held ends is set from outside."""
+    n, velocity, v = job.line.h.shape[0], job.books.velocity, job.new.v
+    for k in range(3):
+        if start >= 0:
+            velocity[0, k] = v[0, k]
+        if end >= 0:
+            velocity[1, k] = v[n, k]

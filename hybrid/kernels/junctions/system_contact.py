@@ -1,4 +1,4 @@
-"""Contact of each line of a system with itself in a correction of Newton's method, beside the lines' junctions.
+"""Contact of the lines of a system with themselves and each other in a correction of Newton's method, beside the lines' junctions.
 
 As kernels.contact.self_contact_solve, with the matrix A of all lines, points and bodies in place of that of one line: a product
 with A^-1 carries a right-hand side on the nodes in contact through the kept factors of the lines, the junctions and back.
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.block_elimination import ROW, SIZE, SPAN
 from hybrid.kernels.contact.self_contact import read as read_contact
-from hybrid.kernels.contact.self_contact_pairs import MOST_PRODUCTS, NODES, OVERFLOW, POINTS, ROLLS
+from hybrid.kernels.contact.self_contact_pairs import MOST_PRODUCTS, NODES, OVERFLOW, POINTS
 from hybrid.kernels.contact.self_contact_solve import (
     SOLVED,
     find_forces,
@@ -57,6 +57,10 @@ class TouchingJob(NamedTuple):
     G: Floats
     A: Floats
     q: Floats
+    shared: NDArray[
+        np.int64
+    ]  # (L, 2) the line that has the contact of a line (-1: none has), where its nodes begin there
+    contacts: NDArray[np.int64]  # (L, ..) tables of kernels.contact.self_contact.ContactJob, of lines that have contact
     kept: Floats  # (nodes of all lines, 5) corrections without contact, line after line
     moved: Floats  # (B, 6) likewise of bodies
     hessenberg: Floats  # as kernels.contact.self_contact_pairs.Contact has it
@@ -69,7 +73,7 @@ def blank_touching_job() -> TouchingJob:
     return TouchingJob(
         z((1, 1), whole), z((1, 2), whole), z((1, 2, SEAT)), z((1, 2, 3)), z((1, 2, 3)), z(1, whole), z((3, 1, SIZE)),
         z(FUNCTIONAL), z((2, ANSWER)), z((1, 3)), z((1, NUMBERS)), z((1, STATE)), z((1, STATE)), z((1, WORK)),
-        z((HANDED - 1, HANDED)), z((2, 6, 6)), z((4, 2)), z(COLUMNS), z((2, SIZE)), z((1, 6)), room_for_products(),
+        z((HANDED - 1, HANDED)), z((2, 6, 6)), z((4, 2)), z(COLUMNS), z((1, 2), whole), z((1, 1), whole), z((2, SIZE)), z((1, 6)), room_for_products(),
         z(1, whole),
     )  # fmt: skip
 
@@ -83,8 +87,11 @@ read_job = reader(blank_touching_job())
 
 
 @inner
-def set_right_side(l, line_job, contact, joints, touches):
-    """The right-hand side of an eliminated line: forces contact.y on the nodes in contact, or nothing."""
+def set_right_side(l, line_job, contact, first, joints, touches):
+    """The right-hand side of an eliminated line: forces contact.y on the nodes in contact, or nothing.
+
+    first: where its nodes begin in contact.
+    """
     work, n, ends = line_job.work, line_job.line.h.shape[0], line_job.ends
     x, X_ = work.x, work.X
     for i in range(n + 1):
@@ -93,18 +100,18 @@ def set_right_side(l, line_job, contact, joints, touches):
     if joints[l, START] >= 0:
         for a in range(3):
             work.rows[0, (a + 1) * 24 + 23] = 0.0
-    if touches:
-        for k in range(contact.counts[NODES]):
-            i = contact.nodes[k]
-            end = 0 if i == 0 else 1
-            fixed = (i == 0 or i == n) and ends.held[end] != 0 and ends.held[end] != JOINED
-            if i == 0 and joints[l, START] >= 0:  # the march has replaced its balance by its place
-                for a in range(3):
-                    work.rows[0, (a + 1) * 24 + 23] = contact.y[0, a]
-            elif not fixed:
-                for j in range(3):
-                    x[i, 1 + j] = contact.y[i, j]
-            x[i, 4] = contact.y[i, 3] * contact.numbers[ROLLS]
+    for i in range(n + 1 if touches else 0):
+        if contact.marks[first + i] == 0:
+            continue
+        end = 0 if i == 0 else 1
+        fixed = (i == 0 or i == n) and ends.held[end] != 0 and ends.held[end] != JOINED
+        if i == 0 and joints[l, START] >= 0:  # the march has replaced its balance by its place
+            for a in range(3):
+                work.rows[0, (a + 1) * 24 + 23] = contact.y[first, a]
+        elif not fixed:
+            for j in range(3):
+                x[i, 1 + j] = contact.y[first + i, j]
+        x[i, 4] = contact.y[first + i, 3] * contact.rolls[first + i]
     joined = joints[l, END] >= 0
     for i in range(n + 1):
         if touches:
@@ -122,13 +129,15 @@ def respond(job, cv, ca, with_gradient):
     """Corrections work.x of all lines by the forces of contact at contact.x; False if they are not finite."""
     m = job.A.shape[1] - 1
     for l in range(job.tables.shape[0]):
-        line_job = read(job.tables[l])
-        contact, touches = read_contact(line_job.contact_table).contact, False
-        if line_job.contact[ADDRESS] != 0:
+        if touching(job, l) > 0:
+            one = read_contact(job.contacts[l])
+            find_forces(one.line, one.contact, with_gradient)
+    for l in range(job.tables.shape[0]):
+        lead, touches = max(job.shared[l, 0], 0), False
+        contact = read_contact(job.contacts[lead]).contact
+        if job.shared[l, 0] >= 0:
             touches = contact.counts[POINTS] > 0
-            if touches:
-                find_forces(line_job.line, contact, with_gradient)
-        set_right_side(l, line_job, contact, job.joints, touches)
+        set_right_side(l, read(job.tables[l]), contact, job.shared[l, 1], job.joints, touches)
     assemble_junctions(job, m, cv, ca, False)
     if m > 0 and not solve_dense(job.A, m):
         return False
@@ -137,11 +146,11 @@ def respond(job, cv, ca, with_gradient):
 
 @inner
 def touching(job, l):
-    """Points of contact of a line."""
+    """Points of the contact that a line has."""
     line_job = read(job.tables[l])
-    if line_job.contact[ADDRESS] == 0:
+    if not line_job.contact[ADDRESS] > 0:
         return 0
-    return read_contact(line_job.contact_table).contact.counts[POINTS]
+    return read_contact(job.contacts[l]).contact.counts[POINTS]
 
 
 @inner
@@ -150,7 +159,7 @@ def product(job, k, l):
     s = 0.0
     for line in range(job.tables.shape[0]):
         if touching(job, line) > 0:
-            contact = read_contact(read(job.tables[line]).contact_table).contact
+            contact = read_contact(job.contacts[line]).contact
             for i in range(unknowns(contact) * contact.counts[NODES]):
                 s += contact.basis[k, i] * contact.basis[l, i]
     return s
@@ -161,7 +170,7 @@ def add_vector(job, k, part, l):
     """Add part of basis vector k to vector l; where both are the same, it is multiplied by it."""
     for line in range(job.tables.shape[0]):
         if touching(job, line) > 0:
-            contact = read_contact(read(job.tables[line]).contact_table).contact
+            contact = read_contact(job.contacts[line]).contact
             V = contact.basis
             for i in range(unknowns(contact) * contact.counts[NODES]):
                 V[l, i] = part * V[l, i] if k == l else V[l, i] + part * V[k, i]
@@ -173,19 +182,23 @@ def put_response(job, column, first):
     at = 0
     for l in range(job.tables.shape[0]):
         line_job = read(job.tables[l])
+        if job.shared[l, 0] >= 0:
+            contact, o = read_contact(job.contacts[job.shared[l, 0]]).contact, job.shared[l, 1]
+            z, x = contact.z, line_job.work.x
+            for i in range(x.shape[0]):
+                for j in range(1, SIZE):
+                    z[o + i, j] = x[i, j] + job.kept[at + i, j] if first else x[i, j]
+                z[o + i, 4] *= contact.rolls[o + i]
+        at += line_job.line.s.shape[0]
+    for l in range(job.tables.shape[0]):
         if touching(job, l) > 0:
-            contact = read_contact(line_job.contact_table).contact
-            V, per, x = contact.basis, unknowns(contact), line_job.work.x
+            contact = read_contact(job.contacts[l]).contact
+            V, per, z = contact.basis, unknowns(contact), contact.z
             for k in range(contact.counts[NODES]):
                 i = contact.nodes[k]
                 for j in range(per):
-                    y = x[i, 1 + j] * length_of(contact, j, i)
-                    if first:
-                        y += job.kept[at + i, 1 + j] * length_of(contact, j, i)
-                    else:
-                        y = V[column - 1, per * k + j] - y
-                    V[column, per * k + j] = y
-        at += line_job.line.s.shape[0]
+                    y = z[i, 1 + j] * length_of(contact, j, i)
+                    V[column, per * k + j] = y if first else V[column - 1, per * k + j] - y
 
 
 @inner
@@ -193,7 +206,7 @@ def set_unknowns(job, column):
     """contact.x of all lines: basis vector `column`; -1: zero."""
     for l in range(job.tables.shape[0]):
         if touching(job, l) > 0:
-            contact = read_contact(read(job.tables[l]).contact_table).contact
+            contact = read_contact(job.contacts[l]).contact
             if column >= 0:
                 take_vector(contact, column)
             else:
@@ -208,7 +221,7 @@ def combine(job, done):
     H, solution = job.hessenberg, MOST_PRODUCTS + 3
     for l in range(job.tables.shape[0]):
         if touching(job, l) > 0:
-            contact = read_contact(read(job.tables[l]).contact_table).contact
+            contact = read_contact(job.contacts[l]).contact
             per = unknowns(contact)
             for k in range(contact.counts[NODES]):
                 i = contact.nodes[k]
@@ -279,14 +292,14 @@ def keep_corrections(job, back):
 
 @kernel
 def touch_system(table):
-    """Put contact into the corrections of all lines and bodies; 1: no line touches itself, 2: done, 0: it fails."""
+    """Put contact into the corrections of all lines and bodies; 1: nothing touches, 2: done, 0: it fails."""
     job = read_job(table)
     task, points = read(job.tables[0]).task, 0
     for l in range(job.tables.shape[0]):
         line_job = read(job.tables[l])
-        if line_job.contact[ADDRESS] != 0:
+        if line_job.contact[ADDRESS] > 0:
             ask_contact(line_job.contact, line_job.contact_table, REST if job.asked[0] else FIND)
-            contact = read_contact(line_job.contact_table).contact
+            contact = read_contact(job.contacts[l]).contact
             if contact.counts[OVERFLOW]:
                 return 0
             points += contact.counts[POINTS]

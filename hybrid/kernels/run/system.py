@@ -33,6 +33,7 @@ from hybrid.kernels.junctions.junctions import (
     correct_all,
     count_tensions,
     first_unknown,
+    move_joints,
     place_ends,
 )
 from hybrid.kernels.junctions.system_job import DT, TIME, read_system, task_of
@@ -180,7 +181,7 @@ def prepare_contact(tables, task, t):
     safe, rho = 1.0, task.rho
     for l in range(tables.shape[0]):
         job = read(tables[l])
-        if job.contact[ADDRESS] != 0:
+        if job.contact[ADDRESS] > 0:
             clock = job.books.clock
             clock[NOW], clock[TRY_END], clock[STEP_BEFORE], clock[RHO] = t - task.dt, t, task.before, task.rho
             clock[RHO_BEFORE] = task.rho_before
@@ -189,7 +190,7 @@ def prepare_contact(tables, task, t):
     common = with_radius(task, rho)
     for l in range(tables.shape[0]):
         job = read(tables[l])
-        if job.contact[ADDRESS] != 0:  # so that each has that of all
+        if job.contact[ADDRESS] > 0:  # so that each has that of all
             own = ask_contact(job.contact, job.contact_table, RADIUS)
             clock = job.books.clock
             if own > rho:
@@ -204,7 +205,7 @@ def safe_part(tables):
     part = 1.0
     for l in range(tables.shape[0]):
         job = read(tables[l])
-        if job.contact[ADDRESS] != 0:
+        if job.contact[ADDRESS] > 0:
             part = min(part, ask_contact(job.contact, job.contact_table, LIMIT))
     return part
 
@@ -224,17 +225,6 @@ def begin_lines(tables, s, safe):
 
 
 @inner
-def move_joints(job, start, end):
-    """Velocity of the ends that are joined to points, for the powers; that of held ends is set from outside."""
-    n, velocity, v = job.line.h.shape[0], job.books.velocity, job.new.v
-    for k in range(3):
-        if start >= 0:
-            velocity[0, k] = v[0, k]
-        if end >= 0:
-            velocity[1, k] = v[n, k]
-
-
-@inner
 def end_lines(tables, joints, floors, s, task, good):
     """Rates after a step of all lines, and if it is good their reports.
 
@@ -245,7 +235,7 @@ def end_lines(tables, joints, floors, s, task, good):
         job = read(tables[l])
         find_rates(1, job.line, job.sea, job.old, job.new, job.work.u, s)
         if good:
-            touches = job.contact[ADDRESS] != 0
+            touches = job.contact[ADDRESS] > 0
             if touches:
                 job.work.report[SELF_CONTACT_ENERGY] = ask_contact(job.contact, job.contact_table, FINISH)
             turn, cell = end_step(
@@ -290,7 +280,7 @@ def begin_books(tables, joints, t):
             books.clock[STORED] = report[SEABED_ENERGY]
             for i in range(new.r.shape[0]):
                 new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
-        if job.contact[ADDRESS] != 0:
+        if job.contact[ADDRESS] > 0:
             books.clock[NOW] = t
             report[SELF_CONTACT_ENERGY] = ask_contact(job.contact, job.contact_table, REST)
         move_joints(job, joints[l, START], joints[l, END])
@@ -381,7 +371,7 @@ def give_scheme(system, task, s):
         numbers[l, TASK_CV], numbers[l, TASK_CA], numbers[l, TASK_DT] = s.cv, s.ca, task.dt
         job = read(tables[l])
         rubs |= job.line.bits & FRICTION
-        if system.touch != 0 and job.contact[ADDRESS] != 0:
+        if system.touch != 0 and job.contact[ADDRESS] > 0:
             rubs |= job.contact[NEAR]
     return rubs
 

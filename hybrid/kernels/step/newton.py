@@ -30,6 +30,7 @@ LARGEST_CONTACT_TURN = 0.3
 # Contact of the line with itself: places of `contact` (address, what is asked, whether it is near), and what is asked
 # (kernels.contact.self_contact).
 ADDRESS, ASKED, NEAR = range(3)
+SHARED = -1  # in place of an address: contact of the line is computed with that of another line of its system
 PREPARE, LIMIT, TOUCH, FINISH, REST, RADIUS, GAIN, FIND = range(8)
 call_contact = caller(0.0)
 call_reel = caller(0)

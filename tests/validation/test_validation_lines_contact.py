@@ -1,0 +1,285 @@
+"""Lines of several that touch each other: ropes that cross, throws, a line that is cut, what is kept and what is said.
+
+Forces of crossing ropes: cosseratbench 0.3.0 (recomputed); of crossing fibres: the closed form for small angles.
+"""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import SceneError
+from tests.simulation.test_system_contact import HOSE, system
+from tests.validation.thrown_lines import WIDTH as D
+from tests.validation.thrown_lines import Throw, straight, throw
+
+Tables = dict[str, Any]
+
+# --- ropes that cross at right angles ------------------------------------------------------------------
+
+RADIUS, MODULUS, DENSITY = 0.005, 1e6, 1000.0
+AREA = np.pi * RADIUS**2
+ROPE = {
+    "length": 1.0, "mass": DENSITY * AREA, "diameter": 2 * RADIUS, "axial_stiffness": MODULUS * AREA,
+    "bending_stiffness": MODULUS * np.pi * RADIUS**4 / 4, "max_strain": 0.1, "damping": {"mass": 3.0},
+}  # fmt: skip
+WEIGHT = DENSITY * AREA * 9.81
+FORCES = {0.05: 0.188161, 0.1: 0.266793, 0.2: 0.360215}  # N, by how much lower the pins of the upper rope are, m
+
+
+def crossing(drop: float, **more: Any) -> Tables:
+    """Two ropes of 1 m whose pins are 0.8 m apart, the upper one looked for from above the lower."""
+    line = {"sections": [ROPE], "model": "rod", "mesh": {"cells": 80}, "contact": {"self": False}}
+    above = {"points": [[-0.4, 0, -drop], [0, 0, 0.1], [0.4, 0, -drop]]}
+    return {
+        "points": {"a": {"position": [-0.4, 0, -drop]}, "b": {"position": [0.4, 0, -drop]},
+                   "c": {"position": [0, -0.4, 0]}, "d": {"position": [0, 0.4, 0]}},
+        "lines": {"upper": line | {"start": "a", "end": "b", "initial": above},
+                  "lower": line | {"start": "c", "end": "d"}},
+        "contact": {}, "output": {"points": 81},
+    } | more  # fmt: skip
+
+
+def force_between(result: Any, row: int) -> tuple[float, float]:
+    """By what the pins of the upper rope bear less than its weight, and those of the lower more, N."""
+    upper, lower = (
+        float(x.reaction_start[row, 2] + x.reaction_end[row, 2]) for x in (result.lines["upper"], result.lines["lower"])
+    )
+    return WEIGHT - upper, lower - WEIGHT
+
+
+@pytest.mark.parametrize("drop", FORCES)
+def test_crossing_ropes_rest_on_each_other(drop: float) -> None:
+    """From the scene alone: without contact the upper rope would rest below the lower one."""
+    result = hybrid.static(crossing(drop))
+    off, on = force_between(result, 0)
+    assert off == pytest.approx(on, rel=1e-6)
+    assert on == pytest.approx(FORCES[drop], rel=0.01)
+    upper, lower = (result.lines[x].position[0, 40] for x in ("upper", "lower"))
+    assert upper[2] - lower[2] == pytest.approx(2 * RADIUS, rel=0.06)
+    if drop == 0.1:
+        assert upper[2] == pytest.approx(-0.277915, abs=0.001)
+        assert lower[2] == pytest.approx(-0.287915, abs=0.001)
+    assert any(e.kind == "lines touch" for e in result.events)
+
+
+def lowered(duration: float = 1.6) -> Tables:
+    """The pins of the upper rope come down from above the lower one, askew, with friction."""
+    tables = crossing(-0.05, contact={"friction": 0.3}, time={"duration": duration, "step": 0.01})
+    del tables["lines"]["upper"]["initial"]
+    tables["points"]["a"]["motion"] = {"travel": {"by": [0.05, 0.02, -0.15], "over": 1.0}}
+    tables["points"]["b"]["motion"] = {"travel": {"by": [0, 0, -0.15], "over": 1.0}}
+    tables["output"] = {"points": 81, "every": 0.1}
+    return tables
+
+
+@pytest.fixture(scope="module")
+def moved() -> Any:
+    return hybrid.run(lowered())
+
+
+def test_a_rope_is_let_down_on_another_one(moved: Any) -> None:
+    """They stay a diameter apart, the force on the one is that on the other, and where they meet first is said."""
+    upper, lower = moved.lines["upper"], moved.lines["lower"]
+    apart = np.linalg.norm(upper.position[:, :, None] - lower.position[:, None], axis=3).min(axis=(1, 2))
+    assert 0.94 * 2 * RADIUS < apart.min() < 1.1 * 2 * RADIUS
+    met = [e for e in moved.events if e.kind == "lines touch"]
+    assert len(met) == 1
+    assert 0.2 < met[0].t < 0.5
+    assert "line upper touches line lower" in met[0].text
+    assert not upper["self_contact"][0].any() and upper["self_contact"][-1].max() > 0.0
+    np.testing.assert_allclose(upper["energy/self_contact"], lower["energy/self_contact"], atol=1e-12)
+
+
+def test_what_lines_do_to_each_other_is_booked(moved: Any) -> None:
+    """What the one loses the other gets, but for what friction takes: 1e-3 of what the pins do is left."""
+    upper, lower = moved.lines["upper"], moved.lines["lower"]
+    done = [x["work/friction"][-1] for x in (upper, lower)]
+    put_in = np.abs(upper["work/start"]).max() + np.ptp(upper["energy/potential"])
+    assert done[0] < -0.005 < 0.005 < done[1]
+    assert -0.1 * done[1] < sum(done) < 0.0
+    assert max(np.abs(x["work/scheme"]).max() for x in (upper, lower)) < 2e-3 * put_in
+
+
+def test_it_resumes_bit_for_bit(moved: Any, tmp_path: Path) -> None:
+    hybrid.run(lowered(0.8), tmp_path / "half.h5")
+    more = hybrid.resume(tmp_path / "half.h5", until=1.6)
+    for name, line in moved.lines.items():
+        for field in ("position", "tension", "self_contact", "energy/self_contact", "work/friction"):
+            np.testing.assert_array_equal(more.lines[name][field], line[field])
+    assert [e.t for e in more.events if e.kind == "lines touch"] == [
+        e.t for e in moved.events if e.kind == "lines touch"
+    ]
+
+
+def test_a_scene_turned_and_mirrored_has_that_result(moved: Any) -> None:
+    c, s = np.cos(0.7), np.sin(0.7)
+    M = np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, 1.0]])
+    tables = lowered()
+    for point in tables["points"].values():
+        point["position"] = (M @ point["position"]).tolist()
+        if "motion" in point:
+            point["motion"]["travel"]["by"] = (M @ point["motion"]["travel"]["by"]).tolist()
+    other = hybrid.run(tables)
+    for name, line in moved.lines.items():
+        np.testing.assert_allclose(other.lines[name].position, line.position @ M.T, atol=1e-5)
+
+
+def test_it_stays_where_it_rests_on_another() -> None:
+    result = hybrid.run(crossing(0.1, time={"duration": 0.3, "step": 0.01}, output={"points": 81, "every": 0.1}))
+    for line in result.lines.values():
+        assert np.abs(line.position - line.position[0]).max() < 1e-9
+        assert line["energy/self_contact"] == pytest.approx(float(line["energy/self_contact"][0]), rel=1e-6)
+        assert line["energy/self_contact"][0] > 0.0
+
+
+# --- fibres under tension ---------------------------------------------------------------------------------
+
+
+def test_crossing_fibres_push_each_other_by_their_tension() -> None:
+    """F = (d - e) T/(l - lam tanh(l/lam)), lam^2 = EI/T, with d the distance in contact; here e = 0 and 2 l the span."""
+    half, width, pull, stiff = 1.0, 0.01, 100.0, 1.0
+    fibre = {"length": 2 * half / 1.01, "mass": 0.1, "diameter": width, "axial_stiffness": pull / 0.01,
+             "bending_stiffness": stiff, "max_strain": 0.1}  # fmt: skip
+    line = {"sections": [fibre], "model": "rod", "mesh": {"cells": 200}, "contact": {"self": False}}
+    above = {"points": [[-half, 0, 0], [0, 0, 0.03], [half, 0, 0]]}
+    result = hybrid.static({
+        "environment": {"gravity": 0},
+        "points": {"a": {"position": [-half, 0, 0]}, "b": {"position": [half, 0, 0]},
+                   "c": {"position": [0, -half, 0]}, "d": {"position": [0, half, 0]}},
+        "lines": {"upper": line | {"start": "a", "end": "b", "initial": above},
+                  "lower": line | {"start": "c", "end": "d"}},
+        "contact": {}, "output": {"points": 201},
+    })  # fmt: skip
+    upper, lower = result.lines["upper"], result.lines["lower"]
+    apart = upper.position[0, 100, 2] - lower.position[0, 100, 2]
+    T, lam = upper.tension[0, 0], np.sqrt(stiff / upper.tension[0, 0])
+    force = apart * T / (half - lam * np.tanh(half / lam))
+    assert lower.reaction_start[0, 2] + lower.reaction_end[0, 2] == pytest.approx(force, rel=0.01)
+    assert 0.9 * width < apart < 1.05 * width
+
+
+# --- throws -------------------------------------------------------------------------------------------------
+
+
+def thrown(friction: float, speed: float, steps: float, duration: float, seed: int, kind: str = "rod") -> Throw:
+    """A line flies across another one at rest; steps and duration in ways of a diameter at that speed."""
+    random = np.random.default_rng(seed)
+    a = straight(1.0, np.zeros(3), np.array([1.0, 0.0, 0.0]), 40)
+    b = straight(1.0, np.array([0.03, 0.05, 3.0 * D]), np.array([0.3, 1.0, 0.0]), 40)
+    va, vb = np.zeros_like(a), np.zeros_like(b)
+    va += 0.05 * speed * random.normal(size=3)
+    vb += 0.3 * speed * random.normal(size=3) * [1.0, 1.0, 0.0] - [0.0, 0.0, speed]
+    return throw([a, b], [va, vb], steps * D / speed, duration * D / speed, friction, kind=kind)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.6])
+def test_momentum_and_angular_momentum_are_kept(friction: float) -> None:
+    """In steps that resolve the collision, as of a line that touches itself."""
+    found = thrown(friction, 6.0, 0.01, 6.0, 1)
+    assert found.shared.met()
+    assert np.abs(np.diff(found.momentum, axis=0)).max() < 1e-12
+    assert np.abs(np.diff(found.turning, axis=0)).max() < 1e-6 * found.size
+    assert max(found.energies) < 1.001 * found.energies[0]
+    assert found.least > 0.9 * D
+
+
+@pytest.mark.parametrize("kind", ["rod", "catenary"])
+@pytest.mark.parametrize("steps", [1.0, 10.0], ids=["pass-through step", "ten times that"])
+def test_no_step_carries_a_line_through_another(steps: float, kind: str) -> None:
+    for seed in range(2):
+        found = thrown(0.3, 12.0, steps, 40.0 * max(1.0, 0.5 * steps), seed, kind)
+        assert found.shared.met()
+        assert found.least > 0.8 * D  # of polygons: the spline between them is up to 0.2 diameters away
+        assert max(found.energies) < 1.001 * found.energies[0]
+
+
+# --- a line that is cut ---------------------------------------------------------------------------------------
+
+
+def cut() -> Tables:
+    """The hose of tests/simulation/test_system_contact.py in two halves, clamped to each other, which touch."""
+    tables = system()
+    base = {"model": "rod", "mesh": {"cells": 40}, "sections": [HOSE | {"length": 2.0}], "contact": {"self": False}}
+    tables["points"]["cut"] = {"kind": "free", "initial_guess": [0.55, 0, -1.7]}
+    clamped = {"kind": "clamped"}
+    tables["lines"] = {
+        "one": base | {"start": "low", "end": "cut", "connections": {"end": clamped}},
+        "two": base | {"start": "cut", "end": "free", "connections": {"start": clamped}},
+        "tail": tables["lines"]["tail"],
+    }
+    return tables | {
+        "contact": {"friction": 0.3, "between": [["one", "two"]]}, "output": {"every": 0.02, "points": 41},
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def hose() -> Any:
+    return hybrid.run(system(), progress=False).lines["hose"]
+
+
+def test_halves_of_a_line_touch_each_other_as_it_touches_itself(hose: Any) -> None:
+    """One law and one solve: the same motion, neighbours along the network being those along the line."""
+    result = hybrid.run(cut(), progress=False)
+    one, two = result.lines["one"], result.lines["two"]
+    both = np.concatenate([one.position, two.position[:, 1:]], axis=1)
+    assert np.linalg.norm(both - hose.position, axis=2).max() < 1e-6
+    energy = one["energy/self_contact"] + two["energy/self_contact"]
+    np.testing.assert_allclose(energy, hose["energy/self_contact"], atol=1e-4 * energy.max())
+    assert one["work/friction"][-1] + two["work/friction"][-1] == pytest.approx(hose["work/friction"][-1], rel=0.1)
+
+
+def test_a_line_beside_others_touches_itself_as_alone(hose: Any) -> None:
+    """The hose and its tail, which meets it at a point: they are neighbours there, and nowhere near each other."""
+    tables = system() | {"contact": {"between": [["hose", "tail"]], "friction": 0.2}}
+    beside = hybrid.run(tables, progress=False).lines["hose"]
+    for name in ("position", "tension", "self_contact", "work/friction"):
+        np.testing.assert_allclose(beside[name], hose[name], atol=1e-9 * np.abs(hose[name]).max())
+
+
+# --- what is refused --------------------------------------------------------------------------------------------
+
+
+def bare(tables: Tables, name: str) -> None:
+    del tables["lines"][name]["sections"][0]["diameter"]
+
+
+@pytest.mark.parametrize(
+    ("change", "where", "says"),
+    [
+        (lambda x: x["contact"].update(between=[["upper", "lowest"]]), "contact.between[0][1]", "name of a line"),
+        (lambda x: x["contact"].update(between=[["upper", "upper"]]), "contact.between[0]", "lines.NAME.contact"),
+        (lambda x: bare(x, "lower"), "lines.lower.sections[0].diameter", "touch each other"),
+        (lambda x: x["lines"]["upper"].update(model="adaptive"), "lines.upper.model", "touch each other"),
+        (lambda x: x.update(accuracy="3%"), "accuracy", "no error is estimated"),
+        (lambda x: x["output"].update(errors=True), "output.errors", "no error is estimated"),
+    ],
+)  # fmt: skip
+def test_what_does_not_go_with_contact_between_lines_is_refused(change: Any, where: str, says: str) -> None:
+    tables = deepcopy(lowered())
+    change(tables)
+    with pytest.raises(SceneError) as refused:
+        hybrid.run(tables)
+    assert any(x.where == where and says in x.expected for x in refused.value.complaints), refused.value
+
+
+def test_contact_of_one_line_with_others_is_refused() -> None:
+    tables = crossing(0.1)
+    del tables["lines"]["upper"], tables["points"]["a"], tables["points"]["b"]
+    with pytest.raises(SceneError, match="there is one line"):
+        hybrid.static(tables)
+
+
+def test_lines_that_are_within_each_other_wherever_they_begin_are_refused() -> None:
+    """Straight under tension, their pins in one plane: nothing says which is above."""
+    line = {"sections": [ROPE | {"length": 0.79}], "model": "rod", "mesh": {"cells": 40}, "contact": {"self": False}}
+    tables = crossing(0.0)
+    tables["lines"] = {"upper": line | {"start": "a", "end": "b"}, "lower": line | {"start": "c", "end": "d"}}
+    tables["environment"] = {"gravity": 0}
+    with pytest.raises(SceneError, match=r"contact[\s\S]*lines upper and lower are .* apart"):
+        hybrid.static(tables)

@@ -1,0 +1,158 @@
+"""Lines that nothing holds, thrown at each other: their steps, energy, momentum, and how near they come."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import hybrid
+from hybrid.errors import Outcome
+from hybrid.kernels.contact.self_contact_pairs import ENERGY
+from hybrid.kernels.junctions.bodies import STATE
+from hybrid.kernels.march.energies import observe
+from hybrid.kernels.state.books import SHORTEST, blank_books
+from hybrid.model.build import build
+from hybrid.model.lines_contact import Touching
+from hybrid.simulation.self_watch import diameters, least_bending
+from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.shared_contact import SharedContact, TouchingLine
+from hybrid.solve.system import SystemSolver
+
+Floats = NDArray[np.float64]
+WIDTH, STIFF = 0.02, 0.1
+
+
+def section(length: float, width: float = WIDTH) -> dict[str, Any]:
+    return {
+        "length": length, "mass": 0.4, "diameter": width, "bending_stiffness": STIFF, "axial_stiffness": 2e5,
+        "torsional_stiffness": 0.8 * STIFF,
+    }  # fmt: skip
+
+
+class Throw(NamedTuple):
+    """What a throw leaves behind."""
+
+    least: float  # m, distance of centrelines, of polygons along straight ways within steps
+    energies: list[float]  # J, after every step
+    momentum: Floats  # (2, 3) before and after
+    turning: Floats  # (2, 3) angular momentum likewise
+    size: float  # kg m2/s, of that
+    tries: int  # given up
+    states: SystemState
+    shared: SharedContact
+    model: list[Any]
+
+
+def straight(length: float, at: Floats, along: Floats, cells: int) -> Floats:
+    """Nodes (N+1, 3) m of a straight line about a middle."""
+    s = np.linspace(-0.5 * length, 0.5 * length, cells + 1)[:, None]
+    return np.asarray(at + s * along / np.linalg.norm(along))
+
+
+def throw(
+    shapes: list[Floats], speeds: list[Floats], step: float, duration: float, friction: float = 0.0,
+    width: float = WIDTH, kind: str = "rod", turn: Floats | None = None,
+) -> Throw:  # fmt: skip
+    """Lines with nodes (N+1, 3) m and velocities (N+1, 3) m/s fly; steps (s) that fail are halved.
+
+    turn: (3, 3), of everything.
+    """
+    models, lines, states = [], [], []
+    for r, v in zip(shapes, speeds, strict=True):
+        r = r if turn is None else r @ turn.T
+        s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(r, axis=0), axis=1)))
+        model = build(hybrid.validate_scene({
+            "environment": {"gravity": 1e-15}, "cable": {"sections": [section(float(s[-1]), width)]},
+            "contact": {"self": True}, "ends": {"start": "free", "end": "free"}, "model": kind,
+            "mesh": {"nodes": s.tolist()}, "initial": {"kind": "points", "points": r.tolist()}, "dimension": 3,
+            "time": {"duration": 1.0, "step": 0.1},
+        }))  # fmt: skip
+        state = model.start.copy()
+        state.v[:] = v if turn is None else v @ turn.T
+        x = JoinedLine(
+            model.line, model.sea.at(0.0), model.ends.at(0.0), model.length, model.tension_scale, -np.inf, (-1, -1)
+        )
+        models.append(model)
+        lines.append(x)
+        states.append(state)
+    count = len(models)
+    touching = Touching(
+        tuple(range(count)), np.ones((count, count), np.int64), np.full((count, count), friction),
+        np.full((count, 2), -1, np.int64),
+    )  # fmt: skip
+    lines = [x._replace(line=touching.bits(x.line)) for x in lines]
+    strands = [TouchingLine(x.line, diameters(x), least_bending(x), x.tension_scale) for x in models]
+    shared = SharedContact(touching, strands)
+    solver = SystemSolver(lines, 0, shared=shared)
+    books = [blank_books(x.line.h.size)._replace(touch=np.zeros((3, x.line.s.size))) for x in lines]
+    for each in books:
+        each.clock[SHORTEST] = 1e-9
+    solver.keep_books(books)
+    old = SystemState(states, np.zeros((0, STATE)))
+    solver.consistent_accelerations(old, [np.zeros((2, 3))] * count)
+    new, t, before, rho, part, tries = old.copy(), 0.0, 0.0, 0.9, step, 0
+    masses = [x.line.mass[:, None] for x in models]
+    first, energies, least = of(models, masses, old), [energy(models, old, shared)], np.inf
+    while t < duration * (1.0 - 1e-9):
+        end = t + part
+        taken = solver.step(old, new, end - t, 0.9, before, rho, end)
+        if taken.outcome != Outcome.OK:
+            part, tries = 0.5 * part, tries + 1
+            assert part > 1e-6 * step, taken
+            continue
+        least = min(least, nearest(old, new))
+        old, new, before, rho, t = new, old, end - t, taken.rho, end
+        energies.append(energy(models, old, shared))
+        part = min(2.0 * part, step)
+    last = of(models, masses, old)
+    size = sum(
+        float((np.linalg.norm(x.r, axis=1)[:, None] * m * np.abs(x.v)).sum())
+        for x, m in zip(old.lines, masses, strict=True)
+    )
+    momentum, turning = np.stack([first[0], last[0]]), np.stack([first[1], last[1]])
+    return Throw(least, energies, momentum, turning, size, tries, old, shared, models)
+
+
+def energy(models: list[Any], states: SystemState, shared: SharedContact) -> float:
+    """Kinetic, elastic and contact energy, J."""
+    total = float(shared.contact.numbers[ENERGY])
+    for model, x in zip(models, states.lines, strict=True):
+        parts, room = np.zeros(5), np.zeros((x.T.size + 1, 3))
+        observe(model.line, model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, room, room.copy(), parts)
+        total += float(parts[:4].sum())
+    return total
+
+
+def of(models: list[Any], masses: list[Floats], states: SystemState) -> tuple[Floats, Floats]:
+    """Momentum and angular momentum about the origin, with that of the sections."""
+    momentum, turning = np.zeros(3), np.zeros(3)
+    for model, mass, x in zip(models, masses, states.lines, strict=True):
+        length = np.linalg.norm(x.e, axis=1)[:, None]
+        d, rate = x.e / length, np.diff(x.v, axis=0) / length
+        line = model.line
+        sections = line.polar[:, None] * x.w[:, None] * d + line.rotary[:, None] * np.cross(d, rate)
+        momentum += (mass * x.v).sum(axis=0)
+        turning += np.cross(x.r, mass * x.v).sum(axis=0) + sections.sum(axis=0)
+    return momentum, turning
+
+
+def nearest(before: SystemState, after: SystemState) -> float:
+    """The least distance, m, of the polygons of lines along straight ways of their nodes in a step."""
+    least = np.inf
+    for k, a in enumerate(before.lines):
+        for m in range(k + 1, len(before.lines)):
+            for part in (0.25, 0.5, 0.75, 1.0):
+                p = (1.0 - part) * a.r + part * after.lines[k].r
+                q = (1.0 - part) * before.lines[m].r + part * after.lines[m].r
+                least = min(least, polygons_apart(p, q))
+    return float(least)
+
+
+def polygons_apart(p: Floats, q: Floats) -> float:
+    """Least distance, m, of two polygons (n, 3) and (m, 3) m, sampled along their sides."""
+    x = np.linspace(0.0, 1.0, 5)[:-1, None, None]
+    a = ((1.0 - x) * p[:-1] + x * p[1:]).reshape(-1, 3)
+    b = ((1.0 - x) * q[:-1] + x * q[1:]).reshape(-1, 3)
+    return float(np.sqrt(((a[:, None] - b[None]) ** 2).sum(axis=2).min()))
