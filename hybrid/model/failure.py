@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.state.state import NO_TORSION
-from hybrid.model.release import without_clamp
+from hybrid.model.release import unclamped
 from hybrid.model.system import SystemModel
 from hybrid.scene.points import Failure, FreePoint
 from hybrid.scene.system import System
@@ -60,11 +59,8 @@ def after_failure(model: SystemModel, weakness: Weakness) -> SystemModel:
         joints[line][k] = points
     models, seats = [*model.models], model.seats.copy()
     for line, k in ends:
-        bare = without_clamp(models[line].line, -k)
-        if bare.torsion.size:  # a torque passes only where both ends hold the twist
-            bare = bare._replace(torsion=NO_TORSION)
-        if bare is not models[line].line:
-            models[line] = replace(models[line], line=bare)
+        if models[line].line.element[-k] or models[line].line.torsion.size:
+            models[line] = unclamped(models[line], k)
         seats[line, k] = 0.0
     shape = model.models[ends[0][0]].start.r[-ends[0][1]]
     return replace(

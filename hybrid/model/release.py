@@ -6,28 +6,31 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybrid.kernels.state.state import Line
+from hybrid.kernels.state.state import NO_TORSION, Line
 from hybrid.model.build import Model
 from hybrid.model.line import with_spin_inertia
 from hybrid.model.line_on_base import LineOnBase
-from hybrid.scene.combinations import RELEASED_TWIST
-from hybrid.scene.schema import Scene
 
 NAMES = ("start", "end")
 
 
 def without_hold(model: Model, k: int, t: float) -> Model:
     """The same model with end k (0 or 1) free from t (s) on; its motion is over.  The old one is as it was."""
+    return replace(unclamped(model, k), ends=model.ends.released_at(k, t))
+
+
+def unclamped(model: Model, k: int) -> Model:
+    """The same model without what holds the direction and the twist of end k (0 or 1)."""
     tangent, twist = model.cable.held_tangent, model.cable.held_twist
     cable = replace(
         model.cable,
         held_tangent=(tangent[0] and k != 0, tangent[1] and k != 1),
         held_twist=(twist[0] and k != 0, twist[1] and k != 1),
     )
-    line, ends, on_base = without_clamp(model.line, -k), model.ends.released_at(k, t), None
+    line, on_base = without_torque(without_clamp(model.line, -k)), None
     if model.layout is not None:
         line, on_base = with_spin_inertia(line, cable), LineOnBase(cable, model.layout.base)
-    return replace(model, line=line, cable=cable, ends=ends, on_base=on_base)
+    return replace(model, line=line, cable=cable, on_base=on_base)
 
 
 def without_clamp(line: Line, node: int) -> Line:
@@ -39,15 +42,13 @@ def without_clamp(line: Line, node: int) -> Line:
     return line._replace(element=element, kb=kb, k0=k0, hn=hn)
 
 
+def without_torque(line: Line) -> Line:
+    """The line without catenary zones that a torque passes through: it passes where both ends hold the twist."""
+    return line._replace(torsion=NO_TORSION) if line.torsion.size else line
+
+
 def released_as(model: Model, released: np.ndarray, t: float) -> Model:
     """The model with the ends free that are marked, (2,) 0 or 1."""
     for k in np.flatnonzero(released).tolist():
         model = without_hold(model, k, t)
     return model
-
-
-def check_releases(scene: Scene, model: Model) -> None:
-    """SceneError: an end is to be let go through which a torque passes into a catenary zone."""
-    for name, end in scene.ends.named().items():
-        if end.release is not None and len(model.line.torsion):
-            raise RELEASED_TWIST.error(f"ends.{name}.release_at", "the end of a twisted catenary")

@@ -379,8 +379,6 @@ PAYOUT = Feature("line that is paid out", "ends.end.payout", _paid_out)
 PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout", _paid_out_at("start"))
 PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out_at("end"))
 RELEASE_AT_WINCH = Feature("release of the end at the winch", "ends.end.release_at", _release_at_winch)
-TWISTED_RELEASE = Feature("release of an end", "ends.end.release_at", lambda tables: ())
-TWISTED_CATENARY = Feature("a catenary zone that carries torque there", "model", lambda tables: ())
 LAYERS = Feature("cells to a boundary layer", "resolution.cells_per_layer",
                  _asks("resolution", "cells_per_layer", lambda x: True))  # fmt: skip
 CLAMPED_CONNECTION = Feature("a clamped connection", "lines.NAME.connections", _clamped)
@@ -418,10 +416,6 @@ WINCH = Feature("line that is paid out", "payout", Absent(
     "leave it out: lines of several keep their lengths; one cable, with `cable` and `ends`, can be paid out",
 ))  # fmt: skip
 
-RELEASED_TWIST = Refusal(
-    TWISTED_RELEASE, TWISTED_CATENARY, "not worked out", "a torque passes through it into catenary zones",
-    fix="give the end swivel: true, or write model: rod",
-)  # fmt: skip
 RESPONSE_TO_MOTION = Refusal(
     OTHER_MOTIONS, RESPONSE, "physics", "a response by frequency is of what is constant or a sum of harmonics",
     "harmonics, and loads that stay", "hybrid run computes it in time",
@@ -470,7 +464,6 @@ REFUSALS: tuple[Refusal, ...] = (
         CURLED, PIPE_CURLED, "not worked out", "the stress of a pipe is that of its curvature from straight (pipe)",
         fix="leave it out, or leave pipe out",
     ),
-    RELEASED_TWIST,
     Refusal(
         STRETCH_LAW, TORQUE_OF_TENSION, "not worked out", "tension makes a torque in this line (tension_torque)",
         "axial_stiffness alone", "give axial_stiffness alone",

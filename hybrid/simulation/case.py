@@ -24,7 +24,6 @@ from hybrid.model.build import Model, build
 from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.plan import output_times
-from hybrid.model.release import check_releases
 from hybrid.model.resolution import (
     Reach,
     Resolution,
@@ -429,7 +428,6 @@ class Case:
             return kept[1]
         with at_once(self.interrupted):
             model = build(self.scene, resolution)
-            check_releases(self.scene, model)
             if model.layout is not None:
                 return zones_at_start(self.scene, model, resolution, 0.0, self.criterion)
             found = equilibrium_of(self.scene, model, 0.0) if self.scene.initial.kind == "equilibrium" else None

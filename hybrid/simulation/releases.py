@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid.kernels.march.energies import observe
+from hybrid.kernels.march.zone_torque import TURN, torsion_energy
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.state import State
+from hybrid.kernels.state.state import NO_TURN, State
 from hybrid.model.build import Model
 from hybrid.model.release import NAMES, without_hold
 from hybrid.solve.run import CompiledRun
@@ -46,24 +47,28 @@ def due(model: Model, t: float, step: float) -> list[int]:
 
 
 def elastic(model: Model, t: float, state: State) -> float:
-    """Energy of bending and torsion, J, at t (s)."""
+    """Energy of bending and torsion, J, at t (s), with that of zones that a torque passes through."""
     cells, energy = model.cells, np.zeros(4)
     vectors = np.zeros((2, cells + 1, 3))
     observe(model.line, model.ends.at(t), state.e, state.v, state.a1, state.w, state.T, state.turn, *vectors, energy)
-    return float(energy[1] + energy[2])
+    line = model.line
+    twist = float(torsion_energy(line, state.turn[:, TURN], state.T)) if line.torsion.size else 0.0
+    return float(energy[1] + energy[2]) + twist
 
 
-def let_go(run: Transient, k: int, why: str) -> Model:
-    """The model of a run with end k (0 or 1) free from now on; energy is booked, and an event says why."""
-    old, t, state = run.model, run.t, run.state
-    model = without_hold(old, k, t)
+def let_go(run: Transient, k: int, why: str) -> tuple[Model, State]:
+    """Model and state of a run with end k (0 or 1) free from now on; energy is booked, and an event says why."""
+    old, t, before = run.model, run.t, run.state
+    model, state = without_hold(old, k, t), run.state.copy()
+    if state.turn.size != 3 * len(model.line.torsion):
+        state = state._replace(turn=NO_TURN)
     energy = 0.0
-    if model.line is not old.line:
-        energy = elastic(model, t, state) - elastic(old, t, state)
-        run.run.books.work[0, k] += energy  # what bends between the end and its clamp goes with the clamp
+    if model.line is not old.line:  # what bends between the end and its clamp goes with the clamp, as does twist
+        energy = elastic(model, t, state) - elastic(old, t, before)
+        run.run.books.work[0, k] += energy
     if run.switching is not None:
         run.switching.release(k, model)
     s = float(model.line.s[-k])
     text = f"ends.{NAMES[k]} is let go {why} and is free from here on"
     run.events.event(t, s, s, "end released", text, energy=energy)
-    return model
+    return model, state

@@ -145,14 +145,12 @@ class SteppedEnds:
     def release(self, end: str) -> None:
         """Let a held end go now: it is free from here on, and `set_force` acts on it.
 
-        end: "start" or "end".  ValueError: it is not held, or a torque passes through it into catenary zones.
+        end: "start" or "end".  ValueError: it is not held.
         """
         self._check_open()
         k, model = self._end(end), self._loop.run.model
         if not model.ends.values.held[k]:
             raise ValueError(f"ends.{end} is not held: there is nothing to release")
-        if len(model.line.torsion):
-            raise ValueError(f"ends.{end} is the end of a twisted catenary: give it swivel: true in the scene")
         self._recorder.commit_old()
         try:
             self._loop.release(k, "by Simulation.release")

@@ -11,10 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid.kernels.junctions.bodies import DONE, SPRING
-from hybrid.kernels.march.zone_torque import TURN, torsion_energy
 from hybrid.kernels.state.report import FORCE_A
-from hybrid.kernels.state.state import NO_TURN, State
-from hybrid.model.build import Model
+from hybrid.kernels.state.state import NO_TURN
 from hybrid.model.failure import Weakness, after_failure, weaknesses
 from hybrid.simulation.releases import elastic
 from hybrid.solve.joined import SystemState
@@ -74,7 +72,7 @@ class Failures:
         self._part(k)
         new, energy = run.model.models[line], 0.0
         if new is not old:
-            energy = _elastic(new, run.t, run.state.lines[line]) - _elastic(old, run.t, before)
+            energy = elastic(new, run.t, run.state.lines[line]) - elastic(old, run.t, before)
             run.lines[line].books.work[0, end] += energy
         text = f"{x.name} {why}; what came loose is free from here on"
         s = float(run.model.models[line].line.s[-end])
@@ -87,6 +85,8 @@ class Failures:
         self.broken.append(k)
         for line, model in zip(run.lines, run.model.models, strict=True):
             line.follow(model)
+        if run.zones is not None:
+            run.zones.release(self.all[k].ends)
         states = [
             x if x.turn.size == 3 * len(model.line.torsion) else x._replace(turn=NO_TURN)
             for x, model in zip(run.state.lines, run.model.models, strict=True)
@@ -95,9 +95,3 @@ class Failures:
         done = run.solver.body_work[:, DONE:SPRING].copy()
         run.make_solver()
         run.solver.body_work[:, DONE:SPRING] = done
-
-
-def _elastic(model: Model, t: float, state: State) -> float:
-    """Energy of bending and torsion, J, at t (s), with that of zones that a torque passes through."""
-    twist = float(torsion_energy(model.line, state.turn[:, TURN], state.T)) if model.line.torsion.size else 0.0
-    return elastic(model, t, state) + twist

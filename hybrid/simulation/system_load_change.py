@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from hybrid.kernels.junctions.bodies import DONE, SPRING
 from hybrid.kernels.state.forces import SELF_CONTACT
 from hybrid.model.build import Model
+from hybrid.model.release import unclamped
 from hybrid.model.self_reach import touching
 from hybrid.model.system import SystemModel, build_system
 from hybrid.scene.system import System
@@ -36,6 +37,9 @@ def loaded_as(model: SystemModel, system: System, t: float) -> SystemModel:
 
 def _line_as(name: str, now: Model, later: Model, system: System, t: float) -> Model:
     """The model of a line with other loads, on its cells of now, with what has come off it."""
+    for k in (0, 1):
+        if later.cable.held_tangent[k] and not now.cable.held_tangent[k]:  # it has broken off
+            later = unclamped(later, k)
     if now.layout is not None:
         later = on_layout(later, now.layout)
     line = later.line

@@ -7,7 +7,7 @@ proposes is carried out: the line has other cells then, and the system another s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -336,6 +336,15 @@ class SystemZones:
             x.full = replace(x.full, line=change(x.full.line))
             model = x.switching.model
             x.switching.model = replace(model, line=change(model.line))
+
+    def release(self, ends: Iterable[tuple[int, int]]) -> None:
+        """Ends (line, 0 or 1) have come loose: nothing holds their direction and their twist any longer."""
+        for x in self.lines:
+            for k in (k for number, k in ends if number == x.number):
+                model = self._run.model.models[x.number]
+                assert x.full.layout is not None
+                x.switching.release(k, model)
+                x.full = on_layout(model, x.full.layout)
 
     def take_loads(self) -> None:
         """Go on with the models of the run, whose loads and motions are others on the same cells."""

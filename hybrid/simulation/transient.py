@@ -305,8 +305,7 @@ class Transient:
 
     def release(self, k: int, why: str, new_leg: bool = True) -> None:
         """End k (0 or 1) is let go now; new_leg: whether equal steps are counted from here."""
-        model = let_go(self, k, why)
-        self.set_model(model, self.state.copy())
+        self.set_model(*let_go(self, k, why))
         self.restart(new_leg)
 
     def restart(self, new_leg: bool = True) -> None:

@@ -11,8 +11,6 @@ import yaml
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.model.build import build
-from hybrid.model.release import check_releases
 from hybrid.scene import combinations as c
 from hybrid.scene.combinations import REFUSALS, Absent, Refusal, Use, refuse_use
 from hybrid.scene.read import parse_either
@@ -109,7 +107,7 @@ OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.TORSION, c.PLANE), {END + "turns": 2, "dimension": 2}, ""),
     ((c.SWIVEL_BESIDE, c.DIRECTED), SWIVEL | CURVED, ""),
 )
-OF_ARRAYS = [c.RELEASED_TWIST, c.RESPONSE_OF_MEMBERS]
+OF_ARRAYS = [c.RESPONSE_OF_MEMBERS]
 
 
 def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
@@ -160,15 +158,6 @@ def test_keys_that_several_lines_do_not_have_say_what_to_do(refusal: Refusal) ->
             with pytest.raises(SceneError) as told:
                 _scene(more | {at[table] + key: {}}, True)
             assert refusal.fix in [x.fix for x in told.value.complaints if x.where.endswith(key)], told.value
-
-
-def test_an_end_through_which_torque_passes_into_catenaries_is_not_let_go() -> None:
-    zones = {"kind": "zones", "zones": [{"rod": 2, "cells": 4}, {"catenary": 6}, {"rod": 2, "cells": 4}]}
-    changes = {"model": zones, "mesh": {"cells": 14}, END + "release_at": {"time": 2}, END + "turns": 1}
-    scene = _scene(changes, False)
-    assert isinstance(scene, Scene)
-    with pytest.raises(SceneError, match=c.RELEASED_TWIST.reason):
-        check_releases(scene, build(scene))
 
 
 def test_nothing_else_refuses_a_combination() -> None:

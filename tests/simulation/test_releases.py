@@ -10,6 +10,8 @@ import pytest
 from bits import Stopping, differences, went_on
 
 import hybrid
+from tests.combinations.pairs import as_system
+from tests.problems import tables_with
 
 SECTION = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 5.0}
 CLAMP = {"kind": "clamped", "position": [8, 0, 0], "tangent": [1, 0, 0]}
@@ -181,13 +183,47 @@ def test_what_cannot_be_is_refused(name: str) -> None:
         scene(pinned(release_at=release), **changes)
 
 
-def test_a_twisted_catenary_is_not_released() -> None:
-    section = SECTION | {"torsional_stiffness": 3.0}
-    start = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}
-    zones = {"kind": "zones", "zones": [{"rod": 2.0}, {"catenary": 6.0}, {"rod": 2.0}]}
-    made = scene(CLAMP | {"release_at": {"time": 0.5}}, start, cable={"sections": [section]}, model=zones)
-    with pytest.raises(hybrid.SceneError, match="twisted catenary"):
-        hybrid.run(made)
+ZONES = {"kind": "zones", "zones": [{"rod": 2.0, "cells": 6}, {"catenary": 6.0, "cells": 12}, {"rod": 2.0, "cells": 6}]}
+
+
+@pytest.mark.parametrize("model", ["zones", "adaptive"])
+def test_a_twisted_catenary_is_let_go_with_its_twist(model: str, tmp_path: Path) -> None:
+    """Its torque is gone, its energy in the event, and it moves as a system of one line whose end breaks off."""
+    GJ, turns = 3.0, 1.5
+    tables: dict[str, Any] = {
+        "environment": {"gravity": 9.81}, "initial": "equilibrium", "contact": {"self": False},
+        "cable": {"sections": [{"length": 10.0, "mass": 1.0, "diameter": 0.03, "axial_stiffness": 1e5,
+                                "bending_stiffness": 5.0, "torsional_stiffness": GJ, "damping": {"mass": 1.0}}],
+                  "attachments": [{"kind": "clump", "at": 9.0, "mass": 15.0}]},
+        "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [0, 0, -1], "normal": [0, 1, 0]},
+                 "end": {"kind": "clamped", "position": [0.4, 0, -9.99], "tangent": [0, 0, -1], "normal": [0, 1, 0],
+                         "turns": turns, "release_at": {"time": 0.5}}},
+        "model": ZONES if model == "zones" else {"kind": "adaptive", "hold_time": 0.1, "force_rod": [[0, 2], [8, 10]]},
+        "time": {"duration": 1.0, "step": 1 / 128}, "output": {"every": 0.125, "exact": True, "points": 21},
+    }  # fmt: skip
+    if model == "adaptive":
+        tables["mesh"] = {"cells": 30}
+    with hybrid.run(tables, tmp_path / "run.h5") as result:
+        (event,) = (x for x in result.events if x.kind == "end released")
+        held, position, torque = result.t < 0.5 - 1e-9, np.array(result.position), np.array(result["torque"])
+        assert np.abs(torque[held]).max() == pytest.approx(GJ * 2.0 * np.pi * turns / 10.0, rel=0.02)
+        if model == "zones":  # rods beside it swing about their axis
+            within = (result.s > 2.0 + 1e-9) & (result.s < 8.0 - 1e-9)
+            assert (torque[~held][1:][:, within] == 0.0).all()
+        if model == "zones":  # with half a cell of the rods on either side
+            catenary = (6.0 + 2.0 / 6.0) * 0.5 * GJ * (2.0 * np.pi * turns / 10.0) ** 2
+            assert event.energy == pytest.approx(-catenary, rel=0.1)
+            assert result.work["end"][-1] == pytest.approx(event.energy, rel=1e-6)
+    lines = as_system(tables)
+    assert lines is not None
+    found = hybrid.run(lines).lines["one"]
+    assert np.abs(found.position - position).max() < 1e-9 * 10.0
+    later = np.abs(found.t - 0.5) > 1e-9  # of a system an output there is of the moment before
+    assert np.abs(found["torque"] - torque)[later].max() < 1e-6
+    short = tmp_path / "short.h5"
+    hybrid.run(tables_with(tables, {"time.duration": 0.75}), short).close()
+    with hybrid.resume(short, until=1.0) as more:
+        assert np.array_equal(more.position, position)
 
 
 @pytest.mark.parametrize("when", [0.5, 0.75])
