@@ -27,7 +27,7 @@ Tables = Mapping[str, Any]
 Kind = Literal["physics", "not worked out", "several lines"]
 # Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
 USE, SYSTEM, LINE = "use", "system", "line"
-Use = Literal["", "stepped", "about rest", "response", "derivatives"]
+Use = Literal["", "about rest", "response", "derivatives"]
 LEAVE_OUT = "leave it out"
 ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
@@ -405,7 +405,6 @@ DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("deriva
 OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change in time",
                         "motion.file, motion.travel, force.history", _changing_loads)  # fmt: skip
 MEMBERS = Feature("free bodies with members", "bodies.NAME.members", lambda tables: ())
-STEPPED = Feature("steps from outside", "hybrid.Simulation", _used("stepped"))
 
 # Of one cable alone, by keys that several lines do not have.
 ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
@@ -475,10 +474,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         LAYERS, FOLLOWING_CELLS, "not worked out", "cells follow the curvature, as model.curvature_error has it",
         fix="leave out the one or the other",
-    ),
-    Refusal(
-        LAYERS, STEPPED, "not worked out",
-        "a cable that is stepped from outside has no coarse run that shows its layers", fix="place cells by `mesh`",
     ),
     # --- obstacles, and other lines ---
     Refusal(

@@ -22,7 +22,6 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.driven_end import DrivenEnd
 from hybrid.model.resolution import first_resolution
-from hybrid.scene.combinations import refuse_use
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene, missing_time
@@ -32,6 +31,8 @@ from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.direct_steps import DirectSteps
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.layer_mesh import layered
+from hybrid.simulation.mesh_survey import with_survey
+from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.stepped import CableState, Saved, Triple, in_space, iterations_allowed, one_thread, tension_now
 from hybrid.simulation.stepped_ends import STILL, SteppedEnds
 from hybrid.simulation.system_stepping import SystemSimulation
@@ -82,7 +83,6 @@ class Simulation(SteppedEnds):
         if self.scene.time is None:
             raise SceneError([missing_time(self.scene)])
         check_motions(self.scene)
-        refuse_use(self.scene, "stepped")
         self._target: Path | io.BytesIO = io.BytesIO()
         if output is not None:
             self._target = Path(output).expanduser().resolve()
@@ -95,7 +95,11 @@ class Simulation(SteppedEnds):
         compile_beside(self.scene)
         self._case = Case(self.scene, criterion)
         try:
-            resolution = layered(self._case, first_resolution(self.scene))
+            first = first_resolution(self.scene)
+            if self.scene.resolution is None:
+                resolution = layered(self._case, first)
+            else:  # nobody knows the motion: layers are those of the equilibrium under full loads
+                resolution = with_survey(first, self.scene, StaticCase(self.scene).survey(first))
             self._loop, recorder, equilibrium = self._case.prepare(resolution, self._target)
         except BaseException:
             self._stack.close()

@@ -6,6 +6,8 @@ import io
 import threading
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -17,23 +19,43 @@ from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.state.report import FORCE_A
 from hybrid.kernels.state.state import Floats
 from hybrid.model.driven_end import FRAME, TURN, DrivenEnd
-from hybrid.scene.combinations import refuse_use
+from hybrid.model.system import SystemResolution
 from hybrid.scene.points import FixedPoint
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import missing_time
 from hybrid.scene.system import System
+from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution, with_survey
 from hybrid.simulation.stepped import CableState, Triple, one_thread, triple
 from hybrid.simulation.stepped_ends import STILL
-from hybrid.simulation.system_run import SystemRun
+from hybrid.simulation.system_run import SystemRun, static_system
 from hybrid.simulation.system_saving import SavedSystem, bring_back, commit, defer, kept, recorders
 from hybrid.simulation.system_start import named
 from hybrid.solve.system_statics import LineFailed
+from hybrid.store.array_recorder import MemoryTarget
 from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
-from hybrid.store.reader import Result, open_result
+from hybrid.store.reader import Result, open_result, written_result
 
 # Of a step: a step so short is round-off of the times of others.
 SLIVER = 1e-6
+
+
+def layers_at_rest(system: System) -> SystemResolution | None:
+    """Cells of lines that say how many a layer has: of the equilibrium under full loads; None: no line says so."""
+    asked = [name for name, line in system.lines.items() if line.resolution is not None]
+    if not asked:
+        return None
+    first, memory = SystemResolution.first(system), MemoryTarget()
+    coarse = SystemResolution({name: replace(survey_resolution(x), every=1) for name, x in first.lines.items()})
+    output = system.output.model_copy(update={"points": POINTS, "quantities": {}})
+    shown = system.model_copy(update={"output": output})
+    run = static_system(shown, memory, partial(scene_text, shown), coarse)
+    found, lines = written_result(memory), dict(first.lines)
+    for name in asked:
+        line, scene, model = found.lines[name], system.scene_of(name), run.model.models[run.model.names.index(name)]
+        outputs = {key: line[key] for key in ("position", "curvature", "tension")}
+        lines[name] = with_survey(lines[name], scene, Survey.of(scene, lines[name], model, line.s, outputs))
+    return SystemResolution(lines)
 
 
 class PointState(NamedTuple):
@@ -64,7 +86,6 @@ class SystemSimulation:
             raise TypeError("most_iterations: steps of several lines are made until they have converged; leave it out")
         if found.time is None:
             raise SceneError([missing_time(found)])
-        refuse_use(found, "stepped")
         lines = {
             name: line.model_copy(update={"contact": line.contact.of_ends_that_are_set()})
             for name, line in found.lines.items()
@@ -78,7 +99,8 @@ class SystemSimulation:
             self._stack.enter_context(locked(self._target))
         self._closed = False
         try:
-            self._run = SystemRun(found, self._target, scene_text(found), moves=True, criterion=criterion)
+            cells = layers_at_rest(found)
+            self._run = SystemRun(found, self._target, scene_text(found), True, cells, criterion=criterion)
             self._run.begin_motion()
         except LineFailed as failed:
             raise self._fail(failed) from None

@@ -62,7 +62,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.STRETCH_LAW, c.TORQUE_OF_TENSION): (ROPE | TORQUE, ""),
     (c.SHORTEST_CELLS, c.STAYING_CELLS): ({"model": {"kind": "adaptive", "rod_cell": 0.1}}, ""),
     (c.LAYERS, c.FOLLOWING_CELLS): ({"resolution": {"cells_per_layer": 2}} | FOLLOWING, ""),
-    (c.LAYERS, c.STEPPED): ({"resolution": {"cells_per_layer": 2}}, "stepped"),
     (c.PLANE, c.OBSTACLES): (BALL | {"dimension": 2}, ""),
     (c.MOVING_ZONES, c.PUSHED): (BALL | MOVING, ""),
     (c.PAYOUT, c.OBSTACLES): (BALL | PAID, ""),

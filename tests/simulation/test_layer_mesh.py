@@ -163,5 +163,11 @@ def test_layers_of_a_line_of_several_have_the_cells_of_the_cable(tmp_path: Path)
     hybrid.resume(tmp_path / "part.h5", until=2.0).close()
     with hybrid.open(tmp_path / "part.h5") as part:
         assert part.lines["riser"].times[-1] == 2.0 and part.status == "complete"
-    with pytest.raises(hybrid.SceneError, match=r"lines\.riser\.resolution"):
-        hybrid.Simulation(system)
+    at_rest = hybrid.static(cable)
+    with hybrid.Simulation(cable) as one, hybrid.Simulation(system) as several:  # which know no motion to come
+        for stepped in (one, several):
+            stepped.advance(0.25)
+        s, r = one.state.s, one.state.position
+        assert np.abs(s - at_rest["mesh/s"]).max() < 1e-9 * 100
+        there = several.line("riser")
+        assert np.abs(there.s - s).max() < 1e-9 * 100 and np.abs(there.position - r).max() < 1e-9 * 100
