@@ -9,11 +9,11 @@ import numpy as np
 
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.zone_transfer import Transfer, blank_match, blank_transfer, transfer
-from hybrid.kernels.state.state import Floats, Line, State, blank_state
+from hybrid.kernels.state.state import NO_WAKE, Floats, Line, State, blank_state
 from hybrid.model.layout import Layout
 
 Clamp = tuple[Floats, Floats]  # first director and tangent
-states = Packed(blank_state, given=("turn", "slow"))
+states = Packed(blank_state, given=("turn", "slow", "wake"))
 
 
 class Remapped(NamedTuple):
@@ -44,7 +44,12 @@ def transfer_to(
     for k, clamp in enumerate(clamps):
         if clamp is not None:
             held[k], frames[k] = True, clamp
-    out = states(target.h.size, turn=np.zeros((len(target.torsion), 3)), slow=np.zeros(len(target.law)))
+    out = states(
+        target.h.size,
+        turn=np.zeros((len(target.torsion), 3)),
+        slow=np.zeros(len(target.law)),
+        wake=np.zeros((len(target.wake_law), NO_WAKE.shape[1])),
+    )
     return Transfer(
         line, target, state, out, old.places, new.places, new.base_of_cell, old.first, kinks, twist,
         frames, held, np.array([shifts]), blank_match(line.h.size, target.h.size),

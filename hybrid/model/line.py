@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.laws.axial_law import SHIFT, follow_law
+from hybrid.kernels.laws.vortices import DIAMETER, LIFT_A, LIFT_B, OFFSET, RAMP
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH
 from hybrid.kernels.mesh.zone_line import Cable, blank_line_job, fill_line
@@ -16,6 +17,7 @@ from hybrid.kernels.state.state import (
     NO_PLANE,
     NO_TABLE,
     NO_TORSION,
+    NO_WAKE_LAW,
     TENSION_TORQUE,
     Floats,
     Line,
@@ -70,6 +72,8 @@ def on_base(
     if material.bends is not None:
         bent, table = bend_law(material, line, of)
         line = line._replace(bend_law=bent, bend_table=table)
+    if material.vortices.size:
+        line = line._replace(wake_law=wake_law(material, s, of))
     return line
 
 
@@ -153,6 +157,21 @@ def torsion_zones(material: Material, h: Floats, rod: np.ndarray, of: np.ndarray
         tau = float(soft @ np.nan_to_num(material.tau[of[cells]]) / soft.sum())
         rows.append((a, b, soft.sum(), share @ material.kappa[of[cells], 2], tau))
     return np.array(rows, float).reshape(-1, 5)
+
+
+def wake_law(material: Material, s: Floats, of: np.ndarray) -> Floats:
+    """`wake_law` of a line with nodes s (N+1,) m and cells on pieces `of` (N,); phases begin once round along it."""
+    row, half = material.vortices[of], 0.5 * np.diff(s)
+    out = np.zeros((s.size, NO_WAKE_LAW.shape[1]))
+    out[1:, LIFT_A], out[:-1, LIFT_B] = half * row[:, 0], half * row[:, 0]
+    sheds = (row[:, 1] > 0.0).astype(float)
+    of_node = np.zeros((s.size, 5))
+    for sides in (slice(1, None), slice(None, -1)):
+        of_node[sides] += row[:, 1:]
+    count = np.concatenate([[0.0], sheds]) + np.concatenate([sheds, [0.0]])
+    out[:, DIAMETER : RAMP + 1] = of_node / np.maximum(count, 1.0)[:, None]
+    out[:, OFFSET] = 2.0 * np.pi * s / s[-1]
+    return out
 
 
 def axial_law(material: Material, h: Floats, of: np.ndarray) -> tuple[Floats, Floats, NDArray[np.int64]]:

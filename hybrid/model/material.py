@@ -13,7 +13,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH
-from hybrid.kernels.state.forces import ADDED_MASS, BODIES, DRAG, FLOW, MASS_DAMPING, STIFFNESS_DAMPING, SURFACE, WAVES
+from hybrid.kernels.state.forces import (
+    ADDED_MASS,
+    BODIES,
+    DRAG,
+    FLOW,
+    MASS_DAMPING,
+    STIFFNESS_DAMPING,
+    SURFACE,
+    VORTICES,
+    WAVES,
+)
 from hybrid.kernels.state.state import Floats
 from hybrid.model.scales import pressing
 from hybrid.model.sections import (
@@ -29,7 +39,7 @@ from hybrid.model.sections import (
     swivels,
     torsional_stiffness,
 )
-from hybrid.scene.schema import BendRestrictor, BendStiffener, Scene, Section
+from hybrid.scene.schema import BendRestrictor, BendStiffener, Scene, Section, Vortices
 from hybrid.scene.stretch import Curve, slopes, stiffened
 
 # The tension below which bending counts as much as tension, in (EI w^2)^(1/3): there a cable bends under its weight as
@@ -89,6 +99,8 @@ class Material:
     curves: list[StretchLaw | None] | None = (
         None  # (K,) of pieces whose tension is no multiple of strain; None: no such
     )
+    # (K, 6) lift per length (kg/m2: rho/2 D Cv), diameter (m), three frequencies (-), ramp (s); empty: no vortices
+    vortices: Floats = field(default_factory=lambda: np.zeros((0, 6)))
     bends: list[Curve | None] | None = None  # (K,) tables of moment over curvature; None: there are none
     tension_torque: Floats = field(default_factory=lambda: np.zeros(0))  # (K,) N m per N; empty: none anywhere
 
@@ -325,6 +337,9 @@ def _wetted(out: Material, scene: Scene, of: list[Section], middle: Floats) -> N
         out.bits |= ADDED_MASS
         out.added_n = rho * disc * np.array([x.added_mass.normal if x.added_mass else 0.0 for x in of]) + extra
         out.added_t = rho * disc * np.array([x.added_mass.tangential if x.added_mass else 0.0 for x in of])
+    if any(x.vortices for x in of):
+        out.bits |= VORTICES
+        out.vortices = np.array([_lift(x.vortices, rho, float(D)) for x, D in zip(of, width, strict=True)])
     if fluid.current is not None:
         out.bits |= FLOW
     if fluid.waves is not None:
@@ -336,6 +351,13 @@ def _wetted(out: Material, scene: Scene, of: list[Section], middle: Floats) -> N
         out.diameter = np.sqrt(4.0 / np.pi * volume)
     else:
         out.weight = out.weight - rho * gravity * volume
+
+
+def _lift(given: Vortices | None, density: float, diameter: float) -> tuple[float, ...]:
+    """A row of `Material.vortices`."""
+    if given is None:
+        return (0.0,) * 6
+    return 0.5 * density * diameter * given.lift, diameter, given.center, given.low, given.high, given.ramp
 
 
 def _points(out: Material, scene: Scene) -> None:

@@ -120,6 +120,30 @@ class AddedMass(Table):
     tangential: NonNegative = Field(default=0.0, description="added mass coefficient along the cable [-]")
 
 
+class Vortices(Table):
+    """Vortex-induced vibration across line and flow: lift whose phase locks in to the motion, within a range of
+
+    frequencies; in motion only, and in space.
+    """
+
+    lift: Positive = Field(default=1.2, description="lift coefficient Cv: 1/2 density x diameter x Cv x |u|^2 [-]")
+    center: Positive = Field(
+        default=0.144, description="frequency of shedding in phase with the motion, over |u|/diameter [-]"
+    )
+    low: Positive = Field(default=0.08, description="the least frequency to which it locks in, over |u|/diameter [-]")
+    high: Positive = Field(
+        default=0.206, description="the largest frequency to which it locks in, over |u|/diameter [-]"
+    )
+    ramp: NonNegative = Field(default=0.0, description="time over which the lift grows at the start; 0: at once [s]")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Vortices:
+        if not self.low < self.center < self.high:
+            expected = f"a number between low, {self.low:g}, and high, {self.high:g}"
+            refuse([Finding(("center",), expected, "is low above high, or center beyond one of them?")])
+        return self
+
+
 class Damping(Table):
     """Rayleigh damping; a plain number means `mass`."""
 
@@ -297,6 +321,9 @@ class Section(Table):
     drag: Drag | None = Field(default=None, description="drag coefficients Cd; need a fluid and a diameter")
     added_mass: AddedMass | None = Field(
         default=None, description="added mass coefficients Ca; need a fluid and a diameter"
+    )
+    vortices: Vortices | None = Field(
+        default=None, description="vortex-induced vibration; needs a fluid and a diameter; absent: none"
     )
     damping: Annotated[Damping, PlainNumber(("mass",))] | None = Field(
         default=None, description="internal damping; a plain number is the mass-proportional part"

@@ -69,7 +69,7 @@ def _fluid_and_diameter(environment: Environment, cable: Cable) -> Iterator[Find
     for i, section in enumerate(cable.sections):
         here: Place = ("cable", "sections", i)
         reasons = ["buoyancy"] if environment.fluid is not None else []
-        for key, name in (("drag", "drag"), ("added_mass", "added mass")):
+        for key, name in (("drag", "drag"), ("added_mass", "added mass"), ("vortices", "vortices")):
             if getattr(section, key) is None:
                 continue
             reasons.append(name)

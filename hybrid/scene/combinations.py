@@ -357,6 +357,7 @@ STRETCH_LAW = Feature("tension over strain by a table or a rope's law", "tension
                       _stretch_laws)  # fmt: skip
 MOMENT_TABLE = Feature("moment over curvature by a table, bend restrictors", "moment_curvature, kind: bend_restrictor",
                        _moment_tables)  # fmt: skip
+VORTICES = Feature("vortex-induced vibration", "vortices", _in_sections("vortices", of=lambda x: x.vortices))
 RESTRICTOR = Feature("bend restrictors", "attachments: kind: bend_restrictor", _attached("bend_restrictor"))
 STIFFNESS_DAMPING = Feature("damping proportional to stiffness", "damping.stiffness",
                             _in_sections("damping", "stiffness",
@@ -537,6 +538,16 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         STIFFENER, PAYOUT, "not worked out", f"{PAID}, and the stiffness of its cells changes at the winch alone",
         "no bend stiffener", LEAVE_OUT,
+    ),
+    Refusal(
+        VORTICES, PLANE, "physics", "vortices shake a line across its plane ({key})", "nothing", IN_SPACE,
+    ),
+    Refusal(
+        VORTICES, PAYOUT, "not worked out", f"{PAID}, and nodes that enter and leave have no phase of lift",
+    ),
+    Refusal(
+        VORTICES, RESPONSE, "not worked out", "lift that locks in to a motion is no part of a response by frequency",
+        fix="leave it out; hybrid run computes it in time",
     ),
     Refusal(
         MOMENT_TABLE, PAYOUT, "not worked out", f"{PAID}, and elements that change there have one bending stiffness",

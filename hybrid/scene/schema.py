@@ -35,7 +35,7 @@ from hybrid.scene.analysis import (
 )
 from hybrid.scene.attachments import Attachment, BendRestrictor, BendStiffener, Clump, Float, Modules, Spread, Swivel
 from hybrid.scene.base import Table, Text, Vector, refuse
-from hybrid.scene.cable import AddedMass, Cable, Contact, Damping, Drag, Environment, Fluid, Section
+from hybrid.scene.cable import AddedMass, Cable, Contact, Damping, Drag, Environment, Fluid, Section, Vortices
 from hybrid.scene.checks import contradictions
 from hybrid.scene.end_loads import Load
 from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned
@@ -112,6 +112,7 @@ __all__ = [
     "Travel",
     "UniformCurrent",
     "Vector",
+    "Vortices",
     "Waves",
     "ZonesModel",
     "missing_time",

@@ -142,7 +142,7 @@ class CellChanges:
             owner.correction is None
             and run.contact is None
             and not (model.line.torsion.size or model.line.tension_twist.size or model.line.law.size)
-            and not model.line.bend_law.size
+            and not (model.line.bend_law.size or model.line.wake_law.size)
         )
         return plain and bool(model.line.bits & PLANAR or not switching.manager.twisted)
 

@@ -19,6 +19,7 @@ from hybrid.kernels.state.state import (
     NO_SLOW,
     NO_TENSION_TORQUE,
     NO_TORSION,
+    NO_WAKE,
     TENSION_TORQUE,
     Floats,
     Line,
@@ -91,7 +92,9 @@ class CellViews:
         return found
 
     def state(self, k: int, which: int, cells: int) -> State:
-        found: State = self._view(self.sides[k].states[which], cells, lambda: {"turn": self._turn, "slow": NO_SLOW})
+        found: State = self._view(
+            self.sides[k].states[which], cells, lambda: {"turn": self._turn, "slow": NO_SLOW, "wake": NO_WAKE}
+        )
         return found
 
     def layout(self, k: int, cells: int) -> Cells:

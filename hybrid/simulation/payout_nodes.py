@@ -32,6 +32,7 @@ from hybrid.kernels.state.state import (
     NO_TENSION_TORQUE,
     NO_TORSION,
     NO_TURN,
+    NO_WAKE,
     TENSION_TORQUE,
     Batch,
     Floats,
@@ -144,7 +145,7 @@ class NodeChanges:
         return found
 
     def _state(self, k: int, which: int, cells: int) -> State:
-        found: State = self._sides[k].states[which].view(cells, turn=NO_TURN, slow=NO_SLOW)
+        found: State = self._sides[k].states[which].view(cells, turn=NO_TURN, slow=NO_SLOW, wake=NO_WAKE)
         return found
 
     def _reel(self, k: int, cells: int) -> Reel:

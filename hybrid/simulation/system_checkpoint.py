@@ -106,6 +106,8 @@ def of_today(lines: Any, template: Mapping[str, Any]) -> Any:
         mine, state, report = template.get(name), line.get("state"), line.get("report")
         if mine is not None and isinstance(state, dict) and not mine["state"]["slow"].size:
             line = line | {"state": {"slow": mine["state"]["slow"], **state}}
+        if mine is not None and isinstance(line.get("state"), dict) and not mine["state"]["wake"].size:
+            line = line | {"state": {"wake": mine["state"]["wake"], **line["state"]}}
         if isinstance(report, np.ndarray) and report.ndim == 1 and FIRST_REPORT <= report.size < REPORT_SIZE:
             line = line | {"report": np.pad(report, (0, REPORT_SIZE - report.size))}
         if mine is not None and "torsion" in mine:

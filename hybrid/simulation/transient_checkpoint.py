@@ -94,6 +94,8 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         saved = {**saved, "state": {**saved["state"], "turn": state.turn}}
     if isinstance(saved.get("state"), dict) and "slow" not in saved["state"] and not state.slow.size:  # not in 0.6
         saved = {**saved, "state": {**saved["state"], "slow": state.slow}}
+    if isinstance(saved.get("state"), dict) and "wake" not in saved["state"] and not state.wake.size:  # not in 0.6
+        saved = {**saved, "state": {**saved["state"], "wake": state.wake}}
     if isinstance(saved.get("ends"), dict) and "released" not in saved["ends"]:  # not in a checkpoint of 0.6
         saved = {**saved, "ends": {**saved["ends"], "released": model.ends.released.copy()}}
     if isinstance(saved.get("zoning"), dict):

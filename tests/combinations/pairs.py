@@ -59,6 +59,7 @@ FEATURES: dict[str, tuple[Tables, str]] = {
     "payout": ({END + ".payout": PAYOUT, END + ".motion": None}, "end"),
     "release": ({END + ".release_at": {"time": 0.25}}, "end"),
     "water": ({"environment.fluid": WATER} | DRAG, "sea"),
+    "vortices": ({"environment.fluid": WATER, S + "vortices": {"ramp": 0.3}} | DRAG, "sea"),
     "waves": (
         {"environment.fluid": WATER | {"surface": 5, "waves": {
             "kind": "regular", "height": 1.0, "period": 4.0, "direction": 30, "ramp": 0.5}}} | DRAG, "sea",

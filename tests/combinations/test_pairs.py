@@ -86,11 +86,15 @@ def answer(tables: Tables) -> hybrid.Result | str:
     return found.lines["one"] if found.lines else found
 
 
+# Phases that begin at the start of a line and grow along it: with its ends exchanged they are others.
+ONE_WAY = "vortices"
+
+
 def differ(names: Sequence[str], said: Callable[[Tables], Tables | None]) -> str:
     """How a scene said otherwise has another answer; empty: it has the same, or cannot be said so."""
     scene = scene_of(*names)
     other = said(scene)
-    if other is None or refusal(scene) or refusal(other):
+    if other is None or refusal(scene) or refusal(other) or (said is turned and ONE_WAY in names):
         return ""
     one, two = answer(scene), answer(other)
     if isinstance(one, str) or isinstance(two, str):

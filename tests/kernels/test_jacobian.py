@@ -27,6 +27,7 @@ from hybrid.kernels.state.forces import (
     SEABED,
     STIFFNESS_DAMPING,
     SURFACE,
+    VORTICES,
     WAVES,
 )
 from hybrid.kernels.state.state import Ends, Line, Sea, blank_state
@@ -187,6 +188,26 @@ def test_jacobian_of_tables_of_moment(seed, bits):
         f = [residual_at(line, sea, ends, st, (k * x).reshape(-1, 5)) for k in (-2, -1, 1, 2)]
         numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
     identity = [0, 5 * N + 4]
+    numeric[identity, identity] = 1.0
+    assert np.abs(J - numeric).max() < 1e-6 * np.abs(J).max()
+
+
+@pytest.mark.parametrize("bits", [0, DRAG | FLOW])
+@pytest.mark.parametrize("zones", ["rod", "catenary"])
+def test_jacobian_of_lift(zones, bits):
+    """Of vortices with a phase that is given."""
+    line, sea, ends, st = random_case(3, ZONES[zones], bits | VORTICES)
+    g = np.random.default_rng(4)
+    line = line._replace(wake_law=g.uniform(0.5, 1.5, (N + 1, 8)))
+    st = st._replace(wake=g.uniform(-1.0, 1.0, (N + 1, 4)))
+    J, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
+    numeric, t = np.zeros_like(J), 1e-4
+    for j in range(J.shape[1]):
+        x = np.zeros(J.shape[1])
+        x[j] = t
+        f = [residual_at(line, sea, ends, st, (k * x).reshape(-1, 5)) for k in (-2, -1, 1, 2)]
+        numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
+    identity = [0] + [5 * i + 4 for i in range(N + 1) if i == N or not line.spin[i]]
     numeric[identity, identity] = 1.0
     assert np.abs(J - numeric).max() < 1e-6 * np.abs(J).max()
 

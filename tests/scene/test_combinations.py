@@ -45,6 +45,7 @@ FOLLOWING = {"model": {"kind": "adaptive", "curvature_error": 0.05}}
 TWO = {SECTION + "bending_stiffness": [10, 20], END + "normal": [0, 1, 0]}
 CURVED = {SECTION + "intrinsic_curvature": [0.01, 0, 0]}
 ROPE = {SECTION + "dynamic_stiffness": {"constant": 2e6, "relaxation_time": 100}}
+SHEDS: dict[str, Any] = {SECTION + "vortices": {}, "environment.fluid": {"density": 1025, "current": [0.3, 0, 0]}}
 CLAMPED = {ONE + "connections": {"end": {"kind": "clamped", "tangent": [1, 0, 0]}}}
 
 # By the pair: what makes a scene of CABLE, or of LINES, that has both, and what is done with it.
@@ -84,6 +85,9 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
         {"cable.attachments": [{"kind": "bend_stiffener", "range": [0, 2], "added_stiffness": [[0, 90], [2, 10]]}]}
         | PAID, ""
     ),
+    (c.VORTICES, c.PLANE): (SHEDS | {"dimension": 2}, ""),
+    (c.VORTICES, c.PAYOUT): (SHEDS | PAID, ""),
+    (c.VORTICES, c.RESPONSE): (SHEDS, "response"),
     (c.MOMENT_TABLE, c.PAYOUT): (
         {SECTION + "moment_curvature": [[0, 0], [0.1, 1], [0.2, 9]], SECTION + "bending_stiffness": None} | PAID, ""
     ),

@@ -76,6 +76,16 @@ ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
 initial: {kind: equilibrium}
 model: {kind: rod}
 """
+SHEDDING = """\
+environment: {fluid: {density: 1025.0}}
+cable:
+  sections:
+    - {length: 10.0, mass: 1.0, diameter: 0.03, bending_stiffness: 2.0,
+       vortices: {lift: 0.7, center: 0.18, low: 0.1, high: 0.26, ramp: 5.0}}
+ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
+initial: {kind: equilibrium}
+model: {kind: rod}
+"""
 SWIVELS = """\
 environment: {fluid: {density: 1025.0}}
 cable:
@@ -151,6 +161,7 @@ TEXTS = (
         "twisted": TWISTED,
         "swivels": SWIVELS,
         "stiffeners": STIFFENERS,
+        "shedding": SHEDDING,
         "ropes": ROPES,
         "measured": MEASURED,
         "piped": PIPED,

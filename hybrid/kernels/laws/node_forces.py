@@ -11,6 +11,7 @@ from hybrid.kernels.laws.bed import bed_before, bed_beside, bed_under
 from hybrid.kernels.laws.loads import body_drag, half_cell_added_mass, half_cell_drag
 from hybrid.kernels.laws.obstacles import obstacle_forces
 from hybrid.kernels.laws.seabed import contact, friction, pressure
+from hybrid.kernels.laws.vortices import lift_at
 from hybrid.kernels.laws.water import current_at, wetted, wetted_stretch
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import (
@@ -23,6 +24,7 @@ from hybrid.kernels.state.forces import (
     OBSTACLES,
     SEABED,
     SURFACE,
+    VORTICES,
     WAVES,
 )
 from hybrid.kernels.state.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_POWER, MASS_DAMPING_POWER, WAVE_POWER
@@ -220,6 +222,9 @@ def node_loads(line, sea, i, r, u, state, before, after, cv, ca, report):
     F, D, GL, GR = inertia_and_water(
         line, sea, i, r[i, 2] + u[i, 2], get3(v, i), get3(state.vd, i), before, after, cv, ca, report
     )
+    if line.bits & VORTICES:
+        f, Df, L, R = lift_at(line, sea, i, r[i, 2] + u[i, 2], state, before, after, cv, report)
+        F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
     if line.bits & SEABED:
         x = (r[i, 0] + u[i, 0], r[i, 1] + u[i, 1], r[i, 2] + u[i, 2])
         touches, f, Df, L, R = seabed_forces(line, sea, i, x, u, v, state.e, cv, report)

@@ -20,6 +20,7 @@ from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, spin_
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import turns_freely
 from hybrid.kernels.laws.tension_torque import stretch_factor, torque_beside
+from hybrid.kernels.laws.vortices import PHASE
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.forces import ROTARY
@@ -184,6 +185,23 @@ def carry_linearly(x, out, s, at, match):
         else:
             part = (at[i] - s[c]) / (s[c + 1] - s[c])
             put3(out, i, add(scale(1.0 - part, get3(x, c)), scale(part, get3(x, c + 1))))
+
+
+@inner
+def carry_wake(line, state, out, at, match):
+    """Phases and means of vortices to the new nodes: phases the shorter way round between the nodes beside them."""
+    for i in range(out.wake.shape[0]):
+        a, c = match.same[i], match.left[i]
+        if a >= 0:
+            for k in range(4):
+                out.wake[i, k] = state.wake[a, k]
+            continue
+        part = (at[i] - line.s[c]) / (line.s[c + 1] - line.s[c])
+        for k in range(4):
+            out.wake[i, k] = (1.0 - part) * state.wake[c, k] + part * state.wake[c + 1, k]
+        turn = state.wake[c + 1, PHASE] - state.wake[c, PHASE]
+        turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+        out.wake[i, PHASE] = state.wake[c, PHASE] + part * turn
 
 
 # --- cells ----------------------------------------------------------------------------------------
@@ -456,6 +474,8 @@ def transfer_state(job):
     carry_nodes(state.a, out.a, line.s, target.s, match, third)
     carry_nodes(state.vd, out.vd, line.s, target.s, match, third)
     carry_linearly(state.slip, out.slip, line.s, target.s, match)
+    if state.wake.shape[0] > 0:
+        carry_wake(line, state, out, target.s, match)
     carry_cells(job)
     if job.shifts[0]:  # of cells that follow it would be a kick at every change
         keep_momentum(job)

@@ -51,6 +51,10 @@ def check_turns(line: Line, state: State) -> None:
         raise ValueError(f"a state with {state.turn.shape[0]} turns on a line that has {line.torsion.shape[0]}")
     if state.slow.shape[0] != line.law.shape[0]:
         raise ValueError(f"a state with {state.slow.shape[0]} mean tensions on a line that has {line.law.shape[0]}")
+    if state.wake.shape[0] != line.wake_law.shape[0]:
+        raise ValueError(
+            f"a state with {state.wake.shape[0]} phases of lift on a line that has {line.wake_law.shape[0]}"
+        )
 
 
 def sharpest(line: Line, ends: Ends, state: State) -> tuple[float, int, float, int]:

@@ -32,6 +32,8 @@ OBSTACLES = 65536
 TOUCHES = SEABED | OBSTACLES
 # No force: moment that is no multiple of curvature (hybrid.kernels.laws.bending_law).
 BENDING_LAW = 131072
+# Lift of vortices that follow the motion (hybrid.kernels.laws.vortices).
+VORTICES = 262144
 
 FORCES = {
     "drag": (DRAG, "velocity, direction; environment.fluid and sections[].drag, or drag_area of modules"),
@@ -43,6 +45,7 @@ FORCES = {
     "waves": (WAVES, "position, time; environment.fluid.waves"),
     "partly wetted cells at the surface": (SURFACE, "height; environment.fluid.surface"),
     "drag, added mass or wetting of bodies": (BODIES, "velocity, acceleration; cable.attachments, ends of kind body"),
+    "lift of vortices": (VORTICES, "velocity, and a phase of its own; sections[].vortices"),
     "seabed contact": (SEABED, "height and its rate; environment.seabed"),
     "seabed friction": (FRICTION, "travel along the seabed; environment.seabed.friction"),
     "contact with obstacles": (OBSTACLES, "distance and its rate; obstacles"),

@@ -30,6 +30,9 @@ NO_LAW: Floats = np.zeros((0, 7))
 NO_TABLE: Floats = np.zeros((0, 3))
 # Of a line whose moments are multiples of curvature (kernels.laws.bending_law has the columns).
 NO_BEND_LAW: Floats = np.zeros((0, 7))
+# Of a line without vortices (kernels.laws.vortices has the columns).
+NO_WAKE_LAW: Floats = np.zeros((0, 8))
+NO_WAKE: Floats = np.zeros((0, 4))
 NO_SLOW: Floats = np.zeros(0)
 NO_ADDRESS: NDArray[np.int64] = np.zeros(0, np.int64)
 # Numbers of an obstacle (kernels.laws.obstacles has them).
@@ -98,6 +101,8 @@ class Line(NamedTuple):
     # (N+1, 7) of elements whose moment is no multiple of bend (kernels.laws.bending_law); empty: there are none
     bend_law: Annotated[Floats, node(columns=7, optional=True)] = NO_BEND_LAW
     bend_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: curvature (1/m), moment (N m), energy per length
+    # (N+1, 8) of nodes with vortices (kernels.laws.vortices); empty: there are none
+    wake_law: Annotated[Floats, node(columns=8, optional=True)] = NO_WAKE_LAW
 
 
 FIELDS = fields_of(Line)
@@ -205,6 +210,7 @@ class State(NamedTuple):
     # beyond half a turn (rad), torque (N m), power that the torque gains because the zone bends without it (W)
     turn: Floats = NO_TURN
     slow: Floats = NO_SLOW  # (N,) N, mean tension of lines with a `law`; else empty
+    wake: Floats = NO_WAKE  # (N+1, 4) of lines with a `wake_law` (kernels.laws.vortices); else empty
 
     def copy(self) -> State:
         return State(*(x.copy() for x in self))
@@ -324,8 +330,11 @@ def no_torsion() -> Torsion:
     )
 
 
-def blank_state(n_cells: int, zones: int = 0, slow: bool = False) -> State:
-    """A state of zeros with room for `n_cells` cells; zones: those that a torque passes through; slow: mean tensions."""
+def blank_state(n_cells: int, zones: int = 0, slow: bool = False, wake: bool = False) -> State:
+    """A state of zeros with room for `n_cells` cells; zones: those that a torque passes through; slow: mean tensions;
+
+    wake: phases of vortices.
+    """
     node, cell = (n_cells + 1, 3), (n_cells, 3)
     z = np.zeros
     w, wa, wd = z(n_cells), z(n_cells), z(n_cells)
@@ -344,12 +353,13 @@ def blank_state(n_cells: int, zones: int = 0, slow: bool = False) -> State:
         z(node),
         z((zones, 3)),
         z(n_cells if slow else 0),
+        z((n_cells + 1 if wake else 0, 4)),
     )
 
 
 def state_for(line: Line) -> State:
     """A state of zeros of a line."""
-    return blank_state(line.h.size, len(line.torsion), line.law.size > 0)
+    return blank_state(line.h.size, len(line.torsion), line.law.size > 0, line.wake_law.size > 0)
 
 
 def no_sea(n_cells: int) -> Sea:

@@ -11,11 +11,12 @@ from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.obstacles import normal_at, passes, stored_in_contact
 from hybrid.kernels.laws.out_of_plane import step_out_of_plane
+from hybrid.kernels.laws.vortices import advance_wake
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.configuration import carry_director
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held, sharpest_in_plane, sharpest_in_space
-from hybrid.kernels.state.forces import FRICTION, OBSTACLES, ROTARY, TOUCHES, WAVES
+from hybrid.kernels.state.forces import FRICTION, OBSTACLES, ROTARY, TOUCHES, VORTICES, WAVES
 from hybrid.kernels.state.report import (
     BEND,
     BEND_NODE,
@@ -194,6 +195,8 @@ def begin_step(plane, space, line, sea, old, new, u, s, safe):
             wave_kinematics(sea, old.r, u)
         if line.bits & FRICTION:
             friction_axes(sea, old.r, old.e, old.slip)
+        if line.bits & VORTICES:
+            advance_wake(line, sea, old, new, s.dt)
     return turn, cell
 
 
