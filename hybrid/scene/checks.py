@@ -24,6 +24,7 @@ from hybrid.scene.analysis import (
     AdaptiveModel,
     CatenaryModel,
     CatenaryZone,
+    Equilibrium,
     Initial,
     Mesh,
     Model,
@@ -279,6 +280,27 @@ def _axes_are_given(cable: Cable, ends: Ends, model: Model, dimension: int | Non
             return
 
 
+def _axes_at_start_are_given(
+    cable: Cable, ends: Ends, model: Model, initial: Initial, dimension: int | None
+) -> Iterator[Finding]:
+    """Where a line that bends otherwise in another direction is not at rest at first, an end says where its axes point.
+
+    At rest a line that turns freely finds them by itself; else axes of the world would stand in their place.
+    """
+    if dimension == 2 or isinstance(model, CatenaryModel) or isinstance(initial, Equilibrium):
+        return
+    if any(end.holds_twist or end.gives_axes for end in ends.both):  # as of every start
+        return
+    for i, section in enumerate(cable.sections):
+        bent = any((section.intrinsic_curvature or ())[:2])
+        if section.weakest_bending and (section.anisotropic or bent):
+            key = "bending_stiffness differs" if section.anisotropic else "intrinsic_curvature is given"
+            expected = f"equilibrium, because cable.sections[{i}].{key} about material axes that nothing turns at first"
+            fix = "clamp an end with `normal: [x, y, z]`, or begin with `equilibrium`"
+            yield Finding(("initial", "kind"), expected, fix, initial.kind)
+            return
+
+
 def _mesh_spans(cable: Cable, mesh: Mesh | None) -> Iterator[Finding]:
     if mesh is None or mesh.nodes is None:
         return
@@ -351,6 +373,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _touches_obstacles,
     _turns_are_held,
     _axes_are_given,
+    _axes_at_start_are_given,
     _mesh_spans,
     _layers_are_meshed,
     _output_on_cable,

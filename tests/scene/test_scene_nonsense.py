@@ -438,3 +438,25 @@ def test_a_scene_that_holds_itself_is_refused() -> None:
     scene["cable"] = {"sections": [scene]}
     with pytest.raises(SceneError, match="nested too deeply"):
         validate_scene(scene)
+
+
+@pytest.mark.parametrize("bends", [{"bending_stiffness": [20.0, 8.0]}, {"intrinsic_curvature": [0.05, 0, 0]}])
+def test_a_start_that_is_no_rest_needs_the_direction_of_material_axes(bends: dict[str, Any]) -> None:
+    """Which a clamp with a normal gives, a rest finds, and a plane or a straight round line does not need."""
+    section = {"length": 12.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5, "bending_stiffness": 20.0}
+    section |= {"torsional_stiffness": 15.0}
+    scene = {
+        "environment": {"gravity": 9.81}, "cable": {"sections": [section | bends]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free"}},
+        "initial": {"kind": "straight", "direction": [1, 0, 0]}, "model": "rod", "mesh": {"cells": 12},
+        "time": {"duration": 1.0, "step": 0.1},
+    }  # fmt: skip
+    with pytest.raises(SceneError, match="material axes that nothing turns"):
+        validate_scene(scene)
+    clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": [0, 1, 0]}
+    for allowed in (
+        scene | {"initial": "equilibrium"},
+        scene | {"ends": scene["ends"] | {"start": clamp}},
+        scene | {"cable": {"sections": [section]}},
+    ):
+        validate_scene(allowed)

@@ -78,8 +78,6 @@ def order(coarse: float, fine: float) -> float:
     return math.log2(coarse / fine)
 
 
-STRAIGHT = {"kind": "straight", "direction": (1, 0.2, -0.3)}
-
 # --- derivatives -----------------------------------------------------------------------------------
 
 SECTION = {
@@ -143,7 +141,9 @@ def test_hand_written_derivatives(name: str, moving: bool) -> None:
     rng = np.random.default_rng(7)
     start, end, zones = LINES[name]
     cells = 2 * len(zones)
-    line = line_of(scene([SECTION, STIFFER], start, end, zones, cells, 9.0, fluid=WATER, initial=STRAIGHT))
+    line = line_of(
+        scene([SECTION, STIFFER], start, end, zones, cells, 9.0, fluid=WATER, initial={"kind": "equilibrium"})
+    )
     y = random_fields(line, rng)
     problem = random_problem(line, y, rng) if moving else Problem(line)
     if moving:  # frames and positions follow from spins and velocities
