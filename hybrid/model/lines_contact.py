@@ -56,17 +56,23 @@ def touching_of(system: System, scenes: Mapping[str, Scene]) -> Touching | None:
     for a, b in pairs:
         for j, k in ((place[a], place[b]), (place[b], place[a])):
             meets[j, k], friction[j, k] = 1, system.contact.friction
-    free = {name: 1 + k for k, name in enumerate((*system.points, *system.bodies))}
-    joined = np.zeros((len(lines), 2), np.int64)
     for j, k in enumerate(lines):
         line, scene = system.lines[names[k]], scenes[names[k]]
         reach = self_reach(scene)
         if reach.asked or reach.may:
             meets[j, j], friction[j, j] = 1, line.contact.friction
+    return Touching(tuple(lines), meets, friction, joined_ends_of(system)[lines])
+
+
+def joined_ends_of(system: System) -> NDArray[np.int64]:
+    """(L, 2) what the ends of lines are joined to, a free point or body by number; 0: what is held or moved."""
+    free = {name: 1 + k for k, name in enumerate((*system.points, *system.bodies))}
+    joined = np.zeros((len(system.lines), 2), np.int64)
+    for k, line in enumerate(system.lines.values()):
         for end, point in enumerate((line.start, line.end)):
             found = system.points[point]
             if isinstance(found, FreePoint):
-                joined[j, end] = free[point]
+                joined[k, end] = free[point]
             elif isinstance(found, Fairlead) and isinstance(system.bodies[found.body], FreeBody):
-                joined[j, end] = free[found.body]
-    return Touching(tuple(lines), meets, friction, joined)
+                joined[k, end] = free[found.body]
+    return joined

@@ -39,7 +39,8 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
         "control": run.loop.control(), "changes": run.changed,
         "quantities": run.quantities.checkpoint(), "rotations": run.rotations.last.copy(),
         "zones": run.zones.checkpoint() if run.zones is not None else {},
-        **({} if run.shared is None else {"contact": run.shared.checkpoint(run.t), "met": [list(x) for x in run.met]}),
+        "passed": sorted(list(x) for x in run.passed), "met": sorted(list(x) for x in run.met),
+        **({} if run.shared is None else {"contact": run.shared.checkpoint(run.t)}),
     }  # fmt: skip
 
 
@@ -51,6 +52,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         run.failures.again(saved["broken"])
     # It took members as at the first guess, and rotations were within half a turn of 0.
     older = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "rotations": run.rotations.last, "changes": 0}
+    older |= {"passed": [], "met": []}
     older["rho"] = run.system.require_time().rho_inf
     complete = "interval" in saved  # else steps ended at outputs
     older |= {"interval": 0.0, "worked": run.loop.worked[1, :, :SPRING]}
@@ -63,7 +65,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     if run.zones is not None or near:
         run.make_solver()
     template = checkpoint(run) | {"dry": None, "broken": None, "control": None}
-    template |= {name: None for name in ("contact", "met") if name in template}  # as many places as there were
+    template |= {name: None for name in ("contact", "met", "passed") if name in template}  # as many as there were
     saved = {"quantities": run.quantities.unknown(), **saved}  # nor did it keep ranges
     saved["quantities"] = run.quantities.of_today(saved["quantities"])
     saved["lines"] = of_today(saved.get("lines"), template["lines"])
@@ -85,6 +87,13 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     if not complete:
         for line in run.lines:
             line.impose_now()
+
+
+def _pairs(saved: Any) -> set[tuple[int, int]]:
+    """Numbers of lines, two each.  ValueError: that cannot be."""
+    if not (isinstance(saved, list) and all(isinstance(x, list) and len(x) == 2 for x in saved)):
+        raise ValueError("passed, met: pairs of numbers of lines were expected")
+    return {(int(a), int(b)) for a, b in saved}
 
 
 def _of(saved: Mapping[str, Any], name: str) -> Mapping[str, Any]:
@@ -136,9 +145,9 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
     run.loaded = found["loaded"]
     run.leg, run.dry, run.cpu = (found["leg"][0], found["leg"][1]), set(found["dry"]), found["cpu"]
     run.loop.take_control(found["control"])
+    run.passed, run.met = (_pairs(found[name]) for name in ("passed", "met"))
     if run.shared is not None:
         run.shared.restore(found["contact"], run.t)
-        run.met = {(int(a), int(b)) for a, b in found["met"]}
     run.state.bodies[:], run.solver.body_work[:, :SPRING] = found["bodies"], found["body_work"]
     run.loop.worked[0], run.loop.worked[1, :, :SPRING] = run.solver.body_work, found["worked"]
     run.quantities.restore(found["quantities"])

@@ -48,6 +48,7 @@ def _line_as(name: str, now: Model, later: Model, system: System, t: float) -> M
     line = line._replace(torsion=now.line.torsion)
     if now.line.bits & SELF_CONTACT:
         line = touching(line, system.lines[name].contact.friction)
+    later.sea.values.obstacles[:] = now.sea.values.obstacles  # as stiff as they were
     later.ends.go_on_from(now.ends, t)
     return replace(later, line=line)
 

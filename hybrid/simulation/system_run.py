@@ -33,6 +33,7 @@ from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import energy_gains_text
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.lines_contact import shared_of, tell_meetings
+from hybrid.simulation.lines_watch import LinesWatch, tell_passages
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import refused, require_same
@@ -168,6 +169,8 @@ class SystemRun:
                 line.diagnostics.begin()
         self.shared: SharedContact | None = None  # contact of lines with each other
         self.met: set[tuple[int, int]] = set()  # lines that have been said to touch
+        self.watch: LinesWatch | None = None  # whether others meet, between which no contact is computed
+        self.passed: set[tuple[int, int]] = set()  # and those that have been said to
         self.rotations = Rotations(system, self.model)
         self.quantities = SystemQuantities(system, scenes)
         if moves and target is not None:
@@ -330,6 +333,7 @@ class SystemRun:
     def gather_events(self) -> None:
         """Record the events of the lines, in the result of the system with their names, as they happened."""
         tell_meetings(self)
+        tell_passages(self)
         noted = [(x, f"line {line.name}: {x[-1]}") for line in self.lines for x in line.take_events()]
         for (t, s_a, s_b, kind, _), text in sorted(noted, key=lambda event: event[0][0]):
             self.recorder.event(t, s_a, s_b, kind, text)
@@ -462,12 +466,22 @@ class SystemRun:
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts, shared)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])
+        if self.moves and self.target is not None:
+            self._watch_lines()
         if self.zones is not None:
             self.zones.look_ahead()
         if self.loop.controlled:
             self.solver.allowed[:] = self.resolution.allowed
         self.loop.stir(self.model.members_of(self.solver.bodies))
         self._moved, self._loaded = [], np.nan
+
+    def _watch_lines(self) -> None:
+        """Look from now on whether lines meet between which no contact is computed."""
+        if self.watch is not None:
+            tell_passages(self)
+        self.watch = LinesWatch(self.system, self.model, self.passed, self.loop.clock)
+        if self.watch.is_needed:
+            self.loop.watch(*self.watch.attach(self.solver.line_tables))
 
     def _make_room(self, solver: SystemSolver) -> None:
         """Room for samples of the lines and bodies as they are."""
@@ -494,6 +508,9 @@ class SystemRun:
         for kind, text in self._notes:
             self.recorder.event(0.0, 0.0, 0.0, kind, text)
         self._settle(self.solver)
+        if self.watch is not None and self.watch.is_needed:
+            self.solver.look_at(self.state)
+            self.passed |= self.watch.begin(self.system)
         if self.zones is not None:
             self.zones.begin()
         if self.system.environment.waves is not None:

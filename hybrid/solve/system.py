@@ -205,6 +205,16 @@ class SystemSolver:
             )  # fmt: skip
             job.bind(touch=touch_system.address(touching.numbers), touch_table=touching.numbers)
 
+    @property
+    def line_tables(self) -> NDArray[np.int64]:
+        """(2, L, ..) jobs of all lines, of steps of even and of odd parity."""
+        return self._numbers
+
+    def look_at(self, states: SystemState) -> None:
+        """Let the jobs of even parity lead from states to the same."""
+        self.turns = None
+        self._bind_states(0, states, states)
+
     def _share(self, tables: NDArray[np.int64], shared: NDArray[np.int64]) -> None:
         """Lines that may touch each other do so; the last of them is asked, and goes into the tables of all contact."""
         found = self.shared
@@ -328,16 +338,14 @@ class SystemSolver:
     def _push(self, states: SystemState) -> dict[int, Floats]:
         """Forces (N+1, 3) N on lines that may touch each other, by number, in states at rest."""
         assert self.shared is not None
-        self.turns = None
-        self._bind_states(0, states, states)
+        self.look_at(states)
         self.shared.rest_energy(self.work)
         return self.shared.forces()
 
     def contact_energy(self, states: SystemState) -> float:
         """Energy, J, of contact of lines with each other in states at rest; infinite: they are in each other."""
         assert self.shared is not None
-        self.turns = None
-        self._bind_states(0, states, states)
+        self.look_at(states)
         return self.shared.rest_energy(self.work)
 
     # --- motion -------------------------------------------------------------------------------------

@@ -105,6 +105,10 @@ class SystemSteps:
             members=tables, with_members=np.array([*members], np.int64), stirrer=stir_members.address(tables[0])
         )  # fmt: skip
 
+    def watch(self, even: np.ndarray, odd: np.ndarray, watcher: int) -> None:
+        """After steps of even and odd parity this kernel looks whether lines have met; 0: none does."""
+        self._job.bind(watched_even=even, watched_odd=odd, watcher=watcher)
+
     @property
     def states(self) -> tuple[SystemState, SystemState]:
         """The state now, and the other one, before the last step."""

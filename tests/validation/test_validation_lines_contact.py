@@ -5,6 +5,7 @@ Forces of crossing ropes: cosseratbench 0.3.0 (recomputed); of crossing fibres: 
 
 from __future__ import annotations
 
+import re
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,14 @@ import pytest
 
 import hybrid
 from hybrid.errors import SceneError
+from hybrid.kernels.junctions.lines_distance import APART, HAVE_MET
+from hybrid.model.system import build_system
+from hybrid.simulation.lines_watch import LinesWatch
+from hybrid.simulation.system_start import joined_lines
+from hybrid.solve.joined import SystemState
+from hybrid.solve.system import SystemSolver
 from tests.simulation.test_system_contact import HOSE, system
+from tests.validation.test_validation_obstacles_of_lines import system_of
 from tests.validation.thrown_lines import WIDTH as D
 from tests.validation.thrown_lines import Throw, straight, throw
 
@@ -240,6 +248,71 @@ def test_a_line_beside_others_touches_itself_as_alone(hose: Any) -> None:
     beside = hybrid.run(tables, progress=False).lines["hose"]
     for name in ("position", "tension", "self_contact", "work/friction"):
         np.testing.assert_allclose(beside[name], hose[name], atol=1e-9 * np.abs(hose[name]).max())
+
+
+# --- lines that pass through each other -------------------------------------------------------------------------
+
+PASSAGE = "lines pass through each other"
+
+
+def without_contact(**more: Any) -> Tables:
+    tables = lowered(0.8) | more
+    del tables["contact"]
+    return tables
+
+
+def test_lines_without_contact_do_not_pass_through_each_other_in_silence(moved: Any, tmp_path: Path) -> None:
+    """One event, when and where contact would have begun; a run that goes on says it no second time."""
+    hybrid.run(without_contact(), tmp_path / "half.h5")
+    told = [e for e in hybrid.resume(tmp_path / "half.h5", until=1.2).events if e.kind == PASSAGE]
+    met = next(e for e in moved.events if e.kind == "lines touch")
+    assert len(told) == 1
+    assert told[0].t == pytest.approx(met.t, abs=0.011)
+    assert re.search(r"lines upper and lower .* s = 0\.4\d* m of the one and 0\.5\d* m of the other", told[0].text)
+    assert "between: [[upper, lower]]" in told[0].text
+
+
+def test_a_passage_within_a_step_is_seen() -> None:
+    """Pins that come down by 20 diameters in three steps, of which no output falls on the passage."""
+    tables = without_contact(time={"duration": 0.4, "step": 0.05}, output={"points": 81, "every": 0.4})
+    tables["points"]["a"]["motion"] = tables["points"]["b"]["motion"] = {"travel": {"by": [0, 0, -0.2], "over": 0.15}}
+    events = [e for e in hybrid.run(tables).events if e.kind == PASSAGE]
+    assert len(events) == 1
+    assert 0.0 < events[0].t < 0.3
+
+
+def test_lines_that_stay_apart_or_have_contact_are_not_said_to_pass(moved: Any) -> None:
+    apart = without_contact(time={"duration": 0.1, "step": 0.02})
+    for events in (hybrid.run(apart).events, moved.events):
+        assert PASSAGE not in {e.kind for e in events}
+
+
+def test_the_distance_of_lines_is_that_of_their_cells() -> None:
+    """Against all pairs of cells, of random polygons at rest."""
+    random = np.random.default_rng(5)
+    tables = without_contact()
+    model = build_system(system_of(tables))
+    watch = LinesWatch(system_of(tables), model, set(), np.zeros(64))
+    solver = SystemSolver(joined_lines(model, 0.0), 0)
+    watch.attach(solver.line_tables)
+    for _ in range(5):
+        states = SystemState([x.start.copy() for x in model.models], model.body_places)
+        for x in states.lines:
+            x.r[:] += 0.05 * random.normal(size=3) + 0.01 * random.normal(size=x.r.shape)
+            x.r[:, 2] *= 0.3
+        watch._room[0, APART] = 0.0  # of another shape
+        solver.look_at(states)
+        watch.begin(system_of(tables))
+        apart = float(watch._room[0, APART])
+        p, q = (x.r for x in states.lines)
+        a, b = (np.concatenate([(1 - x) * r[:-1] + x * r[1:] for x in np.linspace(0, 1, 21)]) for r in (p, q))
+        least = np.sqrt(((a[:, None] - b[None]) ** 2).sum(axis=2)).min() - 2 * RADIUS
+        if apart > 0.0:  # else they have met, and are looked at no longer; sides are sampled every 0.6 mm
+            assert apart == pytest.approx(least, abs=3e-4)
+            assert apart <= least + 1e-12
+        else:
+            assert least < 0.0 or apart == 0.0
+        watch._pairs[0, HAVE_MET] = 0
 
 
 # --- what is refused --------------------------------------------------------------------------------------------

@@ -127,11 +127,14 @@ class StepsJob(NamedTuple):
     worked: Floats  # (3, B, WORK) of bodies: now, before the last step, before the step before
     members: NDArray[np.int64]  # (M, ..) tables of kernels.junctions.members_water.MembersJob, of bodies with members
     with_members: NDArray[np.int64]  # (M,) and which bodies these are
+    watched_even: NDArray[np.int64]  # of a kernels.junctions.lines_distance.LinesJob, after a step of `even`
+    watched_odd: NDArray[np.int64]
     solver: int = 0  # address of kernels.run.system.solve_system
     marcher: int = 0  # of the kernel that solves a step of one line
     book: int = 0  # of book_system_step
     sampler: int = 0  # of sample_system
     stirrer: int = 0  # of kernels.junctions.members_water.stir_members; 0: no body has members
+    watcher: int = 0  # of kernels.junctions.lines_distance.watch_lines; 0: no two lines are watched
 
 
 def no_loads() -> tuple[Floats, Floats]:
@@ -147,12 +150,13 @@ def blank_steps_job() -> StepsJob:
     return StepsJob(
         none, none, none, none, none, lone, none, clock, counts, np.zeros(3), none, none, log, *no_loads(),
         np.zeros(0), np.zeros((1, 1, BODY_SAMPLE)), np.zeros((3, 1, WORK)), lone, none,
+        none, none,
     )  # fmt: skip
 
 
 read_steps = reader(blank_steps_job())
 call_step, call_book = caller((0, 0, 0.0, 0, 0)), caller(0)
-call_sample, call_stir = caller(0), caller(0)
+call_sample, call_stir, call_watch = caller(0), caller(0), caller(0)
 
 
 @inner
@@ -312,6 +316,11 @@ def accept(steps, system):
         row[7], row[8] = pull(report, 0), pull(report, 1)
         steps.seen[l] = watch_itself(job, job.new)
         flags |= job.books.counts[FLAGS] | steps.seen[l]
+    if steps.watcher != 0:  # the parity is that of the next step
+        watched = steps.watched_odd
+        if counts[PARITY]:
+            watched = steps.watched_even
+        call_watch(steps.watcher, watched)
     counts[ROWS] += 1
     counts[WASTED], counts[FLAGS], counts[PHASE] = 0, flags, SAMPLE
 

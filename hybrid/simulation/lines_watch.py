@@ -1,0 +1,98 @@
+"""Lines of a system that come nearer to each other than their radii, where no contact between them is computed."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.junctions.lines_distance import (
+    AT,
+    HAVE_MET,
+    MOVED,
+    OTHER,
+    ROOM,
+    TIME,
+    WATCHED,
+    blank_lines_job,
+    watch_lines,
+)
+from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.state.state import Floats
+from hybrid.model.lines_contact import joined_ends_of
+from hybrid.model.system import SystemModel
+from hybrid.scene.system import System
+from hybrid.simulation.self_watch import diameters
+
+if TYPE_CHECKING:
+    from hybrid.simulation.system_run import SystemRun
+
+
+def watched_pairs(system: System, model: SystemModel) -> list[tuple[int, int]]:
+    """Numbers of lines, two each, that have diameters, and between which no contact is computed."""
+    thick = [k for k, x in enumerate(model.models) if (diameters(x) > 0.0).all()]
+    touching = model.touching
+    return [(a, b) for a, b in combinations(thick, 2) if touching is None or b not in touching.partners(a)]
+
+
+class LinesWatch:
+    """What looks after every step whether two of such lines have met."""
+
+    def __init__(self, system: System, model: SystemModel, met: set[tuple[int, int]], clock: Floats) -> None:
+        """met: lines of which it is known; clock: of the run."""
+        self._pairs = np.array([(*x, x in met) for x in watched_pairs(system, model)], np.int64).reshape(-1, WATCHED)
+        self._room = np.zeros((len(self._pairs), ROOM))
+        width = [diameters(x) for x in model.models]
+        begins = np.concatenate([[0], np.cumsum([x.size for x in width])[:-1]]).astype(np.int64)
+        self._bound = {
+            "joined": joined_ends_of(system), "begins": begins, "width": np.concatenate(width), "clock": clock,
+            "pairs": self._pairs, "room": self._room, "moved": np.zeros((len(width), MOVED)),
+        }  # fmt: skip
+        self._jobs = Table(blank_lines_job), Table(blank_lines_job)
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether there is anything that may still meet."""
+        return bool(len(self._pairs)) and not self._pairs[:, HAVE_MET].all()
+
+    def attach(self, tables: NDArray[np.int64]) -> tuple[np.ndarray, np.ndarray, int]:
+        """Tables for both parities and the address of the kernel; tables: (2, L, ..) jobs of the lines."""
+        for job, numbers in zip(self._jobs, tables, strict=True):
+            job.bind(tables=numbers, **self._bound)
+        even, odd = self._jobs
+        return even.numbers, odd.numbers, watch_lines.address(even.numbers)
+
+    def begin(self, system: System) -> set[tuple[int, int]]:
+        """Look at the start, to which the jobs of even parity lead; lines that meet at a point or body and lie in each
+
+        other there, by a narrow angle, are returned: of these nothing is said.
+        """
+        watch_lines(self._jobs[0].numbers)
+        lines = list(system.lines.values())
+        ends = [{system.body_of(p) or p for p in (x.start, x.end)} for x in lines]
+        return {(a, b) for a, b, *_ in self.met() if any(x is y or x == y for x in ends[a] for y in ends[b])}
+
+    def met(self) -> list[tuple[int, int, float, float, float]]:
+        """Lines that have met, two each: numbers, when (s), and at which arc lengths (m)."""
+        return [
+            (int(a), int(b), float(row[TIME]), float(row[AT]), float(row[OTHER]))
+            for (a, b, has), row in zip(self._pairs, self._room, strict=True)
+            if has
+        ]
+
+
+def tell_passages(run: SystemRun) -> None:
+    """An event for every two lines that have met without contact, when they do first."""
+    for a, b, t, s, other in sorted(run.watch.met() if run.watch is not None else (), key=lambda x: x[2]):
+        if (a, b) in run.passed:
+            continue
+        run.passed.add((a, b))
+        one, two = run.model.names[a], run.model.names[b]
+        text = (
+            f"lines {one} and {two} are nearer to each other than their radii, at s = {s:.4g} m of the one and "
+            f"{other:.4g} m of the other, and pass through each other: contact: {{between: [[{one}, {two}]]}} keeps "
+            "them apart"
+        )
+        run.recorder.event(t, 0.0, 0.0, "lines pass through each other", text)
