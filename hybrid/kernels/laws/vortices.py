@@ -52,8 +52,8 @@ LIFT_A, LIFT_B, DIAMETER, CENTER, LOW, HIGH, RAMP, OFFSET = range(8)
 PHASE, MEAN_V, MEAN_A, SHARE = range(4)
 # Periods of shedding, of the frequency USUAL |u|/D, over which means are taken.
 PERIODS, USUAL = 8.0, 0.17
-# Of the speed of the flow: a motion below it is none.
-STILL = 1e-6
+# Of the speed of the flow: a motion far below it has no phase, or round-off would decide how vortices begin.
+STILL, LEAST = 1e-3, 0.1
 
 split = inner(split_velocity)
 
@@ -87,10 +87,7 @@ def frequency(law, i, phase, v, a, mean_v, mean_a, speed):
     usual = 2.0 * math.pi * law[i, CENTER] * speed / law[i, DIAMETER]  # 1/s
     x = v / max(math.sqrt(mean_v), STILL * speed)
     y = -a / max(math.sqrt(mean_a), STILL * speed * usual)
-    size = math.sqrt(x * x + y * y)
-    if not size > 0.0:
-        return law[i, CENTER]
-    S = (y * math.cos(phase) - x * math.sin(phase)) / size
+    S = (y * math.cos(phase) - x * math.sin(phase)) / max(math.sqrt(x * x + y * y), LEAST)
     return law[i, CENTER] + S * (law[i, HIGH] - law[i, CENTER] if S > 0.0 else law[i, CENTER] - law[i, LOW])
 
 
