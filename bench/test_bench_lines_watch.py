@@ -1,0 +1,95 @@
+"""What it costs to look after every step whether lines meet; random throws of lines that touch each other.
+
+python -m pytest bench/test_bench_lines_watch.py -m bench -n 0 -q -s
+"""
+
+from __future__ import annotations
+
+import os
+import time as clock
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.simulation import lines_watch
+from tests.validation.thrown_lines import WIDTH, straight, throw
+
+pytestmark = pytest.mark.bench
+
+LINES, CELLS, RUNS = 20, 100, 5
+THROWS = int(os.environ.get("HYBRID_THROWS", "100"))
+
+
+def hanging(gap: float, **more: Any) -> dict[str, Any]:
+    """Lines side by side, every other one of which goes up and down at one end; gap: m between them."""
+    section = {"length": 12.0, "mass": 2.0, "diameter": 0.05, "axial_stiffness": 1e5, "damping": {"mass": 0.2}}
+    points: dict[str, Any] = {}
+    for k in range(LINES):
+        points[f"a{k}"] = {"position": [0, gap * k, 0]}
+        points[f"b{k}"] = {"position": [10, gap * k, 0]}
+        if k % 2 == 0:
+            points[f"a{k}"]["motion"] = {"heave": {"amplitude": 0.2, "period": 1.0}, "ramp": 1.0}
+    lines = {
+        f"l{k}": {
+            "start": f"a{k}",
+            "end": f"b{k}",
+            "sections": [section],
+            "model": "catenary",
+            "mesh": {"cells": CELLS},
+        }
+        for k in range(LINES)
+    }
+    time, output = {"duration": 4.0, "step": 0.02}, {"every": 1.0, "points": 11}
+    return {"points": points, "lines": lines, "time": time, "output": output} | more
+
+
+def cpu(tables: dict[str, Any]) -> float:
+    begin = clock.process_time()
+    hybrid.run(tables).close()
+    return clock.process_time() - begin
+
+
+def test_watching_that_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    tables = hanging(1.0)
+    cpu(tables)  # compiles
+    on, off = [], []
+    for _ in range(RUNS):
+        on.append(cpu(tables))
+        with monkeypatch.context() as patch:
+            patch.setattr(lines_watch, "watched_pairs", lambda *_: [])
+            off.append(cpu(tables))
+    print(f"\n{LINES} lines of {CELLS} cells: watched {min(on):.3f} s, not {min(off):.3f} s, {min(on) / min(off):.3f}")
+    assert min(on) < 1.1 * min(off)
+
+
+def test_random_throws() -> None:
+    """Two to four lines, one above the other across each other, fly together at 2 to 20 m/s in steps of 0.3 to 10 diameters.
+
+    Prints how many gain energy, come nearer than 0.9 and 0.5 diameters (of polygons), or fail.
+    """
+    gains, near, through, failed, met = 0, 0, 0, 0, 0
+    for seed in range(THROWS):
+        random = np.random.default_rng(seed)
+        count, speed = int(random.integers(2, 5)), float(np.exp(random.uniform(np.log(2.0), np.log(20.0))))
+        step, friction = float(np.exp(random.uniform(np.log(0.3), np.log(10.0)))), random.uniform(0.0, 0.6)
+        shapes, speeds = [], []
+        for k in range(count):
+            angle = np.pi * k / count + random.uniform(-0.2, 0.2)
+            middle = np.append(0.1 * random.normal(size=2), 3.0 * WIDTH * k)
+            shapes.append(straight(1.0, middle, np.array([np.cos(angle), np.sin(angle), 0.0]), 40))
+            speeds.append(np.tile(np.append(0.2 * speed * random.normal(size=2), -speed * k), (41, 1)))
+        try:
+            found = throw(shapes, speeds, step * WIDTH / speed, 20.0 * WIDTH / speed * max(1.0, step), friction)
+        except AssertionError:
+            failed += 1
+            continue
+        met += bool(found.shared.met())
+        gains += max(found.energies) > 1.001 * found.energies[0]
+        near, through = near + (found.least < 0.9 * WIDTH), through + (found.least < 0.5 * WIDTH)
+    print(
+        f"\n{THROWS} throws: {met} touch, {failed} fail, {gains} gain energy, {near} nearer than 0.9 D, {through} than 0.5 D"
+    )
+    assert failed == through == 0
+    assert gains <= 0.01 * THROWS
