@@ -112,6 +112,7 @@ EVENTS_BY_WEIGHT = (
     "finer run not kept",
     "end force between outputs",
     "line meets itself",
+    "lines pass through each other",
     "contact given up",
     "steps collapse",
     "loop can form",
@@ -155,8 +156,8 @@ LIMIT_EVENTS = {
 }
 # Changes of zones: part of a normal run.
 ZONE_EVENTS = ("split", "grow", "merge", "shrink", "retry")
-# All kinds that are part of a normal run: changes of zones, what `resume`, `release_at` or `ramp` was asked for.
-EXPECTED = (*ZONE_EVENTS, "loads change", "end released", "motion blended in")
+# All kinds that are part of a normal run: changes of zones, what `resume`, `release_at`, `ramp` or `contact` asks for.
+EXPECTED = (*ZONE_EVENTS, "loads change", "end released", "motion blended in", "lines touch")
 # Kinds that, noted at t = 0, are of the whole run and not of its start.
 OF_THE_RUN = frozenset({
     "implausible", "accuracy missed", "no error figure", "error uncertain", "several equilibria", "not converged",
