@@ -75,8 +75,9 @@ from hybrid.store.stored_rows import MissingRows
 STALLED = 0.8
 # Processor time, s, after which runs are not made finer for what they miss: a longer wait should be asked for.
 MOST_CPU = 600.0
-# Processor time, s, after which an equilibrium is not made finer; it takes milliseconds.
-CPU_AT_REST = 5.0
+# Cells from which on an equilibrium is not made finer: it takes seconds.  No clock, by which the first scene of a run,
+# while code is compiled, and one beside others would be less accurate than the same again.
+CELLS_AT_REST = 20_000
 # How much finer a run of an irregular motion may be made: chance is soon more than cells and steps are.
 IRREGULAR_FINER = 2.0
 # A run that is hardly finer is not made of it: what it changes is chance.
@@ -464,7 +465,7 @@ class ErrorController:
         most = MOST_REFINEMENTS if self.moves else REFINEMENTS_AT_REST
         left = (IRREGULAR_REFINEMENTS if self.irregular else most) + 1 - self._judged
         stalls = falls > STALLED or (left > 0 and verdict.ratio * falls**left > 1.0)
-        hopeless = left <= 0 or (stalls if self.moves else sum(self.runs) > CPU_AT_REST)
+        hopeless = left <= 0 or (stalls if self.moves else run.cells >= CELLS_AT_REST)
         along = self.asked.asks("curvature") or self.asked.asks("bending_moment")
         sharp = run.unresolved and self.free.mesh and (along or not self.irregular)  # else at the instant of a snap
         met = verdict.ratio <= 1.0 and not sharp
