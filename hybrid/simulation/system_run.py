@@ -482,6 +482,8 @@ class SystemRun:
         self.watch = LinesWatch(self.system, self.model, self.passed, self.loop.clock)
         if self.watch.is_needed:
             self.loop.watch(*self.watch.attach(self.solver.line_tables))
+        else:
+            self.loop.watch_nothing()  # its tables are of the watch before, which is gone
 
     def _make_room(self, solver: SystemSolver) -> None:
         """Room for samples of the lines and bodies as they are."""

@@ -109,6 +109,10 @@ class SystemSteps:
         """After steps of even and odd parity this kernel looks whether lines have met; 0: none does."""
         self._job.bind(watched_even=even, watched_odd=odd, watcher=watcher)
 
+    def watch_nothing(self) -> None:
+        """Look after no pair of lines."""
+        self._job.bind(watcher=0)
+
     @property
     def states(self) -> tuple[SystemState, SystemState]:
         """The state now, and the other one, before the last step."""
