@@ -24,9 +24,12 @@ WIDTH = 0.02
 
 
 def led_through(**more: Any) -> dict[str, Any]:
-    """A line hangs between two ends in a plane; one is led sideways through the other leg."""
+    """A line hangs between two ends in a plane; one is led sideways through the other leg.
+
+    Its cells show how weight bends it: else an event says so, which has another place among the others after a stop.
+    """
     section = {
-        "length": 4.0, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e4, "bending_stiffness": 1.3e-3,  # its cells show how weight bends it
+        "length": 4.0, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e4, "bending_stiffness": 1.3e-3,
         "damping": {"mass": 1.0},
     }  # fmt: skip
     across = {"travel": {"by": [-1.2, 0, 0], "over": 4.0}}
