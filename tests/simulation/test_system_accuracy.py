@@ -98,6 +98,7 @@ def test_a_stopped_run_goes_on_bit_for_bit(
 ) -> None:
     monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
     monkeypatch.setattr(reports, "REPORT_EVERY", -1.0)
+    monkeypatch.setattr(hybrid.accuracy.refinement, "LITTLE", np.inf)  # an event that goes by clocks
     path = tmp_path / "stopped.h5"
 
     def stop(progress: reports.Progress) -> None:
