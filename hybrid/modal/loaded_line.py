@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
+from hybrid.kernels.laws.bending_law import RIGID, parts_without_spring
 from hybrid.kernels.state.forces import BODIES, DRAG, WAVES
 from hybrid.kernels.state.state import Floats, Line, Sea
 from hybrid.modal.drag import HARMONIC, across, along
@@ -157,6 +158,11 @@ class LoadedLine:
         first /= np.maximum(np.linalg.norm(first, axis=1), 1e-300)[:, None]
         axes = np.stack([first, np.cross(t, first)], axis=1)
         kappa = np.einsum("fni,nki->fnk", change, axes)
+        for k in np.flatnonzero(self.line.element[[0, -1]]):  # what an angular spring turns is no bend of the line
+            part, along = parts_without_spring(self.line, int(k) * (len(size) - 1), float(size[-k] * length[-k]))
+            if part < RIGID:
+                size[-k] *= part
+                kappa[:, -k] *= (along, part)
         return LineResponse(
             self.line.s.copy(), 0.5 * (self.line.s[1:] + self.line.s[:-1]), self.omegas / (2.0 * np.pi), q[:, :, 1:4],
             q[:, 1:, 0], kappa[:, :, 0], kappa[:, :, 1], state.r.copy(), state.T.copy(), size,

@@ -10,7 +10,7 @@ from math import inf
 from hybrid.errors import OF_AN_END
 from hybrid.kernels.laws.obstacles import STIFFNESS
 from hybrid.kernels.mesh.criteria import CRITERIA
-from hybrid.kernels.state.forces import DRAG, FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state.forces import BENDING_LAW, DRAG, FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION, VORTICES
 from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.mesh import Zone
 from hybrid.model.obstacles import obstacle_rows
@@ -177,7 +177,7 @@ def _idle(scene: Scene, line: Line) -> Iterator[Entry]:
     """That there is a current, but nothing of this line has drag."""
     fluid, carried = scene.environment.fluid, (*scene.cable.attachments, *scene.ends.bodies().values())
     flows = fluid is not None and fluid.flows()
-    if flows and not line.bits & DRAG and not any(getattr(x, "drag_area", 0.0) for x in carried):
+    if flows and not line.bits & (DRAG | VORTICES) and not any(getattr(x, "drag_area", 0.0) for x in carried):
         why = "no section, body or member has drag: add `drag: {normal: 1.2}` to a section, or `drag_area`"
         yield Entry(IDLE, False, f"{why} to what it carries", event="ignored")
 
@@ -199,8 +199,9 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
     entries.append(Entry("axial compliance", any(extensible), "sections[].axial_stiffness"))
     if any(x.tension_strain is not None for x in scene.cable.sections):
         entries.append(Entry("tension over strain by a table", True, "sections[].tension_strain"))
-    if any(x.moment_curvature is not None for x in scene.cable.sections):
-        entries.append(Entry("moment over curvature by a table", True, "sections[].moment_curvature"))
+    if line.bits & BENDING_LAW:
+        why = "sections[].moment_curvature, cable.attachments of kind bend_restrictor"
+        entries.append(Entry("moment over curvature by a table", True, why))
     if any(x.dynamic_stiffness is not None for x in scene.cable.sections):
         entries.append(Entry("stiffness that depends on speed and mean tension", True, "sections[].dynamic_stiffness"))
     if "rod" in kinds:

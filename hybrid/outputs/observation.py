@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.laws.bending_law import RIGID
 from hybrid.kernels.march.link import link_of
 from hybrid.kernels.march.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.kernels.state.report import (
@@ -35,7 +36,7 @@ from hybrid.kernels.watch.observed_outputs import observed
 from hybrid.outputs.local_means import means_beside, means_on_line
 from hybrid.outputs.moments import across, node_tangents, node_torques, passed_torques
 from hybrid.outputs.output_grid import Grid
-from hybrid.outputs.strains import bend_directions, ends_of, strains
+from hybrid.outputs.strains import bend_directions, ends_of, part_without_spring, strains
 from hybrid.outputs.touchdown import Touchdown, carried, contact_pressure, penetration, sinking, touchdown
 from hybrid.outputs.vectors import cross, size
 from hybrid.solve.bending_corrector import Shift
@@ -226,11 +227,14 @@ class Observation:
         """Tangent (3, nb) of the line at the clamp at end k, not normalized; as `watch.extremes.beyond_spring`."""
         t, d = self.batch.frame[:, k, 2::3].T, self.at_end(self.d, k)
         part = 0.5 * self.at_end(self.cell_lengths, k) / self.at_end(self.of_line("hn", slice(None)), k)
-        if part.min() > 1.0 - 1e-9:
+        if part.min() > RIGID:
             return t
         angle = np.arccos(np.clip((t * d).sum(axis=0), -1.0, 1.0))
+        if self.line.bend_law.size:
+            n = len(self.d)
+            part = part_without_spring(self, k * n, k * (n - 1), angle)
         between = np.sin(part * angle) * t + np.sin((1.0 - part) * angle) * d
-        return np.where((part > 1.0 - 1e-9) | (angle < 1e-6), t, between)
+        return np.where((part > RIGID) | (angle < 1e-6), t, between)
 
     def _borne_by_bending(self, shift: Shift) -> Floats:
         """Tension (n sides, nb), N, that a catenary has and the rod in its place has not: M^2/(2 EI) of an elastica,

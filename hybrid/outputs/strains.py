@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.laws.bending_law import LAST_A, LAST_B, curvature_under
+from hybrid.kernels.laws.bending_law import LAST_A, LAST_B, RIGID, curvature_under, parts_without_spring
 from hybrid.kernels.march.zone_torque import TORQUE
 from hybrid.kernels.state.forces import PLANAR
 from hybrid.kernels.state.state import Floats, Line
@@ -106,6 +106,8 @@ def _end_rods(view: Observation, out: Floats, spans: Integers) -> None:
     if held.size:
         part = line.hn[at.node[held]] / (0.5 * line.h[at.cell[held]])
         out[at.row[held], 1] *= part[:, None]
+        for k in held[part > 1.0 / RIGID]:
+            out[at.row[k], 0] = _beside_spring(view, int(at.node[k]), int(at.cell[k]))
     if line.tension_twist.size:
         beside = np.where(at.cell == at.node, at.cell + 1, at.cell - 1)
         some = np.flatnonzero(np.tile(spans[:, 1] - spans[:, 0] > 1, 2))
@@ -146,6 +148,23 @@ def _twist_to_node(view: Observation, cell: Integers, inner: Integers) -> Floats
     h, T = view.line.h, view.T
     more = (T[cell] - T[inner]) * (h[cell] / (h[cell] + h[inner]))[:, None]
     return np.asarray((2.0 * view.line.tension_twist[cell] / h[cell])[:, None] * more)
+
+
+def part_without_spring(view: Observation, node: int, cell: int, bend: Floats) -> Floats:
+    """Part (outputs,) of the bend (outputs,) rad at an end that the line has, and an angular spring has not."""
+    line = view.line
+    if line.bend_law.size:
+        return np.array([parts_without_spring(line, node, float(x))[0] for x in bend])
+    found = 0.5 * view.cell_lengths[cell] / view.of_line("hn", node)
+    return np.broadcast_to(found, bend.shape)
+
+
+def _beside_spring(view: Observation, node: int, cell: int) -> Floats:
+    """Curvature (outputs,) of the cell beside a clamp with an angular spring."""
+    natural = view.of_line("k0", node)[:2]
+    bend = view.element_strains[node, :2] - natural
+    bend = natural + part_without_spring(view, node, cell, np.hypot(*bend)) * bend
+    return np.asarray(np.hypot(*bend) / (0.5 * view.cell_lengths[cell]))
 
 
 def _bend_by_table(line: Line, inner: Integers, side: Integers, moment: Floats, plain: Floats) -> Floats:

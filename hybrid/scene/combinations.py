@@ -233,6 +233,15 @@ def _moment_tables(tables: Tables) -> Iterator[Place]:
     yield from _attached("bend_restrictor")(tables)
 
 
+def _tables_beside_two_stiffnesses(tables: Tables) -> Iterator[Place]:
+    cable: Cable | None = tables.get("cable")
+    sections = cable.sections if cable is not None else ()
+    for i, section in enumerate(sections):
+        beside = (*sections[max(i - 1, 0) : i], *sections[i + 1 : i + 2])
+        if section.moment_curvature and any(x.anisotropic for x in beside):
+            yield "cable", "sections", i, "moment_curvature"
+
+
 def _swivels_beside(of: Callable[[Section], Any]) -> Callable[[Tables], Iterator[Place]]:
     """Swivels in or beside a section of which `of` is true."""
 
@@ -359,6 +368,8 @@ MOMENT_TABLE = Feature("moment over curvature by a table, bend restrictors", "mo
                        _moment_tables)  # fmt: skip
 VORTICES = Feature("vortex-induced vibration", "vortices", _in_sections("vortices", of=lambda x: x.vortices))
 RESTRICTOR = Feature("bend restrictors", "attachments: kind: bend_restrictor", _attached("bend_restrictor"))
+TABLE_BESIDE = Feature("a section with a table of moment over curvature beside one of two bending stiffnesses",
+                       "moment_curvature", _tables_beside_two_stiffnesses)  # fmt: skip
 STIFFNESS_DAMPING = Feature("damping proportional to stiffness", "damping.stiffness",
                             _in_sections("damping", "stiffness",
                                          of=lambda x: x.damping is not None and x.damping.stiffness))  # fmt: skip
@@ -435,6 +446,12 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         RESTRICTOR, TWO_STIFFNESSES, "not worked out", "a table of moment is the same about any axis ({key})",
         "a section of one bending_stiffness", "give one number there",
+    ),
+    Refusal(
+        TABLE_BESIDE, TWO_STIFFNESSES, "not worked out",
+        "a table of moment is the same about any axis, and the section beside it is not ({key})",
+        "sections of one bending_stiffness beside it",
+        "give one number there, or put a short section with one bending_stiffness between them",
     ),
     Refusal(
         ROTARY_INERTIA, MOVING_ZONES, "not worked out",

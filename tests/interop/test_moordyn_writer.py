@@ -149,6 +149,14 @@ def test_what_moordyn_has_not_is_refused(change: dict[str, Any], where: str, say
     assert where in {c.where for c in refused.value.complaints} and says in str(refused.value)
 
 
+def test_lift_of_vortices_is_named() -> None:
+    (made,) = import_moordyn(FOLDER / "chain.txt").scenes.values()
+    data = made.scene.model_dump(mode="json", exclude_none=True)
+    data["cable"]["sections"][0]["vortices"] = {}
+    (note,) = deck_of(Straight(hybrid.validate_scene(data))).notes
+    assert note.startswith("cable.sections[0].vortices is left out")
+
+
 def test_currents_and_waves_are_named(tmp_path: Path) -> None:
     (made,) = import_moordyn(FOLDER / "chain.txt").scenes.values()
     data = made.scene.model_dump(mode="json", exclude_none=True)

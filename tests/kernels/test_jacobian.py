@@ -137,20 +137,25 @@ def residual_at(line, sea, ends, st, x):
     return assembled(line, sea, ends, s, work.u)[1]
 
 
+def by_differences(line, sea, ends, st):
+    """The Jacobian by differences of fourth order; rows of unknowns that are not there are replaced by the identity."""
+    size, t = 5 * (N + 1), 1e-4
+    numeric = np.zeros((size, size))
+    for j in range(size):
+        x = np.zeros(size)
+        x[j] = t
+        f = [residual_at(line, sea, ends, st, (k * x).reshape(-1, 5)) for k in (-2, -1, 1, 2)]
+        numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
+    identity = [0] + [5 * i + 4 for i in range(N + 1) if i == N or not line.spin[i]]
+    numeric[identity, identity] = 1.0
+    return numeric
+
+
 @pytest.mark.parametrize(("zones", "bits"), list(itertools.product(ZONES, BITS)))
 def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
     line, sea, ends, st = random_case(3, ZONES[zones], bits)
     J, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
-    numeric = np.zeros_like(J)
-    t = 1e-4
-    for j in range(J.shape[1]):
-        x = np.zeros(J.shape[1])
-        x[j] = t
-        f = [residual_at(line, sea, ends, st, (k * x).reshape(-1, 5)) for k in (-2, -1, 1, 2)]
-        numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
-    exact = J.copy()
-    identity = [0] + [5 * i + 4 for i in range(N + 1) if i == N or not line.spin[i]]
-    numeric[identity, identity] = 1.0  # rows of unknowns that are not there are replaced by the identity
+    numeric, exact = by_differences(line, sea, ends, st), J.copy()
     for i in range(N):
         if line.spin[i]:
             soft = line.kb[i, 2] * line.element[i] + line.kb[i + 1, 2] * line.element[i + 1]
@@ -177,18 +182,11 @@ def with_tables(line):
 @pytest.mark.parametrize("bits", [0, STIFFNESS_DAMPING, LAND])
 @pytest.mark.parametrize("seed", [3, 8])
 def test_jacobian_of_tables_of_moment(seed, bits):
-    """Between the points of the tables the derivative is exact, and moments are those of the energy."""
+    """Between the points of the tables the derivative is exact."""
     line, sea, ends, st = random_case(seed, ZONES["rod"], bits)
     line = with_tables(line)
     J, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
-    numeric, t = np.zeros_like(J), 1e-4
-    for j in range(J.shape[1]):
-        x = np.zeros(J.shape[1])
-        x[j] = t
-        f = [residual_at(line, sea, ends, st, (k * x).reshape(-1, 5)) for k in (-2, -1, 1, 2)]
-        numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
-    identity = [0, 5 * N + 4]
-    numeric[identity, identity] = 1.0
+    numeric = by_differences(line, sea, ends, st)
     assert np.abs(J - numeric).max() < 1e-6 * np.abs(J).max()
 
 
@@ -201,14 +199,7 @@ def test_jacobian_of_lift(zones, bits):
     line = line._replace(wake_law=g.uniform(0.5, 1.5, (N + 1, 8)))
     st = st._replace(wake=g.uniform(-1.0, 1.0, (N + 1, 4)))
     J, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
-    numeric, t = np.zeros_like(J), 1e-4
-    for j in range(J.shape[1]):
-        x = np.zeros(J.shape[1])
-        x[j] = t
-        f = [residual_at(line, sea, ends, st, (k * x).reshape(-1, 5)) for k in (-2, -1, 1, 2)]
-        numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
-    identity = [0] + [5 * i + 4 for i in range(N + 1) if i == N or not line.spin[i]]
-    numeric[identity, identity] = 1.0
+    numeric = by_differences(line, sea, ends, st)
     assert np.abs(J - numeric).max() < 1e-6 * np.abs(J).max()
 
 
@@ -220,14 +211,7 @@ def test_jacobian_of_swivels(where, bits):
     line.kb[where] = [0.7, 0.7, 0.0]
     line.k0[where] = 0.0
     J, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
-    numeric, t = np.zeros_like(J), 1e-4
-    for j in range(J.shape[1]):
-        x = np.zeros(J.shape[1])
-        x[j] = t
-        f = [residual_at(line, sea, ends, st, (k * x).reshape(-1, 5)) for k in (-2, -1, 1, 2)]
-        numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
-    identity = [0, 5 * N + 4]
-    numeric[identity, identity] = 1.0
+    numeric = by_differences(line, sea, ends, st)
     assert np.abs(J - numeric).max() < 1e-6 * np.abs(J).max()
 
 

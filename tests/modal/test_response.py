@@ -157,6 +157,32 @@ def test_spectrum_and_extremes():
     np.testing.assert_allclose(single.most_probable("tension"), math.sqrt(2.0) * single.deviation("tension"), rtol=1e-9)
 
 
+@pytest.mark.parametrize(
+    "law", [{"bending_stiffness": 1e4}, {"moment_curvature": [[0, 0], [1e-3, 90], [5e-3, 200], [1, 2e4]]}]
+)
+@pytest.mark.parametrize("spring", [None, 2e4, 1e-3])
+def test_a_slow_motion_bends_a_sprung_clamp_as_equilibria_do(law, spring):
+    """Curvature of the line, without what its angular spring turns, by the height of the other end."""
+    section = {"length": 8, "mass": 30, "diameter": 0.1, "axial_stiffness": 1e7} | law
+    clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}
+    clamp |= {"bend_stiffness": spring} if spring is not None else {}
+
+    def scene(z, **more):
+        end = {"kind": "pinned", "position": [7, 0, 3 + z]} | more
+        return {
+            "environment": {"fluid": {"density": 1000}}, "cable": {"sections": [section]},
+            "ends": {"start": clamp, "end": end}, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 40},
+            "contact": {"self": False}, "time": {"duration": 10, "step": 0.05}, "output": {"points": 3},
+        }  # fmt: skip
+
+    low, rest, high = (hybrid.static(scene(z)).curvature[0, 0] for z in (-1e-3, 0.0, 1e-3))
+    heave = {"heave": {"amplitude": 1e-3, "period": 400.0}, "ramp": 800}
+    found = hybrid.response(scene(0.0, motion=heave)).lines["cable"]
+    assert found.mean_curvature[0] == pytest.approx(rest, rel=1e-3)
+    assert abs(found.curvature[0, 0]) == pytest.approx(0.5 * abs(high - low), rel=1e-3)
+    assert abs(found.curvature[0, 0]) > 1e-12
+
+
 def test_where_it_is_not_valid():
     motion = {"heave": {"amplitude": 1.5, "period": 4.0}, "ramp": 10.0}
     found = hybrid.response(hung(motion=motion, end=(30, 0, -20)))

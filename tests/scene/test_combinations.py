@@ -43,6 +43,11 @@ PAID: dict[str, Any] = {END + "payout": {"rate": 0.1, "ramp": 1.0}}
 MOVING = {"model": {"kind": "adaptive"}}
 FOLLOWING = {"model": {"kind": "adaptive", "curvature_error": 0.05}}
 TWO = {SECTION + "bending_stiffness": [10, 20], END + "normal": [0, 1, 0]}
+_HALF = {key: x for key, x in CABLE["cable"]["sections"][0].items() if key != "bending_stiffness"} | {"length": 5}
+TABLE_BESIDE_TWO = {
+    "cable.sections": [_HALF | {"bending_stiffness": [10, 20]}, _HALF | {"moment_curvature": [[0, 0], [1, 10]]}],
+    END + "normal": [0, 1, 0],
+}
 CURVED = {SECTION + "intrinsic_curvature": [0.01, 0, 0]}
 ROPE = {SECTION + "dynamic_stiffness": {"constant": 2e6, "relaxation_time": 100}}
 SHEDS: dict[str, Any] = {SECTION + "vortices": {}, "environment.fluid": {"density": 1025, "current": [0.3, 0, 0]}}
@@ -54,6 +59,7 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.RESTRICTOR, c.TWO_STIFFNESSES): (
         TWO | {"cable.attachments": [{"kind": "bend_restrictor", "range": [0, 2], "radius": 2}]}, ""
     ),
+    (c.TABLE_BESIDE, c.TWO_STIFFNESSES): (TABLE_BESIDE_TWO, ""),
     (c.ROTARY_INERTIA, c.MOVING_ZONES): ({SECTION + "rotary_inertia": 1e-3} | MOVING, ""),
     (c.TORSION, c.PLANE): (TORQUE | {"dimension": 2}, ""),
     (c.PLANE, c.SELF_CONTACT): ({"dimension": 2, "contact": {"self": True}}, ""),

@@ -143,6 +143,36 @@ def test_elements_between_tables_have_one_moment() -> None:
     assert d > M / 2e4  # the spring has turned by that much
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("name", ["softens", "locks"])
+def test_a_spring_at_a_clamp_turns_and_the_line_bends_by_its_table(name: str, dimension: int) -> None:
+    """One moment turns the spring and bends the line: curvature, its envelope, and the tangent that the tension is along."""
+    scene = taut(160, TABLES[name], dimension=dimension)
+    scene["ends"]["start"]["bend_stiffness"] = 2e4
+    found = hybrid.static(scene)
+    M = float(found.bending_moment[0, 0])
+    own = float(np.interp(M, *np.array(TABLES[name], float).T[::-1]))
+    assert own > 0.25
+    assert found.curvature[0, 0] == pytest.approx(own, rel=1e-9)
+    assert found.envelope["curvature_max"].max() == pytest.approx(own, rel=1e-9)
+    assert found.tension[0, 0] == pytest.approx(PULL * cos(ANGLE - M / 2e4), rel=1e-9)
+    assert found.envelope["tension_max"][0] == pytest.approx(found.tension[0, 0], rel=1e-9)
+
+
+def test_an_unloaded_line_has_its_own_curvature_beside_a_spring() -> None:
+    section = {
+        "length": LENGTH, "mass": 1, "bending_stiffness": 1e4, "torsional_stiffness": 1e4,
+        "intrinsic_curvature": [0.05, 0, 0],
+    }  # fmt: skip
+    scene = taut(40, None) | {"cable": {"sections": [section]}}
+    scene["ends"] = {"start": scene["ends"]["start"] | {"bend_stiffness": 2e4}, "end": "free"}
+    found = hybrid.static(scene)
+    assert found.curvature[0] == pytest.approx([0.05] * 2, rel=1e-6)
+    assert found.envelope["curvature_max"] == pytest.approx(
+        np.full(found.envelope["curvature_max"].shape, 0.05), rel=1e-6
+    )
+
+
 CABLE = {
     "length": 12, "mass": 2.0, "axial_stiffness": 1e5, "torsional_stiffness": 15,
     "moment_curvature": [[0, 0], [0.05, 1.0], [0.15, 2.0], [0.3, 8.0]],

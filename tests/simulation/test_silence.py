@@ -271,9 +271,9 @@ def idle_notes(result: hybrid.Result) -> list[str]:
 
 
 @pytest.mark.parametrize("clump", [{}, {"drag_area": 0.1}])
-@pytest.mark.parametrize("drag", [{}, {"drag": {"normal": 1.2}}])
+@pytest.mark.parametrize("drag", [{}, {"drag": {"normal": 1.2}}, {"vortices": {}}])
 def test_a_current_that_acts_on_nothing_says_so(drag, clump):
-    """In the plan and in the result; not where the section or what it carries has drag."""
+    """In the plan and in the result; not where the section or what it carries has drag, or sheds vortices."""
     wire = {"length": 10.0, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e6, **drag}
     data = {
         "environment": CURRENT,

@@ -349,6 +349,8 @@ class _Writer:
         damping = section.damping
         if damping is not None and damping.mass:
             self.notes.append(f"{where}.damping.mass is left out: MoorDyn has none")
+        if section.vortices is not None:
+            self.notes.append(f"{where}.vortices is left out: lines of the deck shed no vortices")
         if section.weakest_bending:
             self.notes.append("MoorDyn has no torsion")
         drag = (section.drag.normal, section.drag.tangential) if section.drag is not None else (0.0, 0.0)

@@ -37,6 +37,8 @@ from hybrid.kernels.state.forces import BENDING_LAW
 FIRST_A, LAST_A, HALF_A, FIRST_B, LAST_B, HALF_B, GIVE = range(7)
 # Columns of Line.bend_table: curvature, 1/m; moment, N m; energy per length from the first point on, J/m.
 CURVATURE, MOMENT, ENERGY = range(3)
+# Part of the bend at a clamp that is the line's, above which it has no angular spring.
+RIGID = 1.0 - 1e-9
 
 
 @inner
@@ -116,6 +118,20 @@ def curvature_under(line, i, side, M):
     if not law[i, half + HALF_A] > 0.0:  # both halves are of one table
         half = FIRST_A + FIRST_B - half
     return half_cell(line.bend_table, law, i, half, M)[0] / law[i, half + HALF_A]
+
+
+@kernel
+def parts_without_spring(line, i, x):
+    """Of the element at an end of a line, bent by the size x (rad): the part of its bend that is not that of an angular
+
+    spring, and the part of a small change of it.
+    """
+    if not has_bend_law(line, i):
+        part = 0.5 * line.h[min(i, line.h.shape[0] - 1)] / line.hn[i]
+        return part, part
+    secant, more, _ = shares_of_stiffness(line, i, x)
+    turns = line.bend_law[i, GIVE] / bend_under(line.bend_table, line.bend_law, i, 0.0)[1]
+    return 1.0 - turns * secant, 1.0 - turns * (secant + more)
 
 
 @inner

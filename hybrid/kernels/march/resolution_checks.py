@@ -6,7 +6,7 @@ import math
 
 from hybrid.kernels.algebra.plane import angle_between, chord2, end_chord, row_in_plane, stiffness_about_normal
 from hybrid.kernels.algebra.rotations import frame, get3, get9
-from hybrid.kernels.laws.bending_law import moment_share
+from hybrid.kernels.laws.bending_law import RIGID, moment_share, parts_without_spring
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import strain_of_element
 from hybrid.kernels.laws.tension_torque import rest_strain
@@ -23,6 +23,12 @@ def strain_of(line, T, i, k, strains):
     strains[i, 0] = math.sqrt(k[0] * k[0] + k[1] * k[1]) / line.hn[i]
     x, y = line.kb[i, 0] * (k[0] - line.k0[i, 0]), line.kb[i, 1] * (k[1] - line.k0[i, 1])
     bend = math.sqrt((k[0] - line.k0[i, 0]) ** 2 + (k[1] - line.k0[i, 1]) ** 2)
+    if i == 0 or i == line.h.shape[0]:
+        part = parts_without_spring(line, i, bend)[0]
+        if part < RIGID:
+            a = line.k0[i, 0] + part * (k[0] - line.k0[i, 0])
+            b = line.k0[i, 1] + part * (k[1] - line.k0[i, 1])
+            strains[i, 0] = math.sqrt(a * a + b * b) / (0.5 * line.h[min(i, line.h.shape[0] - 1)])
     strains[i, 1] = moment_share(line, i, bend) * math.sqrt(x * x + y * y)
     strains[i, 2] = line.kb[i, 2] * (k[2] - rest_strain(line, T, i)[2])
 
@@ -46,6 +52,10 @@ def sharpest_in_plane(line, ends, e, T, a1, strains):
             k, k0 = stiffness_about_normal(plane, a1, max(i - 1, 0), before if i > 0 else d, line.kb, line.k0, i)
             share = moment_share(line, i, abs(angle - k0))
             strains[i, 0], strains[i, 1] = x / line.hn[i], share * abs(k * (angle - k0))
+            if i == 0 or i == n:
+                part = parts_without_spring(line, i, abs(angle - k0))[0]
+                if part < RIGID:
+                    strains[i, 0] = abs(k0 + part * (angle - k0)) / (0.5 * line.h[min(i, n - 1)])
         if i == 0 or i == n:
             c = min(i, n - 1)
             stiffness = max(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]

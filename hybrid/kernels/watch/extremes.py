@@ -15,7 +15,14 @@ import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, frame, get3, get9, scale, sub
 from hybrid.kernels.laws.bed import bed_under
-from hybrid.kernels.laws.bending_law import bending_at, curvature_under, damped_bending_at, has_bend_law
+from hybrid.kernels.laws.bending_law import (
+    RIGID,
+    bending_at,
+    curvature_under,
+    damped_bending_at,
+    has_bend_law,
+    parts_without_spring,
+)
 from hybrid.kernels.laws.cell import chord, turning
 from hybrid.kernels.laws.seabed import pressure
 from hybrid.kernels.laws.tension_torque import rest_strain
@@ -72,14 +79,12 @@ def second_cell(h, marks, k):
 
 
 @inner
-def beyond_spring(t, d, part):
-    """Tangent of the line at a clamp with tangent t: between it and the chord d, if an angular spring turns as well.
-
-    part: of the turn from t to d that the half cell bends by; 1 without a spring.
-    """
+def beyond_spring(t, d, line, i):
+    """Tangent of the line at a clamp with tangent t: between it and the chord d, if an angular spring at node i turns."""
     cosine = min(max(dot(t, d), -1.0), 1.0)
     angle = math.acos(cosine)
-    if part > 1.0 - 1e-9 or angle < 1e-6:
+    part = parts_without_spring(line, i, angle)[0]
+    if part > RIGID or angle < 1e-6:
         return t
     return add(scale(math.sin(part * angle), t), scale(math.sin((1.0 - part) * angle), d))
 
@@ -96,7 +101,7 @@ def end_tension(line, ends, state, report, loaded, marks, k):
     t = sub(scale(1.5, d), scale(0.5, d2))
     if line.element[k * n]:
         R = get9(ends.frame, k)
-        t = beyond_spring((R[2], R[5], R[8]), d, 0.5 * line.h[first] / line.hn[k * n])
+        t = beyond_spring((R[2], R[5], R[8]), d, line, k * n)
     at = FORCE_A + 3 * k
     return (1.0 - 2.0 * k) * dot((report[at], report[at + 1], report[at + 2]), t) / math.sqrt(dot(t, t))
 
