@@ -158,9 +158,9 @@ class LoadedLine:
         first /= np.maximum(np.linalg.norm(first, axis=1), 1e-300)[:, None]
         axes = np.stack([first, np.cross(t, first)], axis=1)
         kappa = np.einsum("fni,nki->fnk", change, axes)
-        for k in np.flatnonzero(self.line.element[[0, -1]]):  # what an angular spring turns is no bend of the line
-            part, along = parts_without_spring(self.line, int(k) * (len(size) - 1), float(size[-k] * length[-k]))
-            if part < RIGID:
+        for k in (0, 1):  # what an angular spring turns is no bend of the line
+            part, along = parts_without_spring(self.line, k * (len(size) - 1), float(size[-k] * length[-k]))
+            if self.line.element[-k] and part < RIGID:
                 size[-k] *= part
                 kappa[:, -k] *= (along, part)
         return LineResponse(
