@@ -79,5 +79,7 @@ def tell_meetings(run: SystemRun) -> None:
             continue
         told.add((a, b))
         names = run.model.names
-        text = f"line {names[a]} touches line {names[b]}: at s = {s:.4g} m of the one, {other:.4g} m of the other"
+        text = (
+            f"line {names[a]} touches line {names[b]}: at s = {s:.4g} m of {names[a]}, s = {other:.4g} m of {names[b]}"
+        )
         run.recorder.event(t, 0.0, 0.0, "lines touch", text)

@@ -1,4 +1,4 @@
-"""Lines of a system that come nearer to each other than their radii, where no contact between them is computed."""
+"""Lines of a system that overlap, their centrelines nearer than the mean of their diameters, without contact."""
 
 from __future__ import annotations
 
@@ -91,8 +91,8 @@ def tell_passages(run: SystemRun) -> None:
         run.passed.add((a, b))
         one, two = run.model.names[a], run.model.names[b]
         text = (
-            f"lines {one} and {two} are nearer to each other than their radii, at s = {s:.4g} m of the one and "
-            f"{other:.4g} m of the other, and pass through each other: contact: {{between: [[{one}, {two}]]}} keeps "
-            "them apart"
+            f"lines {one} and {two} pass through each other: no contact between them is computed, and at s = {s:.4g} m "
+            f"of {one} and s = {other:.4g} m of {two} their centrelines are nearer than the mean of their diameters; "
+            f"contact: {{between: [[{one}, {two}]]}} keeps them apart"
         )
         run.recorder.event(t, 0.0, 0.0, "lines pass through each other", text)

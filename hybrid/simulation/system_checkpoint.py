@@ -146,6 +146,7 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
     run.leg, run.dry, run.cpu = (found["leg"][0], found["leg"][1]), set(found["dry"]), found["cpu"]
     run.loop.take_control(found["control"])
     run.passed, run.met = (_pairs(found[name]) for name in ("passed", "met"))
+    run.watch_lines()  # what has met since has not
     if run.shared is not None:
         run.shared.restore(found["contact"], run.t)
     run.state.bodies[:], run.solver.body_work[:, :SPRING] = found["bodies"], found["body_work"]

@@ -60,6 +60,7 @@ def change_loads_of_lines(run: SystemRun, system: System) -> None:
         line.write_down()
     run.gather_events()  # in the order in which they happen
     run.system, run.model = system, loaded_as(run.model, system, run.t)
+    run.loaded = run.t  # loads that end now, or would have ended before, act no more
     run.start_from(run.rest)
     for line, model in zip(run.lines, run.model.models, strict=True):
         line.follow(model)

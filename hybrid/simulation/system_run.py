@@ -466,8 +466,9 @@ class SystemRun:
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts, shared)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])
-        if self.moves and self.target is not None:
-            self._watch_lines()
+        if self.watch is not None:
+            tell_passages(self)
+        self.watch_lines()
         if self.zones is not None:
             self.zones.look_ahead()
         if self.loop.controlled:
@@ -475,10 +476,10 @@ class SystemRun:
         self.loop.stir(self.model.members_of(self.solver.bodies))
         self._moved, self._loaded = [], np.nan
 
-    def _watch_lines(self) -> None:
-        """Look from now on whether lines meet between which no contact is computed."""
-        if self.watch is not None:
-            tell_passages(self)
+    def watch_lines(self) -> None:
+        """Look from now on which lines overlap without contact, beside those that are known to."""
+        if not self.moves or self.target is None:
+            return
         self.watch = LinesWatch(self.system, self.model, self.passed, self.loop.clock)
         if self.watch.is_needed:
             self.loop.watch(*self.watch.attach(self.solver.line_tables))

@@ -47,6 +47,28 @@ def test_a_load_that_ends_is_a_load_that_is_changed(model: str, tmp_path: Path) 
         assert np.ptp(at[:, 0]) > 1e-3
 
 
+@pytest.mark.parametrize("start", [1.0, 2.0])
+def test_a_force_on_a_body_that_has_ended_stays_ended(start: float, tmp_path: Path) -> None:
+    """A body that swings after it was pulled for 1 s: another force until then, given at 1 s or later, never acts."""
+    section = {"length": 10, "mass": 2, "diameter": 0.05, "axial_stiffness": 1e6, "damping": {"mass": 0.2}}
+    scene = {
+        "points": {"top": {"position": [0, 0, 0]}, "eye": {"body": "lump", "place": [0, 0, 0]}},
+        "bodies": {"lump": {"initial_guess": [0, 0, -10], "mass": 500, "inertia": [10, 10, 10],
+                            "force": {"value": [800, 0, 0], "until": 1.0}}},
+        "lines": {"rope": {"start": "top", "end": "eye", "sections": [section], "model": "catenary", "mesh": {"cells": 8}}},
+        "time": {"duration": 3.0, "step": 0.02}, "output": {"every": 0.5},
+    }  # fmt: skip
+    hybrid.run(scene, tmp_path / "whole.h5").close()
+    settings = ["bodies.lump.force.value=[0, 3000, 0]"]
+    with (
+        hybrid.open(tmp_path / "whole.h5") as whole,
+        hybrid.resume(tmp_path / "whole.h5", tmp_path / "other.h5", settings=settings, start=start) as other,
+    ):
+        at, there = (x["bodies/lump/position"] for x in (whole, other))
+        assert np.abs(at - there).max() < 1e-4  # steps begin anew at 2 s
+        assert np.ptp(at[2:, 0]) > 0.05
+
+
 SCENES = {"spar": spar, "clamped": clamped, "adrift": adrift}
 
 
