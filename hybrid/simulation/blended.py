@@ -9,6 +9,8 @@ import numpy as np
 
 from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
+from hybrid.scene.end_loads import Triple
+from hybrid.scene.motion_tables import Motion
 from hybrid.scene.schema import Scene
 from hybrid.scene.vessel_record import motion_record
 from hybrid.simulation.events import EventLog
@@ -19,26 +21,33 @@ AT_REST = 1e-9  # m, deg, m/s or deg/s, below which a record starts at rest
 def note_blended(scene: Scene, events: EventLog) -> None:
     """An event for every motion file with a ramp: where it starts, how fast, and until when it is blended in."""
     for k, (name, end) in enumerate(scene.ends.named().items()):
-        motion = end.prescribed_motion
-        if motion is None or motion.file is None or motion.ramp is None:
+        held = end.held_tangent is not None
+        if text := blended_text(f"ends.{name}", end.prescribed_motion, end.held_position, held):
+            events.event(0.0, k * scene.length, k * scene.length, "motion blended in", text)
+
+
+def blended_text(where: str, motion: Motion | None, position: Triple | None, turns: bool) -> str:
+    """How the file of a motion begins, and until when it is blended in; empty: it has no file or no ramp.
+
+    position: m, of what moves; turns: whether it holds a direction.
+    """
+    if motion is None or motion.file is None or motion.ramp is None:
+        return ""
+    record, parts = motion_record(motion, position, turns), []
+    bases = (np.array(position or (0.0, 0.0, 0.0)), np.zeros(3))
+    for values, base, units in ((record.shift, bases[0], "m"), (record.rotation, bases[1], "deg")):
+        if values is None:
             continue
-        record, parts = motion_record(motion, end.held_position, end.held_tangent is not None), []
-        bases = (np.array(end.held_position or (0.0, 0.0, 0.0)), np.zeros(3))
-        for values, base, units in ((record.shift, bases[0], "m"), (record.rotation, bases[1], "deg")):
-            if values is None:
-                continue
-            first = np.array([np.interp(0.0, record.times, column) for column in values.T])
-            i = max(int(np.searchsorted(record.times, 0.0, side="right")) - 1, 0)
-            speed = np.linalg.norm((values[i + 1] - values[i]) / (record.times[i + 1] - record.times[i]))
-            for size, unit in ((float(np.linalg.norm(first - base)), units), (float(speed), f"{units}/s")):
-                parts += [f"{size:.4g} {unit}"] if size > AT_REST else []
-        begins = f"begins with {', '.join(parts)}" if parts else "begins at rest where the end is"
-        s = k * scene.length
-        text = (
-            f"the motion of ends.{name} in {record.name} {begins}: it is blended in over {motion.ramp:g} s (ramp), and "
-            "followed exactly from then on"
-        )
-        events.event(0.0, s, s, "motion blended in", text)
+        first = np.array([np.interp(0.0, record.times, column) for column in values.T])
+        i = max(int(np.searchsorted(record.times, 0.0, side="right")) - 1, 0)
+        speed = np.linalg.norm((values[i + 1] - values[i]) / (record.times[i + 1] - record.times[i]))
+        for size, unit in ((float(np.linalg.norm(first - base)), units), (float(speed), f"{units}/s")):
+            parts += [f"{size:.4g} {unit}"] if size > AT_REST else []
+    begins = f"begins with {', '.join(parts)}" if parts else "begins at rest where it is held"
+    return (
+        f"the motion of {where} in {record.name} {begins}: it is blended in over {motion.ramp:g} s (ramp), and "
+        "followed exactly from then on"
+    )
 
 
 def rotate_ends_in(

@@ -60,7 +60,7 @@ from hybrid.simulation.system_lines import WAITING, LineResult, LineStep
 from hybrid.simulation.system_load_change import change_loads_of_lines, loaded_as, with_loads_of
 from hybrid.simulation.system_points import Rotations, Sampled, fields_of, gauges_of, times, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
-from hybrid.simulation.system_start import begin_as_placed, equilibrium_of_system, joined_lines, named
+from hybrid.simulation.system_start import begin_as_placed, blended_of_lines, equilibrium_of_system, joined_lines, named
 from hybrid.simulation.system_zones import SystemZones, managers_for, zones_as_placed, zones_at_rest
 from hybrid.simulation.time_loop import SAME_STOP, WORK, apart, falls_on
 from hybrid.solve.joined import SystemState, SystemTaken
@@ -404,6 +404,8 @@ class SystemRun:
             self._make_room(solver)
             solver.keep_books([line.books for line in self.lines])
             solver.evaluate_forces(self.state, 0.0)
+            self.watch_lines()
+            self._look_for_overlaps()
             for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
                 line.note_equilibrium(x, state, None, self.found, self.turned)
             self.take_other()
@@ -478,13 +480,19 @@ class SystemRun:
 
     def watch_lines(self) -> None:
         """Look from now on which lines overlap without contact, beside those that are known to."""
-        if not self.moves or self.target is None:
+        if self.target is None:
             return
         self.watch = LinesWatch(self.system, self.model, self.passed, self.loop.clock)
         if self.watch.is_needed:
             self.loop.watch(*self.watch.attach(self.solver.line_tables))
         else:
             self.loop.watch_nothing()  # its tables are of the watch before, which is gone
+
+    def _look_for_overlaps(self) -> None:
+        """Look which lines overlap without contact in the first state."""
+        if self.watch is not None and self.watch.is_needed:
+            self.solver.look_at(self.state)
+            self.passed |= self.watch.begin(self.system)
 
     def _make_room(self, solver: SystemSolver) -> None:
         """Room for samples of the lines and bodies as they are."""
@@ -508,12 +516,11 @@ class SystemRun:
         elif not self.found.settled:
             refuse_within_itself(self.model, self.solver.lines, self.state, True)
         begin_where_near(self)
-        for kind, text in self._notes:
+        blended = [("motion blended in", text) for text in blended_of_lines(self.system) if text]
+        for kind, text in (*self._notes, *blended):
             self.recorder.event(0.0, 0.0, 0.0, kind, text)
         self._settle(self.solver)
-        if self.watch is not None and self.watch.is_needed:
-            self.solver.look_at(self.state)
-            self.passed |= self.watch.begin(self.system)
+        self._look_for_overlaps()
         if self.zones is not None:
             self.zones.begin()
         if self.system.environment.waves is not None:

@@ -13,10 +13,11 @@ from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
 from hybrid.kernels.state.forces import FRICTION
 from hybrid.kernels.state.state import Floats
 from hybrid.model.system import SystemModel, balanced_places, starts_between
-from hybrid.scene.points import Fairlead
+from hybrid.scene.bodies import FixedBody
+from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
-from hybrid.simulation.blended import rotate_ends_in
+from hybrid.simulation.blended import blended_text, rotate_ends_in
 from hybrid.simulation.equilibrium import count_turns, settling
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.system_contact_equilibrium import settle, solve_with_contact
@@ -167,6 +168,16 @@ def begin_as_placed(
         rotate_ends_in(scene, x, one, log, (joints[0] < 0, joints[1] < 0))
         stepper = Stepper(x.line, x.length, x.tension_scale)
         stepper.static_friction(x.sea.at(0.0), joined_ends(x.ends.at(0.0), joints), one)
+
+
+def blended_of_lines(system: System) -> Iterator[str]:
+    """Texts of simulation.blended.note_blended, of the points and bodies of several lines; empty ones of others."""
+    for name, point in system.points.items():
+        if isinstance(point, FixedPoint):
+            yield blended_text(f"points.{name}", point.motion, point.position, bool(system.clamped_at(name)))
+    for name, body in system.bodies.items():
+        if isinstance(body, FixedBody):
+            yield blended_text(f"bodies.{name}", body.motion, body.position, True)
 
 
 def named(failed: LineFailed, model: SystemModel, first: str = "") -> ComputationError:

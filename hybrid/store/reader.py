@@ -309,6 +309,7 @@ class Result(Histories):
             table = self["events"]
             rows = zip(*(table[k].tolist() for k in Event._fields if k in table), strict=True)
             events = [Event._make(None if x != x else x for x in row) for row in rows]  # NaN: there is none
+        events.sort(key=lambda e: e.t)  # those of outputs are written some steps later
         return [
             e._replace(kind=OLD_EVENTS.get(e.kind, e.kind), criterion=OLD_EVENTS.get(e.criterion, e.criterion))
             for e in events

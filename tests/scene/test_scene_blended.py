@@ -59,6 +59,24 @@ def test_a_run_says_how_it_is_blended_in(tmp_path: Path) -> None:
         np.testing.assert_allclose(end[:, 0], 3.2 + 0.5 * np.sin(W * t), rtol=0, atol=1e-5)
 
 
+def test_a_run_of_several_lines_says_it_of_points(tmp_path: Path) -> None:
+    """Of the point, once, whatever number of lines ends there."""
+    line = {
+        "sections": [{"length": 5.0, "mass": 0.5, "axial_stiffness": 1e4}],
+        "model": "catenary",
+        "mesh": {"cells": 5},
+    }
+    motion = {"file": table(tmp_path), "ramp": RAMP}
+    with hybrid.run({
+        "points": {"low": {"position": [0, 0, 0]}, "far": {"position": [6, 0, 0]},
+                   "eye": {"position": PLACE.tolist(), "motion": motion}},
+        "lines": {"one": line | {"start": "low", "end": "eye"}, "two": line | {"start": "eye", "end": "far"}},
+        "time": {"duration": 0.2, "step": 0.05},
+    }) as result:  # fmt: skip
+        (event,) = (e for e in result.events if e.kind == "motion blended in")
+        assert "points.eye" in event.text and "0.5385 m" in event.text and "over 5 s" in event.text
+
+
 @pytest.mark.parametrize(
     ("motion", "kink", "text"),
     [({}, False, r"the position of this end at the start[\s\S]*or give `ramp"), ({"ramp": 5.0}, True, "a smooth velocity"),

@@ -272,6 +272,39 @@ def test_lines_without_contact_do_not_pass_through_each_other_in_silence(moved: 
     assert "between: [[upper, lower]]" in told[0].text
 
 
+def test_lines_that_overlap_at_rest_are_said_to() -> None:
+    """Two ropes held straight across each other, half a diameter apart; and one and a half."""
+    line = {"sections": [ROPE | {"length": 0.79}], "model": "catenary", "mesh": {"cells": 40}}
+    tables = {"environment": {"gravity": 0}} | crossing(-RADIUS)
+    del tables["contact"], tables["lines"]["upper"]["initial"]
+    for name in tables["lines"]:
+        tables["lines"][name] = {x: tables["lines"][name][x] for x in ("start", "end")} | line
+    (event,) = (e for e in hybrid.static(tables).events if e.kind == PASSAGE)
+    assert event.t == 0.0
+    assert "s = 0.395 m of upper and s = 0.395 m of lower" in event.text
+    for name in ("a", "b"):
+        tables["points"][name]["position"][2] = 3.0 * RADIUS
+    assert PASSAGE not in {e.kind for e in hybrid.static(tables).events}
+
+
+def test_legs_of_a_bridle_are_no_passage() -> None:
+    """Two legs that meet at a point by 14 degrees: they overlap on the first four diameters alone."""
+    leg = {"sections": [ROPE | {"length": 0.79}], "model": "catenary", "mesh": {"cells": 80}, "contact": {"self": False}}
+    tables = {
+        "environment": {"gravity": 0}, "time": {"duration": 0.1, "step": 0.02}, "output": {"points": 5},
+        "points": {"a": {"position": [0, -0.1, 0]}, "b": {"position": [0, 0.1, 0]}, "c": {"position": [1.6, 0, 0]},
+                   "knot": {"kind": "free", "initial_guess": [0.8, 0, 0]}},
+        "lines": {"left": leg | {"start": "a", "end": "knot"}, "right": leg | {"start": "b", "end": "knot"},
+                  "tow": leg | {"start": "knot", "end": "c"}},
+    }  # fmt: skip
+    assert PASSAGE not in {e.kind for e in hybrid.run(tables).events}
+    model = build_system(system_of(tables))
+    watch, solver = LinesWatch(system_of(tables), model, set(), np.zeros(64)), SystemSolver(joined_lines(model, 0.0), 1)
+    watch.attach(solver.line_tables)
+    solver.look_at(SystemState([x.start for x in model.models], model.body_places))
+    assert not watch.begin(system_of(tables))  # they are looked at beyond the joint
+
+
 def test_a_passage_within_a_step_is_seen() -> None:
     """Pins that come down by 20 diameters in three steps, of which no output falls on the passage."""
     tables = without_contact(time={"duration": 0.4, "step": 0.05}, output={"points": 81, "every": 0.4})

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
-from hybrid.kernels.contact.self_contact_pairs import WINDOW
 from hybrid.kernels.contact.self_distance import NEIGHBOURS, least_on_the_way, nearest_feet
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
@@ -27,6 +26,9 @@ from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.job import read
 
 BOX = 8  # cells in a box
+# Of the width: way from line to line about a joint on which nothing is looked at; legs that leave it by 10 degrees or
+# more are apart beyond.
+JOINT = 12.0
 # Of `pairs`: lines, and whether they have met, 1, or not, 0.
 A, B, HAVE_MET, WATCHED = 0, 1, 2, 3
 # Of `room`: how far apart they were, m; M_a - M_b and R_a + R_b at that time; when they met, s, and where, m.
@@ -177,7 +179,7 @@ def search(job, row, a, b):
                 for j in range(second, min(second + BOX, m)):
                     width = 0.5 * (job.width[job.begins[a] + i] + job.width[job.begins[b] + j])
                     apart, x, y = cells_apart(one.old.r, one.new.r, two.old.r, two.new.r, i, j)
-                    if apart - width < best and not are_neighbours(job, a, b, line, other, i, j, WINDOW * width):
+                    if apart - width < best and not are_neighbours(job, a, b, line, other, i, j, JOINT * width):
                         best = apart - width
                         row[AT], row[OTHER] = line.s[i] + x * line.h[i], other.s[j] + y * other.h[j]
     row[APART] = best
