@@ -117,26 +117,17 @@ class Equilibrium(Table):
         return self
 
 
-Initial = Annotated[
+_Shape = (
     Annotated[Straight, Tag("<straight>")]
     | Annotated[Points, Tag("<points>")]
-    | Annotated[Equilibrium, Tag("<equilibrium>")],
-    Discriminator(by_kind),
-    Kinds(("straight", "points", "equilibrium"), usual=("equilibrium",)),
-]
+    | Annotated[Equilibrium, Tag("<equilibrium>")]
+)
+_SHAPES = ("straight", "points", "equilibrium")
+Initial = Annotated[_Shape, Discriminator(by_kind), Kinds(_SHAPES, usual=("equilibrium",))]
 
 # The same of a line of several, whose keys without a kind are of the search of the equilibrium.
-LineInitial = Annotated[
-    Annotated[Straight, Tag("<straight>")]
-    | Annotated[Points, Tag("<points>")]
-    | Annotated[Equilibrium, Tag("<equilibrium>")],
-    Discriminator(by_kind),
-    Kinds(
-        ("straight", "points", "equilibrium"),
-        usual=("equilibrium",),
-        implied=tuple((key, "equilibrium") for key in ("points", "guess", "direction", "friction")),
-    ),
-]
+_OF_SEARCH = tuple((key, "equilibrium") for key in ("points", "guess", "direction", "friction"))
+LineInitial = Annotated[_Shape, Discriminator(by_kind), Kinds(_SHAPES, usual=("equilibrium",), implied=_OF_SEARCH)]
 
 
 # --- which model where -------------------------------------------------------------------------

@@ -173,14 +173,16 @@ def _longer_lines(
     _refuse_what_is_no_later_time(until, reached, "hybrid.open(path).lines[name].at(t=...)")
     _refuse_before_changes(changes, until)
     every = output_interval(system)
+    other = tuple(LoadChange(x.t, _several(_text_until(x.scene, until, every))) for x in changes)
+    return _several(_text_until(system, until, every)), other
 
-    def other(system: System) -> System:
-        data = system.model_dump(mode="json", exclude_none=True)
-        data["time"]["duration"] = until
-        data.setdefault("output", {})["every"] = every
-        return _several(scene_text(type(system).model_validate(data)))
 
-    return other(system), tuple(LoadChange(x.t, other(x.scene)) for x in changes)
+def _text_until(scene: Scene | System, until: float, every: float) -> str:
+    """The text of a scene that ends at another time (s), with outputs every so many seconds."""
+    data = scene.model_dump(mode="json", exclude_none=True)
+    data["time"]["duration"] = until
+    data.setdefault("output", {})["every"] = every
+    return scene_text(type(scene).model_validate(data))
 
 
 def _check_lines(
@@ -261,19 +263,12 @@ def _longer(
     _refuse_what_is_no_later_time(until, reached, "hybrid.open(path).at(t=...)")
     _refuse_before_changes(changes, until)
     every = output_interval(scene)
-
-    def other(scene: Scene) -> Scene:
-        data = scene.model_dump(mode="json", exclude_none=True)
-        data["time"]["duration"] = until
-        data.setdefault("output", {})["every"] = every
-        return parse_scene(scene_text(Scene.model_validate(data)))
-
-    out, longest = other(scene), longest_out(scene)
+    out, longest = parse_scene(_text_until(scene, until, every)), longest_out(scene)
     if longest_out(out) > longest * (1.0 + SAME_PLACE):
         expected = f"a time up to which at most {longest:.6g} m are out, for which the result has points"
         fix = f"run the scene again with {winch_at(scene)}.longest"
         raise _refused("until", f"{until:g} s, when {longest_out(out):.6g} m are out", expected, fix)
-    return out, tuple(LoadChange(x.t, other(x.scene)) for x in changes)
+    return out, tuple(LoadChange(x.t, parse_scene(_text_until(x.scene, until, every))) for x in changes)
 
 
 def _check(last: LoadChange[Scene], changed: Scene, resolution: Resolution, begin: float, end: float) -> None:

@@ -289,7 +289,12 @@ def test_lines_that_overlap_at_rest_are_said_to() -> None:
 
 def test_legs_of_a_bridle_are_no_passage() -> None:
     """Two legs that meet at a point by 14 degrees: they overlap on the first four diameters alone."""
-    leg = {"sections": [ROPE | {"length": 0.79}], "model": "catenary", "mesh": {"cells": 80}, "contact": {"self": False}}
+    leg = {
+        "sections": [ROPE | {"length": 0.79}],
+        "model": "catenary",
+        "mesh": {"cells": 80},
+        "contact": {"self": False},
+    }
     tables = {
         "environment": {"gravity": 0}, "time": {"duration": 0.1, "step": 0.02}, "output": {"points": 5},
         "points": {"a": {"position": [0, -0.1, 0]}, "b": {"position": [0, 0.1, 0]}, "c": {"position": [1.6, 0, 0]},
