@@ -25,7 +25,7 @@ from hybrid.model.resolution import Resolution, for_motion, model_is_free, wants
 from hybrid.scene.schema import AdaptiveModel
 from hybrid.simulation.case import Case
 from hybrid.simulation.layer_mesh import layered
-from hybrid.simulation.mesh_survey import allowed, with_survey
+from hybrid.simulation.mesh_survey import lack_along, with_survey
 from hybrid.simulation.static_case import StaticCase
 
 
@@ -40,12 +40,12 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
     model, demand = survey.model, survey.demand
     gradings: dict[str, Grading] = {"rod": survey.grading(), "catenary": survey.grading_of_catenary}
     gradings["adaptive"] = gradings["rod"]
-    found = ratios(scene, model, demand, min(resolution.zones * model.length, allowed(scene, survey)))
+    found = ratios(scene, model, demand, resolution.zones * model.length, lack_along(scene, survey))
     rods, catenaries = (gradings[kind].count(0.0, model.length, resolution.fineness) for kind in ("rod", "catenary"))
     near = "it comes near itself, and contact of catenaries alone is not asked for" if case.came_near_itself else ""
     why_not = structural(scene, model.cable) or near or no_catenary(found, demand.s)
-    share = rod_share(model, demand, found)
-    each = costs(scene, model, (rods, catenaries, rods, rods), share, why_not)
+    share = rod_share(model, demand, found, gradings["rod"])
+    each = costs(scene, model, rods, catenaries, share, why_not)
     kind = cheapest(each).kind
     if kind != "rod":
         case.scene = with_model(scene, kind)

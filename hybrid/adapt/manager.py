@@ -16,9 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.adapt.user_criterion import FORCED_RATIO, NodeState, UserCriterion, cell_ratios
-from hybrid.adapt.zone_rules import OFF, ROUND_TIME, Rules, planned, reach, spread, tidied, wanted
+from hybrid.adapt.zone_rules import OFF, ROUND_TIME, Rules, planned, reach, spread, tidied, wanted, widen
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh import zone_step as z
+from hybrid.kernels.mesh.cell_lengths import FADE
 from hybrid.kernels.mesh.criteria import CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.mesh.stiffness_ramp import shares
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, evaluate_criteria
@@ -38,7 +39,7 @@ LOST_TENSION, WEIGHTLESS = (
     1e-3,
 )  # remaining part of a lost tension; tension floor over scale, no weight
 LONGEST_WAIT = 8.0  # hold times that a rod is kept below threshold, where earlier ones were released too soon
-SHORTEST = 2.0  # base cells that make a zone
+SHORTEST = 2  # cells that make a zone
 
 
 # What a checkpoint holds of the manager; the rest follows from the scene, the layout and the next step.
@@ -111,6 +112,8 @@ class DomainManager:
         curvature_error: float | None = None,
         asked: Mapping[int, float] = MappingProxyType({}),
         fineness: float = 1.0,
+        edge_time: float | None = None,
+        period: float = 0.0,
     ) -> None:
         """tolerance: m; given: (n,) 1 force_rod, -1 force_catenary, 0 adaptive; scale: tension scale, N.
 
@@ -118,7 +121,8 @@ class DomainManager:
         curvature_error: part of the largest curvature that the length of cells, which follow it, may make it wrong by;
         None: they stay as they are.  asked: parts of the largest tension, curvature and moment (numbers of
         mesh.cell_errors) that leaving bending out may make, where one is asked.  fineness: cells that follow the
-        curvature are so many times as short as that asks for.
+        curvature are so many times as short as that asks for.  edge_time: s, for which the way of a contact edge is
+        foreseen (None: pace).  period: s, the longest of the motion, over some of which its largest values count.
         """
         n = layout.rod.size
         self.cable, self.layout, self.dwell, self.given = cable, layout, dwell, given
@@ -134,6 +138,8 @@ class DomainManager:
         for quantity, part in asked.items():
             self.zones.asked[quantity] = part
         self.zones.clock[z.PACE] = self.pace
+        self.zones.clock[z.EDGE_TIME] = self.pace if edge_time is None else edge_time
+        self.zones.clock[z.MEMORY] = FADE * max(self.pace, period)
         self.zones.clamped[:] = cable.held_tangent
         self.seen = np.zeros((len(CRITERIA), n))  # ratios since the last output
         self.first = np.zeros((len(CRITERIA), n))  # largest ratios by which the first rods were chosen
@@ -214,7 +220,6 @@ class DomainManager:
         H, zones, cable = np.diff(layout.base), self.zones, self.cable
         of = cable.piece(0.5 * (layout.base[:-1] + layout.base[1:]))
         zones.parts[:], zones.H[:] = layout.parts, H
-        self.shortest = SHORTEST * float(np.median(H))
         zones.clock[z.COMPLIANCE] = np.sum(H / np.maximum(cable.B[of, 2], 1e-300))
         zones.clock[z.FREE_TWIST] = H @ cable.kappa[of, 2]
 
@@ -356,7 +361,7 @@ class DomainManager:
         rules = self.rules(state)
         asks = spread(wanted(self.ratios, np.zeros(n, bool)), self.layout.base, rules.buffer)
         self._reset_ratios()
-        return np.asarray(tidied(asks, asks, self.layout.base, rules.shortest) & (self.given >= 0))
+        return np.asarray(tidied(asks, asks, rules.shortest) & (self.given >= 0))
 
     def force_rods(self, cells: np.ndarray, why: str) -> Change:
         """Rods at once, whatever the criteria: after a failed step."""
@@ -384,7 +389,9 @@ class DomainManager:
         """The rules at the tensions of a state."""
         of, least = self.zones.kinds.base_of_cell, 1e-9 * self.scale
         reach(state.T, of, self.EI, self.w, self.floor, BUFFER, least, self.buffer)
-        return Rules(self.buffer, self.shortest, self.dwell)
+        if z.asks_layers(self.zones):
+            widen(self.buffer, self.zones.H)
+        return Rules(self.buffer, SHORTEST, self.dwell)
 
     def _add_global_ratios(self) -> None:
         """Ratios that are not local: forced rods, and torque, which needs rods from end to end."""

@@ -22,17 +22,17 @@ from hybrid.kernels.state.state import Floats
 class Rules(NamedTuple):
     """How zones are made of what is asked.
 
-    buffer: (n,) m, rod on either side of what asks for it; shortest: m, least length of a zone; dwell: s, how
-    long a rod must have been calm before it goes.
+    buffer: (n,) m, rod on either side of what asks for it; shortest: least cells of a zone; dwell: s, how long a rod
+    must have been calm before it goes.
     """
 
     buffer: Floats
-    shortest: float
+    shortest: int
     dwell: float
 
 
 OFF = np.array([x.off for x in CRITERIA])
-ROUND, ROUND_TIME = 1e-12, 1e-9  # of a length; of the pace of zones
+ROUND_BUFFER, ROUND_TIME = 1e-9, 1e-9  # of a length; of the pace of zones
 BACK = 0.5  # ratio above which a rod that is on its way out comes back
 
 
@@ -50,10 +50,10 @@ def spread(asks: np.ndarray, base: Floats, buffer: Floats) -> np.ndarray:
     return out
 
 
-def tidied(flags: np.ndarray, rod: np.ndarray, base: Floats, shortest: float) -> np.ndarray:
-    """No rod and no gap between rods shorter than `shortest`: rods widen, into what was rod first, and gaps close."""
+def tidied(flags: np.ndarray, rod: np.ndarray, shortest: int) -> np.ndarray:
+    """No rod and no gap between rods of less than `shortest` cells: rods widen, into what was rod first; gaps close."""
     out = flags.copy()
-    _tidy(out, rod, base, shortest, np.empty_like(out))
+    _tidy(out, rod, shortest, np.empty_like(out))
     return out
 
 
@@ -79,7 +79,7 @@ def planned(
     if leaving is not None:
         flags[0] = leaving
     wait = np.full(n, float(rules.dwell)) if patience is None else rules.dwell * patience
-    _plan(ratios, OFF, rod, calm, float(t), base, rules.buffer, float(rules.shortest), wait, flags)
+    _plan(ratios, OFF, rod, calm, float(t), base, rules.buffer, rules.shortest, wait, flags)
     return flags[3], calm
 
 
@@ -153,8 +153,17 @@ def _end(flags, a):
 
 
 @kernel
-def _tidy(flags, rod, base, shortest, before):
-    n, least = flags.size, shortest * (1.0 - ROUND)
+def widen(buffer, H):
+    """Buffers (n,) m reach over two cells on either side at least; H: (n,) m, lengths of cells."""
+    n = H.size
+    for j in range(n):
+        beside = max(H[max(j - 1, 0)], H[min(j + 1, n - 1)])
+        buffer[j] = max(buffer[j], beside * (1.0 + ROUND_BUFFER))
+
+
+@kernel
+def _tidy(flags, rod, shortest, before):
+    n = flags.size
     changed = True
     while changed:
         for j in range(n):
@@ -165,20 +174,20 @@ def _tidy(flags, rod, base, shortest, before):
             if before[a]:
                 # a rod grows on both sides, cell by cell; on one side only while only that one was rod
                 lo, hi = a, b
-                while base[hi] - base[lo] < least and (lo > 0 or hi < n):
+                while hi - lo < shortest and (lo > 0 or hi < n):
                     left, right = lo > 0, hi < n
                     if left and right and rod[lo - 1] != rod[hi]:
                         left, right = rod[lo - 1], rod[hi]
                     if left:
                         lo -= 1
-                    if right and base[hi] - base[lo] < least:
+                    if right and hi - lo < shortest:
                         hi += 1
                 flags[lo:hi] = True
             a = b
         a = 0
         while a < n:
             b = _end(flags, a)
-            if not flags[a] and a > 0 and b < n and base[b] - base[a] < least:
+            if not flags[a] and a > 0 and b < n and b - a < shortest:
                 flags[a:b] = True
             a = b
         changed = False
@@ -204,7 +213,7 @@ def _plan(ratios, off, rod, calm, t, base, buffer, shortest, wait, flags):
     _spread(asks, base, buffer, near)
     for j in range(n):
         out[j] = near[j] or (rod[j] and t - calm[j] < wait[j])
-    _tidy(out, rod, base, shortest, asks)
+    _tidy(out, rod, shortest, asks)
 
 
 # --- reviews without consequence --------------------------------------------------------------------
@@ -225,7 +234,7 @@ class ReviewJob(NamedTuple):
     calm: Floats  # (n,) s, as a plan would have it (written)
     wait: Floats  # (n,) s (written)
     flags: NDArray[np.bool_]  # (4, n) (written)
-    shortest: float  # m
+    shortest: int  # cells
     dwell: float  # s
     parts: float  # of the buffer
     light: float  # N/m
@@ -241,7 +250,7 @@ def blank_review_job() -> ReviewJob:
     rows = np.zeros((1, 1))
     return ReviewJob(
         whole, each, whole, each, rows, each, rows, each, each, each, each, flags,
-        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0,
+        0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0,
     )  # fmt: skip
 
 
@@ -300,6 +309,8 @@ def quiet_review(table):
         job.wait[j] = job.dwell * job.patience[j]
     state = run.new if run.counts[b.PARITY] else run.old
     reach(state.T, kinds.base_of_cell, kinds.EI, kinds.w, kinds.floor, job.parts, job.light, job.buffer)
+    if z.asks_layers(zones):
+        widen(job.buffer, zones.H)
     now = run.clock[b.NOW]
     _plan(ratios, job.off, zones.rod, job.calm, now, job.base, job.buffer, job.shortest, job.wait, job.flags)
     for j in range(n):

@@ -10,23 +10,22 @@ import numpy as np
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.material import Material, tension_floor
+from hybrid.model.mesh_grading import Grading
 from hybrid.model.resolution import accuracy_of, holds_stress
 from hybrid.model.run_time import step_time
 from hybrid.scene.accuracy import of_unnamed_model
 from hybrid.scene.schema import AdaptiveModel, CatenaryModel, RodModel, Scene
 
 MODELS = {"rod": RodModel, "catenary": CatenaryModel, "adaptive": AdaptiveModel}
-# Another model must cost less than this part of rods, which need no criterion and leave nothing out.  Zones that move
-# take shorter steps while they change, and more runs where they turn out too lax, which a pre-run does not show: in 31
-# random scenes predicted gains over rods were 0.6 to 2.6 times the measured ones, 1.05 in the median.
-CLEARLY = {"catenary": 0.9, "adaptive": 0.4}
+# Another model must cost less than this part of rods, which need no criterion and leave nothing out.
+CLEARLY = {"catenary": 0.9, "adaptive": 0.8}
 # Catenaries are a choice where criteria that count errors of position stay below 1, and that of slack below this: a
 # pre-run sees outputs alone.  What zones that move would hold as rods is above it in any of them.
 CALM = 0.25
 # Tensions below this part of the largest are those of a line that may go slack between two outputs of a pre-run.
 NEARLY_SLACK = 0.05
-# A clamp or a point load makes so many lengths sqrt(EI/T) a rod.
-DISTURBED = 4.0
+# A clamp or a point load makes so many lengths sqrt(EI/T) a rod, and what asks for it so many on either side of it.
+DISTURBED, WIDER = 4.0, 2.0
 
 
 # Kind of the event that says what was chosen, and what it is called there.
@@ -58,6 +57,7 @@ class Cost(NamedTuple):
     cells: int
     seconds: float
     why_not: str = ""
+    rods_of: float = 1.0  # part of the cells that is rod at some time
 
 
 class Demand(NamedTuple):
@@ -94,51 +94,66 @@ def structural(scene: Scene, cable: Material) -> str:
     return "it is curved without load" if cable.kappa.any() else ""
 
 
-def ratios(scene: Scene, model: Model, demand: Demand, tolerance: float) -> tuple[Floats, Floats, Floats]:
-    """Criteria bend, slack and edge (K,) of docs/zones.md, from extremes; tolerance: m."""
+def ratios(scene: Scene, model: Model, demand: Demand, tolerance: float, along: Floats) -> tuple[Floats, ...]:
+    """Criteria bend, slack and edge (K,) of docs/zones.md, from extremes, and what is asked along the line.
+
+    tolerance: m; along: (K,) what catenaries lack of that.
+    """
     cable = model.cable
     piece = cable.piece(demand.s)
     EI, w = cable.mean_bending[piece], np.abs(cable.submerged_weight[piece])
     low = np.maximum(demand.least, 1e-9 * model.tension_scale)
     slack = np.maximum(tension_floor(EI, w, model.tension_scale), CALM * NEARLY_SLACK * demand.largest.max()) / low
     edge = EI * w / (low * low * tolerance) if scene.environment.seabed is not None else 0.0 * low
-    return EI * demand.bent / tolerance, slack, edge
+    return EI * demand.bent / tolerance, slack, edge, along
 
 
-def rod_share(model: Model, demand: Demand, found: Sequence[Floats]) -> float:
-    """Part of the line that zones that move would make rod at some time; found: `ratios`."""
-    cable, share = model.cable, float(np.mean(np.max(found, axis=0) > CALM))
-    places = [*cable.at, *(x for x, held in zip((0.0, model.length), cable.held_tangent, strict=True) if held)]
-    for place in places:
-        low = max(float(np.interp(place, demand.s, demand.least)), 1e-3 * model.tension_scale)
-        share += DISTURBED * np.sqrt(cable.mean_bending.max() / low) / model.length
-    return min(share, 1.0)
+def rod_share(model: Model, demand: Demand, found: Sequence[Floats], grading: Grading) -> float:
+    """Part of the cells that zones that move would make rod at some time; found: `ratios`; grading: of the cells.
+
+    A rod is wider on either side than what asks for it, by the buffer of the manager and two cells.
+    """
+    cable, s, h = model.cable, demand.s, grading.cell(demand.s)
+    low = np.maximum(demand.least, 1e-3 * model.tension_scale)
+    wider = WIDER * np.sqrt(cable.mean_bending[cable.piece(s)] / low) + 2.0 * h
+    *of_position, along = found
+    asks = np.flatnonzero((np.max(of_position, axis=0) > CALM) | (along > 1.0))
+    a, b = s[asks] - wider[asks], s[asks] + wider[asks]
+    held = [x for x, tangent in zip((0.0, model.length), cable.held_tangent, strict=True) if tangent]
+    places = np.array([*cable.at, *held])
+    width = DISTURBED * np.sqrt(cable.mean_bending.max() / np.maximum(np.interp(places, s, low), 1e-300))
+    a, b = np.append(a, places - 0.5 * width), np.append(b, places + 0.5 * width)
+    middle = 0.5 * (s[:-1] + s[1:])
+    rod = ((middle > a[:, None]) & (middle < b[:, None])).any(axis=0)
+    cells = np.diff(s) / grading.cell(middle)
+    return float(cells[rod].sum() / cells.sum())
 
 
 def no_catenary(found: Sequence[Floats], s: Floats) -> str:
     """Which criterion rules catenaries out and where; empty: none."""
-    bend, slack, edge = found
+    bend, slack, edge, along = found
     for name, ratio, most in (("slack", slack, CALM), ("bend", bend, 1.0), ("edge", edge, 1.0)):
         at = int(np.argmax(ratio))
         if ratio[at] > most:
             return f"criterion {name} comes to {ratio[at]:.2g} at s = {s[at]:.4g} m"
+    if along.max(initial=0.0) > 1.0:
+        at = int(np.argmax(along))
+        return f"they lack {along[at]:.2g} times what is asked along the line at s = {s[at]:.4g} m"
     return ""
 
 
 def costs(
-    scene: Scene, model: Model, cells: tuple[int, int, int, int], share: float, why_not: str
+    scene: Scene, model: Model, rods: int, catenaries: int, share: float, why_not: str
 ) -> tuple[Cost, Cost, Cost]:
-    """Of rods, catenaries and zones that move.
+    """Of rods, catenaries and zones that move, which have the cells of rods.
 
-    cells: of rods, of catenaries, base cells, and cells of zones that move if all is rod; share: part of the line that
-    would be rod then; why_not: why catenaries are no choice.
+    rods, catenaries: cells; share: part of the cells of zones that would be rod; why_not: why catenaries are no choice.
     """
-    rods, catenaries, base, parts = cells
-    moving = share * parts, (1.0 - share) * base
+    moving = step_time(scene, model, share * rods, (1.0 - share) * rods, moves=True, followed=True)
     return (
         Cost("rod", rods, step_time(scene, model, rods, 0)),
         Cost("catenary", catenaries, step_time(scene, model, 0, catenaries, followed=True), why_not),
-        Cost("adaptive", round(sum(moving)), step_time(scene, model, *moving, moves=True, followed=True)),
+        Cost("adaptive", rods, moving, rods_of=share),
     )
 
 
@@ -157,4 +172,5 @@ def reasons(found: Sequence[Cost]) -> str:
 def _in_words(cost: Cost) -> str:
     if cost.why_not:
         return f"is no choice: {cost.why_not}"
-    return f"{float(f'{1e6 * cost.seconds:.2g}'):g} µs of processor time per step ({cost.cells} cells)"
+    cells = f"{cost.cells} cells, {cost.rods_of:.0%} of them rod" if cost.kind == "adaptive" else f"{cost.cells} cells"
+    return f"{float(f'{1e6 * cost.seconds:.2g}'):g} µs of processor time per step ({cells})"

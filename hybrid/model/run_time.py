@@ -26,8 +26,10 @@ MORE = {
 }  # fmt: skip
 # s per node, step and wave: sines and exponentials.
 COST_WAVE = 10e-9
-# s of a run, a step, a step of zones that move, an output.
-COST_RUN, COST_STEP, COST_MANAGER, COST_OUTPUT = 0.02, 12e-6, 40e-6, 0.1e-3
+# s of a run, a step, an output; of a step of zones that move, and of each of their cells: reviews and changes, criteria
+# (bench/test_bench_zones.py).
+COST_RUN, COST_STEP, COST_OUTPUT = 0.02, 12e-6, 0.1e-3
+COST_MANAGER, COST_CRITERIA = 15e-6, 0.1e-6
 USUAL_ITERATIONS = 2.1
 # Part of a line of moving zones that is rod, on average over scenes, which differ from none to all.
 ROD_SHARE = 0.38
@@ -79,7 +81,7 @@ def step_time(
     waves = scene.environment.waves
     if waves is not None:
         each += COST_WAVE * total * (waves.components if isinstance(waves, JonswapWaves) else 1)
-    return each + COST_STEP + COST_MANAGER * moves
+    return each + COST_STEP + (COST_MANAGER + COST_CRITERIA * total) * moves
 
 
 def processor_time(scene: Scene, model: Model, cells: Sequence[int], steps: int, outputs: float) -> float:

@@ -348,7 +348,7 @@ class Observation:
     @property
     def curvature_on_sides(self) -> Floats:
         """(n sides, nb) 1/m, of what was computed, at the nodes of the grid's stretches."""
-        return self._plain._strains[:, 0]
+        return np.abs(self._plain._strains[:, 0])
 
     @cached_property
     def _strains(self) -> Floats:

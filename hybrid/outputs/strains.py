@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.laws.bending_law import LAST_A, LAST_B, RIGID, curvature_under, parts_without_spring
+from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST
 from hybrid.kernels.march.zone_torque import TORQUE
 from hybrid.kernels.state.forces import PLANAR
 from hybrid.kernels.state.state import Floats, Line
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
 Integers = NDArray[np.int64]
 # Of a node where the line is straight.
 ANY_DIRECTION = np.array([0.0, 1.0, 0.0])[:, None]
-# Times sqrt(EI/T): a rod cell longer than that does not show how bending fades at its end.
-UNRESOLVED = 3.0
 
 
 class SpanEnds(NamedTuple):
@@ -61,7 +60,7 @@ def strains(view: Observation) -> Floats:
     if not rods.all():
         out[~of_rod, 0] = view.bends[nodes[~of_rod]]
         _end_catenaries(view, out, spans[~rods])
-    _bend_on_through_joints(view, out, spans, rods)
+    _put_layers_back(view, out, spans, rods)
     return out
 
 
@@ -128,19 +127,46 @@ def _end_catenaries(view: Observation, out: Floats, spans: Integers) -> None:
         out[row, 0] = np.maximum(0.0, (1 - p) * out[row + inward, 0] + p * out[row + 2 * inward, 0])
 
 
-def _bend_on_through_joints(view: Observation, out: Floats, spans: Integers, rods: NDArray[np.bool_]) -> None:
-    """At a joint, curvature of a rod whose cell is too long to show how the bend fades: that of the catenary."""
-    before = np.flatnonzero((rods[:-1] != rods[1:]) & (spans[:-1, 1] == spans[1:, 0]))
-    if not before.size:
-        return
-    last, first = spans[before, 2] + spans[before, 1] - spans[before, 0], spans[before + 1, 2]
-    node, rod = spans[before + 1, 0], rods[before + 1]
-    cell, inner = np.where(rod, node, node - 1), np.where(rod, node + 1, node - 1)
-    k = np.flatnonzero(view.line.element[inner])
-    mine, its = np.where(rod, first, last)[k], np.where(rod, last, first)[k]
-    EI = view.stiffness(inner[k])[:, :2].mean(axis=1) * view.of_line("hn", inner[k])
-    long = view.line.h[cell[k], None] ** 2 * view.T[cell[k]] > UNRESOLVED**2 * EI
-    out[mine, 0] = np.where(long, out[its, 0], out[mine, 0])
+def _put_layers_back(view: Observation, out: Floats, spans: Integers, rods: NDArray[np.bool_]) -> None:
+    """Curvature of rods beside joints with what these take of it: at the joint that of the catenary goes on.
+
+    What is missing fades into the rod as the discrete layer of a hinge (kernels.laws.hinge_layer), node by node; where
+    the rod bends to another side than the catenary, across its own direction.  Negative: against that direction.
+    """
+    for k in np.flatnonzero((rods[:-1] != rods[1:]) & (spans[:-1, 1] == spans[1:, 0])):
+        last, first = spans[k, 2] + spans[k, 1] - spans[k, 0], spans[k + 1, 2]
+        catenary, span, mine, its, way = (
+            (spans[k], spans[k + 1], first, last, 1) if rods[k + 1] else (spans[k + 1], spans[k], last, first, -1)
+        )
+        if span[1] - span[0] < 2 or catenary[1] - catenary[0] < 2:
+            continue
+        node, parts, directions = spans[k + 1, 0], _layer(view, spans[k + 1, 0], way, span), view._bend_directions
+        s = view.of_line("s", np.array([node - way, node, node + way]))
+        a = np.abs(s[1] - s[0]) / np.abs(s[2] - s[0])
+        inner = out[mine + way, 0] * (directions[mine + way] * directions[its]).sum(axis=0)
+        there = np.maximum(((1.0 - a) * out[its - way, 0] + a * inner) / (1.0 - a * parts[1]), 0.0)
+        out[its, 0] = there
+        parts = parts[: 1 + int((parts[1:] > FADED).any(axis=1).sum())]
+        parts[1:][parts[1:] <= FADED] = 0.0  # of each output by itself: none depends on those beside it
+        rows = mine + way * np.arange(len(parts))
+        missing, along = there * parts, (directions[rows] * directions[its]).sum(axis=1)
+        both = out[rows, 0] + missing * along
+        square = both * both + missing * missing * (1.0 - np.minimum(along * along, 1.0))
+        out[rows, 0] = np.copysign(np.sqrt(square), both)
+
+
+def _layer(view: Observation, node: int, way: int, span: Integers) -> Floats:
+    """Parts (m, nb) of a hinge's layer at a node and at those of the rod beside it.
+
+    None is left where there is no stiffness or no tension.
+    """
+    nodes = node + way * np.arange(1, min(span[1] - span[0], FARTHEST + 1))
+    beside, T = np.minimum(nodes, nodes - way), view.T[np.minimum(nodes, nodes - way)]
+    EI = view.stiffness(nodes)[:, 0] * view.of_line("hn", nodes)
+    square = view.cell_lengths[beside] ** 2 * np.maximum(T, 0.0)
+    half = 1.0 + 0.5 * np.divide(square, EI, out=np.full(T.shape, 1e12), where=EI > 0.0)
+    found = np.cumprod(np.where(T > 0.0, 1.0 / (half + np.sqrt(half * half - 1.0)), 0.0), axis=0)
+    return np.concatenate([np.ones((1, T.shape[1])), found])
 
 
 def _twist_to_node(view: Observation, cell: Integers, inner: Integers) -> Floats:

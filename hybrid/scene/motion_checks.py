@@ -222,6 +222,11 @@ def _winch_ramps(ends: Ends) -> Iterator[tuple[float, float]]:
             yield payout.winch.begin, payout.winch.ramp
 
 
+def longest_period(scene: Scene) -> float:
+    """The longest period, s, of waves and of motions of the ends; 0 where none is named."""
+    return max(_all_periods(scene.ends, scene.environment).values(), default=0.0)
+
+
 def stationary_from(scene: Scene) -> tuple[float, float] | None:
     """From when on (s) all that moves or loads a line is periodic or a stationary sea, and the longest period (s).
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.adapt.manager import BUFFER, OF_BASE, REVIEWS, Change
+from hybrid.adapt.manager import BUFFER, OF_BASE, REVIEWS, SHORTEST, Change
 from hybrid.adapt.user_criterion import FORCED_RATIO
 from hybrid.adapt.zone_rules import OFF, blank_review_job, quiet_review
 from hybrid.kernels.contact.self_distance import blank_itself_job, boxes_of
@@ -57,8 +57,8 @@ from hybrid.solve.stepper import HEAVY
 if TYPE_CHECKING:
     from hybrid.simulation.transient import Transient
 
-# Steps from which on the tables pay where cells stay: they are made in the time of so many.
-PAYS_FROM = 100
+# Steps from which on the tables pay where cells stay: they take the time of two or three changes by Python.
+PAYS_FROM = 10
 # Of the tables of a run, what depends on the cells.
 IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
 IN_ZONES = ("line", "sea", "old", "new", "zones")
@@ -249,7 +249,7 @@ class CellChanges:
         n = manager.given.size
         self._review.bind(
             zone_table=self._switching.table.numbers, base=manager.layout.base, given=manager.given.astype(np.int64),
-            off=OFF, calm=np.zeros(n), wait=np.zeros(n), flags=np.zeros((4, n), bool), shortest=manager.shortest,
+            off=OFF, calm=np.zeros(n), wait=np.zeros(n), flags=np.zeros((4, n), bool), shortest=SHORTEST,
             dwell=float(manager.dwell), parts=BUFFER, light=1e-9 * manager.scale, forced=FORCED_RATIO,
             pace=float(manager.pace), pause=1.0 / REVIEWS,
         )  # fmt: skip

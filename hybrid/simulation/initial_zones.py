@@ -24,14 +24,19 @@ from hybrid.model.layout import Layout, edges
 from hybrid.model.payout_law import fastest
 from hybrid.model.resolution import Resolution, follows_curvature, requested_accuracy
 from hybrid.scene.accuracy import ROUGHEST
+from hybrid.scene.motion_checks import longest_period
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.contact_equilibrium import nearness, settled_from
 from hybrid.simulation.equilibrium import MANY, equilibrium_of, solve_model
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
 from hybrid.solve.statics import Equilibrium
 
-# Hold time of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps.
+# Hold time of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps;
+# and of a line that moves to and fro so many periods, lest what is let go comes back, up to so many ramp times.
 HOLD, LEAST_STEPS_HELD = 0.25, 20
+PERIODS_HELD, MOST_HELD = 2.0, 10.0
+# Part of a period for which the way of a contact edge is foreseen: on to where it turns round, at its speed at most.
+STRAIGHT = 0.25
 # Bending comes and goes no slower than in so many times that, and no faster than in so many steps, whatever is asked.
 SLOWEST, FASTEST = 2.0, 10
 # Parts of the tolerance at which zones for an equilibrium are sought, before all becomes rod.
@@ -137,15 +142,19 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
     assert isinstance(wanted, AdaptiveModel) and model.layout is not None
     step = resolution.step if resolution.local is None else 0.0
     pace = max(HOLD * model.time_scale, LEAST_STEPS_HELD * step)
-    hold = wanted.hold_time if wanted.hold_time is not None else pace
+    period = longest_period(scene)
+    hold, ramp = max(pace, min(PERIODS_HELD * period, MOST_HELD * pace)), pace
+    if wanted.hold_time is not None:
+        hold, ramp = wanted.hold_time, min(max(wanted.hold_time, FASTEST * step), SLOWEST * pace)
     curvature_error = wanted.curvature_error if follows_curvature(scene) else None
-    ramp = min(max(hold, FASTEST * step), SLOWEST * pace)
+    foreseen = min(ramp, STRAIGHT * period) if period and curvature_error is None else ramp
     if curvature_error is not None and wanted.hold_time is None and model.payout is None:
         hold = math.inf  # a rod that bends little has cells as long as a catenary: a change of zones costs more
     manager = DomainManager(
         model.cable, model.layout, resolution.zones * model.length, hold, _given(scene, model, ramp),
         model.tension_scale, criterion, ramp,
         model.on_base, curvature_error, shares_asked(scene, curvature_error, resolution.bends), resolution.fineness,
+        foreseen, period if curvature_error is None else 0.0,
     )  # fmt: skip
     manager.load(model.ends.moments)
     return manager

@@ -57,10 +57,10 @@ def with_survey(resolution: Resolution, scene: Scene, survey: Survey | None) -> 
     return replace(for_motion(resolution, scene, survey.reach), grading=survey.grading(), bends=survey.bends)
 
 
-def allowed(scene: Scene, survey: Survey) -> float:
-    """Error of position, m, up to which bending may be left out, by what a scene asks of values along the line."""
+def lack_along(scene: Scene, survey: Survey) -> Floats:
+    """`Survey.lack_along` of what a scene asks; none (K,) where it asks for nothing."""
     asked = requested_accuracy(scene)
-    return survey.tolerance(asked) if asked is not None else np.inf
+    return survey.lack_along(asked) if asked is not None else np.zeros(survey.demand.s.size)
 
 
 def asks_along(scene: Scene) -> bool:
@@ -163,22 +163,19 @@ class Survey:
         stiff = self._square > 0.0
         return np.where(stiff, np.maximum(1.0, 0.5 * cell / np.sqrt(np.where(stiff, self._square, 1.0))), 1.0)
 
-    def tolerance(self, asked: RequestedAccuracy) -> float:
-        """Error of position, m, up to which bending may be left out for what is asked of values along the line.
+    def lack_along(self, asked: RequestedAccuracy) -> Floats:
+        """What leaving bending out makes wrong of values along the line (K,), over the share of it that it may.
 
         A catenary lacks what curvature changes by within sqrt(EI/T), and has EI curvature^2/2 of tension too much.
-        Where this is more than a share of what is asked the line must be rod; infinite where it is so nowhere.
         """
-        demand, must = self.demand, np.zeros(self.demand.s.size, bool)
-        sharpest = np.maximum(demand.curvature, np.maximum(*self._beside())) + self._jumps() * (
-            1.0 - 1.0 / self._smeared
-        )
-        if np.isfinite(self.bends):
-            must |= self._jumps() > OF_ALONG * self.bends * demand.curvature.max()
+        demand = self.demand
+        found = self._jumps() / (OF_ALONG * self.bends * demand.curvature.max(initial=1e-300))
         if asked.of_tension:
+            sharpest = np.maximum(demand.curvature, np.maximum(*self._beside()))
+            sharpest = sharpest + self._jumps() * (1.0 - 1.0 / self._smeared)
             less = 0.5 * self._square * demand.least * sharpest**2
-            must |= less > OF_ALONG * asked.of_tension * demand.largest.max()
-        return float(np.min(OF_ALONG * (self._square * sharpest)[must], initial=np.inf))
+            found = np.maximum(found, less / (OF_ALONG * asked.of_tension * demand.largest.max()))
+        return np.asarray(found)
 
     def grading(self) -> Grading:
         """Cells of a line whose zones stay what they are, those of the pre-run."""

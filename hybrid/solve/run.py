@@ -101,7 +101,7 @@ class CompiledRun:
         right = np.arange(nodes)
         right[marked] = nodes + np.arange(marked.size)
         books = self.books._replace(
-            borne=borne, base=first.astype(np.int64), strains=np.zeros((nodes, 3) if some else (0, 3)), marks=marks,
+            borne=borne, base=first.astype(np.int64), strains=np.zeros((nodes, 4) if some else (0, 4)), marks=marks,
             right=right, start=np.zeros((nodes, 3)), model_error=followed,
             extremes=no_extremes(nodes + marked.size) if some else np.zeros((4, 0, nodes)),
             touch=np.zeros((3, nodes if touches else 0)),

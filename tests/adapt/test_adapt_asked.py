@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from adapt_cases import X, cable, even, on, state_on
@@ -30,6 +32,7 @@ from hybrid.kernels.mesh.zone_step import REJECT_RATIO
 from hybrid.kernels.state.state import no_sea
 
 STEP = 0.02
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 # --- a criterion of the user --------------------------------------------------------------------------
@@ -215,3 +218,19 @@ def test_the_former_name_of_what_a_criterion_sees_still_works():
     with pytest.warns(DeprecationWarning, match=r"hybrid\.Look is now hybrid\.NodeState"):
         former = hybrid.Look  # type: ignore[attr-defined]
     assert former is hybrid.NodeState
+
+
+def test_a_joint_asks_for_no_more_rod() -> None:
+    """A touchdown at rest, curvature asked: the kink of a joint is no bend, for which a rod would grow cell by cell.
+
+    Rods are where contact ends and at the two pins, each a few cells, and no joint has a bend above what is asked.
+    """
+    asked = ["model={kind: adaptive, always_move: true}", "accuracy={curvature: 6%}", "mesh.cells=250"]
+    result = hybrid.static(hybrid.load_scene(EXAMPLES / "touchdown.yaml", asked))
+    found = rods(result, 0)
+    assert len(found) == 3 and sum(b - a for a, b in found) < 25.0
+    assert found[1][0] < 89.0 < found[1][1]  # m, where the line leaves the bed
+    rod = hybrid.static(hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["model=rod", *asked[2:]]))
+    inner = slice(5, -5)  # beside pins curvature falls to nothing within a cell
+    apart = np.abs(result.curvature - rod.curvature)[..., inner]
+    assert apart.max() < 0.03 * rod.curvature.max()

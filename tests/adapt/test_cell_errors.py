@@ -32,8 +32,8 @@ def lack_at_kink(EI, w, T, angle):
 
 
 @kernel
-def lack_at_edge(EI, w, T):
-    return e.lack_at_edge(EI, w, T)
+def lack_at_edge(EI, w, T, k):
+    return e.lack_at_edge(EI, w, T, k, 0.0)
 
 
 @kernel
@@ -155,14 +155,14 @@ def test_kink_at_a_point_load(mass: float) -> None:
         within(found.largest("tension", 49.5, 49.99), lack.tension)
 
 
-@pytest.mark.parametrize("EI", [2e3, 2e4])
-def test_edge_of_contact(EI: float) -> None:
-    """Where a line comes off the bed, its curvature jumps by w/T, of which the rod has half."""
-    bed = {"seabed": {"z": 0.0, "stiffness": 2e6, "damping": 0.0}}
+@pytest.mark.parametrize(("EI", "k"), [(2e3, 2e6), (2e4, 2e6), (2e3, 2e4), (2e4, 5e3)])
+def test_edge_of_contact(EI: float, k: float) -> None:
+    """Where a line comes off a hard bed, its curvature jumps by w/T, of which the rod has half; less on a soft one."""
+    bed = {"seabed": {"z": 0.0, "stiffness": k, "damping": 0.0}}
     found = measured(EI, pinned(93.0, 25.0), environment=bed)
     s = float(found.catenary.touchdown[-1][1])
     T = found.at("tension", s)
-    lack, lam = lack_at_edge(EI, W, T), np.sqrt(EI / T)
+    lack, lam = lack_at_edge(EI, W, T, k), np.sqrt(EI / T)
     within(found.largest("position", s - 6 * lam, s + 6 * lam), lack.position)
     within(found.largest("curvature", s - 4 * lam, s + 4 * lam), lack.curvature)
 

@@ -83,7 +83,7 @@ def test_runs_are_compared_by_their_fineness() -> None:
 
 @pytest.mark.parametrize(
     ("speed", "share", "raised"),
-    [(10.0, 0.05, range(9, 13)), (-10.0, 0.05, range(8, 12)), (10.0, None, range(9, 12))],
+    [(10.0, 0.05, range(9, 13)), (-10.0, 0.05, range(8, 12)), (10.0, None, range(9, 13))],
 )
 def test_contact_is_foreseen_where_its_edge_goes_in_a_ramp_time(speed: float, share: float | None, raised) -> None:
     """A straight line lies on a bed up to s = 52 m, and 20 m further 2 s later, of which a tenth of the line counts."""

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from hybrid.kernels.laws.hinge_layer import FADED
 from hybrid.kernels.laws.seabed import stored
 from hybrid.kernels.march.energies import observe
 from hybrid.kernels.state.report import CONTACT_FORCE, FORCE_A, SELF_CONTACT_ENERGY
@@ -15,7 +16,6 @@ from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, bl
 from hybrid.model.mesh import Zone
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.probes import Observer
-from hybrid.outputs.strains import UNRESOLVED
 from hybrid.outputs.touchdown import Touchdown
 from hybrid.solve.bending_corrector import Shift
 
@@ -221,16 +221,38 @@ class Plain:
                         side[row, 0] = max(0.0, (1 - p) * side[one, 0] + p * side[two, 0])
                     elif b - a >= 2:
                         side[row, 0] = side[one, 0]
-        for k in range(1, len(self.grid.parts)):  # a cell of a rod that is too long to show how its bend fades
-            before, after = self.grid.parts[k - 1].kind, self.grid.parts[k].kind
-            node, _, right = self.grid.spans[k]
-            left = right - 1
-            inner, cell = (node + 1, node) if after == "rod" else (node - 1, node - 1)
-            if before != after and line.element[inner]:
-                EI = line.kb[inner, :2].mean() * line.hn[inner]
-                if line.h[cell] ** 2 * self.state.T[cell] > UNRESOLVED**2 * EI:
-                    out[left if before == "rod" else right, 0] = out[right if before == "rod" else left, 0]
+        for k in range(1, len(self.grid.parts)):  # what a joint takes of a rod's curvature is put back
+            if self.grid.parts[k - 1].kind != self.grid.parts[k].kind:
+                self._put_back(out, k)
         return out
+
+    def _put_back(self, out: Floats, k: int) -> None:
+        """The layer of a hinge beside the joint before stretch k, node by node."""
+        line, (node, last, right) = self.line, self.grid.spans[k]
+        first, left, way = self.grid.spans[k - 1][0], right - 1, 1
+        row, its, cells, beyond = right, left, last - node, node - first
+        if self.grid.parts[k].kind != "rod":
+            row, its, way, cells, beyond = left, right, -1, node - first, last - node
+        if cells < 2 or beyond < 2:
+            return
+
+        def fade(j: int) -> float:
+            i, c = node + j * way, min(node + j * way, node + (j - 1) * way)
+            T, EI = self.state.T[c], line.kb[i, 0] * line.hn[i]
+            b = 2.0 + line.h[c] ** 2 * T / EI if EI > 0.0 and T > 0.0 else np.inf
+            return 0.5 * (b - np.sqrt(b * b - 4.0)) if b < 1e6 else 1.0 / b
+
+        direction, h = self._directions[its], np.abs(line.s[[node - way, node + way]] - line.s[node])
+        outer, inner = out[its - way, 0], out[row + way, 0] * (self._directions[row + way] @ direction)
+        at_joint = max((outer * h[1] + inner * h[0]) / (h.sum() - h[0] * fade(1)), 0.0)
+        out[its, 0] = missing = at_joint
+        for j in range(cells):
+            missing *= fade(j) if j > 0 else 1.0
+            if missing <= FADED * at_joint:
+                return
+            mine = self._directions[row + j * way]
+            whole = out[row + j * way, 0] * mine + missing * direction
+            out[row + j * way, 0] = np.copysign(np.linalg.norm(whole), whole @ mine)
 
     def _strain_of_moment(self, node: int, cell: int) -> tuple[float, float]:
         """Curvature and twist at a rod's end that carries the given moment (zero at a joint)."""

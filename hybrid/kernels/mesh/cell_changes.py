@@ -148,7 +148,7 @@ def fill_books(job):
         for c in range(m):
             books.tension[0, c], books.tension[1, c] = 0.0, 0.0
     for i in range(books.strains.shape[0]):
-        for j in range(3):
+        for j in range(books.strains.shape[1]):
             books.strains[i, j] = 0.0
     for row in range(books.extremes.shape[1]):
         for k in range(books.extremes.shape[2]):

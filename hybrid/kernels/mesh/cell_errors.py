@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from hybrid.kernels.laws.hinge_layer import fade
 from hybrid.kernels.machine.compile import inner
 
 POSITION, TENSION, CURVATURE, MOMENT = range(4)
@@ -77,9 +78,25 @@ def lack_at_kink(EI, w, T, angle):
 
 
 @inner
-def lack_at_edge(EI, w, T):
-    """Of the place where contact with the bed begins: the curvature jumps by w/T, of which a rod has half there."""
-    return lack_of_bend(EI, w, T, 0.5 * w / T, 0.5 * w / (T * layer_length(EI, w, T) ** 2))
+def edge_length(T, k):
+    """Over which a taut line without bending stiffness comes to rest on a bed of stiffness k, N/m2: sqrt(T/k)."""
+    return math.sqrt(T / k) if k > 0.0 else 0.0
+
+
+@inner
+def lack_at_edge(EI, w, T, k, h):
+    """Of the place where contact with a bed of stiffness k, N/m2, begins, against a rod on cells of h, m; 0: short ones.
+
+    On a hard bed the curvature jumps by w/T there, of which a rod has half.  A soft one makes a kink of that jump, of a
+    slope J = w/(T sqrt(T/k)), and a rod rounds it: it has J l0/2 less at most; on cells of h by J h/(1/f - f), with the
+    f of kernels.laws.hinge_layer: those that are longer than l0 show no more of it.
+    """
+    l0 = layer_length(EI, w, T)
+    part = fade(h * h / (l0 * l0))
+    rounds = h / (1.0 / part - part) if h > 1e-3 * l0 else 0.5 * l0
+    lack = lack_of_bend(EI, w, T, 0.5 * w / T, 0.0)
+    curvature = w / T * rounds / (max(2.0 * rounds, h) + edge_length(T, k))
+    return CellError(lack.position, lack.tension, curvature, lack.moment)
 
 
 @inner
@@ -153,13 +170,6 @@ def node_curvature(line, turn, i):
     if 0 < i < n and line.spin[i] != line.spin[i - 1]:
         i = i + 1 if line.spin[i] else i - 1
     return turn[i] / line.hn[i] if 0 < i < n or line.element[i] else 0.0
-
-
-@inner
-def second_difference(line, turn, i):
-    """|kappa''| at an inner node i."""
-    before, after = node_curvature(line, turn, i - 1), node_curvature(line, turn, i + 1)
-    return second_slope(line.s, i, before, node_curvature(line, turn, i), after)
 
 
 @inner

@@ -209,31 +209,31 @@ def lower_at_edge(line, sea, state, zones, i, dt, finer):
 
 
 @inner
-def foresee_edge(line, sea, state, zones, i, time):
+def foresee_edge(line, sea, state, zones, stay, i, time):
     """Raise the ratio of base cells over the way that a contact edge in cell i goes in `time`, s: the stiffness of
 
     rods takes so long to come, and the edge would be there before them.
     """
     kinds, s, n = zones.kinds, line.s, line.h.shape[0]
     low = max(state.T[i], kinds.floor[i], 1e-300)
-    x = min(over_shares(lack_at_edge(kinds.EI[i], kinds.w[i], low), zones.shares), FORESEEN)
     at, speed = edge_at(line, sea, state, i)
     farthest = FARTHEST_KIND * (s[n] - s[0])
     way = min(max(time * speed, -farthest), farthest)
     a, b = at + min(way, 0.0), at + max(way, 0.0)
     for c in range(n):  # base cells by their cells: their lengths may be of before, where line is paid out
         if s[c] <= b and s[c + 1] >= a:
-            j = kinds.base_of_cell[c]
-            raise_ratio(zones.ratios, EDGE, j, j, x)
+            j, h = kinds.base_of_cell[c], line.h[c] if stay else 0.0
+            lack = lack_at_edge(kinds.EI[i], kinds.w[i], low, sea.stiffness, h)
+            raise_ratio(zones.ratios, EDGE, j, j, min(over_shares(lack, zones.shares), FORESEEN))
 
 
 @inner
-def foresee_edges(line, sea, state, zones, time):
-    """`foresee_edge` of all contact edges."""
+def foresee_edges(line, sea, state, zones, stay, time):
+    """`foresee_edge` of all contact edges; stay: cells do, and rods would have the same."""
     if line.bits & SEABED:
         for i in range(line.h.shape[0]):
             if is_edge(line, sea, state, i):
-                foresee_edge(line, sea, state, zones, i, time)
+                foresee_edge(line, sea, state, zones, stay, i, time)
 
 
 @inner

@@ -24,20 +24,23 @@ from hybrid.kernels.algebra.rotations import cross, dot, frame, get3, get9, log_
 from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import relative_rotation
+from hybrid.kernels.laws.hinge_layer import FADED, at_hinge, fade
 from hybrid.kernels.laws.tension_torque import rest_strain
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.mesh.cell_errors import (
     CURVATURE,
     MOMENT,
     CellError,
+    edge_length,
     lack_at_clamp,
     lack_at_edge,
     lack_at_kink,
     lack_of_bend,
     lack_of_torque,
+    layer_length,
     node_curvature,
     over_shares,
-    second_difference,
+    second_slope,
 )
 from hybrid.kernels.mesh.criteria import BEND, CLAMP, EDGE, POINT, SLACK, TORSION
 from hybrid.kernels.state.forces import PLANAR, SEABED
@@ -146,6 +149,7 @@ class NodeKinds(NamedTuple):
     turn: Floats  # (N+1,) rad, turns of nodes (written)
     twisting: Floats  # (N+1,) N m, torques of nodes (written)
     twist: Floats  # (N+1,) rad/m, of rods, and of what would be a rod under the torque of the line (written)
+    curvature: Floats  # (N+1,) 1/m, of inner nodes; with what joints take of it, where that is asked (written)
 
 
 def blank_kinds(cells: int, base: int) -> NodeKinds:
@@ -153,24 +157,72 @@ def blank_kinds(cells: int, base: int) -> NodeKinds:
     z, nodes = np.zeros, cells + 1
     return NodeKinds(
         z(nodes), z(nodes), z(nodes), z(nodes), z(nodes, np.int8), z(nodes), z(cells, np.int64), z(base, np.int8),
-        z(nodes), z(nodes), z(nodes),
+        z(nodes), z(nodes), z(nodes), z(nodes),
     )  # fmt: skip
 
 
 @inner
-def bends_at(line, turn, shares, i):
-    """|kappa''| at inner node i, 1/m^3, where curvature counts; none beside a joint, whose kink is no curvature."""
+def is_joint(line, kinds, i):
+    """Whether a rod and a catenary meet at inner node i, and nothing else is there."""
+    return line.spin[i] != line.spin[i - 1] and kinds.node[i] != LOAD
+
+
+@inner
+def layer_part(line, T, j, way):
+    """f of the cell before node j of a rod (kernels.laws.hinge_layer)."""
+    c = min(j, j - way)
+    return fade(line.h[c] * line.h[c] * T[c] / max(line.kb[j, 0] * line.hn[j], 1e-300))
+
+
+@inner
+def put_layer_back(line, T, kinds, i):
+    """Curvature of joint i and of the rod beside it with what the joint takes of it."""
+    n, kappa, way = line.h.shape[0], kinds.curvature, 1 if line.spin[i] else -1
+    outer, j = i - way, i + way
+    if not (0 < outer < n and 0 < j < n) or line.spin[min(outer, outer - way)] != 0:  # a catenary of one cell
+        return
+    part = layer_part(line, T, j, way)
+    before, after = abs(line.s[i] - line.s[outer]), abs(line.s[j] - line.s[i])
+    missing = there = at_hinge(kappa[outer], kappa[j], before, after, part)
+    kappa[i] = there
+    while 0 < j < n and line.element[j] and missing > FADED * there:
+        missing *= part
+        kappa[j] += missing
+        j += way
+        if 0 < j < n:
+            part = layer_part(line, T, j, way)
+
+
+@inner
+def find_curvature(line, T, kinds, layers):
+    """Curvature of inner nodes; layers: with the layers at joints put back."""
     n = line.h.shape[0]
-    if shares[CURVATURE] < math.inf and 1 < i < n - 1 and line.spin[i - 2] == line.spin[i + 1]:
-        return second_difference(line, turn, i)
+    for i in range(1, n):
+        kinds.curvature[i] = kinds.turn[i] / line.hn[i]
+    if layers:
+        for i in range(1, n):
+            if is_joint(line, kinds, i):
+                put_layer_back(line, T, kinds, i)
+
+
+@inner
+def bends_at(line, kinds, shares, layers, i):
+    """|kappa''| at inner node i, 1/m^3, where curvature counts; without layers none beside a joint, which has a kink."""
+    if not (shares[CURVATURE] < math.inf and 1 < i < line.h.shape[0] - 1):
+        return 0.0
+    if layers or line.spin[i - 2] == line.spin[i + 1]:
+        kappa = kinds.curvature
+        return second_slope(line.s, i, kappa[i - 1], kappa[i], kappa[i + 1])
     return 0.0
 
 
 @inner
-def lack_of_node(line, kinds, shares, i, T):
-    """What a catenary would lack at node i, at tension T, N; and the criterion that this is."""
+def lack_of_node(line, kinds, shares, layers, i, T):
+    """What a catenary would lack at node i, at tension T, N; and the criterion that this is.
+
+    layers: what joints take of curvature is that of results, which put it back.
+    """
     n, turn, EI, w = line.h.shape[0], kinds.turn, kinds.EI[i], kinds.w[i]
-    kappa = turn[i] / line.hn[i]
     along = shares[CURVATURE] < math.inf or shares[MOMENT] < math.inf
     if i == 0 or i == n:
         lack = lack_at_clamp(EI, w, T, turn[i])
@@ -178,32 +230,98 @@ def lack_of_node(line, kinds, shares, i, T):
             k = min(max(i, 1), n - 1)
             lack = CellError(0.0, 0.0, node_curvature(line, turn, k), 0.0)
         if along and line.element[i]:
+            kappa = turn[i] / line.hn[i]
             lack = CellError(lack.position, lack.tension, kappa, EI * kappa)
         return lack, CLAMP
+    kappa = kinds.curvature[i]
+    if layers and is_joint(line, kinds, i):  # what its kink takes of curvature and moment is put back in results
+        lack = lack_at_kink(EI, w, T, kink_at(line, turn, i))
+        bent = lack_of_bend(EI, w, T, 0.0, bends_at(line, kinds, shares, layers, i))
+        return CellError(lack.position, lack.tension, bent.curvature, 0.0), POINT
     if kinds.node[i] == LOAD or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
         lack = lack_at_kink(EI, w, T, kink_at(line, turn, i))
         if along and line.element[i]:
             lack = CellError(lack.position, lack.tension, kappa, EI * kappa)
         return lack, POINT
-    lack = lack_of_bend(EI, w, T, kappa + kinds.bent[i], bends_at(line, turn, shares, i))
+    lack = lack_of_bend(EI, w, T, kappa + kinds.bent[i], bends_at(line, kinds, shares, layers, i))
     return lack, POINT if kinds.node[i] == STEP else BEND
 
 
 @inner
-def weigh_edge(line, sea, state, kinds, shares, i, T, ratios):
-    """Raise the ratio of the base cells at inner node i, if contact with the seabed begins beside it."""
+def weigh_edge(line, sea, state, kinds, shares, layers, i, T, ratios):
+    """Raise the ratio of the base cells at inner node i, if contact with the seabed begins beside it.
+
+    layers: cells stay, and rods would have the same.
+    """
     p, r = depth(sea, state.r, i) > 0.0, state.r
     if p != (depth(sea, r, i - 1) > 0.0) or p != (depth(sea, r, i + 1) > 0.0):
         of = kinds.base_of_cell
-        raise_ratio(ratios, EDGE, of[i - 1], of[i], over_shares(lack_at_edge(kinds.EI[i], kinds.w[i], T), shares))
+        h = min(line.h[i - 1], line.h[i]) if layers else 0.0
+        lack = lack_at_edge(kinds.EI[i], kinds.w[i], T, sea.stiffness, h)
+        raise_ratio(ratios, EDGE, of[i - 1], of[i], over_shares(lack, shares))
 
 
 @inner
-def raise_ratios(line, sea, state, past, ahead, shares, kinds, ratios):
+def shift_per_length(turn):
+    """By how much an edge moves when the line between it and a held place is longer by one; turn: rad, of that line.
+
+    Of a catenary that leaves the bed at a and is held at (X, Y), u = asinh(tan(turn)), C = cosh u, S = sinh u:
+    da = ((1 - C) dX + (S - C u) dY)/((u - S) S + (C - 1)^2).  The largest of all directions; 6/u^2 of a shallow one.
+    """
+    u = math.asinh(math.tan(min(max(turn, 1e-3), 1.5)))
+    if u < 0.1:  # the difference of large numbers
+        return 6.0 / (u * u)
+    C, S = math.cosh(u), math.sinh(u)
+    return math.sqrt((C - 1.0) ** 2 + (C * u - S) ** 2) / ((u - S) * S + (C - 1.0) ** 2)
+
+
+@inner
+def weigh_span(line, sea, state, kinds, shares, edge, far, ratios):
+    """Raise the ratios of edges between node `edge`, where the line leaves the bed, and `far`, where it is held.
+
+    A rod reaches further than a catenary by the integral of lam^2 kappa^2 (docs/theory.md, 13).  By that, over all that
+    is catenary, the edge is elsewhere, and so is the curvature that begins there.
+    """
+    of, way = kinds.base_of_cell, 1 if far > edge else -1
+    first, last = (edge, far - 1) if way > 0 else (edge - 1, far)
+    d0, most = chord(get3(state.e, first))[0], 0.0
+    for c in range(first, last + way, way):
+        d = chord(get3(state.e, c))[0]
+        most = max(most, math.acos(min(max(dot(d0, d), -1.0), 1.0)))
+    before, after = max(edge - 1, 0), min(edge, line.h.shape[0] - 1)
+    T = max(min(state.T[before], state.T[after]), kinds.floor[edge], 1e-300)
+    rounded = layer_length(kinds.EI[edge], kinds.w[edge], T) + edge_length(T, sea.stiffness)
+    allowed = shares[CURVATURE] * T * max(rounded, line.h[before], line.h[after]) / max(kinds.w[edge], 1e-300)
+    shift, per_length = 0.0, shift_per_length(most)
+    for i in range(far - way, edge, -way):
+        kappa = kinds.curvature[i]
+        T = max(min(state.T[i - 1], state.T[i]), kinds.floor[i], 1e-300)
+        shift += per_length * kinds.EI[i] * kappa * kappa / T * line.hn[i]
+        raise_ratio(ratios, EDGE, of[i - 1], of[i], shift / allowed)
+
+
+@inner
+def weigh_shifts(line, sea, state, kinds, shares, ratios):
+    """`weigh_span` of every stretch above the bed; of one between two edges each half."""
+    n, begins, edge = line.h.shape[0], 0, False
+    for i in range(n + 1):
+        if depth(sea, state.r, i) > 0.0 or i == n:
+            ends = i < n or depth(sea, state.r, i) > 0.0
+            if i - begins > 1 and (edge or ends):
+                middle = (begins + i) // 2 if edge and ends else (i if edge else begins)
+                if edge:
+                    weigh_span(line, sea, state, kinds, shares, begins, middle, ratios)
+                if ends:
+                    weigh_span(line, sea, state, kinds, shares, i, middle, ratios)
+            begins, edge = i, True
+
+
+@inner
+def raise_ratios(line, sea, state, past, ahead, shares, layers, kinds, ratios):
     """Raise ratios (criteria, base cells) to those of a state: the largest of every criterion in each base cell.
 
     past: (N,) N, tensions some time ago; ahead: how far their change since then goes on; shares: (4,) of
-    kernels.mesh.cell_errors; kinds: with the turns of this state.
+    kernels.mesh.cell_errors; layers: whether what joints take of curvature counts; kinds: with the turns of this state.
     """
     a = ahead
     floor, of, turn, twisting = kinds.floor, kinds.base_of_cell, kinds.turn, kinds.twisting
@@ -220,7 +338,7 @@ def raise_ratios(line, sea, state, past, ahead, shares, kinds, ratios):
         raise_ratio(ratios, SLACK, ja, jb, slack)
         T = max(floor[i], 1e-300)
         T = now if now > T else T
-        lack, criterion = lack_of_node(line, kinds, shares, i, T)
+        lack, criterion = lack_of_node(line, kinds, shares, layers, i, T)
         raise_ratio(ratios, criterion, ja, jb, over_shares(lack, shares))
         if i == 0 or i == n:
             continue
@@ -228,7 +346,9 @@ def raise_ratios(line, sea, state, past, ahead, shares, kinds, ratios):
         loop = max(loop, over_shares(lack_of_torque(T, twisting[i], whole), shares))
         raise_ratio(ratios, TORSION, ja, jb, loop)
         if line.bits & SEABED:
-            weigh_edge(line, sea, state, kinds, shares, i, T, ratios)
+            weigh_edge(line, sea, state, kinds, shares, layers, i, T, ratios)
+    if line.bits & SEABED and shares[CURVATURE] < math.inf:
+        weigh_shifts(line, sea, state, kinds, shares, ratios)
 
 
 @inner

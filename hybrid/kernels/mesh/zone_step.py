@@ -39,6 +39,7 @@ from hybrid.kernels.mesh.zone_criteria import (
     TWISTED,
     NodeKinds,
     blank_kinds,
+    find_curvature,
     find_turns,
     largest_ratio,
     raise_ratio,
@@ -71,8 +72,10 @@ REJECT_RATIO = 4.0  # a step that ends with a catenary above this is rejected, a
     LEFT,  # part of what catenaries leave out that remains in results: 1, but for results that are corrected
     FINENESS,  # of cells that follow the curvature: those that lengths ask for are so many times as short
     FASTEST,  # m/s, by how much velocities of nodes differed of late
-) = range(18)  # fmt: skip
-CLOCK_SIZE = 18
+    EDGE_TIME,  # s, for which the way of a contact edge is foreseen
+    MEMORY,  # s, over which the largest values of earlier are forgotten
+) = range(20)  # fmt: skip
+CLOCK_SIZE = 20
 # Flags of `counts`.
 (
     KNOWN,  # tensions of earlier are of these cells
@@ -262,8 +265,8 @@ def find_shares(line, state, zones):
     kappa, moment, tension = 0.0, 0.0, 0.0
     for i in range(n + 1):
         if line.element[i] or (0 < i < n and line.spin[i] == line.spin[i - 1]):  # not the kink of a joint
-            kappa = max(kappa, kinds.turn[i] / line.hn[i])
-            moment = max(moment, kinds.EI[i] * kinds.turn[i] / line.hn[i])
+            there = kinds.curvature[i] if 0 < i < n else kinds.turn[i] / line.hn[i]
+            kappa, moment = max(kappa, there), max(moment, kinds.EI[i] * there)
     for c in range(n):
         tension = max(tension, state.T[c])
     for k, size in ((TENSION, tension), (CURVATURE, kappa), (MOMENT, moment)):
@@ -274,6 +277,16 @@ def find_shares(line, state, zones):
     zones.shares[POSITION], zones.limits[POSITION] = z[TOLERANCE] / z[LEFT], z[TOLERANCE] * finer
     if z[SHARE] > 0.0 and zones.largest[CURVATURE] > 0.0:
         zones.limits[CURVATURE] = z[SHARE] * zones.largest[CURVATURE] * finer
+
+
+@kernel
+def asks_layers(zones):
+    """Whether what joints take of curvature counts as put back: curvature is asked, and no moment, on cells that stay.
+
+    Results put it back from the two nodes of the catenary beside it (outputs.strains), so rods are two cells wider, at
+    least, than what asks for them.  A moment that a joint takes stays away.
+    """
+    return zones.asked[CURVATURE] > 0.0 and not zones.asked[MOMENT] > 0.0 and not zones.clock[SHARE] > 0.0
 
 
 @inner
@@ -294,10 +307,11 @@ def evaluate(line, sea, ends, state, zones, near, dt):
         for j in range(3):
             zones.tangents[k, j] = ends.frame[k, 2 + 3 * j] * zones.clamped[k]
     find_turns(line, zones.tangents, state.e, state.a1, state.T, z[TORQUE], zones.kinds)
+    layers = asks_layers(zones)
+    find_curvature(line, state.T, zones.kinds, layers)
     find_shares(line, state, zones)
-    raise_ratios(line, sea, state, zones.past, ahead, zones.shares, zones.kinds, zones.ratios)
-    if z[SHARE] > 0.0:
-        foresee_edges(line, sea, state, zones, z[PACE])
+    raise_ratios(line, sea, state, zones.past, ahead, zones.shares, layers, zones.kinds, zones.ratios)
+    foresee_edges(line, sea, state, zones, layers, z[EDGE_TIME])
     if flags[LOADED]:
         weigh_moments(state, zones)
     weigh_contact(near, zones)
@@ -431,7 +445,7 @@ def follow_zones(table):
     if count[b.PARITY]:
         state, before = before, state
     for k in range(QUANTITIES):
-        zones.largest[k] *= math.exp(-clock[b.LAST_DT] / (FADE * zones.clock[PACE]))
+        zones.largest[k] *= math.exp(-clock[b.LAST_DT] / zones.clock[MEMORY])
     job.work[0, b.ZONES] += book(line, ends, before, state, clock[b.LAST_DT], zones)
     if zones.clock[SHARE] > 0.0:
         follow_arcs(line, state, zones)

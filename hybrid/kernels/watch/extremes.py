@@ -24,6 +24,7 @@ from hybrid.kernels.laws.bending_law import (
     parts_without_spring,
 )
 from hybrid.kernels.laws.cell import chord, turning
+from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST, at_hinge, fade
 from hybrid.kernels.laws.seabed import pressure
 from hybrid.kernels.laws.tension_torque import rest_strain
 from hybrid.kernels.machine.compile import inner, kernel
@@ -33,6 +34,9 @@ from hybrid.kernels.march.zone_torque import TORQUE as PASSED
 from hybrid.kernels.state.books import CURVATURE, DISPLACEMENT, MOMENT, PRESSURE, SEAM, SELF_PRESSURE, TENSION, TORQUE
 from hybrid.kernels.state.forces import PLANAR, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.state.report import FORCE_A
+
+# Columns of strains: curvature, 1/m; with what joints take of it, 1/m (of joints themselves too).
+BENT = 3
 
 
 @kernel  # a call costs a nanosecond; inlined at thirty places it costs seconds of compilation
@@ -184,6 +188,14 @@ def towards(line, state, marks, i, side):
 
 
 @inner
+def beside_kink(line, state, books, i, side):
+    """Curvature of a catenary at what may be a kink, node i, on its side: at a joint that which goes on there."""
+    if 0 < i < line.h.shape[0] and line.spin[i] != line.spin[i - 1]:
+        return books.strains[i, 0]
+    return towards(line, state, books.marks, i, side)
+
+
+@inner
 def note_catenary(line, state, books, i, t):
     """Curvature at a node without element; at what may be a kink, on each side, as its neighbours lead to."""
     if is_smooth(line, books.marks, i):
@@ -194,8 +206,71 @@ def note_catenary(line, state, books, i, t):
         cell = i - 1 if side < 0 else i
         if cell < 0 or cell == n or line.spin[cell]:
             continue
-        x = towards(line, state, books.marks, i, side)
+        x = beside_kink(line, state, books, i, side)
         widen(books.extremes, CURVATURE, i if side < 0 else books.right[i], x, t)
+
+
+@inner
+def bend_direction(state, i):
+    """Direction across both chords at inner node i."""
+    x = cross(chord(get3(state.e, i - 1))[0], chord(get3(state.e, i))[0])
+    length = math.sqrt(dot(x, x))
+    return scale(1.0 / length, x) if length > 0.0 else (0.0, 1.0, 0.0)
+
+
+@inner
+def with_layer(kappa, missing, along):
+    """Curvature kappa with what a joint takes of it, in a direction of cosine `along` to it; negative: against it."""
+    both = kappa + missing * along
+    return math.copysign(math.sqrt(both * both + missing * missing * (1.0 - min(along * along, 1.0))), both)
+
+
+@inner
+def goes_on(line, marks, j, way):
+    """Whether the rod goes on beyond node j, without a point load or another section."""
+    return not marks[j] and line.spin[min(j, j + way)] != 0
+
+
+@inner
+def layer_part(line, state, j, way):
+    """f of the cell before node j of a rod."""
+    T, h = state.T[min(j, j - way)], line.h[min(j, j - way)]
+    EI = line.kb[j, 0] * line.hn[j]
+    return fade(h * h * T / EI) if T > 0.0 and EI > 0.0 else 0.0
+
+
+@inner
+def put_layers_back(line, ends, state, books):
+    """Curvature of rods with what joints take of it, as outputs have it (outputs.strains), into strains[:, BENT].
+
+    At joints themselves that of the side of the catenary into strains[:, 0].
+    """
+    n, bent = line.h.shape[0], books.strains
+    for i in range(n + 1):
+        bent[i, BENT] = bent[i, 0]
+    for i in range(1, n):
+        if line.spin[i] == line.spin[i - 1]:
+            continue
+        way = 1 if line.spin[i] else -1
+        own, _, _ = at_rod_end(line, ends, state, i, way, 0.0)
+        bent[i, 0], bent[i, BENT] = towards(line, state, books.marks, i, -way), own
+        j, outer = i + way, i - way
+        if not (0 < j < n and is_smooth(line, books.marks, outer) and goes_on(line, books.marks, j, way)):
+            continue
+        direction, part = bend_direction(state, outer), layer_part(line, state, j, way)
+        before, after = abs(line.s[i] - line.s[outer]), abs(line.s[j] - line.s[i])
+        along = dot(bend_direction(state, j), direction)
+        there = at_hinge(of_chords(line, state, outer), bent[j, BENT] * along, before, after, part)
+        bent[i, 0], bent[i, BENT] = there, with_layer(own, there, along)
+        for _ in range(FARTHEST):
+            if part <= FADED:
+                break
+            along = dot(bend_direction(state, j), direction)
+            bent[j, BENT] = with_layer(bent[j, BENT], there * part, along)
+            j += way
+            if not (0 < j < n and goes_on(line, books.marks, j, way)):
+                break
+            part *= layer_part(line, state, j, way)
 
 
 @inner
@@ -239,6 +314,8 @@ def note_rod_end(line, ends, state, books, i, passed, t):
                 widen(books.extremes, TORQUE, i if side < 0 else books.right[i], passed, t)
             continue
         curvature, moment, torque = at_rod_end(line, ends, state, i, side, passed)
+        if 0 < i < n:
+            curvature = abs(books.strains[i, BENT])
         at = i if side < 0 else books.right[i]
         widen(books.extremes, CURVATURE, at, curvature, t)
         widen(books.extremes, MOMENT, at, moment, t)
@@ -265,7 +342,7 @@ def note_element(line, books, i, t):
     (Where the stiffness differs, and the cable is curved without load as well, the curvature of a side is the largest
     that this can be.)
     """
-    curvature, moment = books.strains[i, 0], books.strains[i, 1]
+    curvature, moment = abs(books.strains[i, BENT]), books.strains[i, 1]
     widen_both(books.extremes, books.right, MOMENT, i, moment, t)
     widen_both(books.extremes, books.right, TORQUE, i, books.strains[i, 2], t)
     if not (books.marks[i] & SEAM):
@@ -315,6 +392,7 @@ def note_extremes(line, sea, ends, state, books, t):
     """Widen the extremes to the state at time t; books.strains: of its elements, books.report: of the state."""
     n = line.h.shape[0]
     note_tension(line, ends, state, books, t)
+    put_layers_back(line, ends, state, books)
     if line.bits & SEABED:
         note_contact(line, sea, state, books, t)
     zone, zones = 0, line.torsion.shape[0]

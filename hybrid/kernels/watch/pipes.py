@@ -18,13 +18,14 @@ from hybrid.kernels.march.zone_torque import FIRST, LAST
 from hybrid.kernels.march.zone_torque import TORQUE as PASSED
 from hybrid.kernels.state.books import SEAM, VON_MISES, WALL_TENSION
 from hybrid.kernels.watch.extremes import (
+    BENT,
     at_rod_end,
     beside,
+    beside_kink,
     beside_seam,
     end_tension,
     is_smooth,
     of_chords,
-    towards,
     widen,
 )
 
@@ -50,7 +51,7 @@ def bend_and_torque(line, ends, state, books, i, side, passed):
     """Curvature, 1/m, and torque, N m, at node i on its side; passed: N m, that a catenary there passes on."""
     n = line.h.shape[0]
     if line.element[i]:
-        curvature = books.strains[i, 0]
+        curvature = abs(books.strains[i, BENT])
         if books.marks[i] & SEAM:
             curvature = beside_seam(line, books, i, i + side)
         return curvature, books.strains[i, 2]
@@ -60,8 +61,8 @@ def bend_and_torque(line, ends, state, books, i, side, passed):
         side = 1 if i == 0 else -1
     if line.spin[i - 1 if side < 0 else i]:
         curvature, _, torque = at_rod_end(line, ends, state, i, side, passed)
-        return curvature, torque
-    return towards(line, state, books.marks, i, side), passed
+        return abs(books.strains[i, BENT]) if 0 < i < n else curvature, torque
+    return beside_kink(line, state, books, i, side), passed
 
 
 @inner

@@ -1,0 +1,85 @@
+"""What the choice of a model costs: scenes that name none, at 1 %, against rods and zones that move at the same accuracy.
+
+    HYBRID_BENCH_SEEDS=100 pytest bench/test_bench_choice.py -m bench -n 0 -s      (30 seeds if none are given)
+
+Processor times are of whole runs, all passes counted, from the scene to its result in memory; every run is made twice,
+and the second counts.
+"""
+
+from __future__ import annotations
+
+import copy
+import os
+import time
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pytest
+from random_scenes import random_scene
+
+import hybrid
+
+pytestmark = pytest.mark.bench
+SEEDS = int(os.environ.get("HYBRID_BENCH_SEEDS", "30"))
+ASKED = {"all": "1%", "curvature": "none"}
+MODELS: dict[str, Any] = {
+    "default": None, "rod": "rod", "catenary": "catenary", "adaptive": {"kind": "adaptive", "always_move": True},
+}  # fmt: skip
+
+
+def scene(seed: int, model: Any) -> tuple[str, dict[str, Any]]:
+    """Without steps and cells of its own; a third of them in a current across them."""
+    kind, text = random_scene(seed)
+    text = copy.deepcopy(text)
+    text["time"].pop("step")
+    text.pop("model")
+    if seed % 3 == 0:
+        text["environment"]["fluid"]["current"] = [0.0, 0.3, 0.0]
+    return kind, text | {"accuracy": ASKED} | ({"model": model} if model else {})
+
+
+def timed(text: dict[str, Any]) -> tuple[float, hybrid.Result | None]:
+    """s of processor time of the second of two runs; no result where it fails."""
+    spent = np.inf
+    for _ in range(2):
+        begin = time.process_time()
+        try:
+            result = hybrid.run(copy.deepcopy(text))
+        except hybrid.ComputationError:
+            return np.inf, None
+        spent = time.process_time() - begin
+    return spent, result
+
+
+def kept(result: hybrid.Result | None) -> bool:
+    """Whether it did not fail, and says that it met what was asked."""
+    return result is not None and "accuracy missed" not in {e.kind for e in result.events}
+
+
+def test_choice_random() -> None:
+    print(
+        "\nseed kind       cells rod of zones  s: default, rod, catenary, adaptive; default over the cheapest that meets"
+    )
+    ratios, taken = [], Counter[str]()
+    for seed in range(SEEDS):
+        times, found = {}, {}
+        for name, model in MODELS.items():
+            kind, text = scene(seed, model)
+            times[name], found[name] = timed(text)
+        default = found["default"]
+        assert default is not None, f"seed {seed}: the default fails"
+        chosen = str(hybrid.parse_scene(default.scene_text).model.kind)
+        taken[chosen] += 1
+        cheapest = min((times[x] for x in ("rod", "catenary", "adaptive") if kept(found[x])), default=np.nan)
+        ratios.append(times["default"] / cheapest if kept(default) else np.nan)
+        zones = found["adaptive"]
+        rod = np.mean([(mesh.kinds == "rod").mean() for mesh in zones.mesh]) if zones is not None else np.nan
+        line = ", ".join(f"{times[x]:6.2f}{'' if kept(found[x]) else '*'}" for x in MODELS)
+        print(f"{seed:4d} {kind:10s} {rod:6.0%}  {line}  takes {chosen:9s} {ratios[-1]:5.2f}", flush=True)
+    x = np.array(ratios)[np.isfinite(ratios)]
+    print(
+        f"\n* misses 1 %, or fails.  Chosen: {dict(taken)}; over the cheapest of {x.size} that meet: median {np.median(x):.2f}, ",
+        end="",
+    )
+    print(", ".join(f"{p} % {np.percentile(x, p):.2f}" for p in (75, 90, 100)))
