@@ -20,7 +20,7 @@ from hybrid.adapt.zone_rules import OFF, ROUND_TIME, Rules, planned, reach, spre
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.cell_lengths import FADE
-from hybrid.kernels.mesh.criteria import CRITERIA, GIVEN, SLACK, TORSION
+from hybrid.kernels.mesh.criteria import BEND, CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.mesh.stiffness_ramp import shares
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, evaluate_criteria
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
@@ -142,6 +142,7 @@ class DomainManager:
         self.zones.clock[z.MEMORY] = FADE * max(self.pace, period)
         self.zones.clamped[:] = cable.held_tangent
         self.seen = np.zeros((len(CRITERIA), n))  # ratios since the last output
+        self.foreseen = np.zeros(n)  # what catenaries will lack, by a pre-run, over what is allowed
         self.first = np.zeros((len(CRITERIA), n))  # largest ratios by which the first rods were chosen
         self.near: Floats = np.zeros(0)  # (N+1,) of a line that touches itself: how near it is to itself
         self.calm_since, self.buffer = np.full(n, np.inf), np.zeros(n)
@@ -357,6 +358,7 @@ class DomainManager:
         """Base cells that ask to be rod, whatever they are, after `evaluate_criteria`; the ratios begin anew."""
         n = self.layout.rod.size
         self._add_global_ratios()
+        np.maximum(self.ratios[BEND], self.foreseen, out=self.ratios[BEND])
         np.maximum(self.first, self.ratios, out=self.first)
         rules = self.rules(state)
         asks = spread(wanted(self.ratios, np.zeros(n, bool)), self.layout.base, rules.buffer)

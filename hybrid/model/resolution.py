@@ -191,6 +191,8 @@ class Resolution:
     of such a run; follow: whether the error of neglected bending is followed along the run.  later: s, the largest step
     where no vibration is there that a ramp has set off along the line with more than `still` (N); 0: all are alike.
     bends: error of curvature that is asked, as a part of the largest that a pre-run has shown; infinite: none is.
+    rods: stretches (from, to, m; the lack over what is allowed) of which a pre-run has shown that catenaries will lack
+    what is asked along the line: zones that move begin with rods there.
     """
 
     fineness: float
@@ -203,6 +205,7 @@ class Resolution:
     later: float = 0.0
     still: float = 0.0
     bends: float = inf
+    rods: tuple[tuple[float, float, float], ...] = ()
 
     def coarser(self, cells: float = 1.0, steps: float = 1.0) -> Resolution:
         """With cells and steps longer by these factors; the error of a step is of third order."""

@@ -157,6 +157,10 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
         foreseen, period if curvature_error is None else 0.0,
     )  # fmt: skip
     manager.load(model.ends.moments)
+    base = model.layout.base
+    for a, b, lack in resolution.rods:
+        there = (base[:-1] < b) & (base[1:] > a)
+        manager.foreseen[there] = np.maximum(manager.foreseen[there], lack)
     return manager
 
 

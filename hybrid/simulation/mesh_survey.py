@@ -54,7 +54,17 @@ def with_survey(resolution: Resolution, scene: Scene, survey: Survey | None) -> 
     """With cells where a pre-run shows that they should be, and the share of curvature that limits ask for."""
     if survey is None:
         return resolution
-    return replace(for_motion(resolution, scene, survey.reach), grading=survey.grading(), bends=survey.bends)
+    moved = for_motion(resolution, scene, survey.reach)
+    rods = stretches_above_one(survey.demand.s, lack_along(scene, survey))
+    return replace(moved, grading=survey.grading(), bends=survey.bends, rods=rods)
+
+
+def stretches_above_one(s: Floats, x: Floats) -> tuple[tuple[float, float, float], ...]:
+    """Where x (K,) at places s (K,) m is above 1: from, to, half of the way to the next place, and the largest x."""
+    asks, between = x > 1.0, 0.5 * (s[:-1] + s[1:])
+    changes = np.flatnonzero(np.diff(np.concatenate([[False], asks, [False]]).astype(int)))
+    bounds = np.concatenate([s[:1], between, s[-1:]])
+    return tuple((float(bounds[a]), float(bounds[b]), float(x[a:b].max())) for a, b in changes.reshape(-1, 2))
 
 
 def lack_along(scene: Scene, survey: Survey) -> Floats:
