@@ -59,6 +59,7 @@ if TYPE_CHECKING:
 
 # Steps from which on the tables pay where cells stay: they take the time of two or three changes by Python.
 PAYS_FROM = 10
+LEAST_CELLS = 3  # with which tables are made
 # Of the tables of a run, what depends on the cells.
 IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
 IN_ZONES = ("line", "sea", "old", "new", "zones")
@@ -136,7 +137,7 @@ class CellChanges:
             return False
         if not switching.zones.clock[z.SHARE] > 0.0 and owner.steps < PAYS_FROM:
             return False
-        if owner.payout is not None:
+        if owner.payout is not None or switching.manager.layout.rod.size < LEAST_CELLS:
             return False
         plain = (
             owner.correction is None

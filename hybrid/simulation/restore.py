@@ -92,7 +92,7 @@ def resolution_tree(resolution: Resolution) -> Tree:
     """An resolution for a checkpoint."""
     tree = {x.name: getattr(resolution, x.name) for x in fields(resolution)}
     grading = resolution.grading
-    return tree | {"grading": grading and vars(grading), "rods": np.reshape(resolution.rods, (-1, 3))}
+    return tree | {"grading": grading and vars(grading), "rods": np.array(resolution.rods, float).ravel()}
 
 
 def resolution_from(tree: Any, scene: Scene) -> Resolution:
@@ -100,7 +100,7 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
     first = first_resolution(scene)
     if "later" not in tree:  # of a checkpoint of before, whose steps were short from one end to the other
         tree = tree | {"later": first.later * tree["step"] / first.step if first.step else 0.0, "still": first.still}
-    later = {"bends": inf, "rods": np.zeros((0, 3))}
+    later = {"bends": inf, "rods": np.zeros(0)}
     saved = matched(later | tree, resolution_tree(first) | {"grading": None}, "resolution")
     for name in ("fineness", "step", "local", "zones", "later", "still"):
         asked, is_ = getattr(first, name), saved[name]
@@ -119,8 +119,9 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
     if not (saved["fineness"] * 100 <= MOST_CELLS and 1 <= saved["every"] <= FARTHEST and saved["bends"] > 0.0):
         raise ValueError("cells that no mesh has")
     rods = saved["rods"]
-    if rods.shape[1:] != (3,) or not (rods[:, 0] <= rods[:, 1]).all() or not np.isfinite(rods).all():
+    if rods.size % 3 or not np.isfinite(rods).all() or not (rods[::3] <= rods[1::3]).all():
         raise ValueError("stretches that no line has")
+    rods = rods.reshape(-1, 3)
     return Resolution(**saved | {"grading": grading, "rods": tuple((float(a), float(b), float(x)) for a, b, x in rods)})
 
 
