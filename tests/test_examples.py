@@ -211,12 +211,12 @@ def ran_as(model: str, name: str) -> hybrid.Result:
 # Rods (m) in equilibrium and at the end, the share of the line that is rod on the mean, and changes of zones in all.
 # On the mesh that rods everywhere would have: bounds are its nodes, and a zone changes by single cells of it.
 PLANS: dict[str, tuple[list[tuple[float, float]], list[tuple[float, float]], float, int]] = {
-    "s_tether": ([(14.4, 46.641), (55.468, 60)], [(0, 3), (12, 46.641), (55.468, 60)], 0.69, 6),
+    "s_tether": ([(14.4, 46.641), (55.468, 60)], [(0, 3), (11.4, 46.641), (55.468, 60)], 0.70, 3),
     "rov_tether": ([(68.089, 80)], [(65.859, 81.138)], 0.10, 3),
-    "touchdown": ([], [(82.5, 117.5)], 0.116, 17),
-    "laying": ([(0, 184)], [(0, 200)], 0.25, 27),
+    "touchdown": ([], [(80, 127.5)], 0.158, 7),
+    "laying": ([(0, 184)], [(0, 208)], 0.255, 3),
     "slack_on_seabed": ([(0, 17.1)], [(0, 30)], 0.91, 15),
-    "irregular_sea": ([], [(19, 41)], 0.158, 114),
+    "irregular_sea": ([], [(0, 50)], 0.406, 32),
 }
 
 
@@ -238,26 +238,19 @@ def test_the_plan_of_an_example_is_what_it_was(name: str) -> None:
 
 @pytest.mark.parametrize("name, period", [("s_tether", 7.0), ("touchdown", 8.0)])
 def test_zones_breathe_with_the_heave_and_do_not_flicker(name: str, period: float) -> None:
-    """In the last three periods: no changes any more, and nothing has ever changed back within dwell, but for one cell.
-
-    The dwell time is a quarter of the time of a transverse wave, 20 steps at least.  It holds rods back that go, not
-    those that come: of the touchdown one cell, calm for its 2 s, is a rod again 1.6 s later (27.1 s and 28.7 s), while
-    the heave settles.  That happens once; the line stays within 5 mm of rods (4.4 mm).
-    """
+    """In the last three periods: no changes any more, and nothing has ever changed back within two periods."""
     result = ran(name)
     changes = [e for e in result.events if e.kind in ZONE_EVENTS]
     assert not [e for e in changes if e.t > result.times[-1] - 3 * period]
-    dwell = 20 * 0.05 if name == "s_tether" else 20 * 0.1
     goes = ("merge", "shrink")
     back = []
     for a in changes:
         for b in changes:
-            reversed_ = (a.kind in goes) != (b.kind in goes) and 0.0 < b.t - a.t < dwell
+            reversed_ = (a.kind in goes) != (b.kind in goes) and 0.0 < b.t - a.t < 2 * period
             if reversed_ and a.s_a < b.s_b and b.s_a < a.s_b:
                 back.append((a, b))
-    assert len(back) == (name == "touchdown"), back
-    for a, b in back:
-        assert a.kind == "shrink" and b.kind == "grow" and b.t - a.t > 1.5 and b.t < 4 * period, (a, b)
+    assert not back
+    if name == "touchdown":
         rods = ran_as("rod", name)
         assert np.linalg.norm(result.position - rods.position, axis=2).max() < 5e-3
 
@@ -277,7 +270,7 @@ def test_s_tether_needs_bending_where_it_is_nearly_slack() -> None:
     s = np.linspace(0, 60, 61)
     there = [x.at(s=s, names=["position"])["position"] for x in (result, rod, catenary)]
     apart = [np.linalg.norm(x - there[1], axis=2).max() for x in (there[0], there[2])]
-    assert apart == pytest.approx([0.025, 0.61], rel=0.2)
+    assert apart == pytest.approx([0.020, 0.61], rel=0.2)
 
 
 def test_s_tether_carries_its_weight_in_still_water() -> None:
