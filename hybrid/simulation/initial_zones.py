@@ -35,7 +35,7 @@ from hybrid.solve.statics import Equilibrium
 # and of a line that moves to and fro so many periods, lest what is let go comes back, up to so many ramp times.
 HOLD, LEAST_STEPS_HELD = 0.25, 20
 PERIODS_HELD, MOST_HELD = 2.0, 10.0
-# Part of a period for which the way of a contact edge is foreseen: on to where it turns round, at its speed at most.
+# Part of a period over which the way of a contact edge is foreseen: from the middle of its way to where it turns round.
 STRAIGHT = 0.25
 # Bending comes and goes no slower than in so many times that, and no faster than in so many steps, whatever is asked.
 SLOWEST, FASTEST = 2.0, 10
