@@ -192,6 +192,29 @@ model: catenary
 time: {duration: 120.0, step: 0.1}
 ```
 
+Other seas; each is a value of `waves`, and `depth` and `ramp` go with all:
+
+```text
+- {kind: jonswap, significant_height: 3, peak_period: 9, spreading: {exponent: 10}}  # cos^2s of half the angle
+- {kind: pierson_moskowitz, significant_height: 3, zero_crossing_period: 6.5}        # ISSC, Bretschneider
+- kind: ochi_hubble
+  parts:
+    - {significant_height: 2, peak_period: 14, shape: 3}
+    - {significant_height: 1.5, peak_period: 6, shape: 1.2}
+- kind: sum
+  spectra:
+    - {kind: jonswap, significant_height: 2, peak_period: 14, direction: 200}
+    - {kind: jonswap, significant_height: 1.5, peak_period: 6, spreading: {exponent: 8}}
+- {kind: components, file: sea.csv}      # amplitude,frequency,direction,phase (m, rad/s, deg, deg)
+- {kind: record, file: eta.csv, direction: 30, shortest_period: 2}                   # t,elevation (s, m)
+```
+
+Swell and wind sea (`sum`) have independent phases and no frequency in common.
+With `spreading` every wave of a sea has one direction of its own, drawn from the seed, so that a step costs what it
+does without; the waves do not lie in a plane any more.  cosⁿ of the whole angle with n = 2 is about s = 5.6.
+A `record` is met where it was measured, at its own times; elsewhere it is as if all of it ran in one direction.  Its
+harmonics begin anew at its end, so a run may not be longer; what is in no wave is an event.
+
 `buoyancy` is net: the weight of the displaced fluid minus that of the float or the modules.  Where the size is known
 rather than the lift, give `volume` instead.
 Mass and volume must make a possible density: from 0.008 of that of the fluid (0.05 for a clump) to 25 000 kg/m³.

@@ -27,8 +27,10 @@ from hybrid.model.resolution import (
 from hybrid.model.sections import swivels
 from hybrid.model.self_reach import self_reach
 from hybrid.scene.accuracy import USUAL
-from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.scene.schema import AdaptiveModel, RecordedWaves, Scene
 
+# Part of the variance of a record that is round-off.
+LOST = 1e-6
 # What the entry of the accuracy that is asked is called.
 ACCURACY = "accuracy"
 
@@ -182,6 +184,18 @@ def _idle(scene: Scene, line: Line) -> Iterator[Entry]:
         yield Entry(IDLE, False, f"{why} to what it carries", event="ignored")
 
 
+def _left_out(scene: Scene) -> Iterator[Entry]:
+    """What of a measured elevation is in no wave."""
+    waves = scene.environment.waves
+    if isinstance(waves, RecordedWaves) and (waves.recorded.lost > LOST or abs(waves.recorded.mean) > 0.0):
+        x = waves.recorded
+        why = (
+            f"{100.0 * x.lost:.3g} % of its variance, in periods other than {x.shortest:.4g} to {x.longest:.4g} s, and "
+            f"its mean, {x.mean:.4g} m"
+        )
+        yield Entry("a part of the record of the sea (environment.fluid.waves)", False, why, event="ignored")
+
+
 def obstacle_entries(scene: Scene, rows: Floats) -> Iterator[Entry]:
     """Each obstacle of a scene, with how stiff it is; rows: (M, OBSTACLE) of them."""
     for (name, x), row in zip(scene.obstacles.items(), rows, strict=True):
@@ -227,7 +241,7 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
     entries += _accuracy(scene)
     entries.append(Entry("gravity", scene.environment.gravity != 0, "environment.gravity"))
     entries.append(Entry("buoyancy", scene.environment.fluid is not None, "environment.fluid"))
-    entries += _idle(scene, line)
+    entries += (*_idle(scene, line), *_left_out(scene))
     entries += [_force(scene, line, name, bit, needs) for name, (bit, needs) in FORCES.items()]
     if isinstance(scene.model, AdaptiveModel):
         why = "rods that come and go have none; fixed zones and `model: rod` do"

@@ -14,7 +14,7 @@ from hybrid.kernels.step.generalized_alpha import weights
 from hybrid.kernels.step.step_law import SAFETY
 from hybrid.model.build import Model
 from hybrid.model.resolution import Resolution, requested_accuracy, wants_errors
-from hybrid.scene.schema import JonswapWaves, Scene
+from hybrid.scene.schema import Scene
 
 # s per cell and Newton iteration, in space and in a plane.
 COST = {"rod": (0.4e-6, 0.18e-6), "catenary": (0.1e-6, 0.09e-6)}
@@ -80,7 +80,7 @@ def step_time(
     each *= USUAL_ITERATIONS * (1.0 + COST_CORRECTOR * followed)
     waves = scene.environment.waves
     if waves is not None:
-        each += COST_WAVE * total * (waves.components if isinstance(waves, JonswapWaves) else 1)
+        each += COST_WAVE * total * waves.waves_in_sum
     return each + COST_STEP + (COST_MANAGER + COST_CRITERIA * total) * moves
 
 

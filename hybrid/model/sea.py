@@ -11,16 +11,9 @@ from hybrid.kernels.state.state import Floats, Sea, no_sea, with_waves
 from hybrid.model.ends import rise
 from hybrid.model.obstacles import obstacle_rows
 from hybrid.model.scales import pressing
-from hybrid.scene.schema import (
-    CurrentProfile,
-    JonswapWaves,
-    PowerLawCurrent,
-    RegularWaves,
-    Scene,
-    Seabed,
-    UniformCurrent,
-)
-from hybrid.scene.sea import wavenumber
+from hybrid.model.spectra import waves_of
+from hybrid.scene.schema import CurrentProfile, PowerLawCurrent, Scene, Seabed, UniformCurrent
+from hybrid.scene.waves import GivenWaves, RecordedWaves, RegularWaves, SumOfWaves, Waves, wavenumber
 
 # Contact sets in over half the penetration of a cable at rest: it then rests on the linear part.
 ONSET = 0.5
@@ -29,8 +22,6 @@ SLIP_LENGTH = 0.01
 # Heights at which a power law is tabulated, and how they crowd towards its foot, where it is steep:
 # linear interpolation of the usual seventh root is then right to 1e-5 of the largest speed.
 POWER_LAW_HEIGHTS, CROWDING = 800, 8
-# Frequencies of an irregular sea, in peak frequencies: outside lies less than 0.2 % of its energy.
-LOWEST, HIGHEST = 0.3, 6.0
 
 
 class Surroundings:
@@ -140,43 +131,28 @@ def current_table(scene: Scene) -> tuple[Floats, Floats]:
     return np.array([p.z for p in ordered], float), np.array([p.flow for p in ordered], float)
 
 
-def components(waves: RegularWaves | JonswapWaves, depth: float, gravity: float) -> Floats:
+def components(waves: Waves, depth: float, gravity: float) -> Floats:
     """Wave components (W, 6): amplitude, frequency, kx, ky, phase, k (m, 1/s, 1/m, 1/m, rad, 1/m).
 
-    An irregular sea gets components of equal energy, each at the root mean square of its share of the JONSWAP
-    spectrum (Hasselmann et al. 1973), with phases drawn from the seed: no frequency is a multiple of
-    another, so the sea does not repeat itself, and its variance is that of the spectrum exactly.
+    An irregular sea gets components of equal energy, each at the root mean square of its share of the spectrum, with
+    phases drawn from the seed: no frequency is a multiple of another, so the sea does not repeat itself, and its
+    variance is that of the spectrum exactly.
     """
+    place = (0.0, 0.0)
     if isinstance(waves, RegularWaves):
-        amplitude = np.array([0.5 * waves.height])
-        omega = np.array([2 * np.pi / waves.period])
-        phase = np.radians([waves.phase])
+        amplitude, omega = np.array([0.5 * waves.height]), np.array([2 * np.pi / waves.period])
+        phase, towards = np.radians([waves.phase]), np.array([math.radians(waves.direction)])
+    elif isinstance(waves, SumOfWaves):
+        seas = [waves_of(x, i, len(waves.spectra)) for i, x in enumerate(waves.spectra)]
+        amplitude, omega, phase, towards = (np.concatenate(x) for x in zip(*seas, strict=True))
+    elif isinstance(waves, GivenWaves | RecordedWaves):
+        amplitude, omega, phase, heading = waves.recorded.waves.T
+        towards = np.array([math.radians(x) for x in heading.tolist()])
+        place = getattr(waves, "position", place)
     else:
-        n = waves.components
-        omega = frequencies(2 * np.pi / waves.peak_period, waves.gamma, n)
-        amplitude = np.full(n, 0.25 * waves.significant_height * math.sqrt(2.0 / n))
-        phase = np.random.default_rng(waves.seed).uniform(0.0, 2 * np.pi, n)
+        amplitude, omega, phase, towards = waves_of(waves)
     k = np.array([wavenumber(w, None if math.isinf(depth) else depth, gravity) for w in omega])
-    towards = math.radians(waves.direction)
-    return np.column_stack([amplitude, omega, k * math.cos(towards), k * math.sin(towards), phase, k])
-
-
-def jonswap(omega: Floats, peak: float, gamma: float) -> Floats:
-    """JONSWAP spectrum over frequency (1/s), not normalised."""
-    width = np.where(omega <= peak, 0.07, 0.09)
-    crest = np.exp(-0.5 * ((omega - peak) / (width * peak)) ** 2)
-    return np.asarray(omega**-5.0 * np.exp(-1.25 * (peak / omega) ** 4) * gamma**crest)
-
-
-def frequencies(peak: float, gamma: float, n: int) -> Floats:
-    """Root mean squares of n parts of equal energy of a JONSWAP spectrum, 1/s.
-
-    The variance of the sea and that of its rate are then those of the spectrum.
-    """
-    omega = peak * np.geomspace(LOWEST, HIGHEST, 20_001)
-    S = jonswap(omega, peak, gamma)
-    energy, rate = (
-        np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(omega))]) for y in (S, omega**2 * S)
-    )
-    parts = np.interp(np.arange(n + 1) / n * energy[-1], energy, rate)
-    return np.asarray(np.sqrt(np.diff(parts) * n / energy[-1]))
+    kx, ky = (k * np.array([part(x) for x in towards.tolist()]) for part in (math.cos, math.sin))
+    if any(place):
+        phase = phase - kx * place[0] - ky * place[1]
+    return np.column_stack([amplitude, omega, kx, ky, phase, k])

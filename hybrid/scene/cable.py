@@ -21,7 +21,7 @@ from hybrid.scene.base import (
     number_or_list,
     refuse,
 )
-from hybrid.scene.sea import Current, CurrentPoint, CurrentProfile, PowerLawCurrent, Seabed, UniformCurrent, Waves
+from hybrid.scene.sea import Current, CurrentPoint, CurrentProfile, PowerLawCurrent, Seabed, UniformCurrent
 from hybrid.scene.stretch import (
     Curve,
     CurveFile,
@@ -33,6 +33,7 @@ from hybrid.scene.stretch import (
     rows_of,
     slopes,
 )
+from hybrid.scene.waves import Waves
 
 
 class Fluid(Table):
@@ -87,7 +88,8 @@ class Environment(Table):
     def files(self) -> list[str]:
         """Paths of the files that are read."""
         depths = self.seabed.depths if self.seabed is not None else None
-        return [depths.file] if depths is not None and depths.file is not None else []
+        named = (getattr(depths, "file", None), getattr(self.waves, "file", None))
+        return [file for file in named if file is not None]
 
     @property
     def waves(self) -> Waves | None:

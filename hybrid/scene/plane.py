@@ -263,9 +263,10 @@ def _sea(environment: Environment) -> Iterator[Witness]:
             x, y, z = (float(v) for v in table if not isinstance(v, CurrentPoint))
             yield Witness(here, "along", (x, y, z))
     if fluid.waves is not None:
-        towards = math.radians(fluid.waves.direction)
-        level = (round(math.cos(towards), 15), round(math.sin(towards), 15), 0.0)
-        yield Witness(("environment", "fluid", "waves", "direction"), "along", level)
+        for key, heading in fluid.waves.headings():
+            towards = math.radians(heading)
+            level = (round(math.cos(towards), 15), round(math.sin(towards), 15), 0.0)
+            yield Witness(("environment", "fluid", "waves", *key), "along", level)
 
 
 def _flow_key(flow: UniformCurrent | PowerLawCurrent | CurrentPoint) -> str:

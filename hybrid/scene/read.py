@@ -263,7 +263,7 @@ def _resolve_motion_files(data: Any, folder: Path) -> None:
     files = [*product(("ends",), ("start", "end"), ("motion", "force", "moment", "thrust", "payout"))]
     files += product(("points",), points if isinstance(points, dict) else (), ("motion", "force"))
     files += product(("bodies",), bodies if isinstance(bodies, dict) else (), ("motion", "force", "moment"))
-    files.append(("environment", "seabed", "depths"))
+    files += [("environment", "seabed", "depths"), ("environment", "fluid", "waves")]
     for path in files:
         _make_absolute(_at(data, path), folder)
     lines = data.get("lines") if isinstance(data, dict) else None

@@ -1,4 +1,4 @@
-"""The sea around the cable: currents, waves, the seabed.
+"""The sea around the cable: currents and the seabed; its waves are in `waves.py`.
 
 Heights count along z; directions in degrees from x, counter-clockwise seen from above.
 """
@@ -31,7 +31,6 @@ from hybrid.scene.base import (
     Positive,
     Table,
     Vector,
-    Whole,
     Words,
     by_kind,
     numbers,
@@ -189,86 +188,6 @@ Current = Annotated[
     ],
     Discriminator(_current_form),
 ]
-
-
-# --- waves -------------------------------------------------------------------------------------
-
-_DIRECTION = "direction (heading) in which the waves travel, from x counter-clockwise seen from above [deg]"
-_DEPTH = "depth of the water for the length of the waves; absent: down to the seabed, or deep without one [m]"
-
-
-class RegularWaves(Table):
-    """Linear (Airy) waves of one period: elevation height / 2 x cos(k x - w t + phase) along their direction."""
-
-    kind: Literal["regular"] = Field(default="regular", description="one period, linear (Airy)")
-    height: Positive = Field(description="height H from trough to crest [m]")
-    period: Positive = Field(description="period T [s]")
-    direction: Number = Field(default=0.0, description=_DIRECTION)
-    phase: Number = Field(default=0.0, description="phase at x = y = 0 and t = 0; 0 is a crest [deg]")
-    depth: Positive | None = Field(default=None, description=_DEPTH)
-    ramp: Positive | None = Field(default=None, description=_RAMP.format(what="sea"))
-
-    @property
-    def main_period(self) -> float:
-        """The period that carries most energy [s]."""
-        return self.period
-
-
-class JonswapWaves(Table):
-    """Irregular, long-crested waves: a sum of linear waves with random phases and a JONSWAP spectrum."""
-
-    kind: Literal["jonswap"] = Field(default="jonswap", description="a spectrum of periods: irregular waves")
-    significant_height: Positive = Field(
-        validation_alias=AliasChoices("significant_height", "height"),
-        description="significant wave height Hs, four standard deviations of the elevation [m]",
-    )
-    peak_period: Positive = Field(
-        validation_alias=AliasChoices("peak_period", "period"), description="period Tp at the peak of the spectrum [s]"
-    )
-    gamma: Number = Field(default=3.3, ge=1, description="peak enhancement; 1 is a Pierson-Moskowitz sea [-]")
-    direction: Number = Field(default=0.0, description=_DIRECTION)
-    seed: Whole = Field(default=1, ge=0, description="seed of the random phases: another seed, another sea [-]")
-    components: Whole = Field(default=100, ge=1, le=1000, description="number of waves in the sum [-]")
-    depth: Positive | None = Field(default=None, description=_DEPTH)
-    ramp: Positive | None = Field(default=None, description=_RAMP.format(what="sea"))
-
-    @property
-    def main_period(self) -> float:
-        """The period that carries most energy [s]."""
-        return self.peak_period
-
-
-Waves = Annotated[
-    Annotated[RegularWaves, Tag("<regular>")] | Annotated[JonswapWaves, Tag("<jonswap>")],
-    Discriminator(by_kind),
-    Kinds(("regular", "jonswap"), usual=("regular",)),
-]
-
-# Newton's method on the dispersion relation gains digits quadratically from a start within 5 %.
-_MOST_ITERATIONS = 20
-# Values of omega^2 depth / gravity beyond which tanh(k depth) is 1, or k depth, to round-off.
-_DEEP, _SHALLOW = 20.0, 1e-16
-
-
-def wavenumber(omega: float, depth: float | None, gravity: float) -> float:
-    """Wavenumber k > 0 [1/m] of a linear wave: omega^2 = gravity k tanh(k depth), to round-off.
-
-    omega: angular frequency > 0 [rad/s]; depth [m], None for deep water; gravity > 0 [m/s^2].
-    """
-    deep = omega * omega / gravity
-    if depth is None or deep * depth > _DEEP:
-        return deep
-    q = deep * depth
-    if q < _SHALLOW:
-        return omega / math.sqrt(gravity * depth)
-    y = q / math.sqrt(math.tanh(q))  # Eckart (1952): k depth within 5 %
-    for _ in range(_MOST_ITERATIONS):
-        t = math.tanh(y)
-        change = (y * t - q) / (t + y * (1.0 - t * t))
-        y -= change
-        if abs(change) <= 1e-15 * y:
-            break
-    return y / depth
 
 
 # --- the seabed --------------------------------------------------------------------------------

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from hybrid.scene.analysis import Equilibrium, Initial, Straight
+from hybrid.scene.analysis import Equilibrium, Initial, Straight, Time
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.depths import Depths
 from hybrid.scene.ends import Ends, Triple
-from hybrid.scene.sea import RegularWaves, wavenumber
+from hybrid.scene.waves import RecordedWaves, wavenumber
 
 # Miche (1944): a wave of height H and length L breaks where H / L reaches 0.142 tanh(k depth).
 STEEPEST = 0.142
@@ -20,6 +20,9 @@ SUNK = 1e-3
 
 # s: beyond it waves are tides, and so long that the formulas lose their digits.
 LONGEST_PERIOD = 1e5
+
+# Part of a time: round-off.
+SAME_TIME = 1e-9
 
 # Two depths that differ by less than this part are the same: people write six digits.
 SAME_DEPTH = 1e-6
@@ -72,22 +75,37 @@ def waves(environment: Environment) -> Iterator[Finding]:
     if sea.depth is not None and depth is not None and abs(sea.depth - depth) > SAME_DEPTH * depth:
         expected = f"{depth:.8g} m, the depth of the seabed under the surface at x = y = 0"
         yield Finding((*_WAVES, "depth"), expected, "leave depth out; it follows from the seabed")
-    key = "period" if isinstance(sea, RegularWaves) else "peak_period"
-    if sea.main_period > LONGEST_PERIOD:
-        expected = f"at most {LONGEST_PERIOD:g} s: longer waves are tides"
-        yield Finding((*_WAVES, key), expected, "give a tide as environment.fluid.current; periods are in seconds")
+    for height, key, period, period_key in sea.sizes():
+        if period > LONGEST_PERIOD:
+            expected = f"at most {LONGEST_PERIOD:g} s: longer waves are tides"
+            fix = "give a tide as environment.fluid.current; periods are in seconds"
+            yield Finding((*_WAVES, *period_key), expected, fix)
+            continue
+        k = wavenumber(2 * math.pi / period, depth, environment.gravity)
+        length = 2 * math.pi / k if k > 0.0 else math.inf
+        highest = STEEPEST * length * (math.tanh(k * depth) if depth is not None else 1.0)
+        if height >= highest:
+            water = "deep water" if depth is None else f"{depth:.6g} m of water"
+            expected = (
+                f"less than {highest:.4g} m, because in {water} waves of {period:.6g} s are {length:.4g} m long, "
+                "and higher ones break"
+            )
+            given = f"Hs = {height:.4g} m" if key == ("file",) else None
+            yield Finding((*_WAVES, *key), expected, "lower waves, or a longer period", given)
+
+
+def record_lasts(environment: Environment, time: Time | None) -> Iterator[Finding]:
+    """A measured elevation that begins after a run, or ends before it: its harmonics would begin anew."""
+    sea = environment.waves
+    if not isinstance(sea, RecordedWaves) or time is None:
         return
-    k = wavenumber(2 * math.pi / sea.main_period, depth, environment.gravity)
-    length = 2 * math.pi / k if k > 0.0 else math.inf
-    highest = STEEPEST * length * (math.tanh(k * depth) if depth is not None else 1.0)
-    key = "height" if isinstance(sea, RegularWaves) else "significant_height"
-    if getattr(sea, key) >= highest:
-        water = "deep water" if depth is None else f"{depth:.6g} m of water"
-        expected = (
-            f"less than {highest:.4g} m, because in {water} waves of {sea.main_period:g} s are {length:.4g} m long, "
-            "and higher ones break"
-        )
-        yield Finding((*_WAVES, key), expected, "lower waves, or a longer period")
+    begin, end = sea.recorded.begin, sea.recorded.end
+    if begin > 0.0:
+        given = f"{begin:g} to {end:g} s"
+        yield Finding((*_WAVES, "file"), "a record from t = 0 on, or before", "shift its times", given)
+    elif end < time.duration * (1.0 - SAME_TIME):
+        expected = f"at most {end:.8g} s, the end of the record of the sea, which would begin anew"
+        yield Finding(("time", "duration"), expected, "a shorter run, or a longer record")
 
 
 def followed(environment: Environment, ends: Ends) -> Iterator[Finding]:

@@ -21,8 +21,9 @@ from hybrid.kernels.laws import seabed, water
 from hybrid.kernels.laws.seabed import contact
 from hybrid.kernels.laws.water import FADED, SAME_WETNESS, wave_kinematics
 from hybrid.kernels.state.state import no_sea, with_waves
-from hybrid.model.sea import Surroundings, components, current_table, frequencies, jonswap, surroundings
-from hybrid.scene.sea import JonswapWaves, RegularWaves
+from hybrid.model.sea import Surroundings, components, current_table, surroundings
+from hybrid.model.spectra import FINE, HIGHEST, LOWEST, jonswap, shares
+from hybrid.scene.waves import JonswapWaves, RegularWaves
 
 
 def entry(law):
@@ -384,7 +385,8 @@ def test_jonswap_spectrum_has_its_shape():
 def test_waves_share_the_energy():
     """Each wave stands at the median of its share: as many waves lie below a frequency as there is energy."""
     peak, n = 2 * math.pi / 10.0, 200
-    w = frequencies(peak, 3.3, n)
+    fine = peak * np.geomspace(LOWEST, HIGHEST, FINE)
+    w = shares(fine, jonswap(fine, peak, 3.3), n)[0]
     total = quad(lambda x: float(jonswap(np.array([x]), peak, 3.3)[0]), 0.3 * peak, 6 * peak, limit=400, points=[peak])[
         0
     ]

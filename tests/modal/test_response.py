@@ -114,6 +114,31 @@ def test_a_rod_that_a_clamp_turns_as_in_time():
     np.testing.assert_allclose(here, there, rtol=0.03)
 
 
+def test_waves_of_many_directions_as_in_time(tmp_path):
+    """Given waves of 12, 8 and 6 s from three directions: the line swings in both planes, as it does over 24 s.
+
+    Low and damped, what has the square of the waves is 0.4 % (2 % of waves three times as high).
+    """
+    rows = [f"{a},{2 * math.pi / period!r},{to},{phase}" for a, period, to, phase in
+            ((0.05, 12, 20, 10), (0.03, 8, 140, 200), (0.02, 6, -75, 70))]  # fmt: skip
+    (tmp_path / "sea.csv").write_text("\n".join(["amplitude,frequency,direction,phase", *rows]))
+    waves = {"kind": "components", "file": str(tmp_path / "sea.csv"), "depth": 100, "ramp": 24}
+    tables = hung(waves, cells=40, damping=5.0)
+    response = hybrid.response(tables)
+    line = response.lines["cable"]
+    assert line.f == pytest.approx([1 / 12, 1 / 8, 1 / 6])
+    tables |= {"time": {"duration": 96.0, "step": 0.2}, "output": {"every": 0.2, "points": [15.0, 30.0, 45.0]}}
+    result = hybrid.run(tables)
+    late = (result.times > 48.0) & (result.times <= 96.0)
+    there = result.position[late].std(axis=0)
+    at = [int(np.argmin(np.abs(line.s - s))) for s in (15.0, 30.0, 45.0)]
+    here = line.deviation("position")[at]
+    np.testing.assert_allclose(here, there, rtol=6e-3)
+    tension = result.tension[late].std(axis=0)
+    np.testing.assert_allclose(np.interp([15, 30, 45], line.middle, line.deviation("tension")), tension, rtol=6e-3)
+    assert here[:, 1].min() > 0.3 * here[:, 0].min()
+
+
 def test_one_line_of_a_system_is_the_cable():
     """In a sea; and turned about the vertical with its waves."""
     one = hybrid.response(hung(STORM))

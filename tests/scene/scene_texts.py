@@ -161,6 +161,28 @@ initial: {kind: equilibrium, points: [[10.0, 0.0, 0.0], [10.0, 0.0, -20.0], [0.0
 model: {kind: catenary}
 """
 
+SEVERAL_SEAS = """\
+environment:
+  fluid:
+    density: 1025.0
+    surface: 0.0
+    waves:
+      kind: sum
+      ramp: 9.0
+      depth: 60.0
+      spectra:
+        - {kind: jonswap, significant_height: 2.0, peak_period: 14.0, direction: 200.0, spreading: {exponent: 25.0}}
+        - {kind: pierson_moskowitz, significant_height: 1.0, zero_crossing_period: 4.0, components: 30, seed: 3}
+        - kind: ochi_hubble
+          parts:
+            - {significant_height: 1.0, peak_period: 12.0, shape: 3.0}
+            - {significant_height: 0.5, peak_period: 6.0, shape: 1.0}
+cable: {sections: [{length: 10.0, mass: 2.0, diameter: 0.03}]}
+ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
+initial: {kind: equilibrium}
+model: {kind: catenary}
+"""
+
 SEA_LIST = """\
 environment:
   fluid:
@@ -197,7 +219,7 @@ PIPE = "diameter: 0.03, pipe: {wall: 0.004, outer_diameter: 0.025, modulus: 2.0e
 MEASURED = SEA.replace("output: {elevation: [[0.0, 0.0], [20.0, 5.0]]}\n", QUANTITIES)
 PIPED = SEA_TOO.replace("diameter: 0.03}]", PIPE)
 
-SEAS = {"sea": SEA, "sea too": SEA_TOO, "sea list": SEA_LIST, "sea uniform": SEA_UNIFORM}
+SEAS = {"several seas": SEVERAL_SEAS, "sea": SEA, "sea too": SEA_TOO, "sea list": SEA_LIST, "sea uniform": SEA_UNIFORM}
 
 AT_REST = """\
 cable: {sections: [{length: 10.0, mass: 1.0}]}

@@ -158,7 +158,9 @@ def test_a_kind_that_no_other_key_tells_is_required() -> None:
     assert given["RegularWaves"] and given["JonswapWaves"] and given["Float"] and given["Pinned"]
     assert not given["PowerLawCurrent"] and not given["AdaptiveModel"]
     sea = "environment: {fluid: {density: 1025, surface: 0, waves: {height: 1, period: 8}}}\n"
-    with pytest.raises(SceneError, match="one of: regular, jonswap"):
+    with pytest.raises(
+        SceneError, match="one of: regular, jonswap, pierson_moskowitz, ochi_hubble, sum, components, record"
+    ):
         parse_scene(sea + AT_REST)
 
 

@@ -38,8 +38,8 @@ from hybrid.scene.schema import (
     Travel,
     UniformCurrent,
 )
-from hybrid.scene.sea import wavenumber
 from hybrid.scene.start_checks import net_weight
+from hybrid.scene.waves import wavenumber
 
 # --- what is read ------------------------------------------------------------------------------
 

@@ -26,6 +26,15 @@ CASES = {
     "adaptive in space": ("s_tether", ["time.duration=6"]),
     "friction, laid": ("laying", ["time.duration=12"]),
     "waves": ("irregular_sea", ["time.duration=6"]),
+    "two spread seas": (
+        "irregular_sea",
+        [
+            "time.duration=4",
+            "environment.fluid.waves={kind: sum, ramp: 10, spectra: [{kind: jonswap, significant_height: 1, "
+            "peak_period: 12, spreading: {exponent: 20}, components: 20}, {kind: pierson_moskowitz, "
+            "significant_height: 1, peak_period: 6, direction: 40, spreading: {exponent: 4}, components: 20}]}",
+        ],
+    ),
     "model error": ("touchdown", ["time.duration=6", "model=catenary", "output.errors=true"]),
     "controlled steps": ("rov_tether", ["time={duration: 10, tolerance: 1.0e-4}"]),
     "accuracy": ("06_whip", ["accuracy=0.3%", "time={duration: 0.3}"]),

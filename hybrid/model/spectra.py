@@ -1,0 +1,109 @@
+"""Irregular seas as sums of linear waves: spectra, their parts of equal energy, directions that spread.
+
+symbol   meaning                                  unit
+w, w_p   angular frequency, at the peak           1/s
+S        spectrum of the elevation                m^2 s
+H        significant height                       m
+l        shape of a part of Ochi and Hubble       -
+s        exponent of the spreading                -
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybrid.kernels.state.state import Floats
+from hybrid.scene.waves import JonswapWaves, OchiHubbleWaves, PiersonMoskowitzWaves, Spectrum, Spreading
+
+# Frequencies of an irregular sea, in peak frequencies: outside lies less than 0.2 % of its energy.
+LOWEST, HIGHEST = 0.3, 6.0
+# Frequencies at which a spectrum is integrated.
+FINE = 20_001
+
+
+def jonswap(omega: Floats, peak: float, gamma: float) -> Floats:
+    """JONSWAP spectrum over frequency (1/s), not normalised."""
+    width = np.where(omega <= peak, 0.07, 0.09)
+    crest = np.exp(-0.5 * ((omega - peak) / (width * peak)) ** 2)
+    return np.asarray(omega**-5.0 * np.exp(-1.25 * (peak / omega) ** 4) * gamma**crest)
+
+
+def ochi_hubble(omega: Floats, parts: list[tuple[float, float, float]]) -> Floats:
+    """Spectrum (m^2 s) over frequency (1/s) of parts of significant height (m), peak (1/s) and shape l.
+
+    (1/4) a^l H^2/(Gamma(l) w^(4 l + 1)) exp(-a/w^4), a = (4 l + 1) w_p^4/4 (Ochi and Hubble 1976), of each part; its
+    integral is H^2/16, its largest value at w_p, and l = 1 is the spectrum of Pierson and Moskowitz.
+    """
+    S = np.zeros_like(omega)
+    for height, peak, shape in parts:
+        x = (shape + 0.25) * (peak / omega) ** 4
+        size = shape * np.log(x) - x - np.log(omega) - math.lgamma(shape)
+        S += 0.25 * height**2 * np.exp(size)
+    return S
+
+
+def shares(omega: Floats, S: Floats, n: int, shift: float = 0.0) -> tuple[Floats, Floats]:
+    """Frequencies (n,) 1/s of n parts of a spectrum over fine frequencies, and the part of the energy in each.
+
+    Each has the root mean square of the frequencies of its part: the variance of the sea and that of its rate are then
+    those of the spectrum.  Parts are of equal energy; shift: by which part of one all but the outer edges lie lower.
+    """
+    energy, rate = (
+        np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(omega))]) for y in (S, omega**2 * S)
+    )
+    edges = np.arange(n + 1) / n
+    if shift and n > 1:
+        edges[1:-1] -= shift / n
+    parts = np.interp(edges * energy[-1], energy, rate)
+    share = np.diff(edges) if shift else np.full(n, 1.0 / n)
+    return np.asarray(
+        np.sqrt(np.diff(parts) / (share * energy[-1]) if shift else np.diff(parts) * n / energy[-1])
+    ), share
+
+
+def directions(spreading: Spreading, n: int, draw: np.random.Generator) -> Floats:
+    """Angles (n,) rad from the mean direction, one for each wave, in random order.
+
+    The distribution cos^2s of half the angle is cut into n parts of equal energy, and in each an angle is drawn: with
+    y the sine of half the angle, (1 + y)/2 has a beta distribution with both parameters s + 1/2.
+    """
+    from scipy.special import betaincinv  # slow to import
+
+    part = (draw.permutation(n) + draw.uniform(size=n)) / n
+    half = spreading.exponent + 0.5
+    return np.asarray(2.0 * np.arcsin(2.0 * betaincinv(half, half, part) - 1.0))
+
+
+def waves_of(sea: Spectrum, order: int = 0, of: int = 1) -> tuple[Floats, Floats, Floats, Floats]:
+    """Amplitudes (m), frequencies (1/s), phases and directions (rad), (n,) each, of an irregular sea.
+
+    order, of: which it is of how many that act together: their frequencies lie between each other, and their phases are
+    drawn anew, so that seas that are alike are independent.
+    """
+    omega, S, height = _spectrum(sea)
+    n = sea.components
+    w, share = shares(omega, S, n, order / of)
+    amplitude = 0.25 * height * np.sqrt(2.0 * share)
+    if not order:
+        amplitude = np.full(n, 0.25 * height * math.sqrt(2.0 / n))
+    draw = np.random.default_rng([sea.seed, order] if order else sea.seed)
+    phase = draw.uniform(0.0, 2 * np.pi, n)
+    towards = np.full(n, math.radians(sea.direction))
+    if sea.spreading is not None:
+        towards += directions(sea.spreading, n, draw)
+    return amplitude, w, phase, towards
+
+
+def _spectrum(sea: Spectrum) -> tuple[Floats, Floats, float]:
+    """Fine frequencies (1/s) of a sea, its spectrum there in any unit, and its significant height (m)."""
+    if isinstance(sea, OchiHubbleWaves):
+        parts = [(x.significant_height, 2 * np.pi / x.peak_period, x.shape) for x in sea.parts]
+        peaks = [peak for _, peak, _ in parts]
+        omega = np.geomspace(LOWEST * min(peaks), HIGHEST * max(peaks), FINE)
+        return omega, ochi_hubble(omega, parts), sea.significant_height
+    assert isinstance(sea, JonswapWaves | PiersonMoskowitzWaves)
+    peak = 2 * np.pi / sea.main_period
+    omega = peak * np.geomspace(LOWEST, HIGHEST, FINE)
+    return omega, jonswap(omega, peak, getattr(sea, "gamma", 1.0)), sea.significant_height
