@@ -161,7 +161,10 @@ class Result(Histories):
                 raise ResultError(f"'{name}' was not read before the result was closed; open the file again")
             dims, _ = self._dims[name], self.units[name]  # which stay with it when the file is closed
             with readable(self._source):
-                array = self._contents.values(name, self._rows.get(dims[0]) if dims else None)
+                rows = self._rows.get(dims[0]) if dims else None
+                array = self._contents.values(name, rows)
+                if name.startswith("events/"):  # in the order of time: those of outputs are written some steps later
+                    array = array[np.argsort(self._contents.values("events/t", rows), kind="stable")]
             if array.dtype.kind == "S":
                 array = np.char.decode(array, "utf-8", "replace")
             array.setflags(write=False)  # it is shared by everyone who asks again
@@ -309,7 +312,6 @@ class Result(Histories):
             table = self["events"]
             rows = zip(*(table[k].tolist() for k in Event._fields if k in table), strict=True)
             events = [Event._make(None if x != x else x for x in row) for row in rows]  # NaN: there is none
-        events.sort(key=lambda e: e.t)  # those of outputs are written some steps later
         return [
             e._replace(kind=OLD_EVENTS.get(e.kind, e.kind), criterion=OLD_EVENTS.get(e.criterion, e.criterion))
             for e in events
