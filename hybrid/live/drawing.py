@@ -10,6 +10,7 @@ import numpy as np
 from hybrid.store.reader import Result
 from hybrid.view.along import along
 from hybrid.view.decimate import even
+from hybrid.view.obstacles import rings
 from hybrid.view.projections import bed_heights, whole_zones
 from hybrid.view.scenery import box_and_planes
 from hybrid.view.style import BED, BODY, INK, colour_of
@@ -29,7 +30,7 @@ def lines_of(result: Result) -> dict[str, Result]:
 def around(result: Result) -> dict[str, Any]:
     """The box that is drawn, m, seabed and still water in it, and what is too far to be drawn."""
     every = AllLines(result).as_result if result.lines else result
-    box, planes, far = box_and_planes(every)
+    box, planes, far = box_and_planes(every, moving=False)
     return {"box": _plain(box.T), "planes": [plane for plane in planes if plane], "far": far}
 
 
@@ -49,9 +50,11 @@ def frames(result: Result, outputs: list[int], most: int) -> list[dict[str, Any]
     """
     lines = [_along_line(line, outputs, most) for line in lines_of(result).values()]
     marks = _marks(result, outputs)
+    one = next(iter(lines_of(result).values()))
+    moved = [[_plain(x) for x in rings(one, i)] for i in outputs]
     times = result.times[outputs]
     return [
-        {"t": float(t), "lines": [line[k] for line in lines], "marks": marks[k], "arms": _arms(result, i)}
+        {"t": float(t), "lines": [line[k] for line in lines], "marks": marks[k], "arms": _arms(result, i) + moved[k]}
         for k, (i, t) in enumerate(zip(outputs, times, strict=True))
     ]
 

@@ -140,7 +140,7 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool) -> LinearL
     """
     line, count = in_space(x.line, state, sticks), x.line.s.size
     if line.bits & FRICTION:
-        friction_axes(x.sea, state.r, state.e, np.zeros_like(state.slip))
+        friction_axes(x.sea, state.r, state.e, np.zeros_like(state.slip), state.grip)
     held, joined = x.ends.held.copy(), [x.joints[k] >= 0 for k in (0, 1)]
     held[joined] = 0
     ends = x.ends._replace(held=held)

@@ -192,6 +192,8 @@ def build(
     touch |= contact_bits(scene) | obstacle_bits(scene)
     moves = layout is not None
     line = line_on(cable, s, rod, touch, sections_turn=not moves or spins_freely(cable), comes_and_goes=moves)
+    if sea.values.carried.size:
+        line = line._replace(moved=np.array([x.moves for x in scene.obstacles.values()], np.int8))
 
     shape = hung(scene, line, sea.values) if like is None else Hanging(like.start.r, like.start.T)
     start, shape_name, ends = first_state(scene, line, cable, sea, scale, shape)

@@ -8,9 +8,9 @@ from itertools import pairwise
 from math import inf
 
 from hybrid.errors import OF_AN_END
-from hybrid.kernels.laws.obstacles import STIFFNESS
 from hybrid.kernels.mesh.criteria import CRITERIA
 from hybrid.kernels.state.forces import BENDING_LAW, DRAG, FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION, VORTICES
+from hybrid.kernels.state.obstacle_rows import STIFFNESS
 from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.mesh import Zone
 from hybrid.model.obstacles import obstacle_rows

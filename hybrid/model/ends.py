@@ -9,7 +9,6 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 
 from hybrid.kernels.state.state import (
-    FAIRLEAD,
     PLACE_THERE,
     RIDES,
     SEAT_THERE,
@@ -18,6 +17,7 @@ from hybrid.kernels.state.state import (
     Ends,
     Floats,
     Moves,
+    no_moves,
 )
 from hybrid.model.driven_end import PATH, DrivenEnd
 from hybrid.scene.motion import MotionTerms
@@ -115,6 +115,43 @@ def table_of_loads(loads: Sequence[EndLoad]) -> tuple[Floats, Floats]:
         for x, a, b in zip(loads, rows[:-1], rows[1:], strict=True)
     ]
     return np.array(table, float).reshape(-1, 8), np.concatenate([CONSTANT, *(x.history for x in loads)])
+
+
+def table_of_motions(
+    motions: Mapping[int, Motion | DrivenEnd], position: Floats, frame: Floats, paths: Floats, seats: Floats
+) -> Moves:
+    """What kernels.laws.end_motion reads of n ends, or obstacles, that move by motions or from outside; without loads.
+
+    position: (n, 3) m and frame: (n, 9) without motion; paths: (n, PATH), kept; seats: (n, 9) of ends that turn freely
+    on a body.
+    """
+    moves = no_moves(len(position))
+    position, frame = position.copy(), frame.copy()
+    harmonics: list[tuple[float, ...]] = []
+    knots, cubics = [np.zeros(0)], [np.zeros((0, 6, 4))]
+    for k, motion in motions.items():
+        if isinstance(motion, DrivenEnd):
+            moves.driven[k] = motion.held, motion.turns
+            continue
+        terms = motion.terms()
+        position[k] = motion.base
+        if terms.ride is not None:
+            axes, place, seat = terms.ride
+            frame[k], moves.fairlead[k, PLACE_THERE:SEAT_THERE] = axes.ravel(), place
+            moves.fairlead[k, RIDES] = TURNS_FREELY if seat is None else TURNS_WITH_BODY
+            moves.fairlead[k, SEAT_THERE:] = seats[k] if seat is None else seat.ravel()
+        moves.prescribed[k] = terms.translates, terms.rotates
+        moves.ramp[k], moves.velocity[k], moves.velocity_ramp[k] = terms.ramp, terms.velocity, terms.velocity_ramp
+        moves.travel[k], moves.follows[k] = terms.travel, terms.follows
+        harmonics += [(k, *h) for h in terms.harmonics]
+        first = sum(x.size for x in knots)
+        moves.file[k] = first, first + max(terms.knots.size - 1, 0)
+        knots.append(terms.knots)
+        cubics.append(terms.cubics)
+    return moves._replace(
+        position=position, frame=frame, harmonics=np.array(harmonics).reshape(-1, 5), knots=np.concatenate(knots),
+        cubics=np.concatenate(cubics), paths=paths,
+    )  # fmt: skip
 
 
 class EndConditions:
@@ -296,40 +333,12 @@ class EndConditions:
         self.set_loads(t)
 
     def _as_moves(self) -> Moves:
-        prescribed, file = np.zeros((2, 2), np.int8), np.zeros((2, 2), np.int64)
-        ramp, velocity, velocity_ramp, travel = np.zeros(2), np.zeros((2, 3)), np.zeros(2), np.zeros((2, 5))
-        follows, missing, position = np.zeros(2, np.int8), np.zeros((2, 4)), self.values.position.copy()
-        driven, frame, fairlead = np.zeros((2, 2), np.int8), self._given[0].copy(), np.zeros((2, FAIRLEAD))
-        harmonics: list[tuple[float, ...]] = []
-        knots, cubics = [np.zeros(0)], [np.zeros((0, 6, 4))]
-        for k, motion in self.motions.items():
-            if isinstance(motion, DrivenEnd):
-                driven[k] = motion.held, motion.turns
-                continue
-            terms = motion.terms()
-            position[k] = motion.base
-            if terms.ride is not None:
-                axes, place, seat = terms.ride
-                frame[k], fairlead[k, PLACE_THERE:SEAT_THERE] = axes.ravel(), place
-                fairlead[k, RIDES] = TURNS_FREELY if seat is None else TURNS_WITH_BODY
-                fairlead[k, SEAT_THERE:] = self.values.frame[k] if seat is None else seat.ravel()
-            prescribed[k] = terms.translates, terms.rotates
-            ramp[k], velocity[k], velocity_ramp[k] = terms.ramp, terms.velocity, terms.velocity_ramp
-            travel[k], follows[k] = terms.travel, terms.follows
-            harmonics += [(k, *h) for h in terms.harmonics]
-            first = sum(x.size for x in knots)
-            file[k] = first, first + max(terms.knots.size - 1, 0)
-            knots.append(terms.knots)
-            cubics.append(terms.cubics)
+        moves = table_of_motions(self.motions, self.values.position, self._given[0], self._paths, self.values.frame)
+        missing = np.zeros((2, 4))
         for k, (axis, angle) in self._turns.items():
             missing[k] = [*axis, angle]
         loads, history = table_of_loads(self._acting)
-        return Moves(
-            prescribed, position, frame, ramp, np.array(harmonics).reshape(-1, 5), velocity,
-            velocity_ramp, travel, follows, file, np.concatenate(knots), np.concatenate(cubics), missing,
-            float(self._bring_in), driven, self._paths, loads, history,
-            fairlead,
-        )  # fmt: skip
+        return moves._replace(missing=missing, bring_in=float(self._bring_in), loads=loads, history=history)
 
     def _grow(self, t: float) -> None:
         self._grown = t >= self._growing_until

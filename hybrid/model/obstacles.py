@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.laws.obstacles import (
+from hybrid.kernels.state.forces import FRICTION, OBSTACLES
+from hybrid.kernels.state.obstacle_rows import (
     AXIS,
     DAMPING,
     FLAT,
@@ -21,7 +22,6 @@ from hybrid.kernels.laws.obstacles import (
     STIFFNESS,
     STRAND,
 )
-from hybrid.kernels.state.forces import FRICTION, OBSTACLES
 from hybrid.kernels.state.state import NO_OBSTACLES, Floats
 from hybrid.model.scales import tension_scale
 from hybrid.model.sections import merged_sections

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from hybrid.kernels.laws.bed import HEIGHTS
+from hybrid.kernels.laws.obstacle_motion import carry_obstacles
+from hybrid.kernels.state.obstacle_rows import EACH
 from hybrid.kernels.state.state import Floats, Sea, no_sea, with_waves
+from hybrid.model.driven_end import DrivenEnd
 from hybrid.model.ends import rise
+from hybrid.model.obstacle_motion import courses_of
 from hybrid.model.obstacles import obstacle_rows
 from hybrid.model.scales import pressing
 from hybrid.model.spectra import waves_of
@@ -27,16 +32,18 @@ POWER_LAW_HEIGHTS, CROWDING = 800, 8
 class Surroundings:
     """Evaluates the sea at a time into the arrays of `Sea` (overwritten by the next call)."""
 
-    def __init__(self, values: Sea, names: tuple[str, ...] = ()) -> None:
-        """names: of obstacles."""
-        self.values, self.names = values, names
+    def __init__(self, values: Sea, names: tuple[str, ...] = (), driven: Mapping[str, DrivenEnd] | None = None) -> None:
+        """names: of obstacles; driven: those of them that are set from outside."""
+        self.values, self.names, self.driven = values, names, dict(driven or {})
         self.at(np.inf)
 
     def on(self, cells: int) -> Surroundings:
         """The same sea around a line of another number of cells."""
         axis, slip, slid, bed = (np.zeros((cells + 1, 3)) for _ in range(4))
         values = self.values._replace(flow=np.zeros((cells + 1, 7)), axis=axis, slip=slip, slid=slid, bed=bed)
-        return Surroundings(values, self.names)
+        if values.carried.size:
+            values = values._replace(grip=np.zeros((cells + 1, self.values.grip.shape[1])))
+        return Surroundings(values, self.names, self.driven)
 
     def at(self, t: float) -> Sea:
         """The sea at t; t = infinity asks for what stays: the current fully grown, and no waves."""
@@ -45,6 +52,8 @@ class Surroundings:
         current_ramp, wave_ramp = self.values.ramps.tolist()
         now[1] = rise(t, current_ramp)[0]
         now[2], now[3] = rise(t, wave_ramp) if math.isfinite(t) else (0.0, 0.0)
+        if self.values.carried.size:
+            carry_obstacles(float(now[0]), float(now[0]), self.values)
         return self.values
 
     def elevation(self, x: float, y: float, t: float) -> tuple[float, float, float, float]:
@@ -92,7 +101,20 @@ def surroundings(scene: Scene, cells: int) -> Surroundings:
             sea = sea._replace(
                 friction=np.zeros(2), slip_length=1.0
             )  # of the bed: friction of obstacles is in their rows
-    return Surroundings(sea._replace(ramps=np.array([current_ramp or 0.0, wave_ramp or 0.0])), tuple(scene.obstacles))
+    around = Surroundings(sea._replace(ramps=np.array([current_ramp or 0.0, wave_ramp or 0.0])), tuple(scene.obstacles))
+    return _moved(scene, cells, around)
+
+
+def _moved(scene: Scene, cells: int, around: Surroundings) -> Surroundings:
+    """The same with the motions of obstacles."""
+    sea = around.values
+    courses = courses_of(scene, sea.obstacles, sea.waves, float(sea.ramps[1]), around.elevation)
+    if not courses.carried.size:
+        return around
+    grip = np.zeros((cells + 1, EACH * len(sea.obstacles)))
+    return Surroundings(
+        sea._replace(courses=courses.moves, carried=courses.carried, grip=grip), around.names, courses.driven
+    )
 
 
 def rubs(bed: Seabed | None) -> bool:

@@ -17,6 +17,7 @@ from hybrid.model.mesh import Zone
 from hybrid.model.output_points import NEAR
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
 from hybrid.outputs.observation import Observation
+from hybrid.outputs.obstacles import obstacle_fields, obstacle_values
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.varying_grid import VaryingGrid
 from hybrid.outputs.vectors import size
@@ -123,6 +124,7 @@ WORK = {
     "friction": "work of friction on the seabed, on obstacles, of the line on itself; work of lines that touch it",
     "zones": "energy that zones, and cells at a winch, put in or take out when they change, and of torque where a "
     "catenary bends without it",
+    "obstacles": "work done on the cable by obstacles as they move; of what rubs on a surface that turns, too",
     "scheme": "energy change that no work accounts for: the time scheme's own (negative: dissipated)",
 }
 
@@ -191,6 +193,7 @@ class Observer:
         gauges: Sequence[tuple[float, float]] = (),
         payout: bool = False,
         quantities: Quantities | None = None,
+        obstacles: Sequence[str] = (),
     ) -> None:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
 
@@ -200,7 +203,8 @@ class Observer:
         jumps: arc lengths, m, inside the line and in s where a quantity may have two values; changes: those where one
         section ends and the next begins; finest: m, all nodes that there may be, where cells follow the curvature;
         gauges: places (x, y), m, where the elevation of the sea is recorded.
-        payout: whether the line is paid out; quantities: what the scene asks for beside the usual.
+        payout: whether the line is paid out; quantities: what the scene asks for beside the usual;
+        obstacles: their names.
         """
         self._finest = finest
         self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(changes)
@@ -219,6 +223,7 @@ class Observer:
             for name, p in PROBES.items()
             if (not p.needs or has.intersection(p.needs.split())) and (only is None or name in only)
         }
+        self._obstacles = tuple(obstacles) if line.moved.size else ()
         self.quantities = quantities
         may_be_nan: tuple[str, ...] = MAY_BE_NAN
         if self.quantities is not None:
@@ -240,7 +245,8 @@ class Observer:
         ]  # fmt: skip
         self._right = [f.name for f in right]
         if with_work:
-            fields += [Field(f"work/{name}", "J", text) for name, text in WORK.items()]
+            moved = bool(line.moved.size)
+            fields += [Field(f"work/{x}", "J", text) for x, text in WORK.items() if x != "obstacles" or moved]
         self._criteria = [f"criteria/{name}" for name, _ in criteria]
         fields += [
             Field(name, "", f"largest since the last output: {text}", (s.size,), _S)
@@ -265,6 +271,7 @@ class Observer:
         self.gauges = np.array(gauges, float).reshape(-1, 2)
         if len(self.gauges):
             fields.append(elevation_field(self.gauges))
+        fields += obstacle_fields(self._obstacles)
         if finest is not None:
             text = "which of the nodes mesh/s there are: bit k % 64 of word k // 64"
             fields.append(Field(THERE, "", text, (-(-finest.size // 64),), ("word",), dtype="int64"))
@@ -364,6 +371,7 @@ class Observer:
             out |= {name: ratios[:, k] for k, name in enumerate(self._criteria)}
         if len(self.gauges):
             out["elevation"] = elevation(self.sea, self.gauges, batch.sea_now)
+        out |= obstacle_values(self._obstacles, batch.obstacles)
         if self._finest is not None:
             lines = [x.line for x in plain.outputs] if isinstance(plain, JoinedObservation) else [self.line]
             rows = [there(self._finest, line.s) for line in lines]
@@ -372,6 +380,10 @@ class Observer:
             energy = sum((out[name] for name in out if name.startswith("energy/")), np.zeros(batch.t.size))
             if self.first_energy is None:
                 self.first_energy = float(energy[0])
-            out |= {f"work/{name}": batch.work[:, k].copy() for k, name in enumerate(POWERS)}
+            out |= {
+                f"work/{name}": batch.work[:, k].copy()
+                for k, name in enumerate(POWERS)
+                if name != "obstacles" or self.line.moved.size
+            }
             out["work/scheme"] = energy - self.first_energy - batch.work.sum(axis=1)
         return out

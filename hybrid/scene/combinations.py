@@ -397,9 +397,9 @@ CLAMPED_CONNECTION = Feature("a clamped connection", "lines.NAME.connections", _
 BREAKS_OFF_CLAMP = Feature("a break at a clamp", "break_at", _breaks_off_clamp)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
 CLAMPED_TO_FREE = Feature("a line that is clamped to a free point or body", "lines.NAME.connections", _clamped_to_free)
-OBSTACLES = Feature("fixed obstacles", "obstacles", _obstacles)
+OBSTACLES = Feature("obstacles", "obstacles", _obstacles)
 LINES_TOUCH = Feature("contact of lines with each other", "contact", _lines_touch)
-PUSHED = Feature("fixed obstacles, contact of lines with each other", "obstacles, contact",
+PUSHED = Feature("obstacles, contact of lines with each other", "obstacles, contact",
                  _either(OBSTACLES, LINES_TOUCH))  # fmt: skip
 DIAMETERS = Feature("sections of several diameters", "diameter", _other_diameters)
 ACCURACY = Feature("accuracy", "accuracy", lambda tables: iter([("accuracy",)] if tables.get("accuracy") else []))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.analysis import Time
@@ -18,6 +18,7 @@ from hybrid.scene.ends import End, Ends
 from hybrid.scene.load_checks import load_findings, turning_times
 from hybrid.scene.magnitude_checks import moved_into_the_ground
 from hybrid.scene.motion_tables import SHIFTS, Harmonic, Motion, Vessel
+from hybrid.scene.obstacles import Obstacles
 
 if TYPE_CHECKING:
     from hybrid.scene.motion_file import Record
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 AT_REST = 1e-6
 # Time steps that a period, and a ramp, must last at least: six steps a period are a poor answer, but the same motion.
 SAMPLES, RAMP_STEPS = 6, 3
+# rad, through which an obstacle may spin in a time step.
+LARGEST_TURN = 1.0
 
 # m, between the position of an end and its fairlead.
 SAME_FAIRLEAD = 1e-3
@@ -39,7 +42,9 @@ TOP_SPEED, TOP_ACCELERATION = 1.875, 10.0 / math.sqrt(3.0)
 
 def check_motions(scene: Scene) -> None:
     """SceneError if a motion cannot be read, does not start from rest, jumps, is too fast, or ends too early."""
-    found = motion_findings({name: getattr(scene, name) for name in ("ends", "time", "cable", "environment")})
+    found = motion_findings(
+        {name: getattr(scene, name) for name in ("ends", "time", "cable", "environment", "obstacles")}
+    )
     if found:
         raise SceneError([Complaint(dotted(f.at), f.given or "motion", f.expected, f.fix) for f in found])
 
@@ -64,11 +69,62 @@ def motion_findings(tables: Mapping[str, Any]) -> list[Finding]:
         found += [Finding((*here, *f.at), f.expected, f.fix, f.given) for f in wrong]
         if step is not None and not wrong:
             late += _unresolved(here, motion, record, environment, step)
+    for place, held in _obstacles(tables.get("obstacles")):
+        record, wrong = None, list(_harmonic_jump(held.motion))
+        if held.motion.file is not None:
+            record, wrong = _judged(held, held.motion, time.duration if isinstance(time, Time) else None)
+        if held.motion.vessel is not None:
+            wrong += _vessel(held, held.motion.vessel)
+        found += [Finding((*place, *f.at), f.expected, f.fix, f.given) for f in wrong]
+        if step is not None and not wrong:
+            late += _unresolved(place, held.motion, record, environment, step)
+            late += _fast_period(list(_periods(place, held.motion)), step)
+    if step is not None:
+        late += _fast_spins(tables.get("obstacles"), step)
     for wrong_load in load_findings(ends, step):
         (late if wrong_load.at[0] == "time" else found).append(wrong_load)
     if step is not None:
         late += _fastest_period(ends, environment, step)
     return found or late
+
+
+class Held(NamedTuple):
+    """What moves by a motion, and where: an end, or an obstacle about its place."""
+
+    motion: Motion
+    held_position: tuple[float, float, float] | None
+    held_tangent: tuple[float, float, float] | None
+
+
+def _obstacles(obstacles: Obstacles | None) -> list[tuple[tuple[str, ...], Held]]:
+    """Place, and what moves by which motion, of the obstacles that do."""
+    return [
+        (("obstacles", name, "motion"), Held(x.motion, x.at, (1.0, 0.0, 0.0)))
+        for name, x in (obstacles or {}).items()
+        if x.motion is not None
+    ]
+
+
+def _fast_spins(obstacles: Obstacles | None, step: float) -> Iterator[Finding]:
+    """Obstacles that turn so far in a time step that the way of their surface is no longer known."""
+    for name, x in (obstacles or {}).items():
+        spin = getattr(x, "spin", None)
+        if spin is None:
+            continue
+        if abs(spin.rate) * step > LARGEST_TURN:
+            expected = f"at most {_rounded_down(LARGEST_TURN / abs(spin.rate))} s: a radian of obstacles.{name}.spin"
+            yield Finding(("time", "step"), expected, "a smaller step", f"{step:g}")
+        if spin.ramp < RAMP_STEPS * step * (1 - 1e-9):
+            expected = f"a ramp of at least {RAMP_STEPS} time steps of {step:g} s, or it is a jump"
+            yield Finding(("obstacles", name, "spin", "ramp"), expected, "a longer ramp", f"{spin.ramp:g}")
+
+
+def _fast_period(periods: list[tuple[str, str, Harmonic]], step: float) -> Iterator[Finding]:
+    """A harmonic that a time step does not resolve."""
+    for where, _, h in periods:
+        if h.period < SAMPLES * step * (1 - 1e-9):
+            expected = f"at most a sixth of the period of {where}, {_rounded_down(h.period / SAMPLES)} s"
+            yield Finding(("time", "step"), expected, f"time.step: {h.period / 20:.3g}, or less", f"{step:g}")
 
 
 def _motions(ends: Ends) -> list[tuple[tuple[str, ...], End, Motion]]:
@@ -100,7 +156,7 @@ def _harmonic_jump(motion: Motion) -> Iterator[Finding]:
     yield Finding((), expected, fix, f"{name} without ramp: {jump} at t = 0")
 
 
-def _judged(end: End, motion: Motion, duration: float | None) -> tuple[Record | None, list[Finding]]:
+def _judged(end: End | Held, motion: Motion, duration: float | None) -> tuple[Record | None, list[Finding]]:
     """A motion file, if it can be read, and what is wrong with it."""
     from hybrid.scene.motion_file import RecordRefused
     from hybrid.scene.motion_jumps import judge_record
@@ -122,7 +178,7 @@ def _judged(end: End, motion: Motion, duration: float | None) -> tuple[Record | 
     return record, judge_record(record, end.held_position, duration, motion.ramp is not None)
 
 
-def _vessel(end: End, vessel: Vessel) -> Iterator[Finding]:
+def _vessel(end: End | Held, vessel: Vessel) -> Iterator[Finding]:
     """A vessel whose table cannot be read, or whose fairlead is not where the end is held."""
     from hybrid.scene.motion_file import RecordRefused
     from hybrid.scene.rao_file import read_rao

@@ -1,13 +1,26 @@
-"""Fixed obstacles that a line touches: planes, spheres and cylinders, by name."""
+"""Obstacles that a line touches, fixed or moving: planes, spheres and cylinders, by name."""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, model_validator
 
-from hybrid.scene.base import Direction, Kinds, NonNegative, Positive, Table, Vector, by_kind, unit
+from hybrid.scene.base import (
+    Direction,
+    Finding,
+    Kinds,
+    NonNegative,
+    Number,
+    Positive,
+    Table,
+    Vector,
+    by_kind,
+    refuse,
+    unit,
+)
+from hybrid.scene.motion_tables import Motion
 from hybrid.scene.points import Name
 
 _FRICTION = "coefficient of friction (Coulomb) of the line on it, in every direction [-]"
@@ -16,6 +29,14 @@ _STIFFNESS = (
     "diameter at most under the tension and weight that the scene asks for [N/m per m]"
 )
 _DAMPING = "force per metre of line and speed of penetration, in contact [N s/m per m]"
+_MOTION = "how it moves, and turns about the place `at`, where it is at t = 0; absent: not at all"
+
+
+class Spin(Table):
+    """Turning of a cylinder about its own axis, which carries along what rubs on it."""
+
+    rate: Number = Field(description="angular velocity about `axis`, right-handed [rad/s]")
+    ramp: Positive = Field(description="time over which it grows from zero, smoothly [s]")
 
 
 class _Obstacle(Table):
@@ -24,6 +45,22 @@ class _Obstacle(Table):
     friction: NonNegative = Field(default=0.0, description=_FRICTION)
     stiffness: Positive | None = Field(default=None, description=_STIFFNESS)
     damping: NonNegative = Field(default=0.0, description=_DAMPING)
+    motion: Motion | None = Field(default=None, description=_MOTION)
+    from_outside: bool = Field(
+        default=False, description="whether it is moved step by step by `Simulation.set_obstacle`; it rests until it is"
+    )
+
+    @model_validator(mode="after")
+    def _moves_once(self) -> Self:
+        if self.from_outside and self.motion is not None:
+            fix = "leave out the one or the other"
+            refuse([Finding(("motion",), "nothing, because the obstacle is set from outside", fix)])
+        return self
+
+    @property
+    def moves(self) -> bool:
+        """Whether it does, or turns, or may be set from outside."""
+        return self.motion is not None or self.from_outside or getattr(self, "spin", None) is not None
 
 
 class PlaneObstacle(_Obstacle):
@@ -51,7 +88,7 @@ class SphereObstacle(_Obstacle):
 
 
 class CylinderObstacle(_Obstacle):
-    """A roller, pile or pipe; it does not turn."""
+    """A roller, pile or pipe."""
 
     kind: Literal["cylinder"] = Field(default="cylinder", description="a round cylinder: a pipe, pile or roller")
     at: Vector = Field(description="the middle of its axis, or any point of an endless one, inertial frame [m]")
@@ -59,6 +96,9 @@ class CylinderObstacle(_Obstacle):
     radius: Positive = Field(description="its radius [m]")
     length: Positive | None = Field(
         default=None, description="its length, without the half spheres in which it ends; absent: endless [m]"
+    )
+    spin: Spin | None = Field(
+        default=None, description="how it turns about its axis, as a driven roller; absent: not at all"
     )
 
     def distance(self, x: tuple[float, float, float]) -> float:

@@ -144,7 +144,7 @@ class Scene(Table):
     cable: Cable = Field(description="what the cable is made of")
     contact: Contact = Field(default=Contact(), description="what the cable touches beside the seabed")
     obstacles: Obstacles = Field(
-        default={}, description="fixed obstacles by name that the cable touches: planes, spheres, cylinders"
+        default={}, description="obstacles by name, fixed or moving, that the cable touches: planes, spheres, cylinders"
     )
     ends: Ends = Field(description="how the ends are held, moved and loaded")
     initial: Initial = Field(description="where the cable is at t = 0")

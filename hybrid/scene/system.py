@@ -219,7 +219,8 @@ class System(Table):
         description="which lines touch each other, with what friction; absent: none, they pass through each other",
     )
     obstacles: Obstacles = Field(
-        default={}, description="fixed obstacles by name that every line touches: planes, spheres, cylinders"
+        default={},
+        description="obstacles by name, fixed or moving, that every line touches: planes, spheres, cylinders",
     )
     time: Time | None = Field(default=None, description="how long to compute; absent: statics only")
     accuracy: AskedAccuracy | None = Field(

@@ -177,6 +177,8 @@ def _line_findings(system: System, name: str) -> Iterator[Finding]:
 
 def _of_system(system: System, name: str, found: Finding) -> Finding:
     line, at = system.lines[name], found.at
+    if at[:1] == ("obstacles",):  # which are those of all lines
+        return found
     if at[:1] == ("cable",):
         at = ("lines", name, *at[1:])
     elif at[:1] in (("model",), ("mesh",), ("resolution",), ("initial",)) or (

@@ -14,12 +14,13 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.laws.obstacles import KIND, RADIUS, ROUND, depths_in_obstacles
+from hybrid.kernels.laws.obstacles import depths_in_obstacles, put_obstacles
 from hybrid.kernels.march.resolution_checks import lowest
 from hybrid.kernels.run.entry import sharpest
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, PLANAR, SEABED, SELF_FRICTION
+from hybrid.kernels.state.obstacle_rows import KIND, RADIUS, ROUND
 from hybrid.kernels.state.report import BEND, TWIST_NODE
 from hybrid.kernels.state.state import Batch, Ends, Floats, State, ends_in, state_in
 from hybrid.kernels.step.accept import LARGEST_TWIST
@@ -431,9 +432,11 @@ class Diagnostics:
     def _obstacles(self, batch: Batch) -> None:
         """A line that lies deep in an obstacle or has passed through it, and cells that do not follow its radius."""
         line, sea = self._model.line, self._model.sea
-        rows = sea.values.obstacles
+        rows = sea.values.obstacles.copy()
         longest = np.maximum(np.append(line.h, 0.0), np.append(0.0, line.h))
-        for t, r in zip(batch.t.tolist(), batch.r, strict=True):
+        for k, (t, r) in enumerate(zip(batch.t.tolist(), batch.r, strict=True)):
+            if batch.obstacles.size:
+                put_obstacles(rows, sea.values.carried, batch.obstacles[k])
             within = depths_in_obstacles(rows, r)
             which, node = (int(i) for i in np.unravel_index(np.argmax(within), within.shape))
             if within[which, node] > self._within:

@@ -9,7 +9,8 @@ import numpy as np
 
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.machine.cache import cache_folder
-from hybrid.kernels.state.forces import SEABED, SURFACE
+from hybrid.kernels.state.forces import OBSTACLES, SEABED, SURFACE
+from hybrid.kernels.state.obstacle_rows import AXIS, HALF_LENGTH, KIND, PLACE, RADIUS, STILL_AXIS, STRAND
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
@@ -249,8 +250,24 @@ def _depths(model: Model) -> list[tuple[Field, np.ndarray]]:
     ]
 
 
+def _obstacle_shapes(model: Model) -> list[tuple[Field, np.ndarray]]:
+    """What obstacles are, and where at t = 0."""
+    sea, found = model.sea.values, []
+    for k, name in enumerate(model.sea.names):
+        row = sea.obstacles[k]
+        place, axis = row[PLACE : PLACE + 3], row[AXIS : AXIS + 3]
+        if sea.carried.size:
+            place, axis = sea.courses.position[k], sea.carried[k, STILL_AXIS : STILL_AXIS + 3]
+        half = row[HALF_LENGTH] if np.isfinite(row[HALF_LENGTH]) else -1.0
+        what = "kind (0 plane, 1 round), place, axis or normal, radius, half its length (0: a ball, -1: endless)"
+        text = f"obstacle {name} at t = 0: {what}"
+        shape = np.array([row[KIND], *place, *axis, row[RADIUS] - row[STRAND], half])
+        found.append((Field(f"obstacles/{name}/shape", "", text, shape.shape, ("shape",), "inertial"), shape))
+    return found
+
+
 def _surroundings(model: Model) -> list[tuple[Field, np.ndarray]]:
-    """What pictures show besides the cable: seabed, still water, what is attached."""
+    """What pictures show besides the cable: seabed, still water, obstacles, what is attached."""
     line, sea = model.line, model.sea.values
     out: list[tuple[Field, np.ndarray]] = []
     if line.bits & SEABED:
@@ -260,6 +277,8 @@ def _surroundings(model: Model) -> list[tuple[Field, np.ndarray]]:
             text, plane = f"{text}; the mean of its depths", _mean_plane(sea)
             out += _depths(model)
         out.append((Field("seabed", "", text, (4,), ("plane",), "inertial"), plane))
+    if line.bits & OBSTACLES:
+        out += _obstacle_shapes(model)
     if line.bits & SURFACE:
         out.append((Field("surface", "m", "height of still water"), np.array(sea.surface)))
     if model.attached:

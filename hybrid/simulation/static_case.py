@@ -158,7 +158,7 @@ class StaticCase:
             model.line, model.sea.values, model.zones, s, False, model.attached, only=only, errors=errors,
             jumps=jumps, changes=section_changes(self.scene),
             gauges=() if only else self.scene.output.elevation or (),
-            quantities=None if only else quantities_of(self.scene),
+            quantities=None if only else quantities_of(self.scene), obstacles=() if only else model.sea.names,
         )  # fmt: skip
 
 

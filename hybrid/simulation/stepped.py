@@ -77,6 +77,7 @@ class Saved(NamedTuple):
     owner: object  # what tells one Simulation from another
     number: int  # of the save, from 1
     cut_short: int  # steps so far
+    obstacles: Any  # what is set of them
 
 
 def vector(x: Sequence[float] | Floats, name: str) -> Floats:

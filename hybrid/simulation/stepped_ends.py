@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 
 from hybrid.kernels.state.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.driven_end import DrivenEnd, rotation_vector
+from hybrid.model.sea import Surroundings
 from hybrid.scene.schema import Scene
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.interface_stiffness import interface_stiffness
 from hybrid.simulation.payout import length_asked
+from hybrid.simulation.set_obstacles import STILL, SettableObstacles
 from hybrid.simulation.stepped import EndForces, Triple, numbers, one_thread, triple, vector
 from hybrid.simulation.time_loop import TimeLoop
 from hybrid.simulation.transient import StepFailed
@@ -23,13 +25,12 @@ from hybrid.simulation.transient import StepFailed
 ENDS = ("start", "end")
 # Of the largest component: what is out of a plane by no more is in it.
 IN_PLANE = 1e-9
-STILL = (0.0, 0.0, 0.0)
 # Rows of three numbers that the report of a step begins with: the forces and the moments at both ends.
 OF_ENDS = 4
 assert (FORCE_A, FORCE_B, MOMENT_A, MOMENT_B) == (0, 3, 6, 9)
 
 
-class SteppedEnds:
+class SteppedEnds(SettableObstacles):
     """The ends of a cable that is stepped from outside."""
 
     scene: Scene
@@ -51,6 +52,9 @@ class SteppedEnds:
     def t(self) -> float:
         """Time of the state, s."""
         return self._loop.run.t
+
+    def _states(self) -> list[tuple[Surroundings, State]]:
+        return [(self._loop.run.model.sea, self._loop.run.state)]
 
     def _check_open(self) -> None:
         if self._closed:

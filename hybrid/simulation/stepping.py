@@ -32,9 +32,10 @@ from hybrid.simulation.direct_steps import DirectSteps
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.layer_mesh import layered
 from hybrid.simulation.mesh_survey import with_survey
+from hybrid.simulation.set_obstacles import STILL
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.stepped import CableState, Saved, Triple, in_space, iterations_allowed, one_thread, tension_now
-from hybrid.simulation.stepped_ends import STILL, SteppedEnds
+from hybrid.simulation.stepped_ends import SteppedEnds
 from hybrid.simulation.system_stepping import SystemSimulation
 from hybrid.simulation.transient import StepFailed
 from hybrid.store.hdf5_file import check_target
@@ -113,6 +114,7 @@ class Simulation(SteppedEnds):
         self._driven: dict[int, DrivenEnd] = {}
         self._wound: tuple[float | None, float] | None = None  # length and rate that are set for the next step
         self._next: dict[int, tuple[Triple, Triple, Triple]] = {}  # what ends are set to, for the next step
+        self._courses, self._moved = {}, {}
         self._loop.patient = self._plain
         self._loop.run.run.count[b.MOST_ITERATIONS] = self._most
         self._loop.run.run.wait_longer()
@@ -166,6 +168,8 @@ class Simulation(SteppedEnds):
         for k, end in self._driven.items():
             position, velocity, turn = self._next.pop(k, None) or (end.at(now)[0].tolist(), STILL, STILL)
             end.set(now, until, position, velocity, turn)
+        if self._moved:
+            self._move_obstacles(now, until)
         self._recorder.commit_old()
         try:
             self._step_to(min(until, duration))
@@ -225,7 +229,7 @@ class Simulation(SteppedEnds):
         self._saves += 1
         return Saved(
             self._recorder.mark(), self.t, state, watch, paths, (ends.position.copy(), ends.frame.copy()), loads,
-            run.model, self._owner, self._saves, self.cut_short,
+            run.model, self._owner, self._saves, self.cut_short, self._kept_courses(),
         )  # fmt: skip
 
     @one_thread
@@ -260,6 +264,7 @@ class Simulation(SteppedEnds):
                     end.stand(saved.places[0][k], saved.places[1][k])
             run.model.ends.bring_back_loads(saved.loads, saved.t)
             run.run.move(run.model.ends.moves())
+        self._bring_back_courses(saved.obstacles)
         self._loop.remember(saved.watch)
         self._loop.run.run.count[b.CUT_SHORT] = saved.cut_short
         self._next.clear()

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.kernels.junctions.bodies import SPRING
+from hybrid.kernels.state.books import WORKS
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.model.system import SystemResolution
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.system import System
 from hybrid.simulation.restore import program, refused, resolution_from, resolution_tree
 from hybrid.simulation.system_contact import let_touch
-from hybrid.simulation.transient_checkpoint import FIRST_REPORT, zoning_of_today
+from hybrid.simulation.transient_checkpoint import FIRST_REPORT, FIRST_WORKS, zoning_of_today
 from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import matched
@@ -117,6 +118,11 @@ def of_today(lines: Any, template: Mapping[str, Any]) -> Any:
             line = line | {"state": {"slow": mine["state"]["slow"], **state}}
         if mine is not None and isinstance(line.get("state"), dict) and not mine["state"]["wake"].size:
             line = line | {"state": {"wake": mine["state"]["wake"], **line["state"]}}
+        if mine is not None and isinstance(line.get("state"), dict) and not mine["state"]["grip"].size:
+            line = line | {"state": {"grip": mine["state"]["grip"], **line["state"]}}
+        work = line.get("work")
+        if isinstance(work, np.ndarray) and work.ndim == 1 and FIRST_WORKS <= work.size < WORKS:
+            line = line | {"work": np.pad(work, (0, WORKS - work.size))}
         if isinstance(report, np.ndarray) and report.ndim == 1 and FIRST_REPORT <= report.size < REPORT_SIZE:
             line = line | {"report": np.pad(report, (0, REPORT_SIZE - report.size))}
         if mine is not None and "torsion" in mine:

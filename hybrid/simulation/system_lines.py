@@ -97,6 +97,7 @@ def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | N
     return Observer(
         model.line, model.sea.values, model.zones, s, moves and only is None, model.attached, kinds, criteria,
         only=only, jumps=jumps, changes=section_changes(scene), quantities=None if only else quantities_of(scene),
+        obstacles=() if only else model.sea.names,
     )  # fmt: skip
 
 
@@ -176,8 +177,8 @@ class LineResult:
     @property
     def sample_size(self) -> int:
         """Numbers of an output of the line as it is."""
-        line = self.model.line
-        return sample_size(line.h.size, self.model.layout is not None, len(line.torsion), self.books.touch.size > 0)
+        line, varies, touches = self.model.line, self.model.layout is not None, self.books.touch.size > 0
+        return sample_size(line.h.size, varies, len(line.torsion), touches, line.moved.size)
 
     def make_room(self, rows: int) -> None:
         """Room for so many samples of the line as it is; what is there is gone."""
@@ -323,8 +324,9 @@ class LineResult:
     def sampled(self, count: int) -> Batch:
         """The outputs that steps have sampled, as many as there are in the buffer; in arrays of their own."""
         line, books = self.model.line, self.books
-        rows, varies = books.samples[:count].copy(), self.model.layout is not None
-        return batch_of_rows(rows, line.h.size, HELD, varies, len(line.torsion), books.touch.shape[1])[0]
+        varies = self.model.layout is not None
+        sizes = line.h.size, HELD, varies, len(line.torsion), books.touch.shape[1], line.moved.size
+        return batch_of_rows(books.samples[:count].copy(), *sizes)[0]
 
     def state_now(self, t: float, ends: Ends, state: State, work: Work) -> Batch:
         """The state at t (s), now, as an output that is made of it."""

@@ -29,6 +29,7 @@ class SavedSystem(NamedTuple):
     stops: tuple[float, ...]  # s, that are still to come
     paths: Mapping[str, list[Floats]]  # of points that are set from outside, for each end there
     next: Mapping[str, tuple[Triple, Triple]]  # where points are to be at the end of the next step
+    obstacles: Any  # what is set of them
 
     def place(self, line: str, end: str) -> Floats:
         """Position (3,) m of a held end."""

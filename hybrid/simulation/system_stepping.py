@@ -17,16 +17,17 @@ import numpy as np
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.state.report import FORCE_A
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Floats, State
 from hybrid.model.driven_end import FRAME, TURN, DrivenEnd
+from hybrid.model.sea import Surroundings
 from hybrid.model.system import SystemResolution
 from hybrid.scene.points import FixedPoint
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import missing_time
 from hybrid.scene.system import System
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution, with_survey
+from hybrid.simulation.set_obstacles import STILL, SettableObstacles
 from hybrid.simulation.stepped import CableState, Triple, one_thread, triple
-from hybrid.simulation.stepped_ends import STILL
 from hybrid.simulation.system_run import SystemRun, static_system
 from hybrid.simulation.system_saving import SavedSystem, bring_back, commit, defer, kept, recorders
 from hybrid.simulation.system_start import named
@@ -66,7 +67,7 @@ class PointState(NamedTuple):
     force: Floats
 
 
-class SystemSimulation:
+class SystemSimulation(SettableObstacles):
     """Several lines in motion that are stepped from outside; a context manager.
 
     scene: several lines, as of `hybrid.run`; its time table gives the longest step and the duration, beyond which
@@ -110,6 +111,7 @@ class SystemSimulation:
         self._stops = self._run.stops()
         self._driven: dict[str, list[DrivenEnd]] = {}
         self._next: dict[str, tuple[Triple, Triple]] = {}
+        self._courses, self._moved = {}, {}
         self._owner, self._final = object(), 0  # how often what had been recorded was made final
         self._here: SavedSystem | None = None  # what was saved of the state as it is now
 
@@ -117,6 +119,9 @@ class SystemSimulation:
     def t(self) -> float:
         """Time of the state, s."""
         return self._run.t
+
+    def _states(self) -> list[tuple[Surroundings, State]]:
+        return [(x.sea, state) for x, state in zip(self._run.model.models, self._run.state.lines, strict=True)]
 
     @one_thread
     def set_point(
@@ -169,6 +174,7 @@ class SystemSimulation:
             position, velocity = self._next.pop(name, None) or (ends[0].at(now)[0].tolist(), STILL)
             for end in ends:
                 end.set(now, until, position, velocity, STILL)
+        self._move_obstacles(now, until)
         try:
             while self._stops and self._stops[0] < until - sliver:
                 self._run.go_to(self._stops.pop(0))
@@ -220,7 +226,13 @@ class SystemSimulation:
     def _kept(self) -> SavedSystem:
         paths = {name: [end.path.copy() for end in ends] for name, ends in self._driven.items()}
         return SavedSystem(
-            self._owner, self._final, stops=tuple(self._stops), paths=paths, next=dict(self._next), **kept(self._run)
+            self._owner,
+            self._final,
+            stops=tuple(self._stops),
+            paths=paths,
+            next=dict(self._next),
+            obstacles=self._kept_courses(),
+            **kept(self._run),
         )
 
     def _before(self) -> SavedSystem:
@@ -237,7 +249,9 @@ class SystemSimulation:
                     driven.stand(saved.place(line, end), driven.path[FRAME:TURN])
         self._driven = {name: self._driven[name] for name in saved.paths}
         self._follow(saved.paths)
+        self._bring_back_courses(saved.obstacles)
         bring_back(self._run, saved)
+        self._bring_back_courses(saved.obstacles)  # of the model of then
         self._follow(saved.paths)  # with the frames of then
         for model in self._run.model.models:
             model.ends.at(self.t)
@@ -254,6 +268,7 @@ class SystemSimulation:
         error = named(failed, self._run.model)
         self._bring_back(before)
         self._next.clear()
+        self._courses.clear()
         return ComputationError(
             error.outcome, error.t, error.s, f"{error.detail}; the simulation is back at t = {self.t:.6g} s",
             first="set the points again and advance in a shorter step",

@@ -18,6 +18,7 @@ from hybrid.simulation.restore import mesh_tree
 from hybrid.simulation.transient import Transient
 from hybrid.store.named_arrays import matched
 
+FIRST_WORKS = 11  # works that were booked once
 FIRST_REPORT = 34  # numbers that a report had once; later ones have more behind these
 SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
 
@@ -96,6 +97,11 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         saved = {**saved, "state": {**saved["state"], "slow": state.slow}}
     if isinstance(saved.get("state"), dict) and "wake" not in saved["state"] and not state.wake.size:  # not in 0.6
         saved = {**saved, "state": {**saved["state"], "wake": state.wake}}
+    if isinstance(saved.get("state"), dict) and "grip" not in saved["state"] and not state.grip.size:  # not in 0.6
+        saved = {**saved, "state": {**saved["state"], "grip": state.grip}}
+    work = saved.get("work")
+    if isinstance(work, np.ndarray) and work.ndim == 1 and FIRST_WORKS <= work.size < b.WORKS:
+        saved = {**saved, "work": np.pad(work, (0, b.WORKS - work.size))}
     if isinstance(saved.get("ends"), dict) and "released" not in saved["ends"]:  # not in a checkpoint of 0.6
         saved = {**saved, "ends": {**saved["ends"], "released": model.ends.released.copy()}}
     if isinstance(saved.get("zoning"), dict):

@@ -245,7 +245,7 @@ class Corrector:
         """The error of an equilibrium; with_friction: friction took part in it, so that a shift is felt as friction."""
         line = self.line._replace(bits=self.line.bits & ~(WAVES if with_friction else FRICTION | WAVES))
         if line.bits & FRICTION:
-            friction_axes(sea, state.r, state.e, state.slip)
+            friction_axes(sea, state.r, state.e, state.slip, state.grip)
         work = workspace(line.h.size, keep=True)
         ca = ANCHOR * self.scale / (float(line.mass.sum()) * self.length)
         still, no_spin = np.zeros_like(state.r), np.zeros_like(state.w)

@@ -20,6 +20,7 @@ from hybrid.kernels.run.run import in_plane, in_space, run
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import blank_books, sample_size
 from hybrid.kernels.state.forces import PLANAR, SELF_CONTACT
+from hybrid.kernels.state.obstacle_rows import EACH, SEEN
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import NOT_VARYING, Batch, Ends, Floats, Line, Moves, Sea, State, Work, no_torsion
 from hybrid.kernels.step.job import blank_job
@@ -92,7 +93,8 @@ class CompiledRun:
         cells = line.h.size
         followed = corrector.sampled if corrector is not None else np.zeros((2, 0))
         touches = bool(line.bits & SELF_CONTACT)
-        size = sample_size(cells, bool(self.count[b.VARIES]), len(line.torsion), touches) + followed.shape[1]
+        size = sample_size(cells, bool(self.count[b.VARIES]), len(line.torsion), touches, line.moved.size)
+        size += followed.shape[1]
         if not self._room.size:
             self._room = np.empty(max(1, min(self._rows, MOST_SAMPLED // size)) * size)  # some MB, touched as needed
         rows = max(1, min(self._rows, self._room.size // size))
@@ -301,17 +303,19 @@ class CompiledRun:
     def batch_of(self, rows: Floats, cells: int, ends: Ends) -> Batch:
         """Rows (n, size) of samples of a line of so many cells, as views; ends: as of `samples`."""
         touching, varies = self.books.touch.shape[1], bool(self.count[b.VARIES])
-        batch, self.sampled_errors = batch_of_rows(rows, cells, ends.held, varies, len(self.state.turn), touching)
+        batch, self.sampled_errors = batch_of_rows(
+            rows, cells, ends.held, varies, len(self.state.turn), touching, self.state.grip.shape[1] // EACH
+        )
         return batch
 
 
 def batch_of_rows(
-    rows: Floats, cells: int, held: np.ndarray, varies: bool, zones: int, touching: int
+    rows: Floats, cells: int, held: np.ndarray, varies: bool, zones: int, touching: int, obstacles: int = 0
 ) -> tuple[Batch, Floats]:
     """Samples (n, size) of a line as views (kernels.state.books.sample_size), and the columns behind them.
 
     held: (2,) as `Ends` has it; varies: whether they have lengths and stiffness; zones: that a torque passes through;
-    touching: N+1, or 0 where the line does not touch itself.
+    touching: N+1, or 0 where the line does not touch itself; obstacles: of which one moves.
     """
     at, count = 0, len(rows)
 
@@ -325,10 +329,11 @@ def batch_of_rows(
     r, v, vd = take(cells + 1, 3), take(cells + 1, 3), take(cells + 1, 3)
     e, T, a1, w = take(cells, 3), take(cells), take(cells, 3), take(cells)
     h, kb = (take(cells), take(cells + 1, 3)) if varies else (NOT_VARYING, NOT_VARYING)
-    turn, touch = take(zones, 3), take(touching)
+    turn, touch, seen = take(zones, 3), take(touching), take(obstacles, SEEN)
     ends = np.repeat(held[None], count, axis=0)
     batch = Batch(
         t, r, v, vd, e, T, a1, w, ends, position, frame, spin, force, moment, report, work, sea, h, kb, turn, touch,
+        seen,
     )  # fmt: skip
     return batch, rows[:, at:]
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from hybrid.kernels.laws.obstacles import KIND, ONSET_OF, RADIUS, ROUND, STIFFNESS
 from hybrid.kernels.state.forces import OBSTACLES, SEABED
+from hybrid.kernels.state.obstacle_rows import KIND, ONSET_OF, RADIUS, ROUND, STIFFNESS
 from hybrid.kernels.state.state import Line, Sea
 
 # How deep a continuation lets a line lie first in the bed, of its length, and in a round obstacle, of its radius.

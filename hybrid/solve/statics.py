@@ -106,7 +106,7 @@ class _Solver:
         for _ in range(BALANCING):
             self.work.u[:] = 0.0
             if line.bits & FRICTION:
-                friction_axes(self.sea, new.r, new.e, new.slip)
+                friction_axes(self.sea, new.r, new.e, new.slip, new.grip)
             outcome, iterations, _, where = entry.equilibrium(
                 line, sea or self.sea, ends, new, self.anchor, limits, turning, self.work
             )
@@ -142,7 +142,7 @@ class _Solver:
     def prove(self, ends: Ends, state: State) -> float:
         """Largest force out of balance at a node, N; infinity when it cannot be told."""
         if self.line.bits & FRICTION:
-            friction_axes(self.sea, state.r, state.e, state.slip)
+            friction_axes(self.sea, state.r, state.e, state.slip, state.grip)
         self.work.u[:] = 0.0
         bad = entry.assembly(self.line, self.sea, ends, state, 0.0, self.anchor, self.work)
         return float(self.work.report[RESIDUAL]) if bad < 0 else float("inf")

@@ -12,6 +12,7 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.kernels.algebra.block_elimination import solve_again
 from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.laws.seabed import normal_forces
 from hybrid.kernels.laws.water import wave_kinematics
@@ -40,10 +41,10 @@ REACH = 0.1
 HEAVY = 1e36
 # report of the march -> powers: start, end (reactions and given moments), applied forces and
 # moments, drag, mass-proportional damping, stiffness-proportional damping, added mass, waves with
-# buoyancy at the surface, contact with the seabed, friction on it, zones that change
+# buoyancy at the surface, contact with the seabed, friction on it, zones that change, obstacles that move
 POWERS = (
     "start", "end", "applied", "drag", "mass_damping", "stiffness_damping", "added_mass", "waves", "contact",
-    "friction", "zones",
+    "friction", "zones", "obstacles",
 )  # fmt: skip
 
 
@@ -127,7 +128,7 @@ class Stepper:
         entry.assembly(line, sea, ends, at_rest, 0.0, HEAVY, self.work._replace(rows=rows))
         force = out_of_balance(line, rows)
         force[np.flatnonzero(ends.held) * (line.s.size - 1)] = 0.0
-        friction_axes(sea, state.r, state.e, state.slip)
+        friction_axes(sea, state.r, state.e, state.slip, state.grip)
         state.slip[:] = static_friction_travel(self.line, sea, state.r, force)
 
     def consistent_accelerations(
@@ -155,7 +156,7 @@ class Stepper:
         if self.line.bits & WAVES:
             wave_kinematics(sea, state.r, self.work.u)
         if self.line.bits & FRICTION:
-            friction_axes(sea, state.r, state.e, state.slip)
+            friction_axes(sea, state.r, state.e, state.slip, state.grip)
         bad = entry.correction(self.line, sea, held, state, 0.0, HEAVY, work._replace(gaps=gaps))
         if bad >= 0:
             return Taken(Outcome.SINGULAR, 1, np.inf, bad, float(work.report[RESIDUAL]))
@@ -181,6 +182,8 @@ class Stepper:
         if self.line.bits & TOUCHES:
             self.work.report[SEABED_ENERGY] = stored_energy(self.line, sea, state.r)
             state.bed[:] = sea.bed
+            if self.line.moved.size:
+                grip_obstacles(self.line, sea, self.work.u, state, state.grip, state.grip)
         self.told = self.work.report.tolist()
         return Taken(Outcome.OK, 1, 0.0, -1, self.told[RESIDUAL])
 
@@ -190,9 +193,11 @@ class Stepper:
         if self.line.bits & WAVES:
             wave_kinematics(sea, state.r, self.work.u)
         if self.line.bits & FRICTION:
-            friction_axes(sea, state.r, state.e, state.slip)
+            friction_axes(sea, state.r, state.e, state.slip, state.grip)
         entry.assembly(self.line, sea, ends, state, 0.0, HEAVY, self.work)
         if self.line.bits & TOUCHES:
             self.work.report[SEABED_ENERGY] = stored_energy(self.line, sea, state.r)
             state.bed[:] = sea.bed
+            if self.line.moved.size:
+                grip_obstacles(self.line, sea, self.work.u, state, state.grip, state.grip)
         self.told = self.work.report.tolist()

@@ -23,6 +23,7 @@ from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL
 from hybrid.kernels.junctions.junctions import HANDED
 from hybrid.kernels.junctions.system_contact import blank_touching_job, room_for_products, touch_system
 from hybrid.kernels.junctions.system_job import ASKED, blank_system_job
+from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run.entry import NO_PUSH
@@ -396,6 +397,8 @@ class SystemSolver:
                     work.u[-end] = -given[end] / HEAVY  # what a held end has still to go is position - r - u
             if x.joints[0] >= 0:
                 work.u[0] = -self._gaps[k, 0]
+            if x.line.moved.size:
+                carry_obstacles(t, t, x.sea)
             self._around(x, state, work)
             ends = x.ends._replace(position=state.r[[0, -1]])
             self.bind_line(k, work=work._replace(gaps=gaps), ends=ends)
@@ -439,6 +442,8 @@ class SystemSolver:
         """
         for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
             work.u[:] = 0.0
+            if x.line.moved.size:
+                carry_obstacles(t, t, x.sea)
             self._around(x, state, work)
         taken = self._solve(Task(ASSEMBLY, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states, t)
         if taken.outcome == Outcome.OK:
@@ -476,7 +481,7 @@ class SystemSolver:
         if x.line.bits & WAVES:
             wave_kinematics(x.sea, state.r, work.u)
         if x.line.bits & FRICTION:
-            friction_axes(x.sea, state.r, state.e, state.slip)
+            friction_axes(x.sea, state.r, state.e, state.slip, state.grip)
 
     # --- equilibrium --------------------------------------------------------------------------------
 

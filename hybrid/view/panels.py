@@ -18,6 +18,7 @@ from hybrid.store.records import not_converged_in
 from hybrid.view.along import AXES, Along, along, extent
 from hybrid.view.decimate import Kept, even
 from hybrid.view.figure import Area, Axis, Band, Box, Item, Line, Marks, Panel, Rule, Text
+from hybrid.view.obstacles import outlines
 from hybrid.view.projections import (
     STILL,
     Numbers,
@@ -116,9 +117,9 @@ def framed(result: Result, view: View, items: list[Item], when: str = "") -> Pan
 
 
 def cable(result: Result, view: View, output: int, *, joints: bool = False) -> list[Item]:
-    """The cable at an output: its zones, its ends, what is attached, and where it touches down."""
+    """The cable at an output: its zones, its ends, what is attached, where it touches down, obstacles that move."""
     s, position = result.s, result.position[output]
-    items, pieces = list[Item](), pieces_of(result, output)
+    items, pieces = outlines(result, view, output, moving=True), pieces_of(result, output)
     for kind, where in pieces:
         items.append(Line(*view.project(_place(where, s, position)), kind, colour_of(kind), 2.0))
     if "attached" in result:
@@ -136,7 +137,10 @@ def cable(result: Result, view: View, output: int, *, joints: bool = False) -> l
 
 
 def sea(result: Result, view: View) -> list[Item]:
-    """Water below its surface and sand below the bed, out to the rims of the panel, whatever these will be."""
+    """Water below its surface and sand below the bed, out to the rims of the panel, whatever these will be; and
+
+    obstacles that rest.
+    """
     bed, box = bed_in(view, result), extent_in(view, result)
     middle, far = box.mean(axis=1), 30.0 * float(np.ptp(box, axis=1).max())  # more than any panel shows
     x, deep = middle[0] + far * np.array([-1.0, 1.0]), middle[1] - far
@@ -157,7 +161,7 @@ def sea(result: Result, view: View) -> list[Item]:
         floor = min(deep, float(uneven[:, 1].min()))
         outline = np.vstack([uneven, [[uneven[-1, 0], floor], [uneven[0, 0], floor]]])
         items += [Area(outline[None], SAND), Line(uneven[:, 0], uneven[:, 1], "seabed", colour=BED, width=0.9)]
-    return items
+    return items + outlines(result, view, -1, moving=False)
 
 
 # ---- along the cable ------------------------------------------------------------------------------

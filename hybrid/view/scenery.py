@@ -11,6 +11,7 @@ import numpy as np
 
 from hybrid.store.reader import Result
 from hybrid.view.decimate import Kept, Store
+from hybrid.view.obstacles import surfaces
 from hybrid.view.plotly_backend import colour_scale
 from hybrid.view.projections import STILL, bed_heights
 from hybrid.view.style import BED, BODY, INK, LEVEL, SAND, TOUCHDOWN, WATER, colour_of, prefix, short
@@ -46,11 +47,14 @@ def scenery(result: Result, store: Store, shown: Kept) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def box_and_planes(result: Result) -> tuple[np.ndarray, list[dict[str, Any]], list[str]]:
-    """The box (2, 3) m that is drawn, the planes in it, and texts on those that are far."""
+def box_and_planes(result: Result, moving: bool | None = None) -> tuple[np.ndarray, list[dict[str, Any]], list[str]]:
+    """The box (2, 3) m that is drawn, the planes and obstacles in it, and texts on those that are far.
+
+    moving: of obstacles those that move, or those that do not; None: all, where they are at last.
+    """
     position = result.position
     box = np.array([position.min(axis=(0, 1)), position.max(axis=(0, 1))])
-    planes = _planes(result, box)
+    planes = [*_planes(result, box), *({"far": False, "made": x} for x in surfaces(result, box, moving))]
     extent = np.ptp(box, axis=0)
     size = float(extent.max()) or 1.0
     room = np.maximum(0.5 * (_THIN * size - extent), 0.03 * size)  # thin directions get some depth, others a margin
@@ -182,6 +186,8 @@ def _plane(plane: dict[str, Any], box: np.ndarray) -> dict[str, Any]:
     """Its four corners in the box, and how it looks."""
     if plane["far"]:
         return {}
+    if "made" in plane:
+        return dict(plane["made"])
     if "surface" in plane:
         x, y, z = plane["surface"]
         look = {key: plane[key] for key in ("name", "fill", "line", "solid", "text")}

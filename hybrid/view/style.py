@@ -14,6 +14,7 @@ KIND_COLOURS = {
     "catenary": "#0072B2",
     "corrected": "#009E73",  # of 0.6
 }  # kinds that are not named here are drawn in ink
+STONE, STONE_EDGE = "#D9D4CF", "#7A726B"
 SAND, BED, BODY = "#EEE5D0", "#8C6D31", "#F0E442"
 WATER, LEVEL = "#EFF6FA", "#4A90C2"
 DOUBT = "#8E63B5"  # of estimated errors

@@ -15,6 +15,7 @@ from hybrid.store.reader import Result
 from hybrid.view.along import along
 from hybrid.view.figure import Axis, Band, Item, Line, Marks, Page, Panel
 from hybrid.view.headed_page import page_of
+from hybrid.view.obstacles import outlines
 from hybrid.view.panels import framed, sea
 from hybrid.view.projections import Numbers, View, aspect_of, telling_times, view_named, views_of
 from hybrid.view.style import BODY, INK, earlier_grey, prefix, short
@@ -40,10 +41,15 @@ class AllLines:
         self.s = np.arange(self.position.shape[1], dtype=float)
 
     def __contains__(self, name: str) -> bool:
-        return name.startswith(("seabed", "surface")) and name in self._around
+        return name.startswith(("seabed", "surface", "obstacles/")) and name in self._around
 
     def __getitem__(self, name: str) -> Any:
         return self._around[name]
+
+    @property
+    def names(self) -> list[str]:
+        """Of what is around."""
+        return [name for name in self._around.names if name in self]
 
     @property
     def as_result(self) -> Result:
@@ -112,7 +118,7 @@ def fairleads_of(result: Result) -> dict[str, str]:
 
 def shapes(result: Result, every: AllLines, view: View, output: int = -1) -> list[Item]:
     """The lines at an output, each in its colour, points and bodies with arms to their fairleads."""
-    items: list[Item] = []
+    items: list[Item] = outlines(every.as_result, view, output, moving=True)
     for k, (name, colour) in enumerate(colours(result).items()):
         label = name if k < MOST_NAMED else ""
         items.append(Line(*view.project(every.lines[name].position[output]), label, colour, 1.8))

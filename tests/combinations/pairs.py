@@ -94,6 +94,11 @@ FEATURES: dict[str, tuple[Tables, str]] = {
         {"obstacles": {"pipe": {"kind": "cylinder", "at": [4, 0, -2], "axis": [0.1, 1, 0.05], "radius": 0.8,
                                 "friction": 0.3}}}, "obstacles",
     ),
+    "obstacle that moves": (
+        {"obstacles": {"pipe": {"kind": "cylinder", "at": [4, 0, -2], "axis": [0.1, 1, 0.05], "radius": 0.8,
+                                "friction": 0.3, "motion": {"travel": {"by": [0.05, 0.1, 0.08], "over": 0.4}}}}},
+        "obstacles",
+    ),
     "chosen steps": ({"time.tolerance": 1e-4, "time.step": None}, "time"),
 }  # fmt: skip
 

@@ -30,7 +30,8 @@ from hybrid.kernels.state.forces import (
     VORTICES,
     WAVES,
 )
-from hybrid.kernels.state.state import Ends, Line, Sea, blank_state
+from hybrid.kernels.state.obstacle_rows import BEGAN, CARRIED, EACH, ENDED, PLACE, SPEED, SWEEP, TURNING
+from hybrid.kernels.state.state import NO_CARRIED, NO_GRIP, NO_MOVES, Ends, Line, Sea, blank_state
 
 N = 7
 CV, CA = 3.0, 7.0
@@ -113,6 +114,7 @@ def random_sea(g):
             bed_x=np.zeros(0), bed_y=np.zeros(0), bed_heights=np.zeros((0, 4)), stiffness=3.0, damping=0.5, onset=50.0, obstacles=OBSTACLES_THERE,
         friction=np.array([0.3, 0.6]), slip_length=0.4, flow=0.1 * g.normal(size=(N + 1, 7)), lanes=np.zeros((10, 16)),
         axis=axis / np.linalg.norm(axis, axis=1)[:, None], slip=slip, slid=np.zeros((N + 1, 3)), bed=np.zeros((N + 1, 3)),
+        courses=NO_MOVES, carried=NO_CARRIED, grip=NO_GRIP,
     )  # fmt: skip
 
 
@@ -161,6 +163,37 @@ def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
             soft = line.kb[i, 2] * line.element[i] + line.kb[i + 1, 2] * line.element[i + 1]
             exact[5 * i + 4, 5 * i + 4] += 1e-9 * soft
     assert np.abs(exact - numeric).max() < 1e-6 * np.abs(J).max()
+
+
+def with_moving_obstacles(line, sea, st):
+    """The same with obstacles that have moved and turned in the step, and go on, on nodes that have travels on them."""
+    g = np.random.default_rng(6)
+    carried = np.zeros((len(OBSTACLES_THERE), CARRIED))
+    for k, row in enumerate(carried):
+        R = np.linalg.qr(np.eye(3) + 0.05 * g.normal(size=(3, 3)))[0]
+        row[SWEEP : SWEEP + 9] = (R * np.sign(np.diag(R))).ravel()
+        row[ENDED : ENDED + 3] = OBSTACLES_THERE[k, PLACE : PLACE + 3]
+        row[BEGAN : BEGAN + 3] = row[ENDED : ENDED + 3] + 0.02 * g.normal(size=3)
+        row[SPEED : TURNING + 3] = 0.5 * g.normal(size=6)
+    grip = 0.1 * g.normal(size=(N + 1, EACH * len(carried)))
+    moved = np.ones(len(carried), np.int8)
+    return line._replace(moved=moved), sea._replace(carried=carried, grip=grip), st._replace(grip=grip.copy())
+
+
+@pytest.mark.parametrize("bits", [OBSTACLES, OBSTACLES | FRICTION, OBSTACLES | LAND])
+@pytest.mark.parametrize("zones", ["rod", "catenary"])
+def test_jacobian_of_obstacles_that_move(zones, bits):
+    line, sea, ends, st = random_case(3, ZONES[zones], bits)
+    at_rest, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
+    line, sea, st = with_moving_obstacles(line, sea, st)
+    J, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
+    numeric, exact = by_differences(line, sea, ends, st), J.copy()
+    for i in range(N):
+        if line.spin[i]:
+            soft = line.kb[i, 2] * line.element[i] + line.kb[i + 1, 2] * line.element[i + 1]
+            exact[5 * i + 4, 5 * i + 4] += 1e-9 * soft
+    assert np.abs(exact - numeric).max() < 1e-6 * np.abs(J).max()
+    assert np.abs(J - at_rest).max() > 1e-3 * np.abs(J).max()
 
 
 def with_tables(line):

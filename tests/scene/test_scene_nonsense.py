@@ -133,9 +133,10 @@ OBSTRUCTED = """\
 cable: {sections: [{length: 10.0, mass: 1.0, diameter: 0.02}]}
 ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
 obstacles:
-  wall: {at: [0.0, 3.0, 0.0], normal: [0.0, -1.0, 0.0]}
+  wall: {at: [0.0, 3.0, 0.0], normal: [0.0, -1.0, 0.0], from_outside: true}
   ball: {kind: sphere, at: [0.0, 0.0, -20.0], radius: 1.0, friction: 0.3}
-  roller: {at: [2.0, 0.0, -5.0], axis: [0.0, 1.0, 0.0], radius: 0.5, damping: 10.0}
+  roller: {at: [2.0, 0.0, -5.0], axis: [0.0, 1.0, 0.0], radius: 0.5, damping: 10.0,
+           spin: {rate: 2.0, ramp: 1.0}, motion: {travel: {by: [0.0, 0.0, 1.0], over: 2.0}}}
 initial: {kind: equilibrium}
 model: {kind: catenary}
 """
@@ -239,6 +240,7 @@ def _harmless(path: tuple[str | int, ...], nonsense: Any) -> bool:
         "always_move": (True,),
         "errors": (True,),
         "self": (True,),
+        "from_outside": (True,),
         "damping": ({},),
     }
     return any(nonsense == h and type(nonsense) is type(h) for h in harmless.get(str(path[-1]), ()))
@@ -295,6 +297,7 @@ SIGNED |= {
     "always_move",
     "errors",
     "self",
+    "from_outside",
 }
 SIGNED |= {
     "z",

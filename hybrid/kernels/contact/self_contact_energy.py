@@ -35,6 +35,7 @@ from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, TOUCHES
 from hybrid.kernels.state.report import (
     CONTACT_WORK,
     FRICTION_WORK,
+    OBSTACLE_WORK,
     SEABED_ENERGY,
     SELF_CONTACT_ENERGY,
     SELF_FRICTION_WORK,
@@ -110,6 +111,8 @@ def work_of_try(line, ends, contact, velocity, before, state, work, clock):
         missed += half * abs(contact.power[k] - before[k])
     if line.bits & TOUCHES:
         done += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock[STORED] + report[FRICTION_WORK]
+    if line.moved.shape[0] > 0:
+        done += report[OBSTACLE_WORK]
     for i in range(work.u.shape[0]):
         for k in range(3):
             done += line.force[i, k] * work.u[i, k]

@@ -1,4 +1,4 @@
-"""Fixed obstacles that a line touches: planes, spheres, cylinders.
+"""Obstacles that a line touches, fixed or moving (kernels.laws.obstacle_motion): planes, spheres, cylinders.
 
 A cylinder of finite length ends in half spheres, so that a sphere is one of no length: the distance of a point to it
 is that to a stretch of its axis, less the radius.  A cell presses on the obstacle as on the bed (kernels.laws.seabed):
@@ -15,7 +15,8 @@ the penetration is linear between its nodes, and the force per length has a pote
     q        elastic travel of friction: the way of the node along the surface    3      m      inertial
 
 Friction acts on the centreline: mu N at most, against the travel, whatever its direction.  A node that touches several
-surfaces has one travel, of which each surface takes the part along itself; what is kept of it lies along all of them.
+fixed surfaces has one travel, of which each takes the part along itself; what is kept of it lies along all of them.  Where
+an obstacle moves every one has a travel of its own, which lies in it and turns with it.
 """
 
 from __future__ import annotations
@@ -24,30 +25,33 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.algebra.rotations import add, dot, get3, madd, mat_vec, mscale, outer, scale, sub
+from hybrid.kernels.algebra.rotations import add, cross, dot, get3, madd, mat_vec, mscale, outer, scale, sub
 from hybrid.kernels.laws.bed import bed_under
+from hybrid.kernels.laws.obstacle_motion import row3, surface_velocity, swept, way_along
 from hybrid.kernels.laws.seabed import contact, stored, with_cell
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SEABED
+from hybrid.kernels.state.obstacle_rows import (
+    AXIS,
+    DAMPING,
+    FLAT,
+    HALF_LENGTH,
+    KIND,
+    MU,
+    ONSET_OF,
+    PLACE,
+    RADIUS,
+    ROUND,
+    SEEN_FORCE,
+    SEEN_TURN,
+    SLIP,
+    STIFFNESS,
+    STILL_AXIS,
+    STRAND,
+    TURNING,
+)
 from hybrid.kernels.state.state import Floats
 
-# Columns of Sea.obstacles: kind; place (m); unit axis of a cylinder, unit normal of a plane; radius of the surface moved
-# out by the strand's (m; of a plane how far it is moved out); half the length of the cylinder (m; infinite: endless; 0: a
-# sphere); radius of the strand (m); friction; stiffness (N/m per m), damping (N s/m per m), onset (m), elastic travel (m).
-KIND, PLACE, AXIS, RADIUS, HALF_LENGTH, STRAND, MU, STIFFNESS, DAMPING, ONSET_OF, SLIP = (
-    0,
-    1,
-    4,
-    7,
-    8,
-    9,
-    10,
-    11,
-    12,
-    13,
-    14,
-)
-FLAT, ROUND = 0.0, 1.0
 Z3 = (0.0, 0.0, 0.0)
 Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 E9 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -116,18 +120,23 @@ def grip(t, n, K, N, mu, sl):
 
 
 @inner
-def half_cell(rows, k, x, p, pd, e, v, h, cv):
+def half_cell(sea, moves, k, x, p, pd, e, v, h, cv):
     """Contact of the half cell towards a neighbour at x + e with velocity v: N, dN/dp, dN/dpd, dN/d(place there).
 
-    p, pd: penetration of the node at x and its rate.
+    moves: whether an obstacle does; p, pd: penetration of the node at x and its rate.
     """
+    rows = sea.obstacles
     d, m, hollow, a = beside(rows, k, add(x, e))
     o = rows[k, ONSET_OF]
     po = 0.5 * o - d
     if not (p > 0.0 or po > 0.0):
         return 0.0, 0.0, 0.0, Z3
+    if moves:
+        v = sub(v, surface_velocity(sea.carried, k, add(x, e)))
     f, f0, f1, g0, g1 = contact(p, po, pd, -dot(m, v), h, rows[k, STIFFNESS], rows[k, DAMPING], o)
     slope = scale(-(f1 + cv * g1), m)
+    if moves:
+        slope = add(slope, scale(g1, cross(m, row3(sea.carried, k, TURNING))))
     if g1 != 0.0:
         slope = sub(slope, scale(g1, bent(hollow, m, a, v)))
     return f, f0, g0, slope
@@ -143,19 +152,27 @@ def obstacle_forces(line, sea, i, x, u, v, e, cv):
         lies = sea.bed[i, 0] != 0.0 or sea.bed[i, 1] != 0.0 or sea.bed[i, 2] != 0.0
     t, vi = add(get3(sea.slip, i), get3(u, i)), get3(v, i)
     kept = get3(sea.slid, i) if lies else t
-    touches, rubs = False, False
+    touches, rubs, moves = False, False, line.moved.shape[0] > 0
     for k in range(rows.shape[0]):
         d, n, hollow, a = beside(rows, k, x)
+        if moves:
+            vi = sub(get3(v, i), surface_velocity(sea.carried, k, x))
         p, pd = 0.5 * rows[k, ONSET_OF] - d, -dot(n, vi)
-        N = DN = 0.0
+        N = DN = turned = 0.0
         L, R, dN = Z3, Z3, Z3
         if i > 0:
-            f, f0, g0, L = half_cell(rows, k, x, p, pd, scale(-1.0, get3(e, i - 1)), get3(v, i - 1), line.h[i - 1], cv)
+            f, f0, g0, L = half_cell(
+                sea, moves, k, x, p, pd, scale(-1.0, get3(e, i - 1)), get3(v, i - 1), line.h[i - 1], cv
+            )
             N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(hollow, n, a, vi)))
+            turned += g0
         if i < line.h.shape[0]:
-            f, f0, g0, R = half_cell(rows, k, x, p, pd, get3(e, i), get3(v, i + 1), line.h[i], cv)
+            f, f0, g0, R = half_cell(sea, moves, k, x, p, pd, get3(e, i), get3(v, i + 1), line.h[i], cv)
             N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(hollow, n, a, vi)))
+            turned += g0
         dN = add(dN, scale(-DN, n))
+        if moves:
+            dN = add(dN, scale(turned, cross(n, row3(sea.carried, k, TURNING))))
         if N == 0.0 and DN == 0.0:
             continue
         touches = True
@@ -163,10 +180,13 @@ def obstacle_forces(line, sea, i, x, u, v, e, cv):
         slope = n
         F, D = add(F, scale(N, n)), madd(D, mscale(N, K))
         if line.bits & FRICTION and rows[k, MU] > 0.0 and N > 0.0:
+            if moves:
+                t = way_along(sea.carried, k, row3(sea.grip, i, 6 * k), x, get3(u, i))
             f, g, Df, _ = grip(t, n, K, N, rows[k, MU], rows[k, SLIP])
             F, D, slope = add(F, f), madd(D, Df), add(n, g)
-            _, _, _, kept = grip(kept, n, K, N, rows[k, MU], rows[k, SLIP])
-            rubs = True
+            if not moves:
+                _, _, _, kept = grip(kept, n, K, N, rows[k, MU], rows[k, SLIP])
+                rubs = True
         # the neighbours lie at x - e before and x + e after: what they add by x they add by the chords too
         before, after = outer(slope, L), outer(slope, R)
         D = madd(D, madd(outer(slope, dN), madd(before, after)))
@@ -220,10 +240,10 @@ def stored_energy(line, sea, r):
 
 
 @inner
-def normal_at(line, sea, x):
-    """Normal at x of what is pressed on most deeply there, the bed or an obstacle."""
+def normal_at(line, sea, x, of_bed):
+    """Normal at x of what is pressed on most deeply there, the bed or an obstacle; of_bed: of the bed alone."""
     n, deep = bed_under(sea, x)
-    if line.bits & OBSTACLES:
+    if line.bits & OBSTACLES and not of_bed:
         if not line.bits & SEABED:
             deep = -math.inf
         for k in range(sea.obstacles.shape[0]):
@@ -235,15 +255,19 @@ def normal_at(line, sea, x):
 
 
 @kernel
-def passes(sea, r, u):
+def passes(line, sea, r, u):
     """The first node that a step leads deeper into an obstacle than by the strand's radius, or through it; -1: none.
 
-    r: (N+1, 3) m, before the step; u: its displacements.
+    r: (N+1, 3) m, before the step; u: its displacements.  Of an obstacle that moves: against it.
     """
     rows = sea.obstacles
+    moves = line.moved.shape[0] > 0
     for i in range(u.shape[0]):
         x, y = get3(r, i), get3(u, i)
         for k in range(rows.shape[0]):
+            if moves:  # as seen from the obstacle
+                x = swept(sea.carried, k, get3(r, i))
+                y = sub(add(get3(r, i), get3(u, i)), x)
             before, _, _, _ = beside(rows, k, x)
             after, _, _, _ = beside(rows, k, add(x, y))
             least = after
@@ -278,6 +302,13 @@ def distances(rows: Floats, x: Floats) -> Floats:
             y = w - np.clip(t, -row[HALF_LENGTH], row[HALF_LENGTH])[:, None] * a
             out[k] = np.linalg.norm(y, axis=1) - row[RADIUS]
     return out
+
+
+def put_obstacles(rows: Floats, carried: Floats, seen: Floats) -> None:
+    """Rows (M, OBSTACLE) where obstacles were that move; carried: as of `Sea`; seen: (M, SEEN) of them then."""
+    rows[:, PLACE : PLACE + 3] = seen[:, :SEEN_TURN]
+    turn = seen[:, SEEN_TURN:SEEN_FORCE].reshape(-1, 3, 3)
+    rows[:, AXIS : AXIS + 3] = np.einsum("kij,kj->ki", turn, carried[:, STILL_AXIS : STILL_AXIS + 3])
 
 
 # Parts of a chord at which its distance is looked at; of the radius of an obstacle, how deep a chord may cut it.

@@ -252,7 +252,7 @@ def before_forces(table):
     if job.line.bits & WAVES:
         wave_kinematics(job.sea, job.old.r, job.work.u)
     if job.line.bits & FRICTION:
-        friction_axes(job.sea, job.old.r, job.old.e, job.old.slip)
+        friction_axes(job.sea, job.old.r, job.old.e, job.old.slip, job.old.grip)
 
 
 @kernel

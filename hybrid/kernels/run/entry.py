@@ -51,6 +51,10 @@ def check_turns(line: Line, state: State) -> None:
         raise ValueError(f"a state with {state.turn.shape[0]} turns on a line that has {line.torsion.shape[0]}")
     if state.slow.shape[0] != line.law.shape[0]:
         raise ValueError(f"a state with {state.slow.shape[0]} mean tensions on a line that has {line.law.shape[0]}")
+    if state.grip.shape[1] != 6 * line.moved.size:
+        raise ValueError(
+            f"a state with grips of {state.grip.shape[1] // 6} obstacles, of which {line.moved.size} are known"
+        )
     if state.wake.shape[0] != line.wake_law.shape[0]:
         raise ValueError(
             f"a state with {state.wake.shape[0]} phases of lift on a line that has {line.wake_law.shape[0]}"

@@ -37,6 +37,7 @@ from hybrid.kernels.junctions.junctions import (
     place_ends,
 )
 from hybrid.kernels.junctions.system_job import DT, TIME, read_system, task_of
+from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller
@@ -278,6 +279,8 @@ def begin_books(tables, joints, t):
         if line.bits & TOUCHES:
             report[SEABED_ENERGY] = stored_in_contact(line, sea, new.r)
             books.clock[STORED] = report[SEABED_ENERGY]
+            if line.moved.shape[0] > 0:
+                grip_obstacles(line, sea, job.work.u, new, new.grip, new.grip)
             for i in range(new.r.shape[0]):
                 new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
         if job.contact[ADDRESS] > 0:

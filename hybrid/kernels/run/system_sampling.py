@@ -92,7 +92,7 @@ def take_sample(steps, system, where):
         if x < 1.0:
             sea_at(t, job.sea)
         sample_head(job.sea, books, x, dt, k, t, row)
-        sample_state(job.line, before, now, books, where, row)
+        sample_state(job.line, job.sea, before, now, books, where, row)
         for j in range(3):
             row[SAMPLE_POSITION + j] = row[HEAD + j]
             row[SAMPLE_POSITION + 3 + j] = row[HEAD + 3 * n + j]

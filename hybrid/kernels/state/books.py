@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.state.obstacle_rows import SEEN
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import Floats
 
@@ -107,8 +108,8 @@ COLLAPSES = 131072
 # --- powers and work --------------------------------------------------------------------------------
 
 RATES = 8  # by their rates: start, end, applied, drag, mass damping, stiffness damping, added mass, waves
-CONTACT, FRICTION, ZONES = 8, 9, 10  # by steps
-WORKS = 11
+CONTACT, FRICTION, ZONES, OBSTACLE = 8, 9, 10, 11  # by steps
+WORKS = 12
 # Columns of the step log.
 LOG = ("t", "dt", "iterations", "correction", "residual", "repeats", "error", "end_force_start", "end_force_end")
 # Steps of which the worst is remembered, with (left, t, dt, node).
@@ -161,7 +162,8 @@ class Books(NamedTuple):
 
 # A sample, one row: t, sea.now (4), of both ends position (2, 3), frame (2, 9), spin, force and moment (2, 3 each), report,
 # work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N); where they vary, h (N) and kb (N+1, 3); turns (K, 3)
-# of zones that a torque passes through; of a line that touches itself, the force of that (N+1); of the model error,
+# of zones that a torque passes through; of a line that touches itself, the force of that (N+1); of obstacles of which one
+# moves, SEEN of each (kernels.state.obstacle_rows); of the model error,
 # where it is followed, K numbers.
 SAMPLE_SEA, SAMPLE_POSITION, SAMPLE_FRAME, SAMPLE_SPIN, SAMPLE_FORCE, SAMPLE_MOMENT, SAMPLE_REPORT = (
     1,
@@ -176,14 +178,22 @@ SAMPLE_WORK = SAMPLE_REPORT + REPORT_SIZE
 HEAD = SAMPLE_WORK + WORKS
 
 
-def sample_size(cells: int, varies: bool = False, zones: int = 0, touches: bool = False) -> int:
+def sample_size(cells: int, varies: bool = False, zones: int = 0, touches: bool = False, obstacles: int = 0) -> int:
     """Numbers of a sample of a line of so many cells; varies: with lengths and stiffness; zones: with turns; touches:
 
-    with the force of contact with itself.
+    with the force of contact with itself; obstacles: of which one moves.
 
     What is sampled of the model error comes behind them.
     """
-    return HEAD + 9 * (cells + 1) + 8 * cells + varies * (cells + 3 * (cells + 1)) + 3 * zones + touches * (cells + 1)
+    return (
+        HEAD
+        + 9 * (cells + 1)
+        + 8 * cells
+        + varies * (cells + 3 * (cells + 1))
+        + 3 * zones
+        + touches * (cells + 1)
+        + SEEN * obstacles
+    )
 
 
 def blank_books(cells: int = 1, rows: int = 1) -> Books:

@@ -27,7 +27,7 @@ AXIAL_LAW = 16384
 # No force: the line may come to touch itself, which is computed from where it comes near itself on.
 MAY_TOUCH = 32768
 
-# Contact with fixed obstacles (hybrid.kernels.laws.obstacles); what the line is pressed on by, bed or obstacles.
+# Contact with obstacles (hybrid.kernels.laws.obstacles); what the line is pressed on by, bed or obstacles.
 OBSTACLES = 65536
 TOUCHES = SEABED | OBSTACLES
 # No force: moment that is no multiple of curvature (hybrid.kernels.laws.bending_law).

@@ -29,6 +29,7 @@ The assembly of every iteration clears and writes the first `ASSEMBLED` numbers,
     STRETCH_ENERGY            energy of stretch where an axial law is no straight line         J
     USED_RHO                  spectral radius at infinity of the step                          -
     NET_A, NET_B              resultant on the node at the start and at the end, 3 numbers     N
+    OBSTACLE_WORK             work of obstacles as they move, in the step                      J
 """
 
 from __future__ import annotations
@@ -49,4 +50,5 @@ LENGTH_OUT, PAYOUT_RATE, PAYOUT_POWER = 35, 36, 37
 STRETCH_ENERGY = 38
 USED_RHO = 39
 NET_A, NET_B = 40, 43
-REPORT_SIZE = 46
+OBSTACLE_WORK = 46
+REPORT_SIZE = 47

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.machine.references import by_reference
 from hybrid.kernels.state.fields import HALF, MEAN, POINT, ROD, SHARED, blank, cell, fields_of, node
+from hybrid.kernels.state.obstacle_rows import CARRIED, EACH, ENDED, FORCE, OBSTACLE, SEEN, TURNED
 from hybrid.kernels.state.report import REPORT_SIZE
 
 Floats = NDArray[np.float64]
@@ -35,9 +36,12 @@ NO_WAKE_LAW: Floats = np.zeros((0, 8))
 NO_WAKE: Floats = np.zeros((0, 4))
 NO_SLOW: Floats = np.zeros(0)
 NO_ADDRESS: NDArray[np.int64] = np.zeros(0, np.int64)
-# Numbers of an obstacle (kernels.laws.obstacles has them).
-OBSTACLE = 15
 NO_OBSTACLES: Floats = np.zeros((0, OBSTACLE))
+# Of a scene in which no obstacle moves (kernels.state.obstacle_rows has the columns).
+NO_CARRIED: Floats = np.zeros((0, CARRIED))
+NO_OBSTACLES_SEEN: Floats = np.zeros((0, 0, SEEN))
+NO_GRIP: Floats = np.zeros((0, 0))
+NO_MOVED: NDArray[np.int8] = np.zeros(0, np.int8)
 
 
 class Line(NamedTuple):
@@ -103,6 +107,7 @@ class Line(NamedTuple):
     bend_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: curvature (1/m), moment (N m), energy per length
     # (N+1, 8) of nodes with vortices (kernels.laws.vortices); empty: there are none
     wake_law: Annotated[Floats, node(columns=8, optional=True)] = NO_WAKE_LAW
+    moved: NDArray[np.int8] = NO_MOVED  # (M,) of all obstacles: 1 where one moves; empty: none does
 
 
 FIELDS = fields_of(Line)
@@ -161,8 +166,8 @@ NOT_ON_BODY, TURNS_FREELY, TURNS_WITH_BODY = 0.0, 1.0, 2.0
 class Sea(NamedTuple):
     """What surrounds the line at one moment.  Parameters of what is off are NaN or empty.
 
-    The last six are work arrays: `flow` and `lanes` are filled by `kernels.laws.water.wave_kinematics`, `axis` and `slip` at the start of a
-    step, `slid` and `bed` by the march.
+    `flow` and what follows are work arrays, `courses` and `carried` aside: `flow` and `lanes` are filled by
+    `kernels.laws.water.wave_kinematics`, `axis`, `slip` and `grip` at the start of a step, `slid` and `bed` by the march.
     """
 
     z: Floats  # (K,) m, increasing: heights of the current profile
@@ -182,13 +187,18 @@ class Sea(NamedTuple):
     onset: float  # m, penetration over which contact sets in
     friction: Floats  # (2,) axial and lateral coefficient
     slip_length: float  # m, elastic travel before a touching cable slides
-    obstacles: Floats  # (M, OBSTACLE) fixed obstacles (kernels.laws.obstacles); empty: there are none
+    obstacles: (
+        Floats  # (M, OBSTACLE) obstacles (kernels.state.obstacle_rows), where they are now; empty: there are none
+    )
     flow: Floats  # (N+1, 7) velocity and acceleration of the waves at the nodes, and their elevation there
     lanes: Floats  # (10 + 2 W, LANES) what kernels.laws.water needs for LANES nodes at a time
     axis: Floats  # (N+1, 3) direction of the cable in the plane of the seabed
     slip: Floats  # (N+1, 3) m, elastic travel at the start of the step
     slid: Floats  # (N+1, 3) m, at its end
     bed: Floats  # (N+1, 3) N, force of the seabed and of obstacles on the nodes
+    courses: Moves  # how obstacles move, a row each; empty: none does
+    carried: Floats  # (M, CARRIED) how far they have (kernels.laws.obstacle_motion); empty: none does
+    grip: Floats  # (N+1, 6 M) as `State.grip`, at the start of the step; empty: no obstacle moves
 
 
 class State(NamedTuple):
@@ -211,6 +221,9 @@ class State(NamedTuple):
     turn: Floats = NO_TURN
     slow: Floats = NO_SLOW  # (N,) N, mean tension of lines with a `law`; else empty
     wake: Floats = NO_WAKE  # (N+1, 4) of lines with a `wake_law` (kernels.laws.vortices); else empty
+    grip: Floats = (
+        NO_GRIP  # (N+1, 6 M) of each obstacle, of lines with `moved` (kernels.laws.obstacle_grip); else empty
+    )
 
     def copy(self) -> State:
         return State(*(x.copy() for x in self))
@@ -243,6 +256,7 @@ class Batch(NamedTuple):
     kb: Floats = NOT_VARYING  # (nb, N+1, 3) N m, stiffness of elements, likewise
     turn: Floats = NO_TURNS  # (nb, K, 3) as `State.turn`
     touch: Floats = NOT_VARYING  # (nb, N+1) N/m, of contact of the line with itself; empty: there is none
+    obstacles: Floats = NO_OBSTACLES_SEEN  # (nb, M, SEEN) where they are, and what acts on them; empty: none moves
 
     def line(self, k: int, line: Line) -> Line:
         """The line at output k, from the one of all outputs."""
@@ -266,7 +280,16 @@ def batch_of_one(
         ends.position[None].copy(), ends.frame[None].copy(), ends.spin[None].copy(), ends.force[None].copy(),
         ends.moment[None].copy(), report[None].copy(), work[None].copy(), sea.now[None].copy(), turn=now.turn,
         **{} if touch is None else {"touch": touch[None].copy()},
+        **{} if not state.grip.size else {"obstacles": obstacles_now(sea, state)[None]},
     )  # fmt: skip
+
+
+def obstacles_now(sea: Sea, state: State) -> Floats:
+    """Where obstacles are that move, and what the line does to them: (M, SEEN) of kernels.state.obstacle_rows."""
+    place, turned = sea.carried[:, ENDED : ENDED + 3], sea.carried[:, TURNED : TURNED + 9]
+    force = -state.grip.reshape(len(state.r), -1, EACH)[:, :, FORCE:]
+    moment = np.cross(state.r[:, None] - place, force)
+    return np.hstack([place, turned, force.sum(axis=0), moment.sum(axis=0)])
 
 
 def state_in(batch: Batch, k: int, line: Line) -> State:
@@ -330,10 +353,10 @@ def no_torsion() -> Torsion:
     )
 
 
-def blank_state(n_cells: int, zones: int = 0, slow: bool = False, wake: bool = False) -> State:
+def blank_state(n_cells: int, zones: int = 0, slow: bool = False, wake: bool = False, obstacles: int = 0) -> State:
     """A state of zeros with room for `n_cells` cells; zones: those that a torque passes through; slow: mean tensions;
 
-    wake: phases of vortices.
+    wake: phases of vortices; obstacles: of which one moves.
     """
     node, cell = (n_cells + 1, 3), (n_cells, 3)
     z = np.zeros
@@ -354,12 +377,13 @@ def blank_state(n_cells: int, zones: int = 0, slow: bool = False, wake: bool = F
         z((zones, 3)),
         z(n_cells if slow else 0),
         z((n_cells + 1 if wake else 0, 4)),
+        z((n_cells + 1 if obstacles else 0, 6 * obstacles)),
     )
 
 
 def state_for(line: Line) -> State:
     """A state of zeros of a line."""
-    return blank_state(line.h.size, len(line.torsion), line.law.size > 0, line.wake_law.size > 0)
+    return blank_state(line.h.size, len(line.torsion), line.law.size > 0, line.wake_law.size > 0, line.moved.size)
 
 
 def no_sea(n_cells: int) -> Sea:
@@ -369,6 +393,7 @@ def no_sea(n_cells: int) -> Sea:
         np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), nan, nan, np.array([0.0, 1.0, 1.0, 0.0]), np.zeros(2),
         np.array([0.0, 0.0, 1.0]), nan, np.zeros(0), np.zeros(0), np.zeros((0, 4)), nan, nan, nan, np.full(2, nan), nan,
         NO_OBSTACLES, np.zeros((n_cells + 1, 7)), np.zeros((10, LANES)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
+        NO_MOVES, NO_CARRIED, NO_GRIP,
     )  # fmt: skip
 
 
@@ -389,14 +414,17 @@ def no_ends() -> Ends:
     return Ends(np.zeros(2, np.int8), vectors[0], np.zeros((2, 9)), *vectors[1:])
 
 
-def no_moves() -> Moves:
-    """Both ends at the origin, not moved, not loaded."""
+def no_moves(n: int = 2) -> Moves:
+    """Both ends, or n obstacles, at the origin, not moved, not loaded."""
     z = np.zeros
     return Moves(
-        z((2, 2), np.int8), z((2, 3)), z((2, 9)), z(2), z((0, 5)), z((2, 3)), z(2), z((2, 5)), z(2, np.int8),
-        z((2, 2), np.int64), z(0), z((0, 6, 4)), z((2, 4)), 1.0, z((2, 2), np.int8), z((2, 26)), z((0, 8)), z((0, 4)),
-        z((2, FAIRLEAD)),
+        z((n, 2), np.int8), z((n, 3)), z((n, 9)), z(n), z((0, 5)), z((n, 3)), z(n), z((n, 5)), z(n, np.int8),
+        z((n, 2), np.int64), z(0), z((0, 6, 4)), z((n, 4)), 1.0, z((n, 2), np.int8), z((n, 26)), z((0, 8)), z((0, 4)),
+        z((n, FAIRLEAD)),
     )  # fmt: skip
+
+
+NO_MOVES = no_moves(0)
 
 
 def no_work() -> Work:

@@ -28,6 +28,7 @@ from hybrid.kernels.algebra.rotations import (
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import relative_rotation
 from hybrid.kernels.laws.end_motion import sea_at, turn_by_vector
+from hybrid.kernels.laws.obstacle_grip import sample_obstacles
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.march.configuration import carry_director
 from hybrid.kernels.state.books import (
@@ -52,6 +53,7 @@ from hybrid.kernels.state.books import (
     WORKS,
 )
 from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.obstacle_rows import SEEN
 from hybrid.kernels.state.report import ASSEMBLED, LENGTH_OUT, PAYOUT_RATE, REPORT_SIZE
 
 # Of the step: an output so near to its end is its end.
@@ -293,12 +295,12 @@ def sample_model_error(model_error, x, row, at):
 
 
 @inner
-def sample_state(line, old, new, books, where, row):
+def sample_state(line, sea, old, new, books, where, row):
     """The state at a time within the last step as a row; where: that time (s), the part of the step before it, the
 
     length of the step (s), and that of the step before as a part of it, as k of `parabola`.  The sea is that of the time.
     """
-    _, x, dt, k = where
+    t, x, dt, k = where
     sample_nodes(old, new, x, dt, row)
     sample_cells(line, old, new, x, dt, k, books.tension, row)
     if x < 1.0 and not line.bits & PLANAR:
@@ -314,6 +316,9 @@ def sample_state(line, old, new, books, where, row):
     for i in range(books.touch.shape[1]):
         row[at + i] = x * books.touch[0, i] + (1.0 - x) * books.touch[1, i]
     at += books.touch.shape[1]
+    if line.moved.shape[0] > 0:
+        sample_obstacles(sea, old, new, t, x, row, at)
+        at += SEEN * line.moved.shape[0]
     sample_model_error(books.model_error, x, row, at)
 
 
@@ -333,7 +338,7 @@ def sample_step(line, sea, old, new, books):
         sea_at(t, sea)
         row, k = books.samples[count[SAMPLES]], clock[EARLIER_DT] / dt if x < 1.0 else 0.0
         sample_head(sea, books, x, dt, k, t, row)
-        sample_state(line, old, new, books, (t, x, dt, k), row)
+        sample_state(line, sea, old, new, books, (t, x, dt, k), row)
         count[SAMPLES] += 1
         count[OUTPUT] += 1
     return True

@@ -6,9 +6,11 @@ import math
 
 from hybrid.kernels.algebra.block_elimination import ROW
 from hybrid.kernels.algebra.block_elimination_plane import KEPT, TRIPLE
-from hybrid.kernels.algebra.rotations import dot, get3, spin_about
+from hybrid.kernels.algebra.rotations import dot, get3, spin_about, sub
 from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.obstacle_grip import book_obstacles, grip_obstacles, mean_force
+from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.obstacles import normal_at, passes, stored_in_contact
 from hybrid.kernels.laws.out_of_plane import step_out_of_plane
 from hybrid.kernels.laws.vortices import advance_wake
@@ -17,6 +19,7 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.configuration import carry_director
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held, sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, ROTARY, TOUCHES, VORTICES, WAVES
+from hybrid.kernels.state.obstacle_rows import EACH
 from hybrid.kernels.state.report import (
     BEND,
     BEND_NODE,
@@ -24,6 +27,7 @@ from hybrid.kernels.state.report import (
     FRICTION_WORK,
     LOCAL_ERROR,
     LOCAL_ERROR_NODE,
+    OBSTACLE_WORK,
     PUSH_ENERGY,
     SEABED_ENERGY,
     SLACKEST,
@@ -55,7 +59,7 @@ def largest_turn(e, u):
 
 
 @kernel
-def friction_axes(sea, r, e, slip):
+def friction_axes(sea, r, e, slip, grip):
     """Remember for friction how the line lies when a step starts: its direction along the bed, its elastic travel."""
     last = e.shape[0]
     for i in range(last + 1):
@@ -72,6 +76,8 @@ def friction_axes(sea, r, e, slip):
             size = math.sqrt(x * x + y * y + z * z)
         sea.axis[i, 0], sea.axis[i, 1], sea.axis[i, 2] = x / size, y / size, z / size
         sea.slip[i, 0], sea.slip[i, 1], sea.slip[i, 2] = slip[i, 0], slip[i, 1], slip[i, 2]
+        for k in range(grip.shape[1]):
+            sea.grip[i, k] = grip[i, k]
 
 
 @inner
@@ -154,11 +160,19 @@ def find_rates(space, line, sea, old, new, u, s):
 @inner
 def contact_work(line, sea, old, new, u, report):
     """Work of the seabed and of obstacles in the step, and what they store."""
+    moves = line.moved.shape[0] > 0
+    if moves:
+        report[OBSTACLE_WORK] = 0.0
+        grip_obstacles(line, sea, u, new, old.grip, new.grip)
+        book_obstacles(sea, old, new, u, report)
     for i in range(u.shape[0]):  # force times way: bounded by the energy of a blow, however short the step is not
         b = (0.5 * (old.bed[i, 0] + sea.bed[i, 0]), 0.5 * (old.bed[i, 1] + sea.bed[i, 1]),
              0.5 * (old.bed[i, 2] + sea.bed[i, 2]))  # fmt: skip
+        if moves:  # what is left is the bed's
+            for k in range(line.moved.shape[0]):
+                b = sub(b, mean_force(old, new, i, EACH * k))
         ui = get3(u, i)
-        normal = normal_at(line, sea, get3(new.r, i))
+        normal = normal_at(line, sea, get3(new.r, i), moves)
         along = dot(normal, ui) * dot(normal, b)
         report[CONTACT_WORK] += along
         report[FRICTION_WORK] += dot(b, ui) - along
@@ -185,6 +199,9 @@ def begin_step(plane, space, line, sea, old, new, u, s, safe):
 
     Returns the largest turn of a chord (rad) and its cell; beyond LARGEST_STEP_TURN the step is not begun.
     """
+    if space is not None:
+        if line.moved.shape[0] > 0:
+            carry_obstacles(sea.now[0] - s.dt, sea.now[0], sea)
     predict_nodes(old, new, u, s)
     if safe < 1.0:
         shorten(new, u, s, safe)
@@ -194,7 +211,7 @@ def begin_step(plane, space, line, sea, old, new, u, s, safe):
         if line.bits & WAVES:  # at the predicted positions, which are right to third order
             wave_kinematics(sea, old.r, u)
         if line.bits & FRICTION:
-            friction_axes(sea, old.r, old.e, old.slip)
+            friction_axes(sea, old.r, old.e, old.slip, old.grip)
         if line.bits & VORTICES:
             advance_wake(line, sea, old, new, s.dt)
     return turn, cell
@@ -267,7 +284,7 @@ def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, s
         if not spun < LARGEST_STEP_TURN:
             return spun, cell
         if line.bits & OBSTACLES:
-            node = passes(sea, old.r, u)
+            node = passes(line, sea, old.r, u)
             if node >= 0:
                 return THROUGH, min(node, old.T.shape[0] - 1)
     return largest_turn(old.e, u)

@@ -1,0 +1,31 @@
+"""What rows of Sea.obstacles, Sea.carried, State.grip and of samples hold of obstacles."""
+
+from __future__ import annotations
+
+# Of Sea.obstacles: kind; place (m); unit axis of a cylinder, unit normal of a plane; radius of the surface moved out by the strand's (m; of a
+# plane how far it is moved out); half the length of the cylinder (m; infinite: endless; 0: a sphere); radius of the strand
+# (m); friction; stiffness (N/m per m), damping (N s/m per m), onset (m), elastic travel (m).
+KIND, PLACE, AXIS, RADIUS, HALF_LENGTH, STRAND, MU, STIFFNESS, DAMPING, ONSET_OF, SLIP = (
+    0,
+    1,
+    4,
+    7,
+    8,
+    9,
+    10,
+    11,
+    12,
+    13,
+    14,
+)
+FLAT, ROUND = 0.0, 1.0
+OBSTACLE = 15
+# Of Sea.carried, of obstacles that move: c at the begin and the end of the step (m); R R0^T; v (m/s), w (1/s) and R at the
+# end (kernels.laws.obstacle_motion); the axis at t = 0, the rate of the spin about it (1/s) and the time over which it
+# grows (s).
+BEGAN, ENDED, SWEEP, SPEED, TURNING, TURNED, STILL_AXIS, RATE, RAMP = 0, 3, 6, 15, 18, 21, 30, 33, 34
+CARRIED = 35
+# Of each obstacle in a row of State.grip: travel (m), force on the node (N).
+TRAVEL, FORCE, EACH = 0, 3, 6
+# Of each obstacle in a sample: place (m), R, force of the line on it (N), moment about that place (N m).
+SEEN_TURN, SEEN_FORCE, SEEN_MOMENT, SEEN = 3, 12, 15, 18

@@ -1,0 +1,53 @@
+"""How obstacles of a scene move, as arrays for kernels.laws.obstacle_motion, and those that are set from outside."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.errors import SceneError
+from hybrid.kernels.state.obstacle_rows import AXIS, CARRIED, RAMP, RATE, STILL_AXIS, TURNED
+from hybrid.kernels.state.state import NO_CARRIED, NO_MOVES, Floats, Moves
+from hybrid.model.driven_end import PATH, DrivenEnd
+from hybrid.model.ends import Motion, table_of_motions
+from hybrid.scene.motion import Elevation, EndMotion
+from hybrid.scene.schema import Scene
+
+
+class Courses(NamedTuple):
+    """How obstacles move: Sea.courses and Sea.carried, and those that are set from outside, by name."""
+
+    moves: Moves
+    carried: Floats
+    driven: dict[str, DrivenEnd]
+
+
+def courses_of(scene: Scene, rows: Floats, waves: Floats, ramp: float, elevation: Elevation) -> Courses:
+    """How the obstacles of a scene move; rows: (M, OBSTACLE) of them at t = 0.
+
+    waves: as `Sea.waves`, ramp: s, over which they grow; elevation: of the surface, as of scene.motion.EndMotion.
+    """
+    if not any(x.moves for x in scene.obstacles.values()):
+        return Courses(NO_MOVES, NO_CARRIED, {})
+    count, still = len(scene.obstacles), np.eye(3)
+    position, frame = np.array([x.at for x in scene.obstacles.values()], float), np.tile(still.ravel(), (count, 1))
+    carried, paths = np.zeros((count, CARRIED)), np.zeros((count, PATH))
+    carried[:, STILL_AXIS : STILL_AXIS + 3], carried[:, TURNED : TURNED + 9] = rows[:, AXIS : AXIS + 3], frame
+    motions: dict[int, Motion | DrivenEnd] = {}
+    driven = {}
+    for k, (name, x) in enumerate(scene.obstacles.items()):
+        if x.from_outside:
+            motions[k] = driven[name] = DrivenEnd(paths[k], position[k], frame[k], True, True)
+        elif x.motion is not None:
+            try:
+                motions[k] = EndMotion(x.motion, x.at, still, elevation, (waves, ramp, True))
+            except SceneError as error:
+                raise SceneError(
+                    [replace(each, where=f"obstacles.{name}.{each.where}") for each in error.complaints]
+                ) from None
+        spin = getattr(x, "spin", None)
+        if spin is not None:
+            carried[k, RATE], carried[k, RAMP] = spin.rate, spin.ramp
+    return Courses(table_of_motions(motions, position, frame, paths, frame), carried, driven)

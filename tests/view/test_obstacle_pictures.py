@@ -1,0 +1,93 @@
+"""Obstacles in pictures: outlines in a view, triangles in space, where they are at an output."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.live.drawing import around, frames
+from hybrid.view.figure import Area
+from hybrid.view.obstacles import hull, obstacles_at, outlines, surfaces
+from hybrid.view.projections import view_named
+
+BALL = {"kind": "sphere", "at": [0.5, 0.3, -0.4], "radius": 0.1}
+PIPE = {"kind": "cylinder", "at": [1.0, 0.5, -0.6], "axis": [0, 1, 0], "radius": 0.05}
+WALL = {"kind": "plane", "at": [0, 0, -1.5], "normal": [0.2, 0, 1]}
+LIFT = {"travel": {"by": [0, 0.5, 0.25], "over": 0.05}}
+
+
+@pytest.fixture(scope="module")
+def result() -> Any:
+    section = {"length": 2.2, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 1e4, "bending_stiffness": 0.05}
+    return hybrid.run(
+        hybrid.validate_scene(
+            {
+                "cable": {"sections": [section]},
+                "obstacles": {"ball": BALL | {"motion": LIFT}, "pipe": PIPE, "wall": WALL},
+                "ends": {
+                    "start": {"kind": "pinned", "position": [0, 0, 0.2]},
+                    "end": {"kind": "pinned", "position": [2, 0, 0.2]},
+                },
+                "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20}, "contact": {"self": False},
+                "time": {"duration": 0.1, "step": 0.01}, "output": {"every": 0.05, "points": 21},
+            }
+        )
+    )  # fmt: skip
+
+
+def test_obstacles_are_where_they_are_at_an_output(result: Any) -> None:
+    first, last = (next(x for x in obstacles_at(result, k) if x.name == "ball") for k in (0, -1))
+    np.testing.assert_allclose(first.place, [0.5, 0.3, -0.4])
+    np.testing.assert_allclose(last.place, [0.5, 0.8, -0.15], atol=1e-12)
+    assert [x.name for x in obstacles_at(result, 0, moving=True)] == ["ball"]
+    assert [x.name for x in obstacles_at(result, 0, moving=False)] == ["pipe", "wall"]
+
+
+def test_outlines_are_those_of_shapes(result: Any) -> None:
+    """A ball is a circle from everywhere; an endless pipe a strip from above and a circle along it; a wall its section."""
+    areas = [x.outlines[0] for x in outlines(result, view_named("xz"), -1) if isinstance(x, Area)]
+    assert len(areas) == 3
+    for corners, centre, radius in ((areas[0], [0.5, -0.15], 0.1), (areas[1], [1.0, -0.6], 0.05)):
+        away = np.linalg.norm(corners - centre, axis=1)
+        assert 0.98 * radius < away.min() <= away.max() < 1.001 * radius
+    edge = areas[2][1] - areas[2][0]
+    assert edge[1] / edge[0] == pytest.approx(-0.2)
+    above = [x.outlines[0] for x in outlines(result, view_named("xy"), -1) if isinstance(x, Area)]
+    assert len(above) == 2  # the wall is not seen from the side
+    assert np.ptp(above[1], axis=0) == pytest.approx([0.1, np.ptp(above[1][:, 1])], rel=0.01)
+    assert np.ptp(above[1][:, 1]) > 4.0
+
+
+def test_surfaces_in_space_are_closed_triangles(result: Any) -> None:
+    box = np.array([[0.0, 0.0, -0.3], [2.0, 0.1, 0.2]])
+    ball, pipe, wall = surfaces(result, box)
+    assert box[1, 1] >= 0.9 - 1e-9  # it has grown to hold the ball
+    for each, place, radius in ((ball, [0.5, 0.8, -0.15], 0.1), (pipe, [1.0, 0.5, -0.6], 0.05)):
+        x = np.column_stack([each[k] for k in "xyz"])
+        w = x - place
+        if each is pipe:
+            w[:, 1] = 0.0
+        np.testing.assert_allclose(np.linalg.norm(w, axis=1), radius, rtol=1e-9)
+        assert max(*each["i"], *each["j"], *each["k"]) == len(x) - 1
+    assert "t = 0.1 s" in ball["text"]
+    assert "t =" not in pipe["text"]
+    np.testing.assert_allclose(0.2 * np.array(wall["x"]) + np.array(wall["z"]) + 1.5, 0.0, atol=1e-9)
+
+
+def test_a_page_moves_what_moves(result: Any) -> None:
+    texts = [plane["text"] for plane in around(result)["planes"]]
+    assert texts == ["obstacle pipe", "obstacle wall"]
+    found = frames(result, [0, 2], 50)
+    middles = [np.mean([p for arm in x["arms"] for p in arm], axis=0)[1] for x in found]
+    assert middles[1] - middles[0] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_a_hull_holds_all_points() -> None:
+    points = np.random.default_rng(0).normal(size=(200, 2))
+    corners = hull(points)
+    after = np.roll(corners, -1, axis=0) - corners
+    for a, d in zip(corners, after, strict=True):
+        assert (d[0] * (points[:, 1] - a[1]) - d[1] * (points[:, 0] - a[0]) > -1e-12).all()
