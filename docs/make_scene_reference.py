@@ -195,6 +195,7 @@ time: {duration: 120.0, step: 0.1}
 Other seas; each is a value of `waves`, and `depth` and `ramp` go with all:
 
 ```text
+- {kind: stream_function, height: 6, period: 9}  # one wave of finite height
 - {kind: jonswap, significant_height: 3, peak_period: 9, spreading: {exponent: 10}}  # cos^2s of half the angle
 - {kind: pierson_moskowitz, significant_height: 3, zero_crossing_period: 6.5}        # ISSC, Bretschneider
 - kind: ochi_hubble
@@ -209,6 +210,9 @@ Other seas; each is a value of `waves`, and `depth` and `ramp` go with all:
 - {kind: record, file: eta.csv, direction: 30, shortest_period: 2}                   # t,elevation (s, m)
 ```
 
+A `stream_function` wave is steady, with sharp crests and flat troughs, and holds up to its surface; its water is at
+rest on average at a fixed point under the troughs, and a current is added to it, which changes neither its length nor
+its period.
 Swell and wind sea (`sum`) have independent phases and no frequency in common.
 With `spreading` every wave of a sea has one direction of its own, drawn from the seed, so that a step costs what it
 does without; the waves do not lie in a plane any more.  cosⁿ of the whole angle with n = 2 is about s = 5.6.

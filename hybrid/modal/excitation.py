@@ -114,8 +114,8 @@ def _of_wave(line: Line, sea: Sea, state: State, wave: Floats, rows_of: RowsOf) 
     for amplitude, phase in ((0.0, 0.0), (small, 0.0), (small, -0.5 * np.pi)):  # none; its cosine; its sine
         one[0, 0], one[0, 4] = amplitude, phase
         there = sea._replace(
-            waves=one, now=np.array([0.0, sea.now[1], 1.0, 0.0]), flow=np.zeros((line.s.size, 7)),
-            lanes=np.zeros((12, LANES)),
+            waves=one, orbits=one[:, 0] * one[:, 1], now=np.array([0.0, sea.now[1], 1.0, 0.0]),
+            flow=np.zeros((line.s.size, 7)), lanes=np.zeros((12, LANES)),
         )  # fmt: skip
         wave_kinematics(there, state.r, still)
         forces = -rows_of(there).reshape(-1, SIZE, WIDTH)[:, 1:4, -1]

@@ -20,7 +20,8 @@ from hybrid.model.sections import limits_along, weakest_bending
 from hybrid.model.start_vibration import start_vibrations
 from hybrid.scene.accuracy import NOT_ASKED, ROUGHEST, USUAL, Accuracy, amount
 from hybrid.scene.motion_checks import shortest_period
-from hybrid.scene.schema import AdaptiveModel, CatenaryZone, RegularWaves, RodModel, Scene, Section, ZonesModel
+from hybrid.scene.schema import AdaptiveModel, CatenaryZone, RodModel, Scene, Section, ZonesModel
+from hybrid.scene.waves import PeriodicWaves
 
 # Part of the requested error that neglecting bending in catenary zones may use; mesh and time step share the rest.
 OF_ZONES = 0.1
@@ -331,8 +332,7 @@ def is_irregular(scene: Scene) -> bool:
 
 
 def _waves_are_irregular(scene: Scene) -> bool:
-    fluid = scene.environment.fluid
-    return scene.time is not None and fluid is not None and not isinstance(fluid.waves, RegularWaves | None)
+    return scene.time is not None and not isinstance(scene.environment.waves, PeriodicWaves | None)
 
 
 def wants_errors(scene: Scene) -> bool:

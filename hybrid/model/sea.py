@@ -17,8 +17,9 @@ from hybrid.model.obstacle_motion import courses_of
 from hybrid.model.obstacles import obstacle_rows
 from hybrid.model.scales import pressing
 from hybrid.model.spectra import waves_of
+from hybrid.scene.dispersion import wavenumber
 from hybrid.scene.schema import CurrentProfile, PowerLawCurrent, Scene, Seabed, UniformCurrent
-from hybrid.scene.waves import GivenWaves, RecordedWaves, RegularWaves, SumOfWaves, Waves, wavenumber
+from hybrid.scene.waves import GivenWaves, RecordedWaves, RegularWaves, StreamFunctionWaves, SumOfWaves, Waves
 
 # Contact sets in over half the penetration of a cable at rest: it then rests on the linear part.
 ONSET = 0.5
@@ -78,7 +79,9 @@ def surroundings(scene: Scene, cells: int) -> Surroundings:
             sea = sea._replace(surface=float(fluid.surface))
         if fluid.waves is not None:
             depth = scene.environment.depth or math.inf
-            sea = with_waves(sea, components(fluid.waves, depth, scene.environment.gravity), depth)
+            waves, gravity = fluid.waves, scene.environment.gravity
+            orbits = waves.steady(depth, gravity).orbits if isinstance(waves, StreamFunctionWaves) else None
+            sea = with_waves(sea, components(waves, depth, gravity), depth, orbits)
             wave_ramp = fluid.waves.ramp
     if bed is not None:
         if bed.depths is not None:
@@ -161,6 +164,8 @@ def components(waves: Waves, depth: float, gravity: float) -> Floats:
     variance is that of the spectrum exactly.
     """
     place = (0.0, 0.0)
+    if isinstance(waves, StreamFunctionWaves):
+        return _harmonics(waves, depth, gravity)
     if isinstance(waves, RegularWaves):
         amplitude, omega = np.array([0.5 * waves.height]), np.array([2 * np.pi / waves.period])
         phase, towards = np.radians([waves.phase]), np.array([math.radians(waves.direction)])
@@ -178,3 +183,14 @@ def components(waves: Waves, depth: float, gravity: float) -> Floats:
     if any(place):
         phase = phase - kx * place[0] - ky * place[1]
     return np.column_stack([amplitude, omega, kx, ky, phase, k])
+
+
+def _harmonics(waves: StreamFunctionWaves, depth: float, gravity: float) -> Floats:
+    """Components of one wave of finite height, which travel together."""
+    steady = waves.steady(depth, gravity)
+    j = np.arange(1, waves.order + 1)
+    k, towards = j * steady.k, math.radians(waves.direction)
+    return np.column_stack([
+        steady.elevation, j * (2 * np.pi / waves.period), k * math.cos(towards), k * math.sin(towards),
+        j * math.radians(waves.phase), k,
+    ])  # fmt: skip

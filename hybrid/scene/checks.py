@@ -353,6 +353,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     attachment_checks.bodies_in_fluid,
     attachment_checks.densities,
     sea_checks.waves,
+    sea_checks.wave_is_steady,
     sea_checks.record_lasts,
     sea_checks.followed,
     sea_checks.surface_over_seabed,

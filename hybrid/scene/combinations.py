@@ -20,6 +20,7 @@ from hybrid.scene.end_loads import Load
 from hybrid.scene.ends import Clamped, Ends, Pinned
 from hybrid.scene.payout import Payout
 from hybrid.scene.start_checks import SAME_LENGTH
+from hybrid.scene.waves import StreamFunctionWaves
 
 Tables = Mapping[str, Any]
 # Why a pair is refused: it cannot be; nobody has worked it out; or the code of several lines has not got what that of
@@ -331,6 +332,24 @@ def _changing_loads(tables: Tables) -> Iterator[Place]:
                 yield (*at, name)
 
 
+def _finite_waves(tables: Tables) -> Iterator[Place]:
+    environment = tables.get("environment")
+    if isinstance(getattr(environment, "waves", None), StreamFunctionWaves):
+        yield "environment", "fluid", "waves", "kind"
+
+
+def _by_rao(tables: Tables) -> Iterator[Place]:
+    """Ends, points and bodies that move by an RAO."""
+    ends: Ends | None = tables.get("ends")
+    holders: list[tuple[Place, Any]] = [(("ends", x), end) for x, end in ends.named().items()] if ends else []
+    if SYSTEM in tables:
+        holders = [((key, x), one) for key in ("points", "bodies") for x, one in getattr(tables[SYSTEM], key).items()]
+    for at, holder in holders:
+        vessel = getattr(getattr(holder, "motion", None), "vessel", None)
+        if vessel is not None and vessel.rao is not None:
+            yield (*at, "motion", "vessel", "rao")
+
+
 def _several(tables: Tables) -> Iterator[Place]:
     return iter([("lines",)] if SYSTEM in tables else [])
 
@@ -416,6 +435,8 @@ RESPONSE = Feature("response to a sea", "hybrid response", _used("response"))
 DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("derivatives"))
 OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change in time",
                         "motion.file, motion.travel, force.history", _changing_loads)  # fmt: skip
+FINITE_WAVES = Feature("waves of finite height", "waves.kind: stream_function", _finite_waves)
+BY_RAO = Feature("a vessel that moves by an RAO", "motion.vessel.rao", _by_rao)
 MEMBERS = Feature("free bodies with members", "bodies.NAME.members", lambda tables: ())
 
 # Of one cable alone, by keys that several lines do not have.
@@ -532,6 +553,15 @@ REFUSALS: tuple[Refusal, ...] = (
     # --- response and derivatives ---
     RESPONSE_TO_MOTION,
     RESPONSE_OF_MEMBERS,
+    Refusal(
+        FINITE_WAVES, RESPONSE, "physics", "a response by frequency is linear in the waves, and these are not",
+        "waves of another kind", "kind: regular has the same height and period; hybrid run computes these in time",
+    ),
+    Refusal(
+        BY_RAO, FINITE_WAVES, "physics",
+        "an RAO is of linear waves, and the harmonics of one wave of finite height ({key}) travel with it",
+        fix="waves: {{kind: regular}}, or the motion from a file",
+    ),
     Refusal(
         DERIVATIVES, SEVERAL_LINES, "several lines", "there are several lines ({key}), whose derivatives are missing",
         "one cable", "take differences of two equilibria",

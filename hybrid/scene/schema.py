@@ -58,6 +58,7 @@ from hybrid.scene.waves import (
     RecordedWaves,
     RegularWaves,
     Spreading,
+    StreamFunctionWaves,
     SumOfWaves,
     Waves,
 )
@@ -119,6 +120,7 @@ __all__ = [
     "Spread",
     "Spreading",
     "Straight",
+    "StreamFunctionWaves",
     "SumOfWaves",
     "Swivel",
     "Table",

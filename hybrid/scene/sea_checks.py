@@ -9,8 +9,9 @@ from hybrid.scene.analysis import Equilibrium, Initial, Straight, Time
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.depths import Depths
+from hybrid.scene.dispersion import wavenumber
 from hybrid.scene.ends import Ends, Triple
-from hybrid.scene.waves import RecordedWaves, wavenumber
+from hybrid.scene.waves import RecordedWaves, StreamFunctionWaves
 
 # Miche (1944): a wave of height H and length L breaks where H / L reaches 0.142 tanh(k depth).
 STEEPEST = 0.142
@@ -92,6 +93,29 @@ def waves(environment: Environment) -> Iterator[Finding]:
             )
             given = f"Hs = {height:.4g} m" if key == ("file",) else None
             yield Finding((*_WAVES, *key), expected, "lower waves, or a longer period", given)
+
+
+def wave_is_steady(environment: Environment) -> Iterator[Finding]:
+    """A wave of finite height that breaks, or whose series does not converge."""
+    sea = environment.waves
+    if not isinstance(sea, StreamFunctionWaves) or environment.gravity == 0.0:
+        return
+    from hybrid.scene.stream_function import FADED, steady_wave
+
+    if sea.period > LONGEST_PERIOD:
+        fix = "give a tide as environment.fluid.current; periods are in seconds"
+        yield Finding((*_WAVES, "period"), f"at most {LONGEST_PERIOD:g} s: longer waves are tides", fix)
+        return
+    depth = environment.depth
+    found = steady_wave(sea.height, depth or math.inf, environment.gravity, sea.order, sea.period)
+    water = "deep water" if depth is None else f"{depth:.6g} m of water"
+    if found is None:
+        expected = f"less, because no wave of {sea.period:g} s in {water} is that high without breaking"
+        yield Finding((*_WAVES, "height"), expected, "lower waves, or a longer period")
+    elif found.left > FADED:
+        expected = f"more, because its last harmonics are {100.0 * found.left:.2g} % of the first in {water}"
+        fix = "a larger order, or a lower wave: close to breaking, and in very shallow water, more than 40 are needed"
+        yield Finding((*_WAVES, "order"), expected, fix)
 
 
 def record_lasts(environment: Environment, time: Time | None) -> Iterator[Finding]:

@@ -15,6 +15,7 @@ from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
 from hybrid.scene.base import Finding, Kinds, Number, Place, Positive, Table, Text, Whole, by_kind, refuse
 
 if TYPE_CHECKING:
+    from hybrid.scene.stream_function import SteadyWave
     from hybrid.scene.wave_files import Recorded
 
 _RAMP = "time over which the sea grows from nothing, smoothly; absent: there from the beginning [s]"
@@ -25,7 +26,7 @@ _PEAK = "period Tp at the peak of the spectrum [s]"
 _SPREADING = "how the directions of its waves spread about `direction`; absent: all waves travel the same way"
 _SEED = "seed of the random phases and directions: another seed, another sea [-]"
 _COUNT = "number of waves in the sum [-]"
-# Periods per second of a Pierson-Moskowitz spectrum: of its zero crossings, per peak period, (4/(5 pi))^(1/4).
+# Period of the zero crossings of a Pierson-Moskowitz spectrum, in peak periods: (4/(5 pi))^(1/4).
 CROSSINGS = (1.25 * math.pi) ** -0.25
 
 # A height, its key, the period of most energy and its key: what is compared with the height of waves that break.
@@ -68,6 +69,53 @@ class RegularWaves(Table):
     def headings(self) -> Iterator[tuple[Place, float]]:
         """Directions [deg] that tell in which planes the water moves, with their keys."""
         yield ("direction",), self.direction
+
+
+class StreamFunctionWaves(Table):
+    """Waves of one period and finite height, steady: crests are sharper than troughs, and nothing is stretched."""
+
+    kind: Literal["stream_function"] = Field(
+        default="stream_function", description="one period, finite height (stream function of Rienecker and Fenton)"
+    )
+    height: Positive = Field(description="height H from trough to crest [m]")
+    period: Positive = Field(description="period T, where there is no current [s]")
+    direction: Number = Field(default=0.0, description=_DIRECTION)
+    phase: Number = Field(default=0.0, description="phase at x = y = 0 and t = 0; 0 is a crest [deg]")
+    order: Whole = Field(default=20, ge=5, le=40, description="number of harmonics of its Fourier series [-]")
+    depth: Positive | None = Field(default=None, description=_DEPTH)
+    ramp: Positive | None = Field(default=None, description=_RAMP)
+
+    def steady(self, depth: float, gravity: float) -> SteadyWave:
+        """The wave in water of a depth (m; infinity: deep).  Only after validation: there is one then."""
+        from hybrid.scene.stream_function import steady_wave
+
+        found = steady_wave(self.height, depth, gravity, self.order, self.period)
+        if found is None:
+            expected = "a wave that does not break"
+            refuse([Finding(("environment", "fluid", "waves", "height"), expected, "lower waves, or a longer period")])
+        assert found is not None
+        return found
+
+    @property
+    def main_period(self) -> float:
+        """The period that carries most energy [s]."""
+        return self.period
+
+    @property
+    def waves_in_sum(self) -> int:
+        """Number of harmonics."""
+        return self.order
+
+    def sizes(self) -> Iterator[Size]:
+        """Nothing: whether it breaks is found with the wave."""
+        yield from ()
+
+    def headings(self) -> Iterator[tuple[Place, float]]:
+        """Directions [deg] that tell in which planes the water moves, with their keys."""
+        yield ("direction",), self.direction
+
+
+PeriodicWaves = RegularWaves | StreamFunctionWaves
 
 
 class Spectrum(Table):
@@ -365,6 +413,7 @@ class RecordedWaves(_OfFile):
 
 Waves = Annotated[
     Annotated[RegularWaves, Tag("<regular>")]
+    | Annotated[StreamFunctionWaves, Tag("<stream_function>")]
     | Annotated[JonswapWaves, Tag("<jonswap>")]
     | Annotated[PiersonMoskowitzWaves, Tag("<pierson_moskowitz>")]
     | Annotated[OchiHubbleWaves, Tag("<ochi_hubble>")]
@@ -373,33 +422,7 @@ Waves = Annotated[
     | Annotated[RecordedWaves, Tag("<record>")],
     Discriminator(by_kind),
     Kinds(
-        ("regular", "jonswap", "pierson_moskowitz", "ochi_hubble", "sum", "components", "record"),
+        ("regular", "stream_function", "jonswap", "pierson_moskowitz", "ochi_hubble", "sum", "components", "record"),
         usual=("regular",),
     ),
 ]
-
-# Newton's method on the dispersion relation gains digits quadratically from a start within 5 %.
-_MOST_ITERATIONS = 20
-# Values of omega^2 depth / gravity beyond which tanh(k depth) is 1, or k depth, to round-off.
-_DEEP, _SHALLOW = 20.0, 1e-16
-
-
-def wavenumber(omega: float, depth: float | None, gravity: float) -> float:
-    """Wavenumber k > 0 [1/m] of a linear wave: omega^2 = gravity k tanh(k depth), to round-off.
-
-    omega: angular frequency > 0 [rad/s]; depth [m], None for deep water; gravity > 0 [m/s^2].
-    """
-    deep = omega * omega / gravity
-    if depth is None or deep * depth > _DEEP:
-        return deep
-    q = deep * depth
-    if q < _SHALLOW:
-        return omega / math.sqrt(gravity * depth)
-    y = q / math.sqrt(math.tanh(q))  # Eckart (1952): k depth within 5 %
-    for _ in range(_MOST_ITERATIONS):
-        t = math.tanh(y)
-        change = (y * t - q) / (t + y * (1.0 - t * t))
-        y -= change
-        if abs(change) <= 1e-15 * y:
-            break
-    return y / depth

@@ -109,7 +109,8 @@ def random_sea(g):
     slip = 0.3 * g.normal(size=(N + 1, 3))  # some stick and some slide
     slip -= np.outer(slip @ normal, normal)
     return Sea(
-        z=np.array([-9.0, 9.0]), current=g.normal(size=(2, 3)), waves=np.zeros((0, 6)), depth=np.inf, surface=0.3,
+        z=np.array([-9.0, 9.0]), current=g.normal(size=(2, 3)), waves=np.zeros((0, 6)), orbits=np.zeros(0), stretched=1.0,
+        depth=np.inf, surface=0.3,
         now=np.array([0.0, 0.7, 1.0, 0.0]), ramps=np.zeros(2), normal=normal, offset=0.2,
             bed_x=np.zeros(0), bed_y=np.zeros(0), bed_heights=np.zeros((0, 4)), stiffness=3.0, damping=0.5, onset=50.0, obstacles=OBSTACLES_THERE,
         friction=np.array([0.3, 0.6]), slip_length=0.4, flow=0.1 * g.normal(size=(N + 1, 7)), lanes=np.zeros((10, 16)),

@@ -23,7 +23,8 @@ from hybrid.kernels.laws.water import FADED, SAME_WETNESS, wave_kinematics
 from hybrid.kernels.state.state import no_sea, with_waves
 from hybrid.model.sea import Surroundings, components, current_table, surroundings
 from hybrid.model.spectra import FINE, HIGHEST, LOWEST, jonswap, shares
-from hybrid.scene.waves import JonswapWaves, RegularWaves
+from hybrid.scene.stream_function import steady_wave
+from hybrid.scene.waves import JonswapWaves, RegularWaves, StreamFunctionWaves
 
 
 def entry(law):
@@ -694,3 +695,69 @@ def test_friction_pressed_unevenly_gives_back_no_more_than_it_can_store():
     most = 0.5 * MU_A * (10 * N - N) * SL
     print(f"given back: {given:.2e} J of at most {most:.2e} J")
     assert 0.0 < given <= most
+
+
+# --- waves of finite height ----------------------------------------------------------------------
+
+
+def test_steady_wave_of_a_published_case():
+    """H 0.25 m, d 0.5 m, length 2 m, 20 harmonics, as raschii's own test: crest and velocity under it at y = 0.2 m.
+
+    raschii ends its iteration at 1e-7 or so, and gives 0.67352456 m and 0.27263788 m/s.
+    """
+    wave = steady_wave(0.25, 0.5, 9.81, 20, length=2.0)
+    j = np.arange(1, 21)
+    assert 0.5 + wave.elevation.sum() == pytest.approx(0.67352456, abs=1e-7)
+    u = np.sum(wave.stream * np.cosh(j * wave.k * 0.2) / np.cosh(j * wave.k * 0.5))
+    assert u == pytest.approx(0.27263788, rel=1e-6)
+
+
+def test_steady_wave_of_fenton_s_program():
+    """H/d 0.3, T 10 sqrt(d/g): length, speed, B_j and E_j as its output prints them, and no Eulerian current."""
+    wave = steady_wave(0.3, 1.0, 1.0, 20, period=10.0)
+    assert 2 * math.pi / wave.k == pytest.approx(9.6897, abs=5e-5)
+    assert wave.speed == pytest.approx(0.9690, abs=5e-5)
+    B = wave.stream / (np.arange(1, 21) * wave.k) * wave.k**1.5
+    np.testing.assert_allclose(B[:4], [1.1499699e-1, 1.7651940e-2, 2.4828287e-3, 2.5065983e-4], rtol=1e-6)
+    E = [8.8912241e-2, 2.7443980e-2, 7.5955668e-3, 2.1863966e-3]
+    np.testing.assert_allclose(wave.elevation[:4] * wave.k, E, rtol=1e-6)
+
+
+@pytest.mark.parametrize("depth", [math.inf, 30.0, 9.0])
+def test_steady_waves_as_the_line_feels_them(depth):
+    """At its surface the water moves with the wave (kinematic condition), and Bernoulli's constant is one.
+
+    Both from what kernels say of velocity and elevation at places all along the wave, up to the crest.
+    """
+    sea = StreamFunctionWaves(height=3.0, period=7.0, direction=25.0, phase=40.0, order=25)
+    steady = sea.steady(depth, G)
+    values = with_waves(
+        no_sea(0)._replace(surface=2.0, ramps=np.zeros(2)), components(sea, depth, G), depth, steady.orbits
+    )
+    around = Surroundings(values)
+    towards, c = np.array([math.cos(math.radians(25.0)), math.sin(math.radians(25.0))]), steady.speed
+    heads = []
+    for x in np.linspace(0.0, 2 * math.pi / steady.k, 13):
+        place = x * towards
+        eta, rate, *slopes = around.elevation(*place, 1.3)
+        u = stirred(around, 1.3, (*place, 2.0 + eta))[0]
+        assert u[6] == pytest.approx(eta, abs=1e-12)
+        level = u[:2] @ towards
+        assert abs(u[0] * towards[1] - u[1] * towards[0]) < 1e-12
+        assert u[2] == pytest.approx(rate + u[:2] @ slopes, abs=2e-3 * steady.stream[0])
+        heads.append(0.5 * ((level - c) ** 2 + u[2] ** 2) + G * eta)
+        a = (stirred(around, 1.3001, (*place, 1.0))[0, :3] - stirred(around, 1.2999, (*place, 1.0))[0, :3]) / 2e-4
+        if eta > -0.9:
+            np.testing.assert_allclose(stirred(around, 1.3, (*place, 1.0))[0, 3:6], a, atol=1e-5)
+    assert np.ptp(heads) < 1e-3 * G * 3.0
+    heights = [around.elevation(0.0, 0.0, t)[0] for t in np.linspace(0.0, 7.0, 201)]
+    assert np.ptp(heights) == pytest.approx(3.0, rel=2e-3) and max(heights) > 1.55
+
+
+def test_low_steady_waves_are_linear():
+    low = StreamFunctionWaves(height=1e-4, period=7.0, direction=25.0, phase=40.0)
+    linear = components(RegularWaves(height=1e-4, period=7.0, direction=25.0, phase=40.0), 12.0, G)
+    found = components(low, 12.0, G)
+    np.testing.assert_allclose(found[0], linear[0], rtol=1e-5)
+    assert low.steady(12.0, G).orbits[0] == pytest.approx(linear[0, 0] * linear[0, 1], rel=1e-5)
+    assert np.abs(found[1:, 0]).max() < 1e-4 * linear[0, 0]

@@ -256,6 +256,12 @@ SAID = {
         {"kind": "sum", "spectra": [SWELL, WIND_SEA | {"significant_height": 12}]}, "spectra.1.significant_height",
         "higher ones break",
     ),
+    "too high": (
+        {"kind": "stream_function", "height": 20, "period": 8}, "height", "no wave of 8 s in deep water is that high",
+    ),
+    "few harmonics": (
+        {"kind": "stream_function", "height": 4.5, "period": 15, "depth": 8, "order": 8}, "order", "more, because",
+    ),
     "narrow": (SWELL | {"spreading": {"exponent": 2000}}, "spreading.exponent", "1000"),
 }  # fmt: skip
 
@@ -296,3 +302,43 @@ def test_files_that_are_refused(name, tmp_path: Path):
     (tmp_path / "sea.csv").write_text(text)
     with pytest.raises(SceneError, match=expected):
         scene({"kind": kind, "file": str(tmp_path / "sea.csv")}, time={"duration": 30.0, "step": 0.1})
+
+
+# --- one wave of finite height -------------------------------------------------------------------
+
+HIGH = {"kind": "stream_function", "height": 4.0, "period": 7.0, "direction": 35.0, "depth": 40.0, "ramp": 2.0}
+
+
+def test_a_line_in_high_waves_is_one_of_several_and_is_turned_with_them():
+    tables = {
+        "environment": {"fluid": {"density": 1025, "surface": 0, "waves": HIGH}},
+        "cable": {"sections": [{"length": 20, "mass": 5, "diameter": 0.05, "drag": {"normal": 1.0}}]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0], "motion": {"follow": "waves"}}, "end": "free"},
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 10},
+        "time": {"duration": 4.0, "step": 0.1}, "output": {"every": 0.5},
+    }  # fmt: skip
+    one = hybrid.run(tables)
+    line = {"sections": tables["cable"]["sections"], "start": "a", "end": "b", "model": "catenary"}
+    points = {
+        "a": {"kind": "fixed", "position": [0, 0, 0], "motion": {"follow": "waves"}},
+        "b": {"kind": "free", "initial_guess": [0, 0, -20]},
+    }
+    several = {
+        "environment": tables["environment"], "points": points, "lines": {"l": line | {"mesh": {"cells": 10}}},
+        "time": tables["time"], "output": tables["output"],
+    }  # fmt: skip
+    np.testing.assert_allclose(hybrid.run(several).lines["l"].position, one.position, atol=1e-7)
+    turned = tables | {"environment": {"fluid": {"density": 1025, "surface": 0, "waves": HIGH | {"direction": 125.0}}}}
+    x, y, z = np.moveaxis(hybrid.run(turned).position, -1, 0)
+    np.testing.assert_allclose(np.stack([y, -x, z], axis=-1), one.position, atol=1e-9)
+    assert np.ptp(one.position[:, 0, 2]) > 1.0 and np.abs(one.position[..., 0]).max() > 0.05
+
+
+def test_what_is_linear_is_refused_beside_high_waves(tmp_path: Path):
+    with pytest.raises(SceneError, match="a response by frequency is linear"):
+        hybrid.response(scene(HIGH))
+    (tmp_path / "rao.csv").write_text("frequency,heading,heave\n0.1,0,1\n9,0,1\n0.1,180,1\n9,180,1\n")
+    vessel = {"rao": str(tmp_path / "rao.csv"), "origin": [0, 0, 0], "fairlead": [0, 0, 0]}
+    start = {"kind": "pinned", "position": [0, 0, 0], "motion": {"vessel": vessel}}
+    with pytest.raises(SceneError, match="an RAO is of linear waves"):
+        scene(HIGH, ends={"start": start, "end": "free"})

@@ -183,6 +183,18 @@ initial: {kind: equilibrium}
 model: {kind: catenary}
 """
 
+HIGH_WAVES = """\
+environment:
+  fluid:
+    density: 1025.0
+    surface: 0.0
+    waves: {kind: stream_function, height: 6.0, period: 9.0, direction: 30.0, phase: 90.0, order: 16, depth: 40.0, ramp: 9.0}
+cable: {sections: [{length: 10.0, mass: 2.0, diameter: 0.03}]}
+ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
+initial: {kind: equilibrium}
+model: {kind: catenary}
+"""
+
 SEA_LIST = """\
 environment:
   fluid:
@@ -219,7 +231,14 @@ PIPE = "diameter: 0.03, pipe: {wall: 0.004, outer_diameter: 0.025, modulus: 2.0e
 MEASURED = SEA.replace("output: {elevation: [[0.0, 0.0], [20.0, 5.0]]}\n", QUANTITIES)
 PIPED = SEA_TOO.replace("diameter: 0.03}]", PIPE)
 
-SEAS = {"several seas": SEVERAL_SEAS, "sea": SEA, "sea too": SEA_TOO, "sea list": SEA_LIST, "sea uniform": SEA_UNIFORM}
+SEAS = {
+    "several seas": SEVERAL_SEAS,
+    "high waves": HIGH_WAVES,
+    "sea": SEA,
+    "sea too": SEA_TOO,
+    "sea list": SEA_LIST,
+    "sea uniform": SEA_UNIFORM,
+}
 
 AT_REST = """\
 cable: {sections: [{length: 10.0, mass: 1.0}]}

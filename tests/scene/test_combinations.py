@@ -51,6 +51,9 @@ TABLE_BESIDE_TWO = {
 CURVED = {SECTION + "intrinsic_curvature": [0.01, 0, 0]}
 ROPE = {SECTION + "dynamic_stiffness": {"constant": 2e6, "relaxation_time": 100}}
 SHEDS: dict[str, Any] = {SECTION + "vortices": {}, "environment.fluid": {"density": 1025, "current": [0.3, 0, 0]}}
+HIGH_WAVES: dict[str, Any] = {"environment.fluid": {
+    "density": 1025, "surface": 5, "waves": {"kind": "stream_function", "height": 1, "period": 5, "ramp": 9}}}  # fmt: skip
+RAO = {"rao": str(Path(__file__).parents[1] / "data" / "rao.csv"), "origin": [8, 0, 0], "fairlead": [0, 0, 0]}
 CLAMPED = {ONE + "connections": {"end": {"kind": "clamped", "tangent": [1, 0, 0]}}}
 
 # By the pair: what makes a scene of CABLE, or of LINES, that has both, and what is done with it.
@@ -94,6 +97,8 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.VORTICES, c.PLANE): (SHEDS | {"dimension": 2}, ""),
     (c.VORTICES, c.PAYOUT): (SHEDS | PAID, ""),
     (c.VORTICES, c.RESPONSE): (SHEDS, "response"),
+    (c.FINITE_WAVES, c.RESPONSE): (HIGH_WAVES, "response"),
+    (c.BY_RAO, c.FINITE_WAVES): (HIGH_WAVES | {END + "motion": {"vessel": RAO}}, ""),
     (c.MOMENT_TABLE, c.PAYOUT): (
         {SECTION + "moment_curvature": [[0, 0], [0.1, 1], [0.2, 9]], SECTION + "bending_stiffness": None} | PAID, ""
     ),

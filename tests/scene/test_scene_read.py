@@ -159,7 +159,8 @@ def test_a_kind_that_no_other_key_tells_is_required() -> None:
     assert not given["PowerLawCurrent"] and not given["AdaptiveModel"]
     sea = "environment: {fluid: {density: 1025, surface: 0, waves: {height: 1, period: 8}}}\n"
     with pytest.raises(
-        SceneError, match="one of: regular, jonswap, pierson_moskowitz, ochi_hubble, sum, components, record"
+        SceneError,
+        match="one of: regular, stream_function, jonswap, pierson_moskowitz, ochi_hubble, sum, components, record",
     ):
         parse_scene(sea + AT_REST)
 

@@ -9,7 +9,8 @@
 
 Waves are linear (Airy), each component of an irregular sea by itself.  Above and below still
 water the kinematics are stretched after Wheeler: the depth at which a component is taken is
-scaled so that the moving surface has what linear theory has at the still one.
+scaled so that the moving surface has what linear theory has at the still one.  Components of one
+wave of finite height hold up to the surface as they are.
 """
 
 from __future__ import annotations
@@ -75,8 +76,8 @@ def cos_sin(a):
 
 
 @inner
-def exp_of_negative(y):
-    """exp(y) for -10 <= y <= 0 without branches: the 32nd power of Taylor's series at y/32; within 1e-14 of the value."""
+def exp_of_small(y):
+    """exp(y) for -10 <= y <= 10 without branches: the 32nd power of Taylor's series at y/32; within 1e-14 of the value."""
     x = y / 32.0
     q = 1.0 + x * (
         1.0 + x * (E2 + x * (E3 + x * (E4 + x * (E5 + x * (E6 + x * (E7 + x * (E8 + x * (E9 + x * E10))))))))
@@ -111,9 +112,10 @@ def elevate(sea, r, u, first):
     for l in range(LANES):
         eta = part * lanes[3, l]
         # Wheeler: the surface keeps what linear theory has at z = 0, the bed what it has there
-        s = min(lanes[2, l] - sea.surface, eta) - eta
+        up = sea.stretched * eta
+        s = min(lanes[2, l] - sea.surface, eta) - up
         if sea.depth < math.inf:
-            s = max(s * sea.depth / (sea.depth + eta), -sea.depth)
+            s = max(s * sea.depth / (sea.depth + up), -sea.depth)
         lanes[2, l], lanes[3, l] = s, eta
 
 
@@ -129,10 +131,10 @@ def stir(sea):
         if k * highest < LAST:
             continue
         q = math.exp(-2.0 * k * sea.depth) if sea.depth < math.inf else 0.0
-        speed, towards_x, towards_y = waves[j, 0] * w / (1.0 - q), waves[j, 2] / k, waves[j, 3] / k
+        speed, towards_x, towards_y = sea.orbits[j] / (1.0 - q), waves[j, 2] / k, waves[j, 3] / k
         for l in range(LANES):
             y = k * lanes[2, l]
-            fade = exp_of_negative(max(y, LAST))
+            fade = exp_of_small(max(y, LAST))
             here = speed if y >= LAST else 0.0
             level, up = here * (fade + q / fade), here * (fade - q / fade)
             c, s = lanes[10 + 2 * j, l], lanes[11 + 2 * j, l]

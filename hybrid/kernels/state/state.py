@@ -173,6 +173,8 @@ class Sea(NamedTuple):
     z: Floats  # (K,) m, increasing: heights of the current profile
     current: Floats  # (K, 3) m/s, at these heights; linear between, constant beyond
     waves: Floats  # (W, 6) m, 1/s, 1/m, 1/m, rad, 1/m: amplitude, frequency, kx, ky, phase, k
+    orbits: Floats  # (W,) m/s, amplitude of their velocity, times cosh k(d + z)/sinh k d: A w of linear waves
+    stretched: float  # 1: kinematics are stretched to the moving surface (Wheeler); 0: they hold up to it
     depth: float  # m, for waves; infinite in deep water
     surface: float  # m, z of still water
     now: Floats  # (4,) time, s; grown part of the current; of the waves, and its rate, 1/s
@@ -390,16 +392,19 @@ def no_sea(n_cells: int) -> Sea:
     """Nothing around a line of `n_cells` cells: no current but zero, no waves, no seabed."""
     node, nan = (n_cells + 1, 3), float("nan")
     return Sea(
-        np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), nan, nan, np.array([0.0, 1.0, 1.0, 0.0]), np.zeros(2),
+        np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), np.zeros(0), nan, nan, nan, np.array([0.0, 1.0, 1.0, 0.0]), np.zeros(2),
         np.array([0.0, 0.0, 1.0]), nan, np.zeros(0), np.zeros(0), np.zeros((0, 4)), nan, nan, nan, np.full(2, nan), nan,
         NO_OBSTACLES, np.zeros((n_cells + 1, 7)), np.zeros((10, LANES)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
         NO_MOVES, NO_CARRIED, NO_GRIP,
     )  # fmt: skip
 
 
-def with_waves(sea: Sea, waves: Floats, depth: float) -> Sea:
-    """The same with waves (W, 6) over water of a depth, m."""
-    return sea._replace(waves=waves, depth=depth, lanes=np.zeros((10 + 2 * len(waves), LANES)))
+def with_waves(sea: Sea, waves: Floats, depth: float, orbits: Floats | None = None) -> Sea:
+    """The same with waves (W, 6) over water of a depth, m; orbits: (W,) m/s of waves that are not linear."""
+    stretched = 1.0 if orbits is None else 0.0
+    speeds = waves[:, 0] * waves[:, 1] if orbits is None else orbits
+    lanes = np.zeros((10 + 2 * len(waves), LANES))
+    return sea._replace(waves=waves, orbits=speeds, stretched=stretched, depth=depth, lanes=lanes)
 
 
 def blank_line(n_cells: int) -> Line:
