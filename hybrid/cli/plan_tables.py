@@ -269,5 +269,6 @@ def outputs_table(found: Sequence[Listed], more: Sequence[Listed]) -> Any:
     for x in more:
         table.add_row(x.name, x.unit, "", x.description)
     table.add_row("wall_tension, von_mises", "N, Pa", "", "cable.sections[..].pipe: {wall: ...}")
+    table.add_row("capacity_used", "%", "", "cable.sections[..].capacity: [[tension, 0], .., [0, curvature]]")
     table.add_row("elevation", "m", "", "output.elevation: [[x, y], ...], in waves")
     return Group("", table)

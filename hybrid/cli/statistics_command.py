@@ -43,6 +43,15 @@ def stats(
     section: Annotated[
         Any, typer.Option(metavar="A,D,E", parser=numbers, help=".. of stress: area (m2), diameter (m), modulus (Pa).")
     ] = None,
+    mooring: Annotated[
+        float | None, typer.Option(metavar="N", help="Utilisation by DNV-OS-E301 of this strength (N), with ..")
+    ] = None,
+    factors: Annotated[
+        Any, typer.Option(metavar="A,B", parser=numbers, help=".. load factors of pretension and environment, and ..")
+    ] = None,
+    pretension: Annotated[
+        str | None, typer.Option(metavar="N|REST.h5", help=".. a pretension (N), or the equilibrium that has it.")
+    ] = None,
     line: LineName = None, quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
     """Statistics of a result: mean, standard deviation, extremes, period, most probable maximum (MPM) and P90 in 3 h,
@@ -52,6 +61,9 @@ def stats(
     if curve is None and (strength is not None or section is not None):
         name = "--strength" if strength is not None else "--section"
         raise UsageError(f"{name}: of fatigue damage, which needs a curve; add --curve NAME, such as --curve 'D sea'")
+    asked = (mooring is not None, factors is not None, pretension is not None)
+    if any(asked) and not all(asked):
+        raise UsageError("--mooring, --factors and --pretension go together; there is no usual factor")
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
         if opened.lines and (names is None or not all(name in opened for name in names)):
             from hybrid.store.histories import usual_names
@@ -94,7 +106,37 @@ def stats(
             console.show(lambda: "\n".join(lines))
         if curve is not None:
             console.show(lambda: _fatigue_lines(curve, facts))
-        console.json("done", file=str(result), status=opened.status, fatigue=facts, utilisation=used)
+        moored = {} if mooring is None else _moored(opened, mooring, tuple(factors), str(pretension), line)
+        if moored:
+            console.show(lambda: moored["text"])
+        more = {"mooring": moored} if moored else {}
+        console.json("done", file=str(result), status=opened.status, fatigue=facts, utilisation=used, **more)
+
+
+def _moored(
+    result: Result, strength: float, factors: tuple[float, ...], pretension: str, line: str | None
+) -> dict[str, Any]:
+    """Where a mooring line is used most by DNV-OS-E301, in numbers and in words; pretension: N, or a file."""
+    from hybrid.store.verdicts import doubt_of
+
+    def used(before: Any) -> tuple[Any, Any]:
+        s, _, most = result.mooring(strength, factors, before)
+        return s, most
+
+    try:
+        number = float(pretension)
+    except ValueError:
+        with opened_line(Path(pretension), line) as (rest, _):
+            s, most = used(rest)
+    else:
+        s, most = used(number)
+    k, doubt = int(most.argmax()), doubt_of(result, "tension")
+    text = (
+        f"mooring line by DNV-OS-E301 (2021), factors {', '.join(f'{x:g}' for x in factors)}, strength {strength:g} N: "
+        f"{100.0 * most[k]:.4g} % used at s = {s[k]:.5g} m, of the largest tension of every step and output"
+    )
+    text += "" if doubt is None else f"; {doubt.text}"
+    return {"s": float(s[k]), "used": float(most[k]), "text": text, "not_verified": "" if doubt is None else doubt.text}
 
 
 def _table(rows: list[dict[str, Any]], hours: float) -> Any:

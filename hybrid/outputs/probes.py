@@ -47,7 +47,7 @@ class Probe:
 
 _S, _SX, _X, _E, _EX = ("s",), ("s", "xyz"), ("xyz",), ("edge",), ("edge", "xyz")
 # Of a line that touches nothing; where a section without torsional stiffness becomes catenary.
-MAY_BE_NAN = ("touchdown", "touchdown_position", "turns/twist", "turns/link", "von_mises")
+MAY_BE_NAN = ("touchdown", "touchdown_position", "turns/twist", "turns/link", "von_mises", "capacity_used")
 PROBES: dict[str, Probe] = {
     "position": Probe("m", "position of the centreline", _SX, lambda v: v.grid.nodes @ v.r, frame="inertial"),
     "velocity": Probe("m/s", "velocity of the centreline", _SX, lambda v: v.grid.nodes @ v.v, frame="inertial"),
@@ -132,6 +132,7 @@ WORK = {
 # Quantities that may have two values at a point: what a point load, a joint or a change of section makes of them.
 SIDED = (
     "tension", "theta", "phi", "curvature", "twist", "bending_moment", "torque", "shear", "wall_tension", "von_mises",
+    "capacity_used",
 )  # fmt: skip
 # What leaving bending out makes of each quantity, by name: unit, description, dimensions.
 MODEL_ERRORS = {

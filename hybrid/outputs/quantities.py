@@ -13,6 +13,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.kernels.watch.named_quantities import LEAST_AZIMUTH
 from hybrid.model.payout import whole_scene
 from hybrid.model.sections import outer_diameter
+from hybrid.outputs.capacity import Capacities
 from hybrid.outputs.distance import nearest
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.pipe import Pipes
@@ -29,8 +30,8 @@ WHERE = "_at"
 
 def quantities_of(scene: Scene) -> Quantities | None:
     """What a scene asks for beside the usual outputs; None: nothing."""
-    pipes = any(x.pipe is not None for x in scene.cable.sections)
-    return Quantities(scene, scene.output.quantities) if pipes or scene.output.quantities else None
+    along = any(x.pipe is not None or x.capacity is not None for x in scene.cable.sections)
+    return Quantities(scene, scene.output.quantities) if along or scene.output.quantities else None
 
 
 class Quantities:
@@ -39,6 +40,7 @@ class Quantities:
     def __init__(self, scene: Scene, wanted: Mapping[str, Quantity]) -> None:
         self.wanted = dict(wanted)
         self.pipes = Pipes(scene) if any(x.pipe is not None for x in scene.cable.sections) else None
+        self.capacities = Capacities(scene) if any(x.capacity for x in scene.cable.sections) else None
         self._scene, self._begin = whole_scene(scene)
         self._seabed = scene.environment.seabed is not None
         # nodes (nb, m+1, 3) m and radii of cells (m,) m of other lines in the outputs that are looked at, by name
@@ -52,7 +54,8 @@ class Quantities:
 
     def probes(self) -> dict[str, Probe]:
         """Probes by name."""
-        found = self.pipes.probes() if self.pipes is not None else {}
+        along = (x for x in (self.pipes, self.capacities) if x is not None)
+        found = {name: probe for x in along for name, probe in x.probes().items()}
         excursions = azimuths = 0
         for name, q in self.wanted.items():
             if q.kind == "touchdown_excursion":

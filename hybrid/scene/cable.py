@@ -21,6 +21,7 @@ from hybrid.scene.base import (
     number_or_list,
     refuse,
 )
+from hybrid.scene.capacity import capacity_findings
 from hybrid.scene.sea import Current, CurrentPoint, CurrentProfile, PowerLawCurrent, Seabed, UniformCurrent
 from hybrid.scene.stretch import (
     Curve,
@@ -309,6 +310,12 @@ class Section(Table):
         description="smallest tension allowed, 0 where the cable must not be slack, negative for a compression that it "
         "bears; changes nothing that is computed; absent: none [N]",
     )
+    capacity: tuple[Pair, ...] | None = Field(
+        default=None,
+        description="what it bears of tension and bending together: corners [tension, curvature] of a polygon around "
+        "no load, from [largest tension, 0] round to [0, largest curvature], or on to [-largest compression, 0]; "
+        "changes nothing that is computed: the result has capacity_used; absent: none [N, 1/m]",
+    )
     rotary_inertia: OneOrTwo | None = Field(
         default=None,
         description="rotary inertia per length: transverse, or [transverse, polar]; "
@@ -472,6 +479,12 @@ class Section(Table):
         if self.min_tension is not None and self.max_tension is not None and self.min_tension >= self.max_tension:
             expected = f"a tension below max_tension, {self.max_tension:g} N"
             refuse([Finding(("min_tension",), expected, "are the two exchanged?")])
+        return self
+
+    @model_validator(mode="after")
+    def _capacity_goes_round(self) -> Section:
+        found = capacity_findings(self.capacity) if self.capacity is not None else []
+        refuse(Finding(("capacity", *x.at), x.expected, x.fix, x.given) for x in found)
         return self
 
     @model_validator(mode="after")

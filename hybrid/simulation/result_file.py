@@ -21,6 +21,7 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.envelope import Envelope
 from hybrid.solve.statics import Equilibrium
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target, Text
+from hybrid.store.capacity import CORNERS
 from hybrid.store.format import Field
 from hybrid.store.named_arrays import Tree
 from hybrid.store.recorder import BaseRecorder
@@ -197,6 +198,9 @@ def _limits_of_quantities(observer: Observer) -> list[tuple[Field, np.ndarray]]:
     if observer.quantities is None:
         return []
     out, pipes, text = limits_of(observer.quantities.wanted), observer.quantities.pipes, "largest von Mises stress"
+    if (capacities := observer.quantities.capacities) is not None:
+        rows, what = capacities.rows(), "corners of capacity polygons: from and to (m), tension (N), curvature (1/m)"
+        out.append((Field(CORNERS, "", what, rows.shape, ("corner", "capacity_row")), rows))
     if pipes is None or np.isnan(pipes.limits).all():
         return out
     for name, s in (("", observer.s), ("right/", observer.jumps)):

@@ -46,7 +46,7 @@ class SystemQuantities:
             mine = {name: q for name, q in self._wanted.items() if q.line == line}
             if mine:
                 found = Quantities(scene, mine)
-                found.pipes = None  # their stresses are in the result of the line
+                found.pipes = found.capacities = None  # what goes along a line is in the result of the line
                 self._of_line[line] = found, found.probes()
 
     def keep_ranges(self, lines: Sequence[LineResult]) -> None:

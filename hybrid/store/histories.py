@@ -13,6 +13,7 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.statistics import extremes, fatigue, moments, spectrum
 from hybrid.store.bends import bends_of
+from hybrid.store.capacity import mooring_use
 from hybrid.store.envelope import Judged
 from hybrid.store.extrapolation import extreme_of
 from hybrid.store.names import ALIASES
@@ -27,7 +28,7 @@ Window = tuple[float | None, float | None]
 # What is looked at when nothing is asked for, where the result has it; and all that its scene asks for by name.
 USUAL = (
     "end_force_start", "end_force_end", "tension", "curvature", "bending_moment", "torque", "contact", "wall_tension",
-    "von_mises",
+    "von_mises", "capacity_used",
 )  # fmt: skip
 # Histories of one value that every result may have, and no scene asks for.
 NOT_ASKED_FOR = ("t", "contact_force", "grounded_length")
@@ -199,6 +200,16 @@ class Histories:
                 f"    expected: that of one line\n    try:      result.lines[{first!r}].utilisation()"
             )
         return {found.limit: found for found in section_limits(self)}
+
+    def mooring(
+        self: Any, strength: float, factors: tuple[float, ...], pretension: Any
+    ) -> tuple[Floats, Floats, Floats]:
+        """Utilisation of a mooring line by DNV-OS-E301 (July 2021), (T_pre g_pre + (T - T_pre) g_env)/S: arc lengths
+        (n,) m, at the outputs (nt, n), and of the largest tension over all steps and outputs (n,).
+
+        strength: S, N; factors: g_pre, g_env, by class and limit state, without default; pretension: T_pre, N, or the
+        result of an equilibrium under it, `hybrid.static` without current.  ResultError: of another line."""
+        return mooring_use(self, strength, factors, pretension)
 
     def verdicts(self: Any) -> Verdicts:
         """What may be said of the result: limits of sections and of quantities are within or broken, an accuracy that

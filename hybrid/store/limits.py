@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from hybrid.store.capacity import NAME, bound_of_steps
 from hybrid.store.envelope import GROUP as GROUP_OF_NODES
 from hybrid.store.envelope import NOT_VERIFIED, SAME, Arrays, extremes_of_outputs, has_envelope, not_verified
 
@@ -129,6 +130,20 @@ def held_of(result: Result) -> list[Held]:
                 continue
             broken = value < allowed if limit == "smallest" else value > allowed
             found.append(Held(name, limit, unit, value, allowed, broken, t, where, moves and known is None))
-    if (stressed := stress_of(result)) is not None:
-        found.append(stressed)
-    return found
+    return found + [x for x in (stress_of(result), capacity_of(result)) if x is not None]
+
+
+def capacity_of(result: Result) -> Held | None:
+    """The largest part of the capacity of sections that tension and curvature use, over the outputs; None: none given.
+
+    Between outputs it is known to stay within where their ranges over all steps do, as if they came at once.
+    """
+    if NAME not in result:
+        return None
+    most = extremes_of_outputs(result, NAME)
+    value, t, s = (most[f"{GROUP_OF_NODES}/{x}"] for x in (f"{NAME}_max", f"{NAME}_t_max", "s"))
+    if np.isnan(value).all():
+        return None
+    k, bound = int(np.nanargmax(value)), bound_of_steps(result)
+    open_ = len(result.times) > 1 and (bound is None or bound > 1.0)
+    return Held(NAME, "capacity", "%", float(value[k]), 100.0, bool(value[k] > 100.0), float(t[k]), float(s[k]), open_)

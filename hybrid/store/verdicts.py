@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, IN_SPACE, OF_AN_END
+from hybrid.store.capacity import bound_with_errors
 from hybrid.store.envelope import BROKEN, GROUP, LIMITED, NOT_VERIFIED, WITHIN, Judged, limits_of, not_verified
 from hybrid.store.limits import Held, held_of
 from hybrid.store.records import Event, not_converged_in
@@ -312,13 +313,20 @@ def _doubt_of_held(result: Result, x: Held) -> Doubt | None:
     """Of a force at an end, an angle of it, or a clearance the error follows from those that are estimated."""
     name = {"N": "end_force", "deg": "end_force"}.get(x.unit, "position")
     clearance = f"{x.name}_at" in result
-    names = frozenset({"von_mises", "tension", "curvature"} if x.unit == "Pa" else {name})
+    along = {"Pa": {"von_mises", "tension", "curvature"}, "%": {"tension", "curvature"}}
+    names = frozenset(along.get(x.unit, {name}))
     if (doubt := next(_doubts(result, names, np.zeros(0)), None)) is not None:
         return doubt
     if x.by_outputs:
         return Doubt("its values between outputs are not known", "a shorter output.every")
     if x.unit == "Pa":
         return _stress_reached(result, x)
+    if x.unit == "%":
+        bound = bound_with_errors(result)
+        if bound is None:
+            return Doubt(f"the error of {x.name} is not estimated", FINER)
+        why = "with the errors of tension and curvature it may pass the limit"
+        return None if bound <= 1.0 else Doubt(why, "a smaller accuracy")
     error = _error_of_held(result, x, clearance)
     if error is None:
         return Doubt(f"the error of {x.name} is not estimated", FINER)

@@ -266,13 +266,18 @@ def _slack(result: Result) -> Fact:
 def _limits(result: Result) -> Fact:
     """All limits of the sections in one table."""
     keys = "limit", "value", "allowed", "broken", "s", "t", "verdict", "why", "remedy"
-    title, stresses = "Limits of the sections", [x for x in quantity_limits(result) if x.limit == "max_stress"]
+    title, stresses = (
+        "Limits of the sections",
+        [x for x in quantity_limits(result) if x.limit in ("max_stress", "capacity")],
+    )
     rows = [x._asdict() for x in section_limits(result)]
     for x in stresses:
         used = None if x.verdict == NOT_VERIFIED else x.value / x.allowed
         rows.append({key: getattr(x, key) for key in keys} | {"used": used})
     if not rows:
-        none = "None given: min_bend_radius, max_tension, min_tension, or max_stress of the pipe, of a section."
+        none = (
+            "None given: min_bend_radius, max_tension, min_tension, capacity, or max_stress of the pipe, of a section."
+        )
         return Fact("limits", title, none, "absent")
     counts = [(sum(x["verdict"] == word for x in rows), word) for word in (BROKEN, NOT_VERIFIED)]
     text = ", ".join(f"{n} of {len(rows)} {word}" for n, word in counts if n) or "All are within"

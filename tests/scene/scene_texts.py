@@ -189,7 +189,7 @@ environment:
     density: 1025.0
     surface: 0.0
     waves: {kind: stream_function, height: 6.0, period: 9.0, direction: 30.0, phase: 90.0, order: 16, depth: 40.0, ramp: 9.0}
-cable: {sections: [{length: 10.0, mass: 2.0, diameter: 0.03}]}
+cable: {sections: [{length: 10.0, mass: 2.0, diameter: 0.03, capacity: [[1.0e+5, 0.0], [6.0e+4, 0.2], [0.0, 0.4]]}]}
 ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
 initial: {kind: equilibrium}
 model: {kind: catenary}

@@ -1,0 +1,149 @@
+"""How much of its capacity a line uses of tension and curvature at once, and of its strength as a mooring line.
+
+    symbol   meaning                                                      unit
+    T, k     tension, curvature, at one time and place                    N, 1/m
+    c_i      corners (T_i, k_i) of the capacity polygon                   N, 1/m
+    u        part that is used: how far (T, k) is on the way from no load -
+             to the polygon
+
+Between the directions of two corners u = (p x e)/(c_i x e), with p = (T, k), e = c_{i+1} - c_i and x the cross product
+in the plane.  Tension below zero counts as none where the polygon has no compression.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hybrid.errors import ResultError
+from hybrid.store.envelope import GROUP, SCALE, has_envelope
+
+if TYPE_CHECKING:
+    from hybrid.store.reader import Result
+
+Floats = np.ndarray
+# The field of a result, in percent; its sections with their corners, rows (K, 4) of s from, s to (m), T (N), k (1/m).
+NAME, CORNERS = "capacity_used", "capacity"
+# Part of the length of a line within which a place is at a border of sections.
+NEAR = 1e-9
+
+
+def used(corners: Floats, T: Floats, k: Floats) -> Floats:
+    """Part of the capacity that tensions (N) and curvatures (1/m) use, of any shape; corners: (n, 2)."""
+    corners = np.asarray(corners, float)
+    if corners[-1, 0] == 0.0:
+        T = np.maximum(T, 0.0)
+    k = np.abs(k)
+    found = np.zeros(np.broadcast_shapes(np.shape(T), np.shape(k)))
+    for i, (a, b) in enumerate(pairwise(corners)):
+        e = b - a
+        here = (a[0] * k - a[1] * T >= 0.0) & (b[0] * k - b[1] * T <= 0.0)
+        if i == 0:  # below the first direction there is nothing
+            here |= (k == 0.0) & (T >= 0.0)
+        if i == len(corners) - 2:
+            here |= (k == 0.0) & (T < 0.0)
+        part = (T * e[1] - k * e[0]) / (a[0] * e[1] - a[1] * e[0])
+        found = np.where(here, part, found)
+    return np.where(np.isfinite(T) & np.isfinite(k), found, np.nan)
+
+
+def most_used(corners: Floats, low: Floats, high: Floats, k: Floats) -> Floats:
+    """The largest part that any tension from low to high (N) with any curvature up to k (1/m) uses.
+
+    It is at a corner of that rectangle, or where the way to a corner of the polygon leaves it.
+    """
+    corners = np.asarray(corners, float)
+    found = np.maximum.reduce([used(corners, T, x) for T in (low, high) for x in (k, np.zeros_like(k))])
+    for T_i, k_i in corners:
+        if k_i > 0.0:
+            found = np.maximum(found, used(corners, np.clip(k * T_i / k_i, low, high), k))
+        for T in (low, high):
+            if T_i != 0.0:
+                found = np.maximum(found, used(corners, T, np.clip(T * k_i / T_i, 0.0, k)))
+    return found
+
+
+class Stretch(NamedTuple):
+    """A section that has a capacity: from a to b (m), corners (n, 2) N, 1/m."""
+
+    a: float
+    b: float
+    corners: Floats
+
+
+def stretches_of(result: Result) -> list[Stretch]:
+    """The sections of a result that have a capacity."""
+    if CORNERS not in result:
+        return []
+    rows = np.asarray(result[CORNERS])
+    places = sorted({(a, b) for a, b in rows[:, :2].tolist()})
+    return [Stretch(a, b, rows[(rows[:, 0] == a) & (rows[:, 1] == b), 2:]) for a, b in places]
+
+
+def _inside(x: Stretch, s: Floats) -> np.ndarray:
+    """Which places (n,) m lie in a section; of a place that comes twice the first belongs to the left one."""
+    near = NEAR * max(float(s[-1] - s[0]), 1.0)
+    twice = np.diff(s) == 0.0
+    first, second = np.append(twice, False), np.insert(twice, 0, False)
+    return (s >= x.a - near) & (s <= x.b + near) & ~(first & (np.abs(s - x.a) <= near)) & ~(
+        second & (np.abs(s - x.b) <= near)
+    )  # fmt: skip
+
+
+def bound_of_steps(result: Result) -> float | None:
+    """The part of the capacity that no step and node exceeds, by the ranges of tension and curvature over all of them,
+    as if they came at once; None: the result has no envelope."""
+    names = [f"{GROUP}/{x}" for x in ("tension_min", "tension_max", "curvature_max")]
+    if not has_envelope(result) or any(name not in result for name in names):
+        return None
+    low, high, k = (np.asarray(result[name]) for name in names)
+    s = np.asarray(result[SCALE])
+    return _largest(result, lambda x, at: most_used(x.corners, low[at], high[at], k[at]), s)
+
+
+def bound_with_errors(result: Result) -> float | None:
+    """The part that no output exceeds, whatever the errors of tension and curvature; None: they are not known."""
+    names = ("tension", "curvature", "errors/total/tension", "errors/total/curvature")
+    if any(name not in result for name in names):
+        return None
+    s = result.both_sides("tension")[0]
+    T, k, dT, dk = (result.both_sides(name)[1] for name in names)
+    return _largest(result, lambda x, at: most_used(x.corners, (T - dT)[:, at], (T + dT)[:, at], (k + dk)[:, at]), s)
+
+
+def _largest(result: Result, part: Callable[[Stretch, np.ndarray], Floats], s: Floats) -> float | None:
+    values = [v for x in stretches_of(result) if (v := part(x, _inside(x, s))).size and np.isfinite(v).any()]
+    return max((float(np.nanmax(v)) for v in values), default=None)
+
+
+# --- mooring lines -------------------------------------------------------------------------------
+
+
+def mooring_use(
+    result: Result, strength: float, factors: tuple[float, ...], pretension: float | Result
+) -> tuple[Floats, Floats, Floats]:
+    """Arc lengths (n,) m, and u = (T_pre g_pre + (T - T_pre) g_env)/S at the outputs (nt, n) and of the largest tension
+    of all steps and outputs (n,).
+
+    strength: S, N; factors: g_pre, g_env; pretension: T_pre, N, or the result of an equilibrium under it.  DNV-OS-E301
+    (July 2021), Ch.2 Sec.2, as the manual of SIMA 4.8 gives it.  ResultError: a pretension of another line.
+    """
+    if not (0.0 < strength < np.inf and len(factors) == 2 and all(0.0 < x < np.inf for x in factors)):
+        raise ResultError("mooring\n    expected: a strength (N) above 0, and two factors above 0")
+    s, T = result.both_sides("tension")
+    if isinstance(pretension, int | float):
+        before = np.full(s.shape, float(pretension))
+    else:
+        if pretension.lines or abs(float(pretension.s[-1] - result.s[-1])) > 1e-6 * float(result.s[-1] - result.s[0]):
+            raise ResultError("mooring\n    expected: the pretension of the same line, or a number in N")
+        there, tension = pretension.both_sides("tension")
+        before = tension[0] if np.array_equal(there, s) else np.interp(s, there, tension[0])
+    most = T.max(axis=0)
+    if has_envelope(result) and f"{GROUP}/tension_max" in result:
+        most = np.maximum(most, np.interp(s, result[SCALE], result[f"{GROUP}/tension_max"]))
+    first, second = factors
+    at_outputs, largest = ((before * first + (x - before) * second) / strength for x in (T, most))
+    return s, at_outputs, largest
