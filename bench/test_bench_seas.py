@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from hybrid.model.sea import components
-from hybrid.scene.waves import JonswapWaves, OchiHubbleWaves, PiersonMoskowitzWaves, SumOfWaves
+from hybrid.scene.spectra import JonswapWaves, OchiHubbleWaves, PiersonMoskowitzWaves, SumOfWaves, TorsethaugenWaves
 
 pytestmark = pytest.mark.bench
 REALISATIONS, DURATION, STEP, PLACE = 1000, 1800.0, 0.5, (37.0, -12.0)
@@ -32,6 +32,7 @@ SEAS = {
             {"significant_height": 1.5, "peak_period": 6.0, "shape": 1.2},
         ]
     ),
+    "torsethaugen": TorsethaugenWaves(significant_height=2.5, peak_period=13.0),
     "sum": SumOfWaves(spectra=[SWELL, WIND]),
 }
 

@@ -202,6 +202,7 @@ Other seas; each is a value of `waves`, and `depth` and `ramp` go with all:
   parts:
     - {significant_height: 2, peak_period: 14, shape: 3}
     - {significant_height: 1.5, peak_period: 6, shape: 1.2}
+- {kind: torsethaugen, significant_height: 3, peak_period: 9}                      # North Sea: swell and wind sea
 - kind: sum
   spectra:
     - {kind: jonswap, significant_height: 2, peak_period: 14, direction: 200}

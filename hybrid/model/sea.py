@@ -19,7 +19,8 @@ from hybrid.model.scales import pressing
 from hybrid.model.spectra import waves_of
 from hybrid.scene.dispersion import wavenumber
 from hybrid.scene.schema import CurrentProfile, PowerLawCurrent, Scene, Seabed, UniformCurrent
-from hybrid.scene.waves import GivenWaves, RecordedWaves, RegularWaves, StreamFunctionWaves, SumOfWaves, Waves
+from hybrid.scene.spectra import SumOfWaves
+from hybrid.scene.waves import GivenWaves, RecordedWaves, RegularWaves, StreamFunctionWaves, Waves
 
 # Contact sets in over half the penetration of a cable at rest: it then rests on the linear part.
 ONSET = 0.5
@@ -170,14 +171,14 @@ def components(waves: Waves, depth: float, gravity: float) -> Floats:
         amplitude, omega = np.array([0.5 * waves.height]), np.array([2 * np.pi / waves.period])
         phase, towards = np.radians([waves.phase]), np.array([math.radians(waves.direction)])
     elif isinstance(waves, SumOfWaves):
-        seas = [waves_of(x, i, len(waves.spectra)) for i, x in enumerate(waves.spectra)]
+        seas = [waves_of(x, gravity, i, len(waves.spectra)) for i, x in enumerate(waves.spectra)]
         amplitude, omega, phase, towards = (np.concatenate(x) for x in zip(*seas, strict=True))
     elif isinstance(waves, GivenWaves | RecordedWaves):
         amplitude, omega, phase, heading = waves.recorded.waves.T
         towards = np.array([math.radians(x) for x in heading.tolist()])
         place = getattr(waves, "position", place)
     else:
-        amplitude, omega, phase, towards = waves_of(waves)
+        amplitude, omega, phase, towards = waves_of(waves, gravity)
     k = np.array([wavenumber(w, None if math.isinf(depth) else depth, gravity) for w in omega])
     kx, ky = (k * np.array([part(x) for x in towards.tolist()]) for part in (math.cos, math.sin))
     if any(place):

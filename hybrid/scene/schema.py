@@ -50,18 +50,15 @@ from hybrid.scene.sea import (
     Seabed,
     UniformCurrent,
 )
-from hybrid.scene.waves import (
-    GivenWaves,
+from hybrid.scene.spectra import (
     JonswapWaves,
     OchiHubbleWaves,
     PiersonMoskowitzWaves,
-    RecordedWaves,
-    RegularWaves,
     Spreading,
-    StreamFunctionWaves,
     SumOfWaves,
-    Waves,
+    TorsethaugenWaves,
 )
+from hybrid.scene.waves import GivenWaves, RecordedWaves, RegularWaves, StreamFunctionWaves, Waves
 
 __all__ = [
     "Accuracy",
@@ -125,6 +122,7 @@ __all__ = [
     "Swivel",
     "Table",
     "Time",
+    "TorsethaugenWaves",
     "Travel",
     "UniformCurrent",
     "Vector",

@@ -23,8 +23,9 @@ from hybrid.kernels.laws.water import FADED, SAME_WETNESS, wave_kinematics
 from hybrid.kernels.state.state import no_sea, with_waves
 from hybrid.model.sea import Surroundings, components, current_table, surroundings
 from hybrid.model.spectra import FINE, HIGHEST, LOWEST, jonswap, shares
+from hybrid.scene.spectra import JonswapWaves
 from hybrid.scene.stream_function import steady_wave
-from hybrid.scene.waves import JonswapWaves, RegularWaves, StreamFunctionWaves
+from hybrid.scene.waves import RegularWaves, StreamFunctionWaves
 
 
 def entry(law):

@@ -13,8 +13,16 @@ from scipy.special import gamma as Gamma
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.model.sea import components, surroundings
-from hybrid.model.spectra import directions, jonswap, ochi_hubble
-from hybrid.scene.waves import CROSSINGS, JonswapWaves, OchiHubbleWaves, PiersonMoskowitzWaves, Spreading, SumOfWaves
+from hybrid.model.spectra import directions, jonswap, ochi_hubble, torsethaugen, torsethaugen_parts
+from hybrid.scene.spectra import (
+    CROSSINGS,
+    JonswapWaves,
+    OchiHubbleWaves,
+    PiersonMoskowitzWaves,
+    Spreading,
+    SumOfWaves,
+    TorsethaugenWaves,
+)
 
 G = 9.81
 SWELL = {"kind": "jonswap", "significant_height": 2.0, "peak_period": 14.0, "gamma": 6, "direction": 200.0}
@@ -29,7 +37,7 @@ def irregular(kind, **tables):
     """A sea by spectrum of each kind."""
     return {
         "jonswap": JonswapWaves, "pierson_moskowitz": PiersonMoskowitzWaves, "ochi_hubble": OchiHubbleWaves,
-        "sum": SumOfWaves,
+        "torsethaugen": TorsethaugenWaves, "sum": SumOfWaves,
     }[kind](**tables)  # fmt: skip
 
 
@@ -37,6 +45,7 @@ SEAS = {
     "jonswap": {"significant_height": 3.0, "peak_period": 9.0},
     "pierson_moskowitz": {"significant_height": 3.0, "peak_period": 9.0},
     "ochi_hubble": {"parts": TWO_PEAKS},
+    "torsethaugen": {"significant_height": 2.5, "peak_period": 13.0},
     "sum": {"spectra": [SWELL, WIND_SEA]},
 }
 SPREAD = {name: x | ({} if name == "sum" else {"spreading": {"exponent": 8}}) for name, x in SEAS.items()}
@@ -103,6 +112,31 @@ def test_seas_of_a_sum_are_independent():
     assert np.diff(w).min() > 0.1 * np.median(np.diff(w))
     m2 = [np.sum((x[:, 0] * x[:, 1]) ** 2) for x in (waves[:50], waves[50:100], waves[100:])]
     np.testing.assert_allclose(m2[1:], m2[0], rtol=1e-6)
+
+
+def test_wind_sea_and_swell_of_torsethaugen():
+    """The formulas with numbers put in, on both sides of the period of a fully grown sea, where they meet.
+
+    H 2 m: 6.6 2^(1/3) = 8.3155 s.  T 6 s: e = (8.3155 - 6)/(8.3155 - 2.8284) = 0.42199, wind sea 0.7 + 0.3 exp(-0.71230).
+    T 14 s: e = (14 - 8.3155)/(25 - 8.3155) = 0.34071, swell 0.6 + 0.4 exp(-1.28979).
+    """
+    (wind, w, n, m, gamma), (swell, s, *_) = torsethaugen_parts(2.0, 6.0, G)
+    assert (n, m) == (pytest.approx(3.2 + 0.5 * 1.41421356), 4.0)
+    assert wind == pytest.approx(2.0 * 0.847156, rel=1e-5) and wind**2 + swell**2 == pytest.approx(4.0)
+    assert (w, s) == (pytest.approx(2 * math.pi / 6.0), pytest.approx(2 * math.pi / 10.31548, rel=1e-6))
+    assert gamma == pytest.approx(35.0 * (1.0 + 3.5 * 0.1353353) * (2 * math.pi * wind / (G * 36.0)) ** 0.857, rel=1e-6)
+    (swell, s, _, _, peaked), (wind, w, _, m, one) = torsethaugen_parts(2.0, 14.0, G)
+    assert swell == pytest.approx(2.0 * 0.710130, rel=1e-5) and wind**2 + swell**2 == pytest.approx(4.0)
+    assert peaked == pytest.approx(35.0 * 1.473673 * (2 * math.pi * 2.0 / (G * 69.14707)) ** 0.857 * 3.04426, rel=1e-4)
+    assert m == pytest.approx(4.0 * (1.0 - 0.7 * 0.513417), rel=1e-5) and one == 1.0 and w > s
+    below, above = (torsethaugen_parts(2.0, 6.6 * 2.0 ** (1 / 3) + x, G) for x in (-1e-6, 1e-6))
+    assert below[0][0] == pytest.approx(2.0) and above[0][0] == pytest.approx(2.0)
+    assert below[0][4] == pytest.approx(above[0][4], rel=1e-5)
+    omega = np.geomspace(0.05, 60.0, 40001)
+    for T in (6.0, 8.3, 14.0):
+        S = torsethaugen(omega, 2.0, T, G)
+        assert 16.0 * np.trapezoid(S, omega) == pytest.approx(4.0, rel=2e-3)
+        assert omega[np.argmax(S)] == pytest.approx(2 * math.pi / T, rel=1e-2)
 
 
 # --- directions --------------------------------------------------------------------------------

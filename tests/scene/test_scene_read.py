@@ -160,7 +160,7 @@ def test_a_kind_that_no_other_key_tells_is_required() -> None:
     sea = "environment: {fluid: {density: 1025, surface: 0, waves: {height: 1, period: 8}}}\n"
     with pytest.raises(
         SceneError,
-        match="one of: regular, stream_function, jonswap, pierson_moskowitz, ochi_hubble, sum, components, record",
+        match="one of: regular, stream_function, jonswap, pierson_moskowitz, ochi_hubble, torsethaugen, sum, components, record",
     ):
         parse_scene(sea + AT_REST)
 
