@@ -14,8 +14,10 @@ import math
 import numpy as np
 import pytest
 
+import hybrid
 from hybrid.model.sea import components
 from hybrid.scene.spectra import JonswapWaves, OchiHubbleWaves, PiersonMoskowitzWaves, SumOfWaves, TorsethaugenWaves
+from hybrid.scene.stream_function import steady_wave
 
 pytestmark = pytest.mark.bench
 REALISATIONS, DURATION, STEP, PLACE = 1000, 1800.0, 0.5, (37.0, -12.0)
@@ -77,3 +79,79 @@ def test_realisations(name):
     )
     assert np.abs(off).max() < 3.5
     assert 0.9 < found[:, 0].std(ddof=1) / beats < 1.1
+
+
+# --- waves of finite height against raschii (pip install raschii) ----------------------------------
+
+# Height, depth, length (m) and order: raschii's own test, deep, middle and shallow water.
+STEADY = [
+    (0.25, 0.5, 2.0, 20),
+    (8.0, 200.0, 100.0, 15),
+    (5.0, 50.0, 150.0, 15),
+    (10.0, 40.0, 180.0, 20),
+    (1.0, 5.0, 40.0, 25),
+]
+
+
+def test_against_raschii():
+    """Elevations, and velocities along and up from the bed to the surface, at nine phases; errors as parts of the most."""
+    raschii = pytest.importorskip("raschii")
+    make, _ = raschii.get_wave_model("Fenton")
+    for height, depth, length, order in STEADY:
+        theirs = make(height=height, depth=depth, length=length, N=order)
+        ours = steady_wave(height, depth, 9.81, order, length=length)
+        j, x = np.arange(1, order + 1), np.linspace(0.0, 0.5 * length, 9)
+        eta = np.cos(np.outer(x, j) * ours.k) @ ours.elevation
+        off_eta = np.abs(eta + depth - theirs.surface_elevation(x)).max() / height
+        off = most = 0.0
+        for place, top in zip(x, eta, strict=True):
+            for y in np.linspace(0.02 * depth, 0.999 * (depth + top), 7):
+                kd = j * ours.k * ours.depth
+                lift = j * ours.k * (y - depth + ours.depth)
+                u = np.sum(ours.stream * np.cosh(lift) / np.cosh(kd) * np.cos(j * ours.k * place))
+                w = np.sum(ours.stream * np.sinh(lift) / np.cosh(kd) * np.sin(j * ours.k * place))
+                there = np.ravel(theirs.velocity(place, y))
+                off, most = max(off, np.hypot(u - there[0], w - there[1])), max(most, np.hypot(u, w))
+        print(f"\nH {height:g}, d {depth:g}, L {length:g} m, {order}: elevation {off_eta:.1e}, velocity {off / most:.1e}, "
+              f"speed {ours.speed / theirs.c - 1.0:.1e}")  # fmt: skip
+        assert off_eta < 1e-5 and off / most < 1e-5
+
+
+# --- spread seas by frequency and in time ----------------------------------------------------------
+
+
+def test_spread_sea_by_frequency_and_in_time():
+    """Standard deviations of tension, and of positions along x and y, of a line in a spread sea against six hours."""
+    places = [3.0, 15.0, 30.0, 45.0, 57.0]
+    waves = {
+        "kind": "jonswap", "significant_height": 2.0, "peak_period": 8.0, "direction": 30, "ramp": 10, "depth": 100.0,
+        "spreading": {"exponent": 4},
+    }  # fmt: skip
+    line = {
+        "length": 60.0, "mass": 30.0, "diameter": 0.1, "axial_stiffness": 5e6, "bending_stiffness": 2e3,
+        "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
+    }  # fmt: skip
+    tables = {
+        "environment": {"fluid": {"density": 1025, "surface": 0, "waves": waves}}, "cable": {"sections": [line]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, -65]}, "end": {"kind": "pinned", "position": [6, 0, -5.15]},
+        },
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 60},
+        "time": {"duration": 3600.0, "step": 0.15}, "output": {"every": 0.25, "points": places},
+    }  # fmt: skip
+    there: list[list[np.ndarray]] = [[], [], []]
+    for seed in range(1, 7):
+        fluid = {"density": 1025, "surface": 0, "waves": waves | {"seed": seed}}
+        result = hybrid.run(tables | {"environment": {"fluid": fluid}})
+        late = result.times > 100.0
+        place = result.position[late].std(axis=0)
+        for values, found in zip(there, (result.tension[late].std(axis=0), place[:, 0], place[:, 1]), strict=True):
+            values.append(found)
+    found = hybrid.response(tables).lines["cable"]
+    at = [int(np.abs(found.s - s).argmin()) for s in places]
+    ours = (np.interp(places, found.middle, found.deviation("tension")), *found.deviation("position")[at, :2].T)
+    for name, here, values in zip(("tension", "x", "y"), ours, there, strict=True):
+        off = here / np.mean(values, axis=0) - 1.0
+        scatter = np.std(values, axis=0, ddof=1) / np.mean(values, axis=0)
+        print(f"\n{name}: {', '.join(f'{100 * x:+.1f} %' for x in off)}; seeds scatter by {100 * scatter.max():.1f} %")
+        assert np.abs(off).max() < 0.1
