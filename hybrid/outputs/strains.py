@@ -141,10 +141,12 @@ def _put_layers_back(view: Observation, out: Floats, spans: Integers, rods: NDAr
         if span[1] - span[0] < 2 or catenary[1] - catenary[0] < 2:
             continue
         node, parts, directions = spans[k + 1, 0], _layer(view, spans[k + 1, 0], way, span), view._bend_directions
-        s = view.of_line("s", np.array([node - way, node, node + way]))
-        a = np.abs(s[1] - s[0]) / np.abs(s[2] - s[0])
-        inner = out[mine + way, 0] * (directions[mine + way] * directions[its]).sum(axis=0)
-        there = np.maximum(((1.0 - a) * out[its - way, 0] + a * inner) / (1.0 - a * parts[1]), 0.0)
+        before, after = _stiffness_shares(view, node, way)
+        turned = _directions(view.line, np.cross(view.d[node - 1], view.d[node], axis=0)[None])[0]
+        turn, held = view.bends[node], before * out[its - way, 0]
+        along = (turned * directions[its]).sum(axis=0)
+        square = np.maximum(turn * turn + 2.0 * along * turn * held + held * held, 0.0)
+        there = np.copysign(np.sqrt(square) / (1.0 + before + after * (1.0 - parts[1])), along * turn + held)
         out[its, 0] = there
         parts = parts[: 1 + int((parts[1:] > FADED).any(axis=1).sum())]
         parts[1:][parts[1:] <= FADED] = 0.0  # of each output by itself: none depends on those beside it
@@ -153,6 +155,15 @@ def _put_layers_back(view: Observation, out: Floats, spans: Integers, rods: NDAr
         both = out[rows, 0] + missing * along
         square = both * both + missing * missing * (1.0 - np.minimum(along * along, 1.0))
         out[rows, 0] = np.copysign(np.sqrt(square), both)
+
+
+def _stiffness_shares(view: Observation, node: int, way: int) -> tuple[Floats, Floats]:
+    """B (nb,) of kernels.laws.hinge_layer on the catenary's side of a joint and on the rod's, which lies along `way`."""
+    nodes, cells = np.array([node, node + way]), np.array([node - 1, node])[:: way]
+    hn, h, T = view.of_line("hn", nodes), view.cell_lengths[cells], view.T[cells[1]]
+    EI = view.stiffness(nodes[1:])[0, 0] * hn[1]
+    before, after = (np.divide(EI, T * hn[0] * x, out=np.zeros(T.shape), where=T > 0.0) for x in h)
+    return before, after
 
 
 def _layer(view: Observation, node: int, way: int, span: Integers) -> Floats:

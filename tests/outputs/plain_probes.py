@@ -242,13 +242,17 @@ class Plain:
             b = 2.0 + line.h[c] ** 2 * T / EI if EI > 0.0 and T > 0.0 else np.inf
             return 0.5 * (b - np.sqrt(b * b - 4.0)) if b < 1e6 else 1.0 / b
 
-        direction, h = self._directions[its], np.abs(line.s[[node - way, node + way]] - line.s[node])
-        outer, inner = out[its - way, 0], out[row + way, 0] * (self._directions[row + way] @ direction)
-        at_joint = max((outer * h[1] + inner * h[0]) / (h.sum() - h[0] * fade(1)), 0.0)
+        direction, turn = self._directions[its], cross(self.d[node - 1], self.d[node])
+        turn *= 2.0 / (1.0 + self.d[node - 1] @ self.d[node]) / line.hn[node]  # of the circle
+        T, EI = self.state.T[min(node, node + way)], line.kb[node + way, 0] * line.hn[node + way]
+        h = line.h[[node - 1, node]][::way]
+        before, after = EI / (T * line.hn[node] * h) if T > 0.0 else np.zeros(2)  # B of the hinge's layer
+        both = (turn + before * out[its - way, 0] * direction) / (1.0 + before + after * (1.0 - fade(1)))
+        at_joint = float(np.copysign(np.linalg.norm(both), both @ direction))
         out[its, 0] = missing = at_joint
         for j in range(cells):
             missing *= fade(j) if j > 0 else 1.0
-            if missing <= FADED * at_joint:
+            if abs(missing) <= FADED * abs(at_joint):
                 return
             mine = self._directions[row + j * way]
             whole = out[row + j * way, 0] * mine + missing * direction

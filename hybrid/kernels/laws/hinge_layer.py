@@ -9,9 +9,14 @@ Far from the hinge the moment M of a rod is EI times the curvature of the line w
 of it, D, obeys EI D'' = T D.  On equal cells that is D_(i+1) - (2 + (h/lam)^2) D_i + D_(i-1) = 0, hence D_i = D_0 f^i
 with f + 1/f = 2 + (h/lam)^2: the discrete layer, which is what the nodes of a rod have, whatever h is.
 
-D_0 is the curvature kappa_J that the line would have at the hinge.  It lies on a straight line between that of the
-next node of the catenary and that of the next node of the rod, with D_1 put back.  (On from two nodes of the catenary it
-would be as wrong as three times the error of one of them: at a contact edge beside the joint, a quarter of the jump.)
+D_0 is the curvature kappa_J that the line would have at the hinge.  The forces at the hinge, whose rod ends without a
+moment, are in balance with the turn of its chords, per length k_J:  with B = lam^2/(h_n h) on either side, a that of the
+catenary, b that of the rod,
+
+    (1 + B_a + B_b (1 - f)) kappa_J = k_J + B_a kappa_a
+
+is the same balance with the moments of a line that goes on: kappa_a that of the next node of the catenary, on the other
+side f kappa_J more than the rod has.  What loads the hinge alone is in k_J; neighbours do not know it.
 """
 
 from __future__ import annotations
@@ -32,10 +37,18 @@ def fade(square):
 
 
 @inner
-def at_hinge(outer, inner_, before, after, part):
-    """kappa_J, 1/m: outer, of the catenary's node, `before` m from the hinge; inner_, of the rod's, `after` m from it.
+def stiffness_share(EI, T, hn, h):
+    """B, of a cell of h, m, beside a node that stands for hn, m; nothing without tension."""
+    return EI / (T * hn * h) if T > 0.0 else 0.0
 
-    part: f of the rod's first cell.
+
+@inner
+def at_hinge(turn, along, outer, before, after, part):
+    """kappa_J, 1/m, negative where it is against the curvature `outer` of the next node of the catenary.
+
+    turn: of the chords at the hinge, in a direction of cosine `along` to that; before, after: B there and on the rod's
+    side; part: f of the rod's first cell.
     """
-    a = before / (before + after)
-    return max(((1.0 - a) * outer + a * inner_) / (1.0 - a * part), 0.0)
+    held, whole = before * outer, 1.0 + before + after * (1.0 - part)
+    square = turn * turn + 2.0 * along * turn * held + held * held
+    return math.copysign(math.sqrt(max(square, 0.0)) / whole, along * turn + held)

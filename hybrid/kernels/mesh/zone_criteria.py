@@ -24,7 +24,7 @@ from hybrid.kernels.algebra.rotations import cross, dot, frame, get3, get9, log_
 from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import relative_rotation
-from hybrid.kernels.laws.hinge_layer import FADED, at_hinge, fade
+from hybrid.kernels.laws.hinge_layer import FADED, at_hinge, fade, stiffness_share
 from hybrid.kernels.laws.tension_torque import rest_strain
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.mesh.cell_errors import (
@@ -182,8 +182,10 @@ def put_layer_back(line, T, kinds, i):
     if not (0 < outer < n and 0 < j < n) or line.spin[min(outer, outer - way)] != 0:  # a catenary of one cell
         return
     part = layer_part(line, T, j, way)
-    before, after = abs(line.s[i] - line.s[outer]), abs(line.s[j] - line.s[i])
-    missing = there = at_hinge(kappa[outer], kappa[j], before, after, part)
+    EI, tension = line.kb[j, 0] * line.hn[j], T[min(j, i)]
+    before = stiffness_share(EI, tension, line.hn[i], line.h[min(outer, i)])
+    after = stiffness_share(EI, tension, line.hn[i], line.h[min(j, i)])
+    missing = there = at_hinge(kinds.turn[i] / line.hn[i], 1.0, kappa[outer], before, after, part)
     kappa[i] = there
     while 0 < j < n and line.element[j] and missing > FADED * there:
         missing *= part

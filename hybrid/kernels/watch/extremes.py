@@ -24,7 +24,7 @@ from hybrid.kernels.laws.bending_law import (
     parts_without_spring,
 )
 from hybrid.kernels.laws.cell import chord, turning
-from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST, at_hinge, fade
+from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST, at_hinge, fade, stiffness_share
 from hybrid.kernels.laws.seabed import pressure
 from hybrid.kernels.laws.tension_torque import rest_strain
 from hybrid.kernels.machine.compile import inner, kernel
@@ -258,10 +258,13 @@ def put_layers_back(line, ends, state, books):
         if not (0 < j < n and is_smooth(line, books.marks, outer) and goes_on(line, books.marks, j, way)):
             continue
         direction, part = bend_direction(state, outer), layer_part(line, state, j, way)
-        before, after = abs(line.s[i] - line.s[outer]), abs(line.s[j] - line.s[i])
+        T, EI = state.T[min(j, i)], line.kb[j, 0] * line.hn[j]
+        before = stiffness_share(EI, T, line.hn[i], line.h[min(outer, i)])
+        after = stiffness_share(EI, T, line.hn[i], line.h[min(j, i)])
         along = dot(bend_direction(state, j), direction)
-        there = at_hinge(of_chords(line, state, outer), bent[j, BENT] * along, before, after, part)
-        bent[i, 0], bent[i, BENT] = there, with_layer(own, there, along)
+        turned = dot(bend_direction(state, i), direction)
+        there = at_hinge(of_chords(line, state, i), turned, of_chords(line, state, outer), before, after, part)
+        bent[i, 0], bent[i, BENT] = abs(there), with_layer(own, there, along)
         for _ in range(FARTHEST):
             if part <= FADED:
                 break
