@@ -1,6 +1,7 @@
 """Zones that move, fixed zones, catenaries and rods on one mesh: processor time of a step, and what zones leave out.
 
     pytest bench/test_bench_zones.py -m bench -n 0 -s
+    HYBRID_BENCH_HOURS=3 pytest bench/test_bench_zones.py -m bench -n 0 -s -k riser
 
 Times are of the time loop, smallest of ROUNDS runs in turns.  Errors are those of the whole field at all outputs after
 the first period, s = 3 to 247 m, against a rod of many cells with half the step; of curvature over its largest.
@@ -9,8 +10,10 @@ the first period, s = 3 to 247 m, against a rod of many cells with half the step
 from __future__ import annotations
 
 import copy
+import os
+import tempfile
 from collections.abc import Callable, Mapping
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -27,6 +30,7 @@ pytestmark = pytest.mark.bench
 EXAMPLES = Path(__file__).parents[1] / "examples"
 ROUNDS, PERIOD = 3, 8.0
 PLACES = np.arange(3.0, 247.01, 0.25)  # m: closer than sqrt(EI/T), 0.37 m
+HOURS = float(os.environ.get("HYBRID_BENCH_HOURS", "0.25"))  # of the riser
 SHARE = 0.03  # of the largest curvature that leaving bending out may make
 Text = dict[str, Any]
 
@@ -178,3 +182,114 @@ def test_accuracy_of_the_touchdown() -> None:
         print(
             f"  {name:8s} {spent:5.2f}  {runs:3d} {cells:5d} {rod_cells(result):5.0f} {len(result.steps['t']):6d}  {kinds}"
         )
+
+
+def riser() -> Text:
+    """2000 m from a vessel that heaves down to an anchor, in 50 waves at 30 degrees and a sheared current, 5 m cells."""
+    steel = {
+        "length": 2000.0, "diameter": 0.2, "mass": 55.0, "axial_stiffness": 4e8, "bending_stiffness": 1e5,
+        "torsional_stiffness": 8e4, "drag": {"normal": 1.1, "tangential": 0.01}, "added_mass": {"normal": 1.0},
+        "damping": {"mass": 0.01},
+    }  # fmt: skip
+    heave = {"heave": {"amplitude": 0.6, "period": 11.0}, "sway": {"amplitude": 1.0, "period": 13.0}, "ramp": 20.0}
+    return {
+        "environment": {"fluid": {
+            "density": 1025.0, "surface": 0.0,
+            "current": [{"z": 0.0, "velocity": [0.6, 0.3, 0.0]}, {"z": -1900.0, "velocity": [0.1, 0.0, 0.0]}],
+            "waves": {"kind": "jonswap", "significant_height": 5.0, "peak_period": 11.0, "direction": 30.0, "components": 50, "seed": 1,
+                      "ramp": 20.0},
+        }},
+        "cable": {"sections": [steel]},
+        "ends": {"start": {"kind": "pinned", "position": [480.0, 0.0, -1900.0]},
+                 "end": {"kind": "pinned", "position": [0.0, 0.0, 10.0], "motion": heave}},
+        "initial": "equilibrium", "contact": {"self": False},
+        "time": {"duration": HOURS * 3600.0, "step": 0.1},
+        "output": {"every": 1.0, "points": 401},
+    }  # fmt: skip
+
+
+def compare_with_rods(name: str, text: Text, mesh: Text, asked: dict[str, float | None]) -> None:
+    """Rods, and zones that move by their tolerance or with a share of curvature, on one mesh: cost and what they are off."""
+    models: dict[str, Callable[[], hybrid.Result]] = {"rods": lambda: run(text, mesh, {"kind": "rod"})}
+    for said, share in asked.items():
+        models[said] = partial(run, text, mesh, {"kind": "adaptive"}, share)
+    print(f"\n{name}: us a step, over rods; rod cells; changes; curvature off rods, of its largest: at most, 99.9 % of")
+    print("all outputs and places, root mean square; standard deviation of the tension off by at most, of its own")
+    found = compared(models)
+    rods, later = found["rods"][1], found["rods"][1].times > 60.0
+    for said, (time, result) in found.items():
+        off = np.abs(result.curvature - rods.curvature)[later] / rods.curvature[later].max()
+        spread = np.abs(result.tension[later].std(axis=0) / rods.tension[later].std(axis=0) - 1.0)
+        changes = sum(e.kind in ZONE_EVENTS for e in result.events)
+        print(
+            f"  {said:34s} {time:5.0f}  {found['rods'][0] / time:4.2f} x  {rod_cells(result):4.0f} {changes:4d}"
+            f"  {off.max():6.2%} {np.quantile(off, 0.999):6.2%} {np.sqrt(np.mean(off**2)):6.3%}  {spread.max():.3%}"
+        )
+
+
+def test_riser() -> None:
+    """HYBRID_BENCH_HOURS of it, a quarter of one if that is not given."""
+    asked = {"zones that move": None, "zones that move, 1 % of curvature": 0.01}
+    compare_with_rods(f"riser of 2000 m, {HOURS:g} h", riser(), {"cells": 400}, asked)
+
+
+def spread() -> Text:
+    """Six lines of 2000 m from a vessel to anchors on a bed, in waves with a current; all fairleads move alike."""
+    chain = {
+        "length": 2000.0, "diameter": 0.15, "mass": 120.0, "axial_stiffness": 9e8, "bending_stiffness": 2e5,
+        "torsional_stiffness": 1e5, "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0},
+    }  # fmt: skip
+    motion = {"heave": {"amplitude": 1.5, "period": 11.0}, "surge": {"amplitude": 2.0, "period": 60.0}, "ramp": 22.0}
+    points: Text = {}
+    lines: Text = {}
+    for k in range(6):
+        x, y = float(np.cos(np.pi * k / 3)), float(np.sin(np.pi * k / 3))
+        points[f"anchor{k}"] = {"position": [1740 * x, 1740 * y, -800.0]}
+        points[f"fairlead{k}"] = {"position": [20 * x, 20 * y, -10.0], "motion": motion}
+        lines[f"line{k}"] = {
+            "sections": [chain], "start": f"anchor{k}", "end": f"fairlead{k}", "mesh": {"cells": 200},
+            "contact": {"self": False},
+        }  # fmt: skip
+    return {
+        "environment": {
+            "fluid": {
+                "density": 1025.0, "surface": 0.0, "current": [0.3, 0.6, 0.0],
+                "waves": {"kind": "jonswap", "significant_height": 5.0, "peak_period": 11.0, "direction": 30.0, "components": 50, "seed": 1,
+                          "ramp": 20.0},
+            },
+            "seabed": {"z": -800.0, "stiffness": 2e5, "damping": 1e4, "friction": 0.5},
+        },
+        "points": points, "lines": lines, "time": {"duration": 300.0, "step": 0.1},
+        "output": {"every": 1.0, "points": 201},
+    }  # fmt: skip
+
+
+def test_spread() -> None:
+    """Whole runs with their files: rods, catenaries and zones that move by their tolerance, on the same mesh."""
+    print(
+        "\nspread of six lines of 2000 m, 200 cells each, 300 s: s of processor time, over rods; rod cells of a line on"
+    )
+    print("average; changes; tension off rods by at most, of its largest; position, m")
+    models: dict[str, Any] = {"rods": "rod", "catenaries": "catenary", "zones that move": {"kind": "adaptive"}}
+    found: dict[str, tuple[float, hybrid.Result]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for k in range(ROUNDS + 1):  # the first compiles
+            for name, model in models.items():
+                text = spread()
+                for line in text["lines"].values():
+                    line["model"] = model
+                begin = process_time()
+                result = hybrid.run(text, Path(folder) / f"{name}{k}.h5")
+                spent = process_time() - begin
+                if k > 0:
+                    found[name] = (min(spent, found.get(name, (np.inf,))[0]), result)
+        rods = found["rods"]
+        for name, (spent, result) in found.items():
+            pairs = [(result.lines[x], rods[1].lines[x]) for x in result.lines]
+            cells = np.mean([rod_cells(x) for x, _ in pairs])
+            changes = sum(e.kind in ZONE_EVENTS for e in result.events)
+            tension = max(np.abs(x.tension - y.tension).max() / y.tension.max() for x, y in pairs)
+            far = max(np.linalg.norm(x.position - y.position, axis=2).max() for x, y in pairs)
+            print(
+                f"  {name:16s} {spent:6.2f} {rods[0] / spent:5.2f} x  {cells:4.0f} {changes:4d}  {tension:.3%} {far:.4f}"
+            )

@@ -105,7 +105,7 @@ def test_every_public_name_is_on_the_page() -> None:
 
 
 def test_every_page_begins_with_what_it_is_for() -> None:
-    for page in sorted(DOCS.glob("*.md")):
+    for page in sorted(DOCS.rglob("*.md")):
         first = page.read_text(encoding="utf-8").split("\n\n")[1]
         assert re.match(r"Use this page to [^.]*[^.]*[.:]", first.replace("examples/", "")), (
             f"{page.name}: {first[:80]}"

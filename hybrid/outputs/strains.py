@@ -158,8 +158,8 @@ def _put_layers_back(view: Observation, out: Floats, spans: Integers, rods: NDAr
 
 
 def _stiffness_shares(view: Observation, node: int, way: int) -> tuple[Floats, Floats]:
-    """B (nb,) of kernels.laws.hinge_layer on the catenary's side of a joint and on the rod's, which lies along `way`."""
-    nodes, cells = np.array([node, node + way]), np.array([node - 1, node])[:: way]
+    """B (nb,) of kernels.laws.hinge_layer on the catenary's side of a joint and on the rod's, along `way`."""
+    nodes, cells = np.array([node, node + way]), np.array([node - 1, node])[::way]
     hn, h, T = view.of_line("hn", nodes), view.cell_lengths[cells], view.T[cells[1]]
     EI = view.stiffness(nodes[1:])[0, 0] * hn[1]
     before, after = (np.divide(EI, T * hn[0] * x, out=np.zeros(T.shape), where=T > 0.0) for x in h)

@@ -570,7 +570,7 @@ class SystemRun:
             self._attach()
             code = loop.go()
             self.state, self.other = loop.states
-            if code in (b.STEPPED, b.FAILED) or self.zones is not None or loop.is_half_full:
+            if code in (b.TRYING, b.TRIED, b.STEPPED, b.FAILED) or loop.is_half_full:
                 self._record_samples()  # of lines as they were until now
             if code == b.TRYING:
                 self._prepare(float(loop.clock[b.TRY_END]))
@@ -600,14 +600,13 @@ class SystemRun:
         """Steps lead from the state of now, with ends that move as they do now."""
         loop, solver = self.loop, self.solver
         loop.counts[b.ASKS] = 0
-        if self.zones is not None:
-            loop.counts[b.ASKS] = b.ASK_BEFORE | b.ASK_TRIES | b.ASK_STEPS
-            loop.clock[b.ALLOWED] = self.zones.longest
-        elif self.failures.all:
+        if self.failures.all:
             loop.counts[b.ASKS] |= b.ASK_STEPS
         if loop.attach(solver, self.state, self.other):
             for line, old, new in zip(self.lines, self.state.lines, self.other.lines, strict=True):
                 line.attach(solver, (old, new), loop.clock, loop.counts)
+        if self.zones is not None:
+            self.zones.attach(loop)
         if loop.counts[b.ASKS] & b.ASK_BEFORE:
             return
         moves = [model.ends.moves() for model in self.model.models]

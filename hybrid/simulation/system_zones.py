@@ -38,7 +38,9 @@ from hybrid.solve.system_statics import SystemEquilibrium
 from hybrid.store.named_arrays import matched
 
 if TYPE_CHECKING:
+    from hybrid.kernels.machine.binding import Table
     from hybrid.simulation.system_run import SystemRun
+    from hybrid.solve.system_steps import SystemSteps
 
 HELD = (
     "zones stay rod: in equilibrium, catenary where the criteria allow it is further from the rod than the tolerance; "
@@ -184,9 +186,23 @@ class _LineZones:
         )  # fmt: skip
         follow_zones(self.switching.table.numbers)
 
+    def bind(self, run: SystemRun, loop: SystemSteps) -> Table:
+        """What follows the zones within the compiled steps of a loop."""
+        model, (even, odd) = self.switching.model, loop.turns
+        self.switching.table.bind(
+            line=model.line, sea=model.sea.values, ends=model.ends.values, old=even.lines[self.number],
+            new=odd.lines[self.number], clock=loop.clock, counts=loop.counts, work=run.lines[self.number].books.work,
+            zones=self.switching.zones, near=self.switching.manager.near,
+        )  # fmt: skip
+        return self.switching.table
+
 
 class SystemZones:
-    """The zones of all lines of a run whose zones move."""
+    """The zones of all lines of a run whose zones move.
+
+    Steps follow them compiled, and Python looks at them where something is due; a criterion of the user's own is asked
+    around every try, contact after every step, and outputs of criteria are written before the next one.
+    """
 
     def __init__(self, run: SystemRun, managers: Mapping[int, DomainManager]) -> None:
         every = run.resolution.one.every
@@ -194,7 +210,23 @@ class SystemZones:
         self.lines = [_LineZones(k, run.model.models[k], x, every) for k, x in managers.items()]
         for k, x in managers.items():
             run.lines[k].manager = x
-        self._rescues = 0  # of the step that is tried
+        self._rescues, self._rescued = 0, 0  # of the step that is tried, after so many
+        self._compiled = all(x.switching.compiled for x in self.lines)
+
+    def attach(self, loop: SystemSteps) -> None:
+        """Let the steps of a loop follow the zones from now on, or ask for what they do."""
+        run = self._run
+        loop.clock[b.ALLOWED] = self.longest
+        if not self._compiled:
+            loop.follow([])
+            loop.counts[b.ASKS] |= b.ASK_BEFORE | b.ASK_TRIES | b.ASK_STEPS
+            return
+        loop.follow([x.bind(run, loop) for x in self.lines])
+        mine = [run.lines[x.number] for x in self.lines]
+        if run.shared is not None or any(x.contact is not None for x in mine):
+            loop.counts[b.ASKS] |= b.ASK_STEPS
+        if any(x.observer.writes_criteria for x in mine):
+            loop.counts[b.ASKS] |= b.ASK_BEFORE | b.ASK_STEPS
 
     def look_ahead(self) -> None:
         """Criteria know how near lines come to themselves, by the contact that the solver has now."""
@@ -269,7 +301,7 @@ class SystemZones:
     def prepare(self, end: float) -> None:
         """Before a try that ends at `end` (s): lengths and stiffness as they will be then."""
         run = self._run
-        for x in self.lines:
+        for x in self.lines if not self._compiled else ():
             x.follow(run, b.SOLVE, run.t, end, run.state.lines[x.number], run.other.lines[x.number])
 
     def wants_more_rod(self, taken: SystemTaken, end: float, last: bool) -> bool:
@@ -277,15 +309,17 @@ class SystemZones:
 
         last: no shorter step is left to try.
         """
-        run, changed = self._run, False
+        run, changed, step = self._run, False, int(self._run.loop.counts[b.STEPS])
+        if step != self._rescued:
+            self._rescues, self._rescued = 0, step
         for x in self.lines:
             k = x.number
             old, new = run.state.lines[k], run.other.lines[k]
             how = Tried(taken.outcome, taken.iterations, taken.correction, taken.where)
-            if taken.outcome == Outcome.OK:
-                x.follow(run, b.JUDGE, run.t, end, old, new)
-            elif taken.line not in (k, -1):
+            if taken.outcome != Outcome.OK and taken.line not in (k, -1):
                 continue
+            if taken.outcome == Outcome.OK and not self._compiled:
+                x.follow(run, b.JUDGE, run.t, end, old, new)
             change = x.switching.rescue(how, end, end - run.t, new, self._rescues)
             if change is None and last:
                 change = x.switching.all_rod(how)
@@ -299,13 +333,14 @@ class SystemZones:
 
     def accepted(self, dt: float) -> None:
         """After an accepted step of dt (s), with the states exchanged: energy, and what should change."""
-        run, self._rescues = self._run, 0
+        run = self._run
         self._note_contact()
         for x in self.lines:
             k = x.number
             state, before = run.state.lines[k], run.other.lines[k]
-            x.clock[b.LAST_DT], x.clock[b.LAST_RHO] = dt, run.last_rho
-            x.follow(run, b.END_STEP, run.t, run.t, state, before)
+            if not self._compiled:
+                x.clock[b.LAST_DT], x.clock[b.LAST_RHO] = dt, run.last_rho
+                x.follow(run, b.END_STEP, run.t, run.t, state, before)
             x.pending = x.switching.book_step(run.t, state)
 
     def adapt(self) -> None:

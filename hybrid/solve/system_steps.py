@@ -11,6 +11,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import WORK
 from hybrid.kernels.junctions.members_water import stir_members
 from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.mesh.zone_step import follow_zones
 from hybrid.kernels.run.system import book_system_step, solve_system
 from hybrid.kernels.run.system_run import CUT_LINE, LINE, blank_steps_job, run_system, sample_system
 from hybrid.kernels.run.system_sampling import BODY_SAMPLE
@@ -109,9 +110,19 @@ class SystemSteps:
         """After steps of even and odd parity this kernel looks whether lines have met; 0: none does."""
         self._job.bind(watched_even=even, watched_odd=odd, watcher=watcher)
 
+    def follow(self, zones: Sequence[Table]) -> None:
+        """These tables of kernels.mesh.zone_step follow zones of lines from now on; none: Python does."""
+        tables = np.array([x.numbers for x in zones]) if zones else np.zeros((0, 0), np.int64)
+        self._job.bind(followed=tables, follower=follow_zones.address(tables[0]) if zones else 0)
+
     def watch_nothing(self) -> None:
         """Look after no pair of lines."""
         self._job.bind(watcher=0)
+
+    @property
+    def turns(self) -> tuple[SystemState, SystemState]:
+        """The states that are those of now at even parity and at odd."""
+        return self._states
 
     @property
     def states(self) -> tuple[SystemState, SystemState]:

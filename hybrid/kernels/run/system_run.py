@@ -7,6 +7,7 @@ bound once.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +38,7 @@ from hybrid.kernels.run.run import watch_itself
 from hybrid.kernels.run.system import error_ratio
 from hybrid.kernels.run.system_sampling import BODY_SAMPLE, is_due, keep_bodies, sample_now, sample_within
 from hybrid.kernels.state.books import (
+    ALLOWED,
     ASK_BEFORE,
     ASK_STEPS,
     ASK_TRIES,
@@ -88,12 +90,13 @@ from hybrid.kernels.state.books import (
     UNTIL,
     WASTED,
     WHERE,
+    ZONES_DUE,
 )
 from hybrid.kernels.state.report import LOCAL_ERROR, RESIDUAL, SLACKEST, SLACKEST_CELL, USED_RHO
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.accept import collapses
 from hybrid.kernels.step.generalized_alpha import SAME
-from hybrid.kernels.step.job import call_solver, read
+from hybrid.kernels.step.job import call_follower, call_solver, read
 from hybrid.kernels.step.newton import OK, SLACK, STEP, TURNED_TOO_FAR
 from hybrid.kernels.step.step_control import begin_step, halve, passes
 
@@ -129,12 +132,14 @@ class StepsJob(NamedTuple):
     with_members: NDArray[np.int64]  # (M,) and which bodies these are
     watched_even: NDArray[np.int64]  # of a kernels.junctions.lines_distance.LinesJob, after a step of `even`
     watched_odd: NDArray[np.int64]
+    followed: NDArray[np.int64]  # (Z, ..) tables of kernels.mesh.zone_step.ZoneJob, with this clock and these counts
     solver: int = 0  # address of kernels.run.system.solve_system
     marcher: int = 0  # of the kernel that solves a step of one line
     book: int = 0  # of book_system_step
     sampler: int = 0  # of sample_system
     stirrer: int = 0  # of kernels.junctions.members_water.stir_members; 0: no body has members
     watcher: int = 0  # of kernels.junctions.lines_distance.watch_lines; 0: no two lines are watched
+    follower: int = 0  # of kernels.mesh.zone_step.follow_zones; 0: no zones move, or Python follows them
 
 
 def no_loads() -> tuple[Floats, Floats]:
@@ -150,7 +155,7 @@ def blank_steps_job() -> StepsJob:
     return StepsJob(
         none, none, none, none, none, lone, none, clock, counts, np.zeros(3), none, none, log, *no_loads(),
         np.zeros(0), np.zeros((1, 1, BODY_SAMPLE)), np.zeros((3, 1, WORK)), lone, none,
-        none, none,
+        none, none, lone,
     )  # fmt: skip
 
 
@@ -251,6 +256,19 @@ def try_step(steps, system):
 
 
 @inner
+def follow_lines(steps):
+    """What zones of all lines do in the present phase (kernels.mesh.zone_step); 1: Python must look at them."""
+    clock, due, allowed = steps.clock, 0, math.inf
+    if steps.follower == 0:
+        return 0
+    for k in range(steps.followed.shape[0]):
+        due |= call_follower(steps.follower, steps.followed[k])
+        allowed = min(allowed, clock[ALLOWED])
+    clock[ALLOWED] = allowed  # which each writes after a step
+    return due
+
+
+@inner
 def give_up(steps, cause):
     """A try is given up, and repeated in another length."""
     counts = steps.counts
@@ -322,7 +340,10 @@ def accept(steps, system):
             watched = steps.watched_even
         call_watch(steps.watcher, watched)
     counts[ROWS] += 1
-    counts[WASTED], counts[FLAGS], counts[PHASE] = 0, flags, SAMPLE
+    counts[WASTED], counts[PHASE] = 0, SAMPLE
+    if follow_lines(steps) != 0:
+        flags |= ZONES_DUE
+    counts[FLAGS] = flags
 
 
 @inner
@@ -391,6 +412,7 @@ def run_system(table):
             own = steps.odd
         system = read_system(own)
         if counts[PHASE] == SOLVE:
+            follow_lines(steps)
             if not counts[ASKS] & ASK_BEFORE:
                 move_lines(system, steps.clock[TRY_END])
                 load_bodies(system.bodies, steps.loads, steps.history, steps.clock[TRY_END])
@@ -398,6 +420,8 @@ def run_system(table):
             try_step(steps, system)
             counts[PHASE] = JUDGE
             if counts[ASKS] & ASK_TRIES:
+                return TRIED
+            if steps.follower != 0 and (counts[OUTCOME] != OK or follow_lines(steps) != 0):
                 return TRIED
         verdict = judge(steps, system)
         if verdict < 0:

@@ -104,6 +104,7 @@ NEARS_PLANE = 8192
 NEARS_ITSELF = 16384
 PARTS_ITSELF, HIDES_ITSELF = 32768, 65536
 COLLAPSES = 131072
+ZONES_DUE = 262144  # of a system: zones of a line are to be looked at
 
 # --- powers and work --------------------------------------------------------------------------------
 
