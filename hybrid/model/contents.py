@@ -187,7 +187,7 @@ def _idle(scene: Scene, line: Line) -> Iterator[Entry]:
 def _left_out(scene: Scene) -> Iterator[Entry]:
     """What of a measured elevation is in no wave."""
     waves = scene.environment.waves
-    if isinstance(waves, RecordedWaves) and (waves.recorded.lost > LOST or abs(waves.recorded.mean) > 0.0):
+    if isinstance(waves, RecordedWaves) and (waves.recorded.lost > LOST or waves.recorded.has_mean):
         x = waves.recorded
         why = (
             f"{100.0 * x.lost:.3g} % of its variance, in periods other than {x.shortest:.4g} to {x.longest:.4g} s, and "

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 GIVEN, RECORD = ["amplitude", "frequency", "direction", "phase"], ["t", "elevation"]
 # Waves in a sum: a step takes as long as 40 of a line of 100 cells without waves.
 MOST_WAVES = 5000
+# Part of the height of a record that is round-off of its digits.
+ROUND_OFF = 1e-6
 # Samples: of fewer no harmonic is known.
 FEWEST = 8
 # Part of a step by which times may be off their even grid: they are written with few digits.
@@ -48,6 +50,11 @@ class Recorded:
     def significant_height(self) -> float:
         """Four standard deviations, m."""
         return 4.0 * math.sqrt(0.5 * float(np.sum(self.waves[:, 0] ** 2)))
+
+    @property
+    def has_mean(self) -> bool:
+        """Whether the mean that is left out is more than round-off."""
+        return abs(self.mean) > ROUND_OFF * self.significant_height
 
     @property
     def shortest(self) -> float:

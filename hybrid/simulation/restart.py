@@ -21,7 +21,7 @@ from hybrid.model.plan import output_interval
 from hybrid.model.resolution import Resolution
 from hybrid.model.self_reach import self_reach
 from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.read import parse_either, parse_scene, scene_text
+from hybrid.scene.read import as_scene_or_system, parse_either, parse_scene, scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.restore import refused, resolution_from, restored_points
 from hybrid.store.checkpoint import Checkpoint, read_before, read_checkpoint
@@ -182,7 +182,7 @@ def _text_until(scene: Scene | System, until: float, every: float) -> str:
     data = scene.model_dump(mode="json", exclude_none=True)
     data["time"]["duration"] = until
     data.setdefault("output", {})["every"] = every
-    return scene_text(type(scene).model_validate(data))
+    return scene_text(as_scene_or_system(data))
 
 
 def _check_lines(

@@ -317,6 +317,17 @@ def test_spread_seas_are_in_no_plane():
         scene(SWELL | {"spreading": {"exponent": 10}}, **tables)
 
 
+def test_a_run_goes_on_no_longer_than_its_record(tmp_path: Path):
+    record(tmp_path, begin=0.0, mean=0.0, rows=40)
+    waves = {"kind": "record", "file": str(tmp_path / "eta.csv"), "ramp": 5.0}
+    with hybrid.run(scene(waves, time={"duration": 1.0, "step": 0.25}), tmp_path / "run.h5") as result:
+        assert not any("record of the sea" in x.text for x in result.events)  # nothing of it is left out
+    with pytest.raises(SceneError, match="at most 20 s, the end of the record"):
+        hybrid.resume(tmp_path / "run.h5", until=21.0)
+    with hybrid.resume(tmp_path / "run.h5", until=2.0) as result:
+        assert result.times[-1] == 2.0
+
+
 REFUSED = {
     "columns": ("components", "amplitude,period,direction,phase\n1,2,3,4\n", "columns amplitude,frequency,direction"),
     "no amplitude": ("components", "amplitude,frequency,direction,phase\n1,1,0,0\n0,2,3,4\n", "line 3: amplitude = 0"),
