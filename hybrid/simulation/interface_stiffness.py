@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.algebra.block_elimination import SIZE, solve_again
+from hybrid.kernels.algebra.block_elimination import SIZE
+from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.run import entry
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.forces import PLANAR

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.algebra.block_elimination import solve_again
+from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import stored_energy

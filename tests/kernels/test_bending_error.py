@@ -9,7 +9,8 @@ import pytest
 from test_jacobian import CA, CV, WITHOUT_OBSTACLES, ZONES, N, assembled, random_case
 
 import hybrid
-from hybrid.kernels.algebra.block_elimination import KEPT, ROW, solve_again
+from hybrid.kernels.algebra.block_elimination import KEPT, ROW
+from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.run.entry import assembly, workspace
 from hybrid.kernels.state.forces import ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.state.report import REPORT_SIZE

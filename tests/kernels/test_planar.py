@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from test_jacobian import CA, CV, WITHOUT_OBSTACLES, ZONES, random_case, with_tables
 
-from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH, solve_again
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.algebra.block_elimination_plane import KEPT, TRIPLE, WIDE, solve_again_planar
+from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.laws.out_of_plane import BAND, REACH, step_out_of_plane, wrong_pivots_at_rest
 from hybrid.kernels.march.configuration import update
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace

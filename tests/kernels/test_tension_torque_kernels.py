@@ -6,7 +6,8 @@ from kernels.test_jacobian import CA, CV, ZONES, N, random_case
 from kernels.test_zone_torque import LINES, differences, twisted_case
 from kernels.test_zone_torque import residual as zone_residual
 
-from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH, solve_again
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
+from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.march.configuration import update
 from hybrid.kernels.march.energies import observe
 from hybrid.kernels.run.entry import assembly, block_rows, correction, workspace_of

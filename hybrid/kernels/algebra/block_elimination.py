@@ -14,12 +14,16 @@ relation that everything before node i imposes on what follows (docs/theory.md, 
 Rows without bending have four unknowns and take a path of their own in the same march.
 
 Where X has room for more than the X_i, the march keeps there what another right-hand side of the same
-matrix needs (`solve_again`): KEPT numbers a block,
+matrix needs (kernels.algebra.kept_factors): KEPT numbers a block,
 
     wide     0..11 balance against (dr, dpsi) of block i-2;  12..36 against block i-1, after that;  37..61 pivot block
     narrow   0..8 balance against dr_{i-1};  9..11 length;  12..27 pivot block
-    both     62 unit of the length row;  63 whether it is wide;  64..68 right-hand side of the pivot block
+    both     62 unit of the length row;  63 0 where it is narrow;  64..68 right-hand side of the pivot block
     wide     69..72 length against (dr, dpsi) of block i-2, which tension that makes a torque reaches
+
+Of a wide block 37..61 are the factors L U of its pivot block with its rows exchanged: the inverses of U's diagonal in
+its place, L below without its ones; number 63 says in which order L takes the rows (`exchange`).  The first and the
+last block keep the pivot block itself, which lines that are joined need (kernels.junctions.joined_lines).
 """
 
 from __future__ import annotations
@@ -33,8 +37,7 @@ WIDTH = 24  # columns of W
 SPAN = 9  # columns of X_i
 ROW = SIZE * SPAN  # numbers of X_i
 KEPT = 73  # numbers kept of a block, for another right-hand side
-# A straight inextensible line that is held at both ends has no compliance: a pivot, as a part of its row, that is none.
-NO_PIVOT = 1e-12
+IN_ORDER = 0 | 1 << 3 | 2 << 6 | 3 << 9 | 4 << 12  # rows of a pivot block as they stand
 
 
 @inner
@@ -128,11 +131,20 @@ def subtract_solved_row(X, x, y, f):
 
 
 @inner
-def solve_block(W, X, i):
+def exchange(order, a, b):
+    """Exchange rows a and b of an order: three bits for each row."""
+    differ = ((order >> 3 * a) ^ (order >> 3 * b)) & 7
+    return order ^ (differ << 3 * a | differ << 3 * b)
+
+
+@inner
+def solve_block(W, X, i, factors):
     """X_i from the five rows of W, with pivoting inside the block; False when the block is singular.
 
+    factors: where those of the pivot block go in X, 0: nowhere.
     A cofactor inverse would lose eps (k_axial/k_transverse)^2.
     """
+    order = IN_ORDER
     for c in range(SIZE):
         o = c * WIDTH
         best, where = abs(W[o + 10 + c]), c
@@ -145,9 +157,23 @@ def solve_block(W, X, i):
             p = where * WIDTH
             for j in range(10, WIDTH):
                 W[o + j], W[p + j] = W[p + j], W[o + j]
+            if factors > 0:
+                order = exchange(order, c, where)
+                for j in range(c):
+                    a, b = factors + SIZE * c + j, factors + SIZE * where + j
+                    X[a], X[b] = X[b], X[a]
         inverse = 1.0 / W[o + 10 + c]
         for r in range(c + 1, SIZE):
-            subtract_row(W, r * WIDTH, o, W[r * WIDTH + 10 + c] * inverse)
+            f = W[r * WIDTH + 10 + c] * inverse
+            if factors > 0:
+                X[factors + SIZE * r + c] = f
+            subtract_row(W, r * WIDTH, o, f)
+        if factors > 0:
+            X[factors + (SIZE + 1) * c] = inverse
+            for j in range(c + 1, SIZE):
+                X[factors + SIZE * c + j] = W[o + 10 + j]
+    if factors > 0:
+        X[factors + 26] = order
     for c in range(SIZE - 1, -1, -1):
         o, x = c * WIDTH, i * ROW + c * SPAN
         for j in range(SPAN):
@@ -189,12 +215,15 @@ def eliminate_wide(W, X, i, kept, size, couples):
             W[o + 23] -= subtract_block(W, o + 10, X, i - 1, W[o + 6], W[o + 7], W[o + 8], W[o + 9])
             if l0 != 0.0:  # the balance of the node, through block i-2
                 W[o + 23] -= subtract_tension_row(W, o + 10, X, i - 1, l0)
+    factors = 0
     if kept > 0:
+        if i > 0 and kept + KEPT < X.shape[0]:
+            factors = kept + 37
         for r in range(SIZE):
-            for j in range(SIZE):
+            for j in range(SIZE if factors == 0 else 0):
                 X[kept + 37 + SIZE * r + j] = W[r * WIDTH + 10 + j]
             X[kept + 64 + r] = W[r * WIDTH + 23]
-    return solve_block(W, X, i)
+    return solve_block(W, X, i, factors)
 
 
 @inner
@@ -327,173 +356,3 @@ def substitute(X, x):
         z0, z1, z2 = y[1], y[2], y[3]
         y = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4])
     return total < math.inf
-
-
-@inner
-def solve4(A0, A1, A2, A3):
-    """Four unknowns from four rows (five numbers, the last the right-hand side), with pivoting."""
-    if abs(A1[0]) > abs(A0[0]):
-        A0, A1 = A1, A0
-    if abs(A2[0]) > abs(A0[0]):
-        A0, A2 = A2, A0
-    if abs(A3[0]) > abs(A0[0]):
-        A0, A3 = A3, A0
-    i0 = 1.0 / A0[0]
-    f1, f2, f3 = i0 * A1[0], i0 * A2[0], i0 * A3[0]
-    B1 = (A1[1] - f1 * A0[1], A1[2] - f1 * A0[2], A1[3] - f1 * A0[3], A1[4] - f1 * A0[4])
-    B2 = (A2[1] - f2 * A0[1], A2[2] - f2 * A0[2], A2[3] - f2 * A0[3], A2[4] - f2 * A0[4])
-    B3 = (A3[1] - f3 * A0[1], A3[2] - f3 * A0[2], A3[3] - f3 * A0[3], A3[4] - f3 * A0[4])
-    if abs(B2[0]) > abs(B1[0]):
-        B1, B2 = B2, B1
-    if abs(B3[0]) > abs(B1[0]):
-        B1, B3 = B3, B1
-    i1 = 1.0 / B1[0]
-    f2, f3 = i1 * B2[0], i1 * B3[0]
-    C2 = (B2[1] - f2 * B1[1], B2[2] - f2 * B1[2], B2[3] - f2 * B1[3])
-    C3 = (B3[1] - f3 * B1[1], B3[2] - f3 * B1[2], B3[3] - f3 * B1[3])
-    if abs(C3[0]) > abs(C2[0]):
-        C2, C3 = C3, C2
-    i2 = 1.0 / C2[0]
-    f3 = i2 * C3[0]
-    x3 = (C3[2] - f3 * C2[2]) / (C3[1] - f3 * C2[1])
-    x2 = i2 * (C2[2] - C2[1] * x3)
-    x1 = i1 * (B1[3] - B1[1] * x2 - B1[2] * x3)
-    x0 = i0 * (A0[4] - A0[1] * x1 - A0[2] * x2 - A0[3] * x3)
-    return x0, x1, x2, x3
-
-
-@inner
-def solve5(X, k, W, x, i):
-    """x_i from the pivot block kept at X[k:] and the right-hand side in x_i; W: room for 30 numbers."""
-    for r in range(SIZE):
-        for j in range(SIZE):
-            W[6 * r + j] = X[k + SIZE * r + j]
-        W[6 * r + 5] = x[i, r]
-    for c in range(SIZE):
-        best, where = abs(W[7 * c]), c
-        for r in range(c + 1, SIZE):
-            if abs(W[6 * r + c]) > best:
-                best, where = abs(W[6 * r + c]), r
-        if where != c:
-            for j in range(c, 6):
-                W[6 * c + j], W[6 * where + j] = W[6 * where + j], W[6 * c + j]
-        for r in range(c + 1, SIZE):
-            f = W[6 * r + c] / W[7 * c]
-            for j in range(c + 1, 6):
-                W[6 * r + j] -= f * W[6 * c + j]
-    for c in range(SIZE - 1, -1, -1):
-        y = W[6 * c + 5]
-        for j in range(c + 1, SIZE):
-            y -= W[6 * c + j] * x[i, j]
-        x[i, c] = y / W[7 * c]
-
-
-@inner
-def solve_last(X, k, x, n):
-    """The last block of a line whose end is joined to a point, held there: x_n from its right-hand side in x_n."""
-    a, rest = X[k + 37] if X[k + 63] > 0.0 else X[k + 12], 0.0
-    for j in range(1, 4):
-        rest = max(rest, abs(X[k + 37 + j] if X[k + 63] > 0.0 else X[k + 12 + j]))
-    x[n, 0] = x[n, 0] / a if abs(a) > NO_PIVOT * rest else 0.0
-    for j in range(1, SIZE):
-        x[n, j] = 0.0
-
-
-@inner
-def solve_forward(X, W, b, x, joined):
-    """The first half of `solve_with`: what another right-hand side makes of that of every X_i, into x."""
-    n = x.shape[0] - 1
-    for i in range(n + 1):
-        k = (n + 1) * ROW + i * KEPT
-        size = X[k + 62]
-        if X[k + 63] > 0.0:
-            x[i, 0], x[i, 4] = size * b[i, 0], b[i, 4]
-            if i >= 2:
-                for j in range(4):
-                    x[i, 0] -= X[k + 69 + j] * x[i - 2, j + 1]
-            for r in range(3):
-                y = b[i, r + 1]
-                if i >= 2:
-                    for j in range(4):
-                        y -= X[k + 4 * r + j] * x[i - 2, j + 1]
-                x[i, r + 1] = y
-            if i >= 1:
-                for r in range(SIZE):
-                    y = x[i, r]
-                    for j in range(SIZE):
-                        y -= X[k + 12 + SIZE * r + j] * x[i - 1, j]
-                    x[i, r] = y
-            if not (joined and i == n):
-                solve5(X, k + 37, W, x, i)
-        else:
-            b0, b1, b2, b3 = size * b[i, 0], b[i, 1], b[i, 2], b[i, 3]
-            if i >= 1:
-                y0, y1, y2 = x[i - 1, 1], x[i - 1, 2], x[i - 1, 3]
-                b0 += X[k + 9] * y0 + X[k + 10] * y1 + X[k + 11] * y2
-                b1 -= X[k] * y0 + X[k + 1] * y1 + X[k + 2] * y2
-                b2 -= X[k + 3] * y0 + X[k + 4] * y1 + X[k + 5] * y2
-                b3 -= X[k + 6] * y0 + X[k + 7] * y1 + X[k + 8] * y2
-            if joined and i == n:
-                x[n, 0] = b0
-            else:
-                x[i, 0], x[i, 1], x[i, 2], x[i, 3] = solve4(
-                    (X[k + 12], X[k + 13], X[k + 14], X[k + 15], b0),
-                    (X[k + 16], X[k + 17], X[k + 18], X[k + 19], b1),
-                    (X[k + 20], X[k + 21], X[k + 22], X[k + 23], b2),
-                    (X[k + 24], X[k + 25], X[k + 26], X[k + 27], b3),
-                )
-            x[i, 4] = 0.0
-    if joined:
-        solve_last(X, (n + 1) * ROW + n * KEPT, x, n)
-
-
-@inner
-def solve_backward(X, x):
-    """The second half of `solve_with`, in place."""
-    n = x.shape[0] - 1
-    total = 0.0
-    for i in range(n - 1, -1, -1):
-        p = i * ROW
-        if X[(n + 1) * ROW + i * KEPT + 63] > 0.0:
-            for j in range(SIZE):
-                q = p + SPAN * j
-                y = x[i, j]
-                for m in range(SIZE):
-                    y -= X[q + m] * x[i + 1, m]
-                if i + 2 <= n:
-                    y -= X[q + 5] * x[i + 2, 1] + X[q + 6] * x[i + 2, 2] + X[q + 7] * x[i + 2, 3]
-                x[i, j] = y
-                total += abs(y)
-        else:
-            y0, y1, y2, y3 = x[i + 1, 0], x[i + 1, 1], x[i + 1, 2], x[i + 1, 3]
-            for j in range(SIZE - 1):
-                q = p + SPAN * j
-                y = x[i, j] - X[q] * y0 - X[q + 1] * y1 - X[q + 2] * y2 - X[q + 3] * y3
-                x[i, j] = y
-                total += abs(y)
-    return total < math.inf
-
-
-@inner
-def solve_with(X, W, b, x, joined):
-    """As `solve_again`; joined: the end is joined to a point (kernels.junctions.joined_lines), and is held there."""
-    solve_forward(X, W, b, x, joined)
-    return solve_backward(X, x)
-
-
-@inner
-def add_to_right(X, part, x):
-    """Add a part of what `solve_forward` has left in x to the right-hand sides of all X_i."""
-    for i in range(x.shape[0]):
-        for k in range(SIZE):
-            X[i * ROW + k * SPAN + SPAN - 1] += part * x[i, k]
-
-
-@kernel
-def solve_again(X, W, b, x):
-    """Solve with another right-hand side b (N+1, 5) and the factors that the last march kept behind the X_i.
-
-    b: length of the cell before (m), balance of the node (N), spin of the cell after (N m), as the march assembles
-    them; of a held node nothing, because it stays.  x as in `substitute`; False if it is not finite.
-    """
-    return solve_with(X, W, b, x, False)

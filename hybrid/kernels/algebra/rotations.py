@@ -240,6 +240,12 @@ def d_double_cross(k, n, g, g1):
 
 
 @inner
+def vector(row, o):
+    """Three numbers of a row, from o on."""
+    return (row[o], row[o + 1], row[o + 2])
+
+
+@inner
 def get3(A, i):
     return (A[i, 0], A[i, 1], A[i, 2])
 

@@ -164,9 +164,7 @@ def hold_points(line, contact):
             contact.shares[l, j] = 0.0
     for k in range(contact.counts[POINTS]):
         p, q = contact.of[int(contact.points[k, P])], contact.of[int(contact.points[k, Q])]
-        work, energy = hold_point(
-            line, contact, contact.rubs[p, q], contact.points[k], contact.holds[k], numbers[TRIES], other
-        )
+        work, energy = hold_point(line, contact, k, contact.rubs[p, q], numbers[TRIES], other)
         numbers[SLIP_WORK] += work
         numbers[TRIED] += energy
         contact.shares[p, HELD_WITHIN if p == q else HELD_BETWEEN] += 0.5 * energy
@@ -265,7 +263,7 @@ def load_ends(line, ends, contact, report):
         if min(p, q) == 1 or max(p, q) == n - 1:
             add_gradient(point, y)
             if contact.numbers[FRICTION] > 0.0:
-                add_held(line, contact, i, y)
+                add_held(contact, i, y)
     for k in range(2):
         if ends.held[k] != 0:
             for j in range(3):
@@ -340,6 +338,6 @@ def contact_task(table):
     if phase != TOUCH:
         return numbers[ENERGY] + (numbers[TRIED] if rubs else 0.0)
     charge(line, contact, job.counts)
-    if contact.counts[OVERFLOW] or (contact.counts[POINTS] > 0 and not solve_contact(line, ends, contact, work)):
+    if contact.counts[OVERFLOW] or (contact.counts[POINTS] > 0 and not solve_contact(ends, contact, work)):
         return 0.0
     return 1.0

@@ -26,7 +26,7 @@ from hybrid.kernels.laws.bending_law import energy_share
 from hybrid.kernels.laws.cell import chord, turning
 from hybrid.kernels.laws.element import strain_of_element
 from hybrid.kernels.laws.tension_torque import couples
-from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.march.energies import observe
 from hybrid.kernels.march.powers import find_powers
 from hybrid.kernels.march.zone_torque import twist_energy
@@ -81,7 +81,7 @@ def energy_of_line(line, ends, state):
     return moving + bent + twisted, longer
 
 
-@inner
+@called
 def energy_without_weight(line, ends, contact, state, report):
     """Energy, J, of motion, strain and contact of a state with its report; contact.at and .move are used as room."""
     if couples(line):

@@ -15,14 +15,17 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
+from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub, vector
 from hybrid.kernels.contact.self_contact_law import (
     ALONG,
     DISTANCE,
+    FOLLOWS,
     FOOT_PLACE,
     FORCE,
     NORMAL,
     PLACE,
+    RATES,
+    SLOPE,
     SPRING,
     WX,
     WY,
@@ -45,7 +48,14 @@ HELD, SLIDING, GIVES, SLIDES, TRAVEL = 0, 3, 6, 7, 8
 # And of the iteration before in the same try: number of the try; its point, as piece and place in it, and the piece of
 # the foot; what the surfaces were shifted by (m); 1 where that has turned back, and friction is taken as viscous.
 TRY, WHO, WHOSE, BEFORE, TURNS_BACK = 10, 11, 12, 13, 16
-HOLD = 17
+# What the change of friction by the shape needs: shift of the surfaces along n (m); change of y' in the step (m), turn of
+# both strands in it (rad); n x travel from before (m); how a turn of y'..
+SHUT, OPENS, TURNED, ASIDE, ABOUT, LEANS = 17, 18, 21, 24, 27, 30
+HOLD = 31
+# How a point turns with one of its four cells: chord; what the cell has become longer in the step, a vector (m); inverse
+# of its length (1/m); its part in the turn; its spin in the step (rad); 1 where it has one.
+CHORD, LONGER, INVERSE, SHARE, SPUN, SPINS = 0, 3, 6, 7, 8, 9
+ARM = 10
 SHRINKS = 0.9  # part to which a shift falls that goes to none; one that falls by less slides indeed
 # What is kept of it from step to step: piece; arc lengths of the point and of its foot (m); travel (m); spring (N/m).
 PIECE, AT, FOOT, TRAVELLED, KEPT_SPRING = 0, 1, 2, 3, 5
@@ -60,61 +70,95 @@ def arc_length(line, kind, p, u):
 
 
 @inner
-def turn_of(at, x, p, u):
-    """Rotation of the strand at u of piece p by x (N+1, 4): shifts of nodes and spins of cells."""
-    total = (0.0, 0.0, 0.0)
-    for j in range(2):
-        c, part = p - 1 + j, u if j == 1 else 1.0 - u
+def keep_arms(line, contact, k):
+    """How point k turns with its strands: of the two cells beside each, what contact.arms holds."""
+    row, at, x = contact.points[k], contact.at, contact.x
+    for j in range(4):
+        node, u = int(row[P if j < 2 else Q]), row[PLACE if j < 2 else FOOT_PLACE]
+        c, part = node - 1 + j % 2, u if j % 2 == 1 else 1.0 - u
         d, _, il = chord(sub(get3(at, c + 1), get3(at, c)))
-        bent = scale(il, cross(d, sub(get3(x, c + 1), get3(x, c))))
-        total = add(total, scale(part, add(bent, scale(x[c, 3], d))))
-    return total
+        longer, arm = sub(get3(x, c + 1), get3(x, c)), contact.arms[k, j]
+        for m in range(3):
+            arm[CHORD + m], arm[LONGER + m] = d[m], longer[m]
+        arm[INVERSE], arm[SHARE], arm[SPUN] = il, part, x[c, 3]
+        arm[SPINS] = 1.0 if line.spin[c] else 0.0
 
 
 @inner
-def shift_of(contact, row, x):
-    """How x (N+1, 4) shifts the surfaces of the strands against each other at a point, and their centre lines."""
-    p, q = int(row[P]), int(row[Q])
-    n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
-    apart = sub(
-        spline_point(x, p, (row[WX], row[WX + 1], row[WX + 2])), spline_point(x, q, (row[WY], row[WY + 1], row[WY + 2]))
-    )
-    turned = add(turn_of(contact.at, x, p, row[PLACE]), turn_of(contact.at, x, q, row[FOOT_PLACE]))
-    g = sub(apart, scale(0.5 * row[DISTANCE], cross(turned, n)))
-    return sub(g, scale(dot(g, n), n)), dot(apart, n)
+def turn_of(arm, x, c):
+    """The part that cell c has in the turn of its strand by x (N+1, 4): shifts of nodes and spins of cells."""
+    d = vector(arm, CHORD)
+    bent = scale(arm[INVERSE], cross(d, sub(get3(x, c + 1), get3(x, c))))
+    return scale(arm[SHARE], add(bent, scale(x[c, 3], d)))
 
 
 @inner
-def load_turn(line, at, m, p, u, out):
-    """Add a moment m (N m) on the strand at u of piece p to out (N+1, 4): forces on nodes, moments on cells."""
-    for j in range(2):
-        c, part = p - 1 + j, u if j == 1 else 1.0 - u
-        d, _, il = chord(sub(get3(at, c + 1), get3(at, c)))
-        couple = scale(part * il, cross(m, d))
-        for k in range(3):
-            out[c + 1, k] += couple[k]
-            out[c, k] -= couple[k]
-        if line.spin[c]:
-            out[c, 3] += part * dot(m, d)
+def turn_of_strands(contact, k, x):
+    """The turn of both strands at point k by x, one and the other together."""
+    p, q, arms = int(contact.points[k, P]), int(contact.points[k, Q]), contact.arms[k]
+    first = add(turn_of(arms[0], x, p - 1), turn_of(arms[1], x, p))
+    return add(first, add(turn_of(arms[2], x, q - 1), turn_of(arms[3], x, q)))
 
 
 @inner
-def load(line, contact, row, f, out):
-    """Add what a force f (N) on strand p, and its opposite on strand q, are on nodes and cells to out (N+1, 4)."""
-    p, q = int(row[P]), int(row[Q])
-    for j in range(3):
-        for k in range(3):
-            out[p - 1 + j, k] += row[WX + j] * f[k]
-            out[q - 1 + j, k] -= row[WY + j] * f[k]
-    n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
-    m = scale(-0.5 * row[DISTANCE], cross(n, f))
-    load_turn(line, contact.at, m, p, row[PLACE], out)
-    load_turn(line, contact.at, m, q, row[FOOT_PLACE], out)
+def way_apart(row, x):
+    """How x (N+1, 4) shifts the centre lines of the strands against each other at a point."""
+    return sub(spline_point(x, int(row[P]), vector(row, WX)), spline_point(x, int(row[Q]), vector(row, WY)))
+
+
+@inner
+def load_turn(arm, m, c, out):
+    """Add the part that cell c has of a moment m (N m) on its strand to out (N+1, 4): forces on nodes, moments on cells."""
+    d = vector(arm, CHORD)
+    couple = scale(arm[SHARE] * arm[INVERSE], cross(m, d))
+    for k in range(3):
+        out[c + 1, k] += couple[k]
+        out[c, k] -= couple[k]
+    out[c, 3] += arm[SPINS] * arm[SHARE] * dot(m, d)
+
+
+@inner
+def load_turns(contact, k, m, out):
+    """Add a moment m (N m) on both strands of point k to out (N+1, 4)."""
+    p, q, arms = int(contact.points[k, P]), int(contact.points[k, Q]), contact.arms[k]
+    load_turn(arms[0], m, p - 1, out)
+    load_turn(arms[1], m, p, out)
+    load_turn(arms[2], m, q - 1, out)
+    load_turn(arms[3], m, q, out)
+
+
+@inner
+def change_of_turn(arm, x, c, wins):
+    """Change, by a change x of shifts and spins, of the part that cell c had in the turn of its strand in the step.
+
+    wins: by how much its part grows.
+    """
+    d, il, longer = vector(arm, CHORD), arm[INVERSE], vector(arm, LONGER)
+    more = sub(get3(x, c + 1), get3(x, c))
+    turned = scale(il, sub(more, scale(dot(d, more), d)))
+    inverse = scale(il, sub(turned, scale(il * dot(d, more), d)))
+    change = add(cross(inverse, longer), scale(arm[SPUN], turned))
+    had = add(scale(il, cross(d, longer)), scale(arm[SPUN], d))
+    return add(scale(arm[SHARE], change), scale(wins, had))
+
+
+@inner
+def load_change(arm, m, x, c, wins, out):
+    """Add the change, by x, of what the part of cell c of a moment m is to out, m being kept; wins: as above."""
+    d, il = vector(arm, CHORD), arm[INVERSE]
+    more = sub(get3(x, c + 1), get3(x, c))
+    turned = scale(il, sub(more, scale(dot(d, more), d)))
+    inverse = scale(il, sub(turned, scale(il * dot(d, more), d)))
+    couple = cross(m, add(scale(arm[SHARE], inverse), scale(wins * il, d)))
+    for k in range(3):
+        out[c + 1, k] += couple[k]
+        out[c, k] -= couple[k]
+    out[c, 3] += arm[SPINS] * dot(m, add(scale(arm[SHARE], turned), scale(wins, d)))
 
 
 @inner
 def directions(contact, row):
-    """Two directions normal to n, the first as near to strand p as can be."""
+    """Two directions normal to n, the first as near to strand p as can be; x' of that, m, 0: it ends on the other."""
     p = int(row[P])
     n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
     at = contact.at
@@ -123,9 +167,10 @@ def directions(contact, row):
     size = math.sqrt(dot(t, t))
     t = sub(t, scale(dot(t, n), n))
     if not dot(t, t) > 1e-6 * size * size:  # the strand ends on the other: any direction does
-        t = (n[1], -n[0], 0.0) if abs(n[2]) < 0.7 else (0.0, n[2], -n[1])
-    t = scale(1.0 / math.sqrt(dot(t, t)), t)
-    return t, cross(n, t)
+        t, size = (n[1], -n[0], 0.0) if abs(n[2]) < 0.7 else (0.0, n[2], -n[1]), 0.0
+    within = math.sqrt(dot(t, t))
+    t = scale(1.0 / within, t)
+    return t, cross(n, t), within, size
 
 
 @inner
@@ -175,15 +220,32 @@ def turns_back(row, hold, trial, slides, number):
 
 
 @inner
-def hold_point(line, contact, friction, row, hold, number, other_cells):
-    """Friction of a point of contact at the shifts and spins contact.x; its work in the step, and its energy (J).
+def hold_point(line, contact, k, friction, number, other_cells):
+    """Friction of point k of contact at the shifts and spins contact.x; its work in the step, and its energy (J).
 
     number: of the try; other_cells: as in `find_grip`.
     """
-    first, second = directions(contact, row)
+    row, hold = contact.points[k], contact.holds[k]
+    keep_arms(line, contact, k)
+    first, second, within, size = directions(contact, row)
     along, across = find_grip(line, contact, row, other_cells)
-    g, _ = shift_of(contact, row, contact.x)
-    trial = add(g, add(scale(along, first), scale(across, second)))
+    n, q = vector(row, NORMAL), int(row[Q])
+    apart, turned = way_apart(row, contact.x), turn_of_strands(contact, k, contact.x)
+    shift = sub(apart, scale(0.5 * row[DISTANCE], cross(turned, n)))
+    g = sub(shift, scale(dot(shift, n), n))
+    kept = add(scale(along, first), scale(across, second))
+    trial = add(g, kept)
+    opens = spline_point(contact.x, q, vector(row, RATES))
+    aside = cross(n, kept)
+    hold[SHUT] = dot(shift, n)
+    lean = 0.0
+    if size > 0.0:
+        before, after = end_slopes(contact.kind, contact.at, int(row[P]))
+        lean = dot(slope(before, after, row[PLACE]), n)
+    hold[LEANS] = lean
+    for j in range(3):
+        hold[OPENS + j], hold[TURNED + j], hold[ASIDE + j] = opens[j], turned[j], aside[j]
+        hold[ABOUT + j] = second[j] / within if size > 0.0 else 0.0
     size, spring, most = math.sqrt(dot(trial, trial)), row[SPRING], -friction * row[FORCE]
     hold[GIVES], hold[SLIDES], part = spring, 0.0, 1.0
     if spring * size > most:
@@ -191,32 +253,60 @@ def hold_point(line, contact, friction, row, hold, number, other_cells):
         hold[GIVES], hold[SLIDES] = part * spring, friction
     hold[TURNS_BACK] = turns_back(row, hold, trial, hold[SLIDES] > 0.0, number)
     travel = scale(part, trial)
-    for k in range(3):
-        hold[HELD + k] = -spring * travel[k]
-        hold[SLIDING + k] = trial[k] / size if size > 0.0 else 0.0
+    for j in range(3):
+        hold[HELD + j] = -spring * travel[j]
+        hold[SLIDING + j] = trial[j] / size if size > 0.0 else 0.0
     hold[TRAVEL], hold[TRAVEL + 1] = dot(travel, first), dot(travel, second)
     return -spring * dot(travel, g), 0.5 * spring * dot(travel, travel)
 
 
 @inner
-def add_held(line, contact, k, out):
+def add_held(contact, k, out):
     """Add the friction of point k, with the opposite sign, to out (N+1, 4)."""
-    hold = contact.holds[k]
-    load(line, contact, contact.points[k], (-hold[HELD], -hold[HELD + 1], -hold[HELD + 2]), out)
+    row, f = contact.points[k], scale(-1.0, vector(contact.holds[k], HELD))
+    p, q = int(row[P]), int(row[Q])
+    for j in range(3):
+        for m in range(3):
+            out[p - 1 + j, m] += row[WX + j] * f[m]
+            out[q - 1 + j, m] -= row[WY + j] * f[m]
+    load_turns(contact, k, scale(-0.5 * row[DISTANCE], cross(vector(row, NORMAL), f)), out)
 
 
 @inner
-def add_held_product(line, contact, k, x, out):
-    """Add the change of that by x (N+1, 4), directions and places being kept, to out (N+1, 4)."""
-    row, hold = contact.points[k], contact.holds[k]
-    g, nearer = shift_of(contact, row, x)
-    t = (hold[SLIDING], hold[SLIDING + 1], hold[SLIDING + 2])
-    gives = hold[GIVES]
+def add_held_product(contact, k, x, out):
+    """Add the change of that by x (N+1, 4) to out (N+1, 4)."""
+    row, hold, arms = contact.points[k], contact.holds[k], contact.arms[k]
+    p, q, n, y, d = int(row[P]), int(row[Q]), vector(row, NORMAL), vector(row, SLOPE), row[DISTANCE]
+    t, gives, force = vector(hold, SLIDING), hold[GIVES], scale(-1.0, vector(hold, HELD))
+    z, theta = way_apart(row, x), turn_of_strands(contact, k, x)
+    nearer = dot(z, n)
+    dv = row[FORCE] * row[FOLLOWS] * (dot(y, z) + dot(n, spline_point(x, q, vector(row, RATES))))
+    theta = add(theta, add(change_of_turn(arms[0], x, p - 1, 0.0), change_of_turn(arms[1], x, p, 0.0)))
+    theta = add(theta, add(change_of_turn(arms[2], x, q - 1, -dv), change_of_turn(arms[3], x, q, dv)))
+    away = sub(z, scale(d * dv, y))
+    dn = scale(1.0 / d, sub(away, scale(nearer, n)))
+    g = sub(z, scale(0.5 * d, cross(theta, n)))
+    g = sub(g, add(scale(dv, vector(hold, OPENS)), scale(0.5, cross(vector(hold, TURNED), away))))
+    g = sub(g, scale(hold[SHUT], dn))
+    before, after = end_slopes(contact.kind, x, p)
+    about = dot(vector(hold, ABOUT), sub(slope(before, after, row[PLACE]), scale(hold[LEANS], dn)))
+    g = add(g, scale(about, vector(hold, ASIDE)))
+    g = sub(g, scale(dot(g, n), n))
     f = scale(gives, g)
     if hold[SLIDES] > 0.0:
         along = 0.0 if hold[TURNS_BACK] > 0.0 else gives * dot(t, g)
         f = sub(f, scale(along + hold[SLIDES] * row[ALONG] * nearer, t))
-    load(line, contact, row, f, out)
+    f = sub(f, scale(dot(force, dn), n))
+    for j in range(3):
+        for m in range(3):
+            out[p - 1 + j, m] += row[WX + j] * f[m]
+            out[q - 1 + j, m] -= row[WY + j] * f[m] + row[RATES + j] * dv * force[m]
+    moment = scale(-0.5 * d, cross(n, force))
+    load_turns(contact, k, scale(-0.5, add(cross(away, force), scale(d, cross(n, f)))), out)
+    load_change(arms[0], moment, x, p - 1, 0.0, out)
+    load_change(arms[1], moment, x, p, 0.0, out)
+    load_change(arms[2], moment, x, q - 1, -dv, out)
+    load_change(arms[3], moment, x, q, dv, out)
 
 
 @inner

@@ -88,17 +88,19 @@ def foot(kind, r, q, x):
         return 0.0, -1
     if at_end < 0.0:
         return 1.0, 1
+    # away = first + v before + v^2 bend/2, along = before + v bend: their product is c0 + c1 v + c2 v^2 + c3 v^3
+    first = sub(sub(get3(r, q), scale(0.5, before)), x)
+    c0, c1 = dot(first, before), dot(before, before) + dot(first, bend)
+    c2, c3 = 1.5 * dot(before, bend), 0.5 * dot(bend, bend)
     low, high = 0.0, 1.0
     v = at_start / (at_start - at_end)
     for _ in range(FOOT_STEPS):
-        away = sub(spline_point(r, q, spline_weights(kind, q, v)), x)
-        along = slope(before, after, v)
-        g = dot(away, along)
+        g = c0 + v * (c1 + v * (c2 + v * c3))
         if g < 0.0:
             low = v
         else:
             high = v
-        rate = dot(along, along) + dot(away, bend)
+        rate = c1 + v * (2.0 * c2 + v * 3.0 * c3)
         new = v - g / rate if rate > 0.0 else 0.5 * (low + high)
         if not low <= new <= high:
             new = 0.5 * (low + high)

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.algebra.kept_factors import SWEEP
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
-from hybrid.kernels.contact.self_contact_friction import GRIP, HOLD
+from hybrid.kernels.contact.self_contact_friction import ARM, GRIP, HOLD
 from hybrid.kernels.contact.self_contact_law import (
     FIRST,
     INNER,
@@ -39,7 +40,7 @@ from hybrid.kernels.contact.self_distance import (
     nearest_feet,
     runs_on,
 )
-from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.state.books import RATES
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.newton import LIMIT, TOUCH
@@ -125,12 +126,13 @@ class Contact(NamedTuple):
     power: Floats  # (RATES,) W, where the try has led
     x: Floats  # (N+1, 4) m, displacements in products, and spins of cells, rad
     y: Floats  # (N+1, 4) N, N m
-    b: Floats  # (N+1, 5) right-hand side
-    z: Floats  # (N+1, 5) its solution
+    z: Floats  # (N+1, 5) right-hand side of nodes in contact, and its solution
+    sweep: Floats  # (N+1, SWEEP) of the matrix, as kernels.algebra.kept_factors.sweep takes it
     basis: Floats  # (MOST_PRODUCTS + 1, 3 (N+1)); of spins as well with friction: 4 (N+1)
     hessenberg: Floats  # (MOST_PRODUCTS + 1, MOST_PRODUCTS + 4): columns, rotations (2), right-hand side, solution
     # with friction (kernels.contact.self_contact_friction); else no rows
     holds: Floats  # (C, HOLD) of the points of contact
+    arms: Floats  # (C, 4, ARM) how these turn with their cells
     grips: Floats  # (C, GRIP) what has been kept of the last step
     fresh: Floats  # (C, GRIP) what is kept if the try is taken
     heads: NDArray[np.int64]  # (N+1,) the first grip of a piece, -1: none
@@ -155,9 +157,9 @@ def blank_contact(cells: int, points: int = 1, friction: bool = False, lines: in
         counts=z(COUNTS, np.int64), tree=z((2 * leaves, 12)), stack=z((4 * DEPTH, 2), np.int64),
         pairs=z((PAIRS_OF_NODE * nodes, 2), np.int64), at=z((nodes, 3)),
         move=z((nodes, 3)), near=z(nodes), points=z((points, POINT)), nodes=z(nodes, np.int64), marks=z(nodes, np.int64), energy=z(5), power=z(RATES),
-        x=z((nodes, 4)), y=z((nodes, 4)), b=z((nodes, 5)), z=z((nodes, 5)),
+        x=z((nodes, 4)), y=z((nodes, 4)), z=z((nodes, 5)), sweep=z((nodes, SWEEP)),
         basis=z((MOST_PRODUCTS + 1, (4 if friction else 3) * nodes)), hessenberg=z((MOST_PRODUCTS + 1, MOST_PRODUCTS + 4)),
-        holds=z((held, HOLD)), grips=z((held, GRIP)), fresh=z((held, GRIP)), heads=z(nodes, np.int64),
+        holds=z((held, HOLD)), arms=z((held, 4, ARM)), grips=z((held, GRIP)), fresh=z((held, GRIP)), heads=z(nodes, np.int64),
         links=z(held, np.int64),
     )  # fmt: skip
 
@@ -310,7 +312,7 @@ def next_sample(contact, p, q, g, reach):
     return min(g, count)
 
 
-@inner
+@called
 def limit_part(line, ends, contact, p, q, width, moved):
     """Shorten the part so that no sample point of piece p comes too near piece q by a difference of `moved`, m."""
     kind, r, numbers, count = contact.kind, contact.at, contact.numbers, contact.samples[p]
@@ -331,7 +333,7 @@ def limit_part(line, ends, contact, p, q, width, moved):
             numbers[PART] = room / moved
 
 
-@inner
+@called
 def gather(line, contact, p, q, width):
     """Keep the points of contact of piece p with their feet on piece q."""
     kind, r, counts, numbers = contact.kind, contact.at, contact.counts, contact.numbers
@@ -396,7 +398,7 @@ def keep_pair(contact, p, q, room):
     contact.counts[PAIRS] = count + 1
 
 
-@inner
+@called
 def look_at_pair(line, ends, contact, phase, p, q):
     """What there is to do for pieces p < q whose boxes may be near: limit what is asked, or keep points of contact."""
     if not may_touch(line, ends, contact, p, q):
@@ -418,7 +420,7 @@ def look_at_pair(line, ends, contact, phase, p, q):
         gather(line, contact, q, p, width)
 
 
-@inner
+@called
 def look_at_pairs(line, ends, contact, phase):
     """Look at all pairs of pieces whose boxes are within REACH, in an order that does not depend on anything else.
 
@@ -488,7 +490,7 @@ def look_at_kept(line, ends, contact, phase, gone):
         look_at_pairs(line, ends, contact, phase)
 
 
-@inner
+@called
 def limit(line, ends, contact, gone):
     """The part of contact.move that is safe; SPEED becomes the largest difference of what may come into contact, m.
 
@@ -512,7 +514,7 @@ def look_ahead(line, ends, contact, v):
     look_at_pairs(line, ends, contact, WATCH)
 
 
-@inner
+@called
 def find_points(line, ends, contact, gone):
     """The points of contact, their energy, and the nodes in contact; gone: m, largest displacement in the step."""
     counts, numbers = contact.counts, contact.numbers

@@ -9,17 +9,19 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.algebra.block_elimination import solve_again
+from hybrid.kernels.algebra.kept_factors import carry_given, prepare_sweep, solve_backward, sweep
 from hybrid.kernels.contact.self_contact_friction import add_held, add_held_product
 from hybrid.kernels.contact.self_contact_law import add_gradient, add_product
-from hybrid.kernels.contact.self_contact_pairs import FRICTION, MOST_PRODUCTS, NODES, POINTS, PRODUCTS, ROLLS
-from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.contact.self_contact_pairs import FRICTION, MOST_PRODUCTS, NODES, POINTS, PRODUCTS, ROLLS, WIDEST
+from hybrid.kernels.machine.compile import called, inner
 
-SOLVED = 1e-7  # residual of GMRES, as a part of the first
+# GMRES leaves a part of its first residual: of what Newton's method leaves of the correction, its size in diameters, a
+# hundredth, at most LARGEST_LEFT; no less than SOLVED, and than LEAST_LEFT diameters.
+SOLVED, LARGEST_LEFT, PART_LEFT, LEAST_LEFT = 1e-7, 1e-3, 0.01, 1e-11
 
 
 @inner
-def find_forces(line, contact, with_gradient):
+def find_forces(contact, with_gradient):
     """contact.y = H x + g of the nodes in contact, g where asked."""
     held_on = contact.numbers[FRICTION] > 0.0
     x, y = contact.x, contact.y
@@ -31,28 +33,49 @@ def find_forces(line, contact, with_gradient):
         if with_gradient:
             add_gradient(contact.points[k], y)
         if held_on:
-            add_held_product(line, contact, k, x, y)
+            add_held_product(contact, k, x, y)
             if with_gradient:
-                add_held(line, contact, k, y)
+                add_held(contact, k, y)
 
 
 @inner
-def respond(line, ends, contact, work, with_gradient):
-    """contact.z = A^-1 (H x + g), g where asked; x of the nodes in contact."""
-    find_forces(line, contact, with_gradient)
-    y, b, count = contact.y, contact.b, contact.counts[NODES]
+def enough(s, width, size):
+    """Residual that GMRES may leave of the first, s (m), of `size` unknowns of lines of a diameter `width`, m."""
+    scale = width * math.sqrt(size)
+    return max(s * max(SOLVED, min(PART_LEFT * s / scale, LARGEST_LEFT)), LEAST_LEFT * scale)
+
+
+@inner
+def first_node(contact):
+    """The first node in contact."""
+    first = contact.nodes[0]
+    for k in range(contact.counts[NODES]):
+        first = min(first, contact.nodes[k])
+    return first
+
+
+@called
+def respond(ends, contact, work, with_gradient, begin):
+    """contact.z = A^-1 (H x + g) from node `begin` on, g where asked; x of the nodes in contact."""
+    find_forces(contact, with_gradient)
+    y, z = contact.y, contact.z
     last = y.shape[0] - 1
-    for k in range(count):
+    for k in range(contact.counts[NODES]):
         i = contact.nodes[k]
         held = (i == 0 and ends.held[0] != 0) or (i == last and ends.held[1] != 0)
+        z[i, 0] = 0.0
         for j in range(3):
-            b[i, 1 + j] = 0.0 if held else y[i, j]
-        b[i, 4] = y[i, 3] * contact.rolls[i]
-    good = solve_again(work.X, work.W, b, contact.z)
-    for k in range(count):
-        i = contact.nodes[k]
-        b[i, 1], b[i, 2], b[i, 3], b[i, 4] = 0.0, 0.0, 0.0, 0.0
-    return good
+            z[i, 1 + j] = 0.0 if held else y[i, j]
+        z[i, 4] = y[i, 3] * contact.rolls[i]
+    if begin == 0:
+        for i in range(first_node(contact)):
+            for j in range(5):
+                z[i, j] = 0.0
+    if with_gradient:
+        carry_given(work.X, work.W, contact.marks, z, False, max(begin, first_node(contact)))
+    else:
+        sweep(work.X, work.W, contact.sweep, contact.marks, z, False, begin)
+    return solve_backward(work.X, z, begin)
 
 
 @inner
@@ -68,20 +91,32 @@ def length_of(contact, j, i):
 
 
 @inner
+def inner_product(a, b, size):
+    """Of vectors, in four sums: one would wait for itself in every term."""
+    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+    whole = size - size % 4
+    for i in range(0, whole, 4):
+        s0 += a[i] * b[i]
+        s1 += a[i + 1] * b[i + 1]
+        s2 += a[i + 2] * b[i + 2]
+        s3 += a[i + 3] * b[i + 3]
+    for i in range(whole, size):
+        s0 += a[i] * b[i]
+    return (s0 + s1) + (s2 + s3)
+
+
+@inner
 def next_vector(contact, k):
     """Orthogonalise basis vector k + 1 against those before; its length goes into the column k."""
     V, H, size = contact.basis, contact.hessenberg, unknowns(contact) * contact.counts[NODES]
+    new = V[k + 1]
     for j in range(k + 1):
-        s = 0.0
-        for i in range(size):
-            s += V[j, i] * V[k + 1, i]
+        before = V[j]
+        s = inner_product(before, new, size)
         H[j, k] = s
         for i in range(size):
-            V[k + 1, i] -= s * V[j, i]
-    s = 0.0
-    for i in range(size):
-        s += V[k + 1, i] * V[k + 1, i]
-    s = math.sqrt(s)
+            new[i] -= s * before[i]
+    s = math.sqrt(inner_product(new, new, size))
     H[k + 1, k] = s
     if s > 0.0:
         for i in range(size):
@@ -115,7 +150,7 @@ def take_vector(contact, column):
 
 
 @inner
-def find_solution(line, ends, contact, work):
+def find_solution(ends, contact, work):
     """GMRES: contact.x = the correction of the nodes in contact; False: not finite.
 
     It begins at zero, where the residual is A^-1 (b + g), which falls as Newton converges.  The correction x0 of a line
@@ -123,11 +158,13 @@ def find_solution(line, ends, contact, work):
     """
     x, z, V, H = contact.x, contact.z, contact.basis, contact.hessenberg
     count, per, rhs, solution = contact.counts[NODES], unknowns(contact), MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
+    begin = first_node(contact)
+    prepare_sweep(work.X, work.W, contact.sweep, begin, contact.z.shape[0] - 1)
     for k in range(count):
         i = contact.nodes[k]
         for j in range(per):
             x[i, j] = 0.0
-    if not respond(line, ends, contact, work, True):
+    if not respond(ends, contact, work, True, begin):
         return False
     s = 0.0
     for k in range(count):
@@ -144,10 +181,10 @@ def find_solution(line, ends, contact, work):
     if s > 0.0:
         for i in range(per * count):
             V[0, i] /= s
-        left = s
-        while done < min(MOST_PRODUCTS, per * count) and left > SOLVED * s:
+        left, most = s, enough(s, contact.numbers[WIDEST], per * count)
+        while done < min(MOST_PRODUCTS, per * count) and left > most:
             take_vector(contact, done)
-            if not respond(line, ends, contact, work, False):
+            if not respond(ends, contact, work, False, begin):
                 return False
             for k in range(count):
                 i = contact.nodes[k]
@@ -173,9 +210,9 @@ def find_solution(line, ends, contact, work):
 
 
 @inner
-def solve_contact(line, ends, contact, work):
+def solve_contact(ends, contact, work):
     """Put contact into the correction work.x of a line without it; False if it is not finite."""
-    if not find_solution(line, ends, contact, work) or not respond(line, ends, contact, work, True):
+    if not find_solution(ends, contact, work) or not respond(ends, contact, work, True, 0):
         return False
     z = contact.z
     for i in range(work.x.shape[0]):

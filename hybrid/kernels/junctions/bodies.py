@@ -27,6 +27,7 @@ from hybrid.kernels.algebra.rotations import (
     scale,
     sub,
     vec_mat,
+    vector,
 )
 from hybrid.kernels.laws.members import members_change, members_force
 from hybrid.kernels.machine.compile import inner
@@ -59,11 +60,6 @@ WORK = 45
 # round-off of moments; one that is held as softly as 1e-4 of the stiffest converges by four digits an iteration still.
 SOFTEST = 1e-8
 VERTICAL = (0.0, 0.0, 1.0)
-
-
-@inner
-def vector(row, o):
-    return (row[o], row[o + 1], row[o + 2])
 
 
 @inner

@@ -33,8 +33,9 @@ from hybrid.kernels.algebra.rotations import (
     scale,
     sub,
     vec_mat,
+    vector,
 )
-from hybrid.kernels.junctions.bodies import FRAME, START, N, W, matrix, vector
+from hybrid.kernels.junctions.bodies import FRAME, START, N, W, matrix
 from hybrid.kernels.laws.bending_law import bending_at, damped_bending_at
 from hybrid.kernels.laws.cell import chord, turning
 from hybrid.kernels.laws.element import after, angular_velocity, before

@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, SPAN, solve4, solve5
+from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, SPAN
+from hybrid.kernels.algebra.kept_factors import carry_block
 from hybrid.kernels.junctions.carried_frames import (
     BY_CHORD,
     BY_SPIN,
@@ -50,43 +51,6 @@ def end_row(X, k, r, c):
 
 
 @inner
-def carry_block(X, W, x, i, o, n, solved):
-    """D_i of one coordinate from those before, in row o of x, where its right-hand side stands; not `solved`: as that."""
-    k = (n + 1) * ROW + i * KEPT
-    if X[k + 63] > 0.0:
-        if i >= 2:
-            for j in range(4):
-                x[o, 0] -= X[k + 69 + j] * x[o - 2, j + 1]
-            for r in range(3):
-                for j in range(4):
-                    x[o, r + 1] -= X[k + 4 * r + j] * x[o - 2, j + 1]
-        if i >= 1:
-            for r in range(SIZE):
-                y = x[o, r]
-                for j in range(SIZE):
-                    y -= X[k + 12 + SIZE * r + j] * x[o - 1, j]
-                x[o, r] = y
-        if solved:
-            solve5(X, k + 37, W, x, o)
-        return
-    b0, b1, b2, b3 = x[o, 0], x[o, 1], x[o, 2], x[o, 3]
-    if i > 0:
-        y0, y1, y2 = x[o - 1, 1], x[o - 1, 2], x[o - 1, 3]
-        b0 += X[k + 9] * y0 + X[k + 10] * y1 + X[k + 11] * y2
-        b1 -= X[k] * y0 + X[k + 1] * y1 + X[k + 2] * y2
-        b2 -= X[k + 3] * y0 + X[k + 4] * y1 + X[k + 5] * y2
-        b3 -= X[k + 6] * y0 + X[k + 7] * y1 + X[k + 8] * y2
-    x[o, 0], x[o, 1], x[o, 2], x[o, 3], x[o, 4] = b0, b1, b2, b3, 0.0
-    if solved:
-        x[o, 0], x[o, 1], x[o, 2], x[o, 3] = solve4(
-            (X[k + 12], X[k + 13], X[k + 14], X[k + 15], b0),
-            (X[k + 16], X[k + 17], X[k + 18], X[k + 19], b1),
-            (X[k + 20], X[k + 21], X[k + 22], X[k + 23], b2),
-            (X[k + 24], X[k + 25], X[k + 26], X[k + 27], b3),
-        )
-
-
-@inner
 def put_row(x, o, a, b, c, d, e):
     x[o, 0], x[o, 1], x[o, 2], x[o, 3], x[o, 4] = a, b, c, d, e
 
@@ -102,7 +66,7 @@ def carry_start(X, W, columns, first, n, joined):
             put_row(x, first + i, 0.0, 0.0, 0.0, 0.0, 0.0)
             if i == 0:
                 x[first, b + 1] = unit
-            carry_block(X, W, x, i, first + i, n, not (joined and i == n))
+            carry_block(X, W, x, i, first + i, n, 0, not (joined and i == n))
 
 
 @inner
@@ -124,7 +88,7 @@ def carry_turn(X, W, columns, first, n, joined, answer):
             elif i == 1:
                 longer = length_by_turn(X, 1, n, answer, b)
                 put_row(x, o + 1, -longer, -answer[g + b], -answer[g + 3 + b], -answer[g + 6 + b], 0.0)
-            carry_block(X, W, x, i, o + i, n, not (joined and i == n))
+            carry_block(X, W, x, i, o + i, n, 0, not (joined and i == n))
 
 
 @inner
@@ -135,9 +99,9 @@ def carry_end_turn(X, W, columns, first, n, answer):
         x = columns[END_TURN + b]
         fx, fy, fz = answer[g + b], answer[g + 3 + b], answer[g + 6 + b]
         put_row(x, o - 1, 0.0, -fx, -fy, -fz, -answer[SPIN_BY_TURN + b])
-        carry_block(X, W, x, n - 1, o - 1, n, True)
+        carry_block(X, W, x, n - 1, o - 1, n, n - 1, True)
         put_row(x, o, -length_by_turn(X, n, n, answer, b), fx, fy, fz, 0.0)
-        carry_block(X, W, x, n, o, n, False)
+        carry_block(X, W, x, n, o, n, n - 1, False)
 
 
 @inner

@@ -13,8 +13,8 @@ A point that lines are clamped to is a body without mass.
 
 from __future__ import annotations
 
-from hybrid.kernels.algebra.rotations import cross, hat, mat_mat
-from hybrid.kernels.junctions.bodies import LINES, X, add_own, reach_out, vector
+from hybrid.kernels.algebra.rotations import cross, hat, mat_mat, vector
+from hybrid.kernels.junctions.bodies import LINES, X, add_own, reach_out
 from hybrid.kernels.junctions.carried_frames import TURNS, WITH_POINT, answer_of_end, place_frame, turns
 from hybrid.kernels.junctions.joined_lines import (
     COLUMNS,
@@ -114,8 +114,11 @@ def put_functional(f, low, high, joined, S, e):
 
 
 @inner
-def hand_over(l, job, system, cv):
-    """What a line hands over: its rows and columns of S; cv: of this step (that in the job is being written)."""
+def hand_over(l, job, system, cv, carries):
+    """What a line hands over: its rows and columns of S; cv: of this step (that in the job is being written).
+
+    carries: whether its columns are found; else they are those of the call before, with the same factors.
+    """
     joints, seats, columns, gaps, answers, S = (
         system.joints, system.seats, system.columns, system.gaps, system.answers, system.S,
     )  # fmt: skip
@@ -131,11 +134,11 @@ def hand_over(l, job, system, cv):
         if turns(seats, l, k):
             b = joints[l, k] - points
             answer_of_end(job, k, new[b], work[b], cv, answers[k])
-    if start >= 0:
+    if carries and start >= 0:
         carry_start(X_, job.work.W, columns, o, n, end >= 0)
-    if starts:
+    if carries and starts:
         carry_turn(X_, job.work.W, columns, o, n, end >= 0, answers[START])
-    if ends:
+    if carries and ends:
         carry_end_turn(X_, job.work.W, columns, o, n, answers[END])
     if start >= 0:
         for a in range(6 if starts else 3):
@@ -272,7 +275,7 @@ def assemble_junctions(system, m, cv, ca, own):
     """Equations (m, m+1) of the last tensions, the points and the bodies, from what the lines hand over.
 
     system: a kernels.run.system.SystemJob, or what has the same of it; own: whether what bodies are out of balance by
-    themselves is in the right-hand side.
+    themselves is in the right-hand side; where it is not, that is another one for the same factors of the lines.
     """
     tables, joints, net, A = system.tables, system.joints, system.net, system.A
     for r in range(m):
@@ -284,7 +287,7 @@ def assemble_junctions(system, m, cv, ca, own):
         if start < 0 and end < 0:
             continue
         job = read(tables[l])
-        hand_over(l, job, system, cv)
+        hand_over(l, job, system, cv, own)
         spread(l, job, system, tensions, row if end >= 0 else -1, m)
         if end >= 0:
             row += 1

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.algebra.rotations import add, cross, mat_vec, scale
-from hybrid.kernels.junctions.bodies import FRAME, PLACE, STATE, A, V, W, matrix, vector
+from hybrid.kernels.algebra.rotations import add, cross, mat_vec, scale, vector
+from hybrid.kernels.junctions.bodies import FRAME, PLACE, STATE, A, V, W, matrix
 from hybrid.kernels.laws.members import ALONG, MIDDLE, PIECE, PUSH, WATER, WET
 from hybrid.kernels.laws.water import current_at, wave_kinematics
 from hybrid.kernels.machine.compile import kernel

@@ -141,7 +141,7 @@ def find_pushes(one, pushes):
             if (contact.of[int(row[P])] == contact.of[int(row[Q])]) == within:
                 add_gradient(row, y)
                 if contact.numbers[FRICTION] > 0.0:
-                    add_held(one.line, contact, k, y)
+                    add_held(contact, k, y)
         if not within:
             for i in range(y.shape[0]):
                 for j in range(3):

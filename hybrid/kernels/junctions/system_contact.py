@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.block_elimination import ROW, SIZE, SPAN
+from hybrid.kernels.algebra.kept_factors import carry_given, prepare_sweep, sweep
 from hybrid.kernels.contact.self_contact import read as read_contact
-from hybrid.kernels.contact.self_contact_pairs import MOST_PRODUCTS, NODES, OVERFLOW, POINTS
+from hybrid.kernels.contact.self_contact_pairs import MOST_PRODUCTS, NODES, OVERFLOW, POINTS, WIDEST
 from hybrid.kernels.contact.self_contact_solve import (
-    SOLVED,
+    enough,
     find_forces,
+    inner_product,
     length_of,
     rotate_column,
     take_vector,
@@ -26,9 +28,9 @@ from hybrid.kernels.contact.self_contact_solve import (
 )
 from hybrid.kernels.junctions.bodies import NUMBERS, STATE, WORK, X
 from hybrid.kernels.junctions.carried_frames import ANSWER, SEAT
-from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL, carry_block, last_block, solve_dense
+from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL, last_block, solve_dense
 from hybrid.kernels.junctions.junctions import END, HANDED, START, assemble_junctions, correct_all
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.state.state import Floats
@@ -87,20 +89,29 @@ read_job = reader(blank_touching_job())
 
 
 @inner
-def set_right_side(l, line_job, contact, first, joints, touches):
+def first_in_contact(contact, first, n):
+    """The first of the n + 1 nodes of a line that is in contact; n + 1: none is.  first: where they begin there."""
+    for i in range(n + 1):
+        if contact.marks[first + i] != 0:
+            return i
+    return n + 1
+
+
+@inner
+def set_right_side(l, line_job, contact, first, joints, touches, exactly):
     """The right-hand side of an eliminated line: forces contact.y on the nodes in contact, or nothing.
 
-    first: where its nodes begin in contact.
+    first: where its nodes begin in contact; exactly: not by way of `sweep`.
     """
     work, n, ends = line_job.work, line_job.line.h.shape[0], line_job.ends
-    x, X_ = work.x, work.X
-    for i in range(n + 1):
-        for j in range(SIZE):
-            x[i, j] = 0.0
+    x, X_, joined = work.x, work.X, joints[l, END] >= 0
     if joints[l, START] >= 0:
         for a in range(3):
             work.rows[0, (a + 1) * 24 + 23] = 0.0
-    for i in range(n + 1 if touches else 0):
+    begin = first_in_contact(contact, first, n) if touches else n + 1
+    for i in range(begin, n + 1):
+        for j in range(SIZE):
+            x[i, j] = 0.0
         if contact.marks[first + i] == 0:
             continue
         end = 0 if i == 0 else 1
@@ -112,36 +123,53 @@ def set_right_side(l, line_job, contact, first, joints, touches):
             for j in range(3):
                 x[i, 1 + j] = contact.y[first + i, j]
         x[i, 4] = contact.y[first + i, 3] * contact.rolls[first + i]
-    joined = joints[l, END] >= 0
+    if begin <= n and exactly:
+        carry_given(X_, work.W, contact.marks[first:], x, joined, begin)
+    elif begin <= n:
+        sweep(X_, work.W, contact.sweep[first:], contact.marks[first:], x, joined, begin)
     for i in range(n + 1):
-        if touches:
-            carry_block(X_, work.W, x, i, i, n, not (joined and i == n))
         for k in range(SIZE):
-            X_[i * ROW + k * SPAN + SPAN - 1] = x[i, k]
+            X_[i * ROW + k * SPAN + SPAN - 1] = x[i, k] if i >= begin else 0.0
     if joined:
         o = last_block(X_, n)
         for k in range(SIZE):
-            X_[o + 64 + k] = x[n, k]
+            X_[o + 64 + k] = x[n, k] if n >= begin else 0.0
 
 
-@inner
+@called
 def respond(job, cv, ca, with_gradient):
     """Corrections work.x of all lines by the forces of contact at contact.x; False if they are not finite."""
     m = job.A.shape[1] - 1
     for l in range(job.tables.shape[0]):
         if touching(job, l) > 0:
-            one = read_contact(job.contacts[l])
-            find_forces(one.line, one.contact, with_gradient)
+            find_forces(read_contact(job.contacts[l]).contact, with_gradient)
     for l in range(job.tables.shape[0]):
         lead, touches = max(job.shared[l, 0], 0), False
         contact = read_contact(job.contacts[lead]).contact
         if job.shared[l, 0] >= 0:
             touches = contact.counts[POINTS] > 0
-        set_right_side(l, read(job.tables[l]), contact, job.shared[l, 1], job.joints, touches)
+        set_right_side(l, read(job.tables[l]), contact, job.shared[l, 1], job.joints, touches, with_gradient)
     assemble_junctions(job, m, cv, ca, False)
     if m > 0 and not solve_dense(job.A, m):
         return False
     return correct_all(job, job.net.shape[0], m) < 0
+
+
+@inner
+def prepare_sweeps(job):
+    """What sweeps take of the factors of lines in contact; returns unknowns of GMRES, and the largest diameter, m."""
+    size, width = 0, 0.0
+    for l in range(job.tables.shape[0]):
+        if job.shared[l, 0] >= 0:
+            contact, first = read_contact(job.contacts[job.shared[l, 0]]).contact, job.shared[l, 1]
+            line_job = read(job.tables[l])
+            n, work = line_job.line.h.shape[0], line_job.work
+            if contact.counts[POINTS] > 0:
+                prepare_sweep(work.X, work.W, contact.sweep[first:], first_in_contact(contact, first, n), n)
+        if touching(job, l) > 0:
+            contact = read_contact(job.contacts[l]).contact
+            size, width = size + unknowns(contact) * contact.counts[NODES], max(width, contact.numbers[WIDEST])
+    return size, width
 
 
 @inner
@@ -160,8 +188,7 @@ def product(job, k, l):
     for line in range(job.tables.shape[0]):
         if touching(job, line) > 0:
             contact = read_contact(job.contacts[line]).contact
-            for i in range(unknowns(contact) * contact.counts[NODES]):
-                s += contact.basis[k, i] * contact.basis[l, i]
+            s += inner_product(contact.basis[k], contact.basis[l], unknowns(contact) * contact.counts[NODES])
     return s
 
 
@@ -236,6 +263,7 @@ def combine(job, done):
 def find_solution(job, cv, ca):
     """GMRES from zero: contact.x = the correction of the nodes in contact of all lines; False: not finite."""
     H, rhs, solution = job.hessenberg, MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
+    unknown, width = prepare_sweeps(job)
     set_unknowns(job, -1)
     if not respond(job, cv, ca, True):
         return False
@@ -246,7 +274,8 @@ def find_solution(job, cv, ca):
     H[0, rhs], left, done = s, s, 0
     if s > 0.0:
         add_vector(job, 0, 1.0 / s, 0)
-        while done < MOST_PRODUCTS and left > SOLVED * s:
+        most = enough(s, width, unknown)
+        while done < MOST_PRODUCTS and left > most:
             set_unknowns(job, done)
             if not respond(job, cv, ca, False):
                 return False

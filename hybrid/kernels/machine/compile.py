@@ -24,16 +24,17 @@ class _Function:
 class Inner(_Function):
     """A function that only kernels call."""
 
-    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+    def __init__(self, function: Callable[..., Any], apart: bool = False, **options: Any) -> None:
+        """apart: whether it stays a function of its own in the code of a kernel."""
         super().__init__(function)
-        self._options = options
+        self._apart, self._options = apart, options
 
     @cached_property
     def made(self) -> Any:
         """numba's own of it."""
         from hybrid.kernels.machine.compiler import inner_of
 
-        return inner_of(self.py_func, self._options)
+        return inner_of(self.py_func, self._apart, self._options)
 
     @property
     def _numba_type_(self) -> Any:
@@ -108,3 +109,11 @@ def inner(function: Callable[..., Any]) -> Any:
     Without an entry for Python it takes two thirds of the time.
     """
     return Inner(function, forceinline=True)
+
+
+def called(function: Callable[..., Any]) -> Any:
+    """Compile a function that only kernels call, once for all places of a kernel that do: one that is much code.
+
+    It is not inlined, which costs some nanoseconds a call.
+    """
+    return Inner(function, apart=True, forceinline=False)  # else it takes that of its caller

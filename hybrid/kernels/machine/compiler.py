@@ -67,6 +67,16 @@ class _InlinedCode(JITCodeLibrary):
         return whole
 
 
+class _CalledCode(_InlinedCode):
+    """The same of a function that stays one: LLVM would inline it wherever it is called."""
+
+    def add_ir_module(self, module: Any) -> None:
+        for function in module.functions:
+            if not function.is_declaration:
+                function.attributes.add("noinline")
+        super().add_ir_module(module)
+
+
 class _EntryCode(JITCodeLibrary):
     """Code of an entry with all that it calls: optimised together, once."""
 
@@ -105,6 +115,10 @@ class _EntryCompiler(Compiler):
 
 class _InnerCompiler(_EntryCompiler):
     made = _InlinedCode
+
+
+class _CalledCompiler(_EntryCompiler):
+    made = _CalledCode
 
 
 class Made(NamedTuple):
@@ -152,8 +166,9 @@ def compile_entry(function: Callable[..., Any], key: tuple[Any, ...]) -> Made:
     return Made(result, result.library.codegen.magic_tuple())
 
 
-def inner_of(function: Callable[..., Any], options: dict[str, Any]) -> Any:
-    """Of a function that only kernels call."""
-    made = _njit(no_cpython_wrapper=True, pipeline_class=_InnerCompiler, **(_OPTIONS | options))(function)
+def inner_of(function: Callable[..., Any], apart: bool, options: dict[str, Any]) -> Any:
+    """Of a function that only kernels call; apart: whether it stays a function of its own in their code."""
+    compiler = _CalledCompiler if apart else _InnerCompiler
+    made = _njit(no_cpython_wrapper=True, pipeline_class=compiler, **(_OPTIONS | options))(function)
     made.__class__ = _Kernel
     return made

@@ -21,7 +21,8 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.algebra.block_elimination import SIZE, solve_with
+from hybrid.kernels.algebra.block_elimination import SIZE
+from hybrid.kernels.algebra.kept_factors import solve_with
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale, sub
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.tension_torque import COUPLES, compliance, couples

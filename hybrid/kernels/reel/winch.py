@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.algebra.block_elimination import ROW, SPAN, add_to_right, solve_backward, solve_forward, substitute
+from hybrid.kernels.algebra.block_elimination import ROW, SPAN, substitute
 from hybrid.kernels.algebra.block_elimination_plane import (
     COLUMNS,
     TRIPLE,
@@ -21,6 +21,7 @@ from hybrid.kernels.algebra.block_elimination_plane import (
     solve_forward_planar,
     substitute_planar,
 )
+from hybrid.kernels.algebra.kept_factors import add_to_right, solve_backward, solve_forward
 from hybrid.kernels.algebra.plane import row_in_plane
 from hybrid.kernels.algebra.rotations import get3
 from hybrid.kernels.laws.axial_law import SHIFT, has_law
@@ -139,7 +140,7 @@ def answer_of_cell(line, state, X, W, columns, c, at):
     if line.bits & PLANAR:
         solve_forward_planar(line.plane, X, x, forward)
     else:
-        solve_forward(X, W, x, forward, False)
+        solve_forward(X, W, x, forward, False, 0)
     for i in range(n + 1):
         for k in range(5):
             column[i, k] = forward[i, k]
@@ -147,7 +148,7 @@ def answer_of_cell(line, state, X, W, columns, c, at):
         solve_backward_planar(line.plane, X, column)
         substitute_planar(line.plane, X, x)
     else:
-        solve_backward(X, column)
+        solve_backward(X, column, 0)
         substitute(X, x)
     return column[at, 0], x[at, 0]
 

@@ -7,7 +7,7 @@ through the step before as well, as reactions do.
 
 from __future__ import annotations
 
-from hybrid.kernels.algebra.rotations import mat_vec
+from hybrid.kernels.algebra.rotations import mat_vec, vector
 from hybrid.kernels.junctions.bodies import (
     BEFORE,
     DONE,
@@ -21,7 +21,6 @@ from hybrid.kernels.junctions.bodies import (
     matrix,
     put,
     put_matrix,
-    vector,
 )
 from hybrid.kernels.laws.end_motion import sea_at
 from hybrid.kernels.machine.compile import inner

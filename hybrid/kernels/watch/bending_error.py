@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.algebra.block_elimination import solve_again
 from hybrid.kernels.algebra.block_elimination_plane import solve_again_planar
+from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, mat_vec, scale, sub
 from hybrid.kernels.laws.bed import bed_before, bed_beside, bed_under
 from hybrid.kernels.laws.cell import Chord

@@ -1,0 +1,79 @@
+"""Another right-hand side by kept factors: of some nodes alone, swept from the first of them, by both ways."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_jacobian import CA, CV, ZONES, N, assembled, random_case
+
+from hybrid.kernels.algebra.block_elimination import ROW, SPAN, exchange
+from hybrid.kernels.algebra.kept_factors import SWEEP, carry_given, prepare_sweep, solve_backward, sweep
+from hybrid.kernels.machine.compile import kernel
+from hybrid.kernels.run.entry import assembly, workspace
+
+
+@kernel
+def solve_given(X, W, M, given, x, begin, exactly):
+    if exactly:
+        carry_given(X, W, given, x, False, begin)
+    else:
+        prepare_sweep(X, W, M, begin, x.shape[0] - 1)
+        sweep(X, W, M, given, x, False, begin)
+    return solve_backward(X, x, begin)
+
+
+@kernel
+def exchanged(order, a, b):
+    return exchange(order, a, b)
+
+
+@pytest.mark.parametrize("exactly", [True, False])
+@pytest.mark.parametrize("first", [0, 3, N])
+@pytest.mark.parametrize("name", ZONES)
+def test_right_hand_sides_of_some_nodes(name, first, exactly):
+    """Against a dense solve of the assembled rows, from the first node on; what stood in x at others counts for nothing.
+
+    Round-off: 1e-9 of the largest, at condition numbers near 1e4.
+    """
+    line, sea, ends, st = random_case(3, ZONES[name], 2047, (0, 0))
+    J, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
+    work = workspace(N, keep=True)
+    assembly(line, sea, ends, st, CV, CA, work)
+    random = np.random.default_rng(8)
+    given = np.zeros(N + 1, np.int64)
+    given[first::2] = 1
+    b = random.normal(size=(N + 1, 5)) * given[:, None]
+    b[:, 0] = 0.0
+    b[:-1, 4] *= line.spin
+    b[-1, 4] = 0.0
+    x, M = np.where(given[:, None], b, random.normal(size=b.shape)), random.normal(size=(N + 1, SWEEP))
+    M[0] = 0.0
+    assert solve_given(work.X, work.W, M, given, x, first, exactly)
+    expected = np.linalg.solve(J, b.ravel()).reshape(N + 1, 5)
+    np.testing.assert_allclose(x[first:], expected[first:], rtol=0, atol=1e-9 * np.abs(expected).max())
+
+
+def test_factors_are_those_of_pivot_blocks_with_their_rows_exchanged():
+    """L U of a block is the pivot block, its rows in the order kept: what gave X_i gives it again."""
+    line, sea, ends, st = random_case(3, ZONES["rod"], 2047)
+    work = workspace(N, keep=True)
+    assembly(line, sea, ends, st, CV, CA, work)
+    X, kept = work.X[: (N + 1) * ROW].reshape(N + 1, 5, SPAN), work.X[(N + 1) * ROW :].reshape(N + 1, -1)
+    orders = set()
+    for i in range(1, N):
+        LU, order = kept[i, 37:62].reshape(5, 5), int(kept[i, 63])
+        rows = [order >> 3 * r & 7 for r in range(5)]
+        assert sorted(rows) == [0, 1, 2, 3, 4]
+        orders.add(tuple(rows))
+        U = np.triu(LU, 1) + np.diag(1.0 / LU.diagonal())
+        pivot = np.empty((5, 5))
+        pivot[rows] = (np.tril(LU, -1) + np.eye(5)) @ U
+        np.testing.assert_allclose(np.linalg.solve(pivot, kept[i, 64:69]), X[i, :, 8], rtol=1e-9, atol=1e-12)
+    assert len(orders) > 1
+
+
+def test_an_exchange_moves_two_rows():
+    order = 0 | 1 << 3 | 2 << 6 | 3 << 9 | 4 << 12
+    order = exchanged(order, 1, 4)
+    assert [order >> 3 * r & 7 for r in range(5)] == [0, 4, 2, 3, 1]
+    assert exchanged(order, 2, 2) == order
