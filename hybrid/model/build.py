@@ -32,7 +32,7 @@ from hybrid.model.line import line_on, spins_freely
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import STIFFENER_CELLS, Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
-from hybrid.model.obstacles import least_cells, obstacle_bits
+from hybrid.model.obstacles import kind_of, least_cells, obstacle_bits
 from hybrid.model.payout import PayoutPlan, payout_of, payout_plan, shorter_behind_clamp
 from hybrid.model.plane import in_plane, planar
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, mesh_is_free
@@ -193,7 +193,7 @@ def build(
     moves = layout is not None
     line = line_on(cable, s, rod, touch, sections_turn=not moves or spins_freely(cable), comes_and_goes=moves)
     if sea.values.carried.size:
-        line = line._replace(moved=np.array([x.moves for x in scene.obstacles.values()], np.int8))
+        line = line._replace(moved=np.array([kind_of(x) for x in scene.obstacles.values()], np.int8))
 
     shape = hung(scene, line, sea.values) if like is None else Hanging(like.start.r, like.start.T)
     start, shape_name, ends = first_state(scene, line, cable, sea, scale, shape)

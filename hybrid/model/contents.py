@@ -201,6 +201,7 @@ def obstacle_entries(scene: Scene, rows: Floats) -> Iterator[Entry]:
     for (name, x), row in zip(scene.obstacles.items(), rows, strict=True):
         why = "given" if x.stiffness else "so that it lies at most a twentieth of its diameter deep at rest"
         text = f"obstacle {name}: {x.kind}, {row[STIFFNESS]:.3g} N/m per m, friction {x.friction:g}"
+        text += ", set from outside" * x.from_outside + ", moves" * (x.moves and not x.from_outside)
         yield Entry(text, True, f"obstacles.{name}; stiffness: {why}")
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.errors import SceneError
-from hybrid.kernels.state.obstacle_rows import AXIS, CARRIED, RAMP, RATE, STILL_AXIS, TURNED
+from hybrid.kernels.state.obstacle_rows import AXIS, BEARING, CARRIED, INERTIA, RAMP, RATE, STILL_AXIS, TURNED
 from hybrid.kernels.state.state import NO_CARRIED, NO_MOVES, Floats, Moves
 from hybrid.model.driven_end import PATH, DrivenEnd
 from hybrid.model.ends import Motion, table_of_motions
@@ -50,4 +50,7 @@ def courses_of(scene: Scene, rows: Floats, waves: Floats, ramp: float, elevation
         spin = getattr(x, "spin", None)
         if spin is not None:
             carried[k, RATE], carried[k, RAMP] = spin.rate, spin.ramp
+        bearing = getattr(x, "bearing", None)
+        if bearing is not None:
+            carried[k, INERTIA], carried[k, BEARING] = bearing.inertia, bearing.damping
     return Courses(table_of_motions(motions, position, frame, paths, frame), carried, driven)

@@ -10,9 +10,12 @@ from hybrid.kernels.state.forces import FRICTION, OBSTACLES
 from hybrid.kernels.state.obstacle_rows import (
     AXIS,
     DAMPING,
+    FIXED,
     FLAT,
+    FREE,
     HALF_LENGTH,
     KIND,
+    MOVES,
     MU,
     ONSET_OF,
     PLACE,
@@ -26,7 +29,7 @@ from hybrid.kernels.state.state import NO_OBSTACLES, Floats
 from hybrid.model.scales import tension_scale
 from hybrid.model.sections import merged_sections
 from hybrid.scene.base import unit
-from hybrid.scene.obstacles import CylinderObstacle, PlaneObstacle
+from hybrid.scene.obstacles import CylinderObstacle, Obstacle, PlaneObstacle
 from hybrid.scene.schema import Scene
 
 # How deep a line lies in an obstacle under what the scene asks for, where it follows its radius and where it touches it
@@ -41,6 +44,13 @@ def obstacle_bits(scene: Scene) -> int:
     if not scene.obstacles:
         return 0
     return OBSTACLES | (FRICTION if any(x.friction for x in scene.obstacles.values()) else 0)
+
+
+def kind_of(obstacle: Obstacle) -> int:
+    """Of an obstacle in `Line.moved`: whether it moves, or turns freely."""
+    if getattr(obstacle, "bearing", None) is not None:
+        return FREE
+    return MOVES if obstacle.moves else FIXED
 
 
 def strand_radius(scene: Scene) -> float:

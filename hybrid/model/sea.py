@@ -9,8 +9,8 @@ import numpy as np
 
 from hybrid.kernels.laws.bed import HEIGHTS
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles
-from hybrid.kernels.state.obstacle_rows import EACH
-from hybrid.kernels.state.state import Floats, Sea, no_sea, with_waves
+from hybrid.kernels.state.obstacle_rows import ANGLE, EACH, INERTIA, ROLLED
+from hybrid.kernels.state.state import Floats, Sea, State, no_sea, with_waves
 from hybrid.model.driven_end import DrivenEnd
 from hybrid.model.ends import rise
 from hybrid.model.obstacle_motion import courses_of
@@ -44,7 +44,10 @@ class Surroundings:
         axis, slip, slid, bed = (np.zeros((cells + 1, 3)) for _ in range(4))
         values = self.values._replace(flow=np.zeros((cells + 1, 7)), axis=axis, slip=slip, slid=slid, bed=bed)
         if values.carried.size:
-            values = values._replace(grip=np.zeros((cells + 1, self.values.grip.shape[1])))
+            values = values._replace(
+                grip=np.zeros((cells + 1, self.values.grip.shape[1])),
+                rolling=np.zeros((len(self.values.rolling), cells + 1, 5)),
+            )
         return Surroundings(values, self.names, self.driven)
 
     def at(self, t: float) -> Sea:
@@ -57,6 +60,11 @@ class Surroundings:
         if self.values.carried.size:
             carry_obstacles(float(now[0]), float(now[0]), self.values)
         return self.values
+
+    def roll_as(self, state: State) -> None:
+        """Sheaves that turn freely are turned as in a state."""
+        if state.sheave.size:
+            self.values.carried[:, ROLLED] = state.sheave[:, ANGLE]
 
     def elevation(self, x: float, y: float, t: float) -> tuple[float, float, float, float]:
         """Elevation of the surface above still water (m) at a place and time, its rate (m/s) and slopes along x, y."""
@@ -116,8 +124,11 @@ def _moved(scene: Scene, cells: int, around: Surroundings) -> Surroundings:
     if not courses.carried.size:
         return around
     grip = np.zeros((cells + 1, EACH * len(sea.obstacles)))
+    rolling = np.zeros((2 * int((courses.carried[:, INERTIA] > 0.0).sum()), cells + 1, 5))
     return Surroundings(
-        sea._replace(courses=courses.moves, carried=courses.carried, grip=grip), around.names, courses.driven
+        sea._replace(courses=courses.moves, carried=courses.carried, grip=grip, rolling=rolling),
+        around.names,
+        courses.driven,
     )
 
 

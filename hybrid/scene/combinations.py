@@ -307,6 +307,16 @@ def _obstacles(tables: Tables) -> Iterator[Place]:
     return iter([("obstacles",)] if tables.get("obstacles") else [])
 
 
+def _may_touch(tables: Tables) -> Iterator[Place]:
+    return iter([("contact", "self")] if "contact" in tables and tables["contact"].self is not False else [])
+
+
+def _free_sheaves(tables: Tables) -> Iterator[Place]:
+    """Obstacles that turn freely."""
+    found = tables.get("obstacles") or {}
+    return (("obstacles", name, "bearing") for name, x in found.items() if getattr(x, "bearing", None) is not None)
+
+
 def _lines_touch(tables: Tables) -> Iterator[Place]:
     """A line of several that touches another one."""
     if SYSTEM in tables and any(tables[LINE] in pair for pair in tables[SYSTEM].touching_pairs):
@@ -417,6 +427,8 @@ BREAKS_OFF_CLAMP = Feature("a break at a clamp", "break_at", _breaks_off_clamp)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
 CLAMPED_TO_FREE = Feature("a line that is clamped to a free point or body", "lines.NAME.connections", _clamped_to_free)
 OBSTACLES = Feature("obstacles", "obstacles", _obstacles)
+MAY_TOUCH = Feature("contact of a line with itself, unless it is switched off", "contact.self", _may_touch)
+SHEAVES = Feature("sheaves that turn freely", "obstacles.NAME.bearing", _free_sheaves)
 LINES_TOUCH = Feature("contact of lines with each other", "contact", _lines_touch)
 PUSHED = Feature("obstacles, contact of lines with each other", "obstacles, contact",
                  _either(OBSTACLES, LINES_TOUCH))  # fmt: skip
@@ -518,6 +530,14 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         PLANE, OBSTACLES, "not worked out", "contact with obstacles ({key}) is computed in space", "3 or nothing",
         "leave it out",
+    ),
+    Refusal(
+        SHEAVES, SEVERAL_LINES, "not worked out", "all lines ({key}) would turn a sheave together",
+        fix="give it a spin, or compute one line",
+    ),
+    Refusal(
+        SHEAVES, MAY_TOUCH, "not worked out", "the solve of contact ({key}) knows no sheaves",
+        fix="write `self: false` in contact, or give it a spin",
     ),
     Refusal(PAYOUT, OBSTACLES, "not worked out", "nodes that enter and leave do not know of obstacles ({key})"),
     Refusal(

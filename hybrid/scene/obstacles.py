@@ -39,6 +39,13 @@ class Spin(Table):
     ramp: Positive = Field(description="time over which it grows from zero, smoothly [s]")
 
 
+class Bearing(Table):
+    """A bearing about which a cylinder turns freely, as a sheave does under a line that rubs on it."""
+
+    inertia: Positive = Field(description="moment of inertia about its axis [kg m^2]")
+    damping: NonNegative = Field(default=0.0, description="moment of the bearing over the rate of its turn [N m s/rad]")
+
+
 class _Obstacle(Table):
     """What all obstacles have."""
 
@@ -60,7 +67,7 @@ class _Obstacle(Table):
     @property
     def moves(self) -> bool:
         """Whether it does, or turns, or may be set from outside."""
-        return self.motion is not None or self.from_outside or getattr(self, "spin", None) is not None
+        return self.motion is not None or self.from_outside or any(getattr(self, x, None) for x in ("spin", "bearing"))
 
 
 class PlaneObstacle(_Obstacle):
@@ -100,6 +107,16 @@ class CylinderObstacle(_Obstacle):
     spin: Spin | None = Field(
         default=None, description="how it turns about its axis, as a driven roller; absent: not at all"
     )
+
+    bearing: Bearing | None = Field(
+        default=None, description="inertia and bearing with which it turns freely, as a sheave; absent: not at all"
+    )
+
+    @model_validator(mode="after")
+    def _turns_once(self) -> Self:
+        if self.spin is not None and self.bearing is not None:
+            refuse([Finding(("bearing",), "nothing, because the spin is given", "leave out the one or the other")])
+        return self
 
     def distance(self, x: tuple[float, float, float]) -> float:
         """Distance [m] of a place to the surface; negative within the solid."""

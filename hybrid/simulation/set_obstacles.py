@@ -81,6 +81,7 @@ class SettableObstacles:
             raise ValueError("no obstacle of the scene moves: write `from_outside: true` at one to read them")
         k, found = list(self.scene.obstacles).index(name), []
         for around, state in self._states():
+            around.roll_as(state)
             found.append(obstacles_now(around.at(self.t), state)[k])
         first, acting = found[0], np.sum(found, axis=0)
         rotation = first[SEEN_TURN:SEEN_FORCE].reshape(3, 3).copy()

@@ -216,11 +216,13 @@ class SteppedEnds(SettableObstacles):
         By minus that, times a shift of the place that was set, `forces` changes where the step is taken again: Newton's
         method of an implicit coupling.  It has the inertia and the damping of the step in it (of its last part, where
         it was cut), and is not the static stiffness; directions that the end holds stay.  Before the first step: as of
-        a step of time.step.  ValueError: the end is not held, or a step has failed.
+        a step of time.step.  ValueError: the end is not held, a step has failed, or a sheave turns freely.
         """
         self._check_open()
         self._check_sound()
         k, run = self._end(end), self._loop.run
+        if run.state.sheave.size:
+            raise ValueError("the stiffness of a line over a sheave that turns freely is not worked out")
         if not run.model.ends.values.held[k]:
             raise ValueError(f"ends.{end} is not held: it has no stiffness that is felt from outside")
         return interface_stiffness(run, k, run.resolution.step)

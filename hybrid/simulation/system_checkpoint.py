@@ -120,6 +120,8 @@ def of_today(lines: Any, template: Mapping[str, Any]) -> Any:
             line = line | {"state": {"wake": mine["state"]["wake"], **line["state"]}}
         if mine is not None and isinstance(line.get("state"), dict) and not mine["state"]["grip"].size:
             line = line | {"state": {"grip": mine["state"]["grip"], **line["state"]}}
+        if mine is not None and isinstance(line.get("state"), dict) and not mine["state"]["sheave"].size:
+            line = line | {"state": {"sheave": mine["state"]["sheave"], **line["state"]}}
         work = line.get("work")
         if isinstance(work, np.ndarray) and work.ndim == 1 and FIRST_WORKS <= work.size < WORKS:
             line = line | {"work": np.pad(work, (0, WORKS - work.size))}

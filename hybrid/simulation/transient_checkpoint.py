@@ -99,6 +99,8 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         saved = {**saved, "state": {**saved["state"], "wake": state.wake}}
     if isinstance(saved.get("state"), dict) and "grip" not in saved["state"] and not state.grip.size:  # not in 0.6
         saved = {**saved, "state": {**saved["state"], "grip": state.grip}}
+    if isinstance(saved.get("state"), dict) and "sheave" not in saved["state"] and not state.sheave.size:  # not in 0.6
+        saved = {**saved, "state": {**saved["state"], "sheave": state.sheave}}
     work = saved.get("work")
     if isinstance(work, np.ndarray) and work.ndim == 1 and FIRST_WORKS <= work.size < b.WORKS:
         saved = {**saved, "work": np.pad(work, (0, b.WORKS - work.size))}
@@ -123,6 +125,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     for mine, its in ((state, saved["state"]), (compiled.before, saved["state"])):
         for name, x in its.items():
             getattr(mine, name)[:] = x
+    model.sea.roll_as(state)
     model.sea.at(run.t)
     apart = model.ends.restore(saved["ends"], run.t)
     if apart > SAME_PLACE * model.length:

@@ -31,7 +31,7 @@ from hybrid.kernels.state.forces import (
     WAVES,
 )
 from hybrid.kernels.state.obstacle_rows import BEGAN, CARRIED, EACH, ENDED, PLACE, SPEED, SWEEP, TURNING
-from hybrid.kernels.state.state import NO_CARRIED, NO_GRIP, NO_MOVES, Ends, Line, Sea, blank_state
+from hybrid.kernels.state.state import NO_CARRIED, NO_GRIP, NO_MOVES, NO_ROOM, Ends, Line, Sea, blank_state
 
 N = 7
 CV, CA = 3.0, 7.0
@@ -115,7 +115,7 @@ def random_sea(g):
             bed_x=np.zeros(0), bed_y=np.zeros(0), bed_heights=np.zeros((0, 4)), stiffness=3.0, damping=0.5, onset=50.0, obstacles=OBSTACLES_THERE,
         friction=np.array([0.3, 0.6]), slip_length=0.4, flow=0.1 * g.normal(size=(N + 1, 7)), lanes=np.zeros((10, 16)),
         axis=axis / np.linalg.norm(axis, axis=1)[:, None], slip=slip, slid=np.zeros((N + 1, 3)), bed=np.zeros((N + 1, 3)),
-        courses=NO_MOVES, carried=NO_CARRIED, grip=NO_GRIP,
+        courses=NO_MOVES, carried=NO_CARRIED, grip=NO_GRIP, rolling=NO_ROOM,
     )  # fmt: skip
 
 

@@ -38,6 +38,10 @@ SECTION, END, ONE = "cable.sections.0.", "ends.end.", "lines.one."
 TORQUE = {SECTION + "tension_torque": 1e-3}
 SWIVEL = {"cable.attachments": [{"kind": "swivel", "at": 5}], END + "normal": [0, 1, 0]}
 BALL: dict[str, Any] = {"obstacles": {"ball": {"kind": "sphere", "at": [4, 0, -9], "radius": 1}}}
+SHEAVE: dict[str, Any] = {
+    "obstacles": {"sheave": {"kind": "cylinder", "at": [4, 0, -9], "axis": [0, 1, 0], "radius": 1,
+                             "bearing": {"inertia": 1}}}
+}  # fmt: skip
 THICKER = {"cable.sections": [x | y for x in CABLE["cable"]["sections"] for y in ({}, {"diameter": 0.05})]}
 PAID: dict[str, Any] = {END + "payout": {"rate": 0.1, "ramp": 1.0}}
 MOVING = {"model": {"kind": "adaptive"}}
@@ -75,6 +79,8 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.PLANE, c.OBSTACLES): (BALL | {"dimension": 2}, ""),
     (c.MOVING_ZONES, c.PUSHED): (BALL | MOVING, ""),
     (c.PAYOUT, c.OBSTACLES): (BALL | PAID, ""),
+    (c.SHEAVES, c.SEVERAL_LINES): (SHEAVE | {ONE + "contact": {"self": False}}, ""),
+    (c.SHEAVES, c.MAY_TOUCH): (SHEAVE, ""),
     (c.DIAMETERS, c.OBSTACLES): (BALL | THICKER, ""),
     (c.CHOSEN_STEPS, c.PUSHED): (BALL | {"time": {"duration": 3.0}}, ""),
     (c.ACCURACY, c.PUSHED): (BALL | {"accuracy": "3%"}, ""),

@@ -137,6 +137,8 @@ obstacles:
   ball: {kind: sphere, at: [0.0, 0.0, -20.0], radius: 1.0, friction: 0.3}
   roller: {at: [2.0, 0.0, -5.0], axis: [0.0, 1.0, 0.0], radius: 0.5, damping: 10.0,
            spin: {rate: 2.0, ramp: 1.0}, motion: {travel: {by: [0.0, 0.0, 1.0], over: 2.0}}}
+  sheave: {at: [5.0, 0.0, -5.0], axis: [0.0, 1.0, 0.0], radius: 0.5, bearing: {inertia: 2.0, damping: 0.5}}
+contact: {self: false}
 initial: {kind: equilibrium}
 model: {kind: catenary}
 """

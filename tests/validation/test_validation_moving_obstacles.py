@@ -145,6 +145,101 @@ def test_each_obstacle_has_its_own_travel() -> None:
     assert below[2] + above[2] == pytest.approx(-0.2 * 9.81, rel=0.02)
 
 
+# --- sheaves that turn freely ----------------------------------------------------------------------------
+
+
+def weights(inertia: float, damping: float = 0.0, **more: Any) -> Tables:
+    """A weightless rope over a sheave, pulled at both ends by 10 N, then at one by 14 N."""
+    R = CENTRELINE + 5e-5
+    over = [[R * np.cos(x), 0.0, R * np.sin(x)] for x in np.linspace(np.pi, 0.0, 129)]
+    points = [[-R, 0.0, -1.5], *over, [R, 0.0, -1.5]]
+    tables = capstan(0.5, 10.0, "rod")
+    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    tables["cable"]["sections"][0] |= {"length": length, "damping": {"stiffness": 2e-3}}
+    tables["obstacles"]["drum"]["bearing"] = {"inertia": inertia, "damping": damping}
+    light, heavy = (
+        [[0, 0, 0, 0], [0.2, 0, 0, -10]],
+        [[0, 0, 0, 0], [0.2, 0, 0, -10], [0.3, 0, 0, -10], [0.5, 0, 0, -14]],
+    )
+    tables["ends"] = {
+        "start": {"kind": "free", "force": {"history": light}}, "end": {"kind": "free", "force": {"history": heavy}}
+    }  # fmt: skip
+    tables["initial"] = {"kind": "points", "points": points}
+    tables["time"], tables["output"] = {"duration": 0.9, "step": 0.002}, {"every": 0.02, "points": 101}
+    return tables | more
+
+
+@pytest.fixture(scope="module")
+def rolled() -> Any:
+    return ran(weights(0.1))
+
+
+def speeds(result: Any) -> Any:
+    return -result.velocity[:, -1, 2]
+
+
+@pytest.mark.parametrize("inertia", [0.01, 0.1])
+def test_two_weights_over_a_free_sheave(inertia: float, rolled: Any) -> None:
+    """a = (F2 - F1)/(m + I/rho^2)."""
+    result = rolled if inertia == 0.1 else ran(weights(inertia))
+    late = result.times > 0.6
+    found = np.polyfit(result.times[late], speeds(result)[late], 1)[0]
+    assert found == pytest.approx(4.0 / (0.1 * result.s[-1] + inertia / CENTRELINE**2), rel=2e-3)
+
+
+def test_a_free_sheave_has_the_energy_that_the_line_has_given(rolled: Any) -> None:
+    """I w^2/2, with w = v/rho where the rope does not slide; and turns as far as the rope has run."""
+    way = -(rolled.position[-1, -1, 2] - rolled.position[0, -1, 2])
+    axis = rolled["obstacles/drum/rotation"][-1]
+    turned = way / CENTRELINE
+    assert np.cos(np.radians(axis[1])) * (1 if abs(axis[0]) < 90 else -1) == pytest.approx(np.cos(turned), abs=5e-3)
+    assert rolled["work/obstacles"][-1] == pytest.approx(-0.05 * (speeds(rolled)[-1] / CENTRELINE) ** 2, rel=5e-3)
+    assert np.abs(rolled["work/scheme"]).max() < 1e-3 * rolled["work/applied"][-1]
+
+
+def test_a_bearing_holds_a_sheave_back() -> None:
+    """(F2 - F1) rho = c w in the end; friction holds the rope on the sheave."""
+    result = ran(weights(0.01, damping=1.0))
+    assert speeds(result)[-1] == pytest.approx(4.0 * CENTRELINE**2, rel=0.01)
+
+
+def test_a_run_over_a_sheave_goes_on_and_is_taken_back_bit_for_bit(rolled: Any, tmp_path: Any) -> None:
+    half = weights(0.1)
+    half["time"] = half["time"] | {"duration": 0.6}
+    hybrid.run(hybrid.validate_scene(half), tmp_path / "half.h5")
+    whole = hybrid.resume(tmp_path / "half.h5", until=0.9)
+    np.testing.assert_array_equal(whole.position, rolled.position)
+    np.testing.assert_array_equal(whole["obstacles/drum/rotation"], rolled["obstacles/drum/rotation"])
+    with hybrid.Simulation(weights(0.1)) as simulation:
+        while simulation.t < 0.4 - 1e-9:
+            saved = simulation.save()
+            simulation.step()
+            simulation.restore(saved)
+            simulation.step()
+        with pytest.raises(ValueError, match="not worked out"):
+            simulation.stiffness("end")
+        simulation.advance(0.9)
+        drum, result = simulation.obstacle("drum"), simulation.result()
+    np.testing.assert_array_equal(result.position, rolled.position)
+    np.testing.assert_allclose(drum.moment, rolled["obstacles/drum/moment"][-1], atol=1e-9)
+    turned = np.radians(rolled["obstacles/drum/rotation"][-1, 1])  # about y, beyond a quarter turn with roll and yaw
+    assert abs(drum.rotation[0, 0]) == pytest.approx(np.cos(turned), abs=1e-9)
+
+
+def test_sheaves_that_cannot_be_computed_are_refused() -> None:
+    with pytest.raises(SceneError, match="knows no sheaves") as refused:
+        hybrid.validate_scene(weights(0.1, contact={}))
+    assert [x.where for x in refused.value.complaints] == ["obstacles.drum.bearing"]
+    tables = weights(0.1)
+    tables["obstacles"]["drum"]["spin"] = {"rate": 1.0, "ramp": 1.0}
+    with pytest.raises(SceneError, match="because the spin is given"):
+        hybrid.validate_scene(tables)
+    tables = pushed()
+    tables["obstacles"]["bar"]["bearing"] = {"inertia": 1.0}
+    with pytest.raises(SceneError, match="would turn a sheave together"):
+        hybrid.validate_scene(as_system(tables))
+
+
 # --- frames of reference --------------------------------------------------------------------------------
 
 V = np.array([0.5, -0.3, -3.0])  # m/s

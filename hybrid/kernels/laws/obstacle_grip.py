@@ -17,11 +17,13 @@ from hybrid.kernels.laws.obstacles import Z3, beside, gradient_of_normal, grip, 
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import FRICTION
 from hybrid.kernels.state.obstacle_rows import (
+    ANGLE,
     EACH,
     ENDED,
     FORCE,
     MU,
     ONSET_OF,
+    ROLLED,
     SEEN,
     SEEN_FORCE,
     SEEN_MOMENT,
@@ -34,24 +36,32 @@ from hybrid.kernels.state.obstacle_rows import (
 from hybrid.kernels.state.report import CONTACT_WORK, FRICTION_WORK, OBSTACLE_WORK
 
 
+@inner
+def pressed(line, sea, k, i, x, state):
+    """Force N of obstacle k on node i at x along its normal n, with how that bends: N, n, 1/rho, axis."""
+    d, n, hollow, a = beside(sea.obstacles, k, x)
+    v = state.v
+    p, N = 0.5 * sea.obstacles[k, ONSET_OF] - d, 0.0
+    pd = -dot(n, sub(get3(v, i), surface_velocity(sea.carried, k, x)))
+    if i > 0:
+        before = scale(-1.0, get3(state.e, i - 1))
+        N += half_cell(sea, True, k, x, p, pd, before, get3(v, i - 1), line.h[i - 1], 0.0)[0]
+    if i < line.h.shape[0]:
+        N += half_cell(sea, True, k, x, p, pd, get3(state.e, i), get3(v, i + 1), line.h[i], 0.0)[0]
+    return N, n, hollow, a
+
+
 @kernel
 def grip_obstacles(line, sea, u, state, was, now):
     """Travel and force of every obstacle on every node of a state into `now`; was: those before the step, (N+1, 6 M).
 
     u: (N+1, 3) m, displacements of the nodes in the step.
     """
-    rows, v = sea.obstacles, state.v
+    rows = sea.obstacles
     for i in range(u.shape[0]):
         x = get3(state.r, i)
         for k in range(rows.shape[0]):
-            d, n, hollow, a = beside(rows, k, x)
-            p, N = 0.5 * rows[k, ONSET_OF] - d, 0.0
-            pd = -dot(n, sub(get3(v, i), surface_velocity(sea.carried, k, x)))
-            if i > 0:
-                before = scale(-1.0, get3(state.e, i - 1))
-                N += half_cell(sea, True, k, x, p, pd, before, get3(v, i - 1), line.h[i - 1], 0.0)[0]
-            if i < line.h.shape[0]:
-                N += half_cell(sea, True, k, x, p, pd, get3(state.e, i), get3(v, i + 1), line.h[i], 0.0)[0]
+            N, n, hollow, a = pressed(line, sea, k, i, x, state)
             f, q = scale(N, n), Z3
             if line.bits & FRICTION and rows[k, MU] > 0.0 and N > 0.0:
                 t = way_along(sea.carried, k, row3(was, i, EACH * k), x, get3(u, i))
@@ -108,7 +118,11 @@ def wrench_on(state, k, place):
 @kernel
 def sample_obstacles(sea, old, new, t, x, row, at):
     """Where obstacles are at t (s), the part x of the last step, and what the line does to them there, into a row."""
+    for k in range(new.sheave.shape[0]):
+        sea.carried[k, ROLLED] = x * new.sheave[k, ANGLE] + (1.0 - x) * old.sheave[k, ANGLE]
     carry_obstacles(t, t, sea)
+    for k in range(new.sheave.shape[0]):
+        sea.carried[k, ROLLED] = new.sheave[k, ANGLE]
     for k in range(sea.carried.shape[0]):
         place = row3(sea.carried, k, ENDED)
         force, moment = wrench_on(new, k, place)

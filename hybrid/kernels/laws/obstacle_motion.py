@@ -27,9 +27,13 @@ from hybrid.kernels.state.obstacle_rows import (
     AXIS,
     BEGAN,
     ENDED,
+    INERTIA,
     PLACE,
     RAMP,
     RATE,
+    ROLLED,
+    ROLLED_BEFORE,
+    ROLLING,
     SPEED,
     STILL_AXIS,
     SWEEP,
@@ -67,8 +71,8 @@ def transposed(R):
 
 
 @inner
-def pose_at(t, k, sea):
-    """c, v, R without spin, R, w of obstacle k at t (s)."""
+def pose_at(t, k, sea, rolled):
+    """c, v, R without spin, R, w of obstacle k at t (s); rolled: angle (rad) of one that turns freely."""
     moves = sea.courses
     x, v = row3(moves.position, k, 0), (0.0, 0.0, 0.0)
     if moves.prescribed[k, 0]:
@@ -86,6 +90,11 @@ def pose_at(t, k, sea):
         spun, _ = turn_by_vector(scale(rate * angle, a), (0.0, 0.0, 0.0))
         whole = mat_mat(R, spun)
         w = add(w, scale(rate * rise(t, ramp)[0], mat_vec(R, a)))
+    if sea.carried[k, INERTIA] > 0.0:
+        a = row3(sea.carried, k, STILL_AXIS)
+        spun, _ = turn_by_vector(scale(rolled, a), (0.0, 0.0, 0.0))
+        whole = mat_mat(R, spun)
+        w = add(w, scale(sea.carried[k, ROLLING], mat_vec(R, a)))
     return x, v, R, whole, w
 
 
@@ -93,8 +102,12 @@ def pose_at(t, k, sea):
 def carry_obstacles(begin, end, sea):
     """Bring obstacles that move to where they are at `end` (s), and know where they were at `begin`."""
     for k in range(sea.carried.shape[0]):
-        c0, _, _, R0, _ = pose_at(begin, k, sea)
-        c, v, bare, R, w = pose_at(end, k, sea)
+        rolled = sea.carried[k, ROLLED]
+        before = rolled
+        if begin < end:
+            before = sea.carried[k, ROLLED_BEFORE]
+        c0, _, _, R0, _ = pose_at(max(begin, 0.0), k, sea, before)
+        c, v, bare, R, w = pose_at(end, k, sea, rolled)
         put(sea.carried, k, BEGAN, c0)
         put(sea.carried, k, ENDED, c)
         put(sea.carried, k, SWEEP, mat_mat(R, transposed(R0)))

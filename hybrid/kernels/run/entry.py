@@ -14,6 +14,7 @@ from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_i
 from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
 from hybrid.kernels.run.run import in_plane, in_space
 from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.obstacle_rows import FREE
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work, blank_state, no_ends, no_torsion
 from hybrid.kernels.step.job import blank_job
@@ -55,6 +56,8 @@ def check_turns(line: Line, state: State) -> None:
         raise ValueError(
             f"a state with grips of {state.grip.shape[1] // 6} obstacles, of which {line.moved.size} are known"
         )
+    if (state.sheave.shape[0] > 0) != bool((line.moved == FREE).any()):
+        raise ValueError("a state with angles of sheaves that its line does not have, or without those that it has")
     if state.wake.shape[0] != line.wake_law.shape[0]:
         raise ValueError(
             f"a state with {state.wake.shape[0]} phases of lift on a line that has {line.wake_law.shape[0]}"

@@ -22,9 +22,14 @@ FLAT, ROUND = 0.0, 1.0
 OBSTACLE = 15
 # Of Sea.carried, of obstacles that move: c at the begin and the end of the step (m); R R0^T; v (m/s), w (1/s) and R at the
 # end (kernels.laws.obstacle_motion); the axis at t = 0, the rate of the spin about it (1/s) and the time over which it
-# grows (s).
+# grows (s); of sheaves that turn freely the inertia (kg m2) and the damping of the bearing (N m s), angles at the begin and
+# the end of the step and the next correction (rad), and their rate (1/s).
 BEGAN, ENDED, SWEEP, SPEED, TURNING, TURNED, STILL_AXIS, RATE, RAMP = 0, 3, 6, 15, 18, 21, 30, 33, 34
-CARRIED = 35
+INERTIA, BEARING, ROLLED_BEFORE, ROLLED, ROLL, ROLLING = 35, 36, 37, 38, 39, 40
+CARRIED = 41
+# Of Line.moved; of a row of State.sheave: angle (rad), rate, algorithmic and true acceleration.
+FIXED, MOVES, FREE = 0, 1, 2
+ANGLE, SPIN, ALGORITHMIC, TRUE = 0, 1, 2, 3
 # Of each obstacle in a row of State.grip: travel (m), force on the node (N).
 TRAVEL, FORCE, EACH = 0, 3, 6
 # Of each obstacle in a sample: place (m), R, force of the line on it (N), moment about that place (N m).

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.machine.references import by_reference
 from hybrid.kernels.state.fields import HALF, MEAN, POINT, ROD, SHARED, blank, cell, fields_of, node
-from hybrid.kernels.state.obstacle_rows import CARRIED, EACH, ENDED, FORCE, OBSTACLE, SEEN, TURNED
+from hybrid.kernels.state.obstacle_rows import CARRIED, EACH, ENDED, FORCE, FREE, OBSTACLE, SEEN, TURNED
 from hybrid.kernels.state.report import REPORT_SIZE
 
 Floats = NDArray[np.float64]
@@ -41,6 +41,8 @@ NO_OBSTACLES: Floats = np.zeros((0, OBSTACLE))
 NO_CARRIED: Floats = np.zeros((0, CARRIED))
 NO_OBSTACLES_SEEN: Floats = np.zeros((0, 0, SEEN))
 NO_GRIP: Floats = np.zeros((0, 0))
+NO_SHEAVES: Floats = np.zeros((0, 4))
+NO_ROOM: Floats = np.zeros((0, 0, 0))
 NO_MOVED: NDArray[np.int8] = np.zeros(0, np.int8)
 
 
@@ -107,7 +109,9 @@ class Line(NamedTuple):
     bend_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: curvature (1/m), moment (N m), energy per length
     # (N+1, 8) of nodes with vortices (kernels.laws.vortices); empty: there are none
     wake_law: Annotated[Floats, node(columns=8, optional=True)] = NO_WAKE_LAW
-    moved: NDArray[np.int8] = NO_MOVED  # (M,) of all obstacles: 1 where one moves; empty: none does
+    moved: NDArray[np.int8] = (
+        NO_MOVED  # (M,) of all obstacles: 1 where one moves, 2 where one turns freely; empty: none does
+    )
 
 
 FIELDS = fields_of(Line)
@@ -201,6 +205,7 @@ class Sea(NamedTuple):
     courses: Moves  # how obstacles move, a row each; empty: none does
     carried: Floats  # (M, CARRIED) how far they have (kernels.laws.obstacle_motion); empty: none does
     grip: Floats  # (N+1, 6 M) as `State.grip`, at the start of the step; empty: no obstacle moves
+    rolling: Floats  # (2 K, N+1, 5) room for answers to K sheaves that turn freely (kernels.laws.sheaves)
 
 
 class State(NamedTuple):
@@ -223,9 +228,9 @@ class State(NamedTuple):
     turn: Floats = NO_TURN
     slow: Floats = NO_SLOW  # (N,) N, mean tension of lines with a `law`; else empty
     wake: Floats = NO_WAKE  # (N+1, 4) of lines with a `wake_law` (kernels.laws.vortices); else empty
-    grip: Floats = (
-        NO_GRIP  # (N+1, 6 M) of each obstacle, of lines with `moved` (kernels.laws.obstacle_grip); else empty
-    )
+    # (N+1, 6 M) of each obstacle, of lines with `moved` (kernels.laws.obstacle_grip); else empty
+    grip: Floats = NO_GRIP
+    sheave: Floats = NO_SHEAVES  # (M, 4) of all obstacles where one turns freely (kernels.laws.sheaves); else empty
 
     def copy(self) -> State:
         return State(*(x.copy() for x in self))
@@ -355,10 +360,13 @@ def no_torsion() -> Torsion:
     )
 
 
-def blank_state(n_cells: int, zones: int = 0, slow: bool = False, wake: bool = False, obstacles: int = 0) -> State:
+def blank_state(
+    n_cells: int, zones: int = 0, slow: bool = False, wake: bool = False, obstacles: int = 0,
+    sheaves: bool = False,
+) -> State:  # fmt: skip
     """A state of zeros with room for `n_cells` cells; zones: those that a torque passes through; slow: mean tensions;
 
-    wake: phases of vortices; obstacles: of which one moves.
+    wake: phases of vortices; obstacles: of which one moves; sheaves: one of them turns freely.
     """
     node, cell = (n_cells + 1, 3), (n_cells, 3)
     z = np.zeros
@@ -380,12 +388,14 @@ def blank_state(n_cells: int, zones: int = 0, slow: bool = False, wake: bool = F
         z(n_cells if slow else 0),
         z((n_cells + 1 if wake else 0, 4)),
         z((n_cells + 1 if obstacles else 0, 6 * obstacles)),
+        z((obstacles if sheaves else 0, 4)),
     )
 
 
 def state_for(line: Line) -> State:
     """A state of zeros of a line."""
-    return blank_state(line.h.size, len(line.torsion), line.law.size > 0, line.wake_law.size > 0, line.moved.size)
+    free = bool((line.moved == FREE).any())
+    return blank_state(line.h.size, len(line.torsion), line.law.size > 0, line.wake_law.size > 0, line.moved.size, free)
 
 
 def no_sea(n_cells: int) -> Sea:
@@ -395,7 +405,7 @@ def no_sea(n_cells: int) -> Sea:
         np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), np.zeros(0), nan, nan, nan, np.array([0.0, 1.0, 1.0, 0.0]), np.zeros(2),
         np.array([0.0, 0.0, 1.0]), nan, np.zeros(0), np.zeros(0), np.zeros((0, 4)), nan, nan, nan, np.full(2, nan), nan,
         NO_OBSTACLES, np.zeros((n_cells + 1, 7)), np.zeros((10, LANES)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
-        NO_MOVES, NO_CARRIED, NO_GRIP,
+        NO_MOVES, NO_CARRIED, NO_GRIP, NO_ROOM,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from hybrid.kernels.algebra.block_elimination import substitute
 from hybrid.kernels.algebra.block_elimination_plane import substitute_planar
+from hybrid.kernels.laws.sheaves import roll_on, turn_with
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.machine.references import caller, caller_of_six
 from hybrid.kernels.march.assembly_plane import march_planar
@@ -231,6 +232,8 @@ def solve(
         if space is not None:
             good = substitute(work.X, work.x)
             pass_torque(space, line, ends, new, work, CORRECT, cv)
+            if new.sheave.shape[0] > 0 and task.what == STEP:
+                turn_with(line, sea, ends, old.r, new, work, cv, ca)
         if plane is not None:
             good = substitute_planar(plane, work.X, work.x)
         if not good:
@@ -253,6 +256,9 @@ def solve(
         if contact[ADDRESS] != 0:
             part = min(part, ask_contact(contact, contact_table, LIMIT))
         update(plane, space, line, new, cv, ca, part, task.turning, work)
+        if space is not None:
+            if new.sheave.shape[0] > 0 and task.what == STEP:
+                roll_on(line, sea, old, new, s, part)
         turn = max(turn, WHOLE * shift / reach)
         size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
         outcome, left = has_converged(size, before, it, part)

@@ -13,6 +13,7 @@ from hybrid.kernels.laws.obstacle_grip import book_obstacles, grip_obstacles, me
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.obstacles import normal_at, passes, stored_in_contact
 from hybrid.kernels.laws.out_of_plane import step_out_of_plane
+from hybrid.kernels.laws.sheaves import predict_sheaves
 from hybrid.kernels.laws.vortices import advance_wake
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
@@ -201,6 +202,8 @@ def begin_step(plane, space, line, sea, old, new, u, s, safe):
     """
     if space is not None:
         if line.moved.shape[0] > 0:
+            if new.sheave.shape[0] > 0:
+                predict_sheaves(line, sea, old, new, s)
             carry_obstacles(sea.now[0] - s.dt, sea.now[0], sea)
     predict_nodes(old, new, u, s)
     if safe < 1.0:
