@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.algebra.block_elimination import solve_again
+from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, mat_vec, scale, sub
 from hybrid.kernels.laws.obstacle_grip import pressed
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles, row3, row9, way_along
