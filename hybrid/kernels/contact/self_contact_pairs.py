@@ -400,9 +400,7 @@ def keep_pair(contact, p, q, room):
 
 @called
 def look_at_pair(line, ends, contact, phase, p, q):
-    """What there is to do for pieces p < q whose boxes may be near: limit what is asked, or keep points of contact."""
-    if not may_touch(line, ends, contact, p, q):
-        return
+    """What there is to do for pieces p < q that may touch: limit what is asked, or keep points of contact."""
     apart, width = hull_distance(contact.kind, contact.at, p, q), 0.5 * (contact.width[p] + contact.width[q])
     if phase == COLLECT:
         keep_pair(contact, p, q, apart - OUTER * width)
@@ -444,7 +442,7 @@ def look_at_pairs(line, ends, contact, phase):
             first, second = (a - leaves) * LEAF, (b - leaves) * LEAF
             for p in range(max(first, 1), min(first + LEAF, n)):
                 for q in range(max(second, p + 1), min(second + LEAF, n)):
-                    if contact.kind[p] == WITHIN and contact.kind[q] == WITHIN:
+                    if contact.kind[p] == WITHIN == contact.kind[q] and may_touch(line, ends, contact, p, q):
                         look_at_pair(line, ends, contact, phase, p, q)
             continue
         c, d = 2 * a, 2 * b
