@@ -340,11 +340,12 @@ class Recorder(BaseRecorder):
         self._pause = max(pause(made), _PART * (self._flushed - begin))
 
     def _write_many_steps(self) -> None:
-        if self._steps.waiting >= BLOCK and self._late is None:
-            # alone: outputs are written together with their checkpoint
-            whole = self if self._whole is None else self._whole
+        """Steps alone: outputs are written together with their checkpoint; those of lines of a file all at once."""
+        whole = self if self._whole is None else self._whole
+        steps = [part._steps for part in whole._parts.values()] or [self._steps]
+        if self._late is None and all(x.waiting >= BLOCK for x in steps):
             with whole._writing():
-                whole._write([self._steps])
+                whole._write(steps)
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
