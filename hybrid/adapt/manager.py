@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.adapt.user_criterion import FORCED_RATIO, NodeState, UserCriterion, cell_ratios
 from hybrid.adapt.zone_rules import OFF, ROUND_TIME, Rules, planned, reach, spread, tidied, wanted, widen
@@ -46,6 +47,7 @@ SHORTEST = 2  # cells that make a zone
 CHECKPOINTED = (
     "tolerance", "held", "ratios", "seen", "grown", "leaving", "haste", "calm_since", "calmed", "patience", "released",
     "going", "next_review", "total_twist", "past", "recent", "age", "recent_age", "largest", "fastest",
+    "unweighed",
 )  # fmt: skip
 
 
@@ -155,6 +157,7 @@ class DomainManager:
         self.weightless = bool((floor < WEIGHTLESS * scale).any())
         # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
         self.zones.counts[z.HOLDS_TWIST] = cable.passes_torque
+        self.zones.counts[z.ALL_STEPS] = user is not None
         self.set_layout(layout)
 
     # --- what the compiled run knows ----------------------------------------------------------------
@@ -166,6 +169,7 @@ class DomainManager:
     total_twist = _number(z.TOTAL_TWIST, "Turn of the ends against each other, rad.")
     compliance = _number(z.COMPLIANCE, "Turn per torque of all the line, rad per N m.")
     age, recent_age = _number(z.AGE, "Of `past`, s."), _number(z.RECENT_AGE, "Of `recent`, s.")
+    unweighed = _number(z.UNWEIGHED, "Since a state was weighed last, while all is rod, s.")
     fastest = _number(z.FASTEST, "By how much velocities of nodes differed of late, m/s.")
     going, coming = _flag(z.GOING, "Some stiffness is ramped down."), _flag(z.COMING, "Some is ramped up.")
     twisted = _flag(z.HOLDS_TWIST, "Both ends hold the twist.")
@@ -258,7 +262,7 @@ class DomainManager:
         loudest, grown = saved["calmed"][0], saved["grown"]
         if not (good and 0.0 <= loudest.min(initial=0.0) <= loudest.max(initial=0.0) < len(CRITERIA)):
             raise ValueError("invalid checkpoint of the domain manager")
-        least = min(saved["age"], saved["recent_age"], saved["fastest"], *saved["largest"])
+        least = min(saved["age"], saved["recent_age"], saved["fastest"], saved["unweighed"], *saved["largest"])
         if not (0.0 <= grown.min() <= grown.max() <= 1.0 and least >= 0.0):
             raise ValueError("invalid checkpoint: a part of stiffness outside 0 to 1, or a negative time or size")
         for name in CHECKPOINTED:
@@ -330,7 +334,7 @@ class DomainManager:
         rod = self.layout.rod
         self._add_global_ratios()
         rules = self.rules(state)
-        next_, self.calm_since = planned(
+        next_, self.calm_since[:] = planned(
             self.ratios, rod, self.calm_since, t, self.layout.base, rules, self.leaving, self.patience
         )
         next_ = (next_ | (rod & self.held)) & (self.given >= 0)
@@ -353,6 +357,17 @@ class DomainManager:
             change = Change(new, tuple(self._reasons(rod, new)), urgent, np.zeros_like(rod))
         self._reset_ratios()
         return change
+
+    def bind_review(self, table: Table, zone_table: NDArray[np.int64]) -> None:
+        """Bind what compiled reviews of zones (adapt.zone_rules.quiet_review) know; zone_table: of their ZoneJob."""
+        n = self.given.size
+        table.bind(
+            zone_table=zone_table, base=self.layout.base, given=self.given.astype(np.int64),
+            calm_since=self.calm_since, calmed=self.calmed, patience=self.patience, seen=self.seen, buffer=self.buffer,
+            off=OFF, calm=np.zeros(n), wait=np.zeros(n), flags=np.zeros((4, n), bool), shortest=SHORTEST,
+            dwell=float(self.dwell), parts=BUFFER, light=1e-9 * self.scale, forced=FORCED_RATIO,
+            pace=float(self.pace), pause=1.0 / REVIEWS, held=int(self.held),
+        )  # fmt: skip
 
     def initial_rods(self, state: State) -> np.ndarray:
         """Base cells that ask to be rod, whatever they are, after `evaluate_criteria`; the ratios begin anew."""

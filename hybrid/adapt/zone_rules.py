@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.mesh import zone_step as z
-from hybrid.kernels.mesh.criteria import CRITERIA, GIVEN
+from hybrid.kernels.mesh.criteria import CRITERIA, GIVEN, TORSION
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import Floats
 
@@ -300,8 +300,14 @@ def quiet_review(table):
     run = read_zones(job.zone_table)
     zones, clock = run.zones, run.zones.clock
     kinds, ratios, n = zones.kinds, zones.ratios, zones.rod.shape[0]
-    if clock[z.LOUDEST] > 1.0 or zones.counts[z.HOLDS_TWIST] or zones.counts[z.LOADED]:
+    if clock[z.LOUDEST] > 1.0:
         return 0
+    if zones.counts[z.HOLDS_TWIST] or zones.counts[z.LOADED]:  # torque needs rods from end to end
+        most = 0.0
+        for j in range(n):
+            most = max(most, ratios[TORSION, j])
+        for j in range(n):
+            ratios[TORSION, j] = most
     for j in range(n):
         if job.given[j] > 0:
             ratios[GIVEN, j] = job.forced

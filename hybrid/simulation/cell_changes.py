@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.adapt.manager import BUFFER, OF_BASE, REVIEWS, SHORTEST, Change
-from hybrid.adapt.user_criterion import FORCED_RATIO
-from hybrid.adapt.zone_rules import OFF, blank_review_job, quiet_review
+from hybrid.adapt.manager import OF_BASE, Change
+from hybrid.adapt.zone_rules import blank_review_job, quiet_review
 from hybrid.kernels.contact.self_distance import blank_itself_job, boxes_of
 from hybrid.kernels.machine.binding import Packed, Room, Table
 from hybrid.kernels.mesh import zone_step as z
@@ -244,17 +243,6 @@ class CellChanges:
         self._tables = layouts, kinds, of_run, of_zones, of_itself, switches, renews  # what is bound there stays alive
         self._bind_following(layouts, lines, kinds, of_run, of_zones, of_itself, switches, renews)
 
-    def _bind_review(self) -> None:
-        """The table of reviews that change nothing."""
-        manager = self._switching.manager
-        n = manager.given.size
-        self._review.bind(
-            zone_table=self._switching.table.numbers, base=manager.layout.base, given=manager.given.astype(np.int64),
-            off=OFF, calm=np.zeros(n), wait=np.zeros(n), flags=np.zeros((4, n), bool), shortest=SHORTEST,
-            dwell=float(manager.dwell), parts=BUFFER, light=1e-9 * manager.scale, forced=FORCED_RATIO,
-            pace=float(manager.pace), pause=1.0 / REVIEWS,
-        )  # fmt: skip
-
     def _bind_following(
         self, layouts: list[Table], lines: list[Shaped], kinds: list[Shaped], of_run: list[Shaped],
         of_zones: list[Shaped], of_itself: list[Shaped], switches: list[Shaped], renews: list[Shaped],
@@ -285,7 +273,7 @@ class CellChanges:
             "review": self._review.numbers, "here": zones.here, "waiting": self._waiting, "places": self._places,
         }  # fmt: skip
         self._following.bind(**numbers)
-        self._bind_review()
+        self._switching.manager.bind_review(self._review, self._switching.table.numbers)
         at, samples = self._at, self._on.samples.__array_interface__["data"][0]
         at[f.ROOM], at[f.ROOM_SIZE], at[f.MOST_ROWS] = samples, self._on.samples.size, self._on.rows
         at[f.TASK] = run.table.part("task").start
@@ -342,11 +330,7 @@ class CellChanges:
         reviewed: the criteria have just been reviewed after a step, and zones stay as they are.
         """
         self._at[f.ALONE], self._at[f.MAY_WAIT] = self.alone, self._owner.outputs_may_wait
-        manager = self._switching.manager
-        self._review.bind(
-            calm_since=manager.calm_since, calmed=manager.calmed, patience=manager.patience, seen=manager.seen,
-            buffer=manager.buffer, held=int(manager.held),
-        )  # fmt: skip
+        self._switching.manager.bind_review(self._review, self._switching.table.numbers)
         code = self._run.go(lambda: int(f.go_on(self._following.numbers, reviewed)))
         self._run.set_quota(self.cells)
         return code

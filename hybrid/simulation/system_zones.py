@@ -182,7 +182,7 @@ class _LineZones:
         self.switching.table.bind(
             line=model.line, sea=model.sea.values, ends=model.ends.values, old=old, new=new, clock=self.clock,
             counts=self.counts, work=run.lines[self.number].books.work, zones=self.switching.zones,
-            near=self.switching.manager.near,
+            near=self.switching.manager.near, review=0,
         )  # fmt: skip
         follow_zones(self.switching.table.numbers)
 
@@ -194,6 +194,7 @@ class _LineZones:
             new=odd.lines[self.number], clock=loop.clock, counts=loop.counts, work=run.lines[self.number].books.work,
             zones=self.switching.zones, near=self.switching.manager.near,
         )  # fmt: skip
+        self.switching.let_review()
         return self.switching.table
 
 

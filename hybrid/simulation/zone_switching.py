@@ -10,6 +10,7 @@ import numpy as np
 
 from hybrid.adapt.manager import Change, DomainManager
 from hybrid.adapt.state_transfer import Clamp, transfer_to
+from hybrid.adapt.zone_rules import blank_review_job, quiet_review
 from hybrid.errors import Outcome
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.march.torque_transfer import carry_torque
@@ -81,6 +82,7 @@ class ZoneSwitching:
         self.model, self.manager, self._followed = model, manager, followed
         self.table = Table(blank_zone_job)  # of the compiled run
         self._switch_table, self._plan_table = Table(blank_switch_job), Table(blank_zone_job)
+        self._review = Table(blank_review_job)
         self.guided = np.array(model.cable.held_tangent, float)
         base = manager.layout.base
         self.kinks = np.zeros(base.size, bool)
@@ -131,7 +133,16 @@ class ZoneSwitching:
             line=line, sea=sea, ends=ends, old=run.states[0], new=run.states[1], clock=run.clock, counts=run.count,
             work=run.books.work, zones=self.zones, near=manager.near,
         )  # fmt: skip
+        self.let_review()
         run.follow(self.table, self.compiled)
+
+    def let_review(self) -> None:
+        """Steps review zones themselves where that changes nothing; cells that change have reviews of their own."""
+        review = 0
+        if self.compiled and not self.zones.clock[z.SHARE] > 0.0 and self.model.payout is None:
+            self.manager.bind_review(self._review, self.table.numbers)
+            review = quiet_review.address(self._review.numbers)
+        self.table.bind(review_table=self._review.numbers, review=review)
 
     def limit_steps(self, run: CompiledRun) -> None:
         """Steps are as long as what is ramped allows."""

@@ -18,7 +18,7 @@ from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.end_motion import end_turn
 from hybrid.kernels.laws.tension_torque import twist_of_line
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.machine.references import reader
+from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.energies import observe
 from hybrid.kernels.mesh.cell_errors import (
     CURVATURE,
@@ -74,8 +74,9 @@ REJECT_RATIO = 4.0  # a step that ends with a catenary above this is rejected, a
     FASTEST,  # m/s, by how much velocities of nodes differed of late
     EDGE_TIME,  # s, for which the way of a contact edge is foreseen
     MEMORY,  # s, over which the largest values of earlier are forgotten
-) = range(20)  # fmt: skip
-CLOCK_SIZE = 20
+    UNWEIGHED,  # s, since a state was weighed last, while all is rod
+) = range(21)  # fmt: skip
+CLOCK_SIZE = 21
 # Flags of `counts`.
 (
     KNOWN,  # tensions of earlier are of these cells
@@ -86,8 +87,9 @@ CLOCK_SIZE = 20
     GOING, COMING,  # stiffness is ramped down; up
     STRAINED,  # `strain` is of the state now
     CELLS_DUE,  # rods should have other cells
-) = range(10)  # fmt: skip
-FLAG_COUNT = 10
+    ALL_STEPS,  # the criteria of every step are asked for
+) = range(11)  # fmt: skip
+FLAG_COUNT = 11
 
 
 class Zones(NamedTuple):
@@ -166,6 +168,8 @@ class ZoneJob(NamedTuple):
     near: (
         Floats  # (N+1,) how near the line is to itself (kernels.contact.self_contact_pairs.look_ahead); empty: unknown
     )
+    review_table: NDArray[np.int64]  # of an adapt.zone_rules.ReviewJob
+    review: int = 0  # address of adapt.zone_rules.quiet_review; 0: Python reviews
 
 
 def blank_zone_job() -> ZoneJob:
@@ -173,11 +177,21 @@ def blank_zone_job() -> ZoneJob:
     state = blank_state(1)
     clock, counts, work = np.zeros(b.CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64), np.zeros((2, WORKS))
     return ZoneJob(
-        blank_line(1), no_sea(1), no_ends(), state, state, clock, counts, work, blank_zones(1, 1), np.zeros(0)
+        blank_line(1),
+        no_sea(1),
+        no_ends(),
+        state,
+        state,
+        clock,
+        counts,
+        work,
+        blank_zones(1, 1),
+        np.zeros(0),
+        np.zeros(1, np.int64),
     )
 
 
-read = reader(blank_zone_job())
+read, call_review = reader(blank_zone_job()), caller(0)
 
 
 @inner
@@ -393,6 +407,13 @@ def is_coming(zones):
     return coming
 
 
+@inner
+def waits(zones, end):
+    """Whether a step that ends at `end` need not be weighed: all is rod, of cells that stay, and no review is due."""
+    flags, z = zones.counts, zones.clock
+    return flags[ALL_ROD] and not flags[ALL_STEPS] and z[SHARE] == 0.0 and end < z[NEXT_REVIEW]
+
+
 # --- entries ----------------------------------------------------------------------------------------
 
 
@@ -438,7 +459,10 @@ def follow_zones(table):
         prepare(line, zones, clock[b.TRY_END], dt)
         return 0
     if phase == b.JUDGE:
-        evaluate(line, job.sea, ends, job.old if count[b.PARITY] else job.new, zones, job.near, dt)
+        if waits(zones, clock[b.TRY_END]):
+            return 0
+        tried = job.old if count[b.PARITY] else job.new
+        evaluate(line, job.sea, ends, tried, zones, job.near, zones.clock[UNWEIGHED] + dt)
         return 1 if zones.clock[LOUDEST] > REJECT_RATIO else 0
     # a step is accepted, and the states have changed places
     state, before = job.old, job.new
@@ -446,6 +470,7 @@ def follow_zones(table):
         state, before = before, state
     for k in range(QUANTITIES):
         zones.largest[k] *= math.exp(-clock[b.LAST_DT] / zones.clock[MEMORY])
+    zones.clock[UNWEIGHED] = zones.clock[UNWEIGHED] + clock[b.LAST_DT] if waits(zones, clock[b.NOW]) else 0.0
     job.work[0, b.ZONES] += book(line, ends, before, state, clock[b.LAST_DT], zones)
     if zones.clock[SHARE] > 0.0:
         follow_arcs(line, state, zones)
@@ -453,5 +478,8 @@ def follow_zones(table):
         zones.counts[CELLS_DUE] = other_cells(line, job.sea, state, zones, clock[b.LAST_DT])
     ramping = zones.counts[GOING] or zones.counts[COMING]
     clock[b.ALLOWED] = zones.clock[RAMP_STEP] if ramping else zones.clock[CALM_STEP]
-    due = zones.clock[LOUDEST] > 1.0 or clock[b.NOW] >= zones.clock[NEXT_REVIEW] or zones.counts[CELLS_DUE] != 0
-    return 1 if due else 0
+    if zones.clock[LOUDEST] > 1.0 or zones.counts[CELLS_DUE] != 0:
+        return 1
+    if clock[b.NOW] < zones.clock[NEXT_REVIEW] or (job.review != 0 and call_review(job.review, job.review_table) != 0):
+        return 0
+    return 1
