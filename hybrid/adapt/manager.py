@@ -47,7 +47,6 @@ SHORTEST = 2  # cells that make a zone
 CHECKPOINTED = (
     "tolerance", "held", "ratios", "seen", "grown", "leaving", "haste", "calm_since", "calmed", "patience", "released",
     "going", "next_review", "total_twist", "past", "recent", "age", "recent_age", "largest", "fastest",
-    "unweighed",
 )  # fmt: skip
 
 
@@ -157,7 +156,6 @@ class DomainManager:
         self.weightless = bool((floor < WEIGHTLESS * scale).any())
         # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
         self.zones.counts[z.HOLDS_TWIST] = cable.passes_torque
-        self.zones.counts[z.ALL_STEPS] = user is not None
         self.set_layout(layout)
 
     # --- what the compiled run knows ----------------------------------------------------------------
@@ -169,7 +167,6 @@ class DomainManager:
     total_twist = _number(z.TOTAL_TWIST, "Turn of the ends against each other, rad.")
     compliance = _number(z.COMPLIANCE, "Turn per torque of all the line, rad per N m.")
     age, recent_age = _number(z.AGE, "Of `past`, s."), _number(z.RECENT_AGE, "Of `recent`, s.")
-    unweighed = _number(z.UNWEIGHED, "Since a state was weighed last, while all is rod, s.")
     fastest = _number(z.FASTEST, "By how much velocities of nodes differed of late, m/s.")
     going, coming = _flag(z.GOING, "Some stiffness is ramped down."), _flag(z.COMING, "Some is ramped up.")
     twisted = _flag(z.HOLDS_TWIST, "Both ends hold the twist.")
@@ -262,7 +259,7 @@ class DomainManager:
         loudest, grown = saved["calmed"][0], saved["grown"]
         if not (good and 0.0 <= loudest.min(initial=0.0) <= loudest.max(initial=0.0) < len(CRITERIA)):
             raise ValueError("invalid checkpoint of the domain manager")
-        least = min(saved["age"], saved["recent_age"], saved["fastest"], saved["unweighed"], *saved["largest"])
+        least = min(saved["age"], saved["recent_age"], saved["fastest"], *saved["largest"])
         if not (0.0 <= grown.min() <= grown.max() <= 1.0 and least >= 0.0):
             raise ValueError("invalid checkpoint: a part of stiffness outside 0 to 1, or a negative time or size")
         for name in CHECKPOINTED:
@@ -270,6 +267,8 @@ class DomainManager:
                 getattr(zones, name)[: saved[name].size] = saved[name]
             elif name in OF_BASE:
                 getattr(zones, name)[:] = saved[name]
+            elif isinstance(there := getattr(self, name), np.ndarray):
+                there[:] = saved[name]  # in place: compiled reviews know where it is
             else:
                 setattr(self, name, saved[name])
         zones.counts[z.KNOWN] = saved["past"].size > 0

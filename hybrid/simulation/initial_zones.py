@@ -13,7 +13,6 @@ from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.march.torque_transfer import carry_torque
-from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.mesh.cell_lengths import CALM_STEPS
 from hybrid.kernels.mesh.criteria import CRITERIA
@@ -158,7 +157,6 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
         foreseen, period if curvature_error is None else 0.0,
     )  # fmt: skip
     manager.load(model.ends.moments)
-    manager.zones.counts[z.ALL_STEPS] |= scene.output.criteria
     base = model.layout.base
     for a, b, lack in resolution.rods:
         there = (base[:-1] < b) & (base[1:] > a)

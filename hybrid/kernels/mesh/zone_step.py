@@ -74,9 +74,8 @@ REJECT_RATIO = 4.0  # a step that ends with a catenary above this is rejected, a
     FASTEST,  # m/s, by how much velocities of nodes differed of late
     EDGE_TIME,  # s, for which the way of a contact edge is foreseen
     MEMORY,  # s, over which the largest values of earlier are forgotten
-    UNWEIGHED,  # s, since a state was weighed last, while all is rod
-) = range(21)  # fmt: skip
-CLOCK_SIZE = 21
+) = range(20)  # fmt: skip
+CLOCK_SIZE = 20
 # Flags of `counts`.
 (
     KNOWN,  # tensions of earlier are of these cells
@@ -87,9 +86,8 @@ CLOCK_SIZE = 21
     GOING, COMING,  # stiffness is ramped down; up
     STRAINED,  # `strain` is of the state now
     CELLS_DUE,  # rods should have other cells
-    ALL_STEPS,  # the criteria of every step are asked for
-) = range(11)  # fmt: skip
-FLAG_COUNT = 11
+) = range(10)  # fmt: skip
+FLAG_COUNT = 10
 
 
 class Zones(NamedTuple):
@@ -407,13 +405,6 @@ def is_coming(zones):
     return coming
 
 
-@inner
-def waits(zones, end):
-    """Whether a step that ends at `end` need not be weighed: all is rod, of cells that stay, and no review is due."""
-    flags, z = zones.counts, zones.clock
-    return flags[ALL_ROD] and not flags[ALL_STEPS] and z[SHARE] == 0.0 and end < z[NEXT_REVIEW]
-
-
 # --- entries ----------------------------------------------------------------------------------------
 
 
@@ -459,10 +450,7 @@ def follow_zones(table):
         prepare(line, zones, clock[b.TRY_END], dt)
         return 0
     if phase == b.JUDGE:
-        if waits(zones, clock[b.TRY_END]):
-            return 0
-        tried = job.old if count[b.PARITY] else job.new
-        evaluate(line, job.sea, ends, tried, zones, job.near, zones.clock[UNWEIGHED] + dt)
+        evaluate(line, job.sea, ends, job.old if count[b.PARITY] else job.new, zones, job.near, dt)
         return 1 if zones.clock[LOUDEST] > REJECT_RATIO else 0
     # a step is accepted, and the states have changed places
     state, before = job.old, job.new
@@ -470,7 +458,6 @@ def follow_zones(table):
         state, before = before, state
     for k in range(QUANTITIES):
         zones.largest[k] *= math.exp(-clock[b.LAST_DT] / zones.clock[MEMORY])
-    zones.clock[UNWEIGHED] = zones.clock[UNWEIGHED] + clock[b.LAST_DT] if waits(zones, clock[b.NOW]) else 0.0
     job.work[0, b.ZONES] += book(line, ends, before, state, clock[b.LAST_DT], zones)
     if zones.clock[SHARE] > 0.0:
         follow_arcs(line, state, zones)
