@@ -67,7 +67,9 @@ def test_the_listener_is_called_by_the_thread_that_runs(monkeypatch: pytest.Monk
     fractions = [p.fraction for p in heard]
     assert fractions == sorted(fractions) and fractions[-1] == pytest.approx(1.0)
     first = next(p.fraction for p in heard if p.name == ESTIMATION)
-    assert 0.5 < first < 0.7, "what other threads have done is left out, or counted twice"
+    assert first > 0.5, "what other threads have done is left out"
+    on_the_way = [p.fraction for p in heard if p.t < p.duration]  # how far the others are by then is a race
+    assert max(on_the_way) < 1.0, "what other threads have done is counted twice"
 
 
 def ended(before: set[threading.Thread]) -> bool:
