@@ -58,10 +58,17 @@ def row9(table, k, at):
 
 
 @inner
-def put(table, k, at, values):
-    """Write numbers into a row."""
-    for j in range(len(values)):
-        table[k, at + j] = values[j]
+def put_vector(table, k, at, x):
+    """Write a vector into a row."""
+    for j in range(3):
+        table[k, at + j] = x[j]
+
+
+@inner
+def put_matrix(table, k, at, R):
+    """Write a matrix into a row."""
+    for j in range(9):
+        table[k, at + j] = R[j]
 
 
 @inner
@@ -108,14 +115,14 @@ def carry_obstacles(begin, end, sea):
             before = sea.carried[k, ROLLED_BEFORE]
         c0, _, _, R0, _ = pose_at(max(begin, 0.0), k, sea, before)
         c, v, bare, R, w = pose_at(end, k, sea, rolled)
-        put(sea.carried, k, BEGAN, c0)
-        put(sea.carried, k, ENDED, c)
-        put(sea.carried, k, SWEEP, mat_mat(R, transposed(R0)))
-        put(sea.carried, k, SPEED, v)
-        put(sea.carried, k, TURNING, w)
-        put(sea.carried, k, TURNED, R)
-        put(sea.obstacles, k, PLACE, c)
-        put(sea.obstacles, k, AXIS, mat_vec(bare, row3(sea.carried, k, STILL_AXIS)))
+        put_vector(sea.carried, k, BEGAN, c0)
+        put_vector(sea.carried, k, ENDED, c)
+        put_matrix(sea.carried, k, SWEEP, mat_mat(R, transposed(R0)))
+        put_vector(sea.carried, k, SPEED, v)
+        put_vector(sea.carried, k, TURNING, w)
+        put_matrix(sea.carried, k, TURNED, R)
+        put_vector(sea.obstacles, k, PLACE, c)
+        put_vector(sea.obstacles, k, AXIS, mat_vec(bare, row3(sea.carried, k, STILL_AXIS)))
 
 
 @inner
