@@ -15,6 +15,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -51,8 +52,8 @@ def scene(cells: int, friction: float | None) -> dict[str, Any]:
     return tables
 
 
-def measured(cells: int, friction: float | None, runs: int = RUNS) -> tuple[float, int, float]:
-    """Least processor time, s, of all of the motion; its steps, and the tension at the end, N."""
+def measured(cells: int, friction: float | None, runs: int = RUNS) -> tuple[float, int, float, float]:
+    """Least processor time, s, of all of the motion; its steps, Newton iterations a step, tension at the end, N."""
     least = float("inf")
     for _ in range(runs):
         simulation = hybrid.Simulation(hybrid.validate_scene(scene(cells, friction)))
@@ -60,18 +61,19 @@ def measured(cells: int, friction: float | None, runs: int = RUNS) -> tuple[floa
         simulation.advance(14.0)
         least = min(least, time.process_time() - begin)
     run = simulation._loop.run
-    return least, run.steps, float(run.state.T[-1])
+    iterations = float(np.mean(simulation.result().steps["iterations"]))
+    return least, run.steps, iterations, float(run.state.T[-1])
 
 
 @pytest.mark.parametrize(("cells", "friction"), BEFORE)
 def test_a_plectoneme(cells: int, friction: float) -> None:
     """At most half of what it took, with friction at most 0.35; the tension within 1e-4."""
     measured(cells, friction, 1)  # compiles
-    free, _, _ = measured(cells, None)
-    touching, steps, tension = measured(cells, friction)
+    free, *_ = measured(cells, None)
+    touching, steps, iterations, tension = measured(cells, friction)
     ratio, before = touching / free, BEFORE[cells, friction]
     print(
-        f"\n{cells} cells, friction {friction:g}: {touching:.2f} s, {steps} steps, {ratio:.2f} of without contact "
+        f"\n{cells} cells, friction {friction:g}: {touching:.2f} s, {steps} steps of {iterations:.2f} iterations, {ratio:.2f} of without contact "
         f"(before {before[0]:g}), {ratio / before[0]:.2f} of before; tension {tension:.6f} N, before {before[1]:.6f}"
     )
     assert abs(tension - before[1]) < 1e-4 * before[1]

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.adapt.manager import OF_BASE, Change
-from hybrid.adapt.zone_rules import blank_review_job, quiet_review
 from hybrid.kernels.contact.self_distance import blank_itself_job, boxes_of
 from hybrid.kernels.machine.binding import Packed, Room, Table
 from hybrid.kernels.mesh import zone_step as z
@@ -91,7 +90,7 @@ class CellChanges:
         self._stays = np.zeros(self.most + 1, np.int64)
         self._spare = np.zeros(4 * b.EXTREMES * (self.most + 1 + extra))
         self._match = Room(Packed(blank_joined), self.most), Room(Packed(blank_single), self.most)
-        self._following, self._review = Table(f.blank_following_job), Table(blank_review_job)
+        self._following = Table(f.blank_following_job)
         self._rods_then: list[tuple[int, np.ndarray]] = []  # rods (n,) of the outputs that waited, up to so many
         self._waiting, self._places = np.zeros((MOST_WAITING, 3), np.int64), np.zeros(MOST_PLACES, np.int64)
         self.adopted, self._synced = False, -1  # number of changes that Python knows of
@@ -270,10 +269,9 @@ class CellChanges:
             "layouts": np.array([x.numbers for x in layouts]), "line": lines[0].table.numbers, "lines": stacked(lines),
             "kind": kinds[0].table.numbers, "kinds": stacked(kinds), "switch": switches[0].table.numbers,
             "switches": stacked(switches), "renewed": renews[0].table.numbers, "renews": stacked(renews),
-            "review": self._review.numbers, "here": zones.here, "waiting": self._waiting, "places": self._places,
+            "here": zones.here, "waiting": self._waiting, "places": self._places,
         }  # fmt: skip
         self._following.bind(**numbers)
-        self._switching.manager.bind_review(self._review, self._switching.table.numbers)
         at, samples = self._at, self._on.samples.__array_interface__["data"][0]
         at[f.ROOM], at[f.ROOM_SIZE], at[f.MOST_ROWS] = samples, self._on.samples.size, self._on.rows
         at[f.TASK] = run.table.part("task").start
@@ -284,7 +282,6 @@ class CellChanges:
             f.KINDS: (fill_kinds, kinds[0].table), f.END: (end_switch, switches[0].table),
             f.RENEW: (renew, renews[0].table), f.BEFORE_FORCES: (before_forces, run.table),
             f.AFTER_FORCES: (after_forces, run.table), f.STEPS: (steps, run.table),
-            f.REVIEW: (quiet_review, self._review),
         }  # fmt: skip
         for k, (kernel, table) in calls.items():
             self._calls[k] = kernel.address(table.numbers)
@@ -330,7 +327,6 @@ class CellChanges:
         reviewed: the criteria have just been reviewed after a step, and zones stay as they are.
         """
         self._at[f.ALONE], self._at[f.MAY_WAIT] = self.alone, self._owner.outputs_may_wait
-        self._switching.manager.bind_review(self._review, self._switching.table.numbers)
         code = self._run.go(lambda: int(f.go_on(self._following.numbers, reviewed)))
         self._run.set_quota(self.cells)
         return code

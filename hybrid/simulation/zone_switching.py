@@ -137,9 +137,9 @@ class ZoneSwitching:
         run.follow(self.table, self.compiled)
 
     def let_review(self) -> None:
-        """Steps review zones themselves where that changes nothing; cells that change have reviews of their own."""
+        """Steps review zones themselves where that changes nothing; of a line that is paid out Python does."""
         review = 0
-        if self.compiled and not self.zones.clock[z.SHARE] > 0.0 and self.model.payout is None:
+        if self.compiled and self.model.payout is None:
             self.manager.bind_review(self._review, self.table.numbers)
             review = quiet_review.address(self._review.numbers)
         self.table.bind(review_table=self._review.numbers, review=review)
@@ -187,6 +187,7 @@ class ZoneSwitching:
             if not (found["true"].min() > 0.0 and found["waves"].min() >= 0.0):
                 raise ValueError("lengths that no line has")
             zones.true[:], zones.calm[:], zones.waves[:] = found["true"], found["calm"], found["waves"]
+        self.let_review()  # whether rods may go is another matter now
         line.h[:], line.kb[:], line.force[:] = saved["h"], saved["kb"], saved["force"]
         zones.lengths[:] = line.h
         if strain.size:

@@ -13,20 +13,24 @@ LENGTH, JOINT = 100.0, 40.0
 EI, WEIGHT = 5e4, 20.0 * 9.81  # N m2, N/m
 
 
-def sag(model: Any, cells: int, turned: bool = False, across: float = 0.0) -> hybrid.Result:
+def sag(model: Any, cells: int, turned: bool = False, across: Any = 0.0, up: float = 0.0) -> hybrid.Result:
     """A sag between two pins at rest, its tension some 9 kN: sqrt(EI/T) is 2.4 m; outputs at nodes and middles.
 
-    turned: counted from the other end; across: m/s, of a current that leads it out of its plane.
+    turned: counted from the other end; across: m/s, of a current that leads it out of its plane, or as a table by z;
+    up: m, height of the other pin, as far away.
     """
     section = {"length": LENGTH, "mass": 20.0, "diameter": 0.05, "axial_stiffness": 1e8, "bending_stiffness": EI,
                "drag": {"normal": 1.2}}  # fmt: skip
-    one, two = ({"kind": "pinned", "position": [x, 0, 0]} for x in (0.0, 96.0))
+    far = float(np.sqrt(96.0**2 - up**2))
+    one, two = ({"kind": "pinned", "position": x} for x in ([0, 0, 0], [far, 0, up]))
     if turned:
         one, two = two, one
         if isinstance(model, dict):
             model = {"kind": "zones", "zones": model["zones"][::-1]}
     return hybrid.static({
-        "environment": {"fluid": {"density": 1025, "current": [0, across, 0]}},
+        "environment": {
+            "fluid": {"density": 1025, "current": [0, across, 0] if isinstance(across, float) else across}
+        },
         "cable": {"sections": [section]}, "ends": {"start": one, "end": two}, "initial": "equilibrium",
         "model": model, "mesh": {"cells": cells}, "output": {"points": 2 * cells + 1},
     })  # fmt: skip
@@ -44,6 +48,18 @@ def test_curvature_goes_on_through_a_joint(cells: int, across: float) -> None:
     assert np.abs(zones.curvature - rods.curvature)[..., near].max() < 0.01 * rods.curvature[..., near].max()
     node = int(np.argmin(np.abs(rods.s - JOINT)))
     assert zones.bending_moment[..., node].max() < 1e-6 * EI * rods.curvature.max()  # it passes none
+
+
+def test_what_loads_the_joint_alone_is_in_results() -> None:
+    """A thin jet across a joint of a slanting line whose neighbours are out of it: they do not know its bend."""
+    rest = sag("rod", 25, up=70.0)
+    z = float(np.interp(JOINT, rest.s, rest.position[0, :, 2]))
+    jet = [{"z": z + x, "velocity": [0, y, 0]} for x, y in ((2, 0), (0.7, 4), (-0.7, 4), (-2, 0))]
+    rods, zones = (sag(model, 25, across=jet, up=70.0) for model in ("rod", ZONES))
+    node = int(np.argmin(np.abs(rods.s - JOINT)))
+    peak, beside = rods.curvature[0, node], rods.curvature[0, node - 2 :: 4][:2]
+    assert peak > 1.2 * beside.max()
+    assert zones.curvature[0, node] == pytest.approx(peak, rel=0.05)
 
 
 def test_from_the_other_end_it_is_the_same() -> None:

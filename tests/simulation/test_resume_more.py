@@ -15,7 +15,7 @@ import hybrid
 import hybrid.simulation.time_loop
 from hybrid.accuracy.error_estimate import Estimate
 from hybrid.errors import OTHER_PROGRAM
-from hybrid.simulation import case, restore
+from hybrid.simulation import case, initial_zones, restore
 from hybrid.simulation.progress import ESTIMATION, RESULT
 from hybrid.store import checkpoint, lock
 from hybrid.store import writer as record
@@ -482,3 +482,28 @@ def test_checkpoints_are_at_the_same_places_whatever_the_clock(tmp_path, monkeyp
         kept.append([(x.number, x.t, x.rows, x.state["steps"]) for x in points])
     assert places[0] == places[1] and len(places[0]) == 6  # of 200 steps: the first, after 42, 84, 126, 168, the last
     assert kept[0] == kept[1]
+
+
+def test_zones_that_are_fixed_stay_so(tmp_path, monkeypatch):
+    """A run whose rods may not go, and which says so in its checkpoint alone: the same bits, and none goes."""
+    text = hybrid.load_scene(EXAMPLES / "touchdown.yaml").model_dump(exclude_none=True)
+    text |= {"model": {"kind": "adaptive", "tolerance": 2e-5, "hold_time": 1.5}}
+
+    def lasting(duration):
+        return hybrid.validate_scene(text | {"time": text["time"] | {"duration": duration}})
+
+    assert any(e.kind in ("shrink", "merge") for e in hybrid.run(lasting(20.0)).events)
+    with monkeypatch.context() as patch:
+        found = initial_zones.manager_for
+
+        def held(*given):
+            manager = found(*given)
+            manager.held = True
+            return manager
+
+        patch.setattr(initial_zones, "manager_for", held)
+        whole = hybrid.run(lasting(30.0))
+        hybrid.run(lasting(15.0), tmp_path / "short.h5").close()
+    with hybrid.resume(tmp_path / "short.h5", until=30.0) as more:
+        assert np.array_equal(more.position, whole.position)
+        assert not any(e.kind in ("shrink", "merge") for e in more.events)

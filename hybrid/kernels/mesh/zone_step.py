@@ -295,8 +295,8 @@ def find_shares(line, state, zones):
 def asks_layers(zones):
     """Whether what joints take of curvature counts as put back: curvature is asked, and no moment, on cells that stay.
 
-    Results put it back from the two nodes of the catenary beside it (outputs.strains), so rods are two cells wider, at
-    least, than what asks for them.  A moment that a joint takes stays away.
+    Results put it back from the joint and the nodes beside it (outputs.strains), so rods are two cells wider, at least,
+    than what asks for them.  A moment that a joint takes stays away.
     """
     return zones.asked[CURVATURE] > 0.0 and not zones.asked[MOMENT] > 0.0 and not zones.clock[SHARE] > 0.0
 
@@ -465,8 +465,8 @@ def follow_zones(table):
         zones.counts[CELLS_DUE] = other_cells(line, job.sea, state, zones, clock[b.LAST_DT])
     ramping = zones.counts[GOING] or zones.counts[COMING]
     clock[b.ALLOWED] = zones.clock[RAMP_STEP] if ramping else zones.clock[CALM_STEP]
-    if zones.clock[LOUDEST] > 1.0 or zones.counts[CELLS_DUE] != 0:
+    if zones.clock[LOUDEST] > 1.0:
         return 1
-    if clock[b.NOW] < zones.clock[NEXT_REVIEW] or (job.review != 0 and call_review(job.review, job.review_table) != 0):
-        return 0
-    return 1
+    if clock[b.NOW] >= zones.clock[NEXT_REVIEW] and (job.review == 0 or call_review(job.review, job.review_table) == 0):
+        return 1
+    return 1 if zones.counts[CELLS_DUE] != 0 else 0

@@ -26,8 +26,8 @@ from hybrid.kernels.step.sampling import SAME_TIME
 Numbers = NDArray[np.int64]
 
 # Addresses in `calls`.
-(STEPS, SOLVER, LAY_OUT, CLEAR, LINE, BEGIN, KINDS, END, RENEW, BEFORE_FORCES, AFTER_FORCES, REVIEW) = range(12)
-CALLS = 12
+(STEPS, SOLVER, LAY_OUT, CLEAR, LINE, BEGIN, KINDS, END, RENEW, BEFORE_FORCES, AFTER_FORCES) = range(11)
+CALLS = 11
 # Numbers of `at`.
 (
     SIDE, CELLS,  # of the arrays that are in use, and of the line now
@@ -76,7 +76,6 @@ class FollowingJob(NamedTuple):
     switches: NDArray[np.int64]  # (2 old sides x 2 parities, 3, size)
     renewed: Numbers  # of clear_state and renew
     renews: NDArray[np.int64]
-    review: Numbers  # table of adapt.zone_rules.quiet_review
     here: NDArray[np.bool_]  # (K+1,) of the finest mesh: nodes now
     waiting: NDArray[np.int64]  # (lines, 3)
     places: Numbers  # nodes of the lines whose outputs wait
@@ -88,7 +87,7 @@ def blank_following_job() -> FollowingJob:
     return FollowingJob(
         z(CALLS, np.int64), z(AT_SIZE, np.int64), z(b.CLOCK_SIZE), z(b.COUNT_SIZE, np.int64), z(0), z((2, b.WORKS)),
         z(CLOCK_SIZE), z(FLAG_COUNT, np.int64), z(NUMBERS), few, few, sides, few, few, sides, few, few, sides,
-        z((2, 1), np.int64), few, sides, few, sides, few, sides, few, sides, few, z(1, bool), pairs, few,
+        z((2, 1), np.int64), few, sides, few, sides, few, sides, few, sides, z(1, bool), pairs, few,
     )  # fmt: skip
 
 
@@ -268,10 +267,8 @@ def go_on(table, reviewed):
         if due and not may_change(job):
             return code
         if not reviewed:
-            timed = job.clock[b.NOW] >= job.zone_clock[NEXT_REVIEW]
-            if job.zone_clock[LOUDEST] > 1.0 or not (timed or due):
-                return code
-            if timed and call_count(job.calls[REVIEW], job.review) == 0:
+            asked = job.zone_clock[LOUDEST] > 1.0 or job.clock[b.NOW] >= job.zone_clock[NEXT_REVIEW]
+            if asked or not due:
                 return code
         if due:
             leave(job)
