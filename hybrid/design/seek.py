@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybrid.design.sensitivity import AtRest, cable_of, changed_scene, parse_result
+from hybrid.design.cable_at_rest import CableAtRest
+from hybrid.design.line_at_rest import parse_result
+from hybrid.design.numbers import changed_scene
+from hybrid.design.sensitivity import cable_of
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.read import SceneLike
@@ -46,7 +49,7 @@ def seek(scene: SceneLike, targets: Mapping[str, float], by: Sequence[str]) -> S
     wanted = [parse_result(x, asked.length) for x in targets]
     goal = np.array(list(targets.values()), float)
     scale = np.maximum(np.abs(goal), 1e-12)
-    here, equilibria = AtRest(asked, 1.0, wanted), 1
+    here, equilibria = CableAtRest(asked, 1.0, wanted), 1
     numbers = np.array([here.number(key) for key in by])
     if not numbers.all():
         zero = by[int(np.flatnonzero(numbers == 0.0)[0])]
@@ -56,12 +59,12 @@ def seek(scene: SceneLike, targets: Mapping[str, float], by: Sequence[str]) -> S
         if off <= MET:
             found = {name: float(x) for name, x in zip(targets, here.values, strict=True)}
             return Sought(dict(zip(by, numbers.tolist(), strict=True)), found, dict(targets), equilibria, here.scene)
-        slopes = np.column_stack([here.by(key, x) for key, x in zip(by, numbers, strict=True)])
+        slopes = here.by(by).T
         step = _step(slopes * numbers / scale[:, None], (goal - here.values) / scale)
         for _ in range(HALVED):
             tried = numbers * (1.0 + step)
             try:
-                there = AtRest(_with(asked, by, tried), 1.0, wanted)
+                there = CableAtRest(_with(asked, by, tried), 1.0, wanted)
             except ComputationError:
                 step *= 0.5
                 continue

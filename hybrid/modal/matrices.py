@@ -133,12 +133,13 @@ class _Entries:
         return sparse.csr_array((values, (i, j)), shape=(rows, columns))
 
 
-def linear_line(x: JoinedLine, name: str, state: State, sticks: bool) -> LinearLine:
+def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: bool = True) -> LinearLine:
     """A line about an equilibrium, with ends that are joined as if they were free: the network holds them.
 
     sticks: whether friction holds it elastically where it lies on the bed, as before it slides; else there is none.
+    quick: whether ropes are as stiff as they are to quick motions, else as to what is slow.
     """
-    line, count = in_space(x.line, state, sticks), x.line.s.size
+    line, count = in_space(x.line, state, sticks, quick), x.line.s.size
     if line.bits & FRICTION:
         friction_axes(x.sea, state.r, state.e, np.zeros_like(state.slip), state.grip)
     held, joined = x.ends.held.copy(), [x.joints[k] >= 0 for k in (0, 1)]
@@ -173,14 +174,16 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool) -> LinearL
     )  # fmt: skip
 
 
-def in_space(line: Line, state: State, sticks: bool) -> Line:
-    """The line in space, without what makes no stiffness; ropes are as stiff as they are to quick motions."""
+def in_space(line: Line, state: State, sticks: bool, quick: bool = True) -> Line:
+    """The line in space, without what makes no stiffness; sticks, quick: as of `linear_line`."""
     ck = line.ck
-    if line.law.size:
+    if line.law.size and quick:
         dynamic = line.law[:, DYNAMIC] + line.law[:, PER_TENSION] * np.maximum(state.T, 0.0)
         ck = np.where(line.law[:, DYNAMIC] > 0.0, 1.0 / np.maximum(dynamic, 1e-300), ck)
-    off = PLANAR | WAVES | AXIAL_LAW | (0 if sticks else FRICTION)
-    return line._replace(bits=line.bits & ~off, law_at=NO_ADDRESS, ck=ck)
+    off = PLANAR | WAVES | (0 if sticks else FRICTION)
+    if quick:
+        return line._replace(bits=line.bits & ~(off | AXIAL_LAW), law_at=NO_ADDRESS, ck=ck)
+    return line._replace(bits=line.bits & ~off, ck=ck.copy(), law=line.law.copy())  # the law writes both
 
 
 def rows_at_rest(line: Line, x: JoinedLine, ends: Ends, state: State, c: tuple[float, float], rows: Floats) -> Floats:

@@ -163,7 +163,7 @@ def build(
     """
     cable = material(scene)
     resolution = resolution or first_resolution(scene)
-    layout, s, zones = _nodes(scene, cable, resolution, mesh)
+    layout, s, zones = place_cells(scene, cable, resolution, mesh)
     if stiffeners_of(scene):
         cable = material(scene, s if layout is None else layout.base)
     paid = None
@@ -219,7 +219,7 @@ def build(
     )  # fmt: skip
 
 
-def _nodes(
+def place_cells(
     scene: Scene, cable: Material, resolution: Resolution, mesh: Layout | tuple[Floats, tuple[Zone, ...]] | None
 ) -> tuple[Layout | None, Floats, tuple[Zone, ...]]:
     """Layout of a line whose zones move (else None), nodes (N+1,) m and zones; mesh: as of `build`."""

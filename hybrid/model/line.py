@@ -33,14 +33,15 @@ lines = Packed(blank_line, given=("bits", "plane", "torsion", *TENSION_TORQUE))
 
 def line_on(
     material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, sections_turn: bool = True,
-    comes_and_goes: bool = False,
+    comes_and_goes: bool = False, without: int = 0,
 ) -> Line:  # fmt: skip
     """The line of a material with nodes s (N+1,) and rod cells where `rod` (N,) is true.
 
-    more_bits: forces that the surroundings ask for; sections_turn: whether cross-sections of rods have inertia.
+    more_bits: forces that the surroundings ask for; without: those that are left out all the same.
+    sections_turn: whether cross-sections of rods have inertia.
     comes_and_goes: its rods do; they have inertia about their chords alone, where nothing else holds their spin.
     """
-    bits, inertia = material.bits | more_bits, NO_INERTIA
+    bits, inertia = (material.bits | more_bits) & ~without, NO_INERTIA
     if sections_turn and rod.any() and (material.polar[material.piece(0.5 * (s[:-1] + s[1:]))] > 0.0).any():
         bits |= ROTARY
         inertia = ABOUT_CHORDS if comes_and_goes else WITH_SECTIONS

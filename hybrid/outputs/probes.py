@@ -301,20 +301,39 @@ class Observer:
         other._after = VaryingGrid(nodes, zones, jumps, self._cuts, self._changes, True, self._unloaded)
         return other
 
-    def _dims(self, name: str) -> tuple[str, ...]:
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all probes."""
+        return tuple(self._probes)
+
+    def of(self, names: Sequence[str]) -> Observer:
+        """The same of these probes alone."""
+        other = copy(self)
+        other._probes = {name: self._probes[name] for name in self._probes if name in names}
+        other._right, other._errors, other._obstacles, other._finest = [], False, (), None
+        other.gauges = np.zeros((0, 2))
+        return other
+
+    def dims(self, name: str) -> tuple[str, ...]:
         """Dimensions of a probe, before or after the points where it jumps."""
         probe = self._probes.get(name.removeprefix("right/"))
         return probe.dims if probe is not None else ()
 
     def look_at(self, outputs: Sequence[Output]) -> tuple[Observer, JoinedObservation]:
         """Outputs of which each has a line of its own, and what makes values of them; on a line of constant length."""
-        other = copy(self)
         within = [x.line.s[[0, -1]] for x in outputs]  # beyond, on the reel: the values of the fairlead
         s, jumps = ([np.clip(x, *ends) for ends in within] for x in (self.s, self.jumps))
         of = list(zip(outputs, s, jumps, strict=True))
-        grid = JoinedGrid(self._grids([(x, at) for x, at, _ in of], False))
-        if self._right:
-            other._after = JoinedGrid(self._grids([(x, at) for x, _, at in of], True))
+        after = self._grids([(x, at) for x, _, at in of], True) if self._right else []
+        return self.look_on(outputs, self._grids([(x, at) for x, at, _ in of], False), after)
+
+    def look_on(
+        self, outputs: Sequence[Output], grids: Sequence[Grid], after: Sequence[Grid] = ()
+    ) -> tuple[Observer, JoinedObservation]:
+        """The same, each on a grid of its own, with as many points; after: those just after points where it jumps."""
+        other, grid = copy(self), JoinedGrid(grids)
+        if after:
+            other._after = JoinedGrid(after)
         other.line, other.zones, other.grid = outputs[0].line, outputs[0].zones, grid
         return other, JoinedObservation(outputs, self.sea, grid)
 
@@ -365,7 +384,7 @@ class Observer:
             if self.jumps.size:
                 after = model_errors(plain.on(self._after), corrected.on(self._after))
                 found |= {f"errors/model/right_{name}": after[name] for name in SIDED_ERRORS}
-        out = {name: plain.by_output(x, self._dims(name)) for name, x in found.items()}
+        out = {name: plain.by_output(x, self.dims(name)) for name, x in found.items()}
         if self._criteria:
             if ratios is None:
                 raise ValueError("criteria are written, but `ratios` is not given")

@@ -11,7 +11,9 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
-from hybrid.design.sensitivity import changed_scene
+from hybrid.design.cable_at_rest import CableAtRest
+from hybrid.design.line_at_rest import parse_result
+from hybrid.design.numbers import changed_scene
 
 G = 9.81
 
@@ -91,6 +93,61 @@ def test_differences_of_equilibria_on_the_bed(model):
         slope = (np.array(both[0]) - both[1]) / (2e-4 * number)
         ours = np.array([x.derivative for x in found if x.by == key])
         np.testing.assert_allclose(ours, slope, rtol=2e-5)
+
+
+def results(scene, of):
+    return np.array(CableAtRest(scene, 1.0, [parse_result(x, scene.length) for x in of]).values)
+
+
+@pytest.mark.parametrize("key", ["cable.sections[0].length", "cable.sections[0].mass", "ends.end.position[0]"])
+@pytest.mark.parametrize("dynamic", [None, {"constant": 2e7, "per_tension": 10.0, "relaxation_time": 60.0}])
+def test_a_rope_answers_as_it_stretches_at_rest(key, dynamic):
+    """With the slope of its table at its tension, not that of quick motions."""
+    rope = {"length": 205.0, "mass": 20.0, "tension_strain": [[0.0, 0.0], [0.01, 2e4], [0.03, 2e5]]}
+    rope |= {"dynamic_stiffness": dynamic} if dynamic else {}
+    made = hybrid.validate_scene(scene(rope, pinned(0, 0, 0), pinned(200, 0, 10), "catenary", 40))
+    of = ["tension@end", "position.z@100"]
+    rest = CableAtRest(made, 1.0, [parse_result(x, made.length) for x in of])
+    d = 1e-5 * rest.number(key)
+    more, less = (results(changed_scene(made, key, rest.number(key) + x), of) for x in (d, -d))
+    np.testing.assert_allclose(rest.by([key])[0], (more - less) / (2.0 * d), rtol=1e-6)
+
+
+def test_the_end_stays_the_end_when_the_length_changes():
+    """The lower end of a hanging line sinks by dL and its stretch; a place by its arc length stays where it is."""
+    m, L, EA = 5.0, 40.0, 1e6
+    section = {"length": L, "mass": m, "axial_stiffness": EA}
+    tables = scene(section, pinned(0, 0, 0), {"kind": "free"}, "catenary", 20)
+    key = "cable.sections[0].length"
+    end, same, inside = (
+        hybrid.sensitivity(tables, [name], [key])[0].derivative
+        for name in ("position.z@end", "position.z@40", "position.z@20")
+    )
+    assert end == same == pytest.approx(-1.0 - m * G * L / EA, rel=1e-7)
+    assert inside == pytest.approx(-m * G * 20.0 / EA, rel=1e-4)
+
+
+@pytest.mark.parametrize("key", ["environment.seabed.stiffness", "cable.sections[0].bending_stiffness"])
+def test_a_jump_at_an_anchor_on_the_bed_is_in_no_derivative(key):
+    """The force at a pinned rod's end jumps where that passes the edge of the bed, by rounding: 8 N of 1154."""
+    rod = {"length": 253.0, "mass": 12.8, "diameter": 0.074, "axial_stiffness": 1.6e6, "drag": {"normal": 1.2}}
+    rod |= {"bending_stiffness": 1.2e4, "torsional_stiffness": 1.2e4}
+    bed = -83.5340954497752
+    sea = {"fluid": {"density": 1025, "current": [0.22, 0.03, 0]}, "seabed": {"z": bed, "stiffness": 4038.8}}
+    made = hybrid.validate_scene(scene(rod, pinned(0, 0, bed), pinned(222, 15, 0), "rod", 40, sea))
+    of = ["tension@0", "reaction_start.z"]
+    rest = CableAtRest(made, 1.0, [parse_result(x, made.length) for x in of])
+    elastic = rest.by([key])[0] * rest.number(key) / rest.values[0]
+    assert np.abs(elastic).max() < 0.01
+
+
+def test_numbers_that_others_match_are_refused():
+    parts = {"kind": "zones", "zones": [{"rod": 60.0, "cells": 20}, {"catenary": 190.0, "cells": 20}]}
+    tables = scene(LINE, pinned(0, 0, -60), pinned(205, 0, 0), parts, None, SEA) | {"mesh": None}
+    with pytest.raises(hybrid.SceneError, match="may change by itself"):
+        hybrid.sensitivity(tables, ["tension@0"], ["model.zones[0].rod"])
+    with pytest.raises(hybrid.SceneError, match="may change by itself"):
+        hybrid.sensitivity(tables, ["tension@0"], ["cable.sections[0].length"])
 
 
 def test_what_is_refused():

@@ -1,0 +1,78 @@
+"""Seeded random scenes of one cable at rest, of every kind that derivatives at rest are known of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+KINDS = ("catenary", "rod", "clamped", "bed", "bed of rods", "zones", "sections", "buoyancy", "float", "rope")
+
+
+def scene_at_rest(seed: int) -> tuple[str, dict[str, Any]]:
+    """A kind and a scene: lengths over a decade and a half, bending over three decades, in still water or a current."""
+    rng = np.random.default_rng(seed)
+    kind = KINDS[seed % len(KINDS)]
+    L, w = float(10 ** rng.uniform(1.0, 2.5)), float(10 ** rng.uniform(0.0, 2.0))
+    mass = w / 9.81 * rng.uniform(1.2, 1.5)
+    section: dict[str, Any] = {
+        "length": L, "mass": mass, "diameter": float(np.sqrt(4 * mass / np.pi / 3000)),
+        "axial_stiffness": float(w * L * 10 ** rng.uniform(2.0, 4.0)), "drag": {"normal": 1.2, "tangential": 0.01},
+    }  # fmt: skip
+    if kind not in ("catenary", "bed", "sections", "float", "rope"):
+        section["bending_stiffness"] = section["torsional_stiffness"] = float(w * L**3 * 10 ** rng.uniform(-6, -3))
+    span, rise = L * rng.uniform(0.6, 0.95), L * rng.uniform(-0.2, 0.2)
+    across = float(L * rng.uniform(-0.1, 0.1))
+    one, two = [0.0, 0.0, -L], [span, across, -L + rise]
+    current = [float(rng.uniform(-0.3, 0.3)), float(rng.uniform(-0.3, 0.3)), 0.0]
+    around: dict[str, Any] = {"fluid": {"density": 1025.0, "current": current}}
+    start: dict[str, Any] = {"kind": "pinned", "position": one}
+    cable: dict[str, Any] = {"sections": [section]}
+    model: Any = "catenary" if "bending_stiffness" not in section else "rod"
+    cells = int(rng.choice([40, 80]))
+    if kind.startswith("bed"):
+        depth = L * rng.uniform(0.25, 0.4)
+        one[:], two[:] = [0.0, 0.0, -depth], [float(0.93 * np.sqrt(L**2 - depth**2)), across, 0.0]
+        around["seabed"] = {"z": -depth, "stiffness": float(w / (0.1 * section["diameter"]))}
+    if kind in ("clamped", "zones"):
+        start = {"kind": "clamped", "position": one, "tangent": [1.0, 0.0, float(rng.uniform(-0.5, 0.5))]}
+    if kind == "zones":
+        model = {"kind": "zones", "zones": [{"rod": 0.3 * L, "cells": cells}, {"catenary": 0.7 * L, "cells": 30}]}
+    if kind == "sections":
+        parts, factors = (0.3, 0.45, 0.25), (1.0, 0.6, 1.4)
+        cable["sections"] = [
+            {**section, "length": L * a, "mass": mass * b, "axial_stiffness": section["axial_stiffness"] * b}
+            for a, b in zip(parts, factors, strict=True)
+        ]
+    if kind == "buoyancy":
+        light = {**section, "diameter": section["diameter"] * 2.0, "mass": mass * 2.0}
+        cable["sections"] = [
+            {**section, "length": 0.4 * L},
+            {**light, "length": 0.2 * L},
+            {**section, "length": 0.4 * L},
+        ]
+    if kind == "float":
+        cable["attachments"] = [{"kind": "float", "at": 0.4 * L, "buoyancy": 0.2 * w * L, "mass": 0.02 * mass * L}]
+    if kind == "rope":
+        T = w * L
+        section["tension_strain"] = [[0.0, 0.0], [0.02, 0.4 * T], [0.06, 4.0 * T]]
+        del section["axial_stiffness"]
+    return kind, {
+        "environment": around, "cable": cable, "ends": {"start": start, "end": {"kind": "pinned", "position": two}},
+        "initial": "equilibrium", "model": model, "mesh": None if kind == "zones" else {"cells": cells},
+    }  # fmt: skip
+
+
+def keys_of(tables: dict[str, Any]) -> list[str]:
+    """Numbers of a scene that matter, without those that zones must match."""
+    keys = ["environment.gravity", "environment.fluid.density", "environment.fluid.current[1]"]
+    keys += ["environment.seabed.stiffness"] if "seabed" in tables["environment"] else []
+    for i, section in enumerate(tables["cable"]["sections"]):
+        names = ["mass", "diameter", "axial_stiffness", "bending_stiffness", "length"]
+        keys += [f"cable.sections[{i}].{x}" for x in names if x in section]
+        keys.append(f"cable.sections[{i}].drag.normal")
+    if isinstance(tables["model"], dict):
+        keys = [x for x in keys if not x.endswith("length")]
+    if "attachments" in tables["cable"]:
+        keys += ["cable.attachments[0].buoyancy", "cable.attachments[0].mass"]
+    return [*keys, "ends.end.position[0]", "ends.end.position[2]", "ends.start.position[1]"]

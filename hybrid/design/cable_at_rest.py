@@ -1,0 +1,106 @@
+"""The equilibrium of one cable, and what its results answer to numbers of the scene.
+
+At an equilibrium R(q; p) = 0, so that  A dq/dp = dR/dp  with the matrix A of the modes (theory.md, 20): one solve for
+each number, in place of two equilibria.  dR/dp is the change of the block rows of the same state between two lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from hybrid.accuracy.api import resolution_at_rest
+from hybrid.design.line_at_rest import LEFT_OUT, Beside, LineAtRest, Wanted
+from hybrid.design.numbers import is_allowed, number_of, with_number
+from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
+from hybrid.kernels.algebra.block_elimination import SIZE
+from hybrid.kernels.state.state import Floats
+from hybrid.modal.matrices import linear_line
+from hybrid.model.build import Model
+from hybrid.model.nearby import nearby
+from hybrid.model.resolution import Resolution
+from hybrid.scene.combinations import refuse_use
+from hybrid.scene.schema import Scene
+from hybrid.simulation.static_case import StaticCase
+
+# Part of a number by which lines are differentiated; one that is 0 is changed by this, in its own unit.
+PART = 1e-4
+
+
+class CableAtRest:
+    """The equilibrium on one mesh, its factors, and the values of results."""
+
+    def __init__(self, scene: Scene, cells: float, wanted: Sequence[Wanted]) -> None:
+        """cells: how many times as long as usual; SceneError, ComputationError: as of `hybrid.sensitivity`."""
+        case = StaticCase(scene)
+        resolution: Resolution = resolution_at_rest(case)
+        self.scene = case.scene
+        refuse_use(self.scene, "derivatives", given="hybrid sensitivity")  # with the model that accuracy has chosen
+        self.resolution = resolution.coarser(cells=cells) if cells > 1.0 else resolution
+        self.model, found = case.at_rest(self.resolution)
+        if found.touch.size:
+            expected = "an equilibrium in which the line does not touch itself"
+            raise SceneError([Complaint("contact.self", "a line that touches itself", expected, "another shape")])
+        self.line = LineAtRest(self.scene, self.model, found.state, wanted)
+        linear = linear_line(self.line.joined(self.line.here), "cable", found.state, sticks=False, quick=False)
+        free, held = linear.free.reshape(-1, SIZE).copy(), self.line.here.ends.held
+        for k in (0, 1):
+            if held[k]:
+                free[-k, 1:4] = False
+        self._free, self._held = np.flatnonzero(free.ravel()), [k for k in (0, 1) if held[k]]
+        of_free = linear.stiffness[self._free]
+        self._factors = splu(sparse.csc_array(of_free[:, self._free]))
+        self._by_ends = {k: of_free[:, self._of_end(k)].toarray() for k in self._held}
+        self.values = self.line.values()
+
+    def _of_end(self, k: int) -> np.ndarray:
+        """Which unknowns are the place of an end."""
+        size = SIZE * self.model.line.s.size
+        return np.arange(1, 4) + (size - SIZE if k else 0)
+
+    def number(self, key: str) -> float:
+        """The value of a key of the scene."""
+        return number_of(self.scene, key)
+
+    def by(self, keys: Sequence[str]) -> Floats:
+        """(P, W) derivatives of all results by numbers."""
+        if not keys:
+            return np.zeros((0, self.values.size))
+        numbers = np.array([number_of(self.scene, key) for key in keys])
+        steps = np.where(numbers == 0.0, PART, PART * np.abs(numbers))
+        pairs = [self._beside(*row) for row in zip(keys, numbers.tolist(), steps.tolist(), strict=True)]
+        lines = [x for pair in pairs for x in pair]
+        left, reports = zip(*(self.line.left(x) for x in lines), strict=True)
+        q = np.zeros((len(keys), self.model.line.s.size, SIZE))
+        right = np.stack([x - y for x, y in zip(left[::2], left[1::2], strict=True)], axis=1)[self._free]
+        right /= 2.0 * steps
+        for k in self._held:
+            shift = np.stack([a.ends.position[k] - b.ends.position[k] for a, b in pairs], axis=1) / (2.0 * steps)
+            right -= self._by_ends[k] @ shift
+            q[:, -k, 1:4] = shift.T
+        q.reshape(len(keys), -1)[:, self._free] = self._factors.solve(right).T
+        return self.line.by_state(q) + self.line.by_scene([*zip(lines, reports, strict=True)], steps)
+
+    def _beside(self, key: str, number: float, step: float) -> tuple[Beside, Beside]:
+        """The line with a number that is more by a step, and less."""
+        more, less = (with_number(self.scene, key, number + d) for d in (step, -step))
+        found = []
+        for scene in (more, less):
+            model = nearby(self.model, self.scene, scene, self.resolution, LEFT_OUT)
+            if model is None:
+                detail = f"{key}: a change of it changes the number of cells; give `mesh: {{cells: ..}}`"
+                raise ComputationError(Outcome.NOT_CONVERGED, None, None, detail)
+            if scene is more and not _same_places(model, self.model) and not is_allowed(more):
+                fix = "a number that others do not have to match, as lengths of zones have to"
+                raise SceneError([Complaint("by", key, "a number that may change by itself", fix)])
+            found.append(self.line.beside(scene, model))
+        return found[0], found[1]
+
+
+def _same_places(a: Model, b: Model) -> bool:
+    """Whether nodes, sections and attachments of two models are at the same arc lengths."""
+    pairs = (a.line.s, b.line.s), (a.cable.bounds, b.cable.bounds), (a.cable.at, b.cable.at)
+    return all(np.array_equal(x, y) for x, y in pairs)

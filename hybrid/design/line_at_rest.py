@@ -1,0 +1,275 @@
+"""One line at rest: what its equations leave over when its scene changes, and its results beside the equilibrium."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
+from hybrid.kernels.march.zone_torque import TORQUE
+from hybrid.kernels.run.entry import assembly, workspace_of
+from hybrid.kernels.state.forces import FRICTION, PLANAR, WAVES
+from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, batch_of_one
+from hybrid.modal.matrices import ANCHOR
+from hybrid.model.build import Model
+from hybrid.outputs.joined_lines import Output
+from hybrid.outputs.probes import PROBES, Observer
+from hybrid.scene.schema import Scene
+from hybrid.simulation.static_case import StaticCase
+from hybrid.solve.joined import JoinedLine
+from hybrid.solve.stepper import POWERS
+
+NAME = re.compile(r"^(?:(max|min) )?([a-z_]\w*)(?:\.([xyz]))?(?:@(.+))?$")
+AXES = "xyz"
+# How far a state is moved to differentiate its results: a part of chords, and of the largest tension.
+ALONG = 1e-5
+# Differences to both sides that are unequal by this part of them, and this part of the result, are of a jump.
+KINK, ROUGH = 0.3, 1e-6
+# Forces that do not act at rest, or depend on the way there; and a plane has block rows of its own.
+LEFT_OUT = PLANAR | WAVES | FRICTION
+TURNED = 1e-9  # N m over N m, torque through catenary zones that is none
+
+
+class Wanted(NamedTuple):
+    """A result in parts: `max` or `min` of a quantity or "", its name, its component or "", and its place, m; the end
+
+    of the line, wherever that is, is at infinity.
+    """
+
+    extreme: str
+    name: str
+    axis: str
+    at: float | None
+
+
+def parse_result(text: str, length: float) -> Wanted:
+    """The parts of a result such as `position.z@125` of a line of length m; SceneError: it is none."""
+    found = NAME.match(text)
+    expected = "NAME@S, NAME.x@S, max NAME or min NAME, such as tension@0, tension@end or max curvature"
+    if found is None:
+        raise SceneError([Complaint("of", text, expected, "tension@0")])
+    extreme, name, axis, at = found.groups()
+    try:
+        s = {None: None, "start": 0.0, "end": length}.get(at) if at in (None, "start", "end") else float(at)
+    except ValueError:
+        raise SceneError([Complaint("of", text, expected, "a number of metres behind @")]) from None
+    if s is not None and not 0.0 <= s <= length:
+        raise SceneError([Complaint("of", text, f"an arc length between 0 and {length:g} m", f"{name}@{length:g}")])
+    return Wanted(extreme or "", name, axis or "", np.inf if s == length else s)
+
+
+class Beside(NamedTuple):
+    """A line of a scene: its model, its ends, the sea around it."""
+
+    scene: Scene
+    model: Model
+    ends: Ends
+    sea: Sea
+
+
+class LineAtRest:
+    """One line in the equilibrium of a scene, and lines beside it, of scenes with other numbers."""
+
+    def __init__(self, scene: Scene, model: Model, state: State, wanted: Sequence[Wanted]) -> None:
+        """wanted: results; SceneError: the line has none of that name, or they have no derivative."""
+        self.model, self.state, self.wanted = model, state, tuple(wanted)
+        self.here = Beside(scene, model, model.ends.at(np.inf), model.sea.at(np.inf))
+        self._at = [x.at for x in wanted if x.at is not None]
+        self._nodes = any(x.extreme for x in wanted) or not self._at
+        self._observer, self._node_of = self._observed(self.here), dict[Wanted, int]()
+        self._values = np.zeros(len(self.wanted))
+        self._line = _at_rest(model.line)
+        self._work, self._still, self._tried = workspace_of(self._line), _without_rates(state), _without_rates(state)
+        self._with_rows = self._work._replace(rows=np.zeros((model.line.s.size, SIZE * WIDTH)))
+        if state.turn.size and np.abs(state.turn[:, TORQUE]).max() > TURNED * model.tension_scale * model.length:
+            expected = "an equilibrium in which no torque passes through catenary zones"
+            raise SceneError([Complaint("model", "a torque through a catenary zone", expected, "model: rod")])
+
+    def joined(self, x: Beside) -> JoinedLine:
+        """The line with ends that nothing holds."""
+        model, ends = x.model, x.ends._replace(held=np.zeros(2, np.int8))
+        return JoinedLine(model.line, x.sea, ends, model.length, model.tension_scale, -np.inf, (-1, -1))
+
+    def left(self, x: Beside) -> tuple[Floats, Floats]:
+        """Right-hand side (5 (N+1),) of the equations of another line at this state, and its report."""
+        work = self._with_rows
+        work.report[:] = 0.0
+        assembly(_at_rest(x.model.line), x.sea, x.ends, self._still, 0.0, ANCHOR, work)
+        right = work.rows.reshape(-1, SIZE, WIDTH)[:, :, -1].copy()
+        right[:, 1:] *= -1.0
+        return right.ravel(), work.report.copy()
+
+    def beside(self, scene: Scene, model: Model) -> Beside:
+        """The line of another scene; what is around it is evaluated where it is not what is here."""
+        ends = self.here.ends if model.ends is self.model.ends else model.ends.at(np.inf)
+        sea = self.here.sea if model.sea is self.model.sea else model.sea.at(np.inf)
+        return Beside(scene, model, ends, sea)
+
+    # --- results ----------------------------------------------------------------------------------
+
+    def values(self) -> Floats:
+        """(W,) of what is wanted."""
+        observer = self._observer
+        found = observer.values_of(observer.look(self._output(self.here, self.left(self.here)[1])))
+        for x in self.wanted:
+            if x.extreme and "s" in observer.dims(x.name):
+                value = _component(x, np.asarray(found[x.name][0]))
+                at_nodes = value[np.searchsorted(observer.s, self.model.line.s)]
+                self._node_of[x] = int(at_nodes.argmax() if x.extreme == "max" else at_nodes.argmin())
+        self._values = self._results(found, [(observer.s, self.model.line.s)])[0]
+        return self._values
+
+    def by_state(self, q: Floats) -> Floats:
+        """(P, W) derivatives of results along movements (P, N+1, 5) of the state."""
+        steps = _steps(self.state, q)
+        moved = _moved(self.state, np.repeat(q, 2, axis=0), (steps[:, None] * (1.0, -1.0)).ravel())
+        batch = _repeated(self._output(self.here, self._work.report), 2 * len(q))._replace(**cast(Any, moved))
+        for k in range(2 * len(q)):
+            for name, x in moved.items():
+                getattr(self._tried, name)[:] = x[k]
+            self._work.report[:] = 0.0
+            assembly(self._line, self.here.sea, self.here.ends, self._tried, 0.0, 0.0, self._work)
+            batch.report[k] = self._work.report
+        found = self._of_states(batch)
+        return self._slopes(found[::2], found[1::2], steps)
+
+    def by_scene(self, lines: Sequence[tuple[Beside, Floats]], steps: Floats) -> Floats:
+        """(P, W) derivatives of results of this state by numbers, by steps (P,).
+
+        lines: with more and with less of each number, in turn, and their reports.
+        """
+        found, observers = np.zeros((len(lines), len(self.wanted))), [self._observer_of(x) for x, _ in lines]
+        points = self._observer.s.size
+        together = [k for k, (x, _) in enumerate(lines) if self._looked_at_with(x) and observers[k].s.size == points]
+        if together:
+            outputs = [Output(x.model.line, x.model.zones, self._output(x, y)) for x, y in (lines[k] for k in together)]
+            of = [observers[k] for k in together]
+            observer, seen = self._observer.look_on(outputs, [x.grid for x in of])
+            nodes = [lines[k][0].model.line.s for k in together]
+            places = list(zip([x.s for x in of], nodes, strict=True))
+            found[together] = self._results(observer.values_of(seen), places)
+        for k in sorted({*range(len(lines))} - {*together}):
+            observer = observers[k]
+            places = [(observer.s, lines[k][0].model.line.s)]
+            found[k] = self._results(observer.values_of(observer.look(self._output(*lines[k]))), places)
+        return self._slopes(found[::2], found[1::2], steps)
+
+    def _looked_at_with(self, x: Beside) -> bool:
+        """Whether a line differs from the one here in what may differ among outputs that are looked at together."""
+        line = x.model.line
+        more = (line.law, line.bend_law, line.torsion, line.tension_torque, line.wake_law)
+        return x.sea is self.here.sea and not any(a.size for a in more) and self._observer.quantities is None
+
+    def _observer_of(self, x: Beside) -> Observer:
+        """What looks at a line: that of this one where the nodes and all that it looks at are the same."""
+        same = np.array_equal(x.model.line.s, self.model.line.s) and self._looked_at_with(x)
+        return self._observer if same else self._observed(x)
+
+    def _observed(self, x: Beside) -> Observer:
+        """What looks at a line, at its nodes where extremes are wanted, and at places."""
+        model = x.model
+        at = [min(place, model.length) for place in self._at]
+        places = np.unique(np.concatenate([model.line.s, at] if self._nodes else [at]))
+        observer = StaticCase(x.scene).observer(model, at=places)
+        for wanted in self.wanted:
+            if wanted.name not in observer.names:
+                names = ", ".join(sorted(name for name in observer.names if "/" not in name))
+                raise SceneError([Complaint("of", wanted.name, f"one of {names}", "tension@0")])
+            if "s" in observer.dims(wanted.name) and wanted.at is None and not wanted.extreme:
+                fix = f"{wanted.name}@0, max {wanted.name}"
+                raise SceneError([Complaint("of", wanted.name, "a place or an extreme", fix)])
+        return observer.of([wanted.name for wanted in self.wanted])
+
+    def _slopes(self, more: Floats, less: Floats, steps: Floats) -> Floats:
+        """(P, W) derivatives of results that are these with more and with less, by steps (P,), of each number.
+
+        A force at an end that lies at the edge of the bed may jump by the rounding of its place.  Where differences to
+        both sides disagree, the least of them and of their mean is the one without a jump.
+        """
+        above, below = more - self._values, self._values - less
+        mean = 0.5 * (above + below)
+        every = np.stack([mean, above, below])
+        small = np.take_along_axis(every, np.abs(every).argmin(axis=0)[None], axis=0)[0]
+        rough = np.abs(above - below) > KINK * (np.abs(above) + np.abs(below)) + ROUGH * np.abs(self._values)
+        return np.asarray(np.where(rough, small, mean) / steps[:, None])
+
+    def _of_states(self, batch: Batch) -> Floats:
+        """(n, W) of outputs of the line."""
+        return self._results(
+            self._observer.values_of(self._observer.look(batch)), [(self._observer.s, self.model.line.s)] * batch.t.size
+        )
+
+    def _output(self, x: Beside, report: Floats) -> Batch:
+        """This state on a line."""
+        return batch_of_one(0.0, x.ends, self.state, report, np.zeros(len(POWERS)), x.sea)
+
+    def _results(self, values: Mapping[str, Floats], places: Sequence[tuple[Floats, Floats]]) -> Floats:
+        """(n, W) of what is wanted, of values of n outputs; places: of each, arc lengths of values and of nodes, m."""
+        out = np.zeros((len(places), len(self.wanted)))
+        for k, (s, nodes) in enumerate(places):
+            for j, x in enumerate(self.wanted):
+                out[k, j] = self._result(x, s, nodes, np.asarray(values[x.name][k], float))
+        return out
+
+    def _result(self, x: Wanted, s: Floats, nodes: Floats, value: Floats) -> float:
+        """One result; an extreme is that of the node where it is in the equilibrium."""
+        dims, value = self._observer.dims(x.name), _component(x, value)
+        if "edge" in dims:  # where contact begins and ends: the last of them
+            return float(np.append(np.nan, value[np.isfinite(value)])[-1])
+        if "s" not in dims:
+            return float(value)
+        if x.extreme:
+            return float(value[np.searchsorted(s, nodes[self._node_of[x]])])
+        assert x.at is not None
+        return float(np.interp(x.at, s, value))
+
+
+def _component(wanted: Wanted, value: Floats) -> Floats:
+    """The component that is wanted of a vector, or its size; what is no vector itself."""
+    if PROBES[wanted.name].dims[-1:] != ("xyz",) if wanted.name in PROBES else True:
+        return value
+    return np.asarray(value[..., AXES.index(wanted.axis)] if wanted.axis else np.linalg.norm(value, axis=-1))
+
+
+def _at_rest(line: Line) -> Line:
+    """A line without what does not act at rest, or depends on the way there."""
+    if not line.bits & LEFT_OUT and not line.torsion.size:
+        return line
+    return line._replace(bits=line.bits & ~LEFT_OUT, torsion=line.torsion[:0])
+
+
+def _without_rates(state: State) -> State:
+    """A copy at rest, as a line without zones that a torque passes through has it."""
+    still = state.copy()
+    for rate in (still.v, still.a, still.vd, still.w, still.wa, still.wd, still.slip):
+        rate[:] = 0.0
+    return still._replace(turn=still.turn[:0])
+
+
+def _repeated(batch: Batch, count: int) -> Batch:
+    """A batch of one output so many times."""
+    rows: Any = [np.repeat(x, count, axis=0) if len(x) == 1 else x for x in batch]
+    return Batch(*rows)
+
+
+def _steps(state: State, q: Floats) -> Floats:
+    """(P,) how many times movements q (P, N+1, 5) are taken so that chords and tensions change by a part ALONG."""
+    chord = np.linalg.norm(np.diff(q[:, :, 1:4], axis=1), axis=2) / np.linalg.norm(state.e, axis=1)
+    tension = np.abs(q[:, :, 0]) / max(float(np.abs(state.T).max()), 1e-300)
+    most = np.maximum(np.maximum(chord.max(axis=1), tension.max(axis=1)), np.abs(q[:, :-1, 4]).max(axis=1))
+    return np.asarray(ALONG / np.maximum(most, 1e-300))
+
+
+def _moved(state: State, q: Floats, steps: Floats) -> dict[str, Floats]:
+    """Positions, chords, tensions and directors (P, ..) of a state that is moved by steps (P,) times q (P, N+1, 5)."""
+    q = steps[:, None, None] * q
+    e = state.e + np.diff(q[:, :, 1:4], axis=1)
+    d = e / np.linalg.norm(e, axis=2, keepdims=True)
+    a = state.a1 - (state.a1 * d).sum(axis=2, keepdims=True) * d
+    a = a + q[:, :-1, 4:] * np.cross(d, a)
+    a /= np.maximum(np.linalg.norm(a, axis=2, keepdims=True), 1e-300)
+    return {"r": state.r + q[:, :, 1:4], "e": e, "T": state.T + q[:, 1:, 0], "a1": a}

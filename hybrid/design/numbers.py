@@ -1,0 +1,64 @@
+"""Numbers of a scene by their keys: what they are, and the scene with another one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.scene.base import Invalid, Table
+from hybrid.scene.read import parse_either, scene_text
+from hybrid.scene.schema import Scene
+from hybrid.scene.system import System
+
+AnyScene = TypeVar("AnyScene", Scene, System)
+PART = re.compile(r"[^.\[\]]+")
+
+
+def number_of(scene: Scene | System, key: str) -> float:
+    """The value of a key such as `cable.sections[0].length`; SceneError: it has no number."""
+    value: Any = scene.model_dump(mode="python")
+    for part in PART.findall(key):
+        try:
+            value = value[int(part)] if isinstance(value, list | tuple) else value[part]
+        except (KeyError, IndexError, TypeError, ValueError):
+            expected = "a key of the scene that has a number"
+            raise SceneError([Complaint("by", key, expected, "cable.sections[0].length, for example")]) from None
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise SceneError([Complaint("by", key, f"a number, which {key} is not in this scene", "another key")])
+    return float(value)
+
+
+def changed_scene(scene: AnyScene, key: str, value: float) -> AnyScene:
+    """The scene with another number at a key, read and checked as a file is; SceneError: it may not be that."""
+    found, _ = parse_either(scene_text(scene), overrides=[f"{key}={float(value)!r}"])
+    assert type(found) is type(scene)
+    return found
+
+
+def with_number(scene: AnyScene, key: str, value: float) -> AnyScene:
+    """The scene with another number at a key, unchecked: tables beside the key are those of the scene itself."""
+    found: AnyScene = _put(scene, PART.findall(key), float(value))
+    return found
+
+
+def is_allowed(scene: Scene | System) -> bool:
+    """Whether a scene that was made by `with_number` is one that could be read."""
+    try:
+        type(scene).model_validate(scene.model_dump(mode="python"))
+    except Invalid:
+        return False
+    return True
+
+
+def _put(value: Any, parts: list[str], number: float) -> Any:
+    if not parts:
+        return number
+    first, rest = parts[0], parts[1:]
+    if isinstance(value, Table):
+        return value.model_copy(update={first: _put(getattr(value, first), rest, number)})
+    if isinstance(value, Mapping):
+        return {**value, first: _put(value[first], rest, number)}
+    place = int(first)
+    return type(value)([_put(x, rest, number) if k == place else x for k, x in enumerate(value)])

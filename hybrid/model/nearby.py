@@ -1,0 +1,120 @@
+"""The model of a scene that differs from another in numbers alone, on the same cells, without what begins a search."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hybrid.kernels.state.forces import PLANAR, ROTARY
+from hybrid.kernels.state.state import Floats, Sea
+from hybrid.model.build import Model, build, place_cells
+from hybrid.model.initial_shape import end_conditions
+from hybrid.model.layout import Layout
+from hybrid.model.line import line_on
+from hybrid.model.line_on_base import LineOnBase
+from hybrid.model.material import Material, material
+from hybrid.model.mesh import Zone
+from hybrid.model.plane import planar
+from hybrid.model.resolution import Resolution
+from hybrid.model.sea import Surroundings, surroundings
+from hybrid.model.sections import stiffeners_of
+from hybrid.scene.schema import Scene
+
+# Part of the length by which nodes may move: further than that, another one has been chosen for a place that needs one.
+SHIFT = 2e-4
+# What of a sea a computation writes.
+WRITTEN = ("flow", "axis", "slip", "slid", "bed", "grip", "rolling", "now", "lanes")
+
+
+def nearby(model: Model, of: Scene, scene: Scene, resolution: Resolution, without: int) -> Model | None:
+    """The model of `scene`, in the cells and zones that `model` has of the scene `of`; None: its cells are others.
+
+    without: bits of forces that its line leaves out (kernels.state.forces).
+    Its start, its other starts and its contents are those of `model`.  Tables of `scene` that are the same objects as
+    those of `of` count as unchanged.
+    """
+    if model.payout is not None or _turned_by_shape(model):
+        return _built(model, scene, resolution)
+    cable = material(scene)
+    placed = _cells(model, cable, of, scene, resolution)
+    if placed is None:
+        return None
+    layout, s, zones = placed
+    if stiffeners_of(scene):
+        cable = material(scene, s if layout is None else layout.base)
+    on_base = LineOnBase(cable, layout.base) if layout is not None else None
+    if layout is not None and on_base is not None:
+        line = on_base.line(layout, (model.line.bits | cable.bits) & ~without, model.line.plane)
+    else:
+        turns, bits = bool(model.line.bits & ROTARY), model.line.bits & ~PLANAR
+        line = line_on(cable, s, model.line.spin == 1, bits, sections_turn=turns, without=without)
+        if model.line.bits & PLANAR & ~without:
+            line = planar(line, model.line.plane)
+    sea = _sea(model, of, scene)
+    ends = model.ends
+    if scene.ends is not of.ends:
+        chords = model.start.e[[0, -1]]
+        chords = chords / np.linalg.norm(chords, axis=1)[:, None]
+        frames = ends.values.frame.reshape(2, 3, 3)
+        ends = end_conditions(scene, (frames[0][:, 0], frames[1][:, 0]), chords, sea)
+    return replace(
+        model, line=line, zones=zones, ends=ends, sea=sea, length=float(line.s[-1]), cable=cable, layout=layout,
+        on_base=on_base, attached=tuple(cable.at.tolist()), inextensible=not line.ck.any(),
+    )  # fmt: skip
+
+
+def _turned_by_shape(model: Model) -> bool:
+    """Whether the frame of an end hangs on the first shape: both hold twist, and the scene leaves its plane."""
+    return all(model.cable.held_twist) and bool(model.line.element.any()) and model.plane is None
+
+
+def _sea(model: Model, of: Scene, scene: Scene) -> Surroundings:
+    """The sea of a scene; that of the model where it is the same."""
+    if scene.environment is of.environment and scene.environment.seabed is None and not scene.obstacles:
+        return model.sea
+    sea = surroundings(scene, model.line.h.size)
+    same = all(_same(getattr(sea.values, x), getattr(model.sea.values, x)) for x in Sea._fields if x not in WRITTEN)
+    return model.sea if same else sea
+
+
+def _same(x: Any, y: Any) -> bool:
+    """Whether arrays, or tuples of them, have the same numbers."""
+    if isinstance(x, tuple):
+        return len(x) == len(y) and all(_same(a, b) for a, b in zip(x, y, strict=True))
+    return bool(np.array_equal(x, y, equal_nan=True))
+
+
+def _built(model: Model, scene: Scene, resolution: Resolution) -> Model | None:
+    """The model as for a search, with the zones of `model`; None: its cells are others."""
+    found, here = build(scene, resolution, spare=False), model.layout
+    if found.layout is not None and here is not None:
+        if not np.array_equal(found.layout.parts, here.parts) or found.on_base is None:
+            return None
+        layout = found.layout._replace(rod=here.rod, here=here.here)
+        line = found.on_base.line(layout, found.line.bits, found.line.plane)
+        found = replace(found, line=line, zones=layout.zones, layout=layout, sea=found.sea.on(line.h.size))
+    return found if _near(found.line.s, model.line.s) else None
+
+
+def _cells(
+    model: Model, cable: Material, of: Scene, scene: Scene, resolution: Resolution
+) -> tuple[Layout | None, Floats, tuple[Zone, ...]] | None:
+    """Layout, nodes (N+1,) m and zones; None: they are others than those of the model."""
+    as_before = scene.model is of.model and scene.mesh is of.mesh and scene.initial is of.initial
+    as_before = as_before and np.array_equal(cable.bounds, model.cable.bounds)
+    if as_before and np.array_equal(cable.at, model.cable.at):
+        return model.layout, model.line.s, model.zones
+    layout, s, zones = place_cells(scene, cable, resolution, None)
+    if layout is not None and model.layout is not None:
+        if not np.array_equal(layout.parts, model.layout.parts):
+            return None
+        layout = layout._replace(rod=model.layout.rod, here=model.layout.here)
+        s, zones = layout.nodes, layout.zones
+    return (layout, s, zones) if _near(s, model.line.s) else None
+
+
+def _near(s: Floats, old: Floats) -> bool:
+    """Whether nodes (N+1,) m are where they were, but for a small part of the length."""
+    return s.size == old.size and float(np.abs(s - old).max()) <= SHIFT * float(old[-1])

@@ -1,0 +1,47 @@
+"""Numbers of scenes: what is put in place of them is what reading the scene with them gives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import pytest
+
+from hybrid.design.numbers import changed_scene, is_allowed, number_of, with_number
+from hybrid.errors import SceneError
+from hybrid.scene.read import as_scene_or_system
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def keys(tables: object, path: str = "") -> Iterator[str]:
+    if isinstance(tables, Mapping):
+        for name, x in tables.items():
+            yield from keys(x, f"{path}.{name}".lstrip("."))
+    elif isinstance(tables, list | tuple):
+        for k, x in enumerate(tables):
+            yield from keys(x, f"{path}[{k}]")
+    elif isinstance(tables, float):
+        yield path
+
+
+@pytest.mark.parametrize("name", ["touchdown", "laying", "s_tether", "irregular_sea", "rov_descent"])
+def test_a_number_put_in_place_is_as_read(name):
+    scene, same = as_scene_or_system(EXAMPLES / f"{name}.yaml"), 0
+    for key in keys(scene.model_dump(mode="python")):
+        number = number_of(scene, key) * (1.0 + 1e-5)
+        changed = with_number(scene, key, number)
+        try:
+            read = changed_scene(scene, key, number)
+        except SceneError:
+            assert not is_allowed(changed), key
+            continue
+        assert changed == read, key
+        assert is_allowed(changed) and number_of(changed, key) == number, key
+        same += 1
+    assert same > 10
+
+
+def test_what_does_not_match_is_not_allowed():
+    scene = as_scene_or_system(EXAMPLES / "03_suspension_rod.yaml")
+    assert not is_allowed(with_number(scene, "cable.sections[0].mass", -1.0))
