@@ -117,6 +117,41 @@ The torque of a straight rod of length L is GJ 2π turns / L.
 Catenary zones pass it on.
 Cells that are left to the program are short enough for the twist that `turns` and motions prescribe.
 
+## Ropes
+
+A steel wire has an `axial_stiffness`; what stretches by a table has `tension_strain`; a fibre rope, soft to what is
+slow and stiff to what is fast, `dynamic_stiffness` beside one of the two.
+Polyester remembers besides how hard it was ever pulled: with `syrope` a taut leg follows its original curve while its
+mean tension is the highest so far, and comes back on a working curve, longer than before:
+
+```yaml
+environment:
+  fluid: {density: 1025, surface: 0}
+  seabed: {z: -300, stiffness: 5.0e+4}
+cable:
+  sections:
+    - length: 485
+      mass: 22
+      diameter: 0.16
+      syrope:
+        curve: [[0, 0], [0.01, 8.0e+5], [0.02, 1.45e+6], [0.03, 2.05e+6], [0.05, 3.5e+6]]  # or {file: owc.csv}
+        working: exponential
+        k1: 0.2
+        k2: 1.5
+        highest_tension: 1.5e+6  # by the installation, say
+      dynamic_stiffness: {constant: 1.6e+8, per_tension: 20, relaxation_time: 200}
+ends:
+  start: {kind: pinned, position: [0, 0, -300]}
+  end: {kind: pinned, position: [400, 0, -10]}
+initial: equilibrium
+model: catenary
+```
+
+The mean tension is that of the last `relaxation_time`: long beside waves, short beside a storm, so that a storm is
+remembered and a wave is not.
+At rest the rope is on the working curve below `highest_tension`, or, under more, on the original one.
+`hybrid import` reads such ropes from decks of MoorDyn; what they lose is in `work/hysteresis`.
+
 ## Air and wind
 
 A line in air is a line in a fluid of density 1.225 whose current is the wind, here 12 m/s along y:

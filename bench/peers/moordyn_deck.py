@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,13 +44,18 @@ def segments(text: str, factor: float) -> str:
     return head + mark + "\n".join(map(" ".join, cut)) + "\n---" + rest
 
 
-def march(text: str, motion: Motion, duration: float, every: float, hand: float) -> Seen:
-    """March a deck; motion is handed over every `hand` s (a part of `every`), with the mean velocity over it."""
+def march(text: str, motion: Motion, duration: float, every: float, hand: float, beside: Sequence[Path] = ()) -> Seen:
+    """March a deck; motion is handed over every `hand` s (a part of `every`), with the mean velocity over it.
+
+    beside: files that the deck reads from its own folder.
+    """
     import moordyn
 
     with tempfile.TemporaryDirectory() as folder, silence():
         path = Path(folder) / "deck.txt"
         path.write_text(text)
+        for file in beside:
+            shutil.copy(file, folder)
         system = moordyn.Create(str(path))
         try:
             here = motion(0.0)

@@ -13,7 +13,7 @@ from hybrid.kernels.state.state import NO_WAKE, Floats, Line, State, blank_state
 from hybrid.model.layout import Layout
 
 Clamp = tuple[Floats, Floats]  # first director and tangent
-states = Packed(blank_state, given=("turn", "slow", "wake"))
+states = Packed(blank_state, given=("turn", "slow", "wake", "peak"))
 
 
 class Remapped(NamedTuple):
@@ -49,6 +49,7 @@ def transfer_to(
         turn=np.zeros((len(target.torsion), 3)),
         slow=np.zeros(len(target.law)),
         wake=np.zeros((len(target.wake_law), NO_WAKE.shape[1])),
+        peak=np.zeros(state.peak.size and target.h.size),
     )
     return Transfer(
         line, target, state, out, old.places, new.places, new.base_of_cell, old.first, kinks, twist,

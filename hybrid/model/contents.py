@@ -214,6 +214,8 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
     entries.append(Entry("axial compliance", any(extensible), "sections[].axial_stiffness"))
     if any(x.tension_strain is not None for x in scene.cable.sections):
         entries.append(Entry("tension over strain by a table", True, "sections[].tension_strain"))
+    if any(x.syrope is not None for x in scene.cable.sections):
+        entries.append(Entry("tension over strain by the highest mean tension", True, "sections[].syrope"))
     if line.bits & BENDING_LAW:
         why = "sections[].moment_curvature, cable.attachments of kind bend_restrictor"
         entries.append(Entry("moment over curvature by a table", True, why))

@@ -187,7 +187,7 @@ def axial_law(material: Material, h: Floats, of: np.ndarray) -> tuple[Floats, Fl
         strain, tension = np.array(piece.rows, float).T
         energy = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(strain) * (tension[1:] + tension[:-1]))])
         rows.append(np.column_stack([strain, tension, energy]))
-        law[cells, :SHIFT] = (begin, begin + strain.size, *piece.dynamic)
+        law[cells, :SHIFT] = (begin, begin + strain.size, *piece.dynamic, *piece.working)
         begin += strain.size
     table = np.concatenate(rows)
     blank = blank_line(1)._replace(law=law, law_table=table)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybrid.kernels.laws.axial_law import BY_STIFFNESS, EXPONENTIAL, LINEAR, QUADRATIC
 from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH
 from hybrid.kernels.state.forces import (
     ADDED_MASS,
@@ -61,6 +62,7 @@ class StretchLaw(NamedTuple):
 
     rows: tuple[tuple[float, float], ...]  # strain and tension, N, at rest
     dynamic: tuple[float, float, float]  # dynamic stiffness, N, what it gains by mean tension, relaxation time, s; or 0
+    working: tuple[float, float, float, float]  # shape of working curves, k1, k2, highest tension before, N; or 0
 
 
 @dataclass
@@ -269,11 +271,19 @@ def _stiff_at(stiffener: BendStiffener, a: float, b: float) -> float:
     return high if low + near < a and b >= high - near else 0.5 * (a + b)
 
 
+_FORMS = {"linear": LINEAR, "quadratic": QUADRATIC, "exponential": EXPONENTIAL}
+
+
 def stretch_law(section: Section) -> StretchLaw | None:
     """The law of a section whose tension is no multiple of strain; None: of one whose tension is."""
     given = section.dynamic_stiffness
     dynamic = (given.constant, given.per_tension, given.relaxation_time) if given is not None else (0.0, 0.0, 0.0)
-    return StretchLaw(section.curve, dynamic) if section.curve else None
+    working = (0.0, 0.0, 0.0, 0.0)
+    if section.syrope is not None:
+        x = section.syrope
+        form = BY_STIFFNESS if x.by_stiffness else _FORMS[x.working]
+        working = (form, x.k1, x.k2 or 0.0, x.highest_tension)
+    return StretchLaw(section.curve, dynamic, working) if section.curve else None
 
 
 def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:

@@ -169,14 +169,15 @@ def _material(section: Section) -> Iterator[Wrong]:
 def _stiffness(section: Section) -> Iterator[Wrong]:
     """Axial stiffness against mass, diameter and bending stiffness."""
     axial, bending = section.stiffness, max(bending_stiffness(section))
-    key = "axial_stiffness" if section.axial_stiffness is not None else "tension_strain"
+    named = ("axial_stiffness", "tension_strain", "syrope")
+    key = next((x for x in named if getattr(section, x) is not None), named[0])
     if section.pipe is not None:
         yield from _of_a_pipe(section)
     if axial is None:
         return
     wave = math.sqrt(axial / section.mass)  # m/s
     metal = section.diameter is not None and section.mass / _area(section) > METAL
-    unsaid = section.max_strain is None and section.tension_strain is None
+    unsaid = section.max_strain is None and section.stretch_table is None
     slowest = SLOWEST_IN_METAL if metal else SLOWEST_UNSAID if unsaid else SLOWEST_WAVE
     if wave < slowest:
         least, made = section.mass * slowest**2, "metal" if metal else "hose or fibre" if unsaid else "any rubber"

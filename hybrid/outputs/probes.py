@@ -12,7 +12,7 @@ import numpy as np
 
 from hybrid.kernels.march.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twist
 from hybrid.kernels.state.forces import MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
-from hybrid.kernels.state.state import Batch, Floats, Line, Sea
+from hybrid.kernels.state.state import Batch, Floats, Line, Sea, remembers
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import NEAR
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
@@ -125,8 +125,15 @@ WORK = {
     "zones": "energy that zones, and cells at a winch, put in or take out when they change, and of torque where a "
     "catenary bends without it",
     "obstacles": "work done on the cable by obstacles as they move; of what rubs on a surface that turns, too",
+    "hysteresis": "work of what ropes lose whose stretch depends on their highest tension (syrope)",
     "scheme": "energy change that no work accounts for: the time scheme's own (negative: dissipated)",
 }
+
+
+def works_of(line: Line) -> list[str]:
+    """Names in WORK of what a line can have."""
+    absent = {"obstacles": not line.moved.size, "hysteresis": not remembers(line)}
+    return [name for name in WORK if not absent.get(name)]
 
 
 # Quantities that may have two values at a point: what a point load, a joint or a change of section makes of them.
@@ -246,8 +253,7 @@ class Observer:
         ]  # fmt: skip
         self._right = [f.name for f in right]
         if with_work:
-            moved = bool(line.moved.size)
-            fields += [Field(f"work/{x}", "J", text) for x, text in WORK.items() if x != "obstacles" or moved]
+            fields += [Field(f"work/{x}", "J", WORK[x]) for x in works_of(line)]
         self._criteria = [f"criteria/{name}" for name, _ in criteria]
         fields += [
             Field(name, "", f"largest since the last output: {text}", (s.size,), _S)
@@ -401,9 +407,7 @@ class Observer:
             if self.first_energy is None:
                 self.first_energy = float(energy[0])
             out |= {
-                f"work/{name}": batch.work[:, k].copy()
-                for k, name in enumerate(POWERS)
-                if name != "obstacles" or self.line.moved.size
+                f"work/{name}": batch.work[:, k].copy() for k, name in enumerate(POWERS) if name in works_of(self.line)
             }
             out["work/scheme"] = energy - self.first_energy - batch.work.sum(axis=1)
         return out

@@ -34,6 +34,7 @@ from hybrid.scene.stretch import (
     rows_of,
     slopes,
 )
+from hybrid.scene.syrope import Syrope
 from hybrid.scene.waves import Waves
 
 
@@ -263,13 +264,19 @@ class Section(Table):
     )
     dynamic_stiffness: DynamicStiffness | None = Field(
         default=None,
-        description="of a fibre rope, whose axial_stiffness or tension_strain is the static one; absent: the same, "
-        "however fast",
+        description="of a fibre rope, whose axial_stiffness, tension_strain or syrope is the static one; absent: the "
+        "same, however fast",
+    )
+    syrope: Syrope | None = Field(
+        default=None,
+        description="instead of axial_stiffness: of polyester, whose tension over strain depends on its highest mean "
+        "tension so far",
     )
     max_strain: Positive | None = Field(
         default=None,
         description="strain that the section bears, stretched or compressed; a computation that exceeds it stops; "
-        "absent: the last of tension_strain, or 0.05, or with a `diameter` what 3 GPa over its area make of it, if "
+        "absent: the last of tension_strain or syrope.curve, or 0.05, or with a `diameter` what 3 GPa over its area "
+        "make of it, if "
         "that is between 0.02 and 0.05, because no wire, fibre rope or rod bears more; an inextensible section has "
         "none [-]",
     )
@@ -344,10 +351,17 @@ class Section(Table):
         return isinstance(self.bending_stiffness, tuple) and self.bending_stiffness[0] != self.bending_stiffness[1]
 
     @property
+    def stretch_table(self) -> Curve | None:
+        """Rows of strain and tension [N] of a section that has a table of them, of polyester its original curve."""
+        if self.syrope is not None:
+            return self.syrope.rows
+        return rows_of(self.tension_strain) if self.tension_strain is not None else None
+
+    @property
     def curve(self) -> Curve | None:
         """Rows of strain and tension [N], of a section that is stretched by no constant stiffness; else None."""
-        if self.tension_strain is not None:
-            return rows_of(self.tension_strain)
+        if (table := self.stretch_table) is not None:
+            return table
         if self.dynamic_stiffness is None or self.axial_stiffness is None:
             return None
         return (0.0, 0.0), (1.0, self.axial_stiffness)
@@ -357,7 +371,7 @@ class Section(Table):
         """Axial stiffness [N]; of a table its stiffest piece, of a rope the dynamic one without mean tension."""
         if self.dynamic_stiffness is not None:
             return self.dynamic_stiffness.constant
-        return max(slopes(rows_of(self.tension_strain))) if self.tension_strain is not None else self.axial_stiffness
+        return max(slopes(table)) if (table := self.stretch_table) is not None else self.axial_stiffness
 
     @property
     def strain_limit(self) -> float:
@@ -367,8 +381,8 @@ class Section(Table):
         """
         if self.max_strain is not None:
             return self.max_strain
-        if self.tension_strain is not None:
-            return rows_of(self.tension_strain)[-1][0]
+        if (table := self.stretch_table) is not None:
+            return table[-1][0]
         if self.diameter is None or self.axial_stiffness is None:
             return USUAL_STRAIN
         by_stress = STRONGEST * 0.25 * math.pi * self.diameter**2 / self.axial_stiffness
@@ -450,10 +464,13 @@ class Section(Table):
             refuse([Finding(("axial_stiffness",), "nothing, because tension_strain says how it stretches", fix)])
         if table is not None:
             refuse_rows(table, "tension_strain")
+        if self.syrope is not None:
+            self._remembers(self.syrope)
+            return self
         if dynamic is None:
             return self
         if self.curve is None:
-            expected = "an axial_stiffness or tension_strain beside it, the static one"
+            expected = "an axial_stiffness, tension_strain or syrope beside it, the static one"
             refuse([Finding(("dynamic_stiffness",), expected, "add `axial_stiffness: ...` (N)")])
         else:
             stiffest = max(slopes(self.curve))
@@ -462,6 +479,22 @@ class Section(Table):
                 fix = "a rope answers stiffer to what is fast; are the two exchanged?"
                 refuse([Finding(("dynamic_stiffness", "constant"), expected, fix)])
         return self
+
+    def _remembers(self, syrope: Syrope) -> None:
+        """Refuse what does not go with curves that depend on the highest mean tension."""
+        for key in ("axial_stiffness", "tension_strain"):
+            if getattr(self, key) is not None:
+                refuse([Finding((key,), "nothing, because syrope says how it stretches", "leave one of the two out")])
+        last = syrope.rows[-1][0]
+        if self.max_strain is not None and self.max_strain > last:
+            expected = f"at most the strain of the last row of syrope.curve, {last:g}"
+            refuse([Finding(("max_strain",), expected, "leave it out, or add rows there")])
+        if self.dynamic_stiffness is None:
+            fix = "add `dynamic_stiffness: {constant: ..., relaxation_time: ...}`"
+            refuse([Finding(("dynamic_stiffness",), "a table, because syrope remembers the mean tension", fix)])
+        else:
+            fault = syrope.first_fault(self.dynamic_stiffness)
+            refuse([fault[1]] if fault is not None else [])
 
     @model_validator(mode="after")
     def _one_law_of_bending(self) -> Section:
@@ -544,4 +577,5 @@ class Cable(Table):
 
     def files(self) -> list[str]:
         """Paths of the files that are read."""
-        return [x.tension_strain.file for x in self.sections if isinstance(x.tension_strain, CurveFile)]
+        tables = [x.syrope.curve if x.syrope is not None else x.tension_strain for x in self.sections]
+        return [x.file for x in tables if isinstance(x, CurveFile)]

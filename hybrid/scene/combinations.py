@@ -163,7 +163,8 @@ def _in_sections(*key: str, of: Callable[[Section], Any]) -> Callable[[Tables], 
 def _stretch_laws(tables: Tables) -> Iterator[Place]:
     for at, section in _sections(tables):
         if section.curve is not None:
-            yield (*at, "dynamic_stiffness" if section.dynamic_stiffness is not None else "tension_strain")
+            given = [key for key in ("syrope", "dynamic_stiffness") if getattr(section, key) is not None]
+            yield (*at, *(given or ["tension_strain"])[:1])
 
 
 def _curls(section: Section) -> bool:
@@ -391,7 +392,9 @@ CURLED = Feature("sections that are curved without load", "intrinsic_curvature",
                  _in_sections("intrinsic_curvature", of=_curls))  # fmt: skip
 TORQUE_OF_TENSION = Feature("torque of tension", "tension_torque",
                             _in_sections("tension_torque", of=lambda x: x.tension_torque))  # fmt: skip
-STRETCH_LAW = Feature("tension over strain by a table or a rope's law", "tension_strain, dynamic_stiffness",
+SYROPE = Feature("polyester that remembers its highest tension", "syrope",
+                 _in_sections("syrope", of=lambda x: x.syrope))  # fmt: skip
+STRETCH_LAW = Feature("tension over strain by a table or a rope's law", "tension_strain, dynamic_stiffness, syrope",
                       _stretch_laws)  # fmt: skip
 MOMENT_TABLE = Feature("moment over curvature by a table, bend restrictors", "moment_curvature, kind: bend_restrictor",
                        _moment_tables)  # fmt: skip
@@ -615,6 +618,10 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         VORTICES, RESPONSE, "not worked out", "lift that locks in to a motion is no part of a response by frequency",
         fix="leave it out; hybrid run computes it in time",
+    ),
+    Refusal(
+        SYROPE, PAYOUT, "not worked out", f"{PAID}, and what comes off the drum has had tensions that nobody knows",
+        "tension_strain or axial_stiffness", "give tension_strain, at the highest tension you expect",
     ),
     Refusal(
         MOMENT_TABLE, PAYOUT, "not worked out", f"{PAID}, and elements that change there have one bending stiffness",

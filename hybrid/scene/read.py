@@ -271,6 +271,7 @@ def _resolve_motion_files(data: Any, folder: Path) -> None:
         sections = _at(data, (*cable, "sections"))
         for section in sections if isinstance(sections, list) else ():
             _make_absolute(_at(section, ("tension_strain",)), folder)
+            _make_absolute(_at(section, ("syrope", "curve")), folder)
 
 
 def _at(data: Any, path: Iterable[str]) -> Any:

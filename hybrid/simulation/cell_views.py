@@ -16,6 +16,7 @@ from hybrid.kernels.run import following_run as f
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.state.books import Books, sample_size
 from hybrid.kernels.state.state import (
+    NO_PEAK,
     NO_SLOW,
     NO_TENSION_TORQUE,
     NO_TORSION,
@@ -93,7 +94,9 @@ class CellViews:
 
     def state(self, k: int, which: int, cells: int) -> State:
         found: State = self._view(
-            self.sides[k].states[which], cells, lambda: {"turn": self._turn, "slow": NO_SLOW, "wake": NO_WAKE}
+            self.sides[k].states[which],
+            cells,
+            lambda: {"turn": self._turn, "slow": NO_SLOW, "wake": NO_WAKE, "peak": NO_PEAK},
         )
         return found
 

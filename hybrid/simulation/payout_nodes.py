@@ -28,6 +28,7 @@ from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, sample_size
 from hybrid.kernels.state.state import (
     ALONG_LINE,
+    NO_PEAK,
     NO_SLOW,
     NO_TENSION_TORQUE,
     NO_TORSION,
@@ -145,7 +146,7 @@ class NodeChanges:
         return found
 
     def _state(self, k: int, which: int, cells: int) -> State:
-        found: State = self._sides[k].states[which].view(cells, turn=NO_TURN, slow=NO_SLOW, wake=NO_WAKE)
+        found: State = self._sides[k].states[which].view(cells, turn=NO_TURN, slow=NO_SLOW, wake=NO_WAKE, peak=NO_PEAK)
         return found
 
     def _reel(self, k: int, cells: int) -> Reel:

@@ -11,6 +11,7 @@ import numpy as np
 from hybrid.kernels.junctions.bodies import SPRING
 from hybrid.kernels.state.books import WORKS
 from hybrid.kernels.state.report import REPORT_SIZE
+from hybrid.kernels.state.state import OPTIONAL_STATE
 from hybrid.model.system import SystemResolution
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.system import System
@@ -114,14 +115,9 @@ def of_today(lines: Any, template: Mapping[str, Any]) -> Any:
     found = {}
     for name, line in lines.items():
         mine, state, report = template.get(name), line.get("state"), line.get("report")
-        if mine is not None and isinstance(state, dict) and not mine["state"]["slow"].size:
-            line = line | {"state": {"slow": mine["state"]["slow"], **state}}
-        if mine is not None and isinstance(line.get("state"), dict) and not mine["state"]["wake"].size:
-            line = line | {"state": {"wake": mine["state"]["wake"], **line["state"]}}
-        if mine is not None and isinstance(line.get("state"), dict) and not mine["state"]["grip"].size:
-            line = line | {"state": {"grip": mine["state"]["grip"], **line["state"]}}
-        if mine is not None and isinstance(line.get("state"), dict) and not mine["state"]["sheave"].size:
-            line = line | {"state": {"sheave": mine["state"]["sheave"], **line["state"]}}
+        if mine is not None and isinstance(state, dict):
+            empty = {x: mine["state"][x] for x in OPTIONAL_STATE if x in mine["state"] and not mine["state"][x].size}
+            line = line | {"state": {**empty, **state}}
         work = line.get("work")
         if isinstance(work, np.ndarray) and work.ndim == 1 and FIRST_WORKS <= work.size < WORKS:
             line = line | {"work": np.pad(work, (0, WORKS - work.size))}

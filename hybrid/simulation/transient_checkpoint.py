@@ -11,7 +11,7 @@ import numpy as np
 from hybrid.kernels.mesh.cell_errors import CURVATURE, QUANTITIES
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import REPORT_SIZE
-from hybrid.kernels.state.state import state_for
+from hybrid.kernels.state.state import OPTIONAL_STATE, state_for
 from hybrid.kernels.step.sampling import SAME_TIME
 from hybrid.kernels.step.step_law import WARY
 from hybrid.simulation.restore import mesh_tree
@@ -91,16 +91,9 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         new = {"sampled": run.correction.corrector.sampled[0], "doubt": run.correction.doubt}
         older |= {"correction": new | saved["correction"]}
         saved = {name: x for name, x in saved.items() if name != "correction"}
-    if isinstance(saved.get("state"), dict) and "turn" not in saved["state"] and not model.line.torsion.size:
-        saved = {**saved, "state": {**saved["state"], "turn": state.turn}}
-    if isinstance(saved.get("state"), dict) and "slow" not in saved["state"] and not state.slow.size:  # not in 0.6
-        saved = {**saved, "state": {**saved["state"], "slow": state.slow}}
-    if isinstance(saved.get("state"), dict) and "wake" not in saved["state"] and not state.wake.size:  # not in 0.6
-        saved = {**saved, "state": {**saved["state"], "wake": state.wake}}
-    if isinstance(saved.get("state"), dict) and "grip" not in saved["state"] and not state.grip.size:  # not in 0.6
-        saved = {**saved, "state": {**saved["state"], "grip": state.grip}}
-    if isinstance(saved.get("state"), dict) and "sheave" not in saved["state"] and not state.sheave.size:  # not in 0.6
-        saved = {**saved, "state": {**saved["state"], "sheave": state.sheave}}
+    for name in OPTIONAL_STATE:
+        if isinstance(saved.get("state"), dict) and name not in saved["state"] and not getattr(state, name).size:
+            saved = {**saved, "state": {**saved["state"], name: getattr(state, name)}}
     work = saved.get("work")
     if isinstance(work, np.ndarray) and work.ndim == 1 and FIRST_WORKS <= work.size < b.WORKS:
         saved = {**saved, "work": np.pad(work, (0, b.WORKS - work.size))}

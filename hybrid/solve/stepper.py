@@ -41,10 +41,11 @@ REACH = 0.1
 HEAVY = 1e36
 # report of the march -> powers: start, end (reactions and given moments), applied forces and
 # moments, drag, mass-proportional damping, stiffness-proportional damping, added mass, waves with
-# buoyancy at the surface, contact with the seabed, friction on it, zones that change, obstacles that move
+# buoyancy at the surface, contact with the seabed, friction on it, zones that change, obstacles that move, what
+# materials lose that remember their past
 POWERS = (
     "start", "end", "applied", "drag", "mass_damping", "stiffness_damping", "added_mass", "waves", "contact",
-    "friction", "zones", "obstacles",
+    "friction", "zones", "obstacles", "hysteresis",
 )  # fmt: skip
 
 

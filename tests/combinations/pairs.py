@@ -89,6 +89,11 @@ FEATURES: dict[str, tuple[Tables, str]] = {
     "rope": (
         {S + "dynamic_stiffness": {"constant": 2e5, "per_tension": 10.0, "relaxation_time": 100}}, "stretch",
     ),
+    "polyester": (
+        {S + "axial_stiffness": None,
+         S + "syrope": {"curve": TABLE, "working": "exponential", "k1": 0.5, "k2": 0.5, "highest_tension": 2e3},
+         S + "dynamic_stiffness": {"constant": 6e5, "per_tension": 10.0, "relaxation_time": 0.2}}, "stretch",
+    ),
     "contact": ({"contact.self": True}, "contact"),
     "obstacle": (
         {"obstacles": {"pipe": {"kind": "cylinder", "at": [4, 0, -2], "axis": [0.1, 1, 0.05], "radius": 0.8,

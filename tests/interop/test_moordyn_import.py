@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -377,3 +378,61 @@ def test_a_table_that_is_none(rows: str, message: str, tmp_path: Path) -> None:
 def test_a_dynamic_stiffness_below_the_static_one(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="exchanged"):
         from_text(text_of("chain").replace("2.0e8    0  ", "2.0e8|1.0e8 4.0e9|1e6 "), tmp_path)
+
+
+OWC = "a\nb\nc\n0 0\n0.02 2e6\n0.04 4e6\n0.06 9e6\n"
+SETTINGS = "rope.dat OWC curve\n{} WCType shape\n{} k1 first\n{} k2 second\n"
+PAST = "---------------------- SYROPE IC -----\nLine Tmax Tmean\n(#) (N) (N)\n{}\n---------------------- OPTIONS"
+
+
+def polyester(tmp_path: Path, past: str = "1 2e6 1e6", shape: str = "EXP", k: str = "0.25 1.5", owc: str = OWC) -> Any:
+    """The chain of polyester, by EA = SYROPE:..."""
+    (tmp_path / "rope.dat").write_text(owc, encoding="utf-8")
+    (tmp_path / "shape.dat").write_text(SETTINGS.format(shape, *k.split()), encoding="utf-8")
+    text = text_of("chain").replace("2.0e8    0  ", "SYROPE:shape.dat|3e8|20 1e9|1e6 ")
+    head, tail = re.split(r"(?m)^-+ *OPTIONS", text, maxsplit=1)
+    return from_text(head + PAST.format(past) + tail if past else text, tmp_path)
+
+
+def test_polyester_that_remembers(tmp_path: Path) -> None:
+    """k1 e_m is the strain without tension; at Tmean the curve is as soft as the derivative of its formula."""
+    made = polyester(tmp_path).scenes["line1"]
+    (section,) = made.scene.cable.sections
+    assert (section.syrope.working, section.syrope.k1, section.syrope.k2) == ("exponential", 0.25, 1.5)
+    assert section.syrope.highest_tension == 2e6 and section.axial_stiffness is None
+    grown = math.expm1(1.5)
+    soft = 0.75 * 0.02 * grown / (1.5 * (1 + 0.5 * grown) * 2e6)
+    assert section.dynamic_stiffness.constant == 3e8 and section.dynamic_stiffness.per_tension == 20
+    assert section.dynamic_stiffness.relaxation_time == pytest.approx(1e9 * (soft - 1 / (3e8 + 20 * 1e6)), rel=1e-5)
+    assert section.damping.stiffness == pytest.approx(1e6 / 3e8)
+    assert hybrid.parse_scene(made.text) == made.scene
+    with pytest.raises(SceneError, match="one stiffness, which this export writes"):
+        hybrid.export_moordyn(hybrid.static(made.scene), tmp_path / "back.txt")
+
+
+def test_a_curve_of_polyester_ends_where_it_would_give_back_more_than_it_took(tmp_path: Path) -> None:
+    made = polyester(tmp_path, shape="LINEAR", k="0.6 1", owc=OWC + "0.08 2.4e7\n").scenes["line1"]
+    assert made.scene.cable.sections[0].syrope.curve[-1] == (0.04, 4e6)
+    assert any("taken up to 4e+06 N" in note.why for note in made.notes)
+
+
+def test_the_row_that_moordyn_does_not_read_is_told_of(tmp_path: Path) -> None:
+    told = [any("leaves out the first row" in n.why for n in polyester(tmp_path, owc=x).notes) for x in (OWC, OWC[2:])]
+    assert told == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"past": ""}, "add a row to SYROPE IC"),
+        ({"past": "1 2e6"}, "lines, Tmax and Tmean"),
+        ({"past": "1 2e7 1e6"}, "at most the tension of the last row"),
+        ({"shape": "CUBIC"}, "LINEAR, QUADRATIC or EXP"),
+        ({"k": "-1 2"}, "a number, >= 0"),
+        ({"owc": "a\nb\nc\n0 0\n0.02 2e6\n0.01 4e6\n"}, "line 6"),
+        ({"k": "0.25 9"}, "more: the static stiffness is"),
+    ],
+)
+def test_polyester_that_cannot_be(given: dict[str, str], message: str, tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=message):
+        assert polyester(tmp_path, **given).scenes

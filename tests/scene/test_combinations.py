@@ -58,6 +58,11 @@ SHEDS: dict[str, Any] = {SECTION + "vortices": {}, "environment.fluid": {"densit
 HIGH_WAVES: dict[str, Any] = {"environment.fluid": {
     "density": 1025, "surface": 5, "waves": {"kind": "stream_function", "height": 1, "period": 5, "ramp": 9}}}  # fmt: skip
 RAO = {"rao": str(Path(__file__).parents[1] / "data" / "rao.csv"), "origin": [8, 0, 0], "fairlead": [0, 0, 0]}
+POLYESTER = {
+    SECTION + "axial_stiffness": None,
+    SECTION + "syrope": {"curve": [[0, 0], [0.1, 1e4]], "working": "linear", "k1": 0.3, "highest_tension": 5e3},
+    SECTION + "dynamic_stiffness": {"constant": 3e5, "relaxation_time": 10},
+}
 CLAMPED = {ONE + "connections": {"end": {"kind": "clamped", "tangent": [1, 0, 0]}}}
 
 # By the pair: what makes a scene of CABLE, or of LINES, that has both, and what is done with it.
@@ -105,6 +110,7 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.VORTICES, c.RESPONSE): (SHEDS, "response"),
     (c.FINITE_WAVES, c.RESPONSE): (HIGH_WAVES, "response"),
     (c.BY_RAO, c.FINITE_WAVES): (HIGH_WAVES | {END + "motion": {"vessel": RAO}}, ""),
+    (c.SYROPE, c.PAYOUT): (POLYESTER | PAID, ""),
     (c.MOMENT_TABLE, c.PAYOUT): (
         {SECTION + "moment_curvature": [[0, 0], [0.1, 1], [0.2, 9]], SECTION + "bending_stiffness": None} | PAID, ""
     ),

@@ -59,6 +59,10 @@ cable:
       mass: 1.0
       axial_stiffness: 1.0e+5
       dynamic_stiffness: {constant: 3.0e+5, per_tension: 20.0, relaxation_time: 60.0}
+    - length: 5.0
+      mass: 1.0
+      syrope: {curve: [[0, 0], [0.1, 1000.0]], working: exponential, k1: 0.2, k2: 1.5, highest_tension: 500.0}
+      dynamic_stiffness: {constant: 3.0e+5, relaxation_time: 60.0}
 ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
 initial: {kind: equilibrium}
 model: {kind: catenary}
@@ -341,8 +345,9 @@ def _negative(name: str, path: tuple[str | int, ...]) -> None:
     ballast = path[1:] == ("attachments", 1, "buoyancy")
     if (
         keys[-1] in SIGNED
+        or keys[-1] == "working"
         or "depths" in keys
-        or {"tension_strain", "moment_curvature"} & {*keys}
+        or {"tension_strain", "moment_curvature", "curve"} & {*keys}
         or keys == ["initial", "friction"]
         or keys[:2] == ["initial", "points"]
         or (keys[0] == "obstacles" and keys[-1] in ("at", "axis", "normal"))

@@ -35,7 +35,6 @@ _NO_PLACE = {
     "failure": ("lines of hybrid do not break", "compute the broken line as a scene of its own"),
     "control": ("winches that follow a controller; payout is not computed", ""),
     "external loads": ("steady forces and dampers on points, rods and bodies", "a force acts on `kind: free` ends"),
-    "syrope": ("tension of polyester that depends on its past", "give axial_stiffness, in N, at the mean tension"),
 }
 
 

@@ -136,9 +136,9 @@ def _cable(deck: Deck, chain: list[tuple[Line, bool]]) -> tuple[Cable | None, li
             why = f"it ends at what no scene has: {one.lost.text}: {one.lost.why}"
             nowhere += [note(LEFT_OUT, line.row, why, one.lost.instead) for line, _ in chain]
     for line, _ in chain:
-        kind = deck.types[line.type]
-        if kind.trouble:
-            nowhere.append(note(LEFT_OUT, line.row, f"line type {kind.name}: {kind.trouble}", kind.instead))
+        why, instead = deck.trouble(line)
+        if why:
+            nowhere.append(note(LEFT_OUT, line.row, why, instead))
     if nowhere:
         return None, nowhere
     return Cable(tuple(chain), _turned(start, into=False), _turned(end, into=True)), []

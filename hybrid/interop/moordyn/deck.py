@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from hybrid.interop.moordyn.notes import NOT_NEEDED, TAKEN, Note, note
 from hybrid.interop.moordyn.options import Options, read_options
 from hybrid.interop.moordyn.rows import TITLES, Row, Section, Source, check_names, number, simple
+from hybrid.interop.moordyn.syrope import OTHER, Past, pasts_of, tables_of
 from hybrid.interop.moordyn.types import LineType, line_type
 from hybrid.scene.suggestions import did_you_mean
 
@@ -120,6 +121,22 @@ class Deck:
     lines: dict[int, Line]
     options: Options
     notes: list[Note] = field(default_factory=list)
+    pasts: dict[int, Past] = field(default_factory=dict)  # of lines of polyester, by ID
+
+    def trouble(self, line: Line) -> tuple[str, str]:
+        """Why a line cannot be carried over, and what to do; "" if it can."""
+        kind = self.types[line.type]
+        why, instead = kind.trouble, kind.instead
+        rope = kind.stretch.polyester
+        if not why and rope is not None:
+            past = self.pasts.get(line.id)
+            instead = OTHER
+            if past is None:
+                why = "it is of polyester that remembers its highest tension, and no row says which"
+                instead = "add a row to SYROPE IC with its Tmax and Tmean, in a copy of the deck"
+            elif isinstance(found := tables_of(rope, past, []), str):
+                why = found
+        return (f"line type {kind.name}: {why}" if why else ""), instead
 
 
 def read_deck(source: Source, needs_lines: bool = True) -> Deck:
@@ -145,6 +162,8 @@ def read_deck(source: Source, needs_lines: bool = True) -> Deck:
     points = _numbered(source, "points", _each(source, "points", _point, notes))
     lines = _numbered(source, "lines", _each(source, "lines", _line, notes))
     deck = Deck(source.file, types, points, bodies, rods, lines, read_options(source, notes), notes)
+    polyester = {x.id for x in lines.values() if x.type in types and types[x.type].stretch.polyester is not None}
+    deck.pasts = pasts_of(source, polyester, notes)
     _hold_together(source, deck)
     source.refuse()
     return deck

@@ -7,6 +7,7 @@ EA_s|EA_d, BA_s|BA_d           axial_stiffness = EA_s,                   slow sp
                                damping.stiffness = BA_d/EA_d
 EA_s|alpha MBL|beta            .constant = alpha MBL, .per_tension       EA_d grows with the force of the slow spring
 a file                         tension_strain                            rows of strain and tension after the header
+SYROPE:file|alpha|beta         syrope, dynamic_stiffness                 hybrid.interop.moordyn.syrope
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import NamedTuple
 
 from hybrid.interop.moordyn.notes import DIFFERS, LEFT_OUT, TAKEN, Note, note
 from hybrid.interop.moordyn.rows import Row, Source, number
+from hybrid.interop.moordyn.syrope import OTHER, WORD, Polyester, first_row_is_lost, settings, shape_of
 
 LARGEST, MOST_ROWS = 1_000_000, 1000  # bytes of a file; rows of a table
 FIX = "two lines of names and units, then rows of strain and tension (N), both rising"
@@ -33,6 +35,7 @@ class Stretch(NamedTuple):
     dynamic: dict[str, float] | None = None  # as in a scene
     trouble: str = ""
     instead: str = ""
+    polyester: Polyester | None = None  # of which the past of each line makes tables of a scene
 
 
 def is_word(cell: str) -> bool:
@@ -43,9 +46,8 @@ def is_word(cell: str) -> bool:
 def stretch_of(source: Source, row: Row, ea: str, ba: str, notes: list[Note]) -> Stretch:
     """What the cells EA and BA of a row stand for."""
     parts = ea.split("|")
-    if parts[0].upper().startswith("SYROPE"):
-        why = f"EA is {ea}: tension of polyester that depends on its past"
-        return Stretch(trouble=why, instead="write EA_s|EA_d at the mean tension you expect, in a copy of the deck")
+    if parts[0].upper().startswith(WORD):
+        return _polyester(source, row, parts, ba, notes)
     table = None
     if is_word(parts[0]):
         table = _table(source, row, parts[0], notes)
@@ -63,25 +65,58 @@ def stretch_of(source: Source, row: Row, ea: str, ba: str, notes: list[Note]) ->
     return _rope(source, row, parts, ba, Stretch(static, 0.0, table), notes)
 
 
+def _polyester(source: Source, row: Row, parts: list[str], ba: str, notes: list[Note]) -> Stretch:
+    """A rope of polyester (Syrope)."""
+    name = parts[0][len(WORD) :]
+    if len(parts) != 3:
+        source.complain("EA", "|".join(parts), f"{WORD}file|alpha|beta", "write three parts", row.line)
+        return Stretch(1.0)
+    found = settings(source, row, name)
+    if found is None:
+        return Stretch(trouble=f"EA names {name}, which cannot be read beside the deck", instead=OTHER)
+    shape = shape_of(source, row, name, found) if found else None
+    table = _table(source, row, found["owc"], notes) if shape is not None else None
+    if shape is None or table is None:
+        trouble = f"{name} names no curve that can be read beside the deck"
+        return Stretch(trouble=trouble, instead="put the table that its row OWC names beside the deck")
+    if first_row_is_lost(source, found["owc"]):
+        why = f"MoorDyn 2.7.2 leaves out the first row of {found['owc']}, and counts k1 from the strain of its second"
+        notes.append(note(DIFFERS, row, why, "put a third line before the rows, which it skips, too"))
+    constant = source.number(row, parts[1], "alpha (N)", above=0.0)
+    grows = source.number(row, parts[2], "beta", least=0.0)
+    ba_s, ba_d = _two_dampings(source, row, ba, notes)
+    if not ba_s > 0.0:
+        trouble = f"BA is {ba}: without damping of the slow spring, in N s, nothing says how fast the rope creeps"
+        return Stretch(trouble=trouble, instead="write BA_s|BA_d in N s")
+    static = max((U - T) / (y - x) for (x, T), (y, U) in pairwise(table))
+    return Stretch(static, ba_d, polyester=Polyester(table, shape, (constant, grows), ba_s))
+
+
+def _two_dampings(source: Source, row: Row, ba: str, notes: list[Note]) -> tuple[float, float]:
+    """BA_s and BA_d, N s, of a rope with two springs."""
+    slow, *rest = ba.split("|")
+    ba_s = source.number(row, slow, "BA_s (N s)")
+    ba_d = source.number(row, rest[0], "BA_d (N s)") if rest else 0.0
+    if ba_d < 0.0:
+        notes.append(note(LEFT_OUT, row, f"BA_d is {ba_d:g}", "set damping.stiffness, BA_d/EA_d, in s"))
+        ba_d = 0.0
+    return ba_s, ba_d
+
+
 def _rope(source: Source, row: Row, parts: list[str], ba: str, at_rest: Stretch, notes: list[Note]) -> Stretch:
     """A rope with a dynamic stiffness beside the static one."""
     fast = source.number(row, parts[1], "EA_d (N)" if len(parts) == 2 else "alpha MBL (N)", above=0.0)
     grows = source.number(row, parts[2], "beta", least=0.0) if len(parts) == 3 else 0.0
-    slow_ba, *rest = ba.split("|")
-    ba_s = source.number(row, slow_ba, "BA_s (N s)")
-    ba_d = source.number(row, rest[0], "BA_d (N s)") if rest else 0.0
     static = at_rest.ea
     if fast <= static:
         expected = f"a dynamic stiffness above the static one, {static:g} N"
         source.complain("EA", parts[1], expected, "are the two exchanged?", row.line)
         return at_rest
+    ba_s, ba_d = _two_dampings(source, row, ba, notes)
     if not ba_s > 0.0:
         why = f"BA is {ba}: without damping of the slow spring, in N s, nothing says how fast the rope creeps"
         notes.append(note(TAKEN, row, f"{why}; static EA alone is taken", "write BA_s|BA_d in N s"))
         return at_rest
-    if ba_d < 0.0:
-        notes.append(note(LEFT_OUT, row, f"BA_d is {ba_d:g}", "set damping.stiffness, BA_d/EA_d, in s"))
-        ba_d = 0.0
     rope = {"constant": fast, "relaxation_time": ba_s * (fast - static) / (static * fast)}
     if grows:
         rope["per_tension"] = grows

@@ -120,9 +120,10 @@ class _SystemMaker(Tables):
     def _line(self, name: str, chain: Sequence[tuple[Line, bool]]) -> list[str]:
         lines = [line for line, _ in chain]
         types = [self.deck.types[line.type] for line in lines]
-        for line, kind in zip(lines, types, strict=True):
-            if kind.trouble:
-                self._refuse(line.row, f"line type {kind.name}: {kind.trouble}", kind.instead)
+        for line in lines:
+            why, instead = self.deck.trouble(line)
+            if why:
+                self._refuse(line.row, why, instead)
         (first, back), (last, last_back) = chain[0], chain[-1]
         if next_line(self.deck, first, 1 if back else 0, JOINTS) is not None:
             for line in lines:

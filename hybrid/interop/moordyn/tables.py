@@ -20,6 +20,7 @@ from typing import Any
 from hybrid.interop.moordyn.cables import between
 from hybrid.interop.moordyn.deck import Deck, Line, Point, Rod
 from hybrid.interop.moordyn.notes import DIFFERS, TAKEN, Note, note
+from hybrid.interop.moordyn.syrope import tables_of
 from hybrid.interop.moordyn.types import LineType
 from hybrid.scene.attachments import sphere_diameter
 
@@ -99,9 +100,15 @@ class Tables:
             "length": length, "mass": kind.mass, "diameter": kind.diameter,
         }  # fmt: skip
         how = kind.stretch
-        section |= {"tension_strain": how.table} if how.table is not None else {"axial_stiffness": kind.ea}
-        if how.dynamic is not None:
-            section["dynamic_stiffness"] = how.dynamic
+        dynamic = how.dynamic
+        if how.polyester is not None:
+            found = tables_of(how.polyester, self.deck.pasts[line.id], self.notes)
+            assert not isinstance(found, str)
+            section["syrope"], dynamic = found
+        else:
+            section |= {"tension_strain": how.table} if how.table is not None else {"axial_stiffness": kind.ea}
+        if dynamic is not None:
+            section["dynamic_stiffness"] = dynamic
         if kind.ei:
             section["bending_stiffness"] = kind.ei
         if self.wet and any(kind.drag):
@@ -116,7 +123,8 @@ class Tables:
     def _tau(self, kind: LineType, line: Line, length: float) -> float:
         """Damping time of stretch, s: BA/EA."""
         if kind.ba >= 0.0:
-            return kind.ba / (kind.ea if kind.stretch.dynamic is None else kind.stretch.dynamic["constant"])
+            rope, dynamic = kind.stretch.polyester, kind.stretch.dynamic
+            return kind.ba / (rope.fast[0] if rope is not None else kind.ea if dynamic is None else dynamic["constant"])
         segment = length / line.segments
         ba = -kind.ba * segment * math.sqrt(kind.ea * kind.mass)
         why = (

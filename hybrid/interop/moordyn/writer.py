@@ -324,7 +324,7 @@ class _Writer:
 
     def _type(self, where: str, section: Section) -> str:
         if section.curve is not None:
-            key = "dynamic_stiffness" if section.dynamic_stiffness is not None else "tension_strain"
+            key = next(x for x in ("syrope", "dynamic_stiffness", "tension_strain") if getattr(section, x) is not None)
             fix = "give axial_stiffness alone, at the tension you expect"
             self._refuse(f"{where}.{key}", "given", "one stiffness, which this export writes", fix)
             return "none"

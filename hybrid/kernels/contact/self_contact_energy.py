@@ -36,6 +36,7 @@ from hybrid.kernels.state.report import (
     CONTACT_WORK,
     FRICTION_WORK,
     OBSTACLE_WORK,
+    ROPE_WORK,
     SEABED_ENERGY,
     SELF_CONTACT_ENERGY,
     SELF_FRICTION_WORK,
@@ -113,6 +114,8 @@ def work_of_try(line, ends, contact, velocity, before, state, work, clock):
         done += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock[STORED] + report[FRICTION_WORK]
     if line.moved.shape[0] > 0:
         done += report[OBSTACLE_WORK]
+    if line.law_at.shape[0] > 0:
+        done += report[ROPE_WORK]
     for i in range(work.u.shape[0]):
         for k in range(3):
             done += line.force[i, k] * work.u[i, k]

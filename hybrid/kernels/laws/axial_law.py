@@ -1,4 +1,4 @@
-"""Cells whose tension is no multiple of their strain: a table, and the static and dynamic stiffness of fibre ropes.
+"""Cells whose tension is no multiple of their strain: tables, static and dynamic stiffness of fibre ropes, polyester.
 
     symbol   meaning                                                                              unit
     T        tension; where the cell is damped, Te its elastic part                               N
@@ -8,8 +8,10 @@
     E        dynamic stiffness a + b theta; a = 0: none, and the strain is s(T)                   N
     eps      strain of the cell, s(theta) + (T - theta)/E                                         -
     U        energy per length, W(theta) + (Te^2 - theta^2)/(2 E) with W the integral of T ds     J/m
+    peak     highest mean tension so far, state.peak, of ropes that remember it (Syrope)          N
 
-In a step theta is that of a tension which changes evenly (exact, whatever the step); at rest it is T.  The law of length
+Of a rope that remembers it s is the table (the original curve) while theta is its peak; below it is a working curve from
+the strain k1 s(peak), where there is no tension, to s(peak), of the shape that is given.  In a step theta is that of a tension which changes evenly (exact, whatever the step); at rest it is T.  The law of length
 is linearised about the tension that an iteration has found: eps = SHIFT + ck T, both written here before every march.
 """
 
@@ -19,11 +21,19 @@ import math
 
 from hybrid.kernels.algebra.rotations import dot, get3, sub
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.report import STRETCH_ENERGY
+from hybrid.kernels.state.report import ROPE_WORK, STRETCH_ENERGY
+from hybrid.kernels.state.state import WORKING
 
 # Columns of Line.law: of a cell, its first row in Line.law_table and the row behind its last (equal: tension is a multiple
-# of strain there); a, b and tau; then what is written: strain without tension of the linearised law; power lost, W.
-FIRST, LAST, DYNAMIC, PER_TENSION, RELAXATION, SHIFT, LOSS = range(7)
+# of strain there); a, b and tau; the shape of working curves (0: there are none), its two numbers, the peak before the
+# start (N); then what is written: strain without tension of the linearised law; power lost, W.
+FIRST, LAST, DYNAMIC, PER_TENSION, RELAXATION = range(WORKING)
+K1, K2, HIGHEST, SHIFT, LOSS = range(WORKING + 1, WORKING + 6)
+# Shapes of working curves: T/peak over the part of the way from the strain without tension to the peak.  That by a
+# stiffness is straight, with k1 its stiffness, N.
+LINEAR, BY_STIFFNESS, QUADRATIC, EXPONENTIAL = 1.0, 2.0, 3.0, 4.0
+# Part of the peak below which a working curve goes on straight: that of a square has no stiffness without tension.
+STRAIGHT = 1e-3
 # Columns of Line.law_table: strain; tension, N; energy per length from the first point on, J/m.
 STRAIN, TENSION, ENERGY = range(3)
 # Below this part of the relaxation time a step takes the series of what would cancel.
@@ -61,6 +71,99 @@ def tension_at(table, first, last, strain):
 
 
 @inner
+def shape_of(form, k, y):
+    """Of a working curve where its tension is the part y of the peak: part of the way, its slope, area below in both."""
+    if form == QUADRATIC:
+        root = math.sqrt((1.0 - k) * (1.0 - k) + 4.0 * k * y)
+        x = 2.0 * y / (1.0 - k + root)
+        return x, 1.0 / root, x * x * (k * x / 3.0 + 0.5 * (1.0 - k))
+    if form == EXPONENTIAL:
+        grown = math.expm1(k)
+        x = math.log1p(y * grown) / k
+        return x, grown / (k * (1.0 + y * grown)), y / k - x / grown
+    return y, 1.0, 0.5 * y * y
+
+
+@inner
+def working_shape(form, k, y):
+    """As `shape_of`, straight below STRAIGHT."""
+    x, slope, area = shape_of(form, k, STRAIGHT)
+    if y < STRAIGHT:
+        return x + slope * (y - STRAIGHT), slope, 0.5 * slope * y * y
+    low = 0.5 * slope * STRAIGHT * STRAIGHT - area
+    x, slope, area = shape_of(form, k, y)
+    return x, slope, low + area
+
+
+@inner
+def working_way(law, i, peak, at):
+    """Strain that the working curve of cell i covers below a peak (N), at which its strain is `at`."""
+    return peak / law[i, K1] if law[i, WORKING] == BY_STIFFNESS else (1.0 - law[i, K1]) * at
+
+
+@inner
+def rest_at(law, table, i, mean, peak):
+    """Of cell i at rest under a mean tension, once at `peak`: strain, its derivative (1/N), energy per length (J/m)."""
+    first, last = int(law[i, FIRST]), int(law[i, LAST])
+    if not law[i, WORKING] > 0.0:
+        return strain_at(table, first, last, mean)
+    top = max(mean, peak)
+    at, c, _ = strain_at(table, first, last, top)
+    way = working_way(law, i, top, at)
+    x, slope, area = working_shape(law[i, WORKING], law[i, K2], mean / top)
+    if mean < peak:
+        at, c = at - way * (1.0 - x), way * slope / top
+    return at, c, top * way * area
+
+
+@inner
+def lost_below(law, table, i, peak):
+    """Work per length, J/m, that a cell has not stored when its mean tension has risen to `peak` for the first time."""
+    at, _, taken = strain_at(table, int(law[i, FIRST]), int(law[i, LAST]), peak)
+    _, _, area = working_shape(law[i, WORKING], law[i, K2], 1.0)
+    return taken - peak * working_way(law, i, peak, at) * area
+
+
+@inner
+def strain_of(e, h):
+    """Strain of a chord (m) of unstretched length h (m)."""
+    square = dot(e, e)
+    return (square - h * h) / ((math.sqrt(square) + h) * h)
+
+
+@inner
+def rest_and_fast(line, state, i, peak):
+    """Strain at rest under the mean tension of a cell; the tension (N) above that which its chord has; and what of that
+
+    the fast spring does not give up when the mean tension grows, over the growth.
+    """
+    at, _, _ = rest_at(line.law, line.law_table, i, state.slow[i], peak)
+    E, b = stiffness_at(line.law, i, state.slow[i])
+    part = strain_of(get3(state.e, i), line.h[i]) - at
+    return at, E * part, part * (1.0 + 0.5 * part * b)
+
+
+@inner
+def lost_in_step(line, old, new, i, peak):
+    """Work per length, J/m, that a cell which remembers its peak has lost in a step: its mean tensions are known.
+
+    By way, not by power: that jumps where the peak is passed.
+    """
+    law, table = line.law, line.law_table
+    lost = lost_below(law, table, i, max(peak, new.slow[i])) - lost_below(law, table, i, peak)
+    before, fast_before, kept_before = rest_and_fast(line, old, i, peak)
+    after, fast_after, kept_after = rest_and_fast(line, new, i, peak)
+    lost += 0.5 * (fast_before + fast_after) * (after - before)
+    return lost - 0.5 * (kept_before + kept_after) * (new.slow[i] - old.slow[i])
+
+
+@inner
+def peak_before(law, i, state):
+    """The highest mean tension, N, that a cell has had."""
+    return max(law[i, HIGHEST], state.peak[i]) if law[i, WORKING] > 0.0 else 0.0
+
+
+@inner
 def mean_part(x):
     """How the mean tension after a step of x relaxation times answers to the tension there and before, and to itself."""
     kept = math.exp(-x)
@@ -79,9 +182,9 @@ def stiffness_at(law, i, mean):
 def follow_law(line, old, new, work, dt, _):
     """Linearise the laws of all cells about new.T, after a step of dt (s) from `old`; dt = 0: at rest, new.slow becomes T;
 
-    dt < 0: new.slow stays as it is.  Writes line.ck, SHIFT and LOSS of line.law, new.slow, and the energy.
+    dt < 0: new.slow stays as it is.  Writes line.ck, SHIFT and LOSS of line.law, new.slow, new.peak, energy and work.
     """
-    law, table, energy = line.law, line.law_table, 0.0
+    law, table, energy, lost = line.law, line.law_table, 0.0, 0.0
     for i in range(line.h.shape[0]):
         first, last = int(law[i, FIRST]), int(law[i, LAST])
         e, h, T = get3(new.e, i), line.h[i], new.T[i]
@@ -104,14 +207,17 @@ def follow_law(line, old, new, work, dt, _):
             law[i, LOSS] = (T - elastic) * faster
             energy += h * stored
             continue
-        mean, answers = new.slow[i], 0.0
+        mean, answers, peak = new.slow[i], 0.0, law[i, HIGHEST]
         if dt > 0.0:
+            peak = peak_before(law, i, old)
             answers, before, kept = mean_part(dt / law[i, RELAXATION])
             mean = answers * T + before * old.T[i] + kept * old.slow[i]
         if dt == 0.0:
             mean, answers = T, 1.0
+        if dt < 0.0:
+            peak = peak_before(law, i, new)
         new.slow[i] = mean
-        at, c, stored = strain_at(table, first, last, mean)
+        at, c, stored = rest_at(law, table, i, mean, peak)
         E, b = stiffness_at(law, i, mean)
         eps = at + (T - mean) / E
         line.ck[i] = answers * c + (1.0 - answers - answers * b * (T - mean) / E) / E
@@ -119,9 +225,16 @@ def follow_law(line, old, new, work, dt, _):
         elastic = T if dt == 0.0 else mean + E * (strain - at)
         fast = elastic - mean
         energy += h * (stored + 0.5 * (elastic * elastic - mean * mean) / E)
+        law[i, LOSS] = (T - elastic) * faster
+        if law[i, WORKING] > 0.0:
+            new.peak[i] = max(peak, mean)
+            if dt > 0.0:
+                lost += h * lost_in_step(line, old, new, i, peak)
+            continue
         slides = (T - mean) / law[i, RELAXATION] * fast * (c - 1.0 / E - 0.5 * fast * b / (E * E))
-        law[i, LOSS] = (T - elastic) * faster + h * slides
+        law[i, LOSS] += h * slides
     work.report[STRETCH_ENERGY] = energy
+    work.report[ROPE_WORK] = -lost
     return 0
 
 
@@ -142,7 +255,7 @@ def strain_and_energy(line, state, i):
         strain, _, stored = strain_at(line.law_table, first, last, T)
         return strain, stored
     mean = state.slow[i]
-    strain, _, stored = strain_at(line.law_table, first, last, mean)
+    strain, _, stored = rest_at(law, line.law_table, i, mean, peak_before(law, i, state))
     E, _ = stiffness_at(law, i, mean)
     return strain + (T - mean) / E, stored + 0.5 * (T * T - mean * mean) / E
 

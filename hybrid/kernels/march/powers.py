@@ -8,7 +8,7 @@ from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.march.zone_torque import FIRST, LAST
-from hybrid.kernels.state.books import CONTACT, FRICTION, OBSTACLE, RATES, STORED, WORKS
+from hybrid.kernels.state.books import CONTACT, FRICTION, HYSTERESIS, OBSTACLE, RATES, STORED, WORKS
 from hybrid.kernels.state.forces import SELF_CONTACT, TOUCHES
 from hybrid.kernels.state.report import (
     ADDED_MASS_POWER,
@@ -20,6 +20,7 @@ from hybrid.kernels.state.report import (
     MOMENT_A,
     NET_A,
     OBSTACLE_WORK,
+    ROPE_WORK,
     SEABED_ENERGY,
     SELF_FRICTION_WORK,
     STIFFNESS_DAMPING_POWER,
@@ -81,6 +82,8 @@ def book_work(line, dt, report, books):
         clock[STORED] = report[SEABED_ENERGY]
     if line.moved.shape[0] > 0:
         work[0, OBSTACLE] += report[OBSTACLE_WORK]
+    if line.law_at.shape[0] > 0:
+        work[0, HYSTERESIS] += report[ROPE_WORK]
     if line.bits & SELF_CONTACT:
         work[0, FRICTION] += report[SELF_FRICTION_WORK]
 

@@ -233,6 +233,8 @@ def copy_cell(state, out, a, c):
     out.T[c], out.w[c], out.wa[c], out.wd[c] = state.T[a], state.w[a], state.wa[a], state.wd[a]
     if state.slow.shape[0] > 0:
         out.slow[c] = state.slow[a]
+    if state.peak.shape[0] > 0:
+        out.peak[c] = state.peak[a]
 
 
 @inner
@@ -253,6 +255,8 @@ def carry_cells(job):
         out.T[c] = tension_at(line.s, state.T, match.single, of, middle)
         if state.slow.shape[0] > 0:
             out.slow[c] = tension_at(line.s, state.slow, match.single, of, middle)
+        if state.peak.shape[0] > 0:
+            out.peak[c] = tension_at(line.s, state.peak, match.single, of, middle)
         torque = torque_beside(line, state, of)
         match.lengths[c] = math.sqrt(dot(e, e)) / stretch_factor(target, out, c, torque)
 

@@ -16,7 +16,18 @@ from hybrid.kernels.run.run import in_plane, in_space
 from hybrid.kernels.state.forces import PLANAR
 from hybrid.kernels.state.obstacle_rows import FREE
 from hybrid.kernels.state.report import REPORT_SIZE
-from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work, blank_state, no_ends, no_torsion
+from hybrid.kernels.state.state import (
+    Ends,
+    Floats,
+    Line,
+    Sea,
+    State,
+    Work,
+    blank_state,
+    no_ends,
+    no_torsion,
+    remembers,
+)
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, OK, STEP, Limits, Task
 
@@ -52,6 +63,8 @@ def check_turns(line: Line, state: State) -> None:
         raise ValueError(f"a state with {state.turn.shape[0]} turns on a line that has {line.torsion.shape[0]}")
     if state.slow.shape[0] != line.law.shape[0]:
         raise ValueError(f"a state with {state.slow.shape[0]} mean tensions on a line that has {line.law.shape[0]}")
+    if state.peak.shape[0] != (line.law.shape[0] if remembers(line) else 0):
+        raise ValueError(f"a state with {state.peak.shape[0]} highest mean tensions on a line that has other ones")
     if state.grip.shape[1] != 6 * line.moved.size:
         raise ValueError(
             f"a state with grips of {state.grip.shape[1] // 6} obstacles, of which {line.moved.size} are known"

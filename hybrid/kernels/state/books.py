@@ -109,8 +109,8 @@ ZONES_DUE = 262144  # of a system: zones of a line are to be looked at
 # --- powers and work --------------------------------------------------------------------------------
 
 RATES = 8  # by their rates: start, end, applied, drag, mass damping, stiffness damping, added mass, waves
-CONTACT, FRICTION, ZONES, OBSTACLE = 8, 9, 10, 11  # by steps
-WORKS = 12
+CONTACT, FRICTION, ZONES, OBSTACLE, HYSTERESIS = 8, 9, 10, 11, 12  # by steps
+WORKS = 13
 # Columns of the step log.
 LOG = ("t", "dt", "iterations", "correction", "residual", "repeats", "error", "end_force_start", "end_force_end")
 # Steps of which the worst is remembered, with (left, t, dt, node).

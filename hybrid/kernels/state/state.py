@@ -27,7 +27,8 @@ NO_TENSION_TORQUE: Floats = np.zeros(0)
 NO_TURN: Floats = np.zeros((0, 3))
 NO_TURNS: Floats = np.zeros((0, 0, 3))
 # Of a line whose tensions are multiples of strains (kernels.laws.axial_law has the columns).
-NO_LAW: Floats = np.zeros((0, 7))
+NO_LAW: Floats = np.zeros((0, 11))
+WORKING = 5  # the column that says which cells remember their highest mean tension; 0: not this one
 NO_TABLE: Floats = np.zeros((0, 3))
 # Of a line whose moments are multiples of curvature (kernels.laws.bending_law has the columns).
 NO_BEND_LAW: Floats = np.zeros((0, 7))
@@ -35,6 +36,7 @@ NO_BEND_LAW: Floats = np.zeros((0, 7))
 NO_WAKE_LAW: Floats = np.zeros((0, 8))
 NO_WAKE: Floats = np.zeros((0, 4))
 NO_SLOW: Floats = np.zeros(0)
+NO_PEAK: Floats = np.zeros(0)
 NO_ADDRESS: NDArray[np.int64] = np.zeros(0, np.int64)
 NO_OBSTACLES: Floats = np.zeros((0, OBSTACLE))
 # Of a scene in which no obstacle moves (kernels.state.obstacle_rows has the columns).
@@ -94,8 +96,8 @@ class Line(NamedTuple):
     # (K, 5) catenary zones that a torque passes through: first cell, cell after the last, compliance (rad per N m),
     # turn without torque (rad), stiffness-proportional damping time (s)
     torsion: Floats = NO_TORSION
-    # (N, 7) of cells whose tension is no multiple of strain (kernels.laws.axial_law); empty: there are none
-    law: Annotated[Floats, cell(columns=7, optional=True)] = NO_LAW
+    # (N, 11) of cells whose tension is no multiple of strain (kernels.laws.axial_law); empty: there are none
+    law: Annotated[Floats, cell(columns=11, optional=True)] = NO_LAW
     law_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: strain, tension (N), energy per length (J/m)
     law_at: NDArray[np.int64] = (
         NO_ADDRESS  # (1,) address of kernels.laws.axial_law.follow_law; empty: there is no such cell
@@ -231,9 +233,14 @@ class State(NamedTuple):
     # (N+1, 6 M) of each obstacle, of lines with `moved` (kernels.laws.obstacle_grip); else empty
     grip: Floats = NO_GRIP
     sheave: Floats = NO_SHEAVES  # (M, 4) of all obstacles where one turns freely (kernels.laws.sheaves); else empty
+    peak: Floats = NO_PEAK  # (N,) N, highest mean tension of lines with a section that remembers it; else empty
 
     def copy(self) -> State:
         return State(*(x.copy() for x in self))
+
+
+# What only some lines have of a state: of others it is empty, and earlier programs did not keep all of it.
+OPTIONAL_STATE = ("turn", "slow", "wake", "grip", "sheave", "peak")
 
 
 class Batch(NamedTuple):
@@ -362,11 +369,12 @@ def no_torsion() -> Torsion:
 
 def blank_state(
     n_cells: int, zones: int = 0, slow: bool = False, wake: bool = False, obstacles: int = 0,
-    sheaves: bool = False,
+    sheaves: bool = False, peak: bool = False,
 ) -> State:  # fmt: skip
     """A state of zeros with room for `n_cells` cells; zones: those that a torque passes through; slow: mean tensions;
 
-    wake: phases of vortices; obstacles: of which one moves; sheaves: one of them turns freely.
+    wake: phases of vortices; obstacles: of which one moves; sheaves: one of them turns freely; peak: highest mean
+    tensions.
     """
     node, cell = (n_cells + 1, 3), (n_cells, 3)
     z = np.zeros
@@ -389,13 +397,21 @@ def blank_state(
         z((n_cells + 1 if wake else 0, 4)),
         z((n_cells + 1 if obstacles else 0, 6 * obstacles)),
         z((obstacles if sheaves else 0, 4)),
+        z(n_cells if peak else 0),
     )
 
 
 def state_for(line: Line) -> State:
     """A state of zeros of a line."""
-    free = bool((line.moved == FREE).any())
-    return blank_state(line.h.size, len(line.torsion), line.law.size > 0, line.wake_law.size > 0, line.moved.size, free)
+    free, peak = bool((line.moved == FREE).any()), remembers(line)
+    return blank_state(
+        line.h.size, len(line.torsion), line.law.size > 0, line.wake_law.size > 0, line.moved.size, free, peak
+    )  # fmt: skip
+
+
+def remembers(line: Line) -> bool:
+    """Whether a cell of a line remembers its highest mean tension."""
+    return bool(line.law[:, WORKING].any())
 
 
 def no_sea(n_cells: int) -> Sea:
