@@ -97,6 +97,7 @@ EVENTS_BY_WEIGHT = (
     "bend radius below limit",
     "tension above limit",
     "tension below limit",
+    "contact force above limit",
     "unresolved bend",
     "unresolved slack bend",
     "accuracy missed",
@@ -153,6 +154,7 @@ LIMIT_EVENTS = {
     "min_bend_radius": "bend radius below limit",
     "max_tension": "tension above limit",
     "min_tension": "tension below limit",
+    "max_contact_force": "contact force above limit",
 }
 # Changes of zones: part of a normal run.
 ZONE_EVENTS = ("split", "grow", "merge", "shrink", "retry")

@@ -184,9 +184,14 @@ def _parts_of_time(rows: list[dict[str, Any]], above: float | None, below: float
 
 def _limit_lines(result: Result) -> list[str]:
     """Which part of the limits of sections is used, and the limits of quantities."""
+    from hybrid.store.envelope import largest_contact
     from hybrid.store.verdicts import quantity_limits
 
-    found = []
+    found, pressed = [], None if result.lines else largest_contact(result)
+    if pressed is not None:
+        partner, most = pressed
+        at = f"s = {most.s:.5g} m, t = {most.t:.5g} s"
+        found.append(f"largest contact force: {most.value:.5g} N/m of {partner}, {at}")
     for x in () if result.lines else result.utilisation().values():
         part = "" if x.used is None else f"{100.0 * x.used:.4g} % of {x.limit} used: "
         if x.limit == "min_bend_radius" and x.used is not None:

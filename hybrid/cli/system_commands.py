@@ -123,6 +123,12 @@ def _table(
         if bent is not None and bend is not None:
             radius = f"{bent['value']:.5g} m at s = {bent['s']:.5g} m" + f", t = {bent['t']:.5g} s" * (end is not None)
             table.add_row("", f"smallest bend radius {radius}{judged_text(bend, 'm', bent)}{unknown_text(facts, 'm')}")
+        if (pressed := facts.get("contact_max")) is not None:
+            force = f"{pressed['value']:.5g} N/m at s = {pressed['s']:.5g} m" + f", t = {pressed['t']:.5g} s" * (
+                end is not None
+            )
+            held_force = judged_text(limits.get("max_contact_force"), "N/m", pressed)
+            table.add_row("", f"largest contact force {force}, of {pressed['partner']}{held_force}")
         for x in facts["quantities"]:
             table.add_row("", x["text"] + x["when"] + x["ending"])
         for each in facts.get("accuracy", ()):

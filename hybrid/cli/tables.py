@@ -47,10 +47,13 @@ def lowest_node(s: np.ndarray, r: np.ndarray) -> int:
 
 
 def extremes_facts(result: Result) -> dict[str, Any]:
-    """Largest and smallest tension (N), smallest bend radius (m) with s (m) and t (s), and the limits of sections.
+    """Largest and smallest tension (N), smallest bend radius (m), largest contact force (N/m) where something touches,
+
+    with s (m) and t (s), and the limits of sections.
 
     Of every accepted step where the file has its envelope, and of the outputs.
     """
+    from hybrid.store.envelope import largest_contact
     from hybrid.store.records import not_converged_in
     from hybrid.store.verdicts import section_limits
     from hybrid.view.worst import worst
@@ -63,6 +66,9 @@ def extremes_facts(result: Result) -> dict[str, Any]:
         x = worst(result, "curvature")
         straight = not x.value * float(result.s[-1] - result.s[0]) > 1e-6
         found["bend_radius_min"] = None if straight else {"value": 1.0 / x.value, "s": x.s, "t": x.t}
+    if (pressed := largest_contact(result)) is not None:
+        partner, most = pressed
+        found["contact_max"] = {"value": most.value, "s": most.s, "t": most.t, "partner": partner}
     found["not_converged"] = sorted(not_converged_in(result.attributes))
     found["quantities"] = quantities_facts(result)
     return found | {"limits": [x._asdict() | {"not_verified": x.not_verified} for x in section_limits(result)]}
@@ -82,13 +88,15 @@ def extremes_rows(facts: dict[str, Any], moves: bool) -> Iterator[tuple[str, str
     rows = (
         ("largest tension", "tension_max", "N", "max_tension"), ("smallest tension", "tension_min", "N", "min_tension"),
         ("smallest bend radius", "bend_radius_min", "m", "min_bend_radius"),
+        ("largest contact force", "contact_max", "N/m", "max_contact_force"),
     )  # fmt: skip
     for title, key, unit, limit in rows:
         x, held = facts.get(key), limits.get(limit)
         if x is None:
             continue
         text = f"{x['value']:.5g} {unit} at s = {x['s']:.5g} m" + f", t = {x['t']:.5g} s" * moves
-        yield title, text + judged_text(held, unit, x) + unknown_text(facts, unit)
+        text += f", of {x['partner']}" if "partner" in x else ""
+        yield title, text + judged_text(held, unit, x) + unknown_text(facts, unit) * (unit != "N/m")
     for x in facts["quantities"]:
         yield x["name"], x["text"] + x["when"] + x["ending"]
 
@@ -98,7 +106,7 @@ def judged_text(held: dict[str, Any] | None, unit: str, extreme: dict[str, Any])
     if held is None:
         return ""
     if held["not_verified"]:
-        side = "at most" if held["limit"] == "max_tension" else "at least"
+        side = "at most" if held["limit"].startswith("max") else "at least"
         return f"; {held['limit']}, {side} {held['allowed']:.5g} {unit}, {held['not_verified']}"
     if not held["broken"]:
         return f"; within {held['limit']}"

@@ -26,6 +26,7 @@ SECTION_LIMITS: dict[str, tuple[str, str, np.ufunc]] = {
     "min_bend_radius": ("m", "smallest bend radius allowed", np.fmax),
     "max_tension": ("N", "largest tension allowed", np.fmin),
     "min_tension": ("N", "smallest tension allowed", np.fmax),
+    "max_contact_force": ("N/m", "largest contact force per length allowed", np.fmin),
 }
 # Poisson's ratio of a solid round section, used where a rod's torsional stiffness is not given.
 POISSON = 0.3

@@ -317,6 +317,12 @@ class Section(Table):
         description="smallest tension allowed, 0 where the cable must not be slack, negative for a compression that it "
         "bears; changes nothing that is computed; absent: none [N]",
     )
+    max_contact_force: Positive | None = Field(
+        default=None,
+        description="largest force per length allowed with which the seabed, obstacles, other lines or the line itself "
+        "press on it (crushing); where lines cross, that of the contact over the cells that bear it; changes nothing "
+        "that is computed; absent: none [N/m]",
+    )
     capacity: tuple[Pair, ...] | None = Field(
         default=None,
         description="what it bears of tension and bending together: corners [tension, curvature] of a polygon around "

@@ -17,7 +17,7 @@ from hybrid.errors import LIMIT_EVENTS
 from hybrid.kernels.contact.self_distance import OF_0_6, blank_itself
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
-from hybrid.kernels.state.forces import MAY_TOUCH, PLANAR, SEABED, SELF_CONTACT
+from hybrid.kernels.state.forces import MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.watch.carried_extremes import pass_on
 from hybrid.kernels.watch.extremes import fold_extremes
@@ -46,6 +46,7 @@ QUANTITIES = {
     b.TORQUE: ("torque", "N m", "torque of the elastic strain", "torsion"),
     b.PRESSURE: ("contact", "N/m", "normal force of the seabed per length", "seabed"),
     b.SELF_PRESSURE: ("self_contact", "N/m", "force per length where the line touches itself", "self_contact"),
+    b.OBSTACLE_PRESSURE: ("obstacle_contact", "N/m", "force per length of obstacles across the line", "obstacles"),
     b.DISPLACEMENT: ("displacement", "m", "distance from where the node was at the start", "time"),
     b.WALL_TENSION: ("wall_tension", "N", "tension in the wall", "pipe"),
     b.VON_MISES: ("von_mises", "Pa", "largest von Mises stress in the wall of a pipe", "pipe"),
@@ -110,6 +111,7 @@ class Envelope:
         self.bounds = no_extremes(self.s.size)  # of meshes before that of now
         has = {"", *({"rod"} if layout is not None else {zone.kind for zone in model.zones})}
         has |= ({"seabed"} if model.line.bits & SEABED else set()) | ({"time"} if moves else set())
+        has |= {"obstacles"} if model.line.bits & OBSTACLES else set()
         has |= {"self_contact"} if moves and model.line.bits & (SELF_CONTACT | MAY_TOUCH) else set()
         has |= {"torsion"} if "rod" in has or (model.line.torsion.size and not model.line.bits & PLANAR) else set()
         pipes = Pipes(scene) if moves and any(x.pipe for x in scene.cable.sections) else None
@@ -206,8 +208,8 @@ class Envelope:
         known = saved.get("itself")
         if isinstance(known, np.ndarray) and known.shape == (OF_0_6,):  # nor when contact may end
             saved["itself"] = np.append(known, mine["itself"][OF_0_6:])
-        for name in ("bounds", "now"):  # nor wall tension and stress
-            saved[name] = with_pipes(saved.get(name))
+        for name in ("bounds", "now"):  # nor wall tension, stress and the force of obstacles
+            saved[name] = with_all_rows(saved.get(name))
         self.quantities.restore(saved.get("quantities"))
         older |= {"quantities": self.quantities.reached} if self.quantities else {}
         found = matched(older | saved, mine, "state/envelope")
@@ -259,11 +261,11 @@ class Envelope:
         return out
 
 
-def with_pipes(x: Any) -> Any:
-    """Extremes of a checkpoint, with unknown ones of pipes where it has none."""
-    if not (isinstance(x, np.ndarray) and x.ndim == 3 and x.shape[:2] == (4, b.WALL_TENSION)):
+def with_all_rows(x: Any) -> Any:
+    """Extremes of a checkpoint, with unknown ones of pipes and of obstacles where it has none."""
+    if not (isinstance(x, np.ndarray) and x.ndim == 3 and x.shape[1] in (b.WALL_TENSION, b.OBSTACLE_PRESSURE)):
         return x
-    more = np.full((4, b.EXTREMES - b.WALL_TENSION, x.shape[2]), np.nan)
+    more = np.full((len(x), b.EXTREMES - x.shape[1], x.shape[2]), np.nan)
     return np.concatenate([x, more], axis=1)
 
 

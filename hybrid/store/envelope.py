@@ -18,9 +18,19 @@ if TYPE_CHECKING:
 GROUP = "envelope"
 SCALE, BEGIN, END = f"{GROUP}/s", f"{GROUP}/begin", f"{GROUP}/end"
 # What limits are held against.
-_HELD = {"min_bend_radius": ("curvature", "max"), "max_tension": ("tension", "max"), "min_tension": ("tension", "min")}
+_HELD = (
+    ("min_bend_radius", "curvature", "max"), ("max_tension", "tension", "max"), ("min_tension", "tension", "min"),
+    ("max_contact_force", "contact", "max"), ("max_contact_force", "self_contact", "max"),
+    ("max_contact_force", "obstacle_contact", "max"),
+)  # fmt: skip
 # Which limits there are of quantities that outputs may have beyond their envelope.
-LIMITED = {"curvature": ("min_bend_radius",), "tension": ("max_tension", "min_tension"), "von_mises": ("max_stress",)}
+LIMITED = {
+    "curvature": ("min_bend_radius",), "tension": ("max_tension", "min_tension"), "contact": ("max_contact_force",),
+    "self_contact": ("max_contact_force",), "von_mises": ("max_stress",),
+}  # fmt: skip
+# What presses on the line, by the quantity that has its force per length.
+PARTNERS = {"contact": "the seabed", "self_contact": "the line itself or another", "obstacle_contact": "an obstacle"}
+UNITS = {"min_bend_radius": "m", "max_contact_force": "N/m", "max_stress": "Pa", "capacity": "%"}  # of limits not in N
 # Of the largest tension: what is below is what the solver's tolerance leaves of a force of zero, as at a free end.
 NOTHING = 1e-6
 # Verdicts on limits: `verdicts` decides which.
@@ -57,9 +67,9 @@ class Extreme(NamedTuple):
 class Judged(NamedTuple):
     """How near the cable came to a limit of its sections: where its limit was broken most, or nearly.
 
-    limit: its key in the scene; value, allowed: m or N; used: part of what is allowed, None for a smallest tension,
+    limit: its key in the scene; value, allowed: m, N, N/m; used: part of what is allowed, None for a smallest tension,
     and where it is not verified; s: m; t: s.  verdict: within, broken, or not verified, and then why, and the one thing
-    to do; "" before `verdicts` has decided.
+    to do; "" before `verdicts` has decided.  partner: of a contact force what presses, "" of other limits.
     """
 
     limit: str
@@ -72,6 +82,7 @@ class Judged(NamedTuple):
     verdict: str = ""
     why: str = ""
     remedy: str = ""
+    partner: str = ""
 
     @property
     def margin(self) -> float:
@@ -86,13 +97,14 @@ class Judged(NamedTuple):
     @property
     def text(self) -> str:
         """What was reached, and what is allowed."""
-        unit = "m" if self.limit == "min_bend_radius" else "N"
-        what = "bend radius" if unit == "m" else "tension"
+        unit = UNITS.get(self.limit, "N")
+        what = {"m": "bend radius", "N": "tension"}.get(unit, f"contact force of {self.partner}")
+        most = self.limit.startswith("max")
         if self.verdict == NOT_VERIFIED:
-            side = "at most" if self.limit == "max_tension" else "at least"
+            side = "at most" if most else "at least"
             allowed = f"{self.allowed:.4g} {unit} allowed {side} ({self.limit})"
             return f"{what} of {self.value:.4g} {unit}, {allowed}"
-        side = "above" if self.limit == "max_tension" else "below"
+        side = "above" if most else "below"
         if not self.broken:
             side = "within"
         return f"{what} of {self.value:.4g} {unit}, {side} the {self.allowed:.4g} {unit} allowed ({self.limit})"
@@ -159,16 +171,16 @@ def extremes_of_outputs(values: Recorded, name: str) -> dict[str, np.ndarray]:
 
 
 def limits_of(values: Recorded | None, envelope: Arrays) -> list[Judged]:
-    """Every limit of bend radius and tension that sections have, where it was broken most, or nearly: of an envelope
-    and of the outputs; of an output that is no more than a node of it, the node."""
+    """Every limit of bend radius, tension and contact force that sections have, where it was broken most, or nearly: of
+    an envelope and of the outputs; of an output that is no more than a node of it, the node."""
     found = {x.limit: x for x in judged(envelope)}
-    for name in ("curvature", "tension"):
+    for name in LIMITED:
         if values is not None and name in values and any(limit in values for limit in LIMITED[name]):
             for x in judged(extremes_of_outputs(values, name)):
                 known, near = found.get(x.limit), SAME * max(1.0, abs(x.value), abs(x.allowed))
                 if known is None or x.margin < known.margin - near:
                     found[x.limit] = x
-    return [found[limit] for limit in _HELD if limit in found]
+    return [found[limit] for limit in dict.fromkeys(limit for limit, _, _ in _HELD) if limit in found]
 
 
 def farthest(result: Recorded, name: str, bound: str) -> Extreme | None:
@@ -185,8 +197,8 @@ def judged(values: Arrays) -> list[Judged]:
 
     A place without a value, on a reel to the end, is not judged; nor is a limit without any place that has one.
     """
-    found = []
-    for limit, (name, bound) in _HELD.items():
+    found: dict[str, Judged] = {}
+    for limit, name, bound in _HELD:
         full = f"{GROUP}/{name}_{bound}"
         if f"{GROUP}/{limit}" not in values or full not in values:
             continue
@@ -203,5 +215,16 @@ def judged(values: Arrays) -> list[Judged]:
         if limit == "min_bend_radius":
             value = 1.0 / value if value > 0.0 else np.inf
         broken = bool(worse[k] > most)
-        found.append(Judged(limit, value, float(allowed[k]), used, broken, float(values[SCALE][k]), float(t[k])))
-    return found
+        partner, known = PARTNERS.get(name, ""), found.get(limit)
+        place = float(values[SCALE][k])
+        new = Judged(limit, value, float(allowed[k]), used, broken, place, float(t[k]), partner=partner)
+        if known is None or new.margin < known.margin:
+            found[limit] = new
+    return list(found.values())
+
+
+def largest_contact(result: Recorded) -> tuple[str, Extreme] | None:
+    """What presses on the line most, and with what force per length (N/m); None: nothing is known to touch it."""
+    each = {name: (farthest if name in result else extreme)(result, name, "max") for name in PARTNERS}
+    known = [(PARTNERS[name], x) for name, x in each.items() if x is not None and x.value > 0.0]
+    return max(known, key=lambda x: x[1].value, default=None)

@@ -143,9 +143,12 @@ def section_limits(result: Result) -> list[Judged]:
     for name, limits in LIMITED.items():
         for limit in limits if name != "von_mises" else ():
             if limit in result and limit not in named and not np.isnan(result[limit]).all():
+                named.add(limit)
                 k = int(np.nanargmax(np.isfinite(result[limit])))
                 lacking = Judged(limit, np.nan, float(result[limit][k]), None, False, float(result.s[k]), np.nan)
                 doubt = unfinished(result) or Doubt(f"the result has no {name} there", f"output.fields with {name}")
+                if limit == "max_contact_force":
+                    doubt = unfinished(result) or Doubt("no contact is computed", "obstacles, contact or a seabed")
                 found.append(lacking._replace(verdict=NOT_VERIFIED, why=doubt.why, remedy=doubt.remedy))
     return found
 
@@ -205,7 +208,7 @@ def _doubts(result: Result, names: frozenset[str], s: Floats, more: Doubtful = M
         if (found := _of_event(result, event, kinds[event.kind], names, s)) is not None:
             yield found
     unknown = not_converged_in(result.attributes)
-    for name in sorted(names - {"torque", "von_mises", "wall_tension"}):
+    for name in sorted(names - {"torque", "von_mises", "wall_tension", "contact_force"}):
         if name in unknown:
             yield Doubt(f"the error of {_words(name)} is not known: it does not converge", "shorter steps and cells")
         elif f"error_total_{name}" not in result.attributes and f"errors/total/{name}" not in result:
@@ -263,7 +266,11 @@ def _verified(result: Result, x: Judged) -> Judged:
     # at a clamp or joint of the mesh that no output point shows, limits are those of the envelope
     if f"{GROUP}/{x.limit}" in result:
         held = np.append(held, result[f"{GROUP}/s"][np.isfinite(result[f"{GROUP}/{x.limit}"])])
-    doubt = doubt_of(result, name, s=held) or _reached(result, name, x)
+    if x.limit == "max_contact_force":
+        doubt = unfinished(result) or next(_doubts(result, frozenset({"contact_force"}), held), None)
+        doubt = doubt or Doubt("errors of contact forces are not estimated", FINER)
+    else:
+        doubt = doubt_of(result, name, s=held) or _reached(result, name, x)
     if doubt is None:
         return x._replace(verdict=WITHIN)
     return x._replace(verdict=NOT_VERIFIED, why=doubt.why, remedy=doubt.remedy, used=None)

@@ -10,7 +10,7 @@ from html import escape
 from importlib.resources import files
 from typing import Any
 
-from hybrid.store.envelope import NOT_VERIFIED
+from hybrid.store.envelope import NOT_VERIFIED, UNITS
 from hybrid.store.reader import Result
 from hybrid.store.statistics_table import rows_of
 from hybrid.view.decimate import Store
@@ -138,7 +138,7 @@ def _error_table(fact: Fact) -> str:
 def _limit_table(fact: Fact) -> str:
     rows = []
     for x in fact.values["limits"]:
-        unit = {"min_bend_radius": "m", "max_stress": "Pa", "capacity": "%"}.get(x["limit"], "N")
+        unit = UNITS.get(x["limit"], "N")
         used = "–" if x["used"] is None else f"{short(100 * x['used'], 3)} %"
         part, verdict = 1.0 if x["broken"] else min(x["used"] or 0.0, 1.0), x["verdict"]
         look = verdict.replace(" ", "-")

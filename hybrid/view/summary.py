@@ -29,6 +29,8 @@ HOCKLING = (
     "Criterion: a long rod under tension T and torque M is straight and stable where T > M²/(4 EI) (A. G. Greenhill, "
     "Proc. Inst. Mech. Eng. 34, 1883); friction, plasticity and the structure of the strands are not in it"
 )
+# What a line may press on, by the quantity in its envelope: key of the fact, and in words.
+PRESSED = (("self_contact", "itself", "itself"), ("obstacle_contact", "obstacles", "obstacles"))
 CAUSES = {"mesh": "mesh", "time": "time step", "model": "model", "total": "together"}
 
 
@@ -49,7 +51,8 @@ def facts_of(result: Result) -> list[Fact]:
     facts = [*_warnings(result), *_quantities(result)]
     if len(result.times):
         makers: tuple[Callable[[Result], Fact], ...] = (_tension, _bend, _slack, _limits, _hockling, _seabed, _errors)
-        facts += [make(result) for make in makers + (_itself,) * (f"{GROUP}/self_contact_max" in result)]
+        facts += [make(result) for make in makers]
+        facts += [_pressed(result, *x) for x in PRESSED if f"{GROUP}/{x[0]}_max" in result]
     return [*facts, _status(result)]
 
 
@@ -276,7 +279,8 @@ def _limits(result: Result) -> Fact:
         rows.append({key: getattr(x, key) for key in keys} | {"used": used})
     if not rows:
         none = (
-            "None given: min_bend_radius, max_tension, min_tension, capacity, or max_stress of the pipe, of a section."
+            "None given: min_bend_radius, max_tension, min_tension, max_contact_force, capacity, or max_stress of the "
+            "pipe, of a section."
         )
         return Fact("limits", title, none, "absent")
     counts = [(sum(x["verdict"] == word for x in rows), word) for word in (BROKEN, NOT_VERIFIED)]
@@ -395,14 +399,15 @@ def _seabed(result: Result) -> Fact:
     return Fact("seabed", title, text, "plain", values, t)
 
 
-def _itself(result: Result) -> Fact:
-    force = np.nan_to_num(result[f"{GROUP}/self_contact_max"])
+def _pressed(result: Result, name: str, key: str, partner: str) -> Fact:
+    """The largest force per length of what the line touches, by its quantity in the envelope."""
+    force, title = np.nan_to_num(result[f"{GROUP}/{name}_max"]), f"On {partner}"
     k = int(force.argmax())
     if not force[k] > 0.0:
-        return Fact("itself", "On itself", "The cable never touches itself.", "plain", {"force": 0.0})
-    s, t = float(result[SCALE][k]), float(result[f"{GROUP}/self_contact_t_max"][k])
-    text = f"It presses on itself with at most {amount(force[k], 'N/m', 3)} {place(result, s)}{moment(result, t)}."
-    return Fact("itself", "On itself", text, "plain", {"force": float(force[k])}, t, s)
+        return Fact(key, title, f"The cable never touches {partner}.", "plain", {"force": 0.0})
+    s, t = float(result[SCALE][k]), float(result[f"{GROUP}/{name}_t_max"][k])
+    text = f"It presses on {partner} with at most {amount(force[k], 'N/m', 3)} {place(result, s)}{moment(result, t)}."
+    return Fact(key, title, text, "plain", {"force": float(force[k])}, t, s)
 
 
 def _errors(result: Result) -> Fact:

@@ -1,6 +1,8 @@
-"""What every obstacle does to every node where one of them moves: its travel of friction, force, work and wrench."""
+"""What every obstacle does to every node: its pressure; where one moves, travel of friction, force, work and wrench."""
 
 from __future__ import annotations
+
+import math
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, mat_vec, scale, sub
 from hybrid.kernels.laws.obstacle_motion import (
@@ -40,15 +42,32 @@ from hybrid.kernels.state.report import CONTACT_WORK, FRICTION_WORK, OBSTACLE_WO
 def pressed(line, sea, k, i, x, state):
     """Force N of obstacle k on node i at x along its normal n, with how that bends: N, n, 1/rho, axis."""
     d, n, hollow, a = beside(sea.obstacles, k, x)
-    v = state.v
-    p, N = 0.5 * sea.obstacles[k, ONSET_OF] - d, 0.0
-    pd = -dot(n, sub(get3(v, i), surface_velocity(sea.carried, k, x)))
+    v, moves = state.v, line.moved.shape[0] > 0
+    vi = get3(v, i)
+    if moves:
+        vi = sub(vi, surface_velocity(sea.carried, k, x))
+    p, pd, N = 0.5 * sea.obstacles[k, ONSET_OF] - d, -dot(n, vi), 0.0
     if i > 0:
         before = scale(-1.0, get3(state.e, i - 1))
-        N += half_cell(sea, True, k, x, p, pd, before, get3(v, i - 1), line.h[i - 1], 0.0)[0]
+        N += half_cell(sea, moves, k, x, p, pd, before, get3(v, i - 1), line.h[i - 1], 0.0)[0]
     if i < line.h.shape[0]:
-        N += half_cell(sea, True, k, x, p, pd, get3(state.e, i), get3(v, i + 1), line.h[i], 0.0)[0]
+        N += half_cell(sea, moves, k, x, p, pd, get3(state.e, i), get3(v, i + 1), line.h[i], 0.0)[0]
     return N, n, hollow, a
+
+
+@kernel
+def pressure_of_obstacles(line, sea, state, i):
+    """Force per length (N/m) of all obstacles across node i, over its half cells."""
+    x, F, length = get3(state.r, i), Z3, 0.0
+    for k in range(sea.obstacles.shape[0]):
+        N, n, _, _ = pressed(line, sea, k, i, x, state)
+        if N != 0.0:
+            F = add(F, scale(N, n))
+    if i > 0:
+        length += 0.5 * line.h[i - 1]
+    if i < line.h.shape[0]:
+        length += 0.5 * line.h[i]
+    return math.sqrt(dot(F, F)) / length
 
 
 @kernel

@@ -121,8 +121,10 @@ WORST = 3
 # Bits of `marks`: what a node has.
 LOADED, SEAM = 1, 2  # a point load; where one section ends and the next begins
 # Rows of `extremes`.
-TENSION, CURVATURE, MOMENT, TORQUE, PRESSURE, DISPLACEMENT, SELF_PRESSURE, WALL_TENSION, VON_MISES = range(9)
-EXTREMES = 9
+(
+    TENSION, CURVATURE, MOMENT, TORQUE, PRESSURE, DISPLACEMENT, SELF_PRESSURE, WALL_TENSION, VON_MISES, OBSTACLE_PRESSURE,
+) = range(10)  # fmt: skip
+EXTREMES = 10
 
 
 class Books(NamedTuple):

@@ -25,14 +25,25 @@ from hybrid.kernels.laws.bending_law import (
 )
 from hybrid.kernels.laws.cell import chord, turning
 from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST, at_hinge, fade, stiffness_share
+from hybrid.kernels.laws.obstacle_grip import pressure_of_obstacles
 from hybrid.kernels.laws.seabed import pressure
 from hybrid.kernels.laws.tension_torque import rest_strain
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.march.zone_torque import FIRST, LAST
 from hybrid.kernels.march.zone_torque import TORQUE as PASSED
-from hybrid.kernels.state.books import CURVATURE, DISPLACEMENT, MOMENT, PRESSURE, SEAM, SELF_PRESSURE, TENSION, TORQUE
-from hybrid.kernels.state.forces import PLANAR, SEABED, STIFFNESS_DAMPING
+from hybrid.kernels.state.books import (
+    CURVATURE,
+    DISPLACEMENT,
+    MOMENT,
+    OBSTACLE_PRESSURE,
+    PRESSURE,
+    SEAM,
+    SELF_PRESSURE,
+    TENSION,
+    TORQUE,
+)
+from hybrid.kernels.state.forces import OBSTACLES, PLANAR, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.state.report import FORCE_A
 
 # Columns of strains: curvature, 1/m; with what joints take of it, 1/m (of joints themselves too).
@@ -415,6 +426,9 @@ def note_extremes(line, sea, ends, state, books, t):
                 widen_both(books.extremes, books.right, TORQUE, i, passed, t)
         if books.touch.shape[1] > 0:
             widen_both(books.extremes, books.right, SELF_PRESSURE, i, books.touch[0, i], t)
+        if line.bits & OBSTACLES:
+            pressed = pressure_of_obstacles(line, sea, state, i)
+            widen_both(books.extremes, books.right, OBSTACLE_PRESSURE, i, pressed, t)
         x = sub(get3(state.r, i), get3(books.start, i))
         widen_both(books.extremes, books.right, DISPLACEMENT, i, math.sqrt(dot(x, x)), t)
 
