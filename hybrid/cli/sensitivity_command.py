@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybrid
-from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, load, session, words
+from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, load_either, session, words
 
 if TYPE_CHECKING:
     from hybrid.design.sensitivity import Derivative
     from hybrid.scene.schema import Scene
+    from hybrid.scene.system import System
 
 
 @app.command()
@@ -26,28 +27,35 @@ def sensitivity(
     ] = None,
     quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Derivatives and elasticities (% by %) of the equilibrium of a cable by the numbers of its scene."""
+    """Derivatives and elasticities (% by %) of an equilibrium by the numbers of its scene."""
     with session(as_json, quiet) as console:
-        asked = load(console, scene, settings)
+        asked = load_either(console, scene, settings)
         found = hybrid.sensitivity(asked, of or _results(asked), by or _numbers(asked))
         console.show(lambda: _tables(found))
         for x in found:
             console.json("derivative", **x._asdict())
 
 
-def _results(scene: Scene) -> list[str]:
+def _results(scene: Scene | System) -> list[str]:
     """What engineers ask first."""
+    if not isinstance(scene, hybrid.Scene):
+        return [f"{name}/tension@{end}" for name in scene.lines for end in ("start", "end")]
     names = ["tension@0", f"tension@{scene.length:g}"]
     return [*names, "max curvature"] if scene.model.kind != "catenary" else names
 
 
-def _numbers(scene: Scene) -> list[str]:
+def _numbers(scene: Scene | System) -> list[str]:
     """All numbers of the sections that are not 0."""
+    if isinstance(scene, hybrid.Scene):
+        cables = {"cable": scene.cable}
+    else:
+        cables = {f"lines.{name}": x.cable for name, x in scene.lines.items()}
     out = []
-    for i, section in enumerate(scene.cable.sections):
-        for name, value in section.model_dump().items():
-            if isinstance(value, float) and value != 0.0 and name != "max_strain":
-                out.append(f"cable.sections[{i}].{name}")
+    for place, cable in cables.items():
+        for i, section in enumerate(cable.sections):
+            for name, value in section.model_dump().items():
+                if isinstance(value, float) and value != 0.0 and name != "max_strain":
+                    out.append(f"{place}.sections[{i}].{name}")
     return out
 
 

@@ -10,9 +10,11 @@ import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
+from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.march.zone_torque import TORQUE
 from hybrid.kernels.run.entry import assembly, workspace_of
 from hybrid.kernels.state.forces import FRICTION, PLANAR, WAVES
+from hybrid.kernels.state.report import NET_A
 from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, batch_of_one
 from hybrid.modal.matrices import ANCHOR
 from hybrid.model.build import Model
@@ -74,10 +76,15 @@ class Beside(NamedTuple):
 class LineAtRest:
     """One line in the equilibrium of a scene, and lines beside it, of scenes with other numbers."""
 
-    def __init__(self, scene: Scene, model: Model, state: State, wanted: Sequence[Wanted]) -> None:
-        """wanted: results; SceneError: the line has none of that name, or they have no derivative."""
-        self.model, self.state, self.wanted = model, state, tuple(wanted)
-        self.here = Beside(scene, model, model.ends.at(np.inf), model.sea.at(np.inf))
+    def __init__(
+        self, scene: Scene, model: Model, state: State, wanted: Sequence[Wanted], free: Sequence[int] = ()
+    ) -> None:
+        """wanted: results; free: ends (0, 1) that are joined to free points.
+
+        SceneError: the line has no result of that name, or they have no derivative.
+        """
+        self.model, self.state, self.wanted, self._free = model, state, tuple(wanted), list(free)
+        self.here = Beside(scene, model, self._ends(model), model.sea.at(np.inf))
         self._at = [x.at for x in wanted if x.at is not None]
         self._nodes = any(x.extreme for x in wanted) or not self._at
         self._observer, self._node_of = self._observed(self.here), dict[Wanted, int]()
@@ -88,6 +95,13 @@ class LineAtRest:
         if state.turn.size and np.abs(state.turn[:, TORQUE]).max() > TURNED * model.tension_scale * model.length:
             expected = "an equilibrium in which no torque passes through catenary zones"
             raise SceneError([Complaint("model", "a torque through a catenary zone", expected, "model: rod")])
+
+    def _ends(self, model: Model) -> Ends:
+        """The ends of a line, those at free points joined to these."""
+        ends = model.ends.at(np.inf)
+        held = ends.held.copy()
+        held[self._free] = JOINED
+        return ends._replace(held=held)
 
     def joined(self, x: Beside) -> JoinedLine:
         """The line with ends that nothing holds."""
@@ -101,11 +115,13 @@ class LineAtRest:
         assembly(_at_rest(x.model.line), x.sea, x.ends, self._still, 0.0, ANCHOR, work)
         right = work.rows.reshape(-1, SIZE, WIDTH)[:, :, -1].copy()
         right[:, 1:] *= -1.0
+        for k in self._free:  # what is left over at a point
+            right[-k, 1:4] = work.report[NET_A + 3 * k : NET_A + 3 * k + 3]
         return right.ravel(), work.report.copy()
 
     def beside(self, scene: Scene, model: Model) -> Beside:
         """The line of another scene; what is around it is evaluated where it is not what is here."""
-        ends = self.here.ends if model.ends is self.model.ends else model.ends.at(np.inf)
+        ends = self.here.ends if model.ends is self.model.ends else self._ends(model)
         sea = self.here.sea if model.sea is self.model.sea else model.sea.at(np.inf)
         return Beside(scene, model, ends, sea)
 
@@ -128,6 +144,8 @@ class LineAtRest:
         steps = _steps(self.state, q)
         moved = _moved(self.state, np.repeat(q, 2, axis=0), (steps[:, None] * (1.0, -1.0)).ravel())
         batch = _repeated(self._output(self.here, self._work.report), 2 * len(q))._replace(**cast(Any, moved))
+        for end in self._free:
+            batch.position[:, end] = batch.r[:, -end]
         for k in range(2 * len(q)):
             for name, x in moved.items():
                 getattr(self._tried, name)[:] = x[k]
@@ -162,7 +180,9 @@ class LineAtRest:
         """Whether a line differs from the one here in what may differ among outputs that are looked at together."""
         line = x.model.line
         more = (line.law, line.bend_law, line.torsion, line.tension_torque, line.wake_law)
-        return x.sea is self.here.sea and not any(a.size for a in more) and self._observer.quantities is None
+        plain = not x.model.attached and x.model.cable.bounds.size == 2  # else what cuts the line moves with its nodes
+        same = x.sea is self.here.sea and (plain or np.array_equal(line.s, self.model.line.s))
+        return same and not any(a.size for a in more) and self._observer.quantities is None
 
     def _observer_of(self, x: Beside) -> Observer:
         """What looks at a line: that of this one where the nodes and all that it looks at are the same."""
@@ -204,8 +224,13 @@ class LineAtRest:
         )
 
     def _output(self, x: Beside, report: Floats) -> Batch:
-        """This state on a line."""
-        return batch_of_one(0.0, x.ends, self.state, report, np.zeros(len(POWERS)), x.sea)
+        """This state on a line; an end at a free point counts as held, by it."""
+        held, position = x.ends.held.copy(), x.ends.position.copy()
+        held[self._free] = 1
+        for k in self._free:
+            position[k] = self.state.r[-k]
+        ends = x.ends._replace(held=held, position=position)
+        return batch_of_one(0.0, ends, self.state, report, np.zeros(len(POWERS)), x.sea)
 
     def _results(self, values: Mapping[str, Floats], places: Sequence[tuple[Floats, Floats]]) -> Floats:
         """(n, W) of what is wanted, of values of n outputs; places: of each, arc lengths of values and of nodes, m."""

@@ -12,7 +12,7 @@ from hybrid.scene.read import parse_either, scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 
-AnyScene = TypeVar("AnyScene", Scene, System)
+AnyScene = TypeVar("AnyScene", bound=Scene | System)
 PART = re.compile(r"[^.\[\]]+")
 
 

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybrid.design.cable_at_rest import CableAtRest
-from hybrid.design.line_at_rest import parse_result
 from hybrid.design.numbers import changed_scene
-from hybrid.design.sensitivity import cable_of
+from hybrid.design.sensitivity import at_rest
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
-from hybrid.scene.read import SceneLike
+from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
+from hybrid.scene.system import System
 
 # Rounds at most, and the part of a target within which it is met; a number changes by this part of itself a round at
 # most, and a step that leads away is halved so often.
@@ -32,24 +31,24 @@ class Sought:
     results: Mapping[str, float]
     targets: Mapping[str, float]
     equilibria: int
-    scene: Scene
+    scene: Scene | System
 
 
-def seek(scene: SceneLike, targets: Mapping[str, float], by: Sequence[str]) -> Sought:
+def seek(scene: SceneLike | System, targets: Mapping[str, float], by: Sequence[str]) -> Sought:
     """Change as many numbers of a scene as there are targets until the results of its equilibrium are these.
 
     targets: results as of `hybrid.sensitivity`, such as `{"tension@250": 25e3}`; by: keys of numbers, each of which
     keeps its sign.  SceneError: what has no derivative, more or fewer numbers than targets; ComputationError: they are
     not reached, with how near it came.
     """
-    asked = cable_of(scene)
+    asked = as_scene_or_system(scene)
     if len(by) != len(targets) or not by:
         expected = f"as many keys as targets ({len(targets)})"
         raise SceneError([Complaint("by", f"{len(by)} keys", expected, "one number for each target")])
-    wanted = [parse_result(x, asked.length) for x in targets]
+    wanted = list(targets)
     goal = np.array(list(targets.values()), float)
     scale = np.maximum(np.abs(goal), 1e-12)
-    here, equilibria = CableAtRest(asked, 1.0, wanted), 1
+    here, equilibria = at_rest(asked, wanted), 1
     numbers = np.array([here.number(key) for key in by])
     if not numbers.all():
         zero = by[int(np.flatnonzero(numbers == 0.0)[0])]
@@ -64,7 +63,7 @@ def seek(scene: SceneLike, targets: Mapping[str, float], by: Sequence[str]) -> S
         for _ in range(HALVED):
             tried = numbers * (1.0 + step)
             try:
-                there = CableAtRest(_with(asked, by, tried), 1.0, wanted)
+                there = at_rest(_with(asked, by, tried), wanted)
             except ComputationError:
                 step *= 0.5
                 continue
@@ -95,7 +94,7 @@ def _step(slopes: Floats, gap: Floats) -> Floats:
     return np.asarray(step * min(1.0, STEP / max(largest, 1e-300)))
 
 
-def _with(scene: Scene, by: Sequence[str], numbers: Floats) -> Scene:
+def _with(scene: Scene | System, by: Sequence[str], numbers: Floats) -> Scene | System:
     for key, x in zip(by, numbers, strict=True):
         scene = changed_scene(scene, key, float(x))
     return scene

@@ -10,9 +10,10 @@ from typing import Any, NamedTuple, overload
 from hybrid.design.cable_at_rest import CableAtRest
 from hybrid.design.line_at_rest import parse_result
 from hybrid.design.numbers import number_of
-from hybrid.scene.combinations import refuse_use
+from hybrid.design.system_at_rest import SystemAtRest
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
+from hybrid.scene.system import System
 from hybrid.studies.sensitivity import Influence
 from hybrid.studies.sensitivity import sensitivity as of_study
 
@@ -34,7 +35,7 @@ class Derivative(NamedTuple):
 
 
 @overload
-def sensitivity(scene: SceneLike, of: Sequence[str], by: Sequence[str]) -> list[Derivative]: ...
+def sensitivity(scene: SceneLike | System, of: Sequence[str], by: Sequence[str]) -> list[Derivative]: ...
 
 
 @overload
@@ -42,20 +43,20 @@ def sensitivity(scene: str | Path, of: str) -> list[Influence]: ...
 
 
 def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None) -> Any:
-    """Derivatives of results of the equilibrium of a cable by numbers of its scene.
+    """Derivatives of results of the equilibrium of a cable, or of several lines, by numbers of its scene.
 
     Without `by`, what each variable of a study does to the result `of` (`hybrid.studies.sensitivity`).
 
-    of: results such as `tension@0` (at s, m), `max curvature`, `position.z@125`, `reaction_end.x`; by: keys of numbers
-    such as `cable.sections[0].length`.  Friction of the bed is left out.  SceneError: a key or result that the scene
-    does not have, or what has no derivative; ComputationError: no equilibrium.
+    of: results such as `tension@0` (at s, m), `max curvature`, `position.z@125`, `reaction_end.x`; of several lines
+    `east/tension@end`, `max hose/curvature`.  by: keys of numbers such as `cable.sections[0].length`.  Friction of the
+    bed is left out.  SceneError: a key or result that the scene does not have, or what has no derivative;
+    ComputationError: no equilibrium.
     """
     if by is None:
         return of_study(scene, of)
-    asked = cable_of(scene)
-    wanted = [parse_result(x, asked.length) for x in of]
+    asked = as_scene_or_system(scene)
     numbers = [number_of(asked, key) for key in by]
-    fine, coarse = (CableAtRest(asked, cells, wanted) for cells in (1.0, 2.0))
+    fine, coarse = at_rest(asked, of), at_rest(asked, of, 2.0)
     found, rough = fine.by(by), coarse.by(by)
     errors = OF_DIFFERENCE * abs(found - rough)
     out = []
@@ -67,10 +68,11 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None) -> Any:
     return out
 
 
-def cable_of(scene: SceneLike) -> Scene:
-    """The scene of one cable; SceneError: it is of several lines."""
-    asked = as_scene_or_system(scene)
+def at_rest(asked: Scene | System, of: Sequence[str], cells: float = 1.0) -> CableAtRest | SystemAtRest:
+    """The equilibrium of one cable or of several lines; cells: how many times as long as usual; of: results.
+
+    SceneError: what has no derivative; ComputationError: there is no equilibrium.
+    """
     if isinstance(asked, Scene):
-        return asked
-    refuse_use(asked, "derivatives", given="hybrid sensitivity")
-    raise AssertionError("derivatives of several lines are refused by the table")
+        return CableAtRest(asked, cells, [parse_result(x, asked.length) for x in of])
+    return SystemAtRest(asked, cells, of)

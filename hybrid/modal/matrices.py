@@ -269,10 +269,16 @@ def _hat(a: Floats) -> Floats:
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
-def linear_network(solver: SystemSolver, states: SystemState, names: Sequence[str], sticks: bool) -> LinearNetwork:
-    """The network of lines, points and bodies that a solver holds about an equilibrium; sticks: as of `linear_line`."""
+def linear_network(
+    solver: SystemSolver, states: SystemState, names: Sequence[str], sticks: bool, quick: bool = True
+) -> LinearNetwork:
+    """The network of lines, points and bodies that a solver holds about an equilibrium; sticks, quick: as of
+
+    `linear_line`.
+    """
     lines = tuple(
-        linear_line(x, name, state, sticks) for x, name, state in zip(solver.lines, names, states.lines, strict=True)
+        linear_line(x, name, state, sticks, quick)
+        for x, name, state in zip(solver.lines, names, states.lines, strict=True)
     )
     at = np.concatenate([[0], np.cumsum([x.free.size for x in lines])])
     points, bodies = len(solver.net), len(solver.bodies)

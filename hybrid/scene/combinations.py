@@ -361,6 +361,13 @@ def _by_rao(tables: Tables) -> Iterator[Place]:
             yield (*at, "motion", "vessel", "rao")
 
 
+def _turning(tables: Tables) -> Iterator[Place]:
+    """Free bodies, and free points that lines are clamped to: they turn by the moments of their lines."""
+    if SYSTEM in tables:
+        yield from (("bodies", name) for name in tables[SYSTEM].free_bodies)
+        yield from (("points", name) for name in tables[SYSTEM].rigid)
+
+
 def _several(tables: Tables) -> Iterator[Place]:
     return iter([("lines",)] if SYSTEM in tables else [])
 
@@ -428,6 +435,7 @@ LAYERS = Feature("cells to a boundary layer", "resolution.cells_per_layer",
 CLAMPED_CONNECTION = Feature("a clamped connection", "lines.NAME.connections", _clamped)
 BREAKS_OFF_CLAMP = Feature("a break at a clamp", "break_at", _breaks_off_clamp)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
+TURNING = Feature("free bodies, points that lines are clamped to", "bodies", _turning)
 CLAMPED_TO_FREE = Feature("a line that is clamped to a free point or body", "lines.NAME.connections", _clamped_to_free)
 OBSTACLES = Feature("obstacles", "obstacles", _obstacles)
 MAY_TOUCH = Feature("contact of a line with itself, unless it is switched off", "contact.self", _may_touch)
@@ -586,8 +594,9 @@ REFUSALS: tuple[Refusal, ...] = (
         fix="waves: {{kind: regular}}, or the motion from a file",
     ),
     Refusal(
-        DERIVATIVES, SEVERAL_LINES, "several lines", "there are several lines ({key}), whose derivatives are missing",
-        "one cable", "take differences of two equilibria",
+        DERIVATIVES, TURNING, "not worked out",
+        "what turns by the moments of its lines ({key}) has no derivatives yet", "points that lines pull at alone",
+        "hold the body, or take differences of two equilibria",
     ),
     Refusal(
         DERIVATIVES, SETTLED_FRICTION, "physics", "friction has settled ({key}), and how depends on the way there",

@@ -127,6 +127,16 @@ def test_the_end_stays_the_end_when_the_length_changes():
     assert inside == pytest.approx(-m * G * 20.0 / EA, rel=1e-4)
 
 
+def test_the_tension_at_a_body_at_the_end_by_the_length():
+    """It is the weight of the body, whatever the length; that of the start has all of the line, too."""
+    body = {"kind": "body", "mass": 60.0}
+    section = {"length": 40.0, "mass": 5.0, "axial_stiffness": 1e6}
+    tables = scene(section, pinned(0, 0, 0), body, "catenary", 20)
+    found = hybrid.sensitivity(tables, ["tension@end", "tension@start"], ["cable.sections[0].length"])
+    assert found[0].result == pytest.approx(60.0 * G, rel=1e-9) and abs(found[0].derivative) < 1e-6
+    assert found[1].derivative == pytest.approx(5.0 * G, rel=1e-6)
+
+
 @pytest.mark.parametrize("key", ["environment.seabed.stiffness", "cable.sections[0].bending_stiffness"])
 def test_a_jump_at_an_anchor_on_the_bed_is_in_no_derivative(key):
     """The force at a pinned rod's end jumps where that passes the edge of the bed, by rounding: 8 N of 1154."""
@@ -190,21 +200,14 @@ def test_zones_that_move_stay_where_they_were_found(cells):
         assert not np.allclose(ours, theirs, rtol=1e-8)
 
 
-@pytest.mark.parametrize("what", ["several lines", "friction has settled"])
-def test_what_no_derivative_is_known_of(what):
-    tables = scene(LINE, pinned(0, 0, -100), pinned(205, 0, 0), "catenary", 40, SEA)
-    if what == "several lines":
-        points = {"a": {"position": [0, 0, -100]}, "b": {"position": [205, 0, 0]}}
-        line = {"start": "a", "end": "b", "sections": [LINE], "mesh": {"cells": 40}, "model": "catenary"}
-        tables = {"environment": tables["environment"], "points": points, "lines": {"cable": line}}
-    else:
-        tables["environment"] = SEA | {"seabed": SEA["seabed"] | {"friction": 0.5}}
-        tables["initial"] = {"kind": "equilibrium", "friction": "settled"}
-    key = "lines.cable.sections[0].mass" if what == "several lines" else "cable.sections[0].mass"
-    with pytest.raises(hybrid.SceneError, match=what):
-        hybrid.sensitivity(tables, ["tension@0"], [key])
-    with pytest.raises(hybrid.SceneError, match=what):
-        hybrid.seek(tables, {"tension@0": 1e3}, [key])
+def test_friction_that_has_settled_has_no_derivative():
+    bed = SEA | {"seabed": SEA["seabed"] | {"friction": 0.5}}
+    tables = scene(LINE, pinned(0, 0, -100), pinned(205, 0, 0), "catenary", 40, bed)
+    tables["initial"] = {"kind": "equilibrium", "friction": "settled"}
+    with pytest.raises(hybrid.SceneError, match="friction has settled"):
+        hybrid.sensitivity(tables, ["tension@0"], ["cable.sections[0].mass"])
+    with pytest.raises(hybrid.SceneError, match="friction has settled"):
+        hybrid.seek(tables, {"tension@0": 1e3}, ["cable.sections[0].mass"])
 
 
 def test_the_command(tmp_path, monkeypatch):

@@ -96,7 +96,10 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.OTHER_MOTIONS, c.RESPONSE): (
         {"ends.end": {"kind": "free", "force": {"value": [1, 0, 0], "until": 2}}}, "response"
     ),
-    (c.DERIVATIVES, c.SEVERAL_LINES): ({}, "derivatives"),
+    (c.DERIVATIVES, c.TURNING): (
+        {"points.b": {"body": "buoy", "place": [0, 0, 0]},
+         "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0]}}, "derivatives"
+    ),
     (c.DERIVATIVES, c.SETTLED_FRICTION): ({"initial": {"kind": "equilibrium", "friction": "settled"}}, "derivatives"),
     (c.PAYOUT_AT_START, c.PAYOUT_AT_END): (PAID | {"ends.start.payout": {"rate": 0.1, "ramp": 1.0}}, ""),
     (c.RELEASE_AT_WINCH, c.PAYOUT): (PAID | {END + "release_at": {"time": 2}}, ""),
@@ -141,7 +144,7 @@ def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
 
 
 def _of_several(pair: tuple[c.Feature, c.Feature]) -> bool:
-    names = (c.SEVERAL_LINES, c.CLAMPED_TO_FREE, c.CLAMPED_CONNECTION)
+    names = (c.SEVERAL_LINES, c.CLAMPED_TO_FREE, c.CLAMPED_CONNECTION, c.TURNING)
     return any(x in names for x in pair)
 
 

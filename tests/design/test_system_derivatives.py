@@ -1,0 +1,129 @@
+"""Derivatives of several lines against differences of equilibria, and against one cable."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+import hybrid
+from hybrid.cli.commands import app
+from hybrid.design.numbers import with_number
+from hybrid.design.sensitivity import at_rest
+from hybrid.scene.read import as_scene_or_system
+
+CHAIN = {"length": 185.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}
+HOSE = {"length": 100.0, "mass": 10.0, "diameter": 0.08, "axial_stiffness": 1e7, "bending_stiffness": 400.0}
+SEA = {
+    "fluid": {"density": 1025, "surface": 30.0, "current": [0.5, 0.1, 0]},
+    "seabed": {"z": -100.0, "stiffness": 1e4},
+}
+ANCHORS = {"east": [150.0, 0.0, -100.0], "north": [-75.0, 130.0, -100.0], "south": [-75.0, -130.0, -100.0]}
+HELD = {"position": [0.0, 0.0, 0.0]}
+BUOY = {"kind": "free", "initial_guess": [0.0, 0.0, 5.0], "mass": 1000.0, "volume": 20.0, "drag_area": 4.0}
+
+
+def moored(top, hose=False):
+    points = {name: {"position": place} for name, place in ANCHORS.items()} | {"top": top}
+    lines = {x: {"start": x, "end": "top", "sections": [CHAIN], "mesh": {"cells": 20}} for x in ANCHORS}
+    if hose:
+        points["vessel"] = {"position": [60.0, 0.0, 20.0]}
+        lines["hose"] = {"start": "top", "end": "vessel", "sections": [HOSE], "mesh": {"cells": 30}}
+    return {"environment": SEA, "points": points, "lines": lines}
+
+
+@pytest.mark.parametrize(
+    ("hose", "keys"),
+    [
+        (False, ["lines.east.sections[0].length", "points.east.position[0]", "lines.north.sections[0].axial_stiffness"]),
+        (True, ["points.top.volume", "points.vessel.position[2]", "lines.hose.sections[0].bending_stiffness",
+                "lines.hose.sections[0].length", "environment.fluid.current[0]"]),
+    ],
+)  # fmt: skip
+def test_lines_that_pull_at_a_buoy(hose, keys):
+    """All forces and places answer to a number of any line, or of any point."""
+    made = as_scene_or_system(moored(BUOY, hose))
+    of = ["east/tension@end", "north/reaction_start.x", "south/position.z@end", "max east/tension"]
+    of += ["max hose/curvature", "hose/tension@start"] if hose else []
+    rest = at_rest(made, of)
+    for key, ours in zip(keys, rest.by(keys), strict=True):
+        number, least = rest.number(key), np.full(len(of), np.inf)
+        for part in (1e-3, 1e-4, 1e-5):
+            d = part * abs(number)
+            more, less = (at_rest(with_number(made, key, number + x), of).values for x in (d, -d))
+            theirs = (more - less) / (2.0 * d)
+            floor = 1e-3 * np.abs(rest.values) / abs(number)
+            least = np.minimum(least, np.abs(ours - theirs) / np.maximum(np.abs(theirs), floor))
+        assert least.max() < 1e-6, (key, least)
+
+
+def test_results_are_those_of_the_equilibrium():
+    made = as_scene_or_system(moored(BUOY, True))
+    rest = at_rest(made, ["east/tension@end", "hose/position.z@start", "max hose/curvature", "north/reaction_start.z"])
+    with hybrid.static(made) as found:
+        hose = found.lines["hose"]
+        whole = found.lines["east"].tension[-1][-1], hose.position[-1][0, 2], hose.curvature[-1].max()
+        pull = found.lines["north"].reaction_start[-1][2]
+    np.testing.assert_allclose(rest.values[[0, 1, 3]], [*whole[:2], pull], rtol=1e-9)
+    assert rest.values[2] == pytest.approx(whole[2], rel=0.01)  # at nodes, and at output points
+
+
+def test_a_system_of_one_line_is_the_cable():
+    section = CHAIN | {"bending_stiffness": 2e3, "torsional_stiffness": 2e3}
+    places = {"start": ANCHORS["east"], "end": [0, 0, 0]}
+    ends = {name: {"kind": "pinned", "position": place} for name, place in places.items()}
+    cable = {"environment": SEA, "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium",
+             "model": "rod", "mesh": {"cells": 40}}  # fmt: skip
+    line = {"start": "east", "end": "top", "sections": [section], "model": "rod", "mesh": {"cells": 40}}
+    points = {"east": {"position": ANCHORS["east"]}, "top": HELD}
+    of = ["tension@end", "max curvature", "position.z@100"]
+    one = hybrid.sensitivity(cable, of, ["cable.sections[0].length", "ends.end.position[2]", "environment.gravity"])
+    same = hybrid.sensitivity(
+        {"environment": SEA, "points": points, "lines": {"only": line}},
+        ["only/tension@end", "max only/curvature", "only/position.z@100"],
+        ["lines.only.sections[0].length", "points.top.position[2]", "environment.gravity"],
+    )
+    for x, y in zip(one, same, strict=True):
+        assert y.derivative == pytest.approx(x.derivative, rel=1e-6), (x.of, x.by)
+
+
+def test_pretension_of_a_mooring():
+    """One number for each line; anchors that are not alike get other lengths; few equilibria."""
+    tables = moored(HELD)
+    tables["points"]["east"]["position"] = [160.0, 0.0, -100.0]
+    targets = {f"{x}/tension@end": 25e3 for x in ANCHORS}
+    found = hybrid.seek(tables, targets, [f"lines.{x}.sections[0].length" for x in ANCHORS])
+    assert found.equilibria <= 8
+    with hybrid.static(found.scene) as result:
+        for name in ANCHORS:
+            assert result.lines[name].tension[-1][-1] == pytest.approx(25e3, rel=1e-6)
+
+
+def test_what_is_refused():
+    body = {"mass": 5e3, "inertia": [1e3, 1e3, 1e3], "volume": 30.0, "initial_guess": [0, 0, 0]}
+    turning = moored({"body": "hull", "place": [0, 0, 0]}) | {"bodies": {"hull": body}}
+    key = "lines.east.sections[0].mass"
+    with pytest.raises(hybrid.SceneError, match="turns by the moments of its lines"):
+        hybrid.sensitivity(turning, ["east/tension@end"], [key])
+    for of, words in (("tension@end", "LINE/NAME@S"), ("west/tension@end", "east, north, south"),
+                      ("east/tension@999", "between 0 and 185 m"), ("east/tensoin@0", "one of .*tension")):  # fmt: skip
+        with pytest.raises(hybrid.SceneError, match=words):
+            hybrid.sensitivity(moored(HELD), [of], [key])
+
+
+def test_the_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mooring.yaml").write_text(yaml.safe_dump(moored(HELD)))
+    asked = ["sensitivity", "mooring.yaml", "--of", "east/tension@end", "--json"]
+    told = CliRunner().invoke(app, asked)
+    assert told.exit_code == 0, told.output
+    rows = [x for x in map(json.loads, told.output.splitlines()) if "elasticity" in x]
+    assert {x["by"].split(".")[1] for x in rows} == {"east", "north", "south"}
+    assert all(x["derivative"] == 0.0 for x in rows if "east" not in x["by"])
+    seek = ["seek", "mooring.yaml", "--target", "east/tension@end=22000", "--by", "lines.east.sections[0].length"]
+    told = CliRunner().invoke(app, [*seek, "-o", "new.yaml"])
+    assert told.exit_code == 0, told.output
+    assert as_scene_or_system(tmp_path / "new.yaml").lines["east"].cable.length < 185.0
