@@ -129,7 +129,8 @@ def tables_of(rope: Polyester, past: Past, notes: list[Note]) -> tuple[dict[str,
     mean = min(past.mean, past.highest)
     soft = known.compliance(mean) - 1.0 / (constant + grows * mean)
     why = "MoorDyn's rope relaxes at a rate that changes with its tension; relaxation_time is that at Tmean"
-    notes.append(note(DIFFERS, past.row, why))
+    instead = "where tensions pass Tmax for long, give the longer one of the original curve, BA_s (ds/dT - 1/E) there"
+    notes.append(note(DIFFERS, past.row, why, instead))
     if past.mean > 0.0:
         why = "the tension at the start is that of the equilibrium, whatever Tmean is"
         notes.append(note(TAKEN, past.row, why))
