@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybrid
-from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, load_either, session, words
+from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, flag, load_either, session, words
 
 if TYPE_CHECKING:
     from hybrid.design.sensitivity import Derivative
@@ -25,19 +25,25 @@ def sensitivity(
     by: Annotated[
         Any, typer.Option("--by", metavar="KEY,..", parser=words, help="Numbers; else all of the sections.")
     ] = None,
+    motion: Annotated[
+        bool, flag("--motion", help="Of a run, in steps that stay: of 'max tension@end', 'std position.z@100'.")
+    ] = False,
     quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Derivatives and elasticities (% by %) of an equilibrium by the numbers of its scene."""
+    """Derivatives and elasticities (% by %) of an equilibrium, or a motion, by the numbers of its scene."""
     with session(as_json, quiet) as console:
         asked = load_either(console, scene, settings)
-        found = hybrid.sensitivity(asked, of or _results(asked), by or _numbers(asked))
+        found = hybrid.sensitivity(asked, of or _results(asked, motion), by or _numbers(asked), motion)
         console.show(lambda: _tables(found))
         for x in found:
             console.json("derivative", **x._asdict())
 
 
-def _results(scene: Scene | System) -> list[str]:
+def _results(scene: Scene | System, motion: bool) -> list[str]:
     """What engineers ask first."""
+    if motion:
+        of = [""] if isinstance(scene, hybrid.Scene) else [f"{name}/" for name in scene.lines]
+        return [f"max {line}tension@{end}" for line in of for end in ("start", "end")]
     if not isinstance(scene, hybrid.Scene):
         return [f"{name}/tension@{end}" for name in scene.lines for end in ("start", "end")]
     names = ["tension@0", f"tension@{scene.length:g}"]

@@ -7,7 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, overload
 
+import numpy as np
+
 from hybrid.design.cable_at_rest import CableAtRest
+from hybrid.design.in_motion import in_motion
 from hybrid.design.line_at_rest import parse_result
 from hybrid.design.numbers import number_of
 from hybrid.design.system_at_rest import SystemAtRest
@@ -35,34 +38,40 @@ class Derivative(NamedTuple):
 
 
 @overload
-def sensitivity(scene: SceneLike | System, of: Sequence[str], by: Sequence[str]) -> list[Derivative]: ...
+def sensitivity(
+    scene: SceneLike | System, of: Sequence[str], by: Sequence[str], motion: bool = False
+) -> list[Derivative]: ...
 
 
 @overload
 def sensitivity(scene: str | Path, of: str) -> list[Influence]: ...
 
 
-def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None) -> Any:
+def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bool = False) -> Any:
     """Derivatives of results of the equilibrium of a cable, or of several lines, by numbers of its scene.
 
     Without `by`, what each variable of a study does to the result `of` (`hybrid.studies.sensitivity`).
 
     of: results such as `tension@0` (at s, m), `max curvature`, `position.z@125`, `reaction_end.x`; of several lines
     `east/tension@end`, `max hose/curvature`.  by: keys of numbers such as `cable.sections[0].length`.  Friction of the
-    bed is left out.  SceneError: a key or result that the scene does not have, or what has no derivative;
-    ComputationError: no equilibrium.
+    bed is left out.  motion: of a run with friction, of results such as `max tension@end` (`hybrid.design.in_motion`),
+    with errors by the step of the difference.  SceneError: a key or result that the scene does not have, or what has
+    no derivative; ComputationError: no equilibrium, or runs that do not go on as the one between them.
     """
     if by is None:
         return of_study(scene, of)
     asked = as_scene_or_system(scene)
     numbers = [number_of(asked, key) for key in by]
-    fine, coarse = at_rest(asked, of), at_rest(asked, of, 2.0)
-    found, rough = fine.by(by), coarse.by(by)
-    errors = OF_DIFFERENCE * abs(found - rough)
+    if motion:
+        values, found, errors = in_motion(asked, of, by)
+    else:
+        fine, coarse = at_rest(asked, of), at_rest(asked, of, 2.0)
+        values, found = fine.values, fine.by(by)
+        errors = OF_DIFFERENCE * np.abs(found - coarse.by(by))
     out = []
     for i, (key, number) in enumerate(zip(by, numbers, strict=True)):
         for k, name in enumerate(of):
-            value, result = float(found[i, k]), float(fine.values[k])
+            value, result = float(found[i, k]), float(values[k])
             elastic = value * number / result if result != 0.0 and number != 0.0 else math.nan
             out.append(Derivative(name, key, result, number, value, elastic, float(errors[i, k])))
     return out

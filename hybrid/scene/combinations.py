@@ -28,7 +28,7 @@ Tables = Mapping[str, Any]
 Kind = Literal["physics", "not worked out", "several lines"]
 # Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
 USE, SYSTEM, LINE = "use", "system", "line"
-Use = Literal["", "about rest", "response", "derivatives"]
+Use = Literal["", "about rest", "response", "derivatives", "derivatives in motion"]
 LEAVE_OUT = "leave it out"
 ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
@@ -456,6 +456,9 @@ ABOUT_REST = Feature("natural modes, response to a sea, derivatives at rest", "h
                      _used("about rest", "derivatives"))  # fmt: skip
 RESPONSE = Feature("response to a sea", "hybrid response", _used("response"))
 DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("derivatives"))
+IN_MOTION = Feature("derivatives in motion", "hybrid sensitivity --motion", _used("derivatives in motion"))
+FOLLOWED = Feature("steps that follow the motion", "no time.step, time.tolerance",
+                   _asks("time", "step", lambda x: x.controlled))  # fmt: skip
 OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change in time",
                         "motion.file, motion.travel, force.history", _changing_loads)  # fmt: skip
 FINITE_WAVES = Feature("waves of finite height", "waves.kind: stream_function", _finite_waves)
@@ -597,6 +600,15 @@ REFUSALS: tuple[Refusal, ...] = (
         DERIVATIVES, TURNING, "not worked out",
         "what turns by the moments of its lines ({key}) has no derivatives yet", "points that lines pull at alone",
         "hold the body, or take differences of two equilibria",
+    ),
+    Refusal(
+        IN_MOTION, FOLLOWED, "not worked out",
+        "steps follow the motion ({key}), and runs with other numbers have other steps, which changes results by more",
+        "a step, in s", "give `step: ...` (s) in time, and no tolerance",
+    ),
+    Refusal(
+        IN_MOTION, ACCURACY, "not worked out", "an accuracy ({key}) chooses other cells for other numbers",
+        "cells that stay", "leave {key} out, and give mesh.cells",
     ),
     Refusal(
         DERIVATIVES, SETTLED_FRICTION, "physics", "friction has settled ({key}), and how depends on the way there",

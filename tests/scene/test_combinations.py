@@ -100,6 +100,8 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
         {"points.b": {"body": "buoy", "place": [0, 0, 0]},
          "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0]}}, "derivatives"
     ),
+    (c.IN_MOTION, c.FOLLOWED): ({"time": {"duration": 3.0, "tolerance": 1e-3}}, "derivatives in motion"),
+    (c.IN_MOTION, c.ACCURACY): ({"accuracy": "3%"}, "derivatives in motion"),
     (c.DERIVATIVES, c.SETTLED_FRICTION): ({"initial": {"kind": "equilibrium", "friction": "settled"}}, "derivatives"),
     (c.PAYOUT_AT_START, c.PAYOUT_AT_END): (PAID | {"ends.start.payout": {"rate": 0.1, "ramp": 1.0}}, ""),
     (c.RELEASE_AT_WINCH, c.PAYOUT): (PAID | {END + "release_at": {"time": 2}}, ""),

@@ -1,0 +1,168 @@
+"""What results of a motion answer to numbers of the scene: differences of runs with the steps and cells of a base run.
+
+Where steps follow the motion, a number that changes them changes results by more than by itself: a small difference of
+two runs is then wrong by factors.  Steps that are given are those of every run, and so are its cells; runs in which a
+step was divided, or zones are others, are no neighbours of the base run, and no derivative is made of them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybrid.accuracy.api import run
+from hybrid.design.line_at_rest import AXES
+from hybrid.design.numbers import changed_scene, number_of
+from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
+from hybrid.kernels.state.state import Floats
+from hybrid.outputs.probes import PROBES
+from hybrid.scene.combinations import refuse_use
+from hybrid.scene.schema import Scene
+from hybrid.scene.system import System
+
+NAME = re.compile(r"^(max|min|mean|std|last) (?:([^/@]+)/)?([a-z_]\w*)(?:\.([xyz]))?(?:@(.+))?$")
+# Parts of a number by which runs differ: differences of second order by both, from which one of fourth order follows.
+PARTS = (1e-3, 2e-3)
+# Of the length, by which zones of two runs may differ that are the same.
+SAME_ZONE = 0.005
+
+
+class Wanted(NamedTuple):
+    """A result over the time of a run, in parts; line: "" of one cable; at: m, infinity: the end, None: all places."""
+
+    over: str
+    line: str
+    name: str
+    axis: str
+    at: float | None
+
+
+class Slopes(NamedTuple):
+    """Results (W,) of the base run; their derivatives (P, W) by numbers, and errors of these by the step."""
+
+    values: Floats
+    derivatives: Floats
+    errors: Floats
+
+
+def in_motion(asked: Scene | System, of: Sequence[str], by: Sequence[str]) -> Slopes:
+    """Derivatives of results of a run; four runs for each number.
+
+    of: `max tension@end`, `std position.z@100`, `max hose/curvature`: max, min, mean, std or last over the outputs.
+    SceneError: no such key or result, or steps that follow the motion; ComputationError: a run fails, or steps or zones
+    of runs with other numbers are not those of the base run.
+    """
+    refuse_use(asked, "derivatives in motion", given="hybrid sensitivity --motion")
+    wanted = [_parsed(asked, x) for x in of]
+    numbers = [number_of(asked, key) for key in by]
+    base = _Run(asked, wanted)
+    slopes, errors = (np.zeros((len(by), len(of))) for _ in range(2))
+    for i, (key, number) in enumerate(zip(by, numbers, strict=True)):
+        found = []
+        for part in PARTS:
+            d = part * (abs(number) or 1.0)
+            more, less = (_Run(changed_scene(asked, key, number + x), wanted, base) for x in (d, -d))
+            for each in (more, less):
+                each.check(base, key)
+            found.append((more.values - less.values) / (2.0 * d))
+        slopes[i] = (4.0 * found[0] - found[1]) / 3.0
+        errors[i] = np.abs(slopes[i] - found[0])
+    return Slopes(base.values, slopes, errors)
+
+
+def _parsed(asked: Scene | System, text: str) -> Wanted:
+    found = NAME.match(text)
+    several = isinstance(asked, System)
+    example = "max east/tension@end" if several else "max tension@end"
+    if found is None or bool(found[2]) != several:
+        expected = "max, min, mean, std or last, and NAME@S, of several lines LINE/NAME@S"
+        raise SceneError([Complaint("of", text, expected, example)])
+    over, line, name, axis, at = found.groups()
+    if isinstance(asked, System) and line not in asked.lines:
+        raise SceneError([Complaint("of", text, f"a line of {', '.join(asked.lines)}", example)])
+    length = asked.lines[line].cable.length if isinstance(asked, System) else asked.length
+    try:
+        s = {None: None, "start": 0.0, "end": length}[at] if at in (None, "start", "end") else float(at)
+    except ValueError:
+        raise SceneError([Complaint("of", text, "a number of metres behind @", example)]) from None
+    if s is not None and not 0.0 <= s <= length:
+        raise SceneError([Complaint("of", text, f"an arc length between 0 and {length:g} m", example)])
+    if s is None and name in PROBES and "s" in PROBES[name].dims and over not in ("max", "min"):
+        raise SceneError([Complaint("of", text, "a place", f"{text}@end")])
+    return Wanted(over, line or "", name, axis or "", np.inf if s == length else s)
+
+
+class _Run:
+    """A run, and results of it; extremes are where and when those of the base run are."""
+
+    def __init__(self, scene: Scene | System, wanted: Sequence[Wanted], base: _Run | None = None) -> None:
+        with run(scene) as result:
+            lines: dict[str, Any] = dict(result.lines) or {"": result}
+            self.steps = {name: np.array(x["steps/t"]) for name, x in lines.items()}
+            self.zones = {name: list(_zones(x)) for name, x in lines.items()}
+            self.where: list[Any] = [None] * len(wanted) if base is None else list(base.where)
+            self.values = np.zeros(len(wanted))
+            for k, x in enumerate(wanted):
+                history = self._history(lines[x.line], x)
+                self.values[k], self.where[k] = _over(history, x.over, self.where[k])
+
+    def _history(self, result: Any, x: Wanted) -> Floats:
+        """(outputs, places or 1) of a result."""
+        try:
+            value = np.asarray(result[x.name], float)
+        except (KeyError, ResultError):
+            names = ", ".join(name for name in PROBES if "/" not in name)
+            raise SceneError([Complaint("of", x.name, f"one of {names}", "max tension@end")]) from None
+        dims = PROBES[x.name].dims if x.name in PROBES else ()
+        if dims[-1:] == ("xyz",):
+            value = value[..., AXES.index(x.axis)] if x.axis else np.linalg.norm(value, axis=-1)
+        if "edge" in dims:
+            value = value[:, -1]
+        if "s" not in dims:
+            return value[:, None]
+        s = np.asarray(result.s)
+        if x.at is None:
+            return value
+        return np.array([[np.interp(min(x.at, s[-1]), s, row)] for row in value])
+
+    def check(self, base: _Run, key: str) -> None:
+        """ComputationError where steps or zones are not those of the base run."""
+        for name, steps in self.steps.items():
+            what = ""
+            if not np.array_equal(steps, base.steps[name]):
+                what = "a step was divided in one of the runs"
+            elif not _alike(self.zones[name], base.zones[name]):
+                what = "zones of the runs are others"
+            if what:
+                detail = f"{key}: {what}, so that their difference is not that of this number alone"
+                first = "a smaller time.step, or `model: rod` for zones"
+                raise ComputationError(Outcome.NOT_CONVERGED, None, None, detail, first=first)
+
+
+def _zones(result: Any) -> Iterator[list[tuple[str, float]]]:
+    """Of every output kinds of zones, and where they end as parts of the length."""
+    for zones in result.zones:
+        yield [(x.kind, x.s_b / zones[-1].s_b) for x in zones]
+
+
+def _alike(one: Sequence[Sequence[tuple[str, float]]], other: Sequence[Sequence[tuple[str, float]]]) -> bool:
+    """Whether zones are the same in all outputs."""
+    return len(one) == len(other) and all(
+        [x for x, _ in a] == [x for x, _ in b]
+        and all(abs(x - y) <= SAME_ZONE for (_, x), (_, y) in zip(a, b, strict=True))
+        for a, b in zip(one, other, strict=True)
+    )
+
+
+def _over(history: Floats, over: str, where: Any) -> tuple[float, Any]:
+    """The statistic of outputs (n, places), and when and where an extreme is; where: None: not known yet."""
+    if over in ("max", "min"):
+        if where is None:
+            flat = np.nanargmax(history) if over == "max" else np.nanargmin(history)
+            where = np.unravel_index(int(flat), history.shape)
+        return float(history[where]), where
+    x = history[:, 0]
+    return float({"mean": x.mean(), "std": x.std(), "last": x[-1]}[over]), None

@@ -1,0 +1,126 @@
+"""Derivatives of motions against closed forms, and against a study of the step."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import hybrid
+from hybrid.cli.commands import app
+from hybrid.design.in_motion import in_motion
+from hybrid.design.numbers import changed_scene, number_of
+
+G, A, PERIOD = 9.81, 1.0, 8.0
+W = 2.0 * np.pi / PERIOD
+
+
+def heaved(**more):
+    """A stiff line with a weight below an end that heaves: its pull is that of the mass, whatever stretches."""
+    section = {"length": 40.0, "mass": 5.0, "axial_stiffness": 1e8}
+    heave = {"heave": {"amplitude": A, "period": PERIOD}, "ramp": 3.0 * PERIOD}
+    return {
+        "cable": {"sections": [section]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0], "motion": heave},
+            "end": {"kind": "body", "mass": 60.0},
+        },
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 8},
+        "time": {"duration": 36.0, "step": 0.1, "rho_inf": 0.5}, "output": {"every": 0.1, "points": 9},
+    } | more  # fmt: skip
+
+
+def test_the_pull_of_a_mass_that_is_heaved():
+    """(m L + M)(g + A w^2), and its derivatives by mass, amplitude and gravity."""
+    keys = ["cable.sections[0].mass", "ends.start.motion.heave.amplitude", "environment.gravity"]
+    found = in_motion(hybrid.validate_scene(heaved()), ["max tension@start", "mean tension@start"], keys)
+    mass, pull = 5.0 * 40.0 + 60.0, G + A * W**2
+    assert found.values[0] == pytest.approx(mass * pull, rel=2e-3)
+    assert found.derivatives[0] == pytest.approx([40.0 * pull, 40.0 * G], rel=5e-3)
+    assert found.derivatives[1, 0] == pytest.approx(mass * W**2, rel=2e-2)
+    assert found.derivatives[2] == pytest.approx([mass, mass], rel=1e-3)
+    assert (found.errors < 1e-4 * np.maximum(np.abs(found.derivatives), 1.0)).all()
+
+
+def on_the_bed(model="catenary"):
+    section = {
+        "length": 250.0, "mass": 20.0, "diameter": 0.05, "axial_stiffness": 2e8, "bending_stiffness": 2e3,
+        "torsional_stiffness": 2e3, "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
+    }  # fmt: skip
+    heave = {"heave": {"amplitude": 1.0, "period": 8.0}, "ramp": 4.0}
+    return {
+        "environment": {"fluid": {"density": 1025}, "seabed": {"z": -100.0, "stiffness": 5e3, "damping": 500.0}},
+        "cable": {"sections": [section]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, -100.0]},
+                 "end": {"kind": "pinned", "position": [205.0, 0, 0], "motion": heave}},
+        "initial": "equilibrium", "model": model, "mesh": {"cells": 40},
+        "time": {"duration": 8.0, "step": 0.05}, "output": {"every": 0.2, "points": 51},
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def found():
+    of = ["max tension@end", "std position.z@150", "last tension@end"]
+    keys = ["cable.sections[0].drag.normal", "cable.sections[0].mass"]
+    return of, keys, in_motion(hybrid.validate_scene(on_the_bed()), of, keys)
+
+
+def test_a_study_of_the_step(found):
+    """Of a touchdown that moves: differences by other steps agree to 1e-5, and no worse than the error figure says."""
+    _, keys, ours = found
+    scene = hybrid.validate_scene(on_the_bed())
+    for i, key in enumerate(keys):
+        by_part = []
+        for part in (4e-4, 8e-4):
+            with (
+                hybrid.run(changed_scene(scene, key, number_of(scene, key) * (1 + part))) as more,
+                hybrid.run(changed_scene(scene, key, number_of(scene, key) * (1 - part))) as less,
+            ):
+                peak = int(np.argmax(0.5 * (more.tension[:, -1] + less.tension[:, -1])))
+                each = []
+                for x in (more, less):
+                    z = x.position[:, :, 2]
+                    middle = np.array([np.interp(150.0, x.s, row) for row in z])
+                    each.append(np.array([x.tension[peak, -1], middle.std(), x.tension[-1, -1]]))
+                by_part.append((each[0] - each[1]) / (2.0 * part * number_of(scene, key)))
+        theirs = (4.0 * by_part[0] - by_part[1]) / 3.0
+        np.testing.assert_allclose(ours.derivatives[i], theirs, rtol=1e-5)
+
+
+def test_what_is_refused():
+    scene = heaved()
+    key = "cable.sections[0].mass"
+    for of, words in (("tension@start", "max, min, mean, std or last"), ("max tensoin@0", "one of position"),
+                      ("std tension", "a place"), ("max tension@99", "between 0 and 40 m")):  # fmt: skip
+        with pytest.raises(hybrid.SceneError, match=words):
+            hybrid.sensitivity(scene, [of], [key], motion=True)
+    follows = heaved(time={"duration": 24.0, "tolerance": 1e-3})
+    with pytest.raises(hybrid.SceneError, match="steps follow the motion"):
+        hybrid.sensitivity(follows, ["max tension@start"], [key], motion=True)
+
+
+def test_steps_that_are_divided_are_no_neighbours(monkeypatch):
+    """Runs whose steps are others give no derivative, but say which number did it."""
+    from hybrid.design import in_motion as room
+
+    scene, plain = hybrid.validate_scene(heaved()), room.changed_scene
+
+    def coarser(asked, key, value):
+        return plain(plain(asked, key, value), "time.step", 0.05 if value > 5.0 else 0.1)
+
+    monkeypatch.setattr(room, "changed_scene", coarser)
+    with pytest.raises(hybrid.ComputationError, match=r"cable.sections\[0\].mass: a step was divided"):
+        in_motion(scene, ["max tension@start"], ["cable.sections[0].mass"])
+
+
+def test_the_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "line.yaml").write_text(hybrid.scene_text(hybrid.validate_scene(heaved())))
+    asked = ["sensitivity", "line.yaml", "--motion", "--by", "environment.gravity", "--json"]
+    told = CliRunner().invoke(app, asked)
+    assert told.exit_code == 0, told.output
+    rows = [x for x in map(json.loads, told.output.splitlines()) if "elasticity" in x]
+    assert [x["of"] for x in rows] == ["max tension@start", "max tension@end"]
+    assert rows[0]["derivative"] == pytest.approx(260.0, rel=1e-3)
