@@ -27,6 +27,7 @@ from hybrid.model.resolution import (
 from hybrid.model.sections import swivels
 from hybrid.model.self_reach import self_reach
 from hybrid.scene.accuracy import USUAL
+from hybrid.scene.body_shapes import Carried
 from hybrid.scene.schema import AdaptiveModel, RecordedWaves, Scene
 
 # Part of the variance of a record that is round-off.
@@ -202,7 +203,8 @@ def obstacle_entries(scene: Scene, rows: Floats) -> Iterator[Entry]:
         why = "given" if x.stiffness else "so that it lies at most a twentieth of its diameter deep at rest"
         text = f"obstacle {name}: {x.kind}, {row[STIFFNESS]:.3g} N/m per m, friction {x.friction:g}"
         text += ", set from outside" * x.from_outside + ", moves" * (x.moves and not x.from_outside)
-        yield Entry(text, True, f"obstacles.{name}; stiffness: {why}")
+        key = f"bodies.{name}.shape" if isinstance(x, Carried) else f"obstacles.{name}"
+        yield Entry(text, True, f"{key}; stiffness: {why}")
 
 
 def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) -> tuple[Entry, ...]:

@@ -8,10 +8,25 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.errors import SceneError
-from hybrid.kernels.state.obstacle_rows import AXIS, BEARING, CARRIED, INERTIA, RAMP, RATE, STILL_AXIS, TURNED
+from hybrid.kernels.state.obstacle_rows import (
+    AXIS,
+    BEARING,
+    BEGAN,
+    CARRIED,
+    INERTIA,
+    MEETS_TO,
+    OFFSET,
+    RAMP,
+    RATE,
+    RIDES,
+    STILL_AXIS,
+    SWEEP,
+    TURNED,
+)
 from hybrid.kernels.state.state import NO_CARRIED, NO_MOVES, Floats, Moves
 from hybrid.model.driven_end import PATH, DrivenEnd
 from hybrid.model.ends import Motion, table_of_motions
+from hybrid.scene.body_shapes import Carried, CarriedCylinder
 from hybrid.scene.motion import Elevation, EndMotion
 from hybrid.scene.schema import Scene
 
@@ -37,8 +52,15 @@ def courses_of(scene: Scene, rows: Floats, waves: Floats, ramp: float, elevation
     carried[:, STILL_AXIS : STILL_AXIS + 3], carried[:, TURNED : TURNED + 9] = rows[:, AXIS : AXIS + 3], frame
     motions: dict[int, Motion | DrivenEnd] = {}
     driven = {}
+    carried[:, MEETS_TO] = np.inf
     for k, (name, x) in enumerate(scene.obstacles.items()):
-        if x.from_outside:
+        if isinstance(x, Carried):
+            position[k], frame[k] = x.origin, np.array(x.axes).T.ravel()
+            carried[k, OFFSET : OFFSET + 3], carried[k, RIDES] = x.place, 1.0
+            carried[k, BEGAN:SWEEP], carried[k, TURNED : TURNED + 9] = [*x.origin, *x.origin], frame[k]
+            carried[k, STILL_AXIS : STILL_AXIS + 3] = x.own_axis if isinstance(x, CarriedCylinder) else (0.0, 0.0, 1.0)
+            carried[k, SWEEP : SWEEP + 9] = still.ravel()
+        elif x.from_outside:
             motions[k] = driven[name] = DrivenEnd(paths[k], position[k], frame[k], True, True)
         elif x.motion is not None:
             try:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.kernels.junctions.bodies import FORCE, FRAME, LEVEL, LIFT, MOMENT, NUMBERS, PLACE, STATE, STIFFNESS, V
 from hybrid.kernels.junctions.carried_frames import SEAT, TURNS, WITH_BODY, WITH_POINT
 from hybrid.kernels.laws.members import PIECE
 from hybrid.kernels.machine.binding import Table
+from hybrid.kernels.state.obstacle_rows import MEETS_FROM, MEETS_TO, ONSET_OF, STRAND, TURNED
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.bodies import BodyModel, FairleadMotion, KnownMotion, body_model, frame_of, loads_of
 from hybrid.model.build import Model, build
@@ -33,12 +35,14 @@ from hybrid.model.obstacles import obstacle_rows, pull_on_obstacles
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
+from hybrid.scene.body_shapes import way_out
 from hybrid.scene.points import Fairlead
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 
 MOST_ROUNDS = 100  # of Newton's method for the first places of the points
 SAME_FORCE = 1e-5  # of the largest force at a point: what may be left there of what does not balance
+LEAST_WAY = 1e-9  # of its length: on which a line does not touch the body that it is fixed to
 FARTHEST = 0.25  # of the shortest line: how far a point goes in a round
 
 
@@ -86,6 +90,8 @@ class SystemModel:
     moments: tuple[tuple[EndLoad, ...], ...]  # that are given to each of the points in `rigid`
     touching: Touching | None = None  # which lines touch each other
     loose: frozenset[tuple[int, int]] = frozenset()  # ends (line, 0 or 1) that have left their points
+    # (M,) number of the body that carries an obstacle, -1: none does; empty: no body has a shape
+    rides: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
 
     @property
     def cells(self) -> int:
@@ -178,8 +184,9 @@ def build_system(
         maker.meshes = {name: model.mesh for name, model in zip(like.names, like.models, strict=True)}
     maker.turn_points()
     models = [maker.model(name) for name in system.lines]
-    if system.obstacles:
+    if system.surfaces:
         models = _on_obstacles(system, models, made)
+    rides = _leave_own_bodies(system, models)
     touching = touching_of(system, maker.scenes)
     if touching is not None:
         models = _with_contact(system, models, touching)
@@ -195,8 +202,36 @@ def build_system(
         tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends), places, made, maker.bodies,
         np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
         maker.seats, known, maker.scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
-        touching,
+        touching, rides=rides,
     )  # fmt: skip
+
+
+def _leave_own_bodies(system: System, models: Sequence[Model]) -> NDArray[np.int64]:
+    """Which free bodies carry obstacles (M,), none: empty; a line meets the shape of a body that it is fixed to only
+
+    beyond its way out of that, straight towards its other end.
+    """
+    if not system.shaped:
+        return np.zeros(0, np.int64)
+    surfaces, numbers = list(system.surfaces), list(system.free_bodies)
+    for model, line in zip(models, system.lines.values(), strict=True):
+        carried, length = model.sea.values.carried, model.length
+        places = system.first_place(line.start), system.first_place(line.end)
+        for end, name in enumerate((line.start, line.end)):
+            point = system.points[name]
+            if not isinstance(point, Fairlead) or point.body not in system.shaped:
+                continue
+            body, k = system.free_bodies[point.body], surfaces.index(point.body)
+            axes = carried[k, TURNED : TURNED + 9].reshape(3, 3)
+            towards = tuple((axes.T @ np.subtract(places[1 - end], places[end])).tolist())
+            row = model.sea.values.obstacles[k]
+            assert body.shape is not None
+            out = max(way_out(body.shape, point.place, towards, float(row[STRAND] + row[ONSET_OF])), LEAST_WAY * length)
+            if end:
+                carried[k, MEETS_TO] = length - out
+            else:
+                carried[k, MEETS_FROM] = out
+    return np.array([numbers.index(x) if x in system.shaped else -1 for x in surfaces], np.int64)
 
 
 def _on_obstacles(system: System, models: Sequence[Model], bodies: Sequence[BodyModel]) -> list[Model]:

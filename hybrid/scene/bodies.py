@@ -32,6 +32,7 @@ from hybrid.scene.base import (
     refuse,
     unwrap,
 )
+from hybrid.scene.body_shapes import BodyShape, Carried, carried_shape
 from hybrid.scene.ends import Free, Loading, Triple
 from hybrid.scene.motion_tables import Motion
 
@@ -193,8 +194,17 @@ class FreeBody(Table):
         description="cylinders fixed to the body on which waves, current and its own motion act; their buoyancy is in "
         "`volume` or `hydrostatics`",
     )
+    shape: BodyShape | None = Field(
+        default=None, description="surface that lines touch, whichever they are; absent: they pass through the body"
+    )
     force: Loading | None = Field(default=None, description="force at the origin, inertial frame [N]")
     moment: Loading | None = Field(default=None, description="moment, inertial frame [N m]")
+
+    def surface(self, name: str) -> dict[str, Carried]:
+        """Its shape as an obstacle by the name of the body, where the body is first looked for; empty: it has none."""
+        if self.shape is None:
+            return {}
+        return {name: carried_shape(name, self.shape, self.initial_guess, self.initial_rotation, turned)}
 
     def place(self, place: Triple) -> Triple:
         """Where a point of the body is first looked for, inertial [m]."""

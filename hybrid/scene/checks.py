@@ -36,6 +36,7 @@ from hybrid.scene.analysis import (
     ZonesModel,
 )
 from hybrid.scene.base import Finding, Place
+from hybrid.scene.body_shapes import Carried
 from hybrid.scene.cable import Cable, Contact, Environment
 from hybrid.scene.ends import Clamped, Ends, Free, Pinned
 from hybrid.scene.obstacles import Obstacles
@@ -184,6 +185,8 @@ def _touches_obstacles(cable: Cable, obstacles: Obstacles, ends: Ends) -> Iterat
     for key, places in (("position", ends.held()), ("initial_guess", ends.initial_guesses())):
         for end, place in places.items():
             for name, x in obstacles.items():
+                if isinstance(x, Carried):  # the end may be of its body, and both are where they are looked for first
+                    continue
                 if x.distance(place) < 0.0:
                     expected = f"a place outside of obstacles.{name}, in which it lies {-x.distance(place):.3g} m deep"
                     yield Finding(("ends", end, key), expected, "move it, or the obstacle")

@@ -28,7 +28,7 @@ Tables = Mapping[str, Any]
 Kind = Literal["physics", "not worked out", "several lines"]
 # Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
 USE, SYSTEM, LINE = "use", "system", "line"
-Use = Literal["", "about rest", "response", "derivatives", "derivatives in motion"]
+Use = Literal["", "about rest", "response", "derivatives", "derivatives in motion", "stiffness"]
 LEAVE_OUT = "leave it out"
 ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
@@ -305,7 +305,14 @@ def _breaks_off_clamp(tables: Tables) -> Iterator[Place]:
 
 
 def _obstacles(tables: Tables) -> Iterator[Place]:
-    return iter([("obstacles",)] if tables.get("obstacles") else [])
+    if tables.get("obstacles"):
+        yield ("obstacles",)
+    yield from _shapes(tables)
+
+
+def _shapes(tables: Tables) -> Iterator[Place]:
+    """Shapes of bodies that lines touch."""
+    return (("bodies", name, "shape") for name in (tables[SYSTEM].shaped if SYSTEM in tables else ()))
 
 
 def _may_touch(tables: Tables) -> Iterator[Place]:
@@ -438,6 +445,7 @@ SEVERAL_LINES = Feature("several lines", "lines", _several)
 TURNING = Feature("free bodies, points that lines are clamped to", "bodies", _turning)
 CLAMPED_TO_FREE = Feature("a line that is clamped to a free point or body", "lines.NAME.connections", _clamped_to_free)
 OBSTACLES = Feature("obstacles", "obstacles", _obstacles)
+SHAPES = Feature("bodies that lines touch", "bodies.NAME.shape", _shapes)
 MAY_TOUCH = Feature("contact of a line with itself, unless it is switched off", "contact.self", _may_touch)
 SHEAVES = Feature("sheaves that turn freely", "obstacles.NAME.bearing", _free_sheaves)
 LINES_TOUCH = Feature("contact of lines with each other", "contact", _lines_touch)
@@ -459,6 +467,7 @@ DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("deriva
 IN_MOTION = Feature("derivatives in motion", "hybrid sensitivity --motion", _used("derivatives in motion"))
 FOLLOWED = Feature("steps that follow the motion", "no time.step, time.tolerance",
                    _asks("time", "step", lambda x: x.controlled))  # fmt: skip
+STIFFNESS = Feature("stiffness and offsets of a point or body", "--stiffness, --offsets", _used("stiffness"))
 OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change in time",
                         "motion.file, motion.travel, force.history", _changing_loads)  # fmt: skip
 FINITE_WAVES = Feature("waves of finite height", "waves.kind: stream_function", _finite_waves)
@@ -552,6 +561,18 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         SHEAVES, MAY_TOUCH, "not worked out", "the solve of contact ({key}) knows no sheaves",
         fix="write `self: false` in contact, or give it a spin",
+    ),
+    Refusal(
+        SHAPES, MAY_TOUCH, "not worked out", "the solve of contact of lines with themselves ({key}) knows no bodies",
+        fix="write `self: false` in contact of every line, or leave the shape out",
+    ),
+    Refusal(
+        SHAPES, LINES_TOUCH, "not worked out", "the solve of contact of lines with each other ({key}) knows no bodies",
+        fix="leave {key} out, or the shape",
+    ),
+    Refusal(
+        SHAPES, STIFFNESS, "not worked out", "contact of lines with a body opens and closes",
+        "no shape", "leave it out where no line touches the body",
     ),
     Refusal(PAYOUT, OBSTACLES, "not worked out", "nodes that enter and leave do not know of obstacles ({key})"),
     Refusal(

@@ -261,6 +261,17 @@ class System(Table):
         return {name: body for name, body in self.bodies.items() if isinstance(body, FreeBody)}
 
     @property
+    def surfaces(self) -> Obstacles:
+        """The obstacles, and behind them the shapes of bodies, by name."""
+        shapes = {key: x for name, body in self.free_bodies.items() for key, x in body.surface(name).items()}
+        return {**self.obstacles, **shapes} if shapes else self.obstacles
+
+    @property
+    def shaped(self) -> tuple[str, ...]:
+        """Names of the bodies that lines touch."""
+        return tuple(name for name, body in self.free_bodies.items() if body.shape is not None)
+
+    @property
     def touching_pairs(self) -> list[tuple[str, str]]:
         """Names of lines that touch each other, two each."""
         if self.contact is None:
@@ -430,7 +441,7 @@ class System(Table):
         tables: dict[str, Any] = {
             "title": f"{self.title}, line {name}" if self.title else f"line {name}", "environment": self.environment,
             "cable": line.cable, "ends": Ends(**ends), "initial": initial, "model": line.chosen_model,
-            "mesh": line.mesh, "resolution": line.resolution, "contact": line.contact, "obstacles": self.obstacles,
+            "mesh": line.mesh, "resolution": line.resolution, "contact": line.contact, "obstacles": self.surfaces,
             "accuracy": self._accuracy_of(line),
         }  # fmt: skip
         if self.time is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
@@ -78,7 +79,7 @@ def _lonely_points(system: System) -> Iterator[Finding]:
             yield Finding(("lines", line, "break_at"), expected, fix)
     on = {point.body for point in system.points.values() if isinstance(point, Fairlead)}
     for name in system.bodies:
-        if name not in on:
+        if name not in on and name not in system.shaped:
             fix = f"add a point `{{body: {name}, place: [0, 0, 0]}}` and a line to it, or leave the body out"
             yield Finding(("bodies", name), "a body with a fairlead among the points", fix, "no fairlead")
 
@@ -96,7 +97,7 @@ def _floating_groups(system: System) -> Iterator[Finding]:
             expected = "a free point that lines join to a fixed one, at least by way of others"
             yield Finding(("points", name), expected, "make one of these points `kind: fixed`", "nothing holds it")
     for name in system.bodies:
-        if f"body {name}" not in held:
+        if f"body {name}" not in held and name not in system.shaped:
             expected = "a free body that lines join to what is fixed, at least by way of other points"
             yield Finding(("bodies", name), expected, "let one of its lines end at a fixed point", "nothing holds it")
 
@@ -134,7 +135,11 @@ def _body_findings(system: System, name: str) -> Iterator[Finding]:
         if in_water and system.environment.fluid is None:
             expected = f"a fluid, because body {name} has {in_water[0]}"
             yield Finding(("environment",), expected, "add `fluid: {density: 1025}`", "no fluid")
-    line = next(x for x in system.lines.values() for p in (x.start, x.end) if system.body_of(p) is body)
+    joined = (x for x in system.lines.values() for p in (x.start, x.end) if system.body_of(p) is body)
+    line = next(joined, next(iter(system.lines.values())))
+    if name in system.shaped and name in system.obstacles:
+        expected = f"a name that no obstacle has, because body {name} has a shape"
+        yield Finding(("obstacles", name), expected, "name the one or the other differently")
     ends = Ends(start=still, end=body.end) if isinstance(body, FreeBody) else None
     if isinstance(body, FixedBody):
         moved = Clamped(position=body.position, tangent=(1.0, 0.0, 0.0), motion=body.motion)
@@ -178,7 +183,8 @@ def _line_findings(system: System, name: str) -> Iterator[Finding]:
 def _of_system(system: System, name: str, found: Finding) -> Finding:
     line, at = system.lines[name], found.at
     if at[:1] == ("obstacles",):  # which are those of all lines
-        return found
+        carried = len(at) > 1 and at[1] in system.shaped
+        return replace(found, at=("bodies", at[1], "shape", *at[2:])) if carried else found
     if at[:1] == ("cable",):
         at = ("lines", name, *at[1:])
     elif at[:1] in (("model",), ("mesh",), ("resolution",), ("initial",)) or (

@@ -14,13 +14,13 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.laws.obstacles import depths_in_obstacles, put_obstacles
+from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, put_obstacles
 from hybrid.kernels.march.resolution_checks import lowest
 from hybrid.kernels.run.entry import sharpest
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, PLANAR, SEABED, SELF_FRICTION
-from hybrid.kernels.state.obstacle_rows import KIND, RADIUS, ROUND
+from hybrid.kernels.state.obstacle_rows import KIND, RADIUS, RIDES, ROUND
 from hybrid.kernels.state.report import BEND, TWIST_NODE
 from hybrid.kernels.state.state import Batch, Ends, Floats, State, ends_in, state_in
 from hybrid.kernels.step.accept import LARGEST_TWIST
@@ -434,16 +434,19 @@ class Diagnostics:
         line, sea = self._model.line, self._model.sea
         rows = sea.values.obstacles.copy()
         longest = np.maximum(np.append(line.h, 0.0), np.append(0.0, line.h))
+        met = cells_met(sea.values.carried, line.s) if sea.values.carried.size else None
         for k, (t, r) in enumerate(zip(batch.t.tolist(), batch.r, strict=True)):
             if batch.obstacles.size:
                 put_obstacles(rows, sea.values.carried, batch.obstacles[k])
-            within = depths_in_obstacles(rows, r)
+            within = depths_in_obstacles(rows, r, met)
             which, node = (int(i) for i in np.unravel_index(np.argmax(within), within.shape))
             if within[which, node] > self._within:
+                rides = bool(sea.values.carried.size) and sea.values.carried[which, RIDES] != 0.0
+                key = f"bodies.{sea.names[which]}.shape" if rides else f"obstacles.{sea.names[which]}"
                 text = (
                     f"the line is {within[which, node]:.2g} of its radii deep in obstacle {sea.names[which]} at s = "
-                    f"{line.s[node]:g} m, or has passed through it between two nodes: make obstacles."
-                    f"{sea.names[which]}.stiffness larger, time.step smaller or add cells"
+                    f"{line.s[node]:g} m, or has passed through it between two nodes: make "
+                    f"{key}.stiffness larger, time.step smaller or add cells"
                 )
                 self.note(t, node, "deep in an obstacle", text)
                 self._within = 3.0 * float(within[which, node])

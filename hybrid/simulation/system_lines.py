@@ -237,6 +237,8 @@ class LineResult:
         if found.settled and (line.element.any() or touches):
             there = f"{self._touched}; " if touches else ""
             why = f"{there}a damped motion with contact, without friction, led there"
+        if found.solver.presses_bodies:
+            why = "lines touch a body that is free"
         if why:
             text = f"the stability of this equilibrium is not judged, because {why}"
             self.events.event(0.0, 0.0, self.model.length, "stability not judged", text)

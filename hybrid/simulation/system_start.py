@@ -151,7 +151,8 @@ def joined_lines(model: SystemModel, t: float) -> list[JoinedLine]:
         ends, floor, slackens = joined_ends(x.ends.at(t), joints), x.slack_floor, x.slack == "warn"
         lines.append(
             JoinedLine(
-                x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints, fairleads, seats, slackens
+                x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints, fairleads, seats, slackens,
+                model.rides,
             )
         )  # fmt: skip
     return lines

@@ -16,6 +16,7 @@ from hybrid.model.bodies import angles_of, frame_of
 from hybrid.model.clamps import seat_of, seated
 from hybrid.model.system import SystemModel, build_system
 from hybrid.scene.bodies import FixedBody, FreeBody
+from hybrid.scene.combinations import refuse_use
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene_text
 from hybrid.scene.suggestions import nearest
@@ -79,6 +80,7 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     SceneError where the scene has no such point or body, ComputationError where no equilibrium is found.
     """
     system = _system(scene)
+    refuse_use(system, "stiffness")
     kind, name = target_of(system, at)
     model = build_system(system)
     found = _equilibrium(system, model)
@@ -214,6 +216,7 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
     Errors: as of `stiffness`; the distance at which no equilibrium is found is in the message.
     """
     system = _system(scene)
+    refuse_use(system, "stiffness")
     kind, name = target_of(system, at)
     try:
         known = bool(len(distances)) and bool(np.isfinite([*distances, heading]).all())

@@ -6,7 +6,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.laws.obstacles import depths_in_obstacles
+from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held
 from hybrid.kernels.state.forces import BODIES, FRICTION, OBSTACLES, SEABED
 from hybrid.kernels.state.state import Floats, Line, Sea, State
@@ -43,7 +43,8 @@ def flaw_of_line(line: Line, sea: Sea, state: State, length: float, floor: float
         if deep.max() > max(BURIED * length, BURIED_ONSETS * sea.onset):
             return Outcome.BURIED, int(np.argmax(deep))
     if line.bits & OBSTACLES:
-        within = depths_in_obstacles(sea.obstacles, state.r).max(axis=0)
+        met = cells_met(sea.carried, line.s) if sea.carried.size else None
+        within = depths_in_obstacles(sea.obstacles, state.r, met).max(axis=0)
         if within.max() > 1.0:
             return Outcome.BURIED, int(np.argmax(within))
     turns = np.where(_pressed(line, state), folds(line, state), 0.0)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import STATE
@@ -30,6 +31,7 @@ class JoinedLine(NamedTuple):
         (2, SEAT)
     )  # frames of ends that turn with these (kernels.junctions.carried_frames); zeros: none does
     slackens: bool = False  # whether a motion goes on with slack catenaries, and rest is taken with them if need be
+    rides: NDArray[np.int64] = np.zeros(0, np.int64)  # (M,) bodies that carry obstacles, -1: none does; empty: no body
 
 
 class SystemState(NamedTuple):

@@ -18,6 +18,8 @@ from hybrid.errors import Outcome
 from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE, WIDTH
 from hybrid.kernels.contact.self_contact import blank_contact_job
 from hybrid.kernels.junctions.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, VD, WA, WD, WORK, A, U, V, W, X
+from hybrid.kernels.junctions.body_contact import meet_bodies
+from hybrid.kernels.junctions.body_forces import EACH_BODY, TOUCHED, blank_meeting_job
 from hybrid.kernels.junctions.carried_frames import ANSWER, SEAT, TURNS
 from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL
 from hybrid.kernels.junctions.junctions import HANDED
@@ -105,6 +107,8 @@ class SystemSolver:
         self.joints: NDArray[np.int64] = np.array([x.joints for x in lines], np.int64).reshape(-1, 2)
         self._contacts, self.shared = {k: x for k, x in enumerate(contacts) if x is not None}, shared
         touch = {*self._contacts, *(shared.lines if shared is not None else ())}
+        self._rides = lines[0].rides  # obstacles are those of all lines
+        touch |= {*range(len(lines))} if self._rides.size else set()
         self.work = [_room(x, k in touch) for k, x in enumerate(lines)]
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
         self._floors = np.array([-np.inf if x.slackens else x.floor for x in lines])
@@ -145,6 +149,7 @@ class SystemSolver:
             "asked": self._asked, "columns": self._columns, "functional": self._functional, "answers": self._answers,
             "q": self._turned, "net": self.net, "bodies": self.bodies, "work": self.body_work, "S": self._handed,
             "G": self._follow, "A": self._matrix, "solver": self._solver,
+            "rides": self._rides,
         }  # fmt: skip
         of_lines = {
             "joints": self.joints, "fairleads": self._fairleads, "seats": self._seats, "arms": self._arms,
@@ -166,6 +171,10 @@ class SystemSolver:
             )  # fmt: skip
             if k in self._lone_tables:
                 self._lone_tables[k].bind(task=Task(RUN, limits=limits._replace(most=MOST_OF_STEP)))
+        self._pressing: NDArray[np.int64] = np.zeros(0, np.int64)
+        self._meeting = [Table(blank_meeting_job), Table(blank_meeting_job)] if self._rides.size else []
+        if self._rides.size:
+            self._meet()
         self._touching = Table(blank_touching_job), Table(blank_touching_job)
         self._at_rest = np.zeros(1, np.int64)
 
@@ -178,6 +187,38 @@ class SystemSolver:
         elif self.lone:
             for table in self._joined_tables[number]:
                 table.bind(**values)
+
+    def _meet(self) -> None:
+        """Lines touch the bodies that carry obstacles."""
+        bodies = sorted({int(b) for b in self._rides if b >= 0})
+        slots = np.full(len(self.bodies), -1, np.int64)
+        slots[bodies] = np.arange(len(bodies))
+        nodes = [x.line.s.size for x in self.lines]
+        total, rows = sum(nodes), EACH_BODY * len(bodies)
+        phase, self._pressing = np.zeros(1, np.int64), np.zeros(1 + len(bodies), np.int64)
+        room = {
+            "gaps": np.zeros_like(self._gaps), "rides": self._rides, "carriers": np.array(bodies, np.int64),
+            "slots": slots, "begins": np.append(0, np.cumsum(nodes)[:-1]).astype(np.int64), "phase": phase,
+            "found": self._pressing, "touched": np.zeros((total * len(bodies), TOUCHED)),
+            "own": np.zeros((len(bodies), 36)), "wrench": np.zeros((len(bodies), 6)),
+            "marks": np.zeros(total, np.int64), "kept": np.zeros((total, SIZE)),
+            "moved": np.zeros((len(self.bodies), 6)), "responses": np.zeros((rows, total, SIZE)),
+            "turned": np.zeros((rows, len(self.bodies), 6)), "coupling": np.zeros((rows, rows + 1)),
+        }  # fmt: skip
+        for job, meeting, numbers in zip(self._jobs, self._meeting, self._numbers, strict=True):
+            meeting.bind(**self._of_lines(numbers), **room)
+            job.bind(
+                rides=self._rides, phase=phase, meet=meet_bodies.address(meeting.numbers), meet_table=meeting.numbers
+            )
+
+    def _of_lines(self, numbers: NDArray[np.int64]) -> dict[str, Any]:
+        """What those share that put contact into the corrections of all lines, of jobs `numbers`."""
+        return {
+            "tables": numbers, "joints": self.joints, "seats": self._seats, "arms": self._arms, "first": self._first,
+            "columns": self._columns, "functional": self._functional, "answers": self._answers, "net": self.net,
+            "bodies": self.bodies, "work": self.body_work, "S": self._handed, "G": self._follow, "A": self._matrix,
+            "q": self._turned,
+        }  # fmt: skip
 
     def _touch(self) -> None:
         """Lines that touch themselves do so from now on, with the books as they are."""
@@ -198,12 +239,7 @@ class SystemSolver:
             "contacts": tables,
         }  # fmt: skip
         for job, touching, numbers in zip(self._jobs, self._touching, self._numbers, strict=True):
-            touching.bind(
-                tables=numbers, joints=self.joints, seats=self._seats, arms=self._arms, first=self._first,
-                columns=self._columns, functional=self._functional, answers=self._answers, net=self.net,
-                bodies=self.bodies, work=self.body_work, S=self._handed, G=self._follow, A=self._matrix, q=self._turned,
-                **room,
-            )  # fmt: skip
+            touching.bind(**self._of_lines(numbers), **room)
             job.bind(touch=touch_system.address(touching.numbers), touch_table=touching.numbers)
 
     @property
@@ -265,6 +301,8 @@ class SystemSolver:
             jobs[parity].bind(old=old.bodies, new=new.bodies)
         if self._contacts or self.shared is not None:
             self._touching[parity].bind(old=old.bodies, new=new.bodies)
+        if self._meeting:
+            self._meeting[parity].bind(old=old.bodies, new=new.bodies)
 
     def _solve(self, task: Task, old: SystemState, new: SystemState, t: float = 0.0) -> SystemTaken:
         self.turns = None
@@ -299,6 +337,16 @@ class SystemSolver:
         """Lines that touch themselves, or may touch others that do, in the states that were looked at last."""
         shared = self.shared.lines if self.shared is not None and self.shared.touches else ()
         return [*(k for k, contact in self._contacts.items() if contact.touches), *shared]
+
+    @property
+    def meets(self) -> bool:
+        """Whether lines touch bodies that are free."""
+        return bool(self._rides.size)
+
+    @property
+    def presses_bodies(self) -> bool:
+        """Whether a line touched a free body in the last march."""
+        return bool(self._pressing.any())
 
     @property
     def _touching_lines(self) -> set[int]:
@@ -594,7 +642,7 @@ class SystemSolver:
         what lines do to them then: these two parts are the second variation.  Not asked where a line touches itself.
         """
         outcome, line, where = flaw_of_lines(self.lines, states)
-        if outcome != Outcome.OK or self.in_contact():
+        if outcome != Outcome.OK or self.in_contact() or self.presses_bodies:
             return outcome, line, where
         self.blurred.clear()
         line = buckling_line(self.lines, states, self.blurred)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.junctions.bodies import DAMPING, MASS, V
+from hybrid.kernels.junctions.bodies import DAMPING, FRAME, MASS, V
 from hybrid.kernels.state.forces import AXIAL_LAW, FLOW, FRICTION, TOUCHES, WAVES
 from hybrid.kernels.state.state import NO_ADDRESS, Floats
 from hybrid.solve.contact_statics import damped, stop
@@ -201,6 +201,8 @@ def _easier(x: JoinedLine, part: float) -> JoinedLine:
     now = x.sea.now.copy()
     now[1] *= part
     sea = softened(x.sea, softest(x.line, x.sea, x.length) ** (1.0 - part))._replace(now=now)
+    if x.rides.size:  # a body would sink through lines that are soft
+        sea = sea._replace(obstacles=x.sea.obstacles)
     return x._replace(sea=sea, line=x.line._replace(kb=x.line.kb * LIMP ** (1.0 - part)))
 
 
@@ -300,6 +302,8 @@ def _relax(solver: SystemSolver, points: int, start: SystemState) -> tuple[Syste
                 stop(state)
             continue
         moved = max(float(np.abs(a.r - b.r).max()) for a, b in zip(new.lines, old.lines, strict=True))
+        if here.meets:  # what nothing but contact holds may still fall where lines are at rest
+            moved = max(moved, float(np.abs(new.bodies[:, :FRAME] - old.bodies[:, :FRAME]).max()))
         old, new = new, old
         calm = calm + 1 if moved < CALM * solver.length * dt / time_scale else 0
         if taken.iterations <= 5:

@@ -37,7 +37,7 @@ def obstacles_at(result: Result, output: int, moving: bool | None = None) -> lis
         moves = moves_ever(result, name)
         if moving is not None and moves != moving:
             continue
-        if moves:
+        if f"obstacles/{name}/position" in result:
             place = result[f"obstacles/{name}/position"][output]
             axis = _rotation(np.radians(result[f"obstacles/{name}/rotation"][output])) @ axis
         found.append(Body(name, kind, place, axis, radius, half))

@@ -64,6 +64,12 @@ POLYESTER = {
     SECTION + "dynamic_stiffness": {"constant": 3e5, "relaxation_time": 10},
 }
 CLAMPED = {ONE + "connections": {"end": {"kind": "clamped", "tangent": [1, 0, 0]}}}
+SHAPED = {
+    "points.b": {"body": "buoy", "place": [0, 0, 0]},
+    "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0],
+                    "shape": {"kind": "sphere", "radius": 0.3}},
+}  # fmt: skip
+OTHER_LINE = {"start": "a", "end": "b", "sections": [{"length": 9.5, "mass": 1, "diameter": 0.02}]}
 
 # By the pair: what makes a scene of CABLE, or of LINES, that has both, and what is done with it.
 EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
@@ -86,6 +92,9 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.PAYOUT, c.OBSTACLES): (BALL | PAID, ""),
     (c.SHEAVES, c.SEVERAL_LINES): (SHEAVE | {ONE + "contact": {"self": False}}, ""),
     (c.SHEAVES, c.MAY_TOUCH): (SHEAVE, ""),
+    (c.SHAPES, c.MAY_TOUCH): (SHAPED, ""),
+    (c.SHAPES, c.LINES_TOUCH): (SHAPED | {"lines.two": OTHER_LINE, "contact": {}}, ""),
+    (c.SHAPES, c.STIFFNESS): (SHAPED | {ONE + "contact": {"self": False}}, "stiffness"),
     (c.DIAMETERS, c.OBSTACLES): (BALL | THICKER, ""),
     (c.CHOSEN_STEPS, c.PUSHED): (BALL | {"time": {"duration": 3.0}}, ""),
     (c.ACCURACY, c.PUSHED): (BALL | {"accuracy": "3%"}, ""),
@@ -146,7 +155,7 @@ def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
 
 
 def _of_several(pair: tuple[c.Feature, c.Feature]) -> bool:
-    names = (c.SEVERAL_LINES, c.CLAMPED_TO_FREE, c.CLAMPED_CONNECTION, c.TURNING)
+    names = (c.SEVERAL_LINES, c.CLAMPED_TO_FREE, c.CLAMPED_CONNECTION, c.TURNING, c.SHAPES)
     return any(x in names for x in pair)
 
 

@@ -197,8 +197,7 @@ class _Writer:
         if bed is not None and bed.slope is not None and any(bed.slope):
             expected = "a level bed, which a deck has"
             self._refuse("environment.seabed.slope", bed.slope, expected, "leave slope out, for a comparison")
-        if getattr(self.scene, "obstacles", None):
-            given = ", ".join(self.scene.obstacles)
+        if given := ", ".join((*getattr(self.scene, "obstacles", ()), *getattr(self.scene, "shaped", ()))):
             self._refuse("obstacles", given, "none: a deck has no obstacles", "leave them out, for a comparison")
 
     def _options(self) -> Iterator[tuple[str, float]]:

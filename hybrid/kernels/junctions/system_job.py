@@ -43,8 +43,12 @@ class SystemJob(NamedTuple):
     G: Floats  # (2, 6, 6)
     A: Floats  # (m+3, m+1)
     touch_table: NDArray[np.int64]  # of kernels.junctions.system_contact.touch_system
+    rides: NDArray[np.int64]  # (M,) the body that carries an obstacle, -1: none does; empty: no body has a shape
+    phase: NDArray[np.int64]  # (1,) what is asked of meet_bodies
+    meet_table: NDArray[np.int64]  # of kernels.junctions.body_contact.meet_bodies
     solver: int = 0  # address of the kernel that marches a line
     touch: int = 0  # of touch_system; 0: no line touches itself
+    meet: int = 0  # of meet_bodies; 0: no body has a shape
 
 
 # Numbers of `asked`: of the task (kernels.step.newton.Task), and the time of the new states, s.
@@ -58,7 +62,7 @@ def blank_system_job() -> SystemJob:
     return SystemJob(
         z(ASKED), two, z((1, 1)), two, z((1, 2, 3)), z((1, 2, 1)), z((1, 2, 3)), z((1, 2, 3)), z(1), z(1), one,
         z((1, 1, 1)), z(1), z((2, 1)), z(1), z((1, 3)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)),
-        z((2, 6, 6)), z((1, 1)), one,
+        z((2, 6, 6)), z((1, 1)), one, one, one, one,
     )  # fmt: skip
 
 

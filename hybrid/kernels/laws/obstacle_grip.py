@@ -15,7 +15,7 @@ from hybrid.kernels.laws.obstacle_motion import (
     way_along,
     way_with,
 )
-from hybrid.kernels.laws.obstacles import Z3, beside, gradient_of_normal, grip, half_cell
+from hybrid.kernels.laws.obstacles import Z3, beside, gradient_of_normal, grip, half_cell, meets
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import FRICTION
 from hybrid.kernels.state.obstacle_rows import (
@@ -24,7 +24,9 @@ from hybrid.kernels.state.obstacle_rows import (
     ENDED,
     FORCE,
     MU,
+    OFFSET,
     ONSET_OF,
+    RIDES,
     ROLLED,
     SEEN,
     SEEN_FORCE,
@@ -47,10 +49,10 @@ def pressed(line, sea, k, i, x, state):
     if moves:
         vi = sub(vi, surface_velocity(sea.carried, k, x))
     p, pd, N = 0.5 * sea.obstacles[k, ONSET_OF] - d, -dot(n, vi), 0.0
-    if i > 0:
+    if i > 0 and meets(line, sea, moves, k, i - 1):
         before = scale(-1.0, get3(state.e, i - 1))
         N += half_cell(sea, moves, k, x, p, pd, before, get3(v, i - 1), line.h[i - 1], 0.0)[0]
-    if i < line.h.shape[0]:
+    if i < line.h.shape[0] and meets(line, sea, moves, k, i):
         N += half_cell(sea, moves, k, x, p, pd, get3(state.e, i), get3(v, i + 1), line.h[i], 0.0)[0]
     return N, n, hollow, a
 
@@ -144,6 +146,8 @@ def sample_obstacles(sea, old, new, t, x, row, at):
         sea.carried[k, ROLLED] = new.sheave[k, ANGLE]
     for k in range(sea.carried.shape[0]):
         place = row3(sea.carried, k, ENDED)
+        if sea.carried[k, RIDES] != 0.0:  # the middle of the shape
+            place = add(place, mat_vec(row9(sea.carried, k, TURNED), row3(sea.carried, k, OFFSET)))
         force, moment = wrench_on(new, k, place)
         if x < 1.0:
             f, m = wrench_on(old, k, place)

@@ -31,6 +31,7 @@ from hybrid.kernels.state.obstacle_rows import (
     PLACE,
     RAMP,
     RATE,
+    RIDES,
     ROLLED,
     ROLLED_BEFORE,
     ROLLING,
@@ -107,8 +108,13 @@ def pose_at(t, k, sea, rolled):
 
 @kernel
 def carry_obstacles(begin, end, sea):
-    """Bring obstacles that move to where they are at `end` (s), and know where they were at `begin`."""
+    """Bring obstacles that move to where they are at `end` (s), and know where they were at `begin`.
+
+    Those that bodies carry are where these are (kernels.junctions.body_contact).
+    """
     for k in range(sea.carried.shape[0]):
+        if sea.carried[k, RIDES] != 0.0:
+            continue
         rolled = sea.carried[k, ROLLED]
         before = rolled
         if begin < end:

@@ -37,6 +37,8 @@ from hybrid.kernels.state.obstacle_rows import (
     FLAT,
     HALF_LENGTH,
     KIND,
+    MEETS_FROM,
+    MEETS_TO,
     MU,
     ONSET_OF,
     PLACE,
@@ -142,6 +144,59 @@ def half_cell(sea, moves, k, x, p, pd, e, v, h, cv):
     return f, f0, g0, slope
 
 
+@inner
+def meets(line, sea, moves, k, c):
+    """Whether cell c meets obstacle k: of a body that the line is fixed to only what is beyond the way out of it."""
+    if moves:
+        return line.s[c] >= sea.carried[k, MEETS_FROM] and line.s[c + 1] <= sea.carried[k, MEETS_TO]
+    return True
+
+
+@inner
+def normal_force(line, sea, moves, k, i, x, v, e, cv):
+    """What obstacle k presses on node i at x with: N, whether it touches, n, 1/rho, a, and how N changes with x, and with
+
+    the places of the neighbours before and after.
+    """
+    d, n, hollow, a = beside(sea.obstacles, k, x)
+    vi = get3(v, i)
+    if moves:
+        vi = sub(vi, surface_velocity(sea.carried, k, x))
+    p, pd = 0.5 * sea.obstacles[k, ONSET_OF] - d, -dot(n, vi)
+    N = DN = turned = 0.0
+    L, R, dN = Z3, Z3, Z3
+    if i > 0 and meets(line, sea, moves, k, i - 1):
+        f, f0, g0, L = half_cell(
+            sea, moves, k, x, p, pd, scale(-1.0, get3(e, i - 1)), get3(v, i - 1), line.h[i - 1], cv
+        )
+        N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(hollow, n, a, vi)))
+        turned += g0
+    if i < line.h.shape[0] and meets(line, sea, moves, k, i):
+        f, f0, g0, R = half_cell(sea, moves, k, x, p, pd, get3(e, i), get3(v, i + 1), line.h[i], cv)
+        N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(hollow, n, a, vi)))
+        turned += g0
+    dN = add(dN, scale(-DN, n))
+    if moves:
+        dN = add(dN, scale(turned, cross(n, row3(sea.carried, k, TURNING))))
+    return N, N != 0.0 or DN != 0.0, n, hollow, a, dN, L, R
+
+
+@kernel
+def force_of_obstacle(line, sea, k, i, x, u, v, e, cv):
+    """As `obstacle_forces`, of obstacle k alone, which moves: whether it touches, F, D, GL, GR."""
+    N, touches, n, hollow, a, dN, L, R = normal_force(line, sea, True, k, i, x, v, e, cv)
+    F, D, slope = Z3, Z9, n
+    if touches:
+        K = gradient_of_normal(hollow, n, a)
+        F, D = scale(N, n), mscale(N, K)
+        if line.bits & FRICTION and sea.obstacles[k, MU] > 0.0 and N > 0.0:
+            t = way_along(sea.carried, k, row3(sea.grip, i, 6 * k), x, get3(u, i))
+            f, g, Df, _ = grip(t, n, K, N, sea.obstacles[k, MU], sea.obstacles[k, SLIP])
+            F, D, slope = add(F, f), madd(D, Df), add(n, g)
+        D = madd(D, madd(outer(slope, dN), madd(outer(slope, L), outer(slope, R))))
+    return touches, F, D, mscale(-1.0, outer(slope, L)), outer(slope, R)
+
+
 @kernel  # called for every node of a scene that has obstacles
 def obstacle_forces(line, sea, i, x, u, v, e, cv):
     """Contact and friction of obstacles at node i: whether there are any, F, D, GL, GR (chord before, after)."""
@@ -150,30 +205,12 @@ def obstacle_forces(line, sea, i, x, u, v, e, cv):
     lies = False
     if line.bits & SEABED:
         lies = sea.bed[i, 0] != 0.0 or sea.bed[i, 1] != 0.0 or sea.bed[i, 2] != 0.0
-    t, vi = add(get3(sea.slip, i), get3(u, i)), get3(v, i)
+    t = add(get3(sea.slip, i), get3(u, i))
     kept = get3(sea.slid, i) if lies else t
     touches, rubs, moves = False, False, line.moved.shape[0] > 0
     for k in range(rows.shape[0]):
-        d, n, hollow, a = beside(rows, k, x)
-        if moves:
-            vi = sub(get3(v, i), surface_velocity(sea.carried, k, x))
-        p, pd = 0.5 * rows[k, ONSET_OF] - d, -dot(n, vi)
-        N = DN = turned = 0.0
-        L, R, dN = Z3, Z3, Z3
-        if i > 0:
-            f, f0, g0, L = half_cell(
-                sea, moves, k, x, p, pd, scale(-1.0, get3(e, i - 1)), get3(v, i - 1), line.h[i - 1], cv
-            )
-            N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(hollow, n, a, vi)))
-            turned += g0
-        if i < line.h.shape[0]:
-            f, f0, g0, R = half_cell(sea, moves, k, x, p, pd, get3(e, i), get3(v, i + 1), line.h[i], cv)
-            N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(hollow, n, a, vi)))
-            turned += g0
-        dN = add(dN, scale(-DN, n))
-        if moves:
-            dN = add(dN, scale(turned, cross(n, row3(sea.carried, k, TURNING))))
-        if N == 0.0 and DN == 0.0:
+        N, presses, n, hollow, a, dN, L, R = normal_force(line, sea, moves, k, i, x, v, e, cv)
+        if not presses:
             continue
         touches = True
         K = gradient_of_normal(hollow, n, a)
@@ -211,13 +248,13 @@ def depth_in(rows, k, r, i):
 @kernel
 def stored_on_obstacles(line, sea, r):
     """Energy (J) that obstacles have stored against the line."""
-    rows, energy = sea.obstacles, 0.0
+    rows, energy, moves = sea.obstacles, 0.0, line.moved.shape[0] > 0
     for k in range(rows.shape[0]):
         stiffness, o = rows[k, STIFFNESS], rows[k, ONSET_OF]
         p1 = depth_in(rows, k, r, 0)
         for i in range(line.h.shape[0]):
             p0, p1 = p1, depth_in(rows, k, r, i + 1)
-            if p0 > 0.0 or p1 > 0.0:
+            if (p0 > 0.0 or p1 > 0.0) and meets(line, sea, moves, k, i):
                 energy = with_cell(energy, p0, p1, line.h[i], stiffness, o)
     return energy
 
@@ -315,10 +352,16 @@ def put_obstacles(rows: Floats, carried: Floats, seen: Floats) -> None:
 PARTS, CUTS = 8, 0.125
 
 
-def depths_in_obstacles(rows: Floats, r: Floats) -> Floats:
+def cells_met(carried: Floats, s: Floats) -> Floats:
+    """Whether (M, N) cells between nodes s (N+1,) m meet obstacles that move (carried: as of `Sea`), 1.0 or 0.0."""
+    near, far = carried[:, MEETS_FROM, None], carried[:, MEETS_TO, None]
+    return np.asarray((s[:-1] >= near) & (s[1:] <= far), float)
+
+
+def depths_in_obstacles(rows: Floats, r: Floats, met: Floats | None = None) -> Floats:
     """How deep (M, N+1) the nodes r (N+1, 3) m and the cells after them lie in obstacles, over what they may.
 
-    Nodes: by the radius of the strand; cells, whose ends may lie on an obstacle that they cut, by an eighth of its radius
+    met: (M, N) as of `cells_met`; None: all do.  Nodes: by the radius of the strand; cells, whose ends may lie on an obstacle that they cut, by an eighth of its radius
     more.  Beyond 1 a line is in what is solid, or has passed through it.
     """
     strand = rows[:, STRAND, None]
@@ -327,5 +370,9 @@ def depths_in_obstacles(rows: Floats, r: Floats) -> Floats:
     points = ((1.0 - x) * r[:-1] + x * r[1:]).reshape(-1, 3)
     within = -distances(rows, points).reshape(len(rows), PARTS - 1, len(r) - 1).max(axis=1)
     cut = np.where(within > 0.0, within / (strand + CUTS * rows[:, RADIUS, None]), -np.inf)
+    if met is not None:
+        cut = np.where(met > 0.0, cut, -np.inf)
+        apart = np.zeros((len(rows), 1))
+        found[np.append(met, apart, axis=1) + np.append(apart, met, axis=1) == 0.0] = -np.inf
     found[:, :-1] = np.maximum(found[:, :-1], cut)
     return np.asarray(found)

@@ -23,6 +23,7 @@ from hybrid.kernels.junctions.bodies import (
     size_of_moves,
     start_here,
 )
+from hybrid.kernels.junctions.body_contact import CARRY, COUPLE, HOLD, PRESS, STIFFEN
 from hybrid.kernels.junctions.carried_frames import turns
 from hybrid.kernels.junctions.joined_lines import solve_dense
 from hybrid.kernels.junctions.junctions import (
@@ -93,9 +94,18 @@ from hybrid.kernels.step.step import LARGEST_STEP_TURN, begin_step, end_step, fi
 from hybrid.kernels.watch.extremes import first_strains, note_extremes
 
 JUNCTIONS = 5
-call_solver, call_touch = caller((0, 0, 0.0, 0)), caller(0)
+call_solver, call_touch, call_meet = caller((0, 0, 0.0, 0)), caller(0), caller(0)
 # Where cv and ca of the task are among the numbers of a job, whose first field it is.
 TASK_CV, TASK_CA, TASK_DT = Task._fields.index("cv"), Task._fields.index("ca"), Task._fields.index("dt")
+
+
+@inner
+def ask_bodies(system, phase):
+    """What is asked of bodies that lines touch (kernels.junctions.body_contact); 0: it fails."""
+    if system.meet == 0:
+        return 1
+    system.phase[0] = phase
+    return call_meet(system.meet, system.meet_table)
 
 
 @inner
@@ -112,6 +122,7 @@ def march_lines(system, given):
     for b in range(work.shape[0]):
         for k in range(6):
             work[b, LINES + k] = 0.0
+    ask_bodies(system, CARRY)
     for l in range(tables.shape[0]):
         job = read(tables[l])
         n = job.line.h.shape[0]
@@ -123,6 +134,7 @@ def march_lines(system, given):
         for k in range(2):
             if joints[l, k] >= 0:
                 add_pull(joints[l, k], job.work.report, k, arms[l, k], turns(seats, l, k), net, work)
+    ask_bodies(system, PRESS)
     return -1, -1
 
 
@@ -417,11 +429,13 @@ def solve_system(table):
             outcome = OK
             break
         assemble_junctions(system, m, s.cv, s.ca, True)
+        ask_bodies(system, STIFFEN)
         if task.what == JUNCTIONS:
             outcome = OK
             break
         if task.what == EQUILIBRIUM and it == 1:
             hold_turns(work, A, first_unknown(points, count_tensions(joints), points))
+            ask_bodies(system, HOLD)
         if m > 0 and not solve_dense(A, m):
             outcome = SINGULAR
             break
@@ -429,6 +443,9 @@ def solve_system(table):
         if line >= 0:
             bad = read(tables[line])
             outcome, where = NOT_FINITE, first_bad(bad.work.x, bad.new.e)
+            break
+        if task.what != CORRECTION and ask_bodies(system, COUPLE) == 0:
+            outcome = SINGULAR
             break
         correct_torques(tables, s.cv)
         if touch != 0 and call_touch(touch, system.touch_table) == 0:
@@ -458,6 +475,7 @@ def solve_system(table):
             outcome = NOT_CONVERGED if strength > 1.0 else outcome
             strength = adapt_springs(work, strength, turned, LARGEST_TURN)
     if task.what == STEP or task.what == EQUILIBRIUM:
+        ask_bodies(system, CARRY)
         follow_laws(tables, s)
     if task.what == STEP:
         bad, line_of_bad, cell = end_system_step(system, task, s, outcome == OK)

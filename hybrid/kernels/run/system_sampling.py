@@ -23,6 +23,8 @@ from hybrid.kernels.junctions.bodies import (
     put_matrix,
 )
 from hybrid.kernels.laws.end_motion import sea_at
+from hybrid.kernels.laws.obstacle_motion import put_matrix as put_matrix_of
+from hybrid.kernels.laws.obstacle_motion import put_vector
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.state.books import (
     EARLIER_DT,
@@ -35,6 +37,7 @@ from hybrid.kernels.state.books import (
     SAMPLE_POSITION,
     SAMPLES,
 )
+from hybrid.kernels.state.obstacle_rows import ENDED, TURNED
 from hybrid.kernels.step.job import read
 from hybrid.kernels.step.sampling import SAME_TIME, frame_between, hermite, parabola, sample_head, sample_state
 
@@ -80,13 +83,26 @@ def sample_body(before, now, worked, b, where, row):
 
 
 @inner
+def carry_sampled(system, sea, rows):
+    """Obstacles that bodies carry are where these are in samples, rows of them."""
+    for k in range(system.rides.shape[0]):
+        b = system.rides[k]
+        if b >= 0:
+            put_vector(sea.carried, k, ENDED, vector(rows[b], SAMPLE_PLACE))
+            put_matrix_of(sea.carried, k, TURNED, matrix(rows[b], SAMPLE_AXES))
+
+
+@inner
 def take_sample(steps, system, where):
     """Lines and bodies at a time, as the next rows of the buffers; `system` leads on from the state of now."""
     t, x, dt, k = where
     count = steps.counts[SAMPLES]
+    for b in range(system.work.shape[0]):
+        sample_body(system.new, system.old, steps.worked, b, where, steps.bodies[count, b])
     for l in range(system.tables.shape[0]):
         job = read(system.tables[l])
         now, before, books = job.old, job.new, job.books
+        carry_sampled(system, job.sea, steps.bodies[count])
         row, n = books.samples[count], job.line.h.shape[0]
         if x < 1.0:
             sea_at(t, job.sea)
@@ -97,8 +113,6 @@ def take_sample(steps, system, where):
             row[SAMPLE_POSITION + 3 + j] = row[HEAD + 3 * n + j]
         if x < 1.0:
             sea_at(steps.clock[NOW], job.sea)
-    for b in range(system.work.shape[0]):
-        sample_body(system.new, system.old, steps.worked, b, where, steps.bodies[count, b])
     steps.counts[SAMPLES] += 1
     steps.counts[OUTPUT] += 1
 

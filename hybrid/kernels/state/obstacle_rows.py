@@ -26,7 +26,10 @@ OBSTACLE = 15
 # the end of the step and the next correction (rad), and their rate (1/s).
 BEGAN, ENDED, SWEEP, SPEED, TURNING, TURNED, STILL_AXIS, RATE, RAMP = 0, 3, 6, 15, 18, 21, 30, 33, 34
 INERTIA, BEARING, ROLLED_BEFORE, ROLLED, ROLL, ROLLING = 35, 36, 37, 38, 39, 40
-CARRIED = 41
+# Of a line that is fixed to the body which carries an obstacle: from which arc length and up to which (m) it meets that; of
+# what a body carries its place and whether one does (1.0), in axes of the body, as the axis at t = 0 is.
+MEETS_FROM, MEETS_TO, OFFSET, RIDES = 41, 42, 43, 46
+CARRIED = 47
 # Of Line.moved; of a row of State.sheave: angle (rad), rate, algorithmic and true acceleration.
 FIXED, MOVES, FREE = 0, 1, 2
 ANGLE, SPIN, ALGORITHMIC, TRUE = 0, 1, 2, 3

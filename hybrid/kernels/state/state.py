@@ -12,7 +12,17 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.machine.references import by_reference
 from hybrid.kernels.state.fields import HALF, MEAN, POINT, ROD, SHARED, blank, cell, fields_of, node
-from hybrid.kernels.state.obstacle_rows import CARRIED, EACH, ENDED, FORCE, FREE, OBSTACLE, SEEN, TURNED
+from hybrid.kernels.state.obstacle_rows import (
+    CARRIED,
+    EACH,
+    ENDED,
+    FORCE,
+    FREE,
+    OBSTACLE,
+    OFFSET,
+    SEEN,
+    TURNED,
+)
 from hybrid.kernels.state.report import REPORT_SIZE
 
 Floats = NDArray[np.float64]
@@ -300,7 +310,10 @@ def batch_of_one(
 
 def obstacles_now(sea: Sea, state: State) -> Floats:
     """Where obstacles are that move, and what the line does to them: (M, SEEN) of kernels.state.obstacle_rows."""
-    place, turned = sea.carried[:, ENDED : ENDED + 3], sea.carried[:, TURNED : TURNED + 9]
+    turned = sea.carried[:, TURNED : TURNED + 9]
+    # the middle of what bodies carry
+    offset = np.einsum("kij,kj->ki", turned.reshape(-1, 3, 3), sea.carried[:, OFFSET : OFFSET + 3])
+    place = sea.carried[:, ENDED : ENDED + 3] + offset
     force = -state.grip.reshape(len(state.r), -1, EACH)[:, :, FORCE:]
     moment = np.cross(state.r[:, None] - place, force)
     return np.hstack([place, turned, force.sum(axis=0), moment.sum(axis=0)])

@@ -1,0 +1,383 @@
+"""Lines that touch free bodies: rest by string theory, momentum of a body that is struck, heavy bodies, equivalences."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import Outcome, SceneError
+from hybrid.kernels.junctions.bodies import FRAME, PLACE, STATE, V, W
+from hybrid.kernels.laws.obstacles import stored_energy
+from hybrid.kernels.march.energies import observe
+from hybrid.kernels.state.books import SHORTEST, blank_books
+from hybrid.kernels.state.obstacle_rows import EACH, FORCE
+from hybrid.model.bodies import body_model
+from hybrid.model.build import build
+from hybrid.model.system import build_system
+from hybrid.scene.bodies import FreeBody, turned
+from hybrid.scene.read import as_scene_or_system
+from hybrid.scene.system import System
+from hybrid.simulation.system_start import joined_lines
+from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.system import SystemSolver
+
+RADIUS, STRAND, SPAN, APART, MASS = 0.6, 0.01, 10.0, 0.2, 20.0
+Tables = dict[str, Any]
+
+
+def on_two_lines(**body: Any) -> Tables:
+    """A ball on two taut lines side by side, at the middle of their span."""
+    section = {"length": 9.9, "mass": 0.05, "diameter": 2 * STRAND, "axial_stiffness": 1e6, "bending_stiffness": 1e-3,
+               "damping": {"mass": 0.5}}  # fmt: skip
+    line = {"sections": [section], "contact": {"self": False}, "model": "rod", "mesh": {"cells": 80}}
+    points = {
+        f"{x}{side}": {"position": [x, y, 0]} for x in (0, 10) for side, y in (("left", APART), ("right", -APART))
+    }
+    ball = {"initial_guess": [5.0, 0.0, 0.58], "mass": MASS, "inertia": [3.0, 3.0, 3.0],
+            "shape": {"kind": "sphere", "radius": RADIUS}}  # fmt: skip
+    return {
+        "points": points, "bodies": {"ball": ball | body},
+        "lines": {side: {"start": f"0{side}", "end": f"10{side}", **line} for side in ("left", "right")},
+        "time": {"duration": 0.2, "step": 0.01}, "output": {"every": 0.05, "points": 41},
+    }  # fmt: skip
+
+
+# --- at rest ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def rest() -> Any:
+    return hybrid.static(on_two_lines())
+
+
+def test_a_ball_rests_on_two_taut_lines_as_on_strings(rest: Any) -> None:
+    """A string of tension T under F at its middle gives way by F l/(2 T), l half its span: down by half of the weight,
+
+    and aside, as the normal at the place of contact leans.
+    """
+    left, half = rest.lines["left"], 0.5 * MASS * 9.81
+    place, T = left.position[-1][20], float(left.tension[-1].mean())
+    assert "stability not judged" in {x.kind for x in rest.events}
+    force = -left["obstacles/ball/force"][-1]  # on the line
+    np.testing.assert_allclose(rest["bodies/ball/force"][-1], [0, 0, MASS * 9.81], atol=1e-6)
+    assert force[2] == pytest.approx(-half, rel=1e-6)
+    lean = place[1] / (RADIUS + STRAND)
+    assert force[1] == pytest.approx(half * lean / np.sqrt(1 - lean**2), rel=0.005)
+    own = left["position"][-1][20][2] + half * 0.25 * SPAN / T
+    assert own == pytest.approx(-0.05 * 9.81 * SPAN**2 / (8 * T), rel=0.2)  # its weight, from what is small
+    assert place[1] - APART == pytest.approx(force[1] * 0.25 * SPAN / T, rel=0.02)
+    height = float(rest["bodies/ball/position"][-1][2] - place[2])
+    assert np.hypot(place[1], height) == pytest.approx(RADIUS + STRAND, abs=0.05 * 2 * STRAND)
+
+
+def test_what_rests_stays_and_an_obstacle_there_holds_the_lines_the_same(rest: Any) -> None:
+    moved = hybrid.run(on_two_lines())
+    np.testing.assert_allclose(moved["bodies/ball/position"], rest["bodies/ball/position"][[-1] * 5], atol=1e-8)
+    tables = on_two_lines()
+    del tables["bodies"], tables["time"]
+    at = rest["bodies/ball/position"][-1].tolist()
+    stiffness = float(_rows(on_two_lines())[0, 11])
+    tables["obstacles"] = {"ball": {"kind": "sphere", "at": at, "radius": RADIUS, "stiffness": stiffness}}
+    held = hybrid.static(tables)
+    for side in ("left", "right"):
+        np.testing.assert_allclose(held.lines[side].position, rest.lines[side].position, atol=1e-9)
+
+
+def _rows(tables: Tables) -> Any:
+    system = as_scene_or_system(tables)
+    assert isinstance(system, System)
+    return build_system(system).models[0].sea.values.obstacles
+
+
+# --- in motion --------------------------------------------------------------------------------------
+
+
+def pushed(**shape: Any) -> Tables:
+    """The ball falls askew on the lines, spins, and drags them along by friction."""
+    tables = on_two_lines(initial_guess=[4.2, 0.02, 0.7], initial_rotation=[20, 10, 30], moment=[5.0, 40.0, 3.0])
+    tables["bodies"]["ball"]["shape"] |= {"friction": 0.4} | shape
+    for side, y in (("left", APART), ("right", -APART)):
+        tables["lines"][side]["initial"] = {"kind": "straight", "direction": [1, 0, 0]}
+        tables["lines"][side]["sections"] = [tables["lines"][side]["sections"][0] | {"length": 10.0}]
+        tables["points"][f"0{side}"]["position"][1] = y
+    return tables | {"time": {"duration": 0.5, "step": 0.005}, "output": {"every": 0.05, "points": 21}}
+
+
+@pytest.fixture(scope="module")
+def fallen() -> Any:
+    return hybrid.run(pushed())
+
+
+def test_work_of_lines_on_a_body_is_that_of_the_body_on_the_lines(fallen: Any) -> None:
+    """Booked on both sides, by power here and by way there; the energy of the body is what is done on it."""
+    done = fallen["bodies/ball/work/lines"]
+    by_lines = sum(x["work/obstacles"] for x in fallen.lines.values())
+    assert np.abs(done).max() > 1.0
+    np.testing.assert_allclose(done, -by_lines, atol=0.02 * np.abs(done).max())
+    total = sum(fallen[f"bodies/ball/energy/{x}"] for x in ("kinetic", "potential"))
+    given = sum(fallen[f"bodies/ball/work/{x}"] for x in ("lines", "loads"))
+    np.testing.assert_allclose(total - total[0], given, atol=0.01 * np.abs(done).max())
+    force = sum(x["obstacles/ball/force"] for x in fallen.lines.values())
+    touches = np.linalg.norm(force, axis=1) > 0.0
+    assert touches.any() and not touches.all()
+    np.testing.assert_allclose(force, fallen["bodies/ball/force"], atol=1e-3 * np.abs(force).max())
+    assert not any(x.kind in ("deep in an obstacle", "gains energy") for x in fallen.events)
+
+
+def test_a_turned_scene_moves_the_same(fallen: Any) -> None:
+    angle = np.radians(40.0)
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    tables = pushed()
+    for point in tables["points"].values():
+        point["position"] = (turn @ point["position"]).tolist()
+    ball = tables["bodies"]["ball"]
+    ball["initial_guess"], ball["moment"] = (turn @ ball["initial_guess"]).tolist(), (turn @ ball["moment"]).tolist()
+    ball["initial_rotation"][2] += 40.0
+    for line in tables["lines"].values():
+        line["initial"]["direction"] = turn[:, 0].tolist()
+    result = hybrid.run(tables)
+    np.testing.assert_allclose(result["bodies/ball/position"], fallen["bodies/ball/position"] @ turn.T, atol=1e-9)
+    for side, x in fallen.lines.items():
+        np.testing.assert_allclose(result.lines[side].position, x.position @ turn.T, atol=1e-9)
+
+
+def test_where_the_origin_of_a_body_is_changes_nothing(fallen: Any) -> None:
+    """Origin elsewhere in the body, its middle and its mass where they were: to what steps make of the way of another
+
+    point, a hundred-thousandth of the way.
+    """
+    tables, place = pushed(), (0.1, -0.2, 0.15)
+    ball = tables["bodies"]["ball"]
+    ball["shape"]["place"] = ball["centre"] = list(place)
+    ball["initial_guess"] = np.subtract(ball["initial_guess"], turned((20, 10, 30), place)).tolist()
+    result = hybrid.run(tables)
+    for side, x in fallen.lines.items():
+        a, b = result.lines[side], x
+        np.testing.assert_allclose(a.position, b.position, atol=5e-5)
+        np.testing.assert_allclose(a["obstacles/ball/position"], fallen["bodies/ball/position"], atol=5e-5)
+        most = np.abs(b["obstacles/ball/moment"]).max()
+        assert most > 0.5
+        np.testing.assert_allclose(a["obstacles/ball/moment"], b["obstacles/ball/moment"], atol=0.02 * most)
+
+
+def test_a_run_that_goes_on_has_the_same_bits(tmp_path: Path, fallen: Any) -> None:
+    hybrid.run(pushed() | {"time": {"duration": 0.25, "step": 0.005}}, tmp_path / "a.h5")
+    result = hybrid.resume(tmp_path / "a.h5", until=0.5)
+    for side, x in fallen.lines.items():
+        assert np.array_equal(result.lines[side].position, x.position)
+    assert np.array_equal(result["bodies/ball/position"], fallen["bodies/ball/position"])
+
+
+@pytest.mark.parametrize("kind", ["sphere", "cylinder"])
+def test_a_very_heavy_body_is_an_obstacle(kind: str) -> None:
+    """Of a cylinder across the lines, too, whose axis its body turns there."""
+    tables = pushed(stiffness=1e5)
+    tables["environment"] = {"gravity": 0}
+    heavy = {"initial_guess": [4.2, 0.02, 0.62], "mass": 1e12, "inertia": [1e12, 1e12, 1e12],
+             "shape": tables["bodies"]["ball"]["shape"]}  # fmt: skip
+    obstacle = heavy["shape"] | {"at": heavy["initial_guess"]}
+    if kind == "cylinder":
+        heavy["shape"] |= {"kind": "cylinder", "axis": [2, 0, 0], "length": 3.0, "place": [0.5, 0, 0]}
+        heavy |= {"initial_rotation": [0, 0, 80], "initial_guess": [4.2 - 0.5 * np.cos(np.radians(80)), -0.48, 0.62]}
+        axis = [np.cos(np.radians(80)), np.sin(np.radians(80)), 0]
+        obstacle |= {"kind": "cylinder", "axis": axis, "length": 3.0,
+                     "at": [4.2, -0.48 + 0.5 * np.sin(np.radians(80)), 0.62]}  # fmt: skip
+    tables["bodies"] = {"ball": heavy}
+    for side in ("left", "right"):
+        for end in (0, 10):
+            up = {"travel": {"by": [0, 0, 0.05], "over": 0.3}}
+            tables["points"][f"{end}{side}"]["motion"] = up
+    other = deepcopy(tables)
+    del other["bodies"]
+    other["obstacles"] = {"ball": obstacle}
+    by_body, by_obstacle = hybrid.run(tables), hybrid.run(other)
+    lifted = by_obstacle.lines["left"].position[-1][:, 2]
+    assert lifted.min() < 0.045 < lifted.max()  # it is held back
+    for side in ("left", "right"):
+        a, b = by_body.lines[side], by_obstacle.lines[side]
+        np.testing.assert_allclose(a.position, b.position, atol=1e-6)
+        np.testing.assert_allclose(a.tension, b.tension, rtol=1e-6, atol=1e-3)
+
+
+def test_lines_that_end_at_another_body_run_either_way_and_as_catenaries() -> None:
+    """Both ends of a line may be unknown where it touches: its start at what moves, or its end."""
+
+    def between_bodies(reversed_: bool, model: str) -> Any:
+        tables = pushed()
+        for name, y in (("left", APART), ("right", -APART)):
+            line, section = tables["lines"][name], tables["lines"][name]["sections"][0]
+            tables["points"][f"10{name}"] = {"body": "bar", "place": [0, y, 0]}
+            if reversed_:
+                line["start"], line["end"], line["initial"]["direction"] = line["end"], line["start"], [-1, 0, 0]
+            bends = {"bending_stiffness": section["bending_stiffness"]} if model == "rod" else {}
+            line["sections"] = [{k: x for k, x in section.items() if k != "bending_stiffness"} | bends]
+            line["model"] = model
+        pull = [2000.0, 0, 500.0 * 9.81]
+        tables["bodies"]["bar"] = {"initial_guess": [10, 0, 0], "mass": 500, "inertia": [99, 99, 99], "force": pull}
+        return hybrid.run(tables | {"time": {"duration": 0.35, "step": 0.005}})
+
+    result = between_bodies(False, "rod")
+    assert np.abs(result["bodies/ball/force"]).max() > 100.0
+    back, soft = between_bodies(True, "rod"), between_bodies(False, "catenary")
+    for body in ("ball", "bar"):
+        place = result[f"bodies/{body}/position"]
+        np.testing.assert_allclose(back[f"bodies/{body}/position"], place, atol=1e-9)
+        np.testing.assert_allclose(soft[f"bodies/{body}/position"], place, atol=1e-5)
+    np.testing.assert_allclose(back.lines["left"].position[:, ::-1], result.lines["left"].position, atol=1e-9)
+
+
+def test_a_run_from_outside_is_the_run_and_goes_back(fallen: Any) -> None:
+    with hybrid.Simulation(pushed()) as run:
+        run.advance(0.1)
+        saved = run.save()
+        for _ in range(2):
+            run.advance(0.2)
+            places = np.array(run.line("left").position)[::4]
+            np.testing.assert_allclose(places, fallen.lines["left"].position[4], atol=1e-10)
+            run.restore(saved)
+
+
+def test_a_line_ignores_the_body_that_it_is_fixed_to_until_it_has_left_it() -> None:
+    """A buoy on its mooring, fixed to its bottom or to its middle: as without a shape; laid over the buoy it is not."""
+    section = {"length": 12.0, "mass": 1.0, "diameter": 0.04, "axial_stiffness": 1e6, "bending_stiffness": 1.0}
+    for place in ([0, 0, -0.5], [0, 0, 0]):
+        tables: Tables = {
+            "environment": {"fluid": {"density": 1025}},
+            "points": {"anchor": {"position": [0, 0, -12]}, "eye": {"body": "buoy", "place": place}},
+            "bodies": {"buoy": {"initial_guess": [0.2, 0, 0.5], "mass": 300.0, "inertia": [40.0, 40.0, 40.0],
+                                "volume": 0.5, "centre_of_buoyancy": [0, 0, 0.1]}},
+            "lines": {"leg": {"start": "anchor", "end": "eye", "sections": [section], "model": "rod",
+                              "contact": {"self": False}, "mesh": {"cells": 60}}},
+        }  # fmt: skip
+        bare = hybrid.static(tables)
+        tables["bodies"]["buoy"]["shape"] = {"kind": "sphere", "radius": 0.5, "friction": 0.2}
+        shaped = hybrid.static(tables)
+        np.testing.assert_allclose(shaped.lines["leg"].position, bare.lines["leg"].position, atol=1e-9)
+        assert not shaped.lines["leg"]["obstacles/buoy/force"].any()
+
+
+# --- free flight ------------------------------------------------------------------------------------
+
+
+def thrown(friction: float, step: float) -> tuple[Any, list[float], Any, float]:
+    """A line thrown at a ball: momenta before and after (2, 6) about the origin, energies, final states, largest push."""
+    section = {"length": 3.0, "mass": 0.4, "diameter": 0.02, "bending_stiffness": 0.1, "axial_stiffness": 2e5,
+               "torsional_stiffness": 0.08}  # fmt: skip
+    body = FreeBody(
+        initial_guess=(1.2, 0.3, 0.0), initial_rotation=(10, 20, 30), mass=2.0, inertia=(0.1, 0.2, 0.25),
+        centre=(0.05, 0.02, -0.03), shape={"kind": "sphere", "radius": 0.3, "friction": friction, "stiffness": 1e4},
+    )  # fmt: skip
+    model = build(hybrid.validate_scene({
+        "environment": {"gravity": 1e-15}, "cable": {"sections": [section]}, "contact": {"self": False},
+        "ends": {"start": "free", "end": "free"}, "model": "rod", "mesh": {"cells": 60}, "dimension": 3,
+        "initial": {"kind": "points", "points": [[0, 0, 0.35], [3, 0, 0.35]]}, "obstacles": body.surface("ball"),
+        "time": {"duration": 1.0, "step": 0.1},
+    }))  # fmt: skip
+    state = model.start.copy()
+    state.v[:] = (0.5, 0.0, -4.0)
+    one = body_model("ball", body, 0.0, 0.0)
+    x = JoinedLine(
+        model.line, model.sea.at(0.0), model.ends.at(0.0), model.length, model.tension_scale, -np.inf, (-1, -1),
+        rides=np.zeros(1, np.int64),
+    )  # fmt: skip
+    solver = SystemSolver([x], 0, one.numbers[None])
+    books = [blank_books(60)]
+    books[0].clock[SHORTEST] = 1e-9
+    solver.keep_books(books)
+    row = np.zeros((1, STATE))
+    row[0] = one.start
+    row[0, W : W + 3] = (0.5, -1.0, 2.0)
+    old = SystemState([state], row)
+    solver.consistent_accelerations(old, [np.zeros((2, 3))])
+
+    def momenta(states: SystemState) -> Any:
+        line, b = states.lines[0], states.bodies[0]
+        R, p = b[FRAME:V].reshape(3, 3), model.line.mass[:, None] * line.v
+        both = one.numbers[:36].reshape(6, 6) @ np.concatenate([R.T @ b[V : V + 3], b[W : W + 3]])
+        linear, angular = R @ both[:3], R @ both[3:]
+        turning = np.cross(line.r, p).sum(axis=0) + np.cross(b[PLACE:FRAME], linear) + angular
+        return np.concatenate([p.sum(axis=0) + linear, turning])
+
+    def energy(states: SystemState) -> float:
+        line, b, parts = states.lines[0], states.bodies[0], np.zeros(5)
+        room = np.zeros((61, 3))
+        observe(model.line, x.ends, line.e, line.v, line.a1, line.w, line.T, line.turn, room, room.copy(), parts)
+        nu = np.concatenate([b[FRAME:V].reshape(3, 3).T @ b[V : V + 3], b[W : W + 3]])
+        stored = float(stored_energy(model.line, x.sea, line.r))
+        return float(parts[:4].sum() + 0.5 * nu @ one.numbers[:36].reshape(6, 6) @ nu) + stored
+
+    new, t, before, rho, part, most = old.copy(), 0.0, 0.0, 0.9, step, 0.0
+    first, energies = momenta(old), [energy(old)]
+    while t < 0.25 * (1.0 - 1e-9):
+        x.sea.now[0] = t + part
+        taken = solver.step(old, new, part, 0.9, before, rho, t + part)
+        if taken.outcome != Outcome.OK:
+            part *= 0.5
+            assert part > 1e-5 * step, taken
+            continue
+        old, new, before, rho, t = new, old, part, taken.rho, t + part
+        energies.append(energy(old))
+        most = max(most, float(np.linalg.norm(old.lines[0].grip.reshape(61, EACH)[:, FORCE:].sum(axis=0))))
+        part = min(2.0 * part, step)
+    return np.stack([first, momenta(old)]), energies, old, most
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_a_thrown_line_gives_a_ball_what_it_loses(friction: float) -> None:
+    """Momentum to 1e-6 of what the line brings, and energy never above 1.001 of what there was.
+
+    Angular momentum is kept as well as steps keep that of a free line.
+    """
+    momenta, energies, last, most = thrown(friction, 0.001)
+    brought = 3.0 * 0.4 * 4.0
+    assert most > 2.0 and np.linalg.norm(last.bodies[0, V : V + 3]) > 0.1
+    assert np.abs(momenta[1, :3] - momenta[0, :3]).max() < 1e-6 * brought
+    assert np.abs(momenta[1, 3:] - momenta[0, 3:]).max() < 1e-3 * brought
+    assert min(energies) / energies[0] > 0.8 and max(energies) < 1.001 * energies[0]
+
+
+def test_newtons_method_converges_quadratically() -> None:
+    """A step of a spinning ball pressed on lines, with friction: what is left falls by squares once contact is found."""
+    system = as_scene_or_system(pushed())
+    assert isinstance(system, System)
+    model = build_system(system)
+    solver = SystemSolver(joined_lines(model, 0.0), 0, model.body_numbers(0.0))
+    start = SystemState([x.start for x in model.models], model.body_places).copy()
+    start.bodies[0, PLACE + 2] = 0.574  # 2 mm deep
+    start.bodies[0, W : W + 3] = (1.0, -3.0, 2.0)
+    left = []
+    for most in (4, 5, 6):
+        for x in solver.lines:
+            x.sea.now[0] = 0.002
+        left.append(solver.step(start, start.copy(), 0.002, 0.9, 0.0, 0.9, 0.002, most=most).residual)
+    print(f"\nforces out of balance, N: {', '.join(f'{x:.2g}' for x in left)}")
+    assert left[0] < 10.0 and left[1] < 0.02 * left[0] and left[2] < 1e-3 * left[1]
+
+
+# --- what is refused --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("what", "where"), [("self", "bodies.ball.shape"), ("lines", "bodies.ball.shape")])
+def test_contact_of_lines_beside_a_shape_is_refused(what: str, where: str) -> None:
+    tables = on_two_lines()
+    if what == "self":
+        del tables["lines"]["left"]["contact"]
+    else:
+        tables["contact"] = {"friction": 0.1}
+    with pytest.raises(SceneError, match="knows no bodies") as error:
+        hybrid.static(tables)
+    assert any(x.where == where for x in error.value.complaints)
+
+
+def test_a_shape_has_the_name_of_no_obstacle_and_no_stiffness_is_known_beside_it() -> None:
+    tables = on_two_lines()
+    with pytest.raises(SceneError, match="opens and closes"):
+        hybrid.stiffness(tables, "body:ball")
+    tables["obstacles"] = {"ball": {"kind": "sphere", "at": [0, 0, 9], "radius": 1}}
+    with pytest.raises(SceneError, match="no obstacle has"):
+        hybrid.static(tables)
