@@ -46,7 +46,7 @@ def _results(scene: Scene | System, motion: bool) -> list[str]:
         return [f"max {line}tension@{end}" for line in of for end in ("start", "end")]
     if not isinstance(scene, hybrid.Scene):
         return [f"{name}/tension@{end}" for name in scene.lines for end in ("start", "end")]
-    names = ["tension@0", f"tension@{scene.length:g}"]
+    names = ["tension@start", "tension@end"]
     return [*names, "max curvature"] if scene.model.kind != "catenary" else names
 
 

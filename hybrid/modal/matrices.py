@@ -156,7 +156,8 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: boo
     mass = (more - base) / (high - ANCHOR)
     base -= ANCHOR * mass
     K, M = sparse_rows(base), sparse_rows(mass)
-    K = K - sparse.diags_array(_spin_springs(line))  # what turns freely about its axis is a motion that costs nothing
+    if quick:  # what turns freely about its axis is a motion that costs nothing; at rest springs keep it where it is
+        K = K - sparse.diags_array(_spin_springs(line))
     if line.torsion.size:
         K = K + _through_zones(line)
     free = np.ones((count, SIZE), bool)

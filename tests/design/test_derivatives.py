@@ -113,6 +113,22 @@ def test_a_rope_answers_as_it_stretches_at_rest(key, dynamic):
     np.testing.assert_allclose(rest.by([key])[0], (more - less) / (2.0 * d), rtol=1e-6)
 
 
+def test_a_rod_that_turns_freely_about_its_axis_has_derivatives():
+    """Pinned at both ends, with inertia of its sections: nothing but the spring that a rod is lent holds its spin."""
+    rope = {"length": 60.0, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 1e6, "bending_stiffness": 200.0}
+    rope |= {"torsional_stiffness": 200.0, "drag": {"normal": 1.2, "tangential": 0.03}, "rotary_inertia": [0.01, 0.02]}
+    rope |= {"dynamic_stiffness": {"constant": 2e6, "per_tension": 20.0, "relaxation_time": 20.0}}
+    made = hybrid.validate_scene(scene(rope, pinned(0, 0, -30), pinned(36, 3, -2), "rod", 30, SEA))
+    of = ["tension@end", "reaction_start.x", "max curvature"]
+    rest = CableAtRest(made, 1.0, [parse_result(x, made.length) for x in of])
+    torque = np.where(rest._free % 5 == 4, 1.0 / 30.0, 0.0)
+    assert 1e3 < np.abs(rest._factors.solve(torque)).max() < 1e8  # rad for 1 N m; without the springs 1e12 and more
+    for key in ("cable.sections[0].mass", "ends.end.position[1]"):
+        d = 1e-5 * rest.number(key)
+        more, less = (results(changed_scene(made, key, rest.number(key) + x), of) for x in (d, -d))
+        np.testing.assert_allclose(rest.by([key])[0], (more - less) / (2.0 * d), rtol=2e-6)
+
+
 def test_the_end_stays_the_end_when_the_length_changes():
     """The lower end of a hanging line sinks by dL and its stretch; a place by its arc length stays where it is."""
     m, L, EA = 5.0, 40.0, 1e6
