@@ -27,8 +27,8 @@ NUMBERS = [
     "cable.sections[0].length", "cable.sections[0].mass", "cable.sections[0].diameter", "environment.gravity",
     "cable.sections[0].axial_stiffness", "ends.end.position[0]",
 ]  # fmt: skip
-# Parts of a number by which equilibria differ: what is least between two that follow each other is believed.
-STEPS = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5)
+# Parts of a number by which equilibria differ: coarser ones count kinks of contact; what changes least is believed.
+STEPS = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
 # A result that answers less than this, in parts by parts, is compared with that.
 LEAST = 1e-3
 
@@ -115,6 +115,8 @@ def test_differences_of_equilibria() -> None:
     worst: dict[str, list[np.ndarray]] = {kind: [] for kind in KINDS}
     for seed in range(SCENES):
         kind, tables = scene_at_rest(seed)
+        if not kind.startswith(os.environ.get("KIND", "")):
+            continue
         scene = hybrid.validate_scene(tables)
         place = f"position.z@{0.45 * scene.length!r}"
         wanted = [parse_result(x, scene.length) for x in [*of, place]]
