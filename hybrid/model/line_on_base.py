@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.kernels.machine.binding import Packed, Table
-from hybrid.kernels.mesh.zone_criteria import NodeKinds, blank_kinds
+from hybrid.kernels.mesh.zone_criteria import HINGE, NodeKinds, blank_kinds
 from hybrid.kernels.mesh.zone_line import Cable, blank_kinds_job, blank_line_job, fill_kinds
 from hybrid.kernels.state.state import NO_PLANE, Floats, Line
 from hybrid.model.layout import Layout
@@ -45,4 +45,5 @@ class LineOnBase:
             least=LEAST_TENSION * scale,
         )  # fmt: skip
         fill_kinds(self._kinds_job.numbers)
+        kinds.node[[0, -1]] = np.where(self._material.hinges > 0.0, HINGE, kinds.node[[0, -1]])
         return kinds

@@ -94,6 +94,7 @@ class Material:
     held_tangent: tuple[bool, bool]  # whether an element sits at the ends of a rod
     held_twist: tuple[bool, bool]  # and resists twist
     springs: tuple[float, float]  # N m/rad, angular springs between held tangents and a rod; infinite: rigid
+    hinged: tuple[bool, bool]  # whether a rod has no moment at an end, whatever its loads
     at: Floats  # (P,) m, where points are
     lift: Floats  # (P,) N, constant force upwards of each
     footing: Floats  # (P,) m, cable that presses on the seabed as much as each; empty without a seabed
@@ -128,6 +129,19 @@ class Material:
         how far it bends (catenaries, criteria).
         """
         return self._of_tables(max, self.mean_initial_bending)
+
+    @property
+    def hinges(self) -> Floats:
+        """(2,) N m2, EI at ends where the curvature of a rod fades to nothing, as results of catenaries have it.
+
+        0 where an end bends the line, and where a catenary cannot know what a rod would do: bent without stress, or
+        differently in two directions.
+        """
+        known = [
+            hinged and not self.kappa[k, :2].any() and self.B[k, 0] == self.B[k, 1]
+            for k, hinged in zip((0, -1), self.hinged, strict=True)
+        ]
+        return np.where(known, self.mean_bending[[0, -1]], 0.0)
 
     @property
     def mean_initial_bending(self) -> Floats:
@@ -307,6 +321,7 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         held_tangent=(start.held_tangent is not None, end.held_tangent is not None),
         held_twist=(start.holds_twist, end.holds_twist),
         springs=(start.spring, end.spring),
+        hinged=(not start.acts_by_moment, not end.acts_by_moment),
         at=np.zeros(0), lift=np.zeros(0), footing=np.zeros(0), points={name: np.zeros(0) for name in POINT},
     )  # fmt: skip
     if any(x.curve for x in of):

@@ -57,6 +57,7 @@ class JoinedGrid(Grid):
     def __init__(self, grids: Sequence[Grid]) -> None:
         first, self.of = grids[0], grids
         self.loads, self.changes, self.after, self._kept = first.loads, first.changes, first.after, first._kept
+        self.hinges = grids[0].hinges
         self.begin = np.cumsum([0, *(grid._x.size for grid in grids)])  # nodes before each line
         sides = np.cumsum([0, *(len(grid.side_nodes) for grid in grids)])
         self.parts = tuple(part for grid in grids for part in grid.parts)

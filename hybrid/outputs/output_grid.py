@@ -91,13 +91,15 @@ class Grid:
     def __init__(
         self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = (),
         changes: Sequence[float] = (), after: bool = False, kept: Sequence[float] = (),
+        hinges: Sequence[float] = (0.0, 0.0),
     ) -> None:  # fmt: skip
         """loads: arc lengths, m, that cut the line, as of `stretches`; changes: those of them where one section ends
 
-        and the next begins; after: a point on a cut shows the side after it; kept: those of loads where no force acts.
+        and the next begins; after: a point on a cut shows the side after it; kept: those of loads where no force acts;
+        hinges: N m2, EI at ends where results of catenaries take the curvature away, 0: it stays.
         """
         nodes_s = np.require(nodes_s, float, ("C", "W"))  # so that kernels have one signature
-        self.loads, self.changes, self.after = tuple(loads), tuple(changes), after
+        self.loads, self.changes, self.after, self.hinges = tuple(loads), tuple(changes), after, tuple(hinges)
         self.parts, self._kinds = stretches(zones, loads), [zone.kind for zone in zones]
         bounds = np.array([self.parts[0].s_a, *(part.s_b for part in self.parts)])
         cuts = np.abs(nodes_s - bounds[:, None]).argmin(axis=1)  # their nodes
@@ -138,6 +140,7 @@ class Grid:
             "loads",
             "changes",
             "after",
+            "hinges",
             "parts",
             "spans",
             "side_nodes",

@@ -202,6 +202,7 @@ class Observer:
         payout: bool = False,
         quantities: Quantities | None = None,
         obstacles: Sequence[str] = (),
+        hinges: Sequence[float] = (0.0, 0.0),
     ) -> None:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
 
@@ -212,9 +213,10 @@ class Observer:
         section ends and the next begins; finest: m, all nodes that there may be, where cells follow the curvature;
         gauges: places (x, y), m, where the elevation of the sea is recorded.
         payout: whether the line is paid out; quantities: what the scene asks for beside the usual;
-        obstacles: their names.
+        obstacles: their names; hinges: N m2, as of `Grid`.
         """
         self._finest = finest
+        self._hinges = tuple(hinges)
         self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(changes)
         near = NEAR * line.s[-1]
         self._unloaded = tuple(x for x in jumps if all(abs(x - y) > near for y in loads))
@@ -295,16 +297,16 @@ class Observer:
         self.s, jumps, (begin, end) = s, self.jumps, line.s[[0, -1]]
         if s[-1] > end * (1.0 + NEAR) or s[0] < begin - NEAR * end:  # on the reel: the values of the fairlead
             s, jumps = np.clip(s, begin, end), np.clip(jumps, begin, end)
-        self.grid = Grid(line.s, zones, s, self._cuts, self._changes, kept=self._unloaded)
-        self._after = Grid(line.s, zones, jumps, self._cuts, self._changes, True, self._unloaded)
+        self.grid = Grid(line.s, zones, s, self._cuts, self._changes, kept=self._unloaded, hinges=self._hinges)
+        self._after = Grid(line.s, zones, jumps, self._cuts, self._changes, True, self._unloaded, self._hinges)
 
     def on_varied(self, line: Line, sea: Sea, zones: Sequence[Zone], nodes: Floats) -> Observer:
         """The same fields of a line whose nodes (nb, N+1) m are elsewhere in every output; zones: of the first."""
         other, ends = copy(self), (nodes[:, :1], nodes[:, -1:])
         other.line, other.sea, other.zones = line, sea, tuple(zones)
         s, jumps = np.clip(self.s, *ends), np.clip(self.jumps, *ends)  # on the reel: the values of the fairlead
-        other.grid = VaryingGrid(nodes, zones, s, self._cuts, self._changes, kept=self._unloaded)
-        other._after = VaryingGrid(nodes, zones, jumps, self._cuts, self._changes, True, self._unloaded)
+        other.grid = VaryingGrid(nodes, zones, s, self._cuts, self._changes, kept=self._unloaded, hinges=self._hinges)
+        other._after = VaryingGrid(nodes, zones, jumps, self._cuts, self._changes, True, self._unloaded, self._hinges)
         return other
 
     @property
@@ -351,7 +353,9 @@ class Observer:
             if last is not None and last.suits(x.line.s, x.zones):
                 found.append(last.moved(x.line.s, at))
             else:
-                found.append(Grid(x.line.s, x.zones, at, self._cuts, self._changes, after, self._unloaded))
+                found.append(
+                    Grid(x.line.s, x.zones, at, self._cuts, self._changes, after, self._unloaded, self._hinges)
+                )
         return found
 
     @property

@@ -18,12 +18,13 @@ class VaryingGrid(Grid):
     def __init__(
         self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = (),
         changes: Sequence[float] = (), after: bool = False, kept: Sequence[float] = (),
+        hinges: Sequence[float] = (0.0, 0.0),
     ) -> None:  # fmt: skip
         """nodes_s: (nb, N+1) m, nodes of every output; s: (nb, ns) m, its points; zones: of the first; the rest as of
 
         `Grid`.
         """
-        super().__init__(nodes_s[0], zones, s[0], loads, changes, after, kept)
+        super().__init__(nodes_s[0], zones, s[0], loads, changes, after, kept, hinges)
         self._grids = [self.moved(x, at) for x, at in zip(nodes_s, s, strict=True)]
 
     def _stacked(self, size: int, of: Callable[[Grid], Rows]) -> Rows:

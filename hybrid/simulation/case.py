@@ -487,7 +487,7 @@ class Case:
             model.finest_nodes if follows_curvature(self.scene) and model.layout and not only else None,
             () if only else self.scene.output.elevation or (),
             model.payout is not None, None if only else quantities_of(self.scene),
-            obstacles=() if only else model.sea.names,
+            obstacles=() if only else model.sea.names, hinges=model.cable.hinges,
         )  # fmt: skip
 
     def _report(self, run: Transient, finished: bool) -> None:

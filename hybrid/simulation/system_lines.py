@@ -97,7 +97,7 @@ def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | N
     return Observer(
         model.line, model.sea.values, model.zones, s, moves and only is None, model.attached, kinds, criteria,
         only=only, jumps=jumps, changes=section_changes(scene), quantities=None if only else quantities_of(scene),
-        obstacles=() if only else model.sea.names,
+        obstacles=() if only else model.sea.names, hinges=model.cable.hinges,
     )  # fmt: skip
 
 
@@ -164,6 +164,7 @@ class LineResult:
         right[marked] = nodes + np.arange(marked.size)
         books, base = blank_books(line.h.size), self.model.always.astype(np.int64)
         books.loaded[:] = self.model.loaded_ends
+        books.hinges[:] = self.model.cable.hinges
         books.clock[[LEAST_PEAK, RELEASE_START, RELEASE_END]] = np.inf
         books.counts[STIFF], books.counts[VARIES] = self.model.inextensible, self.model.layout is not None
         books.clock[RHO] = self.scene.time.rho_inf if self.scene.time is not None else 0.0

@@ -231,7 +231,7 @@ class CompiledRun:
 
     def _changing(self) -> Iterator[Floats]:
         skipped = {"outputs", "log", "samples", "borne", "base", "placed", "loaded", "start", "marks", "right"}
-        skipped |= {"asked", "path", "radii", "walls"}
+        skipped |= {"hinges", "asked", "path", "radii", "walls"}
         skipped.add("model_error")  # where it is followed, simulation.stepping packs a checkpoint instead
         yield from (x for state in self.states for x in state)
         yield from self.pushes

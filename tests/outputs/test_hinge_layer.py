@@ -14,6 +14,11 @@ EI, WEIGHT = 5e4, 20.0 * 9.81  # N m2, N/m
 
 
 def sag(model: Any, cells: int, turned: bool = False, across: Any = 0.0, up: float = 0.0) -> hybrid.Result:
+    """The sag at rest."""
+    return hybrid.static(sagging(model, cells, turned, across, up))
+
+
+def sagging(model: Any, cells: int, turned: bool = False, across: Any = 0.0, up: float = 0.0) -> dict[str, Any]:
     """A sag between two pins at rest, its tension some 9 kN: sqrt(EI/T) is 2.4 m; outputs at nodes and middles.
 
     turned: counted from the other end; across: m/s, of a current that leads it out of its plane, or as a table by z;
@@ -27,13 +32,13 @@ def sag(model: Any, cells: int, turned: bool = False, across: Any = 0.0, up: flo
         one, two = two, one
         if isinstance(model, dict):
             model = {"kind": "zones", "zones": model["zones"][::-1]}
-    return hybrid.static({
+    return {
         "environment": {
             "fluid": {"density": 1025, "current": [0, across, 0] if isinstance(across, float) else across}
         },
         "cable": {"sections": [section]}, "ends": {"start": one, "end": two}, "initial": "equilibrium",
         "model": model, "mesh": {"cells": cells}, "output": {"points": 2 * cells + 1},
-    })  # fmt: skip
+    }  # fmt: skip
 
 
 ZONES = {"kind": "zones", "zones": [{"catenary": JOINT}, {"rod": LENGTH - JOINT}]}
@@ -77,3 +82,35 @@ def test_what_is_put_back_is_the_discrete_layer_of_a_hinge() -> None:
     for n in range(1, 6):
         back = curvature[node + 2 * n] - moment[node + 2 * n] / EI
         assert back == pytest.approx(curvature[node] * f**n, rel=0.01)
+
+
+@pytest.mark.parametrize("across", [0.0, 0.5], ids=["plane", "space"])
+@pytest.mark.parametrize("cells", [25, 50, 100])
+def test_curvature_of_a_catenary_fades_at_its_pins(cells: int, across: float) -> None:
+    """As that of a rod, whose ends bear no moment: within 1 %, at nodes and between them."""
+    rods, plain = (sag(model, cells, across=across) for model in ("rod", "catenary"))
+    near = np.minimum(rods.s, LENGTH - rods.s) < 15.0
+    assert np.abs(plain.curvature - rods.curvature)[..., near].max() < 0.01 * rods.curvature[..., near].max()
+    np.testing.assert_array_equal(plain.curvature[..., [0, -1]], 0.0)
+
+
+def test_it_stays_where_an_end_has_a_moment() -> None:
+    """A catenary does not feel it, so it cannot know what a rod would do there."""
+    scene = sagging("catenary", 50)
+    scene["ends"]["end"] = {"kind": "free", "force": [9000.0, 0.0, 9810.0], "moment": [0.0, 100.0, 0.0]}
+    found = hybrid.static(scene)
+    assert found.curvature[0, -1] > 0.9 * found.curvature[0, -2] > 0.0
+    assert found.curvature[0, 0] == 0.0
+
+
+@pytest.mark.parametrize("model", ["catenary", ZONES, {"kind": "adaptive"}], ids=["catenary", "zones", "adaptive"])
+def test_extremes_of_steps_have_it_too(model: Any) -> None:
+    """Of a line that stays at rest extremes over all steps are what outputs show at its nodes."""
+    scene = sagging(model, 50, across=0.5)
+    scene["time"] = {"duration": 0.2, "step": 0.1}
+    scene["output"] |= {"every": 0.1, "points": 51}
+    found = hybrid.run(scene)
+    low, high = (found["envelope"][f"curvature_{x}"] for x in ("min", "max"))
+    shown = found.curvature
+    np.testing.assert_allclose(high, shown.max(axis=0), rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(low, shown.min(axis=0), rtol=1e-6, atol=1e-9)

@@ -52,8 +52,8 @@ MOST = 1e6
 TWISTED = 0.5
 # The most that a tension counts for that is only foreseen.
 FORESEEN = 2.0
-# What may sit at a node: nothing, a jump of bending stiffness, a point load.
-SMOOTH, STEP, LOAD = 0, 1, 2
+# What may sit at a node: nothing, a jump of bending stiffness, a point load, at an end a hinge that results know.
+SMOOTH, STEP, LOAD, HINGE = 0, 1, 2, 3
 
 
 @inner
@@ -142,7 +142,7 @@ class NodeKinds(NamedTuple):
     GJ: Floats  # (N+1,) N m2, the smaller one where it jumps; 0: twist has no meaning
     w: Floats  # (N+1,) N/m, weight per length
     bent: Floats  # (N+1,) 1/m, curvature without stress
-    node: NDArray[np.int8]  # (N+1,) SMOOTH, STEP or LOAD
+    node: NDArray[np.int8]  # (N+1,) SMOOTH, STEP, LOAD or HINGE
     floor: Floats  # (N+1,) N, tension floor
     base_of_cell: NDArray[np.int64]  # (N,)
     free: NDArray[np.int8]  # (n,) of base cells
@@ -222,12 +222,14 @@ def bends_at(line, kinds, shares, layers, i):
 def lack_of_node(line, kinds, shares, layers, i, T):
     """What a catenary would lack at node i, at tension T, N; and the criterion that this is.
 
-    layers: what joints take of curvature is that of results, which put it back.
+    layers: what joints and hinges take of curvature is in results.
     """
     n, turn, EI, w = line.h.shape[0], kinds.turn, kinds.EI[i], kinds.w[i]
     along = shares[CURVATURE] < math.inf or shares[MOMENT] < math.inf
     if i == 0 or i == n:
         lack = lack_at_clamp(EI, w, T, turn[i])
+        if kinds.node[i] == HINGE and layers:  # the layer in which it fades is taken away in results
+            return CellError(0.0, 0.0, 0.0, 0.0), CLAMP
         if along and not line.element[i] and turn[i] == 0.0:  # a pin, where the curvature of a rod fades away
             k = min(max(i, 1), n - 1)
             lack = CellError(0.0, 0.0, node_curvature(line, turn, k), 0.0)

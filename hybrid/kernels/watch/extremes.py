@@ -46,7 +46,7 @@ from hybrid.kernels.state.books import (
 from hybrid.kernels.state.forces import OBSTACLES, PLANAR, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.state.report import FORCE_A
 
-# Columns of strains: curvature, 1/m; with what joints take of it, 1/m (of joints themselves too).
+# Column of strains: curvature as results have it, 1/m: with what joints take of it, without what ends do not bear.
 BENT = 3
 
 
@@ -201,8 +201,11 @@ def towards(line, state, marks, i, side):
 @inner
 def beside_kink(line, state, books, i, side):
     """Curvature of a catenary at what may be a kink, node i, on its side: at a joint that which goes on there."""
-    if 0 < i < line.h.shape[0] and line.spin[i] != line.spin[i - 1]:
+    n = line.h.shape[0]
+    if 0 < i < n and line.spin[i] != line.spin[i - 1]:
         return books.strains[i, 0]
+    if (i == 0 or i == n) and is_hinge(line, books, 0 if i == 0 else 1):
+        return 0.0
     return towards(line, state, books.marks, i, side)
 
 
@@ -210,7 +213,7 @@ def beside_kink(line, state, books, i, side):
 def note_catenary(line, state, books, i, t):
     """Curvature at a node without element; at what may be a kink, on each side, as its neighbours lead to."""
     if is_smooth(line, books.marks, i):
-        widen_both(books.extremes, books.right, CURVATURE, i, of_chords(line, state, i), t)
+        widen_both(books.extremes, books.right, CURVATURE, i, abs(books.strains[i, BENT]), t)
         return
     n = line.h.shape[0]
     for side in (-1, 1):
@@ -243,22 +246,56 @@ def goes_on(line, marks, j, way):
 
 
 @inner
-def layer_part(line, state, j, way):
-    """f of the cell before node j of a rod."""
+def layer_part(line, state, j, way, EI):
+    """f of the cell before node j of a rod; EI: N m2."""
     T, h = state.T[min(j, j - way)], line.h[min(j, j - way)]
-    EI = line.kb[j, 0] * line.hn[j]
     return fade(h * h * T / EI) if T > 0.0 and EI > 0.0 else 0.0
 
 
 @inner
-def put_layers_back(line, ends, state, books):
-    """Curvature of rods with what joints take of it, as outputs have it (outputs.strains), into strains[:, BENT].
+def stiffness_at(line, j):
+    """EI, N m2, of the element at node j."""
+    return line.kb[j, 0] * line.hn[j]
 
-    At joints themselves that of the side of the catenary into strains[:, 0].
+
+@inner
+def is_hinge(line, books, k):
+    """Whether the curvature of a rod would fade to nothing at end k, where a catenary of two cells or more ends."""
+    n = line.h.shape[0]
+    return (
+        books.hinges[k] > 0.0 and n > 1 and not line.spin[k * (n - 1)] and is_smooth(line, books.marks, 1 + k * (n - 2))
+    )
+
+
+@inner
+def take_layer_at_end(line, state, books, k):
+    """Take from strains[:, BENT] of a catenary the layer in which the curvature of a rod fades at its end k."""
+    n, EI = line.h.shape[0], books.hinges[k]
+    way, j = 1 - 2 * k, 1 + k * (n - 2)
+    ends, direction = towards(line, state, books.marks, k * n, way), bend_direction(state, j)
+    part = layer_part(line, state, j, way, EI)
+    for _ in range(FARTHEST):
+        if part <= FADED or not is_smooth(line, books.marks, j):
+            break
+        along = dot(bend_direction(state, j), direction)
+        books.strains[j, BENT] = with_layer(books.strains[j, BENT], -ends * part, along)
+        j += way
+        if 0 < j < n:
+            part *= layer_part(line, state, j, way, EI)
+
+
+@inner
+def put_layers_back(line, ends, state, books):
+    """Curvature as outputs have it (outputs.strains) into strains[:, BENT]: of rods with what joints take of it, of
+
+    catenaries without what fades at their ends.  At joints themselves that of the side of the catenary into strains[:, 0].
     """
     n, bent = line.h.shape[0], books.strains
     for i in range(n + 1):
-        bent[i, BENT] = bent[i, 0]
+        bent[i, BENT] = of_chords(line, state, i) if is_smooth(line, books.marks, i) else bent[i, 0]
+    for k in range(2):
+        if is_hinge(line, books, k):
+            take_layer_at_end(line, state, books, k)
     for i in range(1, n):
         if line.spin[i] == line.spin[i - 1]:
             continue
@@ -268,8 +305,8 @@ def put_layers_back(line, ends, state, books):
         j, outer = i + way, i - way
         if not (0 < j < n and is_smooth(line, books.marks, outer) and goes_on(line, books.marks, j, way)):
             continue
-        direction, part = bend_direction(state, outer), layer_part(line, state, j, way)
-        T, EI = state.T[min(j, i)], line.kb[j, 0] * line.hn[j]
+        T, EI = state.T[min(j, i)], stiffness_at(line, j)
+        direction, part = bend_direction(state, outer), layer_part(line, state, j, way, EI)
         before = stiffness_share(EI, T, line.hn[i], line.h[min(outer, i)])
         after = stiffness_share(EI, T, line.hn[i], line.h[min(j, i)])
         along = dot(bend_direction(state, j), direction)
@@ -284,7 +321,7 @@ def put_layers_back(line, ends, state, books):
             j += way
             if not (0 < j < n and goes_on(line, books.marks, j, way)):
                 break
-            part *= layer_part(line, state, j, way)
+            part *= layer_part(line, state, j, way, stiffness_at(line, j))
 
 
 @inner

@@ -25,7 +25,6 @@ from hybrid.kernels.watch.extremes import (
     beside_seam,
     end_tension,
     is_smooth,
-    of_chords,
     widen,
 )
 
@@ -56,7 +55,7 @@ def bend_and_torque(line, ends, state, books, i, side, passed):
             curvature = beside_seam(line, books, i, i + side)
         return curvature, books.strains[i, 2]
     if is_smooth(line, books.marks, i):
-        return of_chords(line, state, i), passed
+        return abs(books.strains[i, BENT]), passed
     if i == 0 or i == n:
         side = 1 if i == 0 else -1
     if line.spin[i - 1 if side < 0 else i]:
