@@ -10,6 +10,7 @@ from scipy import sparse
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.laws.bending_law import RIGID, parts_without_spring
+from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST
 from hybrid.kernels.state.forces import BODIES, DRAG, WAVES
 from hybrid.kernels.state.state import Floats, Line, Sea
 from hybrid.modal.drag import HARMONIC, across, along
@@ -30,7 +31,7 @@ class LoadedLine:
     """One line, its drag, and what excites it."""
 
     def __init__(self, x: JoinedLine, linear: LinearLine, model: Model, omegas: Floats) -> None:
-        self.name, self.linear, self.x = linear.name, linear, x
+        self.name, self.linear, self.x, self.hinges = linear.name, linear, x, model.cable.hinges
         self.line, state, self.sea = linear.line, linear.state, model.sea.at(np.inf)
         count, calm = self.line.s.size, _without_drag(self.line)
 
@@ -163,10 +164,37 @@ class LoadedLine:
             if self.line.element[-k] and part < RIGID:
                 size[-k] *= part
                 kappa[:, -k] *= (along, part)
+        for k in (0, 1):
+            if not self.line.spin[-k] and self.hinges[k] > 0.0 and len(size) > 2:
+                self._fade_at_hinge(k, size, kappa)
         return LineResponse(
             self.line.s.copy(), 0.5 * (self.line.s[1:] + self.line.s[:-1]), self.omegas / (2.0 * np.pi), q[:, :, 1:4],
             q[:, 1:, 0], kappa[:, :, 0], kappa[:, :, 1], state.r.copy(), state.T.copy(), size,
         )  # fmt: skip
+
+    def _fade_at_hinge(self, k: int, size: Floats, kappa: Floats) -> None:
+        """Take from curvature (N+1,) 1/m of a catenary, and its amplitudes (F, N+1, 2), the layer of a hinge at end k.
+
+        As results have it (outputs.strains): f + 1/f = 2 + h^2 T/EI from node to node, and f changes with tension.
+        """
+        n, way = len(size) - 1, 1 - 2 * k
+        nodes = k * n + way * np.arange(1, min(n, FARTHEST + 1))
+        cells = np.minimum(nodes, nodes - way)
+        s, h, T = self.line.s[k * n + way * np.arange(min(n + 1, 3))], self.line.h[cells], self.linear.state.T[cells]
+        beyond = abs(s[1] - s[0]) / abs(s[2] - s[1]) if n >= 4 else 0.0
+        square = h * h * np.maximum(T, 0.0) / self.hinges[k]
+        half = 1.0 + 0.5 * square
+        f = np.where(T > 0.0, 1.0 / (half + np.sqrt(half * half - 1.0)), 0.0)
+        parts, slope = np.cumprod(f), np.where(T > 0.0, h * h / self.hinges[k] * f / (f * f - 1.0), 0.0)  # d ln f/dT
+        last = int((parts > FADED).sum())
+        nodes, parts = nodes[:last], parts[:last]
+        by_tension = np.cumsum(self.q[:, cells[:last] + 1, 0] * slope[:last], axis=1) * parts  # (F, m)
+        one, two = k * n + way, k * n + 2 * way
+        end = max(size[one] + beyond * (size[one] - size[two]), 0.0)
+        change = kappa[:, one] + beyond * (kappa[:, one] - kappa[:, two])
+        kappa[:, nodes] -= change[:, None] * parts[:, None]
+        kappa[:, nodes, 0] -= end * by_tension
+        size[nodes] -= end * parts
 
 
 def _without_drag(line: Line) -> Line:

@@ -74,6 +74,10 @@ class JoinedGrid(Grid):
         self._first = np.concatenate([grid._first for grid in grids]) + self._before
         self._last = np.concatenate([grid._last for grid in grids]) + self._before
 
+    @property
+    def in_catenary(self) -> NDArray[np.bool_]:
+        return np.concatenate([grid.in_catenary for grid in self.of])
+
     @cached_property
     def chords(self) -> Rows:
         return linear(self._x, self.s, self._before, np.repeat(self.begin[1:] - 1, [grid.s.size for grid in self.of]))

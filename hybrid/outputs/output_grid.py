@@ -116,6 +116,11 @@ class Grid:
         self._stretch = np.searchsorted(self._joints, s)
         self._first, self._last = self._cuts[self._stretch], self._cuts[self._stretch + 1]  # of each point's stretch
 
+    @property
+    def in_catenary(self) -> NDArray[np.bool_]:
+        """(ns,) whether points lie in a catenary."""
+        return np.array([part.kind == "catenary" for part in self.parts])[self._stretch]
+
     def suits(self, nodes_s: Floats, zones: Sequence[Zone]) -> bool:
         """Whether a line of these nodes (N+1,) m and zones has the same cells in the same stretches, but for its ends.
 

@@ -155,11 +155,17 @@ SIDED_ERRORS = tuple(name for name in MODEL_ERRORS if name in SIDED)
 
 
 def model_errors(plain: Observation, corrected: Observation) -> dict[str, Floats]:
-    """MODEL_ERRORS on the output grid: how far what is corrected for bending is from what is not."""
+    """MODEL_ERRORS on the output grid: how far what is corrected for bending is from what is not.
+
+    The curvature of a catenary, w/T, changes with its tension too, of which the moment that is left out knows nothing.
+    """
+    change, bends = np.abs(corrected.tension - plain.tension), plain.curvature_twist[:, 0]
+    taut = (plain.tension > change) & plain.grid.in_catenary[:, None]
+    by_tension = bends * np.divide(change, plain.tension, out=np.zeros(change.shape), where=taut)
     out = {
         "position": size(plain.grid.nodes @ (corrected.r - plain.r)),
-        "tension": np.abs(corrected.tension - plain.tension),
-        "curvature": np.abs(corrected.curvature_twist[:, 0] - plain.curvature_twist[:, 0]),
+        "tension": change,
+        "curvature": np.abs(corrected.curvature_twist[:, 0] - bends) + by_tension,
         "bending_moment": np.abs(corrected.bending_moment - plain.bending_moment),
     }
     for k, name in enumerate(("end_force_start", "end_force_end")):

@@ -223,14 +223,13 @@ def test_the_former_name_of_what_a_criterion_sees_still_works():
 def test_a_joint_asks_for_no_more_rod() -> None:
     """A touchdown at rest, curvature asked: the kink of a joint is no bend, for which a rod would grow cell by cell.
 
-    Rods are where contact ends and at the two pins, each a few cells, and no joint has a bend above what is asked.
+    A rod is where contact ends, a few cells, and no joint or pin asks for one: results know what they take.
     """
     asked = ["model={kind: adaptive, always_move: true}", "accuracy={curvature: 6%}", "mesh.cells=250"]
     result = hybrid.static(hybrid.load_scene(EXAMPLES / "touchdown.yaml", asked))
     found = rods(result, 0)
-    assert len(found) == 3 and sum(b - a for a, b in found) < 25.0
-    assert found[1][0] < 89.0 < found[1][1]  # m, where the line leaves the bed
+    assert len(found) == 1 and found[0][1] - found[0][0] < 20.0
+    assert found[0][0] < 89.0 < found[0][1]  # m, where the line leaves the bed
     rod = hybrid.static(hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["model=rod", *asked[2:]]))
-    inner = slice(5, -5)  # beside pins curvature falls to nothing within a cell
-    apart = np.abs(result.curvature - rod.curvature)[..., inner]
+    apart = np.abs(result.curvature - rod.curvature)
     assert apart.max() < 0.03 * rod.curvature.max()

@@ -224,7 +224,29 @@ class Plain:
         for k in range(1, len(self.grid.parts)):  # what a joint takes of a rod's curvature is put back
             if self.grid.parts[k - 1].kind != self.grid.parts[k].kind:
                 self._put_back(out, k)
+        for k, EI in enumerate(self.grid.hinges):  # what a pin takes of a catenary's is taken away
+            if EI > 0.0 and self.grid.parts[-k].kind == "catenary":
+                self._take_away(out, k, EI)
         return out
+
+    def _take_away(self, out: Floats, k: int, EI: float) -> None:
+        """The layer of a hinge at end k, node by node."""
+        first, last, o = self.grid.spans[-k]
+        node, row, way = (last, o + last - first, -1) if k else (first, o, 1)
+        if last - first < 2:
+            return
+        at_end, direction, part = out[row, 0], self._directions[row], 1.0
+        out[row, 0] = 0.0
+        for j in range(1, last - first):
+            c = min(node + j * way, node + (j - 1) * way)
+            T = self.state.T[c]
+            b = 2.0 + self.line.h[c] ** 2 * T / EI
+            part *= (0.5 * (b - np.sqrt(b * b - 4.0)) if b < 1e6 else 1.0 / b) if T > 0.0 else 0.0
+            if part <= FADED:
+                return
+            mine = self._directions[row + j * way]
+            whole = out[row + j * way, 0] * mine - at_end * part * direction
+            out[row + j * way, 0] = np.copysign(np.linalg.norm(whole), whole @ mine)
 
     def _put_back(self, out: Floats, k: int) -> None:
         """The layer of a hinge beside the joint before stretch k, node by node."""

