@@ -38,7 +38,7 @@ def bridle(**tables: Any) -> dict[str, Any]:
             "east": {"start": "float", "end": "east", "sections": [LEG]},
             "tow": {"start": "float", "end": "winch", "sections": [LEG | {"length": 45, "bending_stiffness": 300}]},
         },
-        "time": {"duration": 4.0}, "accuracy": {"position": "1%", "tension": "1%"},
+        "time": {"duration": 4.0}, "accuracy": {"position": "1%", "tension": "1.5%"},
         # within steps the tension of `east`, wrong by 0.01 %, would change 2.2 times as much by finer runs as by coarser
         "output": {"every": 0.5, "points": 11, "exact": True},
     } | tables  # fmt: skip
@@ -86,7 +86,7 @@ def test_what_is_asked_is_judged_by_line_and_quantity(result: hybrid.Result) -> 
         forces = max(np.linalg.norm(line[f"reaction_{end}"], axis=1).max() for end in ("start", "end"))
         for end in ("start", "end"):
             one = found[f"end_force_{end}"]
-            assert one["asked"] == pytest.approx(0.01 * forces)
+            assert one["asked"] == pytest.approx(0.015 * forces)
             assert one["error"] == line[f"errors/total/end_force_{end}"].max()
             assert one["met"] is (one["error"] <= one["asked"])
     assert len({int(line.attributes["cells"]) for line in result.lines.values()}) > 1  # each has a mesh of its own
