@@ -208,7 +208,7 @@ class Observer:
         payout: bool = False,
         quantities: Quantities | None = None,
         obstacles: Sequence[str] = (),
-        hinges: Sequence[float] = (0.0, 0.0),
+        hinges: Sequence[float] | Floats = (0.0, 0.0),
     ) -> None:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
 
