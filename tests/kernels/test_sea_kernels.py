@@ -209,6 +209,24 @@ def test_what_is_left_out_deep_down():
     assert below == 0.0
 
 
+@pytest.mark.parametrize("depth", [math.inf, 2000.0])
+def test_where_all_components_have_faded_the_water_is_still(depth):
+    """Far below the surface nothing is computed, from a height on at which no component may count at any elevation."""
+    waves = components(JonswapWaves(significant_height=6.0, peak_period=9.0, seed=4), depth, G)
+    highest = np.abs(waves[:, 0]).sum()
+    calm = math.log(FADED) / waves[:, 5].min() - highest
+    above, below = (np.tile([[0.0, 0.0, calm + 3.0 + x]], (40, 1)) for x in (1e-6, -1e-6))
+    around = sea_of(waves, depth, surface=3.0, n=40)
+    for t in (0.0, 31.7, 400.0):
+        assert not stirred(around, t, below).any()
+        exact = airy(waves, math.inf, t, below[0], 3.0)
+        assert np.abs(exact[:3]).max() < FADED * (np.abs(waves[:, 0]) * waves[:, 1]).sum()
+        found = stirred(around, t, above)
+        assert not found[:, :6].any() and found[0, 6] == pytest.approx(exact[6], abs=1e-12)  # there it is looked for
+    low = calm + 3.0 + 2.0 * highest + 1.0  # in a trough some of it is there
+    assert max(np.abs(stirred(around, t, (0, 0, low))[0, :3]).max() for t in np.linspace(0.0, 60.0, 61)) > 0.0
+
+
 @pytest.mark.parametrize("depth", [math.inf, 20.0])
 @pytest.mark.parametrize("ramp", [None, 40.0])
 def test_acceleration_is_the_rate_of_velocity(depth, ramp):

@@ -146,16 +146,38 @@ def stir(sea):
             lanes[9, l] -= w * up * c
 
 
+@inner
+def calm_below(sea):
+    """Height below which all components have faded, whatever the elevation is.
+
+    Depths after Wheeler, d (z - eta)/(d + eta) below still water, are highest in the lowest trough: below z + sum |A|.
+    """
+    least, highest = math.inf, 0.0
+    for j in range(sea.waves.shape[0]):
+        least = min(least, sea.waves[j, 5])
+        highest += abs(sea.waves[j, 0])
+    return sea.surface + LAST / least - highest
+
+
 @kernel
 def wave_kinematics(sea, r, u):
     """Fill sea.flow: velocity and acceleration of the waves at the positions r + u, and the elevation above them.
+
+    Where all components have faded it is still water; the elevation, by which only what is near it knows, is left out.
 
     A component is A cos(kx x + ky y - w t + phase) at the surface; everything is multiplied by the grown part of the
     sea, sea.now[2], and its rate of growth sea.now[3] counts in the acceleration.
     """
     part, rate = sea.now[2], sea.now[3]
-    lanes, flow = sea.lanes, sea.flow
+    lanes, flow, calm = sea.lanes, sea.flow, calm_below(sea)
     for first in range(0, flow.shape[0], LANES):
+        deep = True
+        for i in range(first, min(first + LANES, flow.shape[0])):
+            deep = deep and r[i, 2] + u[i, 2] < calm
+            for k in range(7):
+                flow[i, k] = 0.0
+        if deep:
+            continue
         elevate(sea, r, u, first)
         stir(sea)
         for i in range(first, min(first + LANES, flow.shape[0])):
