@@ -369,8 +369,9 @@ def _by_rao(tables: Tables) -> Iterator[Place]:
 
 
 def _depths(tables: Tables) -> Iterator[Place]:
-    bed = tables["environment"].seabed
-    return iter([("environment", "seabed", "depths")] if bed is not None and bed.depths is not None else [])
+    bed = getattr(tables.get("environment"), "seabed", None)
+    if getattr(bed, "depths", None) is not None:
+        yield "environment", "seabed", "depths"
 
 
 def _turning(tables: Tables) -> Iterator[Place]:
