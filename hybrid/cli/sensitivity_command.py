@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -20,10 +21,12 @@ if TYPE_CHECKING:
 def sensitivity(
     scene: SceneFile, settings: Settings = None,
     of: Annotated[
-        Any, typer.Option("--of", metavar="RESULT,..", parser=words, help="Results such as tension@0, max curvature.")
+        list[Any] | None,
+        typer.Option("--of", metavar="RESULT,..", parser=words, help="Results such as tension@0, max curvature."),
     ] = None,
     by: Annotated[
-        Any, typer.Option("--by", metavar="KEY,..", parser=words, help="Numbers; else all of the sections.")
+        list[Any] | None,
+        typer.Option("--by", metavar="KEY,..", parser=words, help="Numbers; else all of the sections."),
     ] = None,
     motion: Annotated[
         bool, flag("--motion", help="Of a run, in steps that stay: of 'max tension@end', 'std position.z@100'.")
@@ -33,7 +36,8 @@ def sensitivity(
     """Derivatives and elasticities (% by %) of an equilibrium, or a motion, by the numbers of its scene."""
     with session(as_json, quiet) as console:
         asked = load_either(console, scene, settings)
-        found = hybrid.sensitivity(asked, of or _results(asked, motion), by or _numbers(asked), motion)
+        results, numbers = (list(chain.from_iterable(x or ())) for x in (of, by))
+        found = hybrid.sensitivity(asked, results or _results(asked, motion), numbers or _numbers(asked), motion)
         console.show(lambda: _tables(found))
         for x in found:
             console.json("derivative", **x._asdict())

@@ -59,7 +59,7 @@ class BodyShape(Table):
 
     kind: Literal["sphere", "cylinder"] = Field(description="a ball, or a round cylinder")
     place: Vector = Field(default=(0.0, 0.0, 0.0), description=_PLACE)
-    radius: Positive = Field(description="its radius [m]")
+    radius: Positive = Field(description="radius [m]")
     axis: Direction | None = Field(
         default=None, description="of a cylinder: direction of its axis, in axes of the body; any length [-]"
     )

@@ -87,7 +87,7 @@ class SphereObstacle(_Obstacle):
 
     kind: Literal["sphere"] = Field(default="sphere", description="a ball")
     at: Vector = Field(description="its centre, inertial frame [m]")
-    radius: Positive = Field(description="its radius [m]")
+    radius: Positive = Field(description="radius [m]")
 
     def distance(self, x: tuple[float, float, float]) -> float:
         """Distance [m] of a place to the surface; negative within the solid."""
@@ -100,7 +100,7 @@ class CylinderObstacle(_Obstacle):
     kind: Literal["cylinder"] = Field(default="cylinder", description="a round cylinder: a pipe, pile or roller")
     at: Vector = Field(description="the middle of its axis, or any point of an endless one, inertial frame [m]")
     axis: Direction = Field(description="direction of its axis; any length [-]")
-    radius: Positive = Field(description="its radius [m]")
+    radius: Positive = Field(description="radius [m]")
     length: Positive | None = Field(
         default=None, description="its length, without the half spheres in which it ends; absent: endless [m]"
     )

@@ -276,3 +276,40 @@ def test_the_command_seek(tmp_path, monkeypatch):
     found = hybrid.load_scene(tmp_path / "new.yaml").cable.length
     assert hybrid.static(tmp_path / "new.yaml", None).tension.max() > 25000 and 255 < found < 275
     assert CliRunner().invoke(app, ["seek", "line.yaml", "--target", "tension", "--by", "x"]).exit_code == 2
+
+
+def chain_leg(cells: int) -> dict:
+    """400 m of chain on a bed 100 m down, its upper end 370 m away."""
+    section = {"length": 400, "mass": 100, "diameter": 0.12, "axial_stiffness": 5e8, "drag": {"normal": 2.4}}
+    return {
+        "environment": {"fluid": {"density": 1025, "surface": 0}, "seabed": {"z": -100, "stiffness": 5e4}},
+        "cable": {"sections": [section]}, "initial": "equilibrium", "model": "catenary", "mesh": {"cells": cells},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, -100]},
+                 "end": {"kind": "pinned", "position": [370, 0, -5]}},
+    }  # fmt: skip
+
+
+def test_the_error_of_a_derivative_on_a_bed_covers_it():
+    """It goes up and down with the cells (60, 100 and 120): by the length, -11915 N/m of an elastic catenary."""
+    fine = hybrid.sensitivity(chain_leg(1600), ["tension@end"], ["cable.sections[0].length"])[0].derivative
+    assert fine == pytest.approx(-11913.0, rel=1e-3)  # -11911 by hand
+    for cells in (60, 100, 120):
+        (found,) = hybrid.sensitivity(chain_leg(cells), ["tension@end"], ["cable.sections[0].length"])
+        assert abs(found.derivative - fine) < 1.5 * found.error < 0.15 * abs(fine)
+
+
+@pytest.mark.parametrize("of", ["touchdown", "grounded_length", "touchdown_position.x"])
+def test_where_contact_begins_has_no_derivative(of):
+    with pytest.raises(hybrid.SceneError, match="goes by the nodes that come to the bed"):
+        hybrid.sensitivity(chain_leg(60), [of], ["cable.sections[0].length"])
+
+
+def test_options_may_be_repeated(tmp_path):
+    """All of them count: the last one alone would leave out the others without a word."""
+    (tmp_path / "leg.yaml").write_text(hybrid.scene_text(hybrid.validate_scene(chain_leg(60))))
+    given = ["--of", "tension@0,tension@end", "--by", "cable.sections[0].length", "--by", "cable.sections[0].mass"]
+    told = CliRunner().invoke(app, ["sensitivity", str(tmp_path / "leg.yaml"), *given, "--json"])
+    rows = [json.loads(line) for line in told.output.splitlines() if '"derivative"' in line]
+    assert [(x["of"], x["by"][-6:]) for x in rows] == [
+        ("tension@0", "length"), ("tension@end", "length"), ("tension@0", "].mass"), ("tension@end", "].mass"),
+    ]  # fmt: skip

@@ -52,6 +52,8 @@ MOST = 1e6
 TWISTED = 0.5
 # The most that a tension counts for that is only foreseen.
 FORESEEN = 2.0
+# Part of a layer beyond which its tension counts; part of a change of tension within that by which it may be wrong.
+SHOWS, BY_TENSION = 0.37, 0.25
 # What may sit at a node: nothing, a jump of bending stiffness, a point load, at an end a hinge that results know.
 SMOOTH, STEP, LOAD, HINGE = 0, 1, 2, 3
 
@@ -219,8 +221,36 @@ def bends_at(line, kinds, shares, layers, i):
 
 
 @inner
-def lack_of_node(line, kinds, shares, layers, i, T):
+def left_at_hinge(line, T, kinds, i):
+    """Curvature, 1/m, by which the layer that results take away at end i may be wrong.
+
+    They take it to be that of the tension beside each node, and none goes on beyond a load, a change of section or a
+    joint: what is left of it there is missing, and about a quarter of what tension changes by within sqrt(EI/T).
+    """
+    n, way, j = line.h.shape[0], 1 if i == 0 else -1, 1 if i == 0 else line.h.shape[0] - 1
+    end, part, kappa = min(i, n - 1), 1.0, node_curvature(line, kinds.turn, min(max(j, 1), n - 1))
+    first = last = T[end]
+    while True:
+        c = min(j, j - way)
+        if T[c] <= 0.0 or not 0 < j < n:
+            return kappa * part
+        part *= fade(line.h[c] * line.h[c] * T[c] / kinds.EI[i])
+        if part <= FADED:
+            break
+        if part > SHOWS:
+            last = T[c]
+        joint = not line.spin[end] and line.spin[min(j, j + way)] != 0
+        if kinds.node[j] != SMOOTH or joint:
+            return kappa * part
+        j += way
+    return kappa * min(BY_TENSION * abs(last - first) / min(first, last), 1.0)
+
+
+@inner
+def lack_of_node(line, kinds, shares, layers, i, T, tensions):
     """What a catenary would lack at node i, at tension T, N; and the criterion that this is.
+
+    tensions: (N,) N, of all cells.
 
     layers: what joints and hinges take of curvature is in results.
     """
@@ -229,7 +259,7 @@ def lack_of_node(line, kinds, shares, layers, i, T):
     if i == 0 or i == n:
         lack = lack_at_clamp(EI, w, T, turn[i])
         if kinds.node[i] == HINGE and layers:  # the layer in which it fades is taken away in results
-            return CellError(0.0, 0.0, 0.0, 0.0), CLAMP
+            return CellError(0.0, 0.0, left_at_hinge(line, tensions, kinds, i) if along else 0.0, 0.0), CLAMP
         if along and not line.element[i] and turn[i] == 0.0:  # a pin, where the curvature of a rod fades away
             k = min(max(i, 1), n - 1)
             lack = CellError(0.0, 0.0, node_curvature(line, turn, k), 0.0)
@@ -342,7 +372,7 @@ def raise_ratios(line, sea, state, past, ahead, shares, layers, kinds, ratios):
         raise_ratio(ratios, SLACK, ja, jb, slack)
         T = max(floor[i], 1e-300)
         T = now if now > T else T
-        lack, criterion = lack_of_node(line, kinds, shares, layers, i, T)
+        lack, criterion = lack_of_node(line, kinds, shares, layers, i, T, state.T)
         raise_ratio(ratios, criterion, ja, jb, over_shares(lack, shares))
         if i == 0 or i == n:
             continue
