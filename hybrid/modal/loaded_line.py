@@ -10,7 +10,7 @@ from scipy import sparse
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.laws.bending_law import RIGID, parts_without_spring
-from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST
+from hybrid.kernels.laws.hinge_layer import FADED
 from hybrid.kernels.state.forces import BODIES, DRAG, WAVES
 from hybrid.kernels.state.state import Floats, Line, Sea
 from hybrid.modal.drag import HARMONIC, across, along
@@ -165,7 +165,7 @@ class LoadedLine:
                 size[-k] *= part
                 kappa[:, -k] *= (along, part)
         for k in (0, 1):
-            if not self.line.spin[-k] and self.hinges[k] > 0.0 and len(size) > 2:
+            if not self.line.spin[-k] and self.hinges[k, 0] > 0.0 and len(size) > 2:
                 self._fade_at_hinge(k, size, kappa)
         return LineResponse(
             self.line.s.copy(), 0.5 * (self.line.s[1:] + self.line.s[:-1]), self.omegas / (2.0 * np.pi), q[:, :, 1:4],
@@ -175,25 +175,33 @@ class LoadedLine:
     def _fade_at_hinge(self, k: int, size: Floats, kappa: Floats) -> None:
         """Take from curvature (N+1,) 1/m of a catenary, and its amplitudes (F, N+1, 2), the layer of a hinge at end k.
 
-        As results have it (outputs.strains): f + 1/f = 2 + h^2 T/EI from node to node, and f changes with tension.
+        As results have it (outputs.end_layers), up to the first change of section; it changes with tension.
         """
-        n, way = len(size) - 1, 1 - 2 * k
-        nodes = k * n + way * np.arange(1, min(n, FARTHEST + 1))
+        line, n, way, EI = self.line, len(size) - 1, 1 - 2 * k, self.hinges[k, 0]
+        nodes = k * n + way * np.arange(1, n)
         cells = np.minimum(nodes, nodes - way)
-        s, h, T = self.line.s[k * n + way * np.arange(min(n + 1, 3))], self.line.h[cells], self.linear.state.T[cells]
-        beyond = abs(s[1] - s[0]) / abs(s[2] - s[1]) if n >= 4 else 0.0
-        square = h * h * np.maximum(T, 0.0) / self.hinges[k]
-        half = 1.0 + 0.5 * square
-        f = np.where(T > 0.0, 1.0 / (half + np.sqrt(half * half - 1.0)), 0.0)
-        parts, slope = np.cumprod(f), np.where(T > 0.0, h * h / self.hinges[k] * f / (f * f - 1.0), 0.0)  # d ln f/dT
-        last = int((parts > FADED).sum())
-        nodes, parts = nodes[:last], parts[:last]
-        by_tension = np.cumsum(self.q[:, cells[:last] + 1, 0] * slope[:last], axis=1) * parts  # (F, m)
+        beyond = nodes if way > 0 else nodes - 1  # cells
+        T, h = self.linear.state.T, line.h[cells]
+        first = T[k * (n - 1)]
+        other = np.abs(line.s[nodes] - line.s[k * n]) >= (1.0 - 1e-9) * self.hinges[k, 1]
+        ends = np.flatnonzero(other | (line.spin[beyond] != 0))
+        last = int(ends[0]) + 1 if ends.size else n - 1
+        taut = np.logical_and.accumulate(T[cells] > 0.0)
+        slope = np.sqrt(np.maximum(T[cells], 0.0) / EI)
+        mean = 0.5 * (T[cells] + T[beyond])
+        size_there = (np.maximum(mean, 0.0) / max(first, 1e-300)) ** 0.25
+        parts = np.where(taut, size_there * np.exp(-np.cumsum(slope * h)), 0.0)
+        count = min(last, int(np.logical_and.accumulate(parts > FADED).sum()))
+        nodes, cells, beyond, parts = nodes[:count], cells[:count], beyond[:count], parts[:count]
+        dT = self.q[:, 1:, 0]
+        by_depth = np.cumsum(dT[:, cells] * h[:count] / (2.0 * np.sqrt(T[cells] * EI)), axis=1)
+        by_size = 0.25 * (0.5 * (dT[:, cells] + dT[:, beyond]) / mean[:count] - dT[:, [k * (n - 1)]] / first)
         one, two = k * n + way, k * n + 2 * way
-        end = max(size[one] + beyond * (size[one] - size[two]), 0.0)
-        change = kappa[:, one] + beyond * (kappa[:, one] - kappa[:, two])
+        ahead = abs(line.s[one] - line.s[k * n]) / abs(line.s[two] - line.s[one]) if n >= 4 else 0.0
+        end = max(size[one] + ahead * (size[one] - size[two]), 0.0)
+        change = kappa[:, one] + ahead * (kappa[:, one] - kappa[:, two])
         kappa[:, nodes] -= change[:, None] * parts[:, None]
-        kappa[:, nodes, 0] -= end * by_tension
+        kappa[:, nodes, 0] -= end * parts * (by_size - by_depth)
         size[nodes] -= end * parts
 
 

@@ -30,10 +30,10 @@ from hybrid.model.initial_shape import (
 from hybrid.model.layout import Layout, of_rods
 from hybrid.model.line import line_on, spins_freely
 from hybrid.model.line_on_base import LineOnBase
-from hybrid.model.material import STIFFENER_CELLS, Material, material
+from hybrid.model.material import STIFFENER_CELLS, Material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
 from hybrid.model.obstacles import kind_of, least_cells, obstacle_bits
-from hybrid.model.payout import PayoutPlan, payout_of, payout_plan, shorter_behind_clamp
+from hybrid.model.payout import PayoutPlan, cable_of, payout_of, payout_plan, shorter_behind_clamp
 from hybrid.model.plane import in_plane, planar
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, mesh_is_free
 from hybrid.model.scales import tension_scale
@@ -161,11 +161,11 @@ def build(
     Raises SceneError where the scene cannot be meshed (a rod zone of one cell, nodes
     that miss a zone boundary).
     """
-    cable = material(scene)
+    cable = cable_of(scene)
     resolution = resolution or first_resolution(scene)
     layout, s, zones = place_cells(scene, cable, resolution, mesh)
     if stiffeners_of(scene):
-        cable = material(scene, s if layout is None else layout.base)
+        cable = cable_of(scene, s if layout is None else layout.base)
     paid = None
     to_compare = payout_of(scene) is not None and resolution.fineness < first_resolution(scene).fineness
     if layout is not None and payout_of(scene) is not None and follows_curvature(scene):

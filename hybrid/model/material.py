@@ -132,16 +132,18 @@ class Material:
 
     @property
     def hinges(self) -> Floats:
-        """(2,) N m2, EI at ends where the curvature of a rod fades to nothing, as results of catenaries have it.
+        """(2, 2) of each end where the curvature of a rod fades to nothing: EI, N m2, and how far from the end on, m.
 
-        0 where an end bends the line, and where a catenary cannot know what a rod would do: bent without stress, or
+        EI 0 where an end bends the line, and where a catenary cannot know what a rod would do: bent without stress, or
         differently in two directions.
         """
-        known = [
-            hinged and not self.kappa[k, :2].any() and self.B[k, 0] == self.B[k, 1]
-            for k, hinged in zip((0, -1), self.hinged, strict=True)
-        ]
-        return np.where(known, self.mean_bending[[0, -1]], 0.0)
+        found, EI = np.zeros((2, 2)), self.mean_bending
+        for k, (hinged, order) in enumerate(zip(self.hinged, (1, -1), strict=True)):
+            if hinged and not self.kappa[-k, :2].any() and self.B[-k, 0] == self.B[-k, 1]:
+                same = np.flatnonzero(EI[::order] != EI[-k])
+                lengths = np.diff(self.bounds)[::order]
+                found[k] = EI[-k], lengths[: same[0] if same.size else lengths.size].sum()
+        return found
 
     @property
     def mean_initial_bending(self) -> Floats:

@@ -18,6 +18,7 @@ from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import MOST_CELLS, Zone
 from hybrid.model.payout_law import extremes, law_of, least_length, lengths_at, refuse
+from hybrid.model.sections import bending_stiffness
 from hybrid.scene.payout import Payout
 from hybrid.scene.schema import AdaptiveModel, Scene, Section, Spread
 
@@ -388,10 +389,24 @@ def whole_scene(scene: Scene) -> tuple[Scene, float]:
     return scene.model_copy(update={"cable": scene.cable.model_copy(update=changed)}), -more
 
 
+def cable_of(scene: Scene, cells: Floats | None = None) -> Material:
+    """The cable of a scene; cells: as of `material`.
+
+    Where sections differ in bending stiffness, that at the winch is another one as line is paid out: results do not
+    know how the curvature of a rod fades there.
+    """
+    cable = material(scene, cells)
+    if payout_of(scene) is not None and len({bending_stiffness(x) for x in whole_scene(scene)[0].cable.sections}) > 1:
+        start, end = cable.hinged
+        cable.hinged = (start, False) if winch_side(scene) else (False, end)
+    return cable
+
+
 def _whole_material(scene: Scene) -> Material:
     """The cable with what is on the reel, by the arc lengths of the scene."""
     whole, begin = whole_scene(scene)
     cable = material(whole)
+    cable.hinged = cable_of(scene).hinged
     cable.bounds, cable.at, cable.swivels = (x + begin for x in (cable.bounds, cable.at, cable.swivels))
     return cable
 

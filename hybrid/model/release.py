@@ -21,11 +21,12 @@ def without_hold(model: Model, k: int, t: float) -> Model:
 
 def unclamped(model: Model, k: int) -> Model:
     """The same model without what holds the direction and the twist of end k (0 or 1)."""
-    tangent, twist = model.cable.held_tangent, model.cable.held_twist
+    tangent, twist, hinged = model.cable.held_tangent, model.cable.held_twist, model.cable.hinged
     cable = replace(
         model.cable,
         held_tangent=(tangent[0] and k != 0, tangent[1] and k != 1),
         held_twist=(twist[0] and k != 0, twist[1] and k != 1),
+        hinged=(hinged[0] or k == 0, hinged[1] or k == 1),
     )
     line, on_base = without_torque(without_clamp(model.line, -k)), None
     if model.layout is not None:

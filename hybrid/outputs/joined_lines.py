@@ -74,6 +74,9 @@ class JoinedGrid(Grid):
         self._first = np.concatenate([grid._first for grid in grids]) + self._before
         self._last = np.concatenate([grid._last for grid in grids]) + self._before
 
+    def of_line_of(self, node: int) -> NDArray[np.bool_]:
+        return np.asarray(self._before == self.begin[np.searchsorted(self.begin, node, "right") - 1])
+
     @property
     def in_catenary(self) -> NDArray[np.bool_]:
         return np.concatenate([grid.in_catenary for grid in self.of])

@@ -33,6 +33,7 @@ from hybrid.kernels.state.report import (
 )
 from hybrid.kernels.state.state import NO_TURN, Batch, Ends, Floats, Line, Sea
 from hybrid.kernels.watch.observed_outputs import observed
+from hybrid.outputs.end_layers import EndLayer, between_nodes
 from hybrid.outputs.local_means import means_beside, means_on_line
 from hybrid.outputs.moments import across, node_tangents, node_torques, passed_torques
 from hybrid.outputs.output_grid import Grid
@@ -338,6 +339,10 @@ class Observation:
             strains = np.stack([self._curvature_of_moment(self.shift), strains[:, 1]], axis=1)
         bend = self._plain._bend_directions * strains[:, :1]
         found = self.grid.sides @ np.concatenate([bend, strains[:, 1:]], axis=1)
+        for layer, end in self._plain._taken_at_ends:  # which is no straight line in cells that are long for it
+            direction = self._plain._bend_directions[layer.rows[0]]
+            for points, less in between_nodes(self, layer):
+                found[points, :-1] += (less * end)[:, None] * direction
         return np.stack([np.sqrt((found[:, :-1] ** 2).sum(axis=1)), found[:, -1]], axis=1)
 
     @cached_property
@@ -351,9 +356,18 @@ class Observation:
         return np.abs(self._plain._strains[:, 0])
 
     @cached_property
+    def _strains_and_taken(self) -> tuple[Floats, list[tuple[EndLayer, Floats]]]:
+        return strains(self)
+
+    @property
     def _strains(self) -> Floats:
         """Curvature and twist (n sides, 2, nb), 1/m, of what was computed."""
-        return strains(self)
+        return self._strains_and_taken[0]
+
+    @property
+    def _taken_at_ends(self) -> list[tuple[EndLayer, Floats]]:
+        """Layers that catenaries have not at their ends, and the curvature (nb,) 1/m of each without that."""
+        return self._strains_and_taken[1]
 
     def _curvature_of_moment(self, shift: Shift) -> Floats:
         """Curvature (n sides, nb) 1/m of all of the moment, with what was left out; without stiffness, as it is."""

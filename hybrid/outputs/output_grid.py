@@ -18,6 +18,8 @@ from hybrid.kernels.algebra.sparse_rows import add_rows, cubic_rows, linear_rows
 from hybrid.kernels.state.state import Floats
 from hybrid.model.mesh import Zone
 
+NO_HINGES: Floats = np.zeros((2, 2))
+
 
 class Rows(NamedTuple):
     """A sparse matrix by rows: row i has weights[begin[i] : begin[i+1]] in the columns of the same places."""
@@ -91,15 +93,15 @@ class Grid:
     def __init__(
         self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = (),
         changes: Sequence[float] = (), after: bool = False, kept: Sequence[float] = (),
-        hinges: Sequence[float] = (0.0, 0.0),
+        hinges: Floats = NO_HINGES,
     ) -> None:  # fmt: skip
         """loads: arc lengths, m, that cut the line, as of `stretches`; changes: those of them where one section ends
 
         and the next begins; after: a point on a cut shows the side after it; kept: those of loads where no force acts;
-        hinges: N m2, EI at ends where results of catenaries take the curvature away, 0: it stays.
+        hinges: (2, 2) as of `Material`.
         """
         nodes_s = np.require(nodes_s, float, ("C", "W"))  # so that kernels have one signature
-        self.loads, self.changes, self.after, self.hinges = tuple(loads), tuple(changes), after, tuple(hinges)
+        self.loads, self.changes, self.after, self.hinges = tuple(loads), tuple(changes), after, hinges
         self.parts, self._kinds = stretches(zones, loads), [zone.kind for zone in zones]
         bounds = np.array([self.parts[0].s_a, *(part.s_b for part in self.parts)])
         cuts = np.abs(nodes_s - bounds[:, None]).argmin(axis=1)  # their nodes
@@ -115,6 +117,10 @@ class Grid:
         self._x, self.s = nodes_s, np.require(s, float, ("C", "W"))
         self._stretch = np.searchsorted(self._joints, s)
         self._first, self._last = self._cuts[self._stretch], self._cuts[self._stretch + 1]  # of each point's stretch
+
+    def of_line_of(self, node: int) -> NDArray[np.bool_]:
+        """(ns,) whether points lie on the line that a node is of: of one line all do."""
+        return np.ones(self.s.size, bool)
 
     @property
     def in_catenary(self) -> NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from hybrid.model.output_points import NEAR
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.obstacles import obstacle_fields, obstacle_values
-from hybrid.outputs.output_grid import Grid
+from hybrid.outputs.output_grid import NO_HINGES, Grid
 from hybrid.outputs.varying_grid import VaryingGrid
 from hybrid.outputs.vectors import size
 from hybrid.solve.bending_corrector import Shift
@@ -208,7 +208,7 @@ class Observer:
         payout: bool = False,
         quantities: Quantities | None = None,
         obstacles: Sequence[str] = (),
-        hinges: Sequence[float] | Floats = (0.0, 0.0),
+        hinges: Floats = NO_HINGES,
     ) -> None:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
 
@@ -219,10 +219,10 @@ class Observer:
         section ends and the next begins; finest: m, all nodes that there may be, where cells follow the curvature;
         gauges: places (x, y), m, where the elevation of the sea is recorded.
         payout: whether the line is paid out; quantities: what the scene asks for beside the usual;
-        obstacles: their names; hinges: N m2, as of `Grid`.
+        obstacles: their names; hinges: (2, 2) as of `Material`.
         """
         self._finest = finest
-        self._hinges = tuple(hinges)
+        self._hinges = hinges.copy()
         self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(changes)
         near = NEAR * line.s[-1]
         self._unloaded = tuple(x for x in jumps if all(abs(x - y) > near for y in loads))
@@ -292,9 +292,10 @@ class Observer:
             fields.append(Field(THERE, "", text, (-(-finest.size // 64),), ("word",), dtype="int64"))
         self.fields = tuple(fields)
 
-    def on(self, line: Line, sea: Sea, zones: Sequence[Zone]) -> Observer:
-        """The same fields of a line whose zones have changed."""
+    def on(self, line: Line, sea: Sea, zones: Sequence[Zone], hinges: Floats) -> Observer:
+        """The same fields of a line whose zones, or ends, have changed; hinges: as of `Grid`."""
         other = copy(self)
+        other._hinges = hinges.copy()
         other._place(line, sea, zones, self.s)
         return other
 

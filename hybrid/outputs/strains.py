@@ -17,6 +17,7 @@ from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST
 from hybrid.kernels.march.zone_torque import TORQUE
 from hybrid.kernels.state.forces import PLANAR
 from hybrid.kernels.state.state import Floats, Line
+from hybrid.outputs.end_layers import EndLayer, end_layers
 from hybrid.outputs.moments import across
 from hybrid.outputs.vectors import cross, dot, size
 
@@ -46,8 +47,8 @@ def ends_of(spans: Integers) -> SpanEnds:
     return SpanEnds(*(np.concatenate(pair) for pair in pairs))
 
 
-def strains(view: Observation) -> Floats:
-    """Curvature and twist (n sides, 2, outputs), 1/m, of what was computed."""
+def strains(view: Observation) -> tuple[Floats, list[tuple[EndLayer, Floats]]]:
+    """Curvature and twist (n sides, 2, outputs), 1/m, of what was computed; what fades at ends, and their curvature."""
     nodes, spans = view.grid.side_nodes, np.array(view.grid.spans).reshape(-1, 3)
     rods = np.array([zone.kind == "rod" for zone in view.grid.parts])
     of_rod = np.repeat(rods, spans[:, 1] - spans[:, 0] + 1)
@@ -61,8 +62,7 @@ def strains(view: Observation) -> Floats:
         out[~of_rod, 0] = view.bends[nodes[~of_rod]]
         _end_catenaries(view, out, spans[~rods])
     _put_layers_back(view, out, spans, rods)
-    _take_layers_at_ends(view, out, spans, rods)
-    return out
+    return out, _take_layers_at_ends(view, out)
 
 
 def bend_directions(view: Observation) -> Floats:
@@ -141,9 +141,7 @@ def _put_layers_back(view: Observation, out: Floats, spans: Integers, rods: NDAr
         )
         if span[1] - span[0] < 2 or catenary[1] - catenary[0] < 2:
             continue
-        node, directions = spans[k + 1, 0], view._bend_directions
-        nodes = _beside(node, way, span[1] - span[0])
-        parts = _layer(view, nodes, way, view.stiffness(nodes)[:, 0] * view.of_line("hn", nodes))
+        node, parts, directions = spans[k + 1, 0], _layer(view, spans[k + 1, 0], way, span), view._bend_directions
         before, after = _stiffness_shares(view, node, way)
         turned = _directions(view.line, np.cross(view.d[node - 1], view.d[node], axis=0)[None])[0]
         turn, held = view.bends[node], before * out[its - way, 0]
@@ -151,23 +149,26 @@ def _put_layers_back(view: Observation, out: Floats, spans: Integers, rods: NDAr
         square = np.maximum(turn * turn + 2.0 * along * turn * held + held * held, 0.0)
         there = np.copysign(np.sqrt(square) / (1.0 + before + after * (1.0 - parts[1])), along * turn + held)
         out[its, 0] = there
-        parts = _up_to_faded(parts)
+        parts = parts[: 1 + int((parts[1:] > FADED).any(axis=1).sum())]
+        parts[1:][parts[1:] <= FADED] = 0.0  # of each output by itself: none depends on those beside it
         rows = mine + way * np.arange(len(parts))
         _add_layer(out, rows, there * parts, (directions[rows] * directions[its]).sum(axis=1))
 
 
-def _take_layers_at_ends(view: Observation, out: Floats, spans: Integers, rods: NDArray[np.bool_]) -> None:
-    """Curvature of catenaries less the discrete layer of a hinge, at ends where that of a rod fades to nothing."""
-    first, last = (np.isin(spans[:, k], view.end_nodes) & ~rods & (spans[:, 1] - spans[:, 0] > 1) for k in (0, 1))
-    for way, EI, mine in zip((1, -1), view.grid.hinges, (first, last), strict=True):
-        for a, b, row in spans[mine] if EI > 0.0 else ():
-            node, its = (a, row) if way > 0 else (b, row + b - a)
-            nodes = _beside(node, way, b - a)
-            parts = _up_to_faded(_layer(view, nodes, way, EI))
-            rows, directions = its + way * np.arange(len(parts)), view._bend_directions
-            # all is what the layer is of: its direction is that of the next node
-            _add_layer(out, rows, -out[its, 0] * parts, (directions[rows] * directions[its]).sum(axis=1))
-            out[its, 0] = 0.0
+def _take_layers_at_ends(view: Observation, out: Floats) -> list[tuple[EndLayer, Floats]]:
+    """Curvature of catenaries less what of a rod's fades, at ends where that is nothing; the layers, and curvatures
+
+    (outputs,) 1/m of the ends without them.
+    """
+    directions, taken = view._bend_directions, []
+    for layer in end_layers(view):
+        end, rows = out[layer.rows[0], 0].copy(), layer.rows
+        # all is what the layer is of: its direction is that of the next node
+        along = (directions[rows] * directions[rows[0]]).sum(axis=1)
+        _add_layer(out, rows, -end * layer.part[layer.at], along)
+        out[rows[0], 0] = 0.0
+        taken.append((layer, end))
+    return taken
 
 
 def _add_layer(out: Floats, rows: Integers, missing: Floats, along: Floats) -> None:
@@ -175,18 +176,6 @@ def _add_layer(out: Floats, rows: Integers, missing: Floats, along: Floats) -> N
     both = out[rows, 0] + missing * along
     square = both * both + missing * missing * (1.0 - np.minimum(along * along, 1.0))
     out[rows, 0] = np.copysign(np.sqrt(square), both)
-
-
-def _beside(node: int, way: int, cells: int) -> Integers:
-    """Nodes inside a stretch of so many cells beside that at its end, as far as a layer may reach."""
-    return node + way * np.arange(1, min(cells, FARTHEST + 1))
-
-
-def _up_to_faded(parts: Floats) -> Floats:
-    """Parts (m, nb) of layers up to where those of all outputs have faded."""
-    parts = parts[: 1 + int((parts[1:] > FADED).any(axis=1).sum())]
-    parts[1:][parts[1:] <= FADED] = 0.0  # of each output by itself: none depends on those beside it
-    return parts
 
 
 def _stiffness_shares(view: Observation, node: int, way: int) -> tuple[Floats, Floats]:
@@ -198,13 +187,14 @@ def _stiffness_shares(view: Observation, node: int, way: int) -> tuple[Floats, F
     return before, after
 
 
-def _layer(view: Observation, nodes: Integers, way: int, EI: Floats | float) -> Floats:
-    """Parts (m, nb) of a hinge's layer there and at nodes beside it, in the direction `way`; EI: N m2, at those.
+def _layer(view: Observation, node: int, way: int, span: Integers) -> Floats:
+    """Parts (m, nb) of a hinge's layer at a node and at those of the rod beside it.
 
     None is left where there is no stiffness or no tension.
     """
+    nodes = node + way * np.arange(1, min(span[1] - span[0], FARTHEST + 1))
     beside, T = np.minimum(nodes, nodes - way), view.T[np.minimum(nodes, nodes - way)]
-    EI = np.broadcast_to(EI, T.shape)
+    EI = view.stiffness(nodes)[:, 0] * view.of_line("hn", nodes)
     square = view.cell_lengths[beside] ** 2 * np.maximum(T, 0.0)
     half = 1.0 + 0.5 * np.divide(square, EI, out=np.full(T.shape, 1e12), where=EI > 0.0)
     found = np.cumprod(np.where(T > 0.0, 1.0 / (half + np.sqrt(half * half - 1.0)), 0.0), axis=0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid.kernels.state.state import Floats
 from hybrid.model.mesh import Zone
-from hybrid.outputs.output_grid import Grid, Rows
+from hybrid.outputs.output_grid import NO_HINGES, Grid, Rows
 
 
 class VaryingGrid(Grid):
@@ -18,7 +18,7 @@ class VaryingGrid(Grid):
     def __init__(
         self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = (),
         changes: Sequence[float] = (), after: bool = False, kept: Sequence[float] = (),
-        hinges: Sequence[float] = (0.0, 0.0),
+        hinges: Floats = NO_HINGES,
     ) -> None:  # fmt: skip
         """nodes_s: (nb, N+1) m, nodes of every output; s: (nb, ns) m, its points; zones: of the first; the rest as of
 

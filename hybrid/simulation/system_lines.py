@@ -270,8 +270,9 @@ class LineResult:
             return
         self.write_down()
         self.model, first = model, self.observer.first_energy
-        self.observer = self.observer.on(model.line, model.sea.values, model.zones)
+        self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.cable.hinges)
         self.observer.first_energy = first
+        self.books.hinges[:] = model.cable.hinges
         self.diagnostics.follow(model)
         self._itself = LineWatch(self.envelope.itself, model)
         if self.touches != bool(self.books.touch.size):

@@ -328,7 +328,8 @@ class TimeLoop:
         """Record outputs, and look at them; errors: of the model, as sampled with them."""
         run, model = self.run, self.run.model
         if model is not self._observed:
-            self.observer, self._observed = self.observer.on(model.line, model.sea.values, model.zones), model
+            self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.cable.hinges)
+            self._observed = model
         observer, ratios, count = self.observer, None, batch.t.size
         if observer.writes_criteria:
             self._keep_ratios(count)

@@ -619,6 +619,7 @@ class Transient:
             or (self.payout is not None and self.payout.solves_twice)
         )
         self.stepper = Stepper(model.line, model.length, model.tension_scale, keep=keep)
+        books.hinges[:] = model.cable.hinges
         self.run.clock[b.WAVE_STEP] = wave_step(model.line, model.tension_scale)
         self.run.attach(
             model.line, model.sea.values, model.ends.values, model.ends.moves(), self.stepper.work,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -71,6 +72,9 @@ class Plain:
         self.state = state
         self.shift: Shift | None = None
         self._plain: Plain | None = None  # the view that this one corrects
+        self.between: list[
+            tuple[Any, ...]
+        ] = []  # layers of pins in cells: ends, parts there, depth, curvature at the pin
 
     def corrected(self, shift: Shift) -> Plain:
         """The same state with position, tension, curvature and moment corrected; energies and contact stay."""
@@ -224,29 +228,35 @@ class Plain:
         for k in range(1, len(self.grid.parts)):  # what a joint takes of a rod's curvature is put back
             if self.grid.parts[k - 1].kind != self.grid.parts[k].kind:
                 self._put_back(out, k)
-        for k, EI in enumerate(self.grid.hinges):  # what a pin takes of a catenary's is taken away
+        for k, (EI, reach) in enumerate(self.grid.hinges):  # what a pin takes of a catenary's is taken away
             if EI > 0.0 and self.grid.parts[-k].kind == "catenary":
-                self._take_away(out, k, EI)
+                self._take_away(out, k, EI, reach)
         return out
 
-    def _take_away(self, out: Floats, k: int, EI: float) -> None:
-        """The layer of a hinge at end k, node by node."""
+    def _take_away(self, out: Floats, k: int, EI: float, reach: float) -> None:
+        """The layer of a hinge at end k, node by node; `between` has what it is in the cells."""
         first, last, o = self.grid.spans[-k]
         node, row, way = (last, o + last - first, -1) if k else (first, o, 1)
         if last - first < 2:
             return
-        at_end, direction, part = out[row, 0], self._directions[row], 1.0
-        out[row, 0] = 0.0
-        for j in range(1, last - first):
-            c = min(node + j * way, node + (j - 1) * way)
-            T = self.state.T[c]
-            b = 2.0 + self.line.h[c] ** 2 * T / EI
-            part *= (0.5 * (b - np.sqrt(b * b - 4.0)) if b < 1e6 else 1.0 / b) if T > 0.0 else 0.0
-            if part <= FADED:
+        line, T, end, direction = self.line, self.state.T, out[row, 0], self._directions[row]
+        out[row, 0], depth, before = 0.0, 0.0, 1.0
+        for i in range(node + way, (0 if k else line.h.size), way):
+            c, beyond = min(i, i - way), min(i, i + way)
+            deep = line.h[c] * np.sqrt(T[c] / EI)
+            depth += deep
+            part = (0.5 * (T[c] + T[beyond]) / T[-k]) ** 0.25 * np.exp(-depth)
+            part = part if part > FADED else 0.0
+            self.between.append((line.s[i - way], line.s[i], before, part, deep, end * direction))
+            if part == 0.0:
                 return
-            mine = self._directions[row + j * way]
-            whole = out[row + j * way, 0] * mine - at_end * part * direction
-            out[row + j * way, 0] = np.copysign(np.linalg.norm(whole), whole @ mine)
+            before = part
+            for row in np.flatnonzero(self.grid.side_nodes == i):
+                mine = self._directions[row]
+                whole = out[row, 0] * mine - end * part * direction
+                out[row, 0] = np.copysign(np.linalg.norm(whole), whole @ mine)
+            if line.spin[beyond] or abs(line.s[i] - line.s[node]) > reach * (1 - 1e-9):
+                return
 
     def _put_back(self, out: Floats, k: int) -> None:
         """The layer of a hinge beside the joint before stretch k, node by node."""
@@ -301,6 +311,11 @@ class Plain:
         if self.shift is not None:
             strains = np.column_stack([self._curvature_of_moment(self.shift), strains[:, 1]])
         bend = self.grid.sides @ (self._directions * strains[:, :1])
+        for a, b, one, two, deep, vector in (self._plain or self).between:
+            for i in np.flatnonzero((self.grid.s - a) * (self.grid.s - b) < 0.0) if deep > 0.1 else ():
+                u = (self.grid.s[i] - a) / (b - a)
+                here = one * (two / one) ** u if two > 0.0 else one * np.exp(-u * deep)
+                bend[i] += ((1.0 - u) * one + u * two - here) * vector
         return np.column_stack([np.linalg.norm(bend, axis=1), self.grid.sides @ strains[:, 1]])
 
     @cached_property

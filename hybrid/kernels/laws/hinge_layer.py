@@ -9,6 +9,9 @@ Far from the hinge the moment M of a rod is EI times the curvature of the line w
 of it, D, obeys EI D'' = T D.  On equal cells that is D_(i+1) - (2 + (h/lam)^2) D_i + D_(i-1) = 0, hence D_i = D_0 f^i
 with f + 1/f = 2 + (h/lam)^2: the discrete layer, which is what the nodes of a rod have, whatever h is.
 
+Beside the end of a catenary, whose cells have no such layer, it is that of the line, (EI/T D')' = D, for tension that
+changes little within lam:  D = D_0 (T/T_0)^(1/4) exp(-int ds/lam).
+
 D_0 is the curvature kappa_J that the line would have at the hinge.  The forces at the hinge, whose rod ends without a
 moment, are in balance with the turn of its chords, per length k_J:  with B = lam^2/(h_n h) on either side, a that of the
 catenary, b that of the rod,
@@ -34,6 +37,18 @@ def fade(square):
     """f, of (h/lam)^2; nothing fades without tension."""
     half = 1.0 + 0.5 * max(square, 0.0)
     return 1.0 / (half + math.sqrt(half * half - 1.0))
+
+
+@inner
+def depth_of(T, EI, h):
+    """Integral of sqrt(T/EI) over a cell of h, m: by what the layer of a hinge that the cells know nothing of fades."""
+    return math.sqrt(T / EI) * h if T > 0.0 else math.inf
+
+
+@inner
+def left_of(depth, T, end):
+    """Part of such a layer at a depth, where the tension is T, N, and at the end `end`, N."""
+    return (T / end) ** 0.25 * math.exp(-depth)
 
 
 @inner

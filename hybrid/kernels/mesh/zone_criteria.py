@@ -24,7 +24,7 @@ from hybrid.kernels.algebra.rotations import cross, dot, frame, get3, get9, log_
 from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import relative_rotation
-from hybrid.kernels.laws.hinge_layer import FADED, at_hinge, fade, stiffness_share
+from hybrid.kernels.laws.hinge_layer import FADED, at_hinge, depth_of, fade, left_of, stiffness_share
 from hybrid.kernels.laws.tension_torque import rest_strain
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.mesh.cell_errors import (
@@ -224,23 +224,22 @@ def bends_at(line, kinds, shares, layers, i):
 def left_at_hinge(line, T, kinds, i):
     """Curvature, 1/m, by which the layer that results take away at end i may be wrong.
 
-    They take it to be that of the tension beside each node, and none goes on beyond a load, a change of section or a
-    joint: what is left of it there is missing, and about a quarter of what tension changes by within sqrt(EI/T).
+    It goes on to the next change of section or joint, where what is left of it is missing, and is that of a tension that
+    changes little within sqrt(EI/T): about a quarter of what it changes by there.
     """
     n, way, j = line.h.shape[0], 1 if i == 0 else -1, 1 if i == 0 else line.h.shape[0] - 1
-    end, part, kappa = min(i, n - 1), 1.0, node_curvature(line, kinds.turn, min(max(j, 1), n - 1))
+    end, depth, part, kappa = min(i, n - 1), 0.0, 1.0, node_curvature(line, kinds.turn, min(max(j, 1), n - 1))
     first = last = T[end]
-    while True:
+    while part > FADED:
         c = min(j, j - way)
         if T[c] <= 0.0 or not 0 < j < n:
             return kappa * part
-        part *= fade(line.h[c] * line.h[c] * T[c] / kinds.EI[i])
-        if part <= FADED:
-            break
         if part > SHOWS:
             last = T[c]
+        depth += depth_of(T[c], kinds.EI[i], line.h[c])
+        part = left_of(depth, T[c], first)
         joint = not line.spin[end] and line.spin[min(j, j + way)] != 0
-        if kinds.node[j] != SMOOTH or joint:
+        if part > FADED and (kinds.node[j] == STEP or joint):
             return kappa * part
         j += way
     return kappa * min(BY_TENSION * abs(last - first) / min(first, last), 1.0)

@@ -24,7 +24,7 @@ from hybrid.kernels.laws.bending_law import (
     parts_without_spring,
 )
 from hybrid.kernels.laws.cell import chord, turning
-from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST, at_hinge, fade, stiffness_share
+from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST, at_hinge, depth_of, fade, left_of, stiffness_share
 from hybrid.kernels.laws.obstacle_grip import pressure_of_obstacles
 from hybrid.kernels.laws.seabed import pressure
 from hybrid.kernels.laws.tension_torque import rest_strain
@@ -48,6 +48,7 @@ from hybrid.kernels.state.report import FORCE_A
 
 # Column of strains: curvature as results have it, 1/m: with what joints take of it, without what ends do not bear.
 BENT = 3
+SAME_PLACE = 1e-9  # part of a length
 
 
 @kernel  # a call costs a nanosecond; inlined at thirty places it costs seconds of compilation
@@ -206,7 +207,7 @@ def beside_kink(line, state, books, i, side):
         return books.strains[i, 0]
     if (i == 0 or i == n) and is_hinge(line, books, 0 if i == 0 else 1):
         return 0.0
-    return towards(line, state, books.marks, i, side)
+    return abs(towards(line, state, books.marks, i, side) + books.strains[i, BENT])
 
 
 @inner
@@ -263,25 +264,36 @@ def is_hinge(line, books, k):
     """Whether the curvature of a rod would fade to nothing at end k, where a catenary of two cells or more ends."""
     n = line.h.shape[0]
     return (
-        books.hinges[k] > 0.0 and n > 1 and not line.spin[k * (n - 1)] and is_smooth(line, books.marks, 1 + k * (n - 2))
+        books.hinges[k, 0] > 0.0
+        and n > 1
+        and not line.spin[k * (n - 1)]
+        and is_smooth(line, books.marks, 1 + k * (n - 2))
     )
 
 
 @inner
 def take_layer_at_end(line, state, books, k):
-    """Take from strains[:, BENT] of a catenary the layer in which the curvature of a rod fades at its end k."""
-    n, EI = line.h.shape[0], books.hinges[k]
+    """Take from strains[:, BENT] of a catenary the layer in which the curvature of a rod fades at its end k.
+
+    Where it may have a kink, at point loads, what is taken is there alone: the curvature follows from its neighbours.
+    """
+    n, EI, T, h = line.h.shape[0], books.hinges[k, 0], state.T, line.h
     way, j = 1 - 2 * k, 1 + k * (n - 2)
-    ends, direction = towards(line, state, books.marks, k * n, way), bend_direction(state, j)
-    part = layer_part(line, state, j, way, EI)
-    for _ in range(FARTHEST):
-        if part <= FADED or not is_smooth(line, books.marks, j):
+    end, direction = towards(line, state, books.marks, k * n, way), bend_direction(state, j)
+    first, depth = T[k * (n - 1)], 0.0
+    while 0 < j < n and T[min(j, j - way)] > 0.0 and not line.spin[min(j, j - way)] and first > 0.0:
+        depth += depth_of(T[min(j, j - way)], EI, h[min(j, j - way)])
+        part = left_of(depth, 0.5 * max(T[j - 1] + T[j], 0.0), first)
+        if part <= FADED or line.spin[j - 1] != line.spin[j]:
             break
-        along = dot(bend_direction(state, j), direction)
-        books.strains[j, BENT] = with_layer(books.strains[j, BENT], -ends * part, along)
+        if is_smooth(line, books.marks, j):
+            along = dot(bend_direction(state, j), direction)
+            books.strains[j, BENT] = with_layer(books.strains[j, BENT], -end * part, along)
+        else:
+            books.strains[j, BENT] = -end * part
+        if not abs(line.s[j] - line.s[k * n]) < (1.0 - SAME_PLACE) * books.hinges[k, 1]:  # another stiffness
+            break
         j += way
-        if 0 < j < n:
-            part *= layer_part(line, state, j, way, EI)
 
 
 @inner
@@ -292,7 +304,9 @@ def put_layers_back(line, ends, state, books):
     """
     n, bent = line.h.shape[0], books.strains
     for i in range(n + 1):
-        bent[i, BENT] = of_chords(line, state, i) if is_smooth(line, books.marks, i) else bent[i, 0]
+        bent[i, BENT] = bent[i, 0] if line.element[i] else 0.0
+        if is_smooth(line, books.marks, i):
+            bent[i, BENT] = of_chords(line, state, i)
     for k in range(2):
         if is_hinge(line, books, k):
             take_layer_at_end(line, state, books, k)
