@@ -35,8 +35,9 @@ class EndLayer(NamedTuple):
     rows: Integers  # (k,) of sides of nodes; of loads both
     at: Integers  # (k,) which of the nodes each is
     EI: float
-    depth: Floats  # (m, nb)
+    deep: Floats  # (m-1, nb) depth of each cell
     part: Floats  # (m, nb)
+    of_cells: Floats  # (m, nb) what rods of these cells have of it (kernels.laws.hinge_layer.fade)
 
 
 def end_layers(view: Observation) -> list[EndLayer]:
@@ -75,7 +76,10 @@ def _layer(view: Observation, rows: Integers, all_nodes: Integers, way: int, EI:
     cells = np.minimum(nodes[1:], nodes[:-1])
     T, h = view.T[cells], view.cell_lengths[cells]
     slope = np.where(T > 0.0, np.sqrt(np.maximum(T, 0.0) / EI), np.inf)  # none is left without tension
-    depth = np.concatenate([np.zeros((1, T.shape[1])), np.cumsum(slope * h, axis=0)])
+    deep = slope * h
+    depth = np.concatenate([np.zeros((1, T.shape[1])), np.cumsum(deep, axis=0)])
+    half = 1.0 + 0.5 * np.minimum(deep, 1e6) ** 2
+    of_cells = np.cumprod(np.concatenate([np.ones((1, T.shape[1])), 1.0 / (half + np.sqrt(half * half - 1.0))]), axis=0)
     at_nodes = np.concatenate([T[:1], 0.5 * (T[1:] + T[:-1]), T[-1:]])
     with np.errstate(invalid="ignore"):
         part = np.maximum(at_nodes / np.where(T[0] > 0.0, T[0], 1.0), 0.0) ** 0.25 * np.exp(-depth)
@@ -86,7 +90,7 @@ def _layer(view: Observation, rows: Integers, all_nodes: Integers, way: int, EI:
     kept = min(1 + int((part > 0.0).any(axis=1).sum()), len(nodes))
     at = np.abs(all_nodes - nodes[0])
     use = at < kept
-    return EndLayer(nodes[:kept], way, rows[use], at[use], EI, depth[:kept], part[:kept])
+    return EndLayer(nodes[:kept], way, rows[use], at[use], EI, deep[: kept - 1], part[:kept], of_cells[:kept])
 
 
 def between_nodes(view: Observation, layer: EndLayer) -> Iterator[tuple[Integers, Floats]]:
@@ -97,7 +101,7 @@ def between_nodes(view: Observation, layer: EndLayer) -> Iterator[tuple[Integers
     ends = layer.way * (s - s[0])
     near = np.flatnonzero(mine & (x <= ends[-1]).any(axis=1) & (x >= 0.0).any(axis=1))
     x = x[near]
-    deep = np.diff(layer.depth, axis=0)
+    deep = layer.deep
     for c in np.flatnonzero((deep > SHALLOW).any(axis=1)):
         inside = (x > ends[c]) & (x < ends[c + 1])
         some = np.flatnonzero(inside.any(axis=1))

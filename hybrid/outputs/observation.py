@@ -337,6 +337,8 @@ class Observation:
         strains = self._plain._strains
         if self.shift is not None:
             strains = np.stack([self._curvature_of_moment(self.shift), strains[:, 1]], axis=1)
+            for layer, end in self._plain._taken_at_ends:  # moments have that of rods of these cells
+                strains[layer.rows, 0] += end * (layer.of_cells - layer.part)[layer.at]
         bend = self._plain._bend_directions * strains[:, :1]
         found = self.grid.sides @ np.concatenate([bend, strains[:, 1:]], axis=1)
         for layer, end in self._plain._taken_at_ends:  # which is no straight line in cells that are long for it

@@ -72,6 +72,7 @@ class Plain:
         self.state = state
         self.shift: Shift | None = None
         self._plain: Plain | None = None  # the view that this one corrects
+        self.of_cells: list[tuple[int, float]] = []  # what rods have more of it at sides of nodes
         self.between: list[
             tuple[Any, ...]
         ] = []  # layers of pins in cells: ends, parts there, depth, curvature at the pin
@@ -240,7 +241,7 @@ class Plain:
         if last - first < 2:
             return
         line, T, end, direction = self.line, self.state.T, out[row, 0], self._directions[row]
-        out[row, 0], depth, before = 0.0, 0.0, 1.0
+        out[row, 0], depth, before, of_cells = 0.0, 0.0, 1.0, 1.0
         for i in range(node + way, (0 if k else line.h.size), way):
             c, beyond = min(i, i - way), min(i, i + way)
             deep = line.h[c] * np.sqrt(T[c] / EI)
@@ -251,7 +252,10 @@ class Plain:
             if part == 0.0:
                 return
             before = part
+            b = 2.0 + line.h[c] ** 2 * T[c] / EI
+            of_cells *= 0.5 * (b - np.sqrt(b * b - 4.0)) if b < 1e6 else 1.0 / b
             for row in np.flatnonzero(self.grid.side_nodes == i):
+                self.of_cells.append((row, end * (of_cells - part)))
                 mine = self._directions[row]
                 whole = out[row, 0] * mine - end * part * direction
                 out[row, 0] = np.copysign(np.linalg.norm(whole), whole @ mine)
@@ -310,6 +314,9 @@ class Plain:
         strains = self._strains
         if self.shift is not None:
             strains = np.column_stack([self._curvature_of_moment(self.shift), strains[:, 1]])
+            assert self._plain is not None
+            for row, more in self._plain.of_cells:
+                strains[row, 0] += more
         bend = self.grid.sides @ (self._directions * strains[:, :1])
         for a, b, one, two, deep, vector in (self._plain or self).between:
             for i in np.flatnonzero((self.grid.s - a) * (self.grid.s - b) < 0.0) if deep > 0.1 else ():

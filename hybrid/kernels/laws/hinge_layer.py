@@ -12,7 +12,7 @@ with f + 1/f = 2 + (h/lam)^2: the discrete layer, which is what the nodes of a r
 Beside the end of a catenary, whose cells have no such layer, it is that of the line, (EI/T D')' = D, for tension that
 changes little within lam:  D = D_0 (T/T_0)^(1/4) exp(-int ds/lam).
 
-D_0 is the curvature kappa_J that the line would have at the hinge.  The forces at the hinge, whose rod ends without a
+At a joint D_0 is the curvature kappa_J that the line would have at the hinge.  The forces at the hinge, whose rod ends without a
 moment, are in balance with the turn of its chords, per length k_J:  with B = lam^2/(h_n h) on either side, a that of the
 catenary, b that of the rod,
 
