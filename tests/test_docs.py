@@ -67,6 +67,7 @@ def test_readme_commands_run(clone: Path, monkeypatch: pytest.MonkeyPatch, capsy
         "import",
         "modes",
         "response",
+        "sensitivity",
     }
     for arguments in found:
         with pytest.raises(SystemExit) as left:
