@@ -10,19 +10,22 @@ The angle between two chords is measured by 2 sin(angle/2), the distance of thei
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
 from adapt_cases import GRAVITY, X, Y, Z, along, cable, even, layout, on, polygon, state_on, still, untwisted, weighed
+from problems import pinned
 
 from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.zone_rules import wanted
+from hybrid.kernels.mesh.cell_errors import CURVATURE
 from hybrid.kernels.mesh.criteria import BEND, CLAMP, CONTACT, CRITERIA, EDGE, GIVEN, POINT, SLACK, TORSION
 from hybrid.kernels.mesh.zone_criteria import FORESEEN
 from hybrid.kernels.mesh.zone_step import LONGEST_LOOKAHEAD, LOOKAHEAD, REJECT_RATIO
 from hybrid.kernels.state.forces import SEABED
 from hybrid.kernels.state.state import no_sea
-from hybrid.model.material import TENSION_FLOOR
+from hybrid.model.material import TENSION_FLOOR, Material
 
 EI, GJ, W = 2.0, 1.5, 1.0 * GRAVITY  # of `cable()`
 FLOORED = TENSION_FLOOR * (EI * W**2) ** (1 / 3)  # N
@@ -408,3 +411,29 @@ def test_force_catenary_wins():
     manager.evaluate_criteria(on(what, zones), no_sea(12), still(), state, 0.0)
     change = manager.review(0.0, state)
     assert change is not None and change.rod.tolist() == (given >= 0).tolist()
+
+
+def lacks_at_pin(what: Material, tension: Any) -> float:
+    """What the criterion of a pin lacks of curvature, as a part of that, of an arc of 0.1 1/m whose ends are pins."""
+    zones = even(100, "C" * 100, parts=1)
+    manager = DomainManager(what, zones, TOL, 0.5, np.zeros(100, int), 1.0)
+    manager.zones.asked[CURVATURE] = 0.1
+    line = on(what, zones)
+    state = state_on(
+        line, lambda s: np.column_stack([10.0 * np.sin(0.1 * s), 0.0 * s, 10.0 * np.cos(0.1 * s)]), tension
+    )
+    manager.evaluate_criteria(line, no_sea(100), still(), state, 0.0)
+    return float(manager.ratios[CLAMP, 0] * manager.zones.shares[CURVATURE] / 0.1)
+
+
+def test_a_pin_asks_for_rod_where_results_cannot_know_its_layer():
+    """Of 2 N m2 and 50 N it fades over 0.2 m: not on a plain line; where EI changes at 0.4 m, e^-2 of it is missing."""
+    assert lacks_at_pin(cable(end=pinned(10, 0, 0)), 50.0) == 0.0
+    stiff_at_first = cable(end=pinned(10, 0, 0), sections=({"length": 0.4}, {"length": 9.6, "bending_stiffness": 1.0}))
+    assert lacks_at_pin(stiff_at_first, 50.0) == pytest.approx(np.exp(-2.0), rel=0.05)
+    heavier = cable(end=pinned(10, 0, 0), sections=({"length": 0.4}, {"length": 9.6, "mass": 2.0}))
+    assert lacks_at_pin(heavier, 50.0) == 0.0  # another section, the same stiffness
+    assert 0.02 < lacks_at_pin(cable(end=pinned(10, 0, 0)), lambda s: 50.0 + 100.0 * s) < 0.15
+    moved = cable(end=pinned(10, 0, 0))
+    moved.hinged = (False, True)  # as of an end with a moment
+    assert lacks_at_pin(moved, 50.0) == pytest.approx(1.0, rel=0.02)  # all of it is missing
