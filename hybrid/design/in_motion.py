@@ -26,6 +26,10 @@ from hybrid.scene.system import System
 NAME = re.compile(r"^(max|min|mean|std|last) (?:([^/@]+)/)?([a-z_]\w*)(?:\.([xyz]))?(?:@(.+))?$")
 # Parts of a number by which runs differ: differences of second order by both, from which one of fourth order follows.
 PARTS = (1e-3, 2e-3)
+# Coordinates differ by parts of this part of the longest line: what they are depends on where the origin is.
+PLACE, OF_LENGTH = re.compile(r"(position\[\d\]|\.z|\.surface|\.at\[\d\])$"), 0.1
+# Tables of how a scene is computed and written.
+COMPUTING = ("time", "output", "mesh", "accuracy", "model")
 # Of the length, by which zones of two runs may differ that are the same.
 SAME_ZONE = 0.005
 
@@ -63,7 +67,7 @@ def in_motion(asked: Scene | System, of: Sequence[str], by: Sequence[str]) -> Sl
     for i, (key, number) in enumerate(zip(by, numbers, strict=True)):
         found = []
         for part in PARTS:
-            d = part * (abs(number) or 1.0)
+            d = part * _size_of(asked, key, number)
             more, less = (_Run(changed_scene(asked, key, number + x), wanted, base) for x in (d, -d))
             for each in (more, less):
                 each.check(base, key)
@@ -71,6 +75,17 @@ def in_motion(asked: Scene | System, of: Sequence[str], by: Sequence[str]) -> Sl
         slopes[i] = (4.0 * found[0] - found[1]) / 3.0
         errors[i] = np.abs(slopes[i] - found[0])
     return Slopes(base.values, slopes, errors)
+
+
+def _size_of(asked: Scene | System, key: str, number: float) -> float:
+    """What runs differ by parts of; SceneError: a number of how the scene is computed, which has no derivative."""
+    if key.split(".")[0] in COMPUTING:
+        expected = "a number of what is computed: of the cable, its ends, what is around it"
+        raise SceneError([Complaint("by", key, expected, "cable.sections[0].length, for example")])
+    if PLACE.search(key):
+        lines = [x.cable.length for x in asked.lines.values()] if isinstance(asked, System) else [asked.length]
+        return OF_LENGTH * max(lines)
+    return abs(number) or 1.0
 
 
 def _parsed(asked: Scene | System, text: str) -> Wanted:

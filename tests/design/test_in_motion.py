@@ -124,3 +124,22 @@ def test_the_command(tmp_path, monkeypatch):
     rows = [x for x in map(json.loads, told.output.splitlines()) if "elasticity" in x]
     assert [x["of"] for x in rows] == ["max tension@start", "max tension@end"]
     assert rows[0]["derivative"] == pytest.approx(260.0, rel=1e-3)
+
+
+def test_where_the_origin_is_does_not_matter():
+    """A step is a part of the length, not of a coordinate: 5 km away both ends' derivatives are what they were."""
+    keys = ["ends.start.position[0]", "ends.end.position[0]"]
+    found = []
+    for x in (0.0, 5000.0):
+        scene = on_the_bed()
+        for end in scene["ends"].values():
+            end["position"][0] += x
+        found.append(in_motion(hybrid.validate_scene(scene), ["max tension@end"], keys).derivatives[:, 0])
+    assert found[1] == pytest.approx(found[0], rel=1e-5)
+    assert found[0][0] == pytest.approx(-found[0][1], rel=2e-3)  # moved by both nothing changes
+
+
+@pytest.mark.parametrize("key", ["time.step", "time.duration", "mesh.cells"])
+def test_how_a_scene_is_computed_is_no_number_of_it(key):
+    with pytest.raises(hybrid.SceneError, match=r"a number of what is computed"):
+        in_motion(hybrid.validate_scene(on_the_bed()), ["max tension@end"], [key])
