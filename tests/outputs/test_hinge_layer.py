@@ -151,3 +151,21 @@ def test_extremes_of_steps_have_it_too(model: Any) -> None:
     shown = found.curvature
     np.testing.assert_allclose(high, shown.max(axis=0), rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(low, shown.min(axis=0), rtol=1e-6, atol=1e-9)
+
+
+def test_a_clamp_that_lets_go_leaves_an_end_without_a_moment() -> None:
+    """Before, the catenary does not know what the clamp bends; from then on a rod has no curvature there."""
+    scene = sagging("catenary", 50, across=0.7)
+    (section,) = scene["cable"]["sections"]
+    del section["axial_stiffness"]
+    section |= {"bending_stiffness": 500.0, "drag": {"normal": 1.2, "tangential": 0.02}}
+    scene["ends"]["end"] = {
+        "kind": "clamped", "position": [0.0, 12.0, -98.5], "tangent": [0.0, 0.4, -1.0], "release_at": {"time": 0.5},
+    }  # fmt: skip
+    scene |= {"time": {"duration": 1.5, "step": 0.05}}
+    scene["output"] |= {"every": 0.25, "points": 51}
+    found = hybrid.run(scene)
+    assert "end released" in {event.kind for event in found.events}
+    held, free = found.curvature[0, -1], found.curvature[3:, -1]
+    assert held > 0.5 * found.curvature[0].max()
+    np.testing.assert_array_equal(free, 0.0)
