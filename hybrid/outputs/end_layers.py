@@ -108,6 +108,8 @@ def between_nodes(view: Observation, layer: EndLayer) -> Iterator[tuple[Integers
         if some.size:
             u = (x[some] - ends[c]) / (ends[c + 1] - ends[c])
             one, two = layer.part[c], layer.part[c + 1]
-            here = np.where(two > 0.0, one ** (1.0 - u) * two**u, one * np.exp(-u * np.minimum(deep[c], 700.0)))
+            q = np.minimum(deep[c], 700.0)
+            last = one * (np.exp(-u * q) - u * np.exp(-q))  # to nothing where it no longer counts
+            here = np.where(two > 0.0, one ** (1.0 - u) * two**u, last)
             less = (1.0 - u) * one + u * two - here
             yield near[some], np.where(inside[some], less, 0.0)

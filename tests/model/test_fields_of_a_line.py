@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 import hybrid
-import hybrid.model.build
 import hybrid.model.payout
 from hybrid.kernels.state.state import ALONG_LINE, NODES_OF_LINE, Line
 from hybrid.model.build import Model, build
@@ -83,16 +82,15 @@ def paid_out(model: Any, rate: float) -> hybrid.Scene:
 def numbers_for_all(monkeypatch: pytest.MonkeyPatch) -> None:
     """What a material has per length and nobody asked for is a number of its own in each piece, not NaN."""
 
-    def filled(scene: hybrid.Scene) -> Material:
-        cable = material(scene)
+    def filled(scene: hybrid.Scene, nodes: Any = None) -> Material:
+        cable = material(scene, nodes)
         for k, field in enumerate(dataclasses.fields(Material)):
             x = getattr(cable, field.name)
             if isinstance(x, np.ndarray) and x.shape == cable.mass.shape and np.isnan(x).all():
                 setattr(cable, field.name, (2.0 + k) * cable.mass)
         return cable
 
-    for room in (hybrid.model.build, hybrid.model.payout):
-        monkeypatch.setattr(room, "material", filled)
+    monkeypatch.setattr(hybrid.model.payout, "material", filled)
 
 
 def check(line: Line, cable: Material, but: set[str] = WITHOUT_INERTIA, shape: Line | None = None) -> None:

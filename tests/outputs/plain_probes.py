@@ -321,7 +321,7 @@ class Plain:
         for a, b, one, two, deep, vector in (self._plain or self).between:
             for i in np.flatnonzero((self.grid.s - a) * (self.grid.s - b) < 0.0) if deep > 0.1 else ():
                 u = (self.grid.s[i] - a) / (b - a)
-                here = one * (two / one) ** u if two > 0.0 else one * np.exp(-u * deep)
+                here = one * (two / one) ** u if two > 0.0 else one * (np.exp(-u * deep) - u * np.exp(-deep))
                 bend[i] += ((1.0 - u) * one + u * two - here) * vector
         return np.column_stack([np.linalg.norm(bend, axis=1), self.grid.sides @ strains[:, 1]])
 
