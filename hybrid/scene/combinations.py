@@ -570,14 +570,6 @@ REFUSALS: tuple[Refusal, ...] = (
         fix="write `self: false` in contact, or give it a spin",
     ),
     Refusal(
-        SHAPES, MAY_TOUCH, "not worked out", "the solve of contact of lines with themselves ({key}) knows no bodies",
-        fix="write `self: false` in contact of every line, or leave the shape out",
-    ),
-    Refusal(
-        SHAPES, LINES_TOUCH, "not worked out", "the solve of contact of lines with each other ({key}) knows no bodies",
-        fix="leave {key} out, or the shape",
-    ),
-    Refusal(
         SHAPES, STIFFNESS, "not worked out", "contact of lines with a body opens and closes",
         "no shape", "leave it out where no line touches the body",
     ),

@@ -172,6 +172,7 @@ class SystemSolver:
             if k in self._lone_tables:
                 self._lone_tables[k].bind(task=Task(RUN, limits=limits._replace(most=MOST_OF_STEP)))
         self._pressing: NDArray[np.int64] = np.zeros(0, np.int64)
+        self._phase = np.zeros(1, np.int64)
         self._meeting = [Table(blank_meeting_job), Table(blank_meeting_job)] if self._rides.size else []
         if self._rides.size:
             self._meet()
@@ -195,20 +196,24 @@ class SystemSolver:
         slots[bodies] = np.arange(len(bodies))
         nodes = [x.line.s.size for x in self.lines]
         total, rows = sum(nodes), EACH_BODY * len(bodies)
-        phase, self._pressing = np.zeros(1, np.int64), np.zeros(1 + len(bodies), np.int64)
+        self._pressing = np.zeros(1 + len(bodies), np.int64)
         room = {
             "gaps": np.zeros_like(self._gaps), "rides": self._rides, "carriers": np.array(bodies, np.int64),
-            "slots": slots, "begins": np.append(0, np.cumsum(nodes)[:-1]).astype(np.int64), "phase": phase,
+            "slots": slots, "begins": np.append(0, np.cumsum(nodes)[:-1]).astype(np.int64), "phase": self._phase,
             "found": self._pressing, "touched": np.zeros((total * len(bodies), TOUCHED)),
             "own": np.zeros((len(bodies), 36)), "wrench": np.zeros((len(bodies), 6)),
             "marks": np.zeros(total, np.int64), "kept": np.zeros((total, SIZE)),
             "moved": np.zeros((len(self.bodies), 6)), "responses": np.zeros((rows, total, SIZE)),
             "turned": np.zeros((rows, len(self.bodies), 6)), "coupling": np.zeros((rows, rows + 1)),
+            "order": np.zeros(rows, np.int64),
         }  # fmt: skip
         for job, meeting, numbers in zip(self._jobs, self._meeting, self._numbers, strict=True):
             meeting.bind(**self._of_lines(numbers), **room)
             job.bind(
-                rides=self._rides, phase=phase, meet=meet_bodies.address(meeting.numbers), meet_table=meeting.numbers
+                rides=self._rides,
+                phase=self._phase,
+                meet=meet_bodies.address(meeting.numbers),
+                meet_table=meeting.numbers,
             )
 
     def _of_lines(self, numbers: NDArray[np.int64]) -> dict[str, Any]:
@@ -238,6 +243,8 @@ class SystemSolver:
             "moved": np.zeros((len(self.bodies), 6)), "hessenberg": room_for_products(), "shared": shared,
             "contacts": tables,
         }  # fmt: skip
+        for meeting, touching in zip(self._meeting, self._touching, strict=False):
+            touching.bind(phase=self._phase, meet=meet_bodies.address(meeting.numbers), meet_table=meeting.numbers)
         for job, touching, numbers in zip(self._jobs, self._touching, self._numbers, strict=True):
             touching.bind(**self._of_lines(numbers), **room)
             job.bind(touch=touch_system.address(touching.numbers), touch_table=touching.numbers)

@@ -92,8 +92,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.PAYOUT, c.OBSTACLES): (BALL | PAID, ""),
     (c.SHEAVES, c.SEVERAL_LINES): (SHEAVE | {ONE + "contact": {"self": False}}, ""),
     (c.SHEAVES, c.MAY_TOUCH): (SHEAVE, ""),
-    (c.SHAPES, c.MAY_TOUCH): (SHAPED, ""),
-    (c.SHAPES, c.LINES_TOUCH): (SHAPED | {"lines.two": OTHER_LINE, "contact": {}}, ""),
     (c.SHAPES, c.STIFFNESS): (SHAPED | {ONE + "contact": {"self": False}}, "stiffness"),
     (c.DIAMETERS, c.OBSTACLES): (BALL | THICKER, ""),
     (c.CHOSEN_STEPS, c.PUSHED): (BALL | {"time": {"duration": 3.0}}, ""),

@@ -362,18 +362,6 @@ def test_newtons_method_converges_quadratically() -> None:
 # --- what is refused --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("what", "where"), [("self", "bodies.ball.shape"), ("lines", "bodies.ball.shape")])
-def test_contact_of_lines_beside_a_shape_is_refused(what: str, where: str) -> None:
-    tables = on_two_lines()
-    if what == "self":
-        del tables["lines"]["left"]["contact"]
-    else:
-        tables["contact"] = {"friction": 0.1}
-    with pytest.raises(SceneError, match="knows no bodies") as error:
-        hybrid.static(tables)
-    assert any(x.where == where for x in error.value.complaints)
-
-
 def test_a_shape_has_the_name_of_no_obstacle_and_no_stiffness_is_known_beside_it() -> None:
     tables = on_two_lines()
     with pytest.raises(SceneError, match="opens and closes"):

@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 import hybrid
 from hybrid.errors import Outcome
 from hybrid.kernels.contact.self_contact_pairs import ENERGY
-from hybrid.kernels.junctions.bodies import STATE
+from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, PLACE, STATE, V, W
+from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.march.energies import observe
 from hybrid.kernels.state.books import SHORTEST, blank_books
+from hybrid.model.bodies import body_model
 from hybrid.model.build import build
 from hybrid.model.lines_contact import Touching
+from hybrid.scene.bodies import FreeBody
 from hybrid.simulation.self_watch import diameters, least_bending
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.shared_contact import SharedContact, TouchingLine
@@ -53,13 +56,19 @@ def straight(length: float, at: Floats, along: Floats, cells: int) -> Floats:
 
 def throw(
     shapes: list[Floats], speeds: list[Floats], step: float, duration: float, friction: float = 0.0,
-    width: float = WIDTH, kind: str = "rod", turn: Floats | None = None,
+    width: float = WIDTH, kind: str = "rod", turn: Floats | None = None, body: FreeBody | None = None,
 ) -> Throw:  # fmt: skip
     """Lines with nodes (N+1, 3) m and velocities (N+1, 3) m/s fly; steps (s) that fail are halved.
 
-    turn: (3, 3), of everything.
+    turn: (3, 3), of everything; body: a free one with a shape, which spins.
     """
     models, lines, states = [], [], []
+    surface = {} if body is None else {"obstacles": body.surface("ball")}
+    rides = np.zeros(0 if body is None else 1, np.int64)
+    own = () if body is None else (body_model("ball", body, 0.0, 0.0),)
+    numbers = np.array([x.numbers for x in own]).reshape(len(own), NUMBERS)
+    rows = np.array([x.start for x in own]).reshape(len(own), STATE)
+    rows[:, W : W + 3] = (0.5, -1.0, 2.0)
     for r, v in zip(shapes, speeds, strict=True):
         r = r if turn is None else r @ turn.T
         s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(r, axis=0), axis=1)))
@@ -68,12 +77,13 @@ def throw(
             "contact": {"self": True}, "ends": {"start": "free", "end": "free"}, "model": kind,
             "mesh": {"nodes": s.tolist()}, "initial": {"kind": "points", "points": r.tolist()}, "dimension": 3,
             "time": {"duration": 1.0, "step": 0.1},
-        }))  # fmt: skip
+        } | surface))  # fmt: skip
         state = model.start.copy()
         state.v[:] = v if turn is None else v @ turn.T
         x = JoinedLine(
-            model.line, model.sea.at(0.0), model.ends.at(0.0), model.length, model.tension_scale, -np.inf, (-1, -1)
-        )
+            model.line, model.sea.at(0.0), model.ends.at(0.0), model.length, model.tension_scale, -np.inf, (-1, -1),
+            rides=rides,
+        )  # fmt: skip
         models.append(model)
         lines.append(x)
         states.append(state)
@@ -85,18 +95,20 @@ def throw(
     lines = [x._replace(line=touching.bits(x.line)) for x in lines]
     strands = [TouchingLine(x.line, diameters(x), least_bending(x), x.tension_scale) for x in models]
     shared = SharedContact(touching, strands)
-    solver = SystemSolver(lines, 0, shared=shared)
+    solver = SystemSolver(lines, 0, numbers, shared=shared)
     books = [blank_books(x.line.h.size)._replace(touch=np.zeros((3, x.line.s.size))) for x in lines]
     for each in books:
         each.clock[SHORTEST] = 1e-9
     solver.keep_books(books)
-    old = SystemState(states, np.zeros((0, STATE)))
+    old = SystemState(states, rows)
     solver.consistent_accelerations(old, [np.zeros((2, 3))] * count)
     new, t, before, rho, part, tries = old.copy(), 0.0, 0.0, 0.9, step, 0
     masses = [x.line.mass[:, None] for x in models]
-    first, energies, least = of(models, masses, old), [energy(models, old, shared)], np.inf
+    first, energies, least = of(models, masses, old, numbers), [energy(models, old, shared, lines, numbers)], np.inf
     while t < duration * (1.0 - 1e-9):
         end = t + part
+        for x in lines:
+            x.sea.now[0] = end
         taken = solver.step(old, new, end - t, 0.9, before, rho, end)
         if taken.outcome != Outcome.OK:
             part, tries = 0.5 * part, tries + 1
@@ -104,9 +116,9 @@ def throw(
             continue
         least = min(least, nearest(old, new))
         old, new, before, rho, t = new, old, end - t, taken.rho, end
-        energies.append(energy(models, old, shared))
+        energies.append(energy(models, old, shared, lines, numbers))
         part = min(2.0 * part, step)
-    last = of(models, masses, old)
+    last = of(models, masses, old, numbers)
     size = sum(
         float((np.linalg.norm(x.r, axis=1)[:, None] * m * np.abs(x.v)).sum())
         for x, m in zip(old.lines, masses, strict=True)
@@ -115,18 +127,29 @@ def throw(
     return Throw(least, energies, momentum, turning, size, tries, old, shared, models)
 
 
-def energy(models: list[Any], states: SystemState, shared: SharedContact) -> float:
-    """Kinetic, elastic and contact energy, J."""
+def energy(
+    models: list[Any], states: SystemState, shared: SharedContact, lines: list[JoinedLine], bodies: Floats
+) -> float:
+    """Kinetic, elastic and contact energy, J, of lines and bodies."""
     total = float(shared.contact.numbers[ENERGY])
-    for model, x in zip(models, states.lines, strict=True):
+    for model, x, joined in zip(models, states.lines, lines, strict=True):
         parts, room = np.zeros(5), np.zeros((x.T.size + 1, 3))
         observe(model.line, model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, room, room.copy(), parts)
         total += float(parts[:4].sum())
+        if len(bodies):
+            total += float(stored_energy(model.line, joined.sea, x.r))
+    for numbers, row in zip(bodies, states.bodies, strict=True):
+        total += 0.5 * float(_rates(row) @ numbers[:36].reshape(6, 6) @ _rates(row))
     return total
 
 
-def of(models: list[Any], masses: list[Floats], states: SystemState) -> tuple[Floats, Floats]:
-    """Momentum and angular momentum about the origin, with that of the sections."""
+def _rates(row: Floats) -> Floats:
+    """Velocity and angular velocity (6,) of a body in its axes."""
+    return np.concatenate([row[FRAME:V].reshape(3, 3).T @ row[V : V + 3], row[W : W + 3]])
+
+
+def of(models: list[Any], masses: list[Floats], states: SystemState, bodies: Floats) -> tuple[Floats, Floats]:
+    """Momentum and angular momentum about the origin, with that of the sections and of bodies."""
     momentum, turning = np.zeros(3), np.zeros(3)
     for model, mass, x in zip(models, masses, states.lines, strict=True):
         length = np.linalg.norm(x.e, axis=1)[:, None]
@@ -135,6 +158,10 @@ def of(models: list[Any], masses: list[Floats], states: SystemState) -> tuple[Fl
         sections = line.polar[:, None] * x.w[:, None] * d + line.rotary[:, None] * np.cross(d, rate)
         momentum += (mass * x.v).sum(axis=0)
         turning += np.cross(x.r, mass * x.v).sum(axis=0) + sections.sum(axis=0)
+    for numbers, row in zip(bodies, states.bodies, strict=True):
+        R, both = row[FRAME:V].reshape(3, 3), numbers[:36].reshape(6, 6) @ _rates(row)
+        momentum += R @ both[:3]
+        turning += np.cross(row[PLACE:FRAME], R @ both[:3]) + R @ both[3:]
     return momentum, turning
 
 

@@ -14,8 +14,10 @@ over that of the steps, which touches Newton's way alone.
 
 Lines are eliminated (matrix A, all but P and Q) with bodies where they are, and R is in the matrix of the bodies.  With
 y = Q x the rest is of rank 12 for every body that is touched: corrections are those without P and Q, less the responses
-to the columns of P times z and to unit forces on the bodies times y, and z and y solve a small dense system.
-kernels.run.system calls `meet_bodies` by its address, so that systems without such bodies compile none of it.
+to the columns of P times z and to unit forces on the bodies times y, and z and y solve a small dense system.  Its factors
+and the responses serve all corrections of an iteration: those that contact of lines makes of one are many.
+kernels.run.system and kernels.junctions.system_contact call `meet_bodies` by its address, so that systems without such bodies
+compile none of it.
 """
 
 from __future__ import annotations
@@ -45,8 +47,9 @@ from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.step.job import read
 
 # What is asked: shapes are brought to where their bodies are; forces of contact are found; these and R are put into the
-# equations of the bodies; corrections of lines and bodies are coupled; turns that contact does not hold get a spring.
-CARRY, PRESS, STIFFEN, COUPLE, HOLD = range(5)
+# equations of the bodies; corrections of lines and bodies are coupled; turns that contact does not hold get a spring; other
+# corrections of the same iteration are coupled.
+CARRY, PRESS, STIFFEN, COUPLE, HOLD, AGAIN = range(6)
 
 
 @inner
@@ -180,23 +183,43 @@ def keep_corrections(job, kept, moved):
 
 
 @inner
-def combine(job):
-    """Corrections without P and Q, less the responses times z and y."""
-    last = job.coupling.shape[0]
+def put_corrections(job, kept, moved):
+    """The same back."""
     for l in range(job.tables.shape[0]):
         x, o = read(job.tables[l]).work.x, job.begins[l]
         for i in range(x.shape[0]):
             for j in range(SIZE):
-                x[i, j] = job.kept[o + i, j]
-                for r in range(last):
-                    if job.found[1 + r // EACH_BODY] > 0:
-                        x[i, j] -= job.coupling[r, last] * job.responses[r, o + i, j]
+                x[i, j] = kept[o + i, j]
     for b in range(job.work.shape[0]):
         for j in range(6):
-            job.work[b, X + j] = job.moved[b, j]
-            for r in range(last):
-                if job.found[1 + r // EACH_BODY] > 0:
-                    job.work[b, X + j] -= job.coupling[r, last] * job.turned[r, b, j]
+            job.work[b, X + j] = moved[b, j]
+
+
+@inner
+def touches(job, r):
+    """Whether response r is of a body that is touched."""
+    return job.found[1 + r // EACH_BODY] > 0
+
+
+@inner
+def apply(job):
+    """Couple corrections that were found without P and Q: less the responses times z and y."""
+    last = job.coupling.shape[0]
+    for r in range(last):
+        job.coupling[r, last] = 0.0
+    select(job, last)
+    substitute_small(job.coupling, job.order)
+    for r in range(last):
+        if touches(job, r):
+            part = job.coupling[r, last]
+            for l in range(job.tables.shape[0]):
+                x, o = read(job.tables[l]).work.x, job.begins[l]
+                for i in range(x.shape[0]):
+                    for j in range(SIZE):
+                        x[i, j] -= part * job.responses[r, o + i, j]
+            for b in range(job.work.shape[0]):
+                for j in range(6):
+                    job.work[b, X + j] -= part * job.turned[r, b, j]
 
 
 @inner
@@ -207,26 +230,25 @@ def couple(job, cv, ca):
         return 1
     keep_corrections(job, job.kept, job.moved)
     for r in range(last):
-        for c in range(last + 1):
+        for c in range(last):
             job.coupling[r, c] = 1.0 if r == c else 0.0
-    select(job, last)
     for r in range(last):
-        slot = r // EACH_BODY
-        if job.found[1 + slot] == 0:
+        if not touches(job, r):
             continue
-        if not respond(job, slot, r % EACH_BODY, cv, ca):
+        if not respond(job, r // EACH_BODY, r % EACH_BODY, cv, ca):
             return 0
         keep_corrections(job, job.responses[r], job.turned[r])
         select(job, r)
-    if not solve_small(job.coupling):
+    if not factor_small(job.coupling, job.order):
         return 0
-    combine(job)
+    put_corrections(job, job.kept, job.moved)
+    apply(job)
     return 2
 
 
 @inner
-def solve_small(A):
-    """Solve a dense system (n, n + 1) with row exchanges; the solution is in its last column; False: it is singular."""
+def factor_small(A, order):
+    """Factor a dense system (n, n + 1) with row exchanges, which are kept in order (n,); False: it is singular."""
     n = A.shape[0]
     for c in range(n):
         where = c
@@ -235,24 +257,37 @@ def solve_small(A):
                 where = r
         if not abs(A[where, c]) > 0.0:
             return False
+        order[c] = where
         if where != c:
-            for j in range(c, n + 1):
+            for j in range(n):
                 A[c, j], A[where, j] = A[where, j], A[c, j]
         for r in range(c + 1, n):
-            f = A[r, c] / A[c, c]
-            if f != 0.0:
-                for j in range(c + 1, n + 1):
-                    A[r, j] -= f * A[c, j]
+            A[r, c] /= A[c, c]
+            if A[r, c] != 0.0:
+                for j in range(c + 1, n):
+                    A[r, j] -= A[r, c] * A[c, j]
+    return True
+
+
+@inner
+def substitute_small(A, order):
+    """Solve a system that `factor_small` has factored for its last column, which becomes the solution."""
+    n = A.shape[0]
+    for c in range(n):
+        if order[c] != c:
+            A[c, n], A[order[c], n] = A[order[c], n], A[c, n]
+    for c in range(n):
+        for r in range(c + 1, n):
+            A[r, n] -= A[r, c] * A[c, n]
     for c in range(n - 1, -1, -1):
         for j in range(c + 1, n):
             A[c, n] -= A[c, j] * A[j, n]
         A[c, n] /= A[c, c]
-    return True
 
 
 @kernel
 def meet_bodies(table):
-    """Do what is asked of lines that touch bodies (CARRY, PRESS, STIFFEN, COUPLE, HOLD); 0: it fails."""
+    """Do what is asked of lines that touch bodies (CARRY, PRESS, STIFFEN, COUPLE, HOLD, AGAIN); 0: it fails."""
     job = read_meeting(table)
     task, phase = read(job.tables[0]).task, job.phase[0]
     if phase == CARRY:
@@ -264,6 +299,9 @@ def meet_bodies(table):
         push_bodies(job)
     elif phase == HOLD:
         hold_rolling(job)
+    elif phase == AGAIN:
+        if job.found[0] > 0:
+            apply(job)
     else:
         return couple(job, task.cv, task.ca)
     return 1

@@ -96,6 +96,7 @@ class MeetingJob(NamedTuple):
     responses: Floats  # (12 S, T, 5) of lines
     turned: Floats  # (12 S, B, 6) of bodies
     coupling: Floats  # (12 S, 12 S + 1)
+    order: NDArray[np.int64]  # (12 S,) exchanges of its rows
 
 
 def blank_meeting_job() -> MeetingJob:
@@ -106,6 +107,7 @@ def blank_meeting_job() -> MeetingJob:
         z(FUNCTIONAL), z((2, ANSWER)), z((1, 3)), z((1, NUMBERS)), z((1, STATE)), z((1, STATE)), z((1, WORK)),
         z((HANDED - 1, HANDED)), z((2, 6, 6)), z((4, 2)), z(COLUMNS), one, one, one, one, one, z((1, TOUCHED)),
         z((1, 36)), z((1, 6)), one, z((2, SIZE)), z((1, 6)), z((EACH_BODY, 2, SIZE)), z((EACH_BODY, 1, 6)), z((EACH_BODY, EACH_BODY + 1)),
+        one,
     )  # fmt: skip
 
 

@@ -27,11 +27,12 @@ from hybrid.kernels.contact.self_contact_solve import (
     unknowns,
 )
 from hybrid.kernels.junctions.bodies import NUMBERS, STATE, WORK, X
+from hybrid.kernels.junctions.body_contact import AGAIN
 from hybrid.kernels.junctions.carried_frames import ANSWER, SEAT
 from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL, last_block, solve_dense
 from hybrid.kernels.junctions.junctions import END, HANDED, START, assemble_junctions, correct_all
 from hybrid.kernels.machine.compile import called, inner, kernel
-from hybrid.kernels.machine.references import reader
+from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.job import read
@@ -67,6 +68,9 @@ class TouchingJob(NamedTuple):
     moved: Floats  # (B, 6) likewise of bodies
     hessenberg: Floats  # as kernels.contact.self_contact_pairs.Contact has it
     asked: NDArray[np.int64]  # (1,) 1: of a state in which no step is tried
+    phase: NDArray[np.int64]  # (1,) what is asked of meet_bodies
+    meet_table: NDArray[np.int64]  # of kernels.junctions.body_contact.meet_bodies
+    meet: int = 0  # its address; 0: no body has a shape
 
 
 def blank_touching_job() -> TouchingJob:
@@ -76,7 +80,7 @@ def blank_touching_job() -> TouchingJob:
         z((1, 1), whole), z((1, 2), whole), z((1, 2, SEAT)), z((1, 2, 3)), z((1, 2, 3)), z(1, whole), z((3, 1, SIZE)),
         z(FUNCTIONAL), z((2, ANSWER)), z((1, 3)), z((1, NUMBERS)), z((1, STATE)), z((1, STATE)), z((1, WORK)),
         z((HANDED - 1, HANDED)), z((2, 6, 6)), z((4, 2)), z(COLUMNS), z((1, 2), whole), z((1, 1), whole), z((2, SIZE)), z((1, 6)), room_for_products(),
-        z(1, whole),
+        z(1, whole), z(1, whole), z(1, whole),
     )  # fmt: skip
 
 
@@ -86,6 +90,7 @@ def room_for_products() -> Floats:
 
 
 read_job = reader(blank_touching_job())
+call_meet = caller(0)
 
 
 @inner
@@ -152,7 +157,12 @@ def respond(job, cv, ca, with_gradient):
     assemble_junctions(job, m, cv, ca, False)
     if m > 0 and not solve_dense(job.A, m):
         return False
-    return correct_all(job, job.net.shape[0], m) < 0
+    if correct_all(job, job.net.shape[0], m) >= 0:
+        return False
+    if job.meet != 0 and not job.asked[0]:
+        job.phase[0] = AGAIN
+        return call_meet(job.meet, job.meet_table) != 0
+    return True
 
 
 @inner
