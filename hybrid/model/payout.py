@@ -18,7 +18,7 @@ from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import MOST_CELLS, Zone
 from hybrid.model.payout_law import extremes, law_of, least_length, lengths_at, refuse
-from hybrid.model.sections import bending_stiffness
+from hybrid.model.sections import bending_stiffness, restrictors_of, stiffeners_of
 from hybrid.scene.payout import Payout
 from hybrid.scene.schema import AdaptiveModel, Scene, Section, Spread
 
@@ -254,7 +254,8 @@ def payout_plan(
     points = [x for x in (at if side else length - at).tolist() if x < length]
     out = scene.cable.sections if side else scene.cable.sections[::-1]
     changes = [x for x in np.cumsum([x.length for x in out]).tolist() if x < length * (1 - 1e-9)]
-    fixed = max([joint, *points, *changes, _catenary_up_to(scene)])
+    sleeves = [x.range[1] if side else length - x.range[0] for x in (*stiffeners_of(scene), *restrictors_of(scene))]
+    fixed = max([joint, *points, *changes, *sleeves, _catenary_up_to(scene)])
     near = int(np.searchsorted(s, fixed * (1 + 1e-12)))
     least = -np.inf if payout.from_outside or payout.winch is not None else least_length(law, length)
     ride = riding_nodes(scene, line, s, least - s[min(near + FEWEST_CELLS, s.size - 1)])
@@ -286,7 +287,8 @@ def payout_plan(
         nodes.append(nodes[-1] + h)
     winch = winch_of(payout, length)
     winch[w.LEAST], winch[w.MOST] = shortest, longest
-    cable, far, places = _whole_material(scene), 0.0 if side else length, np.array(nodes)
+    far, places = 0.0 if side else length, np.array(nodes)
+    cable = _whole_material(scene, places if side else far - places[::-1])
     finest = np.ones(places.size - 1, int)
     if parts is not None:
         finest = parts(cable, places) if side else parts(cable, far - places[::-1])[::-1]
@@ -402,10 +404,10 @@ def cable_of(scene: Scene, cells: Floats | None = None) -> Material:
     return cable
 
 
-def _whole_material(scene: Scene) -> Material:
-    """The cable with what is on the reel, by the arc lengths of the scene."""
+def _whole_material(scene: Scene, nodes: Floats) -> Material:
+    """The cable with what is on the reel, by the arc lengths of the scene; nodes: m, that there may be."""
     whole, begin = whole_scene(scene)
-    cable = material(whole)
+    cable = material(whole, nodes - begin)
     cable.hinged = cable_of(scene).hinged
     cable.bounds, cable.at, cable.swivels = (x + begin for x in (cable.bounds, cable.at, cable.swivels))
     return cable

@@ -130,8 +130,8 @@ def _stretches_on_cable(cable: Cable, model: Model) -> Iterator[Finding]:
                 yield Finding(("model", key, i), "a stretch apart from those of force_rod", "let them end before")
 
 
-def _stretch_by_a_law(cable: Cable, ends: Ends) -> Iterator[Finding]:
-    """Sections whose tension is no multiple of strain, where that cannot be computed."""
+def _laws_on_a_reel(cable: Cable, ends: Ends) -> Iterator[Finding]:
+    """Sections on a reel that stretch, or bend, by another table than that at the winch."""
     paid = [name for name, x in ends.named().items() if isinstance(x, Pinned | Clamped) and x.payout is not None]
     for name in paid:
         own = cable.sections[0 if name == "start" else -1]
@@ -141,6 +141,10 @@ def _stretch_by_a_law(cable: Cable, ends: Ends) -> Iterator[Finding]:
                 keys = [key for key in ("dynamic_stiffness", "tension_strain") if getattr(section, key) is not None]
                 at: Place = ("ends", name, "payout", "reel", i, *keys[:1])
                 yield Finding(at, expected, "give it the same, or leave these out and give axial_stiffness (N)")
+            if section.moment_curvature != own.moment_curvature:
+                at = ("ends", name, "payout", "reel", i, *["moment_curvature"][: bool(section.moment_curvature)])
+                expected = "the moment over curvature of the section at the winch (moment_curvature)"
+                yield Finding(at, expected, "give it the same")
 
 
 def _tolerance_is_felt(cable: Cable, time: Time | None) -> Iterator[Finding]:
@@ -366,7 +370,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _zones_fill,
     _rods_can_bend,
     _stretches_on_cable,
-    _stretch_by_a_law,
+    _laws_on_a_reel,
     _tolerance_is_felt,
     _accuracy_has_errors,
     elevation_has_waves,

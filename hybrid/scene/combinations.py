@@ -230,11 +230,6 @@ def _attached(kind: str) -> Callable[[Tables], Iterator[Place]]:
 _swivels = _attached("swivel")
 
 
-def _moment_tables(tables: Tables) -> Iterator[Place]:
-    yield from _in_sections("moment_curvature", of=lambda x: x.moment_curvature)(tables)
-    yield from _attached("bend_restrictor")(tables)
-
-
 def _tables_beside_two_stiffnesses(tables: Tables) -> Iterator[Place]:
     cable: Cable | None = tables.get("cable")
     sections = cable.sections if cable is not None else ()
@@ -416,8 +411,6 @@ SYROPE = Feature("polyester that remembers its highest tension", "syrope",
                  _in_sections("syrope", of=lambda x: x.syrope))  # fmt: skip
 STRETCH_LAW = Feature("tension over strain by a table or a rope's law", "tension_strain, dynamic_stiffness, syrope",
                       _stretch_laws)  # fmt: skip
-MOMENT_TABLE = Feature("moment over curvature by a table, bend restrictors", "moment_curvature, kind: bend_restrictor",
-                       _moment_tables)  # fmt: skip
 VORTICES = Feature("vortex-induced vibration", "vortices", _in_sections("vortices", of=lambda x: x.vortices))
 RESTRICTOR = Feature("bend restrictors", "attachments: kind: bend_restrictor", _attached("bend_restrictor"))
 TABLE_BESIDE = Feature("a section with a table of moment over curvature beside one of two bending stiffnesses",
@@ -425,7 +418,6 @@ TABLE_BESIDE = Feature("a section with a table of moment over curvature beside o
 STIFFNESS_DAMPING = Feature("damping proportional to stiffness", "damping.stiffness",
                             _in_sections("damping", "stiffness",
                                          of=lambda x: x.damping is not None and x.damping.stiffness))  # fmt: skip
-STIFFENER = Feature("bend stiffeners", "attachments: kind: bend_stiffener", _attached("bend_stiffener"))
 SWIVEL = Feature("swivels on the line", "attachments: kind: swivel", _swivels)
 DIRECTED = Feature(
     "sections that have a direction about their axis", "bending_stiffness: [EI_1, EI_2], intrinsic_curvature",
@@ -652,10 +644,6 @@ REFUSALS: tuple[Refusal, ...] = (
         fix="leave it out; damping.mass can stay",
     ),
     Refusal(
-        STIFFENER, PAYOUT, "not worked out", f"{PAID}, and the stiffness of its cells changes at the winch alone",
-        "no bend stiffener", LEAVE_OUT,
-    ),
-    Refusal(
         VORTICES, PLANE, "physics", "vortices shake a line across its plane ({key})", "nothing", IN_SPACE,
     ),
     Refusal(
@@ -668,10 +656,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         SYROPE, PAYOUT, "not worked out", f"{PAID}, and what comes off the drum has had tensions that nobody knows",
         "tension_strain or axial_stiffness", "give tension_strain, at the highest tension you expect",
-    ),
-    Refusal(
-        MOMENT_TABLE, PAYOUT, "not worked out", f"{PAID}, and elements that change there have one bending stiffness",
-        "bending_stiffness alone", "give bending_stiffness alone",
     ),
     Refusal(
         TORQUE_OF_TENSION, PAYOUT, "not worked out", f"{PAID} and its twist is not known then", "nothing or 0",

@@ -48,6 +48,7 @@ from hybrid.store.named_arrays import matched
 ROUND_OFF = 1e-9  # of a length
 # Arrays of a line that its length changes, and that outputs ask for.
 VARIES = ("s", "h", "ck", "mass", "force", "kb", "k0", "hn", "rotary", "polar")
+VARIES_TOO = ("bend_law",)  # likewise, of lines that have them
 # What a checkpoint keeps of a reel.
 OF_CELLS = ("lack", "rate", "since", "span")
 KEPT = ("numbers", "lack", "rate", "since", "span", "winch", "balance")
@@ -304,10 +305,10 @@ class PayingOut:
         self, observer: Observer, model: Model, batch: Batch
     ) -> tuple[Observer, Observation, list[tuple[Zone, ...]]]:
         """The outputs of a batch, each of a line as long as it was then, and the zones of all but the first."""
-        varied = {name: np.empty((batch.t.size, *getattr(model.line, name).shape)) for name in VARIES}
+        varied = {name: np.empty((batch.t.size, *getattr(model.line, name).shape)) for name in varying(model.line)}
         zones = []
         moving = model.zones if model.layout is not None else None
-        scratch = model.line._replace(**{name: getattr(model.line, name).copy() for name in ALONG_LINE})
+        scratch = own_arrays(model.line)
         for k, (line, zones_then) in enumerate(self._lines_of(scratch, self.reel, batch, moving)):
             zones.append(zones_then)
             for name, x in varied.items():
@@ -352,7 +353,7 @@ class PayingOut:
         fields: tuple[Any, ...] = tuple(batch)
         of_each = [x.ndim > 0 and len(x) == batch.t.size for x in fields]
         for k, (then, zones) in enumerate(self._lines_of(line, reel, batch)):
-            arrays: dict[str, Any] = {name: getattr(then, name).copy() for name in VARIES}
+            arrays: dict[str, Any] = {name: getattr(then, name).copy() for name in varying(then)}
             own = Batch._make(x[k : k + 1] if each else x for x, each in zip(fields, of_each, strict=True))
             e = self._fitting_chords(reel, line, own.e, own.T, arrays["h"][None], arrays["ck"][None])
             found.append(Output(then._replace(**arrays), zones, own._replace(e=e)))
@@ -469,6 +470,17 @@ def length_asked(scene: Scene, paying: PayingOut | None, length: Any, rate: Any)
         between = f"{plan.shortest:.6g} and {plan.longest:.6g} m"
         raise ValueError(f"length = {length:.9g} m, expected between {between} ({winch_at(scene)}.longest)")
     return float(length), float(rate)
+
+
+def varying(line: Line) -> list[str]:
+    """Arrays of a line that its length changes, and that outputs ask for."""
+    return [*VARIES, *(name for name in VARIES_TOO if getattr(line, name).size)]
+
+
+def own_arrays(line: Line) -> Line:
+    """The line in arrays of its own."""
+    own: Line = line._replace(**{name: getattr(line, name).copy() for name in (*ALONG_LINE, *VARIES_TOO)})
+    return own
 
 
 def energy(line: Line, ends: Ends, state: State) -> float:

@@ -27,7 +27,6 @@ from hybrid.kernels.run.run import run as steps
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, sample_size
 from hybrid.kernels.state.state import (
-    ALONG_LINE,
     NO_PEAK,
     NO_SLOW,
     NO_TENSION_TORQUE,
@@ -49,6 +48,7 @@ from hybrid.model.sea import Surroundings
 from hybrid.outputs.joined_lines import Output
 from hybrid.simulation.cell_arrays import REST_OF_SEA, Kept, Shaped, blank_kept, seas
 from hybrid.simulation.envelope import marks_on
+from hybrid.simulation.payout import own_arrays
 from hybrid.solve.run import MOST_SAMPLED, ROWS
 from hybrid.solve.stepper import HEAVY
 
@@ -113,7 +113,7 @@ class NodeChanges:
     def applies(owner: Transient) -> bool:
         """Whether nodes of a run can enter and leave so: nothing asks Python on the way."""
         line = owner.model.line
-        plain = not (line.torsion.size or line.tension_twist.size or line.law.size)
+        plain = not (line.torsion.size or line.tension_twist.size or line.law.size or line.bend_law.size)
         return owner.pays_out and owner.correction is None and plain
 
     @staticmethod
@@ -381,8 +381,7 @@ def outputs_of_now(owner: Transient, batch: Batch) -> list[Output]:
     """The outputs of a batch of the line of now, copied."""
     paying, line = owner.payout, owner.model.line
     assert paying is not None
-    own = line._replace(**{name: getattr(line, name).copy() for name in ALONG_LINE})
-    return paying.outputs_in(own, paying.reel, Batch._make(x.copy() for x in batch))
+    return paying.outputs_in(own_arrays(line), paying.reel, Batch._make(x.copy() for x in batch))
 
 
 def _copy(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:

@@ -117,19 +117,12 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.PAYOUT_AT_START, c.PAYOUT_AT_END): (PAID | {"ends.start.payout": {"rate": 0.1, "ramp": 1.0}}, ""),
     (c.RELEASE_AT_WINCH, c.PAYOUT): (PAID | {END + "release_at": {"time": 2}}, ""),
     (c.STIFFNESS_DAMPING, c.PAYOUT): (PAID | {SECTION + "damping": {"stiffness": 0.01}}, ""),
-    (c.STIFFENER, c.PAYOUT): (
-        {"cable.attachments": [{"kind": "bend_stiffener", "range": [0, 2], "added_stiffness": [[0, 90], [2, 10]]}]}
-        | PAID, ""
-    ),
     (c.VORTICES, c.PLANE): (SHEDS | {"dimension": 2}, ""),
     (c.VORTICES, c.PAYOUT): (SHEDS | PAID, ""),
     (c.VORTICES, c.RESPONSE): (SHEDS, "response"),
     (c.FINITE_WAVES, c.RESPONSE): (HIGH_WAVES, "response"),
     (c.BY_RAO, c.FINITE_WAVES): (HIGH_WAVES | {END + "motion": {"vessel": RAO}}, ""),
     (c.SYROPE, c.PAYOUT): (POLYESTER | PAID, ""),
-    (c.MOMENT_TABLE, c.PAYOUT): (
-        {SECTION + "moment_curvature": [[0, 0], [0.1, 1], [0.2, 9]], SECTION + "bending_stiffness": None} | PAID, ""
-    ),
     (c.TORQUE_OF_TENSION, c.PAYOUT): (TORQUE | PAID, ""),
     (c.LAYERS, c.PAYOUT): (PAID | {"resolution": {"cells_per_layer": 2}}, ""),
     (c.BREAKS_OFF_CLAMP, c.CLAMPED_CONNECTION): (CLAMPED | {"points.b.break_at": {"time": 2}}, ""),

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.kernels.laws.axial_law import has_law
+from hybrid.kernels.laws.bending_law import HALF_A, HALF_B, LAST_A, LAST_B
 from hybrid.kernels.laws.element import put_spring
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.mesh.fill_line import B_1, COLUMNS, fill_cell, fill_element, fill_node
@@ -35,6 +36,7 @@ from hybrid.kernels.reel.winch import (
     TENSION,
     TRUE_NOW,
 )
+from hybrid.kernels.state.forces import BENDING_LAW
 
 
 @inner
@@ -96,11 +98,22 @@ def growing(line, reel):
 
 
 @inner
+def fill_table(line, i, half):
+    """The length, m, of the element at node i, if it has a table of moment: that of both halves, as on all of the reel."""
+    if line.bend_law[i, LAST_A] > 0.0:
+        line.bend_law[i, HALF_A] = half
+    elif line.bend_law[i, LAST_B] > 0.0:
+        line.bend_law[i, HALF_B] = half
+
+
+@inner
 def fill_between(line, reel, i, a, ha, b, hb):
     """Node i between cells of rows a and b of `reel.made`; lengths: as of kernels.mesh.fill_line.fill_node."""
     fill_node(line, i, reel.made, a, ha, b, hb)
     if line.element[i]:
         fill_element(line, i, reel.made, a, ha, b, hb, line.kb[i, 2] == 0.0)
+        if line.bits & BENDING_LAW:
+            fill_table(line, i, 0.5 * (ha + hb))
 
 
 @inner

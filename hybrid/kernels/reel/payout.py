@@ -22,6 +22,7 @@ import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, dot, frame, get3, log_rotation, scale, sub
 from hybrid.kernels.laws.axial_law import stretch_work
+from hybrid.kernels.laws.bending_law import energy_share, has_bend_law
 from hybrid.kernels.laws.cell import Chord, chord
 from hybrid.kernels.laws.element import relative_rotation
 from hybrid.kernels.laws.node_forces import Z3, inertia_and_water
@@ -223,9 +224,21 @@ def bend_that_came(line, state, i, k, before):
     db, _, _ = chord(get3(state.e, i))
     turn = log_rotation(relative_rotation(frame(get3(state.a1, i - 1), da), frame(get3(state.a1, i), db)))
     x, d = sub(turn, get3(line.k0, i)), sub(get3(line.k0, i), (before[6], before[7], before[8]))
+    if has_bend_law(line, i):
+        return bend_by_table_that_came(line, i, x, d, k, before)
     straight = before[3] * (2.0 * x[0] + d[0]) * d[0] + before[4] * (2.0 * x[1] + d[1]) * d[1]
     straight += before[5] * (2.0 * x[2] + d[2]) * d[2]
     return k[0] * x[0] * x[0] + k[1] * x[1] * x[1] + k[2] * x[2] * x[2] - straight
+
+
+@inner
+def bend_by_table_that_came(line, i, x, d, k, before):
+    """The same of an element with a table, both halves of one: its share of the stiffness is one of the curvature alone."""
+    y, one = (x[0] + d[0], x[1] + d[1], x[2] + d[2]), line.kb[i, 0] / before[3]
+    now, then = math.sqrt(x[0] * x[0] + x[1] * x[1]), math.sqrt(y[0] * y[0] + y[1] * y[1])
+    more = line.kb[i, 0] * now * now * energy_share(line, i, now)
+    more -= before[3] * then * then * energy_share(line, i, then / one)
+    return more + k[2] * x[2] * x[2] - before[5] * (2.0 * x[2] + d[2]) * d[2]
 
 
 @inner

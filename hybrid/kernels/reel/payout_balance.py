@@ -9,8 +9,8 @@ nodes and taken off slowly (paid_length.eased), as the new cells get their lengt
 from __future__ import annotations
 
 from hybrid.kernels.algebra.rotations import add, dot, frame, get3, get9, scale, sub
+from hybrid.kernels.laws.bending_law import bending_at
 from hybrid.kernels.laws.cell import Chord, chord, moment_force, rotary_force, turning
-from hybrid.kernels.laws.element import bending
 from hybrid.kernels.laws.node_forces import Z9, node_loads
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.reel.paid_length import growing, node
@@ -34,7 +34,7 @@ def moment_of(line, ends, state, j):
     d, _, _ = chord(get3(state.e, c))
     held, beside = get9(ends.frame, k), frame(get3(state.a1, c), d)
     before, after = (held, beside) if j == 0 else (beside, held)
-    M, _ = bending(before, after, get3(line.kb, j), get3(line.k0, j))
+    M, _ = bending_at(line, j, before, after, get3(line.kb, j), get3(line.k0, j))
     return M
 
 
