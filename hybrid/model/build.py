@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.kernels.mesh.cell_lengths import SLACK_SHARE
 from hybrid.kernels.state.forces import FRICTION, SEABED
 from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.model.catenary_guess import Hanging
@@ -244,7 +245,7 @@ TWIST, MOST_FOR_TWIST = 0.25, 5000
 FEWEST_CELLS = 4  # of a zone, however little is asked
 # Of rods whose cells follow the curvature: base cells without a mesh, and with one that does not say how many; the
 # shortest cell over (EI/w)^(1/3); most cells in a base cell.
-FOLLOWING_BASE, FOLLOWING_CELLS, FOLLOWING_CELL, MOST_FOLLOWING = 24, 60, 0.125, 512
+FOLLOWING_BASE, FOLLOWING_CELLS, FOLLOWING_CELL, MOST_FOLLOWING = 24, 60, 0.125, 4096
 
 
 def given_zones(scene: Scene, layout: Layout) -> np.ndarray:
@@ -374,7 +375,10 @@ def _following_parts(scene: Scene, cable: Material, base: Floats, resolution: Re
     middle = 0.5 * (base[:-1] + base[1:])
     bend = cable.bending_length(LEAST_WEIGHT * 9.81 * cable.mass)[cable.piece(middle)]
     twisted = TWIST / np.maximum(twist_rate(scene, cable, middle), TWIST / scene.length)
-    cell = np.minimum(scene.model.rod_cell or FOLLOWING_CELL * bend, twisted) / resolution.fineness
+    share = scene.model.curvature_error
+    assert share is not None
+    part = min(FOLLOWING_CELL, 0.45 * float(np.sqrt(8.0 * SLACK_SHARE * share)))
+    cell = np.minimum(scene.model.rod_cell or part * bend, twisted) / resolution.fineness
     halvings = np.ceil(np.log2(np.maximum(np.diff(base) / cell, 1.0)) - 1e-9)
     return np.asarray(np.minimum(2 ** halvings.astype(int), MOST_FOLLOWING))
 

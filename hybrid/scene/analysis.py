@@ -232,8 +232,8 @@ class AdaptiveModel(Table):
     )
     rod_cell: Positive | None = Field(
         default=None,
-        description="with curvature_error: the shortest cells of rods; absent: an eighth of (EI/w)^(1/3), w the weight "
-        "[m]",
+        description="with curvature_error: the shortest cells of rods; absent: an eighth of (EI/w)^(1/3), w the "
+        "weight, or less for a curvature_error below 10 % [m]",
     )
     curvature_error: Positive | None = Field(
         default=None,

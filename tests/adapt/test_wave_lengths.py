@@ -206,7 +206,7 @@ def test_laying_keeps_its_share_at_the_held_end_and_its_pull() -> None:
     assert off < SHARE and pull < 0.004, (off, pull)
     assert truth.curvature[:, -40:].max() > SHARE * truth.curvature.max()
     h = np.diff(found.mesh[-1].s)
-    assert h[-1] < 2.0 and h[60:].max() == 25.0 and h.size < 110
+    assert h[-1] < 2.0 and h[60:].max() == 25.0 and h.size < 140
 
 
 @pytest.mark.parametrize("cut, until", [(2.5, 5.0), (6.5, 8.0)])

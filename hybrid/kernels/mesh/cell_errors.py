@@ -151,10 +151,15 @@ def longest_in_wave(error, bends):
 
 
 @inner
+def tension_beside(T, i):
+    """The lower tension of the cells beside node i, N."""
+    return min(T[max(i - 1, 0)], T[min(i, T.shape[0] - 1)])
+
+
+@inner
 def lowest_beside(kinds, T, i):
     """The lowest tension beside node i, N, its floor at least."""
-    n = T.shape[0]
-    return max(min(T[max(i - 1, 0)], T[min(i, n - 1)]), kinds.floor[i], 1e-300)
+    return max(tension_beside(T, i), kinds.floor[i], 1e-300)
 
 
 @inner

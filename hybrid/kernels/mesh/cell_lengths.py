@@ -30,6 +30,7 @@ from hybrid.kernels.mesh.cell_errors import (
     node_curvature,
     over_shares,
     second_slope,
+    tension_beside,
 )
 from hybrid.kernels.mesh.criteria import EDGE
 from hybrid.kernels.mesh.wave_lengths import lower_by_waves
@@ -39,6 +40,7 @@ from hybrid.kernels.state.forces import SEABED
 TURN = 0.3  # rad that a cell turns through
 TWIST = 0.25  # rad that a cell of a rod is twisted by: cells that stay have as much (model.build)
 SHORTEST_CELL, SHORTEST_SLACK = 0.6, 0.25  # of l0; where a line is slack, layers in motion are sharper than at rest
+SLACK_SHARE = 0.1  # of the share: what interpolation may make wrong where a line is slack, because a bend wanders there
 JOINT_LAYER = 3.0  # of l0: over which a rod bends less beside a hinge, which is no bend of the line
 SHARP = 0.5  # rad: a kink that runs along a line may be as short as this over its curvature, which l0 at rest is not
 NEAR = 3  # nodes to either side whose curvature counts
@@ -58,14 +60,33 @@ SMOOTHED = 0.1  # part by which delta comes nearer to what it is, in a step: at 
 
 
 @inner
-def shortest_length(kinds, T, i, kappa, limits, finer):
+def is_slack(EI, w, T):
+    """Whether weight, not tension, says over what length a line bends: below T0 = (EI w^2)^(1/3)."""
+    return EI * w * w > T * T * T
+
+
+@inner
+def part_of_share(line, sea, state, kinds, i):
+    """The part of its share that interpolation may make wrong at node i: SLACK_SHARE where the line is compressed.
+
+    A bend that nothing but weight holds wanders by what its cells make of it, and is off by some ten times what a cell
+    interpolates wrongly; from T0 on, and on the bed, a line is off by less than that.
+    """
+    EI, w, T = kinds.EI[i], kinds.w[i], tension_beside(state.T, i)
+    if not is_slack(EI, w, T) or (line.bits & SEABED and depth(sea, state.r, i) > 0.0):
+        return 1.0
+    return SLACK_SHARE + (1.0 - SLACK_SHARE) * max(T, 0.0) / (EI * w * w) ** (1.0 / 3.0)
+
+
+@inner
+def shortest_length(kinds, T, i, kappa, part, limits, finer):
     """Below which cells at node i need not be: what a layer, or a kink on its way, of largest curvature kappa asks for."""
-    low = lowest_beside(kinds, T, i)
-    l0 = layer_length(kinds.EI[i], kinds.w[i], low)
-    slack = l0 * l0 * low < 0.99 * kinds.EI[i]  # weight, not tension, says what it is
-    least = (SHORTEST_SLACK if slack else SHORTEST_CELL) * l0 / finer
+    EI, w, low = kinds.EI[i], kinds.w[i], lowest_beside(kinds, T, i)
+    l0 = layer_length(EI, w, low)
+    least = (SHORTEST_SLACK if is_slack(EI, w, low) else SHORTEST_CELL) * l0 / finer
     if kappa > 0.0:
-        least = min(least, 0.9 * math.sqrt(8.0 * limits[CURVATURE] / kappa) * min(l0, SHARP / kappa))
+        share = limits[CURVATURE] * part
+        least = min(least, 0.9 * math.sqrt(8.0 * share / kappa) * min(l0, SHARP / kappa))
     return least
 
 
@@ -88,7 +109,7 @@ def find_bends(line, turn, bend):
 
 
 @inner
-def wanted_length(kinds, T, bend, i, limits, finer):
+def wanted_length(kinds, T, bend, i, part, limits, finer):
     """W at node i; bend: as of `find_bends`; limits: (4,) errors that interpolation may make, by cells as fine as asked."""
     n = T.shape[0]
     bends, largest = 0.0, bend[i, KAPPA]
@@ -96,8 +117,8 @@ def wanted_length(kinds, T, bend, i, limits, finer):
         bends = max(bends, bend[k, BENDS])
     for k in range(max(i - NEAR, 1), min(i + NEAR + 1, n)):  # flanks of a kink are as sharp as it
         largest = max(largest, bend[k, KAPPA])
-    W = length_by_turn(kinds, i, bend[i, KAPPA], bends, limits, finer)
-    return max(W, shortest_length(kinds, T, i, largest, limits, finer))
+    W = length_by_turn(kinds, i, bend[i, KAPPA], bends / part, limits, finer)
+    return max(W, shortest_length(kinds, T, i, largest, part, limits, finer))
 
 
 @inner
@@ -265,7 +286,8 @@ def find_wanted(line, sea, state, zones, dt, finer):
     """Wanted lengths at nodes for the next HORIZON steps of dt into zones.wanted, graded; whether the next needs others."""
     find_bends(line, zones.kinds.turn, zones.moment)
     for i in range(line.h.shape[0] + 1):
-        zones.wanted[i] = wanted_length(zones.kinds, state.T, zones.moment, i, zones.limits, finer)
+        part = part_of_share(line, sea, state, zones.kinds, i)
+        zones.wanted[i] = wanted_length(zones.kinds, state.T, zones.moment, i, part, zones.limits, finer)
     raise_at_hinges(line, state, zones, finer)
     lower_by_twist(zones, finer)
     lower_by_waves(zones)
