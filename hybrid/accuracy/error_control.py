@@ -129,6 +129,7 @@ class ErrorController:
     choice: ModelChoice = NAMED  # of a scene that leaves the choice
     settle: Callable[[bool], None] = lambda kept: None  # whether a finer result takes the place of that before it
     from_rest: bool = True  # whether it begins from an equilibrium, or is one
+    rubs: bool = False  # whether obstacles on which the line may lie have friction
     budget: Budget | None = None  # of all results; None: there is no limit
     stopped: str = ""  # why it is refined no further although it misses what is asked; empty: more would not help
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
@@ -385,7 +386,7 @@ class ErrorController:
         if self.comparisons is None:
             self._notes += result.notes
             return False
-        estimate = Estimate(result, *self.comparisons, self.from_rest)
+        estimate = Estimate(result, *self.comparisons, self.from_rest, self.rubs)
         if estimate.share_unknown and (faster := self._in_shorter_steps(self.comparisons[0])) is not None:
             estimate.show_steps(faster)
         self.excess = snap_excess(result.forces, self.comparisons[0].forces)

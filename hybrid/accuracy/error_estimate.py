@@ -19,6 +19,7 @@ from hybrid.accuracy.error_order import (
     MOST,
     MOST_ORDER,
     ORDERS,
+    RUBBING_ORDERS,
     Falls,
     around,
     as_halved,
@@ -97,15 +98,16 @@ class Estimate:
         rough: RunSample | None,
         coarsest: RunSample | None,
         from_rest: bool = True,
+        rubs: bool = False,
     ) -> None:
         """coarse: longer cells, and steps if there are any; rough: its cells, steps longer still; coarsest: both.
 
-        None: it failed, or nothing moves.  from_rest: it begins from an equilibrium, or is one.
+        None: it failed, or nothing moves.  from_rest: it begins from an equilibrium, or is one.  rubs: on obstacles.
         """
         doubt = self._take(result)
         self.shares_mixed = set[str]()
         both = [name for name in result.values if name in coarse.values]
-        self._from_rest = from_rest
+        self._from_rest, self._rubs = from_rest, rubs
         own = [name for name in both if name in END_FORCES and not from_rest]  # with an order at the start
         # What a halving of cells and steps leaves of the difference to the run before; NaN where it is not known.
         fall = {name: falls(name, result, coarse, coarsest) for name in both}
@@ -171,6 +173,8 @@ class Estimate:
 
     def _bounds(self, name: str, found: Falls) -> tuple[float, float]:
         """Bounds of the order of convergence of an output."""
+        if name == "tension" and self._rubs:
+            return RUBBING_ORDERS
         shaken = self.run.resolution.later > 0.0
         return force_orders(found, self._from_rest, shaken) if name in END_FORCES else ORDERS
 

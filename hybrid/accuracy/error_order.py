@@ -20,6 +20,8 @@ ORDER, ORDERS, MOST_ORDER = 1.5, (1.5, 2.0), 3.0
 # there have all lengths, of which finer cells carry shorter ones (docs/accuracy.md): more than ORDER is shown by runs
 # that are too coarse to carry them.
 START_ORDERS = (1.0, ORDER)
+# Tension along a line that rubs on obstacles jumps where contact with friction begins: of order 1 (docs/accuracy.md).
+RUBBING_ORDERS = (1.0, ORDERS[1])
 # So it is where a ramp has set off vibrations along the line and a halving of cells and steps leaves more than this of
 # what forces at the ends differ by, root mean square: less than first order.
 BELOW_FIRST = 0.6

@@ -28,6 +28,7 @@ from hybrid.model.resolution import (
     is_irregular,
     mesh_is_free,
     requested_accuracy,
+    rubs_on_obstacles,
     wants_errors,
     wants_survey,
     zones_are_free,
@@ -186,7 +187,8 @@ class Passes:
         from_rest = scene.initial.kind == "equilibrium" and not any(end.release for end in scene.ends.both)
         self.control = ErrorController(
             requested_accuracy(scene), free_in(scene), True, case.sample, compute, case.beside, is_irregular(scene),
-            choice, compute.settle, from_rest, Budget(len(output_times(scene)), case.points.s.size),
+            choice, compute.settle, from_rest, rubs_on_obstacles(scene),
+            Budget(len(output_times(scene)), case.points.s.size),
         )  # fmt: skip
         return self.control
 

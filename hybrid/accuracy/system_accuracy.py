@@ -44,6 +44,7 @@ from hybrid.model.resolution import (
     is_irregular,
     mesh_is_free,
     requested_accuracy,
+    rubs_on_obstacles,
     wants_errors,
     wants_survey,
     zones_are_free,
@@ -74,7 +75,8 @@ Samples = dict[str, RunSample]  # of the lines, by name
 def is_refined(system: System, moves: bool) -> bool:
     """Whether a system is computed several times, here: an accuracy is asked, or errors of steps that follow the
 
-    motion, of an equilibrium, or of leaving bending out.  (Others of fixed steps: accuracy.system_errors.)
+    motion, of an equilibrium, of lines that rub on obstacles, or of leaving bending out.  (Others of fixed steps:
+    accuracy.system_errors.)
     """
     scenes = [system.scene_of(name) for name in system.lines]
     if not any(wants_errors(x) for x in scenes):
@@ -82,7 +84,9 @@ def is_refined(system: System, moves: bool) -> bool:
     if any(x.resolution is not None for x in system.lines.values()):
         return True
     open_steps = moves and system.require_time().controlled
-    if not moves or open_steps or any(leaves_bending_out(x) for x in system.lines.values()):
+    if not moves or open_steps or any(rubs_on_obstacles(x) for x in scenes):
+        return True
+    if any(leaves_bending_out(x) for x in system.lines.values()):
         return True
     return any(requested_accuracy(x) is not None for x in scenes)
 
@@ -129,7 +133,7 @@ class SystemPasses:
             name: LineController(
                 requested_accuracy(scene), Free(mesh_is_free(scene), self._steps_free, zones_are_free(scene)), moves,
                 _elsewhere, _elsewhere, irregular=moves and is_irregular(scene),
-                from_rest=not (moves and system.starts_as_placed),
+                from_rest=not (moves and system.starts_as_placed), rubs=rubs_on_obstacles(scene),
             )
             for name, scene in self.scenes.items()
         }  # fmt: skip

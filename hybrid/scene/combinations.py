@@ -454,6 +454,8 @@ ACCURACY = Feature("accuracy", "accuracy", lambda tables: iter([("accuracy",)] i
 ERRORS = Feature("estimated errors", "output.errors", _asks("output", "errors", lambda x: getattr(x, "errors", None)))
 CHOSEN_STEPS = Feature("steps that an accuracy chooses", "no time.step",
                        _asks("time", "step", lambda x: x.step is None and x.tolerance is None))  # fmt: skip
+ESTIMATED = Feature("estimated errors, accuracy, steps that it chooses", "accuracy, output.errors, no time.step",
+                    _either(CHOSEN_STEPS, ACCURACY, ERRORS))  # fmt: skip
 SETTLED_FRICTION = Feature("friction that has settled in the equilibrium", "initial.friction",
                            _asks("initial", "friction",
                                  lambda x: getattr(x, "friction", "neglected") != "neglected"))  # fmt: skip
@@ -576,21 +578,14 @@ REFUSALS: tuple[Refusal, ...] = (
         "rod, catenary or zones", "write `model: rod`",
     ),
     Refusal(
-        CHOSEN_STEPS, PUSHED, "not worked out", f"{TOUCHES}, beside which no error is estimated",
-        "a step, in s, or a tolerance, in m", "give `step: ...` (s) in time, and halve it to see its error",
+        ESTIMATED, LINES_TOUCH, "not worked out",
+        "lines that meet ({key}) do so at other instants with other steps, and figures go down to a fifth of the truth",
+        "a step, in s, and no accuracy or errors",
+        "give `step: ...` (s) in time, leave accuracy and output.errors out; halve step and cells to see their error",
     ),
-    Refusal(
-        ACCURACY, PUSHED, "not worked out", f"{TOUCHES}, beside which no error is estimated",
-        fix="leave it out; halve time.step and the cells to see their error",
-    ),
-    Refusal(ERRORS, PUSHED, "not worked out", f"{TOUCHES}, beside which no error is estimated", "false"),
     Refusal(
         SETTLED_FRICTION, PUSHED, "not worked out", f"{TOUCHES}, and their friction is neglected in every equilibrium",
         "neglected",
-    ),
-    Refusal(
-        LAYERS, PUSHED, "not worked out", f"{TOUCHES}, of which the coarse run knows no layers",
-        fix="place cells by `mesh`",
     ),
     Refusal(
         ABOUT_REST, PUSHED, "not worked out", f"{TOUCHES}, and contact opens and closes",

@@ -30,6 +30,9 @@ AT_REST = 1e-6
 SAMPLES, RAMP_STEPS = 6, 3
 # rad, through which an obstacle may spin in a time step.
 LARGEST_TURN = 1.0
+# What spins take for so many such turns counts as a period: the longest steps of a coarser run, three to a period, then
+# turn an obstacle through one of them.
+TURNS_AS_PERIOD = 3.0
 
 # m, between the position of an end and its fairlead.
 SAME_FAIRLEAD = 1e-3
@@ -255,10 +258,14 @@ def _all_periods(ends: Ends, environment: Environment | None) -> dict[str, float
     return periods | {key: h.period for here, _, motion in _motions(ends) for key, _, h in _periods(here, motion)}
 
 
-def shortest_period(ends: Ends, environment: Environment | None) -> float:
+def shortest_period(ends: Ends, environment: Environment | None, obstacles: Obstacles | None = None) -> float:
     """The shortest period, ramp or move of a scene, s; infinity if it names none."""
     times = list(_all_periods(ends, environment).values())
-    for _, end, motion in _motions(ends):
+    moved: list[tuple[End | Held, Motion]] = [(end, motion) for _, end, motion in _motions(ends)]
+    for place, held in _obstacles(obstacles):
+        times += [h.period for _, _, h in _periods(place, held.motion)]
+        moved.append((held, held.motion))
+    for end, motion in moved:
         times += [t for t in (motion.ramp, motion.travel.over if motion.travel else None) if t]
         if motion.file is not None:
             from hybrid.scene.motion_file import shortest_in
@@ -266,6 +273,9 @@ def shortest_period(ends: Ends, environment: Environment | None) -> float:
 
             times.append(shortest_in(motion_record(motion, end.held_position, end.held_tangent is not None)))
     times += [over for begin, over in _winch_ramps(ends)]
+    for spin in (getattr(x, "spin", None) for x in (obstacles or {}).values()):
+        if spin is not None:
+            times += [spin.ramp, TURNS_AS_PERIOD * LARGEST_TURN / max(abs(spin.rate), 1e-300)]
     return min(times, default=math.inf)
 
 

@@ -23,8 +23,9 @@ from hybrid.kernels.state.forces import (
     TOUCHES,
     WAVES,
 )
+from hybrid.kernels.state.obstacle_rows import FREE, MOVES
 from hybrid.kernels.state.report import RESIDUAL, RESIDUAL_NODE
-from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
+from hybrid.kernels.state.state import NO_ADDRESS, NO_SHEAVES, Ends, Floats, Line, Sea, State
 from hybrid.kernels.step.step import friction_axes
 from hybrid.solve.flaws import flaw_of_line, fold_text, lowest_tension
 from hybrid.solve.laid import laid_on_bed
@@ -224,7 +225,10 @@ def _eased(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, int
 
 
 def _relax(solver: _Solver, ends: Ends, state: State) -> State:
-    """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until the line hardly moves."""
+    """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until the line hardly moves.
+
+    Sheaves are held: without friction nothing turns them, and their correction takes factors that are not kept here.
+    """
     line, length = solver.line, solver.length
     time_scale = np.sqrt(float(line.mass.sum()) * length / solver.scale)
     damp = 2.0 * line.mass / time_scale
@@ -235,9 +239,10 @@ def _relax(solver: _Solver, ends: Ends, state: State) -> State:
         polar=np.nan_to_num(line.polar) + gyration,
         rotary=np.nan_to_num(line.rotary),
         bits=line.bits | MASS_DAMPING | ROTARY,
+        moved=np.where(line.moved == FREE, MOVES, line.moved).astype(np.int8),
     )
     stepper = Stepper(damped, length, solver.scale)
-    old = state.copy()
+    old = state._replace(sheave=NO_SHEAVES).copy()
     new = old.copy()
     dt = 1e-3 * time_scale
     calm = 0
@@ -247,7 +252,7 @@ def _relax(solver: _Solver, ends: Ends, state: State) -> State:
         if taken.outcome != Outcome.OK:
             dt *= 0.25
             if dt < 1e-9 * time_scale:
-                return old
+                break
             old.a[:], old.vd[:], old.v[:] = 0.0, 0.0, 0.0
             old.wa[:], old.wd[:], old.w[:] = 0.0, 0.0, 0.0
             continue
@@ -258,7 +263,7 @@ def _relax(solver: _Solver, ends: Ends, state: State) -> State:
         calm = calm + 1 if moved < CALM * length * dt / time_scale else 0
         if calm >= 3:
             break
-    return old
+    return old._replace(sheave=state.sheave.copy())
 
 
 def nudged(line: Line, state: State, length: float, time_scale: float) -> State:

@@ -70,6 +70,7 @@ SHAPED = {
                     "shape": {"kind": "sphere", "radius": 0.3}},
 }  # fmt: skip
 OTHER_LINE = {"start": "a", "end": "b", "sections": [{"length": 9.5, "mass": 1, "diameter": 0.02}]}
+TWO_LINES = {"lines.two": OTHER_LINE, "contact": {}}
 
 # By the pair: what makes a scene of CABLE, or of LINES, that has both, and what is done with it.
 EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
@@ -94,11 +95,8 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.SHEAVES, c.MAY_TOUCH): (SHEAVE, ""),
     (c.SHAPES, c.STIFFNESS): (SHAPED | {ONE + "contact": {"self": False}}, "stiffness"),
     (c.DIAMETERS, c.OBSTACLES): (BALL | THICKER, ""),
-    (c.CHOSEN_STEPS, c.PUSHED): (BALL | {"time": {"duration": 3.0}}, ""),
-    (c.ACCURACY, c.PUSHED): (BALL | {"accuracy": "3%"}, ""),
-    (c.ERRORS, c.PUSHED): (BALL | {"output.errors": True}, ""),
+    (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
     (c.SETTLED_FRICTION, c.PUSHED): (BALL | {"initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
-    (c.LAYERS, c.PUSHED): (BALL | {"resolution": {"cells_per_layer": 2}}, ""),
     (c.ABOUT_REST, c.PUSHED): (BALL, "about rest"),
     (c.OTHER_MOTIONS, c.RESPONSE): (
         {"ends.end": {"kind": "free", "force": {"value": [1, 0, 0], "until": 2}}}, "response"
@@ -141,6 +139,8 @@ BY_SCHEMA = [x for x in REFUSALS if isinstance(x.feature.places, Absent)]
 OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.TORSION, c.PLANE), {END + "turns": 2, "dimension": 2}, ""),
     ((c.SWIVEL_BESIDE, c.DIRECTED), SWIVEL | CURVED, ""),
+    ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"time": {"duration": 3.0}}, ""),
+    ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"output.errors": True}, ""),
 )
 OF_ARRAYS = [c.RESPONSE_OF_MEMBERS]
 
@@ -150,7 +150,7 @@ def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
 
 
 def _of_several(pair: tuple[c.Feature, c.Feature]) -> bool:
-    names = (c.SEVERAL_LINES, c.CLAMPED_TO_FREE, c.CLAMPED_CONNECTION, c.TURNING, c.SHAPES)
+    names = (c.SEVERAL_LINES, c.LINES_TOUCH, c.CLAMPED_TO_FREE, c.CLAMPED_CONNECTION, c.TURNING, c.SHAPES)
     return any(x in names for x in pair)
 
 
