@@ -13,6 +13,9 @@ from hybrid.accuracy.api import resolution_at_rest
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.junctions.bodies import FRAME, MASS, V
+from hybrid.kernels.laws.obstacles import distances
+from hybrid.kernels.state.forces import OBSTACLES
+from hybrid.kernels.state.obstacle_rows import ONSET_OF
 from hybrid.kernels.state.state import Floats
 from hybrid.modal.eigen import Eigen, lowest_modes
 from hybrid.modal.matrices import LinearLine, LinearNetwork, linear_network
@@ -100,13 +103,14 @@ class _Found:
     points: tuple[str, ...]
     bodies: tuple[str, ...]
     axes: tuple[tuple[Floats, Floats], ...]  # of each body: axes (3, 3), and its mass matrix (6, 6) in these
+    touched: tuple[str, ...]  # obstacles that lines lie on
 
 
 def modes(scene: SceneLike | System, count: int = 10, near: float | None = None, friction: bool = True) -> Modes:
     """Natural modes about the equilibrium under full loads: the longest periods, or those nearest to `near` (s).
 
-    Drag and damping are left out; contact with the bed is as it is in the equilibrium.  friction: whether friction of
-    the bed holds what lies there, elastically, as it does before a line slides; else it has none.  Errors are those of
+    Drag and damping are left out; contact with the bed and obstacles is as it is in the equilibrium.  friction: whether
+    that of these holds what lies there, elastically, as before a line slides; else it has none.  Errors are those of
     the mesh, by one of half the cells.  SceneError: the scene is refused, or its equilibrium touches itself;
     ComputationError: it has none, or nothing can move.
     """
@@ -154,7 +158,18 @@ def _found(asked: Scene | System, cells: float, count: int, near: float | None, 
         (row[FRAME:V].reshape(3, 3), numbers[MASS : MASS + 36].reshape(6, 6))
         for row, numbers in zip(rest.states.bodies, rest.solver.bodies, strict=True)
     )
-    return _Found(network, eigen, rest.points, rest.bodies, axes)
+    return _Found(network, eigen, rest.points, rest.bodies, axes, tuple(dict.fromkeys(_touched(rest))))
+
+
+def _touched(rest: Rest) -> Iterator[str]:
+    """Names of the obstacles that lines lie on in an equilibrium."""
+    for x, model, state in zip(rest.solver.lines, rest.models, rest.states.lines, strict=True):
+        rows = x.sea.obstacles
+        if x.line.bits & OBSTACLES:
+            near = distances(rows, state.r).min(axis=1)
+            yield from (
+                name for name, d, row in zip(model.sea.names, near, rows, strict=True) if d < 0.5 * row[ONSET_OF]
+            )
 
 
 @dataclass(frozen=True)
@@ -175,7 +190,7 @@ class Rest:
 def equilibrium_of(asked: Scene | System, cells: float = 1.0) -> Rest:
     """The equilibrium on the usual mesh, or on one whose cells are so many times as long.
 
-    SceneError: a line touches itself in it, or there are obstacles; ComputationError: there is none.
+    SceneError: a line touches itself in it, another one, a body or a sheave; ComputationError: there is none.
     """
     refuse_use(asked, "about rest", given="modes")
     return _of_line(asked, cells) if isinstance(asked, Scene) else _of_system(asked, cells)
@@ -390,6 +405,8 @@ def _doubts(found: _Found, unstable: int, free: list[str], chosen: np.ndarray) -
             )
     if any(x.line.torsion.size for x in network.lines):
         yield "twist passes through catenary zones as through a torsion spring; what their shape adds is left out"
+    for name in found.touched:
+        yield f"contact with obstacle {name} stays as it is at rest: swings that lift the line off have other periods"
 
 
 def _meetings(asked: Scene | System, found: list[Mode]) -> Iterator[str]:

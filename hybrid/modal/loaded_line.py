@@ -33,6 +33,7 @@ class LoadedLine:
     def __init__(self, x: JoinedLine, linear: LinearLine, model: Model, omegas: Floats) -> None:
         self.name, self.linear, self.x, self.hinges = linear.name, linear, x, model.cable.hinges
         self.line, state, self.sea = linear.line, linear.state, model.sea.at(np.inf)
+        self.obstacles = model.sea.names
         count, calm = self.line.s.size, _without_drag(self.line)
 
         def rows_of(sea: Sea) -> Floats:

@@ -8,13 +8,17 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.special import ndtr
 
-from hybrid.kernels.state.forces import SEABED
+from hybrid.kernels.laws.obstacles import distances
+from hybrid.kernels.state.forces import OBSTACLES, SEABED
+from hybrid.kernels.state.state import Floats
 from hybrid.modal.loaded_line import LoadedLine
 from hybrid.modal.response_results import LineResponse
 
 # Parts of the motion beyond which the line is not linear: share of time that it would be slack; turn of a chord, rad;
 # mean tension by the stretch of swinging, of the standard deviation of tension; length that lifts off or touches down.
 SLACK_SHARE, TURN, STRETCH, LIFTS = 1e-3, 0.2, 0.25, 0.02
+# Step, of the length, by which distances to obstacles are differentiated.
+NEAR = 1e-7
 # Part by which what linear drag leaves out may change a deviation of curvature of at least this part of the largest.
 BY_HARMONICS, OF_LARGEST = 0.1, 0.2
 
@@ -22,7 +26,7 @@ BY_HARMONICS, OF_LARGEST = 0.1, 0.2
 def doubts_of(x: LoadedLine) -> Iterator[str]:
     """Each place where the motion of a line is not small, in words."""
     found = x.result()
-    for doubt in (_slack, _swing, _touchdown, _harmonics):
+    for doubt in (_slack, _swing, _touchdown, _on_obstacles, _harmonics):
         yield from doubt(x, found)
 
 
@@ -65,13 +69,29 @@ def _touchdown(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     if not x.line.bits & SEABED or not x.sea.stiffness > 0.0:
         return
     gap = found.mean_position @ x.sea.normal - x.sea.offset
-    up = np.sqrt(0.5 * (np.abs(found.position @ x.sea.normal) ** 2).sum(axis=0))
+    yield from _crossing(x, gap, found.position @ x.sea.normal, "the bed")
+
+
+def _on_obstacles(x: LoadedLine, found: LineResponse) -> Iterator[str]:
+    """What of the line lifts off an obstacle or comes down on it."""
+    if not x.line.bits & OBSTACLES:
+        return
+    rows, r = x.sea.obstacles, found.mean_position
+    step = NEAR * float(x.line.s[-1])
+    sides = [(distances(rows, r + d) - distances(rows, r - d)) / (2.0 * step) for d in step * np.eye(3)]
+    for name, gap, n in zip(x.obstacles, distances(rows, r), np.stack(sides, axis=-1), strict=True):
+        yield from _crossing(x, gap, np.einsum("fni,ni->fn", found.position, n), f"obstacle {name}")
+
+
+def _crossing(x: LoadedLine, gap: Floats, way: Floats, what: str) -> Iterator[str]:
+    """Where a motion (F, N+1) m along the normal of what is touched crosses it; gap: (N+1,) m, at rest."""
+    up = np.sqrt(0.5 * (np.abs(way) ** 2).sum(axis=0))
     share = np.append(x.line.h, x.line.h[-1])
-    # the length over which a motion of two standard deviations crosses the bed
+    # the length over which a motion of two standard deviations crosses it
     crosses = float(share[2.0 * up > np.abs(gap)].sum())
     if crosses > LIFTS * float(x.line.s[-1]):
         yield (
-            f"about {crosses:.3g} m of line lift off the bed and come down on it, which contact as it is at rest does "
+            f"about {crosses:.3g} m of line lift off {what} and come down on it, which contact as it is at rest does "
             "not show: tension and curvature there are doubtful"
         )
 

@@ -449,6 +449,9 @@ SHEAVES = Feature("sheaves that turn freely", "obstacles.NAME.bearing", _free_sh
 LINES_TOUCH = Feature("contact of lines with each other", "contact", _lines_touch)
 PUSHED = Feature("obstacles, contact of lines with each other", "obstacles, contact",
                  _either(OBSTACLES, LINES_TOUCH))  # fmt: skip
+MOVED_BY_LINES = Feature("contact of lines with each other, with bodies, with sheaves",
+                         "contact, bodies.NAME.shape, obstacles.NAME.bearing",
+                         _either(LINES_TOUCH, SHAPES, SHEAVES))  # fmt: skip
 DIAMETERS = Feature("sections of several diameters", "diameter", _other_diameters)
 ACCURACY = Feature("accuracy", "accuracy", lambda tables: iter([("accuracy",)] if tables.get("accuracy") else []))
 ERRORS = Feature("estimated errors", "output.errors", _asks("output", "errors", lambda x: getattr(x, "errors", None)))
@@ -588,8 +591,9 @@ REFUSALS: tuple[Refusal, ...] = (
         "neglected",
     ),
     Refusal(
-        ABOUT_REST, PUSHED, "not worked out", f"{TOUCHES}, and contact opens and closes",
-        "a line that touches the seabed at most", "hybrid run computes it in time",
+        ABOUT_REST, MOVED_BY_LINES, "not worked out",
+        "what touches ({key}) is a line, a body or a sheave, which moves as well",
+        "lines that touch the seabed and fixed obstacles at most", "hybrid run computes it in time",
     ),
     # --- response and derivatives ---
     RESPONSE_TO_MOTION,

@@ -97,7 +97,7 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.DIAMETERS, c.OBSTACLES): (BALL | THICKER, ""),
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
     (c.SETTLED_FRICTION, c.PUSHED): (BALL | {"initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
-    (c.ABOUT_REST, c.PUSHED): (BALL, "about rest"),
+    (c.ABOUT_REST, c.MOVED_BY_LINES): (TWO_LINES, "about rest"),
     (c.OTHER_MOTIONS, c.RESPONSE): (
         {"ends.end": {"kind": "free", "force": {"value": [1, 0, 0], "until": 2}}}, "response"
     ),
@@ -141,6 +141,7 @@ OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.SWIVEL_BESIDE, c.DIRECTED), SWIVEL | CURVED, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"time": {"duration": 3.0}}, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"output.errors": True}, ""),
+    ((c.ABOUT_REST, c.MOVED_BY_LINES), TWO_LINES, "derivatives"),
 )
 OF_ARRAYS = [c.RESPONSE_OF_MEMBERS]
 
@@ -150,7 +151,15 @@ def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
 
 
 def _of_several(pair: tuple[c.Feature, c.Feature]) -> bool:
-    names = (c.SEVERAL_LINES, c.LINES_TOUCH, c.CLAMPED_TO_FREE, c.CLAMPED_CONNECTION, c.TURNING, c.SHAPES)
+    names = (
+        c.SEVERAL_LINES,
+        c.LINES_TOUCH,
+        c.MOVED_BY_LINES,
+        c.CLAMPED_TO_FREE,
+        c.CLAMPED_CONNECTION,
+        c.TURNING,
+        c.SHAPES,
+    )
     return any(x in names for x in pair)
 
 

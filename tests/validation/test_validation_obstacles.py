@@ -212,13 +212,15 @@ def test_what_does_not_go_with_obstacles_is_refused(change: dict[str, Any], wher
     assert any(x.where == where and says in str(refused.value) for x in refused.value.complaints), refused.value
 
 
-def test_modes_and_derivatives_beside_obstacles_are_refused() -> None:
-    with pytest.raises(SceneError, match="opens and closes"):
-        hybrid.modes(hybrid.validate_scene(over_pipe()))
-    with pytest.raises(SceneError, match="opens and closes"):
-        hybrid.sensitivity(hybrid.validate_scene(over_pipe()), ["tension@0"], ["cable.sections[0].length"])
-    with pytest.raises(SceneError, match="opens and closes"):
-        hybrid.seek(hybrid.validate_scene(over_pipe()), {"tension@0": 100.0}, ["cable.sections[0].length"])
+def test_modes_and_derivatives_of_a_line_on_a_sheave_are_refused() -> None:
+    tables = over_pipe()
+    tables["obstacles"]["pipe"]["bearing"] = {"inertia": 1.0}
+    with pytest.raises(SceneError, match="which moves as well"):
+        hybrid.modes(hybrid.validate_scene(tables))
+    with pytest.raises(SceneError, match="which moves as well"):
+        hybrid.sensitivity(hybrid.validate_scene(tables), ["tension@0"], ["cable.sections[0].length"])
+    with pytest.raises(SceneError, match="which moves as well"):
+        hybrid.seek(hybrid.validate_scene(tables), {"tension@0": 100.0}, ["cable.sections[0].length"])
 
 
 def test_a_line_on_obstacles_has_one_diameter_that_is_given() -> None:

@@ -1,0 +1,97 @@
+"""Modes, response and derivatives of lines that rest on obstacles: strings on both sides, a run, two equilibria."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from tests.validation.obstacle_scenes import over_pipe
+from tests.validation.test_validation_obstacles_accuracy import PIPE, as_system
+
+Tables = dict[str, Any]
+PUSH, AT, SPAN = 0.3, 3.0, 10.0  # m
+
+
+def string(friction: float) -> Tables:
+    """A taut string without weight, pressed up by a thin pipe across it."""
+    section = {"length": 9.99, "mass": 0.5, "diameter": 0.01, "axial_stiffness": 1e6}
+    pipe = {"kind": "cylinder", "at": [AT, 0, PUSH - 0.055], "axis": [0, 1, 0], "radius": 0.05, "friction": friction}
+    return {
+        "environment": {"gravity": 0}, "cable": {"sections": [section]}, "obstacles": {"pipe": pipe},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [SPAN, 0, 0]}},
+        "initial": {"kind": "equilibrium", "points": [[0, 0, 0], [AT, 0, PUSH], [SPAN, 0, 0]]},
+        "model": "catenary", "mesh": {"cells": 300}, "contact": {"self": False},
+    }  # fmt: skip
+
+
+def resting(**pipe: Any) -> Tables:
+    """The rope over a pipe, at rest."""
+    tables = over_pipe(obstacles={"pipe": PIPE | pipe}, mesh={"cells": 96}, output={"every": 0.1, "points": 97})
+    del tables["time"], tables["ends"]["end"]["motion"]
+    over = [[0, 0, 0], [2, 0, -1.3], [4, 0, -0.85], [6, 0, -0.9], [10, 0, 3]]
+    tables["initial"] = {"kind": "equilibrium", "points": over}
+    return tables
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+def test_a_string_over_a_pipe_swings_as_strings_on_both_sides(friction: float) -> None:
+    """Across the pipe each side by itself, with its own length and T; along it both together where it does not stick."""
+    tables = string(friction)
+    rest = hybrid.static(tables)
+    modes = hybrid.modes(tables, count=6)
+    found = modes.modes
+    assert any("obstacle pipe stays as it is at rest" in x for x in modes.notes)
+    lengths = np.array([np.hypot(SPAN - AT, PUSH), np.hypot(AT, PUSH)])
+    density = 0.5 * 9.99 / lengths.sum()
+    T = np.array([rest.tension[-1][-1], rest.tension[-1][0]])
+    right, left = 2.0 * lengths / np.sqrt(T / density)
+    across = sorted((right, left, right / 2), reverse=True)
+    along = across if friction else [2.0 * lengths.sum() / np.sqrt(T.mean() / density) / n for n in (1, 2, 3)]
+    for what, expected in (("in its vertical plane", across), ("sideways", along)):
+        periods = [x.period for x in found if x.what.startswith(what)]
+        np.testing.assert_allclose(periods[:3], expected[: len(periods)][:3], rtol=4e-3)
+        assert len(periods) >= 2
+    np.testing.assert_allclose(
+        [x.period for x in hybrid.modes(as_system(tables), count=6).modes], [x.period for x in found], rtol=1e-6
+    )
+
+
+def test_the_response_is_the_motion_of_a_run_and_says_where_it_lifts_off() -> None:
+    moved = resting(friction=0.0) | {"time": {"duration": 24.0, "step": 0.01}}
+    moved["ends"]["end"]["motion"] = {"heave": {"amplitude": 0.01, "period": 2.0}, "ramp": 4.0}
+    run, found = hybrid.run(moved), hybrid.response(moved)
+    line, last = found.lines["cable"], slice(-21, -1)  # a period
+    turn = np.exp(1j * np.pi * run.times[last])[:, None]
+
+    def amplitude(name: str) -> Any:
+        x = np.array(run[name])[last]
+        return 2.0 * np.abs(((x - x.mean(axis=0)) * turn).mean(axis=0))
+
+    for name, at in (("tension", line.middle), ("curvature", line.s)):
+        expected = np.interp(run.s, at, np.sqrt(2.0) * line.deviation(name))[4:-4]
+        np.testing.assert_allclose(amplitude(name)[4:-4], expected, atol=0.01 * expected.max())
+    assert not any("lift off" in x for x in found.notes)
+    moved["ends"]["end"]["motion"]["heave"]["amplitude"] = 0.5
+    assert any("lift off obstacle pipe" in x for x in hybrid.response(moved).notes)
+
+
+def test_derivatives_are_those_of_two_equilibria() -> None:
+    keys = {
+        "cable.sections[0].length": 1e-4, "cable.sections[0].mass": 1e-4, "ends.end.position[2]": 1e-4,
+        "cable.sections[0].bending_stiffness": 1e-3,
+    }  # fmt: skip
+
+    def pull(key: str, by: float) -> float:
+        tables = resting()
+        section, end = tables["cable"]["sections"][0], tables["ends"]["end"]
+        if key.startswith("ends"):
+            end["position"] = tables["initial"]["points"][-1] = [10, 0, 3 + by]
+        else:
+            section[key.split(".")[-1]] += by
+        return float(hybrid.static(tables).tension[-1][0])
+
+    for x, (key, h) in zip(hybrid.sensitivity(resting(), ["tension@0"], list(keys)), keys.items(), strict=True):
+        assert x.derivative == pytest.approx((pull(key, h) - pull(key, -h)) / (2.0 * h), rel=1e-5)
