@@ -17,7 +17,7 @@ import numpy as np
 
 from hybrid.accuracy.error_report import CAUSES, UNITS
 from hybrid.accuracy.system_samples import touch_unasked
-from hybrid.errors import ComputationError
+from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.plan import output_interval
 from hybrid.model.sections import section_changes
@@ -94,7 +94,7 @@ def write_system_errors(system: System, target: Path | io.BytesIO, compute: Comp
                 try:
                     other, memory = make(other), MemoryTarget()
                     compute(other, memory)
-                except (ComputationError, Invalid):
+                except (ComputationError, Invalid, SceneError):
                     if not again:
                         raise
                     break
@@ -103,6 +103,8 @@ def write_system_errors(system: System, target: Path | io.BytesIO, compute: Comp
         failed = f"a coarser run to compare with stopped: {str(error).splitlines()[0]}"
     except Invalid as error:  # half of few cells, or twice a long step, is no scene
         failed = TOO_COARSE[cause].format(*error.errors()[0]["loc"])
+    except SceneError as error:  # nor are few cells enough for a line that is paid out
+        failed = TOO_COARSE["mesh"].format(*error.complaints[0].where.split("."))
     errors, doubts = {}, dict[str, list[str]]()
     if not failed:
         with open_result(target) as result:

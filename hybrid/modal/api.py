@@ -378,9 +378,11 @@ def _error(fine: _Found, coarse: _Found, k: int) -> float | None:
 
 def of_first_length(asked: Scene | System) -> list[str]:
     """What is to be known of a line that is paid out."""
-    if not isinstance(asked, Scene) or payout_of(asked) is None:
-        return []
-    return ["the line is paid out: all of this is of its first length, to which it does not return"]
+    if isinstance(asked, Scene):
+        paid = ["the line is"] if payout_of(asked) is not None else []
+    else:
+        paid = [f"line {name} is" for name in asked.lines if payout_of(asked.scene_of(name)) is not None]
+    return [f"{who} paid out: all of this is of its first length, to which it does not return" for who in paid]
 
 
 def _doubts(found: _Found, unstable: int, free: list[str], chosen: np.ndarray) -> Iterator[str]:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -13,6 +17,16 @@ from hybrid.scene.payout import Payout
 
 # Of the length of the cable: as much may the first one given differ from it, by round-off.
 SAME_LENGTH = 1e-9
+
+
+@contextmanager
+def said_of_line(name: str) -> Iterator[None]:
+    """What is refused within of how a line of several is paid out is said of its connection."""
+    try:
+        yield
+    except SceneError as error:
+        at = f"lines.{name}.connections."
+        raise SceneError([replace(x, where=re.sub(r"^ends\.", at, x.where)) for x in error.complaints]) from None
 
 
 def refuse(where: str, given: str, expected: str, fix: str) -> NoReturn:

@@ -18,6 +18,7 @@ from hybrid.model.material import material
 from hybrid.model.mesh import Zone
 from hybrid.model.model_costs import structural, with_model
 from hybrid.model.payout import PayoutForecast
+from hybrid.model.payout_law import said_of_line
 from hybrid.model.resolution import first_resolution, model_is_free, predicted_runs
 from hybrid.model.run_time import foretold_steps, processor_time
 from hybrid.model.sections import limits_along, outer_diameter
@@ -144,7 +145,8 @@ def plan_system(system: System) -> SystemPlan:
         scene = system.scene_of(name, system.carried(name), guesses)
         if scene.time:
             refuse_too_much(scene)
-        plans[name] = _plan(scene)
+        with said_of_line(name):
+            plans[name] = _plan(scene)
     every = list(plans.values())
     shortest = min(every, key=lambda x: x.step)  # all have the steps in common
     return SystemPlan(

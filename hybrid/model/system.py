@@ -32,6 +32,7 @@ from hybrid.model.first_state import first_state
 from hybrid.model.initial_shape import dead_loads, hung
 from hybrid.model.lines_contact import Touching, touching_of
 from hybrid.model.obstacles import obstacle_rows, pull_on_obstacles
+from hybrid.model.payout_law import said_of_line
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
@@ -365,7 +366,8 @@ class _Lines:
 
     def _shape(self, name: str, directions: Mapping[str, Any] | None) -> Model:
         scene, mesh = self._scene(name, (), directions), self.meshes.get(name)
-        return build(scene, self._resolution[name], mesh, spare=False)
+        with said_of_line(name):
+            return build(scene, self._resolution[name], mesh, spare=False)
 
     def _scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> Scene:
         """The scene of a line between the places of its points; of one that is carried, with the point."""

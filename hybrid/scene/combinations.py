@@ -177,10 +177,27 @@ def _directed(section: Section) -> bool:
 
 
 def _winches(tables: Tables) -> Iterator[tuple[Place, Payout]]:
+    """How line is paid out, at which end, of a cable or of a line of several."""
     ends: Ends | None = tables.get("ends")
     for name, end in ends.named().items() if ends is not None else ():
         if isinstance(end, Pinned | Clamped) and end.payout is not None:
             yield ("ends", name, "payout"), end.payout
+    held = tables.get("connections")
+    for name in ("start", "end") if held is not None else ():
+        if (payout := getattr(held, name).payout) is not None:
+            yield ("connections", name, "payout"), payout
+
+
+def _joined(tables: Tables, end: str) -> bool:
+    """Whether a line of several ends at what moves by what pulls there."""
+    return bool(tables[SYSTEM].is_joined(getattr(tables[SYSTEM].lines[tables[LINE]], end)))
+
+
+def _tension_held(tables: Tables) -> Iterator[Place]:
+    """Winches that hold a tension, of lines an end of which moves by what pulls there."""
+    for at, payout in _winches(tables) if SYSTEM in tables else ():
+        if payout.winch is not None and any(_joined(tables, end) for end in ("start", "end")):
+            yield (*at, "winch")
 
 
 def _paid_out(tables: Tables) -> Iterator[Place]:
@@ -193,8 +210,13 @@ def _paid_out_at(name: str) -> Callable[[Tables], Iterator[Place]]:
 
 def _release_at_winch(tables: Tables) -> Iterator[Place]:
     for at, _ in _winches(tables):
-        if tables["ends"].named()[at[1]].release_at is not None:
-            yield (*at[:-1], "release_at")
+        if SYSTEM not in tables:
+            if tables["ends"].named()[at[1]].release_at is not None:
+                yield (*at[:-1], "release_at")
+        elif tables[SYSTEM].breaks(name := tables[LINE], str(at[1])):
+            yield "lines", name, "break_at"
+        elif getattr(tables[SYSTEM].points[point := getattr(tables[SYSTEM].lines[name], str(at[1]))], "break_at", None):
+            yield "points", point, "break_at"
 
 
 def holds_rod(model: Any, end: str, length: float) -> bool:
@@ -255,6 +277,10 @@ def _swivels_beside(of: Callable[[Section], Any]) -> Callable[[Tables], Iterator
 
 def _moving(tables: Tables) -> Iterator[Place]:
     return iter([("model",)] if isinstance(tables.get("model"), AdaptiveModel) else [])
+
+
+def _zones_of_several(tables: Tables) -> Iterator[Place]:
+    return _moving(tables) if SYSTEM in tables else iter(())
 
 
 def _of_moving(key: str) -> Callable[[Tables], Iterator[Place]]:
@@ -434,6 +460,8 @@ SELF_CONTACT = Feature("contact of a line with itself", "contact.self", _self_co
 PAYOUT = Feature("line that is paid out", "ends.end.payout", _paid_out)
 PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout", _paid_out_at("start"))
 PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out_at("end"))
+TENSION_HELD = Feature("a winch that holds a tension, of a line to what is free", "payout.winch", _tension_held)
+ZONES_OF_SEVERAL = Feature("zones of several lines that move", "lines.NAME.model", _zones_of_several)
 RELEASE_AT_WINCH = Feature("release of the end at the winch", "ends.end.release_at", _release_at_winch)
 LAYERS = Feature("cells to a boundary layer", "resolution.cells_per_layer",
                  _asks("resolution", "cells_per_layer", lambda x: True))  # fmt: skip
@@ -481,10 +509,6 @@ MEMBERS = Feature("free bodies with members", "bodies.NAME.members", lambda tabl
 # Of one cable alone, by keys that several lines do not have.
 ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
     {"System": ("dimension",)}, "leave it out: several lines are computed in space"
-))  # fmt: skip
-WINCH = Feature("line that is paid out", "payout", Absent(
-    {x: ("payout",) for x in ("FixedPoint", "FreePoint", "Fairlead", "JoinedLine")},
-    "leave it out: lines of several keep their lengths; one cable, with `cable` and `ends`, can be paid out",
 ))  # fmt: skip
 
 RESPONSE_TO_MOTION = Refusal(
@@ -570,7 +594,9 @@ REFUSALS: tuple[Refusal, ...] = (
         SHAPES, STIFFNESS, "not worked out", "contact of lines with a body opens and closes",
         "no shape", "leave it out where no line touches the body",
     ),
-    Refusal(PAYOUT, OBSTACLES, "not worked out", "nodes that enter and leave do not know of obstacles ({key})"),
+    Refusal(
+        PAYOUT, PUSHED, "not worked out", "nodes that enter and leave know no obstacles and no other lines ({key})"
+    ),
     Refusal(
         DIAMETERS, OBSTACLES, "not worked out", "a line that touches obstacles ({key}) has one diameter",
         "the diameter of the first section", "give all sections one diameter, or leave {key} out",
@@ -635,6 +661,13 @@ REFUSALS: tuple[Refusal, ...] = (
         PAYOUT_AT_START, PAYOUT_AT_END, "not worked out", "line is paid out at ends.end", fix="leave one out"
     ),
     Refusal(
+        TENSION_HELD, SEVERAL_LINES, "several lines", "an end of the line moves by what pulls there",
+        fix="give a rate or a length, or hold what is at both ends",
+    ),
+    Refusal(
+        ZONES_OF_SEVERAL, PAYOUT, "several lines", f"{PAID}", "rod, catenary or zones", "write `model: rod`",
+    ),
+    Refusal(
         RELEASE_AT_WINCH, PAYOUT, "not worked out", "line is paid out there", fix="leave it out, or {key}"
     ),
     Refusal(
@@ -682,9 +715,7 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     *(
         Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)
-        for x in (
-            ONE_PLANE, WINCH
-        )
+        for x in (ONE_PLANE,)
         if isinstance(x.places, Absent)
     ),
 )  # fmt: skip

@@ -9,8 +9,9 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.base import Direction, Finding, Kinds, NonNegative, Number, Table, Truth, by_kind, parallel, refuse
 from hybrid.scene.combinations import holds_rod
-from hybrid.scene.ends import BEND_STIFFNESS, TWISTED_BY
+from hybrid.scene.ends import BEND_STIFFNESS, PAYOUT, TWISTED_BY
 from hybrid.scene.motion_tables import TURNS
+from hybrid.scene.payout import Payout
 from hybrid.scene.points import FixedPoint, FreePoint
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ class PinnedConnection(Table):
     """The line turns freely at its point."""
 
     kind: Literal["pinned"] = Field(default="pinned", description="turns freely, no moment")
+    payout: Payout | None = Field(default=None, description=PAYOUT)
 
 
 class ClampedConnection(Table):
@@ -45,6 +47,7 @@ class ClampedConnection(Table):
     turns: Number = Field(default=0.0, description=TWISTED_BY)
     swivel: Truth = Field(default=False, description="true: free to spin about the tangent, so no torque")
     bend_stiffness: NonNegative | None = Field(default=None, description=BEND_STIFFNESS)
+    payout: Payout | None = Field(default=None, description=PAYOUT)
 
     @model_validator(mode="after")
     def _normal_is_across(self) -> ClampedConnection:
@@ -65,7 +68,10 @@ Connection = Annotated[
     Kinds(
         ("pinned", "clamped"),
         usual=("clamped",),
-        implied=tuple((key, "clamped") for key in ("tangent", "normal", "turns", "swivel", "bend_stiffness")),
+        implied=(
+            *((key, "clamped") for key in ("tangent", "normal", "turns", "swivel", "bend_stiffness")),
+            ("payout", "pinned"),
+        ),
     ),
 ]
 
@@ -84,6 +90,11 @@ def connection_findings(system: System) -> Iterator[Finding]:
             held = system.clamp(name, key)
             if held is not None:
                 yield from _clamp_findings(system, name, key, held)
+            payout = getattr(system.lines[name].connections, key).payout
+            if payout is not None and isinstance(system.points[getattr(system.lines[name], key)], FreePoint):
+                fix = "make the point `kind: fixed`, or the fairlead of a body"
+                expected = "nothing, because a winch stands on a fixed point or on a body"
+                yield Finding(("lines", name, "connections", key, "payout"), expected, fix)
     for name, point in system.points.items():
         if isinstance(point, FixedPoint) and point.motion is not None and not system.clamped_at(name):
             for turn in (x for x in point.motion.harmonics() if x in TURNS):

@@ -64,7 +64,7 @@ BEND_STIFFNESS = (
     "of an angular spring between the tangent and the line, as of a bend stiffener or a flexible joint; 0: torque "
     "passes, and no bending moment; absent: rigid [N m/rad]"
 )
-_PAYOUT = "line is paid out here, or taken in, by a winch; at one end alone; absent: its length stays"
+PAYOUT = "line is paid out here, or taken in, by a winch; at one end alone; absent: its length stays"
 _RELEASE = "when the end is let go and becomes free, in mid-motion; absent: never"
 
 
@@ -176,7 +176,7 @@ class Pinned(EndTable):
     )
     position: Vector = Field(description="position of the end, inertial frame [m]")
     motion: Motion | None = Field(default=None, description="how the point moves; absent: not at all")
-    payout: Payout | None = Field(default=None, description=_PAYOUT)
+    payout: Payout | None = Field(default=None, description=PAYOUT)
     release_at: Release | None = Field(default=None, description=_RELEASE)
 
     @model_validator(mode="after")
@@ -199,7 +199,7 @@ class Clamped(EndTable):
     swivel: Truth = Field(default=False, description="true: free to spin about the tangent, so no torque")
     bend_stiffness: NonNegative | None = Field(default=None, description=BEND_STIFFNESS)
     motion: Motion | None = Field(default=None, description="how the clamp moves and turns; absent: not at all")
-    payout: Payout | None = Field(default=None, description=_PAYOUT)
+    payout: Payout | None = Field(default=None, description=PAYOUT)
     release_at: Release | None = Field(default=None, description=_RELEASE)
 
     @property

@@ -19,6 +19,9 @@ _BREAK = (
     "on together, and the point is free; absent: never"
 )
 
+# What to do with a key that ends of one cable have.
+WINCH = {"payout": "write it where a line ends: `lines: {NAME: {connections: {end: {payout: ...}}}}`"}
+
 # Names are keys of the result file and of its groups.
 FORBIDDEN = "/."
 
@@ -49,7 +52,7 @@ class Failure(Table):
 class FixedPoint(Table):
     """A point that is held or moved: an anchor, a fairlead of a vessel whose motion is known."""
 
-    instead: ClassVar[Mapping[str, str]] = instead("FixedPoint")
+    instead: ClassVar[Mapping[str, str]] = instead("FixedPoint") | WINCH
 
     kind: Literal["fixed"] = Field(default="fixed", description="held where it is, or moved as `motion` says")
     position: Vector = Field(description="position, inertial frame [m]")
@@ -60,7 +63,7 @@ class FixedPoint(Table):
 class FreePoint(Table):
     """A point that lines alone hold: a knot, a buoy, a clump.  It has no moment of inertia."""
 
-    instead: ClassVar[Mapping[str, str]] = instead("FreePoint")
+    instead: ClassVar[Mapping[str, str]] = instead("FreePoint") | WINCH
 
     kind: Literal["free"] = Field(default="free", description="moves with the lines that meet there")
     initial_guess: Vector = Field(
@@ -107,7 +110,7 @@ class FreePoint(Table):
 class Fairlead(Table):
     """A point of a body: a fairlead, a padeye, a hang-off.  It moves with the body."""
 
-    instead: ClassVar[Mapping[str, str]] = instead("Fairlead")
+    instead: ClassVar[Mapping[str, str]] = instead("Fairlead") | WINCH
 
     kind: Literal["fairlead"] = Field(default="fairlead", description="a point of a body, and moves with it")
     body: Name = Field(description="name of the body")

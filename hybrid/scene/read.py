@@ -268,6 +268,8 @@ def _resolve_motion_files(data: Any, folder: Path) -> None:
         _make_absolute(_at(data, path), folder)
     lines = data.get("lines") if isinstance(data, dict) else None
     for cable in (("cable",), *(("lines", name) for name in (lines if isinstance(lines, dict) else ()))):
+        for end in ("start", "end"):
+            _make_absolute(_at(data, (*cable, "connections", end, "payout")), folder)
         sections = _at(data, (*cable, "sections"))
         for section in sections if isinstance(sections, list) else ():
             _make_absolute(_at(section, ("tension_strain",)), folder)

@@ -38,7 +38,7 @@ from hybrid.scene.end_loads import GivenLoad
 from hybrid.scene.ends import Clamped, End, Ends, Pinned, Triple
 from hybrid.scene.lines_contact import LinesContact
 from hybrid.scene.obstacles import Obstacles
-from hybrid.scene.points import Failure, Fairlead, FixedPoint, FreePoint, Name, Point
+from hybrid.scene.points import WINCH, Failure, Fairlead, FixedPoint, FreePoint, Name, Point
 from hybrid.scene.quantities import Quantities
 from hybrid.scene.schema import Scene, missing_time
 from hybrid.scene.system_checks import system_findings
@@ -83,7 +83,7 @@ class LineFailure(Failure):
 class JoinedLine(Table):
     """A line from one point to another, with s = 0 at `start`."""
 
-    instead: ClassVar[Mapping[str, str]] = instead("JoinedLine")
+    instead: ClassVar[Mapping[str, str]] = instead("JoinedLine") | WINCH
 
     start: Name = Field(description="name of the point at s = 0")
     end: Name = Field(description="name of the point at s = length")
@@ -414,7 +414,7 @@ class System(Table):
         for key in ("start", "end"):
             point, body = self.points[getattr(line, key)], self.body_of(getattr(line, key))
             held = self.direction(name, key) if directions is None else directions.get(key)
-            place, motion = first[key], None
+            place, motion, payout = first[key], None, getattr(line.connections, key).payout
             if isinstance(point, FixedPoint):
                 place, motion = point.position, point.motion
                 if held is None and motion is not None and self.clamped_at(getattr(line, key)):
@@ -428,12 +428,12 @@ class System(Table):
             elif held is None:
                 carried = _CarriedPin if self.clamp(name, key) is not None else Pinned
                 kind = _JoinedPin if self.may_leave(name, key) else carried
-                ends[key] = kind(position=place, motion=motion)
+                ends[key] = kind(position=place, motion=motion, payout=payout)
             else:
                 clamp = getattr(line.connections, key)
                 ends[key] = (_JoinedClamp if self.may_leave(name, key) else Clamped)(
                     position=place, tangent=held[0], normal=held[1], turns=clamp.turns, swivel=clamp.swivel,
-                    bend_stiffness=clamp.bend_stiffness, motion=motion,
+                    bend_stiffness=clamp.bend_stiffness, motion=motion, payout=payout,
                 )  # fmt: skip
         initial = line.initial if self.starts_as_placed else _between(line.initial, ends)
         if places is not None:

@@ -199,7 +199,7 @@ def _of_system(system: System, name: str, found: Finding) -> Finding:
     elif at[:1] == ("ends",) and len(at) > 1:
         point = getattr(line, str(at[1]))
         rest = at[2:]
-        if rest[:1] in (("normal",), ("turns",)):
+        if rest[:1] in (("normal",), ("turns",), ("payout",)):
             at = ("lines", name, "connections", *at[1:])
             words = (x.replace("ends.", f"lines.{name}.connections.") for x in (found.expected, found.fix))
             expected, fix = (x.replace("cable.", f"lines.{name}.") for x in words)

@@ -6,7 +6,7 @@ import os
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,9 +17,18 @@ from hybrid.simulation.diagnostics import stretch_text
 from hybrid.simulation.transient import Transient
 from hybrid.solve.run import Tried
 
+if TYPE_CHECKING:
+    from hybrid.simulation.payout import PayingOut
+
 # A step in which waves of tension pass so many cells may itself leave a line slack; and by how much shorter one should
 # be that shows whether it does.
 MOST_PASSED, SHORTER = 4.0, 16.0
+
+
+def winch_text(paying: PayingOut) -> str:
+    """What is out where a winch has no more line, or none to take in."""
+    least, most = paying.plan.shortest, paying.plan.longest
+    return f"{paying.length:.6g} m are out, of {least:.6g} m at least and {most:.6g} m (longest) at most"
 
 
 def explanation(run: Transient, tried: Tried, dt: float) -> str:
@@ -31,10 +40,7 @@ def explanation(run: Transient, tried: Tried, dt: float) -> str:
             detail += "; model.force_catenary keeps it from becoming a rod"
     elif tried.outcome == Outcome.WINCH_AT_END:
         assert run.payout is not None
-        least, most = run.payout.plan.shortest, run.payout.plan.longest
-        detail = (
-            f"{np.ptp(run.model.line.s):.6g} m are out, of {least:.6g} m at least and {most:.6g} m (longest) at most"
-        )
+        detail = winch_text(run.payout)
     elif tried.outcome == Outcome.COLLAPSED:
         detail = run.collapse
     elif tried.outcome == Outcome.GAINS_ENERGY:

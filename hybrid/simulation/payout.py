@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -52,6 +52,15 @@ VARIES_TOO = ("bend_law",)  # likewise, of lines that have them
 # What a checkpoint keeps of a reel.
 OF_CELLS = ("lack", "rate", "since", "span")
 KEPT = ("numbers", "lack", "rate", "since", "span", "winch", "balance")
+
+
+class Before(NamedTuple):
+    """A line in motion, as a node that enters or leaves finds it."""
+
+    state: State
+    t: float  # s
+    clock: Floats
+    tension: Floats  # (2, N) N, as of Books
 
 
 class PayingOut:
@@ -180,7 +189,7 @@ class PayingOut:
         return self.holds_tension and not winch[w.LEAST] <= winch[w.LENGTH_NOW] <= winch[w.MOST]
 
     def change(
-        self, run: CompiledRun, model: Model, carry: Callable[[Model, np.ndarray, np.ndarray], None] | None = None
+        self, run: Before, model: Model, carry: Callable[[Model, np.ndarray, np.ndarray], None] | None = None
     ) -> tuple[Model, State, float]:
         """The model and the state with one node more, or less, at the fairlead, and the energy, J, that it puts in.
 
@@ -206,7 +215,7 @@ class PayingOut:
         reel, out = self._blank(material), state_for(changed.line)
         self._carrying.bind(
             line=model.line, target=changed.line, state=state, out=out, reel=old, new=reel, clock=run.clock,
-            tension=run.books.tension, nodes=self._nodes,
+            tension=run.tension, nodes=self._nodes,
         )  # fmt: skip
         carry_node(self._carrying.numbers)
         reel.true[material - 1] = length - plan.layer[0] - plan.nodes[self.count - 1]
@@ -453,13 +462,18 @@ class PayingOut:
         lengthen(self.table.numbers)
 
 
-def length_asked(scene: Scene, paying: PayingOut | None, length: Any, rate: Any) -> tuple[float | None, float]:
-    """Length (m; None: what the rate leads to) and rate (m/s) that are asked of a line; ValueError: they cannot be."""
+def length_asked(
+    scene: Scene, paying: PayingOut | None, length: Any, rate: Any, where: str = ""
+) -> tuple[float | None, float]:
+    """Length (m; None: what the rate leads to) and rate (m/s) that are asked of a line; ValueError: they cannot be.
+
+    where: of a line of several its `payout` stands; empty: of one cable.
+    """
     payout = payout_of(scene)
     if payout is None or paying is None:
         raise ValueError("the scene has no ends.end.payout (nor ends.start.payout): the length of its line stays")
     if not payout.from_outside:
-        raise ValueError(f"{winch_at(scene)} gives the length: leave {', '.join(SOURCES)} out to set it")
+        raise ValueError(f"{where or winch_at(scene)} gives the length: leave {', '.join(SOURCES)} out to set it")
     for name, x in (("rate", rate), ("length", 0.0 if length is None else length)):
         if isinstance(x, bool) or not isinstance(x, int | float | np.integer | np.floating) or not np.isfinite(x):
             raise ValueError(f"{name}: expected a finite number, found {x!r:.60}")
@@ -468,7 +482,7 @@ def length_asked(scene: Scene, paying: PayingOut | None, length: Any, rate: Any)
     plan = paying.plan
     if not plan.shortest <= length <= plan.longest * (1.0 + ROUND_OFF):
         between = f"{plan.shortest:.6g} and {plan.longest:.6g} m"
-        raise ValueError(f"length = {length:.9g} m, expected between {between} ({winch_at(scene)}.longest)")
+        raise ValueError(f"length = {length:.9g} m, expected between {between} ({where or winch_at(scene)}.longest)")
     return float(length), float(rate)
 
 

@@ -42,6 +42,7 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
         "quantities": run.quantities.checkpoint(), "rotations": run.rotations.last.copy(),
         "zones": run.zones.checkpoint() if run.zones is not None else {},
         "passed": sorted(list(x) for x in run.passed), "met": sorted(list(x) for x in run.met),
+        **({} if run.payout is None else {"payout": run.payout.checkpoint()}),
         **({} if run.shared is None else {"contact": run.shared.checkpoint(run.t)}),
     }  # fmt: skip
 
@@ -53,8 +54,8 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
             raise ValueError("broken: numbers of what has broken were expected")
         run.failures.again(saved["broken"])
     # It took members as at the first guess, and rotations were within half a turn of 0.
-    older = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "rotations": run.rotations.last, "changes": 0}
-    older |= {"passed": [], "met": []}
+    older: dict[str, Any] = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "changes": 0}
+    older |= {"rotations": run.rotations.last, "passed": [], "met": []}
     older["rho"] = run.system.require_time().rho_inf
     complete = "interval" in saved  # else steps ended at outputs
     older |= {"interval": 0.0, "worked": run.loop.worked[1, :, :SPRING]}
@@ -64,10 +65,12 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     let_touch(run, near)
     if run.zones is not None:
         run.zones.take_rods(saved["zones"])
-    if run.zones is not None or near:
+    if run.payout is not None:
+        run.payout.restore(saved["payout"])
+    if run.zones is not None or run.payout is not None or near:
         run.make_solver()
     template = checkpoint(run) | {"dry": None, "broken": None, "control": None}
-    template |= {name: None for name in ("contact", "met", "passed") if name in template}  # as many as there were
+    template |= {name: None for name in ("contact", "met", "passed", "payout") if name in template}  # as there are
     saved = {"quantities": run.quantities.unknown(), **saved}  # nor did it keep ranges
     saved["quantities"] = run.quantities.of_today(saved["quantities"])
     saved["lines"] = of_today(saved.get("lines"), template["lines"])
@@ -164,6 +167,8 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
         line.restore(mine, work, run.t, x.joints)
     if run.zones is not None:
         run.zones.restore(found["zones"])
+    if run.payout is not None:
+        run.payout.lengthen()
 
 
 def content(run: SystemRun) -> dict[str, Any]:

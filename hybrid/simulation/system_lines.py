@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -41,15 +41,17 @@ from hybrid.kernels.state.books import (
 from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, OBSTACLES, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one
 from hybrid.model.build import Model
+from hybrid.model.mesh import Zone
 from hybrid.model.output_points import output_points
 from hybrid.model.sections import section_changes
+from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.diagnostics import Diagnostics, Stop, borne_strain, stretch_text
-from hybrid.simulation.envelope import Envelope, marks_of
+from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, energy_gains_text
 from hybrid.simulation.result_file import result_recorder
 from hybrid.simulation.run_sample import COMPARED
@@ -64,6 +66,9 @@ from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.writer import Recorder
+
+if TYPE_CHECKING:
+    from hybrid.simulation.payout import PayingOut
 
 # Outputs of a line that wait for one another: quantities of all of them are computed together.
 WAITING = 64
@@ -91,12 +96,15 @@ def twist_at_rest(x: JoinedLine, state: State) -> float:
 def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | None = None) -> Observer:
     """What records the outputs of a line; moves: whether it does, or is in equilibrium; only: quantities, None: all."""
     s, jumps = output_points(scene)
+    if moves and model.payout is not None:
+        s, jumps = output_points(scene, model.payout.longest, not model.payout.side)
     zones_move = moves and model.layout is not None
     kinds = {"rod", "catenary"} if zones_move else None
     criteria = [(x.name, x.ratio) for x in CRITERIA] if scene.output.criteria and zones_move and only is None else ()
     return Observer(
         model.line, model.sea.values, model.zones, s, moves and only is None, model.attached, kinds, criteria,
-        only=only, jumps=jumps, changes=section_changes(scene), quantities=None if only else quantities_of(scene),
+        only=only, jumps=jumps, changes=section_changes(scene), payout=moves and model.payout is not None,
+        quantities=None if only else quantities_of(scene),
         obstacles=() if only else model.sea.names, hinges=model.cable.hinges,
     )  # fmt: skip
 
@@ -116,19 +124,20 @@ class LineResult:
 
     def __init__(
         self, number: int, name: str, scene: Scene, model: Model, found: SystemEquilibrium | None, state: State,
-        outputs: int, target: Target | None = None, pending: str = "",
+        outputs: int, target: Target | None = None, pending: str = "", paying: PayingOut | None = None,
     ) -> None:  # fmt: skip
         """number: of the line in its system; found: the equilibrium that it starts from, None: it has none; state: from
 
         which displacements count; outputs: after the first, 0 of an equilibrium; target: of the system, None: it is
-        only to be compared with; pending: as of the run.
+        only to be compared with; pending: as of the run; paying: the length of a line that is paid out.
         """
         self.number, self.name, self.model, self.scene = number, name, model, scene
-        self.events = EventLog()
+        self.events, self.paying = EventLog(), paying
         self.diagnostics = Diagnostics(model, self.events)
         self._moves = outputs > 0
         self.observer = observer_of(scene, model, self._moves, COMPARED if target is None else None)
         self.envelope = Envelope(scene, model, self._moves)
+        self._marked = marked_places(scene, model)
         self.envelope.itself.on &= target is not None or bool(model.line.bits & MAY_TOUCH)
         self._itself = LineWatch(self.envelope.itself, model)
         self.nears_itself = self.parts_itself = False  # whether contact with itself has to begin, or to end
@@ -158,7 +167,7 @@ class LineResult:
 
     def _blank_books(self, begin: Floats) -> Books:
         """The same for the cells of now; begin: (N+1, 3) m, from where displacements count."""
-        line, marks = self.model.line, marks_of(self.scene, self.model)
+        line, marks = self.model.line, marks_on(self.model.line.s, self._marked)
         nodes, marked = line.s.size, np.flatnonzero(marks)
         right = np.arange(nodes)
         right[marked] = nodes + np.arange(marked.size)
@@ -206,6 +215,7 @@ class LineResult:
             self.contact = None
             return None
         before, model, other = self.contact, self.model, self._touching.layout is not self.model.layout
+        other |= self.paying is not None
         self.contact = SelfContact(
             model.line, diameters(model), least_bending(model), model.tension_scale, self.scene.contact.friction
         )
@@ -278,15 +288,15 @@ class LineResult:
         if self.touches != bool(self.books.touch.size):
             self.books = self.books._replace(touch=self._blank_touch())
 
-    def take_zones(self, model: Model, extremes: bool = True) -> None:
-        """Go on with other zones, whose cells are others; extremes: whether those of now count."""
+    def take_cells(self, model: Model, extremes: bool = True) -> None:
+        """Go on with other cells; extremes: whether those of now count."""
         before = self.books
         if extremes:
-            self.envelope.fold(self.model.line.s, before.extremes)
+            self.envelope.fold(self.model.nodes, before.extremes)
         self.follow(model)
         names = ("asked", "reached", "path", "radii", "walls", "clock", "counts", "worst", "placed")
         same = {name: getattr(before, name) for name in names}
-        self.books = self._blank_books(self.envelope.start_of(model.line.s))._replace(**same)
+        self.books = self._blank_books(self.envelope.start_of(model.nodes))._replace(**same)
         self.books.work[:], self.books.power[:] = before.work, before.power
         self.books.velocity[:] = before.velocity
 
@@ -356,13 +366,14 @@ class LineResult:
         batch = waiting[0]
         if len(waiting) > 1:
             batch = Batch(*(np.concatenate(x) for x in zip(*waiting, strict=True)))
-        seen = self.observer.look(batch)
+        there, seen, more = self.look(batch)
         ratios = None
         if self.observer.writes_criteria:  # of a line whose outputs do not wait: those of one step
             assert self.manager is not None
             ratios = np.repeat(self.manager.largest_ratios(self.observer.grid.s)[None], len(batch.t), axis=0)
-        values = self.observer.values_of(seen, ratios)
-        self.recorder.save_batch(batch.t.copy(), values, self.observer.zone_rows)
+        values = there.values_of(seen, ratios)
+        self.observer.first_energy = there.first_energy
+        self.recorder.save_batch(batch.t.copy(), values, there.zone_rows, [there.rows_of(zones) for zones in more])
         if not self._moves:
             self.diagnostics.mesh(seen)
             return
@@ -371,6 +382,12 @@ class LineResult:
             stop = self.diagnostics.outputs(seen, values)
         if stop is not None:
             raise LineFailed(self.number, stop[0], float(batch.t[-1]), float(self.model.line.s[stop[1]]))
+
+    def look(self, batch: Batch) -> tuple[Observer, Observation, list[tuple[Zone, ...]]]:
+        """What makes values of outputs, these as computed, and the zones of all but the first where they differ."""
+        if self.paying is not None:
+            return self.paying.look(self.observer, self.model, batch)
+        return self.observer, self.observer.look(batch), []
 
     def judge(self, t: float | None, sharp: Sequence[float], state: State) -> None:
         """Look at a state for what its mesh does not resolve (an event) and for strain beyond what a section bears."""
@@ -399,13 +416,13 @@ class LineResult:
 
     def write_envelope(self, t: float) -> None:
         """Extremes up to t (s), for the file."""
-        self.recorder.replace(self.envelope.values(self.model.line.s, self.books.extremes, t))
+        self.recorder.replace(self.envelope.values(self.model.nodes, self.books.extremes, t))
 
     def close(self, t: float, status: str, message: str) -> list[tuple[float, float, float, str, str]]:
         """Record the envelope up to t (s) and the status; events as of `take_events`."""
         if status == "complete" and self._moves and not isinstance(self.recorder, ComparisonRecorder):
             self.diagnostics.finish(self.books)
-        values = self.envelope.values(self.model.line.s, self.books.extremes, t)
+        values = self.envelope.values(self.model.nodes, self.books.extremes, t)
         self.recorder.replace(values)
         self.envelope.note_broken(values, self.recorder.recorded(), self.events.event)
         if self.contact is not None and (tries := self.contact.given_up):
@@ -442,7 +459,7 @@ class LineResult:
         for name, x in answers_of(work.torsion).items():
             x[:] = saved["torsion"][name]
         self.envelope.restore(saved["envelope"], books.extremes)
-        books.start[:] = self.envelope.start_of(model.line.s)
+        books.start[:] = self.envelope.start_of(model.nodes)
         books.placed[:] = self.diagnostics.restore(saved["noted"], books, books.start)
         self.observer.first_energy = saved["first_energy"]
         if self.contact is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -26,9 +27,15 @@ def with_loads_of(system: System, other: System) -> System:
     return system.model_copy(update={name: getattr(other, name) for name in LOADED})
 
 
-def loaded_as(model: SystemModel, system: System, t: float) -> SystemModel:
-    """The same network from t (s) on with the loads and motions of a system; what is joined or loose stays so."""
+def loaded_as(
+    model: SystemModel, system: System, t: float, fit: Callable[[SystemModel], SystemModel] | None = None
+) -> SystemModel:
+    """The same network from t (s) on with the loads and motions of a system; what is joined or loose stays so.
+
+    fit: gives lines that are paid out the cells of now, in place of those of t = 0.
+    """
     other = build_system(system, model.resolution, model)
+    other = other if fit is None else fit(other)
     models = tuple(_line_as(*each, system, t) for each in zip(model.names, model.models, other.models, strict=True))
     return replace(
         model, models=models, bodies=other.bodies, known=other.known, scenes=other.scenes, moments=other.moments
@@ -59,7 +66,8 @@ def change_loads_of_lines(run: SystemRun, system: System) -> None:
     for line in run.lines:
         line.write_down()
     run.gather_events()  # in the order in which they happen
-    run.system, run.model = system, loaded_as(run.model, system, run.t)
+    fit = None if run.payout is None else run.payout.take_models
+    run.system, run.model = system, loaded_as(run.model, system, run.t, fit)
     run.loaded = run.t  # loads that end now, or would have ended before, act no more
     run.start_from(run.rest)
     for line, model in zip(run.lines, run.model.models, strict=True):

@@ -124,7 +124,7 @@ class SystemQuantities:
                 for q in found.wanted.values()
                 if q.other is not None
             }
-            seen = lines[name].observer.look(self._seen(name, states[name]))
+            _, seen, _ = lines[name].look(self._seen(name, states[name]))
             out |= {key: np.array(probe.value(seen)) for key, probe in probes.items()}
         return out
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 from time import process_time as clock_now
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -76,6 +76,9 @@ from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
 from hybrid.store.records import PENDING
 from hybrid.store.writer import Recorder
+
+if TYPE_CHECKING:
+    from hybrid.simulation.system_payout import SystemPayout
 
 _NO_ZONES: Mapping[int, DomainManager] = {}
 # Steps that Python has a part in, between two reports of the progress.
@@ -158,8 +161,14 @@ class SystemRun:
                     self.model, self.found, managers = start
             self.state = self.found.state.copy()
         self.start_from(self.state.bodies if self._begins else self.model.body_places)
+        self.payout: SystemPayout | None = None  # of lines that are paid out
+        if moves and any(x.payout is not None for x in self.model.models):
+            from hybrid.simulation.system_payout import SystemPayout
+
+            self.payout = SystemPayout(self)
+        reels = self.payout.lines if self.payout is not None else {}
         self.lines = [
-            LineResult(k, name, scene, model, self.found, state, len(self.times), target, pending)
+            LineResult(k, name, scene, model, self.found, state, len(self.times), target, pending, reels.get(k))
             for k, (name, scene, model, state) in enumerate(
                 zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
             )
@@ -468,6 +477,8 @@ class SystemRun:
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts, shared)
         self._make_room(self.solver)
         self.solver.keep_books([line.books for line in self.lines])
+        if self.payout is not None:
+            self.payout.bind(self.solver)
         if self.watch is not None:
             tell_passages(self)
         self.watch_lines()
@@ -557,6 +568,8 @@ class SystemRun:
     def go_to(self, stop: float, look: Callable[[], None] = lambda: None) -> None:
         """Steps to `stop` (s), with what is due there; look: called there, and about ten times a second."""
         loop, step = self.loop, self.resolution.one.step
+        if loop.controlled and self.payout is not None:
+            self.payout.limit_step()
         first, done = self.leg
         parts = equal_parts(stop - first, step)
         if abs(first + done * (stop - first) / parts - self.t) > SAME_STOP * step:  # those steps end here
@@ -607,6 +620,8 @@ class SystemRun:
                 line.attach(solver, (old, new), loop.clock, loop.counts)
         if self.zones is not None:
             self.zones.attach(loop)
+        if self.payout is not None:
+            self.payout.attach(loop)
         if loop.counts[b.ASKS] & b.ASK_BEFORE:
             return
         moves = [model.ends.moves() for model in self.model.models]
@@ -679,6 +694,8 @@ class SystemRun:
             self._tell_collapse()
         if self.zones is not None:
             self.zones.adapt()
+        if self.payout is not None:
+            self.payout.accepted()
         if self.failures.all and self.failures.due(step):
             self.restart_steps()
             self.other = self.state.copy()
@@ -738,7 +755,9 @@ class SystemRun:
             line.books.velocity[:] = model.ends.velocity
         self.model.load_bodies(self.t, solver.bodies, self.loaded)
         self.model.stir(self.t, self.state.bodies, 0.0, solver.bodies)
-        taken = solver.consistent_accelerations(self.state, accelerations, self.t)
+        with ExitStack() as stack:
+            lengthening = stack.enter_context(self.payout.forces_on()) if self.payout is not None else {}
+            taken = solver.consistent_accelerations(self.state, accelerations, self.t, lengthening)
         if taken.outcome != Outcome.OK:
             raise self._stopped(solver, taken, 0.0)
 

@@ -30,6 +30,7 @@ class SavedSystem(NamedTuple):
     paths: Mapping[str, list[Floats]]  # of points that are set from outside, for each end there
     next: Mapping[str, tuple[Triple, Triple]]  # where points are to be at the end of the next step
     obstacles: Any  # what is set of them
+    wound: Mapping[int, tuple[float | None, float]]  # length (m) and rate (m/s) that lines are to have then
 
     def place(self, line: str, end: str) -> Floats:
         """Position (3,) m of a held end."""
@@ -89,16 +90,20 @@ def bring_back(run: SystemRun, saved: SavedSystem) -> None:
     run.gather_events()
     for recorder, mark in zip(recorders(run), saved.marks, strict=True):
         recorder.back_to(mark)
-    # Something has broken since, or contact has begun, or zones have changed, or what changes in them is under way.
-    if run.model is not saved.model or run.zones is not None:
+    # Something has broken since, or contact has begun, or zones or lengths have changed, or what changes is under way.
+    if run.model is not saved.model or run.zones is not None or run.payout is not None:
         run.model, run.failures.broken = saved.model, [*saved.run["broken"]]
         moving = run.zones.numbers if run.zones is not None else []
+        moving += [*run.payout.lines] if run.payout is not None else []
         for k, (line, model, rows) in enumerate(zip(run.lines, saved.model.models, saved.waiting, strict=True)):
             line.wait_again(((), (), rows[2]))
             if k not in moving:
                 line.follow(model)
         if run.zones is not None:
             run.zones.take_rods(saved.run["zones"])
+        if run.payout is not None:
+            run.payout.restore(saved.run["payout"])
+        if moving:
             run.take_other()
         run.make_solver()
     set_state(run, saved.run)

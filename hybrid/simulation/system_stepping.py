@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import threading
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -111,6 +112,7 @@ class SystemSimulation(SettableObstacles):
         self._stops = self._run.stops()
         self._driven: dict[str, list[DrivenEnd]] = {}
         self._next: dict[str, tuple[Triple, Triple]] = {}
+        self._wound: dict[int, tuple[float | None, float]] = {}  # length and rate that are asked of lines
         self._courses, self._moved = {}, {}
         self._owner, self._final = object(), 0  # how often what had been recorded was made final
         self._here: SavedSystem | None = None  # what was saved of the state as it is now
@@ -146,6 +148,33 @@ class SystemSimulation(SettableObstacles):
             ]
         self._next[name] = triple(position, "position"), STILL if velocity is None else triple(velocity, "velocity")
 
+    @one_thread
+    def set_length(self, name: str, length: float, rate: float = 0.0) -> None:
+        """How long a line is to be at the end of the next `advance`, m, and its rate there, m/s.
+
+        It reaches that smoothly, and keeps the rate until it is set again.  ValueError: the line has no `payout`, or
+        that gives the length itself; a length that cannot be.
+        """
+        self._wind(name, math.nan if length is None else length, rate)
+
+    @one_thread
+    def set_payout(self, name: str, rate: float) -> None:
+        """At which rate, m/s, a line is to be paid out at the end of the next `advance`; negative: taken in.
+
+        The rate changes evenly until then, and stays until it is set again.  ValueError: as of `set_length`.
+        """
+        self._wind(name, None, rate)
+
+    def _wind(self, name: str, length: float | None, rate: float) -> None:
+        self._check_open()
+        k, run = self._line(name), self._run
+        if run.payout is None or k not in run.payout.lines:
+            raise ValueError(f"lines.{name}.connections has no payout: the length of the line stays")
+        from hybrid.simulation.payout import length_asked
+
+        where = f"lines.{name}.connections.{('start', 'end')[run.payout.lines[k].plan.side]}.payout"
+        self._wound[k] = length_asked(run.scenes[k], run.payout.lines[k], length, rate, where)
+
     def settable(self, name: str) -> bool:
         """Whether `set_point` moves a point: it is fixed, and has no motion in the scene."""
         self._check_point(name)
@@ -170,6 +199,8 @@ class SystemSimulation(SettableObstacles):
             )
         until = min(float(until), time.duration)
         before = self._before() if self._final else None
+        for k, paying in self._run.payout.lines.items() if self._run.payout is not None else ():
+            paying.go_on(now, until, self._wound.pop(k, None))
         for name, ends in self._driven.items():
             position, velocity = self._next.pop(name, None) or (ends[0].at(now)[0].tolist(), STILL)
             for end in ends:
@@ -231,6 +262,7 @@ class SystemSimulation(SettableObstacles):
             stops=tuple(self._stops),
             paths=paths,
             next=dict(self._next),
+            wound=dict(self._wound),
             obstacles=self._kept_courses(),
             **kept(self._run),
         )
@@ -256,6 +288,7 @@ class SystemSimulation(SettableObstacles):
         for model in self._run.model.models:
             model.ends.at(self.t)
         self._stops, self._next, self._here = [*saved.stops], dict(saved.next), saved
+        self._wound = dict(saved.wound)
 
     def _follow(self, paths: Mapping[str, list[Floats]]) -> None:
         """Let points that are set from outside be on these paths."""
@@ -268,6 +301,7 @@ class SystemSimulation(SettableObstacles):
         error = named(failed, self._run.model)
         self._bring_back(before)
         self._next.clear()
+        self._wound.clear()
         self._courses.clear()
         return ComputationError(
             error.outcome, error.t, error.s, f"{error.detail}; the simulation is back at t = {self.t:.6g} s",
@@ -308,7 +342,7 @@ class SystemSimulation(SettableObstacles):
         k, run = self._line(name), self._run
         run.ends_of_now()
         line, state = run.lines[k], run.state.lines[k]
-        seen = line.observer.look(line.state_now(run.t, run.solver.lines[k].ends, state, run.solver.work[k]))
+        _, seen, _ = line.look(line.state_now(run.t, run.solver.lines[k].ends, state, run.solver.work[k]))
         return np.array(seen.tension[:, 0])
 
     @property

@@ -288,7 +288,7 @@ class SystemZones:
             x.switching, x.pending = ZoneSwitching(model, manager, followed=True), None
             x.full = replace(x.full, line=x.full.line._replace(bits=model.line.bits))
             models[k], states[k] = model, state_for(model.line)
-            run.lines[k].take_zones(model, extremes=False)
+            run.lines[k].take_cells(model, extremes=False)
         run.model, run.state = replace(run.model, models=tuple(models)), run.state._replace(lines=states)
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -364,7 +364,7 @@ class SystemZones:
         models, states = [*run.model.models], [*run.state.lines]
         models[k], states[k] = model, state
         run.model, run.state = replace(run.model, models=tuple(models)), run.state._replace(lines=states)
-        line.take_zones(model)
+        line.take_cells(model)
 
     def change_line(self, number: int, change: Callable[[Line], Line]) -> None:
         """The line of this number is changed, if its zones move: it touches itself from now on, or no longer."""

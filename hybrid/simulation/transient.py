@@ -544,7 +544,11 @@ class Transient:
         if zones is not None:
             zones.hand_over(self.run)
         carry = (zones.carry,) if zones is not None else ()
-        model, state, booked = self.payout.change(self.run, self.model, *carry)
+        from hybrid.simulation.payout import Before
+
+        run = self.run
+        found = Before(run.state, run.t, run.clock, run.books.tension)
+        model, state, booked = self.payout.change(found, self.model, *carry)
         if self.run.contact is not None:  # whose forces kernels.reel.payout_balance does not know
             self.payout.leave_unbalanced()
         self.run.books.work[0, b.ZONES] += booked

@@ -7,8 +7,9 @@ point has none of its own, it is the last or first node of every line that is jo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -428,11 +429,13 @@ class SystemSolver:
         return replace(taken, error=float(errors.max()), ratio=ratio, rho=used)
 
     def consistent_accelerations(
-        self, states: SystemState, accelerations: Sequence[Floats], t: float = 0.0
-    ) -> SystemTaken:
+        self, states: SystemState, accelerations: Sequence[Floats], t: float = 0.0,
+        lengthening: Mapping[int, Floats] = MappingProxyType({}),
+    ) -> SystemTaken:  # fmt: skip
         """Give `states` the accelerations and tensions that positions, velocities and loads imply (solve.stepper).
 
-        accelerations: (2, 3) m/s2 of the held ends of each line.
+        accelerations: (2, 3) m/s2 of the held ends of each line; lengthening: (N,) m/s2, second rates of the lengths of
+        cells, by line.
         """
         states.bodies[:, A:W] = 0.0
         states.bodies[:, WA:] = 0.0
@@ -446,6 +449,8 @@ class SystemSolver:
             e1 = np.diff(state.v, axis=0)
             across = e1 - np.einsum("ij,ij->i", d, e1)[:, None] * d
             gaps = -np.einsum("ij,ij->i", across, across) / (l * HEAVY)
+            if k in lengthening:
+                gaps += lengthening[k] / HEAVY
             work.u[:], work.X[:] = 0.0, 0.0
             for end in (0, 1):
                 if x.joints[end] < 0:

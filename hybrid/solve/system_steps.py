@@ -115,6 +115,10 @@ class SystemSteps:
         tables = np.array([x.numbers for x in zones]) if zones else np.zeros((0, 0), np.int64)
         self._job.bind(followed=tables, follower=follow_zones.address(tables[0]) if zones else 0)
 
+    def pay(self, lines: np.ndarray, payer: int) -> None:
+        """These tables (W, ..) of kernels.reel.reel change the lengths of lines from now on, by pay_out at `payer`."""
+        self._job.bind(paid=lines, payer=payer)
+
     def watch_nothing(self) -> None:
         """Look after no pair of lines."""
         self._job.bind(watcher=0)

@@ -210,11 +210,13 @@ def as_system(tables: Tables) -> Tables | None:
     for name, (key, end) in zip("ab", ends.items(), strict=True):
         end = dict(end)
         kind = end.pop("kind")
-        if kind == "guided" or {"payout", "moment"} & {*end}:
+        if kind == "guided" or "moment" in end:
             return None
         if kind == "clamped":
             keys = {"tangent", "normal", "turns", "swivel", "bend_stiffness"} & {*end}
             line.setdefault("connections", {})[key] = {"kind": kind} | {x: end.pop(x) for x in sorted(keys)}
+        if "payout" in end:
+            line.setdefault("connections", {}).setdefault(key, {"kind": kind})["payout"] = end.pop("payout")
         if "release_at" in end:
             line["break_at"] = end.pop("release_at") | {"end": key}
         if "thrust" in end:

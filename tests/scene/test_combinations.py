@@ -90,7 +90,7 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.LAYERS, c.FOLLOWING_CELLS): ({"resolution": {"cells_per_layer": 2}} | FOLLOWING, ""),
     (c.PLANE, c.OBSTACLES): (BALL | {"dimension": 2}, ""),
     (c.MOVING_ZONES, c.PUSHED): (BALL | MOVING, ""),
-    (c.PAYOUT, c.OBSTACLES): (BALL | PAID, ""),
+    (c.PAYOUT, c.PUSHED): (BALL | PAID, ""),
     (c.SHEAVES, c.SEVERAL_LINES): (SHEAVE | {ONE + "contact": {"self": False}}, ""),
     (c.SHEAVES, c.MAY_TOUCH): (SHEAVE, ""),
     (c.SHAPES, c.STIFFNESS): (SHAPED | {ONE + "contact": {"self": False}}, "stiffness"),
@@ -114,6 +114,13 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.DERIVATIVES, c.SETTLED_FRICTION): ({"initial": {"kind": "equilibrium", "friction": "settled"}}, "derivatives"),
     (c.PAYOUT_AT_START, c.PAYOUT_AT_END): (PAID | {"ends.start.payout": {"rate": 0.1, "ramp": 1.0}}, ""),
     (c.RELEASE_AT_WINCH, c.PAYOUT): (PAID | {END + "release_at": {"time": 2}}, ""),
+    (c.TENSION_HELD, c.SEVERAL_LINES): (
+        {ONE + "connections.end.payout": {"longest": 12, "winch": {"tension": 50, "inertia": 9}},
+         "points.a": {"kind": "free", "mass": 5, "initial_guess": [8, 0, -9]}}, ""
+    ),
+    (c.ZONES_OF_SEVERAL, c.PAYOUT): (
+        {ONE + "connections.end.payout": {"rate": 0.1, "ramp": 1.0}, ONE + "model": MOVING["model"]}, ""
+    ),
     (c.STIFFNESS_DAMPING, c.PAYOUT): (PAID | {SECTION + "damping": {"stiffness": 0.01}}, ""),
     (c.VORTICES, c.PLANE): (SHEDS | {"dimension": 2}, ""),
     (c.VORTICES, c.PAYOUT): (SHEDS | PAID, ""),
@@ -153,6 +160,7 @@ def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
 def _of_several(pair: tuple[c.Feature, c.Feature]) -> bool:
     names = (
         c.SEVERAL_LINES,
+        c.ZONES_OF_SEVERAL,
         c.LINES_TOUCH,
         c.MOVED_BY_LINES,
         c.CLAMPED_TO_FREE,

@@ -231,6 +231,10 @@ class _Writer:
         for name, line in self.scene.lines.items():
             if line.break_at is not None:
                 self.notes.append(f"lines.{name}.break_at is left out")
+            for end in ("start", "end"):
+                if getattr(line.connections, end).payout is not None:
+                    at = f"lines.{name}.connections.{end}.payout"
+                    self.notes.append(f"{at} is left out: the line of the deck keeps its length at t = 0")
             ends = [self._joined(name, end, made[getattr(line, end)]) for end in ("start", "end")]
             self._line(f"lines.{name}", name, line.cable, ends)
 

@@ -172,7 +172,7 @@ def take_riding_off(line, reel):
     """The forces on the line without those by which nodes that ride have more."""
     if reel.stage[RIDING_ON] > 0.0:
         first = growing(line, reel) + 1
-        for k in range(reel.layer.shape[0] - 1):
+        for k in range(reel.layer.shape[0]):
             i = node(line, reel, first + k)
             for j in range(3):
                 line.force[i, j] -= reel.riding[k, j]

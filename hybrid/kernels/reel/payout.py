@@ -27,6 +27,7 @@ from hybrid.kernels.laws.cell import Chord, chord
 from hybrid.kernels.laws.element import relative_rotation
 from hybrid.kernels.laws.node_forces import Z3, inertia_and_water
 from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.reel.paid_length import (
     cell,
     eased,
@@ -146,14 +147,22 @@ def of_material(line, sea, ends, state, reel, i):
 
 
 @inner
-def put_riding_on(line, sea, ends, state, reel):
-    """The forces on the line with those by which nodes that ride have more."""
-    first = growing(line, reel) + 1
-    for k in range(reel.layer.shape[0] - 1):
+def is_joined(ends, reel):
+    """Whether the fairlead is joined to what moves by what pulls there: the force on it is one of the equations."""
+    return ends.held[end_of(reel)] == JOINED
+
+
+@inner
+def put_riding_on(line, sea, ends, state, reel, t):
+    """The forces on the line with those by which nodes that ride, and a fairlead that is joined, have more; t: s."""
+    first, rides = growing(line, reel) + 1, reel.layer.shape[0] - 1
+    for k in range(rides + (1 if is_joined(ends, reel) else 0)):
         more, _ = of_material(line, sea, ends, state, reel, first + k)
+        if k == rides:
+            more = sub(more, sum_of_balance(reel, t))
         for j in range(3):
             reel.riding[k, j] = more[j]
-    for k in range(reel.layer.shape[0] - 1):
+    for k in range(rides + 1):
         i = node(line, reel, first + k)
         for j in range(3):
             line.force[i, j] += reel.riding[k, j]
@@ -197,10 +206,11 @@ def correct_force(line, sea, ends, state, velocity, reel, report, t):
     numbers = reel.numbers
     more, slope = of_material(line, sea, ends, state, reel, line.h.shape[0])
     more = sub(more, sum_of_balance(reel, t))
-    force, at = force_of_fairlead(reel, report, more)
+    there = (0.0, 0.0, 0.0) if is_joined(ends, reel) else more  # where the report does not have it already
+    force, at = force_of_fairlead(reel, report, there)
     report[at], report[at + 1], report[at + 2] = force
     for j in range(3):
-        report[NET_A - FORCE_A + at + j] += more[j]
+        report[NET_A - FORCE_A + at + j] += there[j]
     report[LENGTH_OUT], report[PAYOUT_RATE] = numbers[LENGTH], numbers[RATE]
     report[PAYOUT_POWER] = numbers[RATE] * dot(force, slope)
     numbers[FLUX] = dot(more, get3(velocity, end_of(reel)))
@@ -383,7 +393,7 @@ def iterate(table):
     line, reel, clock = job.line, job.reel, job.clock
     numbers, winch, t = reel.numbers, reel.winch, clock[b.TRY_END]
     if reel.stage[RIDING_ON] == 0.0:
-        put_riding_on(line, job.sea, job.ends, job.old if job.counts[b.PARITY] else job.new, reel)
+        put_riding_on(line, job.sea, job.ends, job.old if job.counts[b.PARITY] else job.new, reel, t)
         return 0
     take_riding_off(line, reel)
     if t <= winch[BEGIN] or not winch[TENSION] > 0.0:
@@ -453,7 +463,8 @@ def put_forces_on(table):
     """On the line of now: forces of nodes that ride, and those that balance the neighbours of the last new node."""
     job = read(table)
     put_balance_on(job.line, job.reel, job.clock[b.NOW])
-    put_riding_on(job.line, job.sea, job.ends, job.new if job.counts[b.PARITY] else job.old, job.reel)
+    state = job.new if job.counts[b.PARITY] else job.old
+    put_riding_on(job.line, job.sea, job.ends, state, job.reel, job.clock[b.NOW])
 
 
 @kernel
@@ -464,15 +475,14 @@ def take_forces_off(table):
     take_balance_off(job.line, job.reel)
 
 
-@kernel
-def stand_still(table):
-    """The same for a state that no step has led to: the line at clock[NOW], and the force of its fairlead."""
-    job = read(table)
+@inner
+def stand(job):
+    """The line at clock[NOW], and the force of its fairlead, for a state that no step has led to."""
     find_length(job.reel, job.clock[b.NOW])
     prepare(job.line, job.reel, job.clock[b.NOW])
     state = job.new if job.counts[b.PARITY] else job.old
     if job.reel.stage[UNBALANCED] > 0.0:
-        put_riding_on(job.line, job.sea, job.ends, state, job.reel)
+        put_riding_on(job.line, job.sea, job.ends, state, job.reel, job.clock[b.NOW])
         find_balance(job.line, job.sea, job.ends, state, job.reel)
         take_riding_off(job.line, job.reel)
         job.reel.stage[UNBALANCED] = 0.0
@@ -480,3 +490,16 @@ def stand_still(table):
     pull = correct_force(job.line, job.sea, job.ends, state, job.velocity, job.reel, job.report, t)
     note_pull(job.reel, t, pull)
     remember(job.line, job.reel)
+
+
+@kernel
+def stand_still(table):
+    """`stand`."""
+    stand(read(table))
+
+
+@kernel
+def stand_among(table):
+    """`stand_still`, for a line of several."""
+    stand(read(table))
+    return 0

@@ -64,7 +64,9 @@ class Reel(NamedTuple):
     report: Floats  # (REPORT_SIZE,) this and the next: work arrays
     made: Floats  # (2, COLUMNS)
     layer: Floats  # (m+1,) m, how far before the fairlead the nodes that ride with it are; that is the last, 0
-    riding: Floats  # (m+1, 3) N, by which the forces on them are more because they do not move as the material does
+    # (m+1, 3) N, by which the forces on them are more because they do not move as the material does; on the fairlead 0
+    # where it is held
+    riding: Floats
     stage: Floats  # (3,) 1 while these, or `balance`, are among the forces on the line; while `balance` is to be found
     balance: Floats  # (N+1, 3) N, forces on nodes, in the order of the line, that balanced them at CHANGED
     plain: Floats  # (N+1, 3) N, the forces on the line without them

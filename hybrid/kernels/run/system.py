@@ -57,7 +57,7 @@ from hybrid.kernels.state.report import (
 )
 from hybrid.kernels.step.accept import impose_now, keep_past, watch
 from hybrid.kernels.step.generalized_alpha import Scheme, scheme
-from hybrid.kernels.step.job import call_quantities, read
+from hybrid.kernels.step.job import call_quantities, call_reel, read
 from hybrid.kernels.step.newton import (
     ADDRESS,
     ASSEMBLY,
@@ -109,8 +109,10 @@ def ask_bodies(system, phase):
 
 
 @inner
-def march_lines(system, given):
-    """March all lines: force on each point into `net`, N, that on bodies into `work`; given: what ends have to go is.
+def march_lines(system, given, steps):
+    """March all lines: force on each point into `net`, N, that on bodies into `work`; given: what ends have to go is;
+
+    steps: whether this is an iteration of a step, of which lines that are paid out know (kernels.reel.payout.iterate).
 
     Returns -1 or a line that failed, and its bad node.
     """
@@ -127,10 +129,14 @@ def march_lines(system, given):
         job = read(tables[l])
         n = job.line.h.shape[0]
         place_ends(l, job, system, given)
+        if steps and job.iterated != 0:
+            call_reel(job.iterated, job.reel_table)
         outcome, _, _, where = call_solver(system.solver, tables[l])
         # the last block is not solved yet
         if outcome != OK and not (outcome == SINGULAR and joints[l, END] >= 0 and where == n):
             return l, where
+        if steps and job.iterated != 0:
+            call_reel(job.iterated, job.reel_table)
         for k in range(2):
             if joints[l, k] >= 0:
                 add_pull(joints[l, k], job.work.report, k, arms[l, k], turns(seats, l, k), net, work)
@@ -299,6 +305,8 @@ def begin_books(tables, joints, t):
             books.clock[NOW] = t
             report[SELF_CONTACT_ENERGY] = ask_contact(job.contact, job.contact_table, REST)
         move_joints(job, joints[l, START], joints[l, END])
+        if job.reel != 0:
+            call_reel(job.reel, job.reel_table)
         find_powers(line, job.ends, books.velocity, new, report, books.power[0])
         keep_report(books, report)
         impose_now(job.ends, books.imposed)
@@ -417,7 +425,7 @@ def solve_system(table):
     while it < most and outcome == NOT_CONVERGED:
         it += 1
         given = task.what == CORRECTION
-        line, where = march_lines(system, given)
+        line, where = march_lines(system, given, task.what == STEP)
         if line >= 0:
             outcome = SINGULAR
             if not read(tables[line]).work.report[RESIDUAL] < math.inf:

@@ -63,6 +63,7 @@ from hybrid.kernels.state.books import (
     LAST_DT,
     LAST_RHO,
     LOG,
+    NODES_DUE,
     NOW,
     OUTCOME,
     PARITY,
@@ -98,7 +99,7 @@ from hybrid.kernels.step.accept import collapses
 from hybrid.kernels.step.generalized_alpha import SAME
 from hybrid.kernels.step.job import call_follower, call_solver, read
 from hybrid.kernels.step.newton import OK, SLACK, STEP, TURNED_TOO_FAR
-from hybrid.kernels.step.step_control import begin_step, halve, passes
+from hybrid.kernels.step.step_control import begin_step, halve, passes, take_past
 
 # Of `lines`: the line (-1: a body) where the last try was worst, and of the last try that was given up.
 LINE, CUT_LINE = 0, 1
@@ -133,6 +134,7 @@ class StepsJob(NamedTuple):
     watched_even: NDArray[np.int64]  # of a kernels.junctions.lines_distance.LinesJob, after a step of `even`
     watched_odd: NDArray[np.int64]
     followed: NDArray[np.int64]  # (Z, ..) tables of kernels.mesh.zone_step.ZoneJob, with this clock and these counts
+    paid: NDArray[np.int64]  # (W, ..) likewise of kernels.reel.reel.ReelJob, of lines that are paid out
     solver: int = 0  # address of kernels.run.system.solve_system
     marcher: int = 0  # of the kernel that solves a step of one line
     book: int = 0  # of book_system_step
@@ -140,6 +142,7 @@ class StepsJob(NamedTuple):
     stirrer: int = 0  # of kernels.junctions.members_water.stir_members; 0: no body has members
     watcher: int = 0  # of kernels.junctions.lines_distance.watch_lines; 0: no two lines are watched
     follower: int = 0  # of kernels.mesh.zone_step.follow_zones; 0: no zones move, or Python follows them
+    payer: int = 0  # of kernels.reel.payout.pay_out; 0: lines keep their lengths
 
 
 def no_loads() -> tuple[Floats, Floats]:
@@ -155,7 +158,7 @@ def blank_steps_job() -> StepsJob:
     return StepsJob(
         none, none, none, none, none, lone, none, clock, counts, np.zeros(3), none, none, log, *no_loads(),
         np.zeros(0), np.zeros((1, 1, BODY_SAMPLE)), np.zeros((3, 1, WORK)), lone, none,
-        none, none, lone,
+        none, none, lone, lone,
     )  # fmt: skip
 
 
@@ -269,6 +272,19 @@ def follow_lines(steps):
 
 
 @inner
+def pay_lines(steps):
+    """What lines that are paid out do in the present phase (kernels.reel.payout); 1: a node is to enter or to leave."""
+    due = 0
+    if steps.payer == 0:
+        return 0
+    if steps.counts[PHASE] == SOLVE:
+        take_past(steps.clock, steps.counts)
+    for k in range(steps.paid.shape[0]):
+        due |= call_follower(steps.payer, steps.paid[k])
+    return due
+
+
+@inner
 def give_up(steps, cause):
     """A try is given up, and repeated in another length."""
     counts = steps.counts
@@ -343,6 +359,8 @@ def accept(steps, system):
     counts[WASTED], counts[PHASE] = 0, SAMPLE
     if follow_lines(steps) != 0:
         flags |= ZONES_DUE
+    if pay_lines(steps) != 0:
+        flags |= NODES_DUE
     counts[FLAGS] = flags
 
 
@@ -417,8 +435,10 @@ def run_system(table):
                 move_lines(system, steps.clock[TRY_END])
                 load_bodies(system.bodies, steps.loads, steps.history, steps.clock[TRY_END])
                 stir_water(steps, system)
+            pay_lines(steps)
             try_step(steps, system)
             counts[PHASE] = JUDGE
+            pay_lines(steps)
             if counts[ASKS] & ASK_TRIES:
                 return TRIED
             if steps.follower != 0 and (counts[OUTCOME] != OK or follow_lines(steps) != 0):

@@ -105,6 +105,7 @@ NEARS_ITSELF = 16384
 PARTS_ITSELF, HIDES_ITSELF = 32768, 65536
 COLLAPSES = 131072
 ZONES_DUE = 262144  # of a system: zones of a line are to be looked at
+NODES_DUE = 524288  # of a system: a node enters or leaves at a winch
 
 # --- powers and work --------------------------------------------------------------------------------
 

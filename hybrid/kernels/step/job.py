@@ -54,7 +54,7 @@ class Job(NamedTuple):
     zones: int = 0  # address of kernels.mesh.zone_step.follow_zones; 0: zones stay, or Python follows them
     itself: int = 0  # address of kernels.contact.self_distance.watch_itself; UNBENT: until the line is bent; 0: never
     solver: int = 0  # of a run: address of the kernel of the line's kind, which solves its steps
-    reel: int = 0  # address of kernels.reel.payout.pay_out; 0: the length of the line stays
+    reel: int = 0  # address of kernels.reel.payout.pay_out, of a line of several stand_among; 0: its length stays
     iterated: int = 0  # of a run: address of kernels.reel.payout.iterate; 0: iterations need nothing of it
     follower: int = 0  # and of what is called with `following` after every step; 0: nothing
     quantities: int = 0  # address of kernels.watch.named_quantities.note_quantities; 0: none are asked for

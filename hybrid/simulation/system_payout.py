@@ -1,0 +1,152 @@
+"""Lines of several that are paid out or taken in: lengths in compiled steps, nodes that enter and leave between them.
+
+As of one cable (simulation.payout), whose reel each of them has: steps follow the lengths, and where a node is due at
+a winch Python changes the line, and the system gets another solver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid.errors import Outcome
+from hybrid.kernels.reel.payout import iterate, pay_out, stand_among
+from hybrid.kernels.reel.reel import ReelJob, zones_that_stay
+from hybrid.kernels.state import books as b
+from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
+from hybrid.kernels.state.state import Floats, state_for
+from hybrid.model.build import Model
+from hybrid.model.system import SystemModel
+from hybrid.simulation.failure import winch_text
+from hybrid.simulation.payout import Before, PayingOut
+from hybrid.simulation.system_contact import renew_solver
+from hybrid.solve.joined import SystemState
+from hybrid.solve.system_statics import LineFailed
+
+if TYPE_CHECKING:
+    from hybrid.simulation.system_run import SystemRun
+    from hybrid.solve.system import SystemSolver
+    from hybrid.solve.system_steps import SystemSteps
+
+
+class SystemPayout:
+    """The lengths of all lines of a run that are paid out."""
+
+    def __init__(self, run: SystemRun) -> None:
+        """Of a run whose model is that of t = 0; it gets lines with the nodes that a winch makes."""
+        self._run = run
+        self.lines = {k: PayingOut(x) for k, x in enumerate(run.model.models) if x.payout is not None}
+        self._take({k: x.on(run.model.models[k], run.model.models[k].length) for k, x in self.lines.items()})
+
+    def _take(self, models: Mapping[int, Model]) -> None:
+        run = self._run
+        found = tuple(models.get(k, x) for k, x in enumerate(run.model.models))
+        run.model = replace(run.model, models=found)
+
+    # --- steps ------------------------------------------------------------------------------------
+
+    def bind(self, solver: SystemSolver) -> None:
+        """A solver finds forces with the lengths of now, of the state of now."""
+        for k, x in self.lines.items():
+            x.table.bind(**self._job(solver, k))
+            numbers = x.table.numbers
+            joined = solver.lines[k].joints[x.plan.side] >= 0
+            asks = iterate.address(numbers) if x.holds_tension or x.rides or joined else 0
+            solver.bind_line(k, reel=stand_among.address(numbers), reel_table=numbers, iterated=asks)
+
+    def _job(self, solver: SystemSolver, k: int) -> dict[str, Any]:
+        """What changes the length of a line, whose state of now is that before a step and after it."""
+        run, paying, x = self._run, self.lines[k], solver.lines[k]
+        books, work, state = run.lines[k].books, solver.work[k], run.state.lines[k]
+        job = ReelJob(
+            x.line, x.sea, x.ends, state, state, run.loop.clock, run.loop.counts, books.work,
+            books.velocity, work.report, paying.reel, work.X, work.W, zones_that_stay(),
+        )  # fmt: skip
+        return job._asdict()
+
+    def attach(self, loop: SystemSteps) -> None:
+        """Let the steps of a loop follow the lengths from now on."""
+        even, odd = loop.turns
+        for k, x in self.lines.items():
+            x.table.bind(old=even.lines[k], new=odd.lines[k])
+        tables = np.array([x.table.numbers for x in self.lines.values()])
+        loop.pay(tables, pay_out.address(tables[0]))
+
+    @contextmanager
+    def forces_on(self) -> Iterator[dict[int, Floats]]:
+        """While accelerations are found: lines with what acts because their lengths change.
+
+        It gives second rates (N,) m/s2 of the lengths of cells, by line.
+        """
+        with ExitStack() as stack:
+            for x in self.lines.values():
+                x.stand_still()
+            for x in self.lines.values():
+                stack.enter_context(x.forces_on())
+            yield {k: x.lengthening for k, x in self.lines.items()}
+
+    def accepted(self) -> None:
+        """After a step and its outputs: nodes enter and leave.  LineFailed: a winch has come to its end."""
+        run, changed = self._run, []
+        for k, x in self.lines.items():
+            if x.at_its_end:
+                text = winch_text(x)
+                raise LineFailed(k, Outcome.WINCH_AT_END, run.t, float(run.model.models[k].line.s[-1]), text)
+            if x.due:
+                self._change(k, x)
+                changed.append(k)
+        if changed:
+            before = {k: float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) for k in changed}
+            renew_solver(run, "where a node enters or leaves at a winch")
+            for k, energy in before.items():
+                run.lines[k].books.work[0, b.ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
+
+    def _change(self, k: int, paying: PayingOut) -> None:
+        """A node enters at the winch of a line, or leaves it."""
+        run, line, states = self._run, self._run.lines[k], [*self._run.state.lines]
+        line.write_down()  # with the reel as it is
+        before = Before(states[k], run.t, run.loop.clock, line.books.tension)
+        model, states[k], booked = paying.change(before, run.model.models[k])
+        if line.contact is not None or line.shares:  # whose forces kernels.reel.payout_balance does not know
+            paying.leave_unbalanced()
+        line.books.work[0, b.ZONES] += booked
+        self._take({k: model})
+        run.state = SystemState(states, run.state.bodies)
+        line.take_cells(model)
+
+    def limit_step(self) -> None:
+        """Of steps that follow the motion: the next one is no longer than the laws of the lengths allow."""
+        for x in self.lines.values():
+            x.limit_step()
+
+    def take_models(self, model: SystemModel) -> SystemModel:
+        """A model with other loads on the cells of t = 0, with the cells of now."""
+        found = [*model.models]
+        for k, x in self.lines.items():
+            found[k] = x.on(found[k], x.length)
+        return replace(model, models=tuple(found))
+
+    # --- checkpoints ------------------------------------------------------------------------------
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What the next steps depend on, by line."""
+        return {self._run.lines[k].name: x.checkpoint() for k, x in self.lines.items()}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Give lines the cells and the reels of a checkpoint.  ValueError: they are none of them."""
+        run, states = self._run, [*self._run.state.lines]
+        for k, x in self.lines.items():
+            model = x.restore(saved[run.lines[k].name], run.model.models[k])
+            self._take({k: model})
+            states[k] = state_for(model.line)
+            run.lines[k].take_cells(model, extremes=False)
+        run.state = SystemState(states, run.state.bodies)
+
+    def lengthen(self) -> None:
+        """The lines as they are at the time of the run."""
+        for x in self.lines.values():
+            x.lengthen()
