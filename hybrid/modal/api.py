@@ -13,7 +13,7 @@ from hybrid.accuracy.api import resolution_at_rest
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.junctions.bodies import FRAME, MASS, V
-from hybrid.kernels.laws.obstacles import distances
+from hybrid.kernels.laws.obstacles import distances, thinner_nodes
 from hybrid.kernels.state.forces import OBSTACLES
 from hybrid.kernels.state.obstacle_rows import ONSET_OF
 from hybrid.kernels.state.state import Floats
@@ -166,7 +166,7 @@ def _touched(rest: Rest) -> Iterator[str]:
     for x, model, state in zip(rest.solver.lines, rest.models, rest.states.lines, strict=True):
         rows = x.sea.obstacles
         if x.line.bits & OBSTACLES:
-            near = distances(rows, state.r).min(axis=1)
+            near = (distances(rows, state.r) + thinner_nodes(rows, x.line.s)).min(axis=1)
             yield from (
                 name for name, d, row in zip(model.sea.names, near, rows, strict=True) if d < 0.5 * row[ONSET_OF]
             )

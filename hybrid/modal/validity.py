@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.special import ndtr
 
-from hybrid.kernels.laws.obstacles import distances
+from hybrid.kernels.laws.obstacles import distances, thinner_nodes
 from hybrid.kernels.state.forces import OBSTACLES, SEABED
 from hybrid.kernels.state.state import Floats
 from hybrid.modal.loaded_line import LoadedLine
@@ -79,7 +79,9 @@ def _on_obstacles(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     rows, r = x.sea.obstacles, found.mean_position
     step = NEAR * float(x.line.s[-1])
     sides = [(distances(rows, r + d) - distances(rows, r - d)) / (2.0 * step) for d in step * np.eye(3)]
-    for name, gap, n in zip(x.obstacles, distances(rows, r), np.stack(sides, axis=-1), strict=True):
+    for name, gap, n in zip(
+        x.obstacles, distances(rows, r) + thinner_nodes(rows, x.line.s), np.stack(sides, axis=-1), strict=True
+    ):
         yield from _crossing(x, gap, np.einsum("fni,ni->fn", found.position, n), f"obstacle {name}")
 
 

@@ -17,6 +17,7 @@ from hybrid.kernels.state.obstacle_rows import (
     KIND,
     MOVES,
     MU,
+    OBSTACLE,
     ONSET_OF,
     PLACE,
     RADIUS,
@@ -54,8 +55,17 @@ def kind_of(obstacle: Obstacle) -> int:
 
 
 def strand_radius(scene: Scene) -> float:
-    """Radius of the line that touches obstacles, m."""
+    """Radius of the line that touches obstacles, where it is thickest, m."""
     return 0.5 * max(x.diameter or 0.0 for x in scene.cable.sections)
+
+
+def _pieces(scene: Scene) -> Floats:
+    """Of a line of several diameters, what rows have behind their OBSTACLE columns; of others nothing."""
+    radii = np.array([0.5 * (x.diameter or 0.0) for x in scene.cable.sections])
+    if (radii == radii[0]).all():
+        return np.zeros(0)
+    ends = np.cumsum([x.length for x in scene.cable.sections])
+    return np.column_stack([ends, radii.max() - radii]).ravel()
 
 
 def pull_on_obstacles(scene: Scene) -> float:
@@ -68,10 +78,13 @@ def obstacle_rows(scene: Scene, pull: float | None = None) -> Floats:
 
     pull: N, tension with which the line lies on them; None: what the scene asks for.
     """
-    rows = np.zeros((len(scene.obstacles), NO_OBSTACLES.shape[1]))
+    pieces = _pieces(scene)
+    rows = np.zeros((len(scene.obstacles), OBSTACLE + pieces.size))
     if not len(rows):
         return NO_OBSTACLES
+    rows[:, OBSTACLE:] = pieces
     strand = strand_radius(scene)
+    least = 0.5 * min(x.diameter or 0.0 for x in scene.cable.sections)  # by which how hard an obstacle is goes
     weight = max(x.mass for x in scene.cable.sections) * (scene.environment.gravity or 1.0)
     pull = pull_on_obstacles(scene) if pull is None else pull
     for row, x in zip(rows, scene.obstacles.values(), strict=True):
@@ -85,10 +98,10 @@ def obstacle_rows(scene: Scene, pull: float | None = None) -> Floats:
         if isinstance(x, CylinderObstacle):
             row[HALF_LENGTH] = math.inf if x.length is None else 0.5 * x.length
         # a string under a tension T that half of T presses on a point of a bed of stiffness k: T/2 = 2 sqrt(k T) depth
-        at_point = pull / (4.0 * 2.0 * DEPTH_AT_POINT * strand) ** 2
-        stiffness = max((weight + pull / over) / (2.0 * DEPTH * strand), at_point)
+        at_point = pull / (4.0 * 2.0 * DEPTH_AT_POINT * least) ** 2
+        stiffness = max((weight + pull / over) / (2.0 * DEPTH * least), at_point)
         row[MU], row[STIFFNESS], row[DAMPING] = x.friction, x.stiffness or stiffness, x.damping
-        row[ONSET_OF], row[SLIP] = 2.0 * ONSET * strand, 2.0 * TRAVEL * strand
+        row[ONSET_OF], row[SLIP] = 2.0 * ONSET * least, 2.0 * TRAVEL * least
     return rows
 
 

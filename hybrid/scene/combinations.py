@@ -352,12 +352,6 @@ def _lines_touch(tables: Tables) -> Iterator[Place]:
         yield ("contact",)
 
 
-def _other_diameters(tables: Tables) -> Iterator[Place]:
-    """Sections that are not as thick as the first one."""
-    known = [(at, x.diameter) for at, x in _sections(tables) if x.diameter is not None]
-    return ((*at, "diameter") for at, diameter in known if diameter != known[0][1])
-
-
 def _changing_loads(tables: Tables) -> Iterator[Place]:
     """Forces and moments on ends, points and bodies that follow a history or end at a time."""
     ends: Ends | None = tables.get("ends")
@@ -480,7 +474,6 @@ PUSHED = Feature("obstacles, contact of lines with each other", "obstacles, cont
 MOVED_BY_LINES = Feature("contact of lines with each other, with bodies, with sheaves",
                          "contact, bodies.NAME.shape, obstacles.NAME.bearing",
                          _either(LINES_TOUCH, SHAPES, SHEAVES))  # fmt: skip
-DIAMETERS = Feature("sections of several diameters", "diameter", _other_diameters)
 ACCURACY = Feature("accuracy", "accuracy", lambda tables: iter([("accuracy",)] if tables.get("accuracy") else []))
 ERRORS = Feature("estimated errors", "output.errors", _asks("output", "errors", lambda x: getattr(x, "errors", None)))
 CHOSEN_STEPS = Feature("steps that an accuracy chooses", "no time.step",
@@ -596,10 +589,6 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal(
         PAYOUT, PUSHED, "not worked out", "nodes that enter and leave know no obstacles and no other lines ({key})"
-    ),
-    Refusal(
-        DIAMETERS, OBSTACLES, "not worked out", "a line that touches obstacles ({key}) has one diameter",
-        "the diameter of the first section", "give all sections one diameter, or leave {key} out",
     ),
     Refusal(
         MOVING_ZONES, PUSHED, "not worked out",

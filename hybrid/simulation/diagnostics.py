@@ -438,7 +438,7 @@ class Diagnostics:
         for k, (t, r) in enumerate(zip(batch.t.tolist(), batch.r, strict=True)):
             if batch.obstacles.size:
                 put_obstacles(rows, sea.values.carried, batch.obstacles[k])
-            within = depths_in_obstacles(rows, r, met)
+            within = depths_in_obstacles(rows, r, line.s, met)
             which, node = (int(i) for i in np.unravel_index(np.argmax(within), within.shape))
             if within[which, node] > self._within:
                 rides = bool(sea.values.carried.size) and sea.values.carried[which, RIDES] != 0.0

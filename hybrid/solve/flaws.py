@@ -44,7 +44,7 @@ def flaw_of_line(line: Line, sea: Sea, state: State, length: float, floor: float
             return Outcome.BURIED, int(np.argmax(deep))
     if line.bits & OBSTACLES:
         met = cells_met(sea.carried, line.s) if sea.carried.size else None
-        within = depths_in_obstacles(sea.obstacles, state.r, met).max(axis=0)
+        within = depths_in_obstacles(sea.obstacles, state.r, line.s, met).max(axis=0)
         if within.max() > 1.0:
             return Outcome.BURIED, int(np.argmax(within))
     turns = np.where(_pressed(line, state), folds(line, state), 0.0)

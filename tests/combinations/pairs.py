@@ -104,6 +104,7 @@ FEATURES: dict[str, tuple[Tables, str]] = {
                                 "friction": 0.3, "motion": {"travel": {"by": [0.05, 0.1, 0.08], "over": 0.4}}}}},
         "obstacles",
     ),
+    "layers": ({"resolution": {"cells_per_layer": 3}, "mesh": None}, "model"),
     "chosen steps": ({"time.tolerance": 1e-4, "time.step": None}, "time"),
 }  # fmt: skip
 
@@ -204,8 +205,8 @@ def as_system(tables: Tables) -> Tables | None:
     cable, ends = found.pop("cable"), found.pop("ends")
     line: Tables = {"start": "a", "end": "b", "model": found.pop("model"), "contact": found.pop("contact")} | cable
     line["initial"] = found.pop("initial")
-    if "mesh" in found:
-        line["mesh"] = found.pop("mesh")
+    for key in {"mesh", "resolution"} & {*found}:
+        line[key] = found.pop(key)
     found["points"] = points = {}
     for name, (key, end) in zip("ab", ends.items(), strict=True):
         end = dict(end)

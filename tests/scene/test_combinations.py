@@ -42,7 +42,6 @@ SHEAVE: dict[str, Any] = {
     "obstacles": {"sheave": {"kind": "cylinder", "at": [4, 0, -9], "axis": [0, 1, 0], "radius": 1,
                              "bearing": {"inertia": 1}}}
 }  # fmt: skip
-THICKER = {"cable.sections": [x | y for x in CABLE["cable"]["sections"] for y in ({}, {"diameter": 0.05})]}
 PAID: dict[str, Any] = {END + "payout": {"rate": 0.1, "ramp": 1.0}}
 MOVING = {"model": {"kind": "adaptive"}}
 FOLLOWING = {"model": {"kind": "adaptive", "curvature_error": 0.05}}
@@ -94,7 +93,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.SHEAVES, c.SEVERAL_LINES): (SHEAVE | {ONE + "contact": {"self": False}}, ""),
     (c.SHEAVES, c.MAY_TOUCH): (SHEAVE, ""),
     (c.SHAPES, c.STIFFNESS): (SHAPED | {ONE + "contact": {"self": False}}, "stiffness"),
-    (c.DIAMETERS, c.OBSTACLES): (BALL | THICKER, ""),
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
     (c.SETTLED_FRICTION, c.PUSHED): (BALL | {"initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
     (c.ABOUT_REST, c.MOVED_BY_LINES): (TWO_LINES, "about rest"),

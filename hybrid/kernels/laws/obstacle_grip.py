@@ -51,9 +51,9 @@ def pressed(line, sea, k, i, x, state):
     p, pd, N = 0.5 * sea.obstacles[k, ONSET_OF] - d, -dot(n, vi), 0.0
     if i > 0 and meets(line, sea, moves, k, i - 1):
         before = scale(-1.0, get3(state.e, i - 1))
-        N += half_cell(sea, moves, k, x, p, pd, before, get3(v, i - 1), line.h[i - 1], 0.0)[0]
+        N += half_cell(line, sea, k, i - 1, x, p, pd, before, get3(v, i - 1), 0.0)[0]
     if i < line.h.shape[0] and meets(line, sea, moves, k, i):
-        N += half_cell(sea, moves, k, x, p, pd, get3(state.e, i), get3(v, i + 1), line.h[i], 0.0)[0]
+        N += half_cell(line, sea, k, i, x, p, pd, get3(state.e, i), get3(v, i + 1), 0.0)[0]
     return N, n, hollow, a
 
 

@@ -40,7 +40,10 @@ from hybrid.kernels.state.obstacle_rows import (
     MEETS_FROM,
     MEETS_TO,
     MU,
+    OBSTACLE,
+    OF_PIECE,
     ONSET_OF,
+    PIECE_END,
     PLACE,
     RADIUS,
     ROUND,
@@ -50,6 +53,7 @@ from hybrid.kernels.state.obstacle_rows import (
     STIFFNESS,
     STILL_AXIS,
     STRAND,
+    THINNER,
     TURNING,
 )
 from hybrid.kernels.state.state import Floats
@@ -122,20 +126,32 @@ def grip(t, n, K, N, mu, sl):
 
 
 @inner
-def half_cell(sea, moves, k, x, p, pd, e, v, h, cv):
-    """Contact of the half cell towards a neighbour at x + e with velocity v: N, dN/dp, dN/dpd, dN/d(place there).
+def thinner(line, rows, k, c):
+    """By how much the radius of a line of several diameters is smaller at cell c than that of the strand, m."""
+    at = OBSTACLE
+    while at + OF_PIECE < rows.shape[1] and 0.5 * (line.s[c] + line.s[c + 1]) > rows[k, at + PIECE_END]:
+        at += OF_PIECE
+    return rows[k, at + THINNER] if at < rows.shape[1] else 0.0
 
-    moves: whether an obstacle does; p, pd: penetration of the node at x and its rate.
+
+@inner
+def half_cell(line, sea, k, c, x, p, pd, e, v, cv):
+    """Contact of half of cell c towards a neighbour at x + e with velocity v: N, dN/dp, dN/dpd, dN/d(place there).
+
+    p, pd: penetration of the node at x, of a line as thick as the strand, and its rate.
     """
-    rows = sea.obstacles
+    rows, moves = sea.obstacles, line.moved.shape[0] > 0
     d, m, hollow, a = beside(rows, k, add(x, e))
     o = rows[k, ONSET_OF]
     po = 0.5 * o - d
+    if rows.shape[1] > OBSTACLE:
+        thin = thinner(line, rows, k, c)
+        p, po = p - thin, po - thin
     if not (p > 0.0 or po > 0.0):
         return 0.0, 0.0, 0.0, Z3
     if moves:
         v = sub(v, surface_velocity(sea.carried, k, add(x, e)))
-    f, f0, f1, g0, g1 = contact(p, po, pd, -dot(m, v), h, rows[k, STIFFNESS], rows[k, DAMPING], o)
+    f, f0, f1, g0, g1 = contact(p, po, pd, -dot(m, v), line.h[c], rows[k, STIFFNESS], rows[k, DAMPING], o)
     slope = scale(-(f1 + cv * g1), m)
     if moves:
         slope = add(slope, scale(g1, cross(m, row3(sea.carried, k, TURNING))))
@@ -166,13 +182,11 @@ def normal_force(line, sea, moves, k, i, x, v, e, cv):
     N = DN = turned = 0.0
     L, R, dN = Z3, Z3, Z3
     if i > 0 and meets(line, sea, moves, k, i - 1):
-        f, f0, g0, L = half_cell(
-            sea, moves, k, x, p, pd, scale(-1.0, get3(e, i - 1)), get3(v, i - 1), line.h[i - 1], cv
-        )
+        f, f0, g0, L = half_cell(line, sea, k, i - 1, x, p, pd, scale(-1.0, get3(e, i - 1)), get3(v, i - 1), cv)
         N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(hollow, n, a, vi)))
         turned += g0
     if i < line.h.shape[0] and meets(line, sea, moves, k, i):
-        f, f0, g0, R = half_cell(sea, moves, k, x, p, pd, get3(e, i), get3(v, i + 1), line.h[i], cv)
+        f, f0, g0, R = half_cell(line, sea, k, i, x, p, pd, get3(e, i), get3(v, i + 1), cv)
         N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(hollow, n, a, vi)))
         turned += g0
     dN = add(dN, scale(-DN, n))
@@ -254,8 +268,9 @@ def stored_on_obstacles(line, sea, r):
         p1 = depth_in(rows, k, r, 0)
         for i in range(line.h.shape[0]):
             p0, p1 = p1, depth_in(rows, k, r, i + 1)
-            if (p0 > 0.0 or p1 > 0.0) and meets(line, sea, moves, k, i):
-                energy = with_cell(energy, p0, p1, line.h[i], stiffness, o)
+            thin = thinner(line, rows, k, i) if rows.shape[1] > OBSTACLE else 0.0
+            if (p0 > thin or p1 > thin) and meets(line, sea, moves, k, i):
+                energy = with_cell(energy, p0 - thin, p1 - thin, line.h[i], stiffness, o)
     return energy
 
 
@@ -319,7 +334,11 @@ def passes(line, sea, r, u):
                     part = min(max(-dot(z, b) / square, 0.0), 1.0)
                     between, _, _, _ = beside(rows, k, add(x, scale(part, y)))
                     least = min(least, between)
-            if least < min(before, 0.0) - rows[k, STRAND]:
+            thin = 0.0
+            if rows.shape[1] > OBSTACLE:  # of the thinner side
+                thin = thinner(line, rows, k, max(i - 1, 0))
+                thin = max(thin, thinner(line, rows, k, min(i, line.h.shape[0] - 1)))
+            if least < min(before, -thin) - (rows[k, STRAND] - thin):
                 return i
     return -1
 
@@ -358,18 +377,35 @@ def cells_met(carried: Floats, s: Floats) -> Floats:
     return np.asarray((s[:-1] >= near) & (s[1:] <= far), float)
 
 
-def depths_in_obstacles(rows: Floats, r: Floats, met: Floats | None = None) -> Floats:
+def thinner_cells(rows: Floats, s: Floats) -> Floats:
+    """By how much (N,) m the radius of cells between nodes s (N+1,) m is smaller than that of the strand."""
+    if rows.shape[1] == OBSTACLE or not len(rows):
+        return np.zeros(s.size - 1)
+    ends, thinner = rows[0, OBSTACLE + PIECE_END :: OF_PIECE], rows[0, OBSTACLE + THINNER :: OF_PIECE]
+    return np.asarray(thinner[np.minimum(np.searchsorted(ends, 0.5 * (s[:-1] + s[1:])), thinner.size - 1)])
+
+
+def thinner_nodes(rows: Floats, s: Floats) -> Floats:
+    """The same of nodes (N+1,), on their thicker side."""
+    thin = thinner_cells(rows, s)
+    return np.minimum(np.append(thin[:1], thin), np.append(thin, thin[-1:]))
+
+
+def depths_in_obstacles(rows: Floats, r: Floats, s: Floats, met: Floats | None = None) -> Floats:
     """How deep (M, N+1) the nodes r (N+1, 3) m and the cells after them lie in obstacles, over what they may.
 
-    met: (M, N) as of `cells_met`; None: all do.  Nodes: by the radius of the strand; cells, whose ends may lie on an obstacle that they cut, by an eighth of its radius
-    more.  Beyond 1 a line is in what is solid, or has passed through it.
+    s: (N+1,) m, of the nodes; met: (M, N) as of `cells_met`; None: all do.  Nodes: by the radius of the line; cells,
+    whose ends may lie on an obstacle that they cut, by an eighth of its radius more.  Beyond 1 a line is in what is
+    solid, or has passed through it.
     """
+    thin = thinner_cells(rows, s)
+    of_node = np.maximum(np.append(thin[:1], thin), np.append(thin, thin[-1:]))
     strand = rows[:, STRAND, None]
-    found = -distances(rows, r) / strand
+    found = (-distances(rows, r) - of_node) / (strand - of_node)
     x = np.linspace(0.0, 1.0, PARTS + 1)[1:-1, None, None]
     points = ((1.0 - x) * r[:-1] + x * r[1:]).reshape(-1, 3)
-    within = -distances(rows, points).reshape(len(rows), PARTS - 1, len(r) - 1).max(axis=1)
-    cut = np.where(within > 0.0, within / (strand + CUTS * rows[:, RADIUS, None]), -np.inf)
+    within = -distances(rows, points).reshape(len(rows), PARTS - 1, len(r) - 1).max(axis=1) - thin
+    cut = np.where(within > 0.0, within / (strand - thin + CUTS * rows[:, RADIUS, None]), -np.inf)
     if met is not None:
         cut = np.where(met > 0.0, cut, -np.inf)
         apart = np.zeros((len(rows), 1))

@@ -20,6 +20,9 @@ KIND, PLACE, AXIS, RADIUS, HALF_LENGTH, STRAND, MU, STIFFNESS, DAMPING, ONSET_OF
 )
 FLAT, ROUND = 0.0, 1.0
 OBSTACLE = 15
+# Behind them, of a line of several diameters, two numbers for each of its sections: the arc length at which it ends, and by
+# how much its radius is smaller than that of the strand, which is the largest (m).
+PIECE_END, THINNER, OF_PIECE = 0, 1, 2
 # Of Sea.carried, of obstacles that move: c at the begin and the end of the step (m); R R0^T; v (m/s), w (1/s) and R at the
 # end (kernels.laws.obstacle_motion); the axis at t = 0, the rate of the spin about it (1/s) and the time over which it
 # grows (s); of sheaves that turn freely the inertia (kg m2) and the damping of the bearing (N m s), angles at the begin and
