@@ -182,7 +182,9 @@ def test_anchor(asked: float) -> None:
     text["output"] = {"every": 0.5, "points": [*np.arange(0.0, 4.0, 0.1), *np.arange(4.0, 250.1, 1.0)]}
     fine = run(text, {"cells": 4000}, {"kind": "rod"})
     free = {key: x for key, x in text.items() if key not in ("mesh", "model")}
-    result = hybrid.run(hybrid.validate_scene(free | {"accuracy": {"curvature": asked}, "time": {"duration": 40.0}}))
+    result = hybrid.run(
+        hybrid.validate_scene(free | {"accuracy": {"curvature": f"{asked:.0%}"}, "time": {"duration": 40.0}})
+    )
     off = np.abs(result.curvature - fine.curvature)[2:].max(axis=0) / fine.curvature.max()
     near = result.s < 4.0
     print(
