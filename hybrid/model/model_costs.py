@@ -26,6 +26,8 @@ CALM = 0.25
 NEARLY_SLACK = 0.05
 # A clamp or a point load makes so many lengths sqrt(EI/T) a rod, and what asks for it so many on either side of it.
 DISTURBED, WIDER = 4.0, 2.0
+# Part of what a catenary may lack along the line from which on zones that move are rod (simulation.initial_zones).
+ZONES_ALONG = 0.5
 
 
 # Kind of the event that says what was chosen, and what it is called there.
@@ -117,7 +119,7 @@ def rod_share(model: Model, demand: Demand, found: Sequence[Floats], grading: Gr
     low = np.maximum(demand.least, 1e-3 * model.tension_scale)
     wider = WIDER * np.sqrt(cable.mean_bending[cable.piece(s)] / low) + 2.0 * h
     *of_position, along = found
-    asks = np.flatnonzero((np.max(of_position, axis=0) > CALM) | (along > 1.0))
+    asks = np.flatnonzero((np.max(of_position, axis=0) > CALM) | (along > ZONES_ALONG))
     a, b = s[asks] - wider[asks], s[asks] + wider[asks]
     held = [x for x, tangent in zip((0.0, model.length), cable.held_tangent, strict=True) if tangent]
     places = np.array([*cable.at, *held])

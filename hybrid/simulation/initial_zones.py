@@ -43,8 +43,9 @@ SLOWEST, FASTEST = 2.0, 10
 STRICTER = (1.0, 0.5, 0.25)
 # Rounds of zones and equilibrium at the start: each only adds rod, so they end.
 MOST_ROUNDS = 10
-# Share of what is asked of tension, curvature or moment along the line that leaving bending out may make.
-OF_ALONG = 0.5
+# Share of what is asked of tension, curvature or moment along the line that leaving bending out may make: as much as
+# finer zones are planned to make (accuracy.refinement), so that they are strict enough from the start.
+OF_ALONG = 0.25
 
 
 def zones_at_start(

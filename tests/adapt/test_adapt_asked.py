@@ -225,7 +225,7 @@ def test_a_joint_asks_for_no_more_rod() -> None:
 
     A rod is where contact ends, a few cells, and no joint or pin asks for one: results know what they take.
     """
-    asked = ["model={kind: adaptive, always_move: true}", "accuracy={curvature: 6%}", "mesh.cells=250"]
+    asked = ["model={kind: adaptive, always_move: true}", "accuracy={curvature: 10%}", "mesh.cells=250"]
     result = hybrid.static(hybrid.load_scene(EXAMPLES / "touchdown.yaml", asked))
     found = rods(result, 0)
     assert len(found) == 1 and found[0][1] - found[0][0] < 20.0

@@ -425,10 +425,10 @@ def test_a_change_of_cells_keeps_momentum_to_second_order(monkeypatch: pytest.Mo
     "asked, share", [("curvature", CURVATURE), ("bending_moment", MOMENT), ("line_tension", TENSION)]
 )
 def test_what_is_asked_along_the_line_is_a_share_of_the_rule(asked: str, share: int) -> None:
-    """Half of it; a curvature error that is smaller stands."""
+    """A quarter of it; a curvature error that is smaller stands."""
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", [f"accuracy={{{asked}: 4%}}", "model=adaptive"])
-    assert shares_asked(scene, None) == {share: 0.02}
-    assert shares_asked(scene, 0.01)[CURVATURE] == 0.01 and shares_asked(scene, 0.03)[share] == 0.02
+    assert shares_asked(scene, None) == {share: 0.01}
+    assert shares_asked(scene, 0.01)[CURVATURE] == 0.01 and shares_asked(scene, 0.03)[share] == 0.01
 
 
 def test_zones_of_an_older_checkpoint() -> None:
