@@ -171,7 +171,7 @@ def wake_law(material: Material, s: Floats, of: np.ndarray) -> Floats:
         of_node[sides] += row[:, 1:]
     count = np.concatenate([[0.0], sheds]) + np.concatenate([sheds, [0.0]])
     out[:, DIAMETER : RAMP + 1] = of_node / np.maximum(count, 1.0)[:, None]
-    out[:, OFFSET] = 2.0 * np.pi * s / s[-1]
+    out[:, OFFSET] = 2.0 * np.pi * s / material.around
     return out
 
 

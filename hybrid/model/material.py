@@ -104,6 +104,8 @@ class Material:
     )
     # (K, 6) lift per length (kg/m2: rho/2 D Cv), diameter (m), three frequencies (-), ramp (s); empty: no vortices
     vortices: Floats = field(default_factory=lambda: np.zeros((0, 6)))
+    # m, over which phases of vortices begin once round; infinite: those of a line that is paid out are in its state
+    around: float = np.inf
     bends: list[Curve | None] | None = None  # (K,) tables of moment over curvature; None: there are none
     tension_torque: Floats = field(default_factory=lambda: np.zeros(0))  # (K,) N m per N; empty: none anywhere
 
@@ -212,7 +214,7 @@ def material(scene: Scene, nodes: Floats | None = None) -> Material:
     middle = 0.5 * (np.array(bounds[:-1]) + np.array(bounds[1:]))
     of = [sections[int(i)] for i in np.clip(np.searchsorted(ends, middle) - 1, 0, len(sections) - 1)]
     out = _bare(scene, np.array(bounds), of)
-    out.edges = np.array(edges[1:-1])
+    out.edges, out.around = np.array(edges[1:-1]), length
     for m in modules:
         on = (middle > m.range[0]) & (middle < m.range[1])
         out.mass[on] += m.mass

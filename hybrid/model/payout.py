@@ -408,7 +408,7 @@ def _whole_material(scene: Scene, nodes: Floats) -> Material:
     """The cable with what is on the reel, by the arc lengths of the scene; nodes: m, that there may be."""
     whole, begin = whole_scene(scene)
     cable = material(whole, nodes - begin)
-    cable.hinged = cable_of(scene).hinged
+    cable.hinged, cable.around = cable_of(scene).hinged, np.inf
     cable.bounds, cable.at, cable.swivels = (x + begin for x in (cable.bounds, cable.at, cable.swivels))
     return cable
 

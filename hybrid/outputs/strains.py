@@ -203,9 +203,9 @@ def _layer(view: Observation, node: int, way: int, span: Integers) -> Floats:
 
 def _twist_to_node(view: Observation, cell: Integers, inner: Integers) -> Floats:
     """Twist (n, outputs) 1/m by which tension turns the middle of cells more than their ends at nodes."""
-    h, T = view.line.h, view.T
-    more = (T[cell] - T[inner]) * (h[cell] / (h[cell] + h[inner]))[:, None]
-    return np.asarray((2.0 * view.line.tension_twist[cell] / h[cell])[:, None] * more)
+    h, T, line = view.cell_lengths, view.T, view.line
+    more = (T[cell] - T[inner]) * (h[cell] / (h[cell] + h[inner]))
+    return np.asarray((2.0 * line.tension_twist[cell] / line.h[cell])[:, None] * more)
 
 
 def part_without_spring(view: Observation, node: int, cell: int, bend: Floats) -> Floats:

@@ -130,21 +130,33 @@ def _stretches_on_cable(cable: Cable, model: Model) -> Iterator[Finding]:
                 yield Finding(("model", key, i), "a stretch apart from those of force_rod", "let them end before")
 
 
+# What all that is on a reel has as the section at the winch.
+OF_A_REEL = {
+    "moment_curvature": "the moment over curvature",
+    "tension_torque": "the torque of tension",
+    "vortices": "the vortices",
+}
+
+
 def _laws_on_a_reel(cable: Cable, ends: Ends) -> Iterator[Finding]:
     """Sections on a reel that stretch, or bend, by another table than that at the winch."""
     paid = [name for name, x in ends.named().items() if isinstance(x, Pinned | Clamped) and x.payout is not None]
     for name in paid:
         own = cable.sections[0 if name == "start" else -1]
         for i, section in enumerate(getattr(ends, name).payout.reel or ()):
-            if (section.curve, section.dynamic_stiffness) != (own.curve, own.dynamic_stiffness):
+            if any(getattr(section, key) != getattr(own, key) for key in ("curve", "dynamic_stiffness", "syrope")):
                 expected = "the tension over strain of the section at the winch (tension_strain, dynamic_stiffness)"
-                keys = [key for key in ("dynamic_stiffness", "tension_strain") if getattr(section, key) is not None]
+                laws = ("dynamic_stiffness", "syrope", "tension_strain")
+                keys = [key for key in laws if getattr(section, key) is not None]
                 at: Place = ("ends", name, "payout", "reel", i, *keys[:1])
                 yield Finding(at, expected, "give it the same, or leave these out and give axial_stiffness (N)")
-            if section.moment_curvature != own.moment_curvature:
-                at = ("ends", name, "payout", "reel", i, *["moment_curvature"][: bool(section.moment_curvature)])
-                expected = "the moment over curvature of the section at the winch (moment_curvature)"
-                yield Finding(at, expected, "give it the same")
+            for key, what in OF_A_REEL.items():
+                if getattr(section, key) != getattr(own, key):
+                    at = ("ends", name, "payout", "reel", i, *[key][: bool(getattr(section, key))])
+                    yield Finding(at, f"{what} of the section at the winch ({key})", "give it the same")
+            if own.vortices and section.diameter != own.diameter:
+                at = ("ends", name, "payout", "reel", i, "diameter")
+                yield Finding(at, "the diameter of the section at the winch, which sheds vortices", "give it the same")
 
 
 def _tolerance_is_felt(cable: Cable, time: Time | None) -> Iterator[Finding]:

@@ -32,7 +32,6 @@ Use = Literal["", "about rest", "response", "derivatives", "derivatives in motio
 LEAVE_OUT = "leave it out"
 ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
-UNTWISTED = f"{LEAVE_OUT}, for a line that tension does not twist"
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,17 +205,6 @@ def _paid_out(tables: Tables) -> Iterator[Place]:
 
 def _paid_out_at(name: str) -> Callable[[Tables], Iterator[Place]]:
     return lambda tables: (at for at, _ in _winches(tables) if at[1] == name)
-
-
-def _release_at_winch(tables: Tables) -> Iterator[Place]:
-    for at, _ in _winches(tables):
-        if SYSTEM not in tables:
-            if tables["ends"].named()[at[1]].release_at is not None:
-                yield (*at[:-1], "release_at")
-        elif tables[SYSTEM].breaks(name := tables[LINE], str(at[1])):
-            yield "lines", name, "break_at"
-        elif getattr(tables[SYSTEM].points[point := getattr(tables[SYSTEM].lines[name], str(at[1]))], "break_at", None):
-            yield "points", point, "break_at"
 
 
 def holds_rod(model: Any, end: str, length: float) -> bool:
@@ -427,8 +415,6 @@ CURLED = Feature("sections that are curved without load", "intrinsic_curvature",
                  _in_sections("intrinsic_curvature", of=_curls))  # fmt: skip
 TORQUE_OF_TENSION = Feature("torque of tension", "tension_torque",
                             _in_sections("tension_torque", of=lambda x: x.tension_torque))  # fmt: skip
-SYROPE = Feature("polyester that remembers its highest tension", "syrope",
-                 _in_sections("syrope", of=lambda x: x.syrope))  # fmt: skip
 STRETCH_LAW = Feature("tension over strain by a table or a rope's law", "tension_strain, dynamic_stiffness, syrope",
                       _stretch_laws)  # fmt: skip
 VORTICES = Feature("vortex-induced vibration", "vortices", _in_sections("vortices", of=lambda x: x.vortices))
@@ -456,7 +442,6 @@ PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout
 PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out_at("end"))
 TENSION_HELD = Feature("a winch that holds a tension, of a line to what is free", "payout.winch", _tension_held)
 ZONES_OF_SEVERAL = Feature("zones of several lines that move", "lines.NAME.model", _zones_of_several)
-RELEASE_AT_WINCH = Feature("release of the end at the winch", "ends.end.release_at", _release_at_winch)
 LAYERS = Feature("cells to a boundary layer", "resolution.cells_per_layer",
                  _asks("resolution", "cells_per_layer", lambda x: True))  # fmt: skip
 CLAMPED_CONNECTION = Feature("a clamped connection", "lines.NAME.connections", _clamped)
@@ -657,9 +642,6 @@ REFUSALS: tuple[Refusal, ...] = (
         ZONES_OF_SEVERAL, PAYOUT, "several lines", f"{PAID}", "rod, catenary or zones", "write `model: rod`",
     ),
     Refusal(
-        RELEASE_AT_WINCH, PAYOUT, "not worked out", "line is paid out there", fix="leave it out, or {key}"
-    ),
-    Refusal(
         STIFFNESS_DAMPING, PAYOUT, "not worked out",
         "a line that is paid out ({key}) has no stiffness-proportional damping",
         fix="leave it out; damping.mass can stay",
@@ -668,19 +650,8 @@ REFUSALS: tuple[Refusal, ...] = (
         VORTICES, PLANE, "physics", "vortices shake a line across its plane ({key})", "nothing", IN_SPACE,
     ),
     Refusal(
-        VORTICES, PAYOUT, "not worked out", f"{PAID}, and nodes that enter and leave have no phase of lift",
-    ),
-    Refusal(
         VORTICES, RESPONSE, "not worked out", "lift that locks in to a motion is no part of a response by frequency",
         fix="leave it out; hybrid run computes it in time",
-    ),
-    Refusal(
-        SYROPE, PAYOUT, "not worked out", f"{PAID}, and what comes off the drum has had tensions that nobody knows",
-        "tension_strain or axial_stiffness", "give tension_strain, at the highest tension you expect",
-    ),
-    Refusal(
-        TORQUE_OF_TENSION, PAYOUT, "not worked out", f"{PAID} and its twist is not known then", "nothing or 0",
-        UNTWISTED,
     ),
     Refusal(LAYERS, PAYOUT, "not worked out", f"{PAID}, and its cells are given", fix="place cells by `mesh`"),
     # --- several lines ---

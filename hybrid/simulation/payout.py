@@ -10,10 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.kernels.laws.axial_law import SHIFT, stretch_energy
+from hybrid.kernels.laws.vortices import PHASE
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.reel import reel as p
 from hybrid.kernels.reel import winch as w
 from hybrid.kernels.reel.payout import (
+    end_payout,
     fit_line,
     iterate,
     lengthen,
@@ -48,7 +50,7 @@ from hybrid.store.named_arrays import matched
 ROUND_OFF = 1e-9  # of a length
 # Arrays of a line that its length changes, and that outputs ask for.
 VARIES = ("s", "h", "ck", "mass", "force", "kb", "k0", "hn", "rotary", "polar")
-VARIES_TOO = ("bend_law",)  # likewise, of lines that have them
+VARIES_TOO = ("bend_law", "tension_twist", "wake_law")  # likewise, of lines that have them
 # What a checkpoint keeps of a reel.
 OF_CELLS = ("lack", "rate", "since", "span")
 KEPT = ("numbers", "lack", "rate", "since", "span", "winch", "balance")
@@ -77,6 +79,7 @@ class PayingOut:
         # node that has entered or left.
         self.foreseen = fastest(self.law)
         self._layout: Layout | None = None  # of a line whose zones move
+        self.ended = False  # whether the end at the winch has been let go
         self.table, self._fitting, self._clock = Table(blank_reel_job()), Table(blank_reel_job()), np.zeros(CLOCK_SIZE)
         self._carrying = Table(blank_carry_job())
 
@@ -87,6 +90,8 @@ class PayingOut:
         numbers = reel.numbers
         numbers[p.SIDE], numbers[p.FAR] = (1.0 if plan.side else -1.0), plan.far
         numbers[p.SPRING] = plan.cable.springs[plan.side]
+        if plan.cable.vortices.size:
+            numbers[p.LIFT] = plan.cable.vortices[-plan.side, 0]
         put_places(reel, self._nodes, material)
         return reel
 
@@ -102,6 +107,26 @@ class PayingOut:
         cells = line.h.size
         sea = model.sea if cells == model.cells else model.sea.on(cells)
         return replace(model, line=line, zones=zones, sea=sea, length=length, layout=layout, on_base=on_base)
+
+    def begin_phases(self, line: Line, state: State) -> None:
+        """Vortices begin once round along the line, in a state at rest; a node that comes has the phase beside it."""
+        if state.wake.size:
+            state.wake[:, PHASE] = 2.0 * np.pi * line.s / self.plan.first
+
+    def end(self, before: Before, line: Line, ends: Ends) -> float:
+        """The end at the winch is let go: what is out goes on as it moves, and no more comes; the energy, J, of that.
+
+        before: whose state is changed.
+        """
+        old = energy(line, ends, before.state)
+        end_payout(self.table.numbers)
+        self.winch[w.TENSION], self.ended = 0.0, True
+        law = np.zeros((1, 8))
+        law[0, 0], law[0, 7] = before.t, self.length
+        self.law, self.reel = law, self.reel._replace(law=law)
+        self.table.bind(reel=self.reel)
+        self.leave_unbalanced()
+        return energy(line, ends, before.state) - old
 
     def attach(self, run: CompiledRun, model: Model, stepper: Stepper, moving: MovingZones) -> None:
         """Let a run pay out its line from now on; moving: of its zones."""
@@ -218,6 +243,8 @@ class PayingOut:
             tension=run.tension, nodes=self._nodes,
         )  # fmt: skip
         carry_node(self._carrying.numbers)
+        if out.wake.size and more_nodes > 0:
+            self._blend_phases(model.line.s, out)
         reel.true[material - 1] = length - plan.layer[0] - plan.nodes[self.count - 1]
         self.reel = reel
         self._fit(changed.line, reel, length, run.t)
@@ -228,6 +255,20 @@ class PayingOut:
         if model.line.law.size:
             more += stretch_energy(changed.line, out) - stretch_energy(model.line, state)
         return changed, out, more
+
+    def _blend_phases(self, s: Floats, out: State) -> None:
+        """Vortices at a node that has just entered (out: written) are between those of its neighbours.
+
+        s: m, nodes of before.  Where these are more than half a turn apart it has those of the material beside it.
+        """
+        i = self.count - 1 if self.plan.side else len(out.wake) - self.count
+        far, near = (i - 1, i) if self.plan.side else (i, i - 1)  # nodes of before
+        step = 1 if self.plan.side else -1
+        one, other = out.wake[i - step], out.wake[i + step]
+        if abs(one[PHASE] - other[PHASE]) < np.pi:
+            there = self.plan.along(self.plan.nodes[: self.count])[-1 if self.plan.side else 0]
+            part = (there - s[far]) / (s[near] - s[far])
+            out.wake[i] = (1.0 - part) * one + part * other
 
     @property
     def enters(self) -> bool:
@@ -378,14 +419,15 @@ class PayingOut:
             cells["rod"] = self._layout.rod.copy()
             if self.plan.follows:
                 cells["here"] = self._layout.there
-        return {"count": self.count, "law": self.law.copy(), "foreseen": self.foreseen, **kept, **cells}
+        ended = {"ended": True} if self.ended else {}
+        return {"count": self.count, "law": self.law.copy(), "foreseen": self.foreseen, **ended, **kept, **cells}
 
     def restore(self, tree: Any, model: Model) -> Model:
         """Go on as `checkpoint` has written: the model as it was then.  ValueError: it is that of another line."""
         template = {"count": 0, "law": np.zeros((0, 8))}
         given = dict(tree)
         cells = {name: given.pop(name) for name in ("rod", "here") if name in given}
-        foreseen = given.pop("foreseen", None)
+        foreseen, self.ended = given.pop("foreseen", None), bool(given.pop("ended", False))
         saved = matched({name: given.pop(name) for name in template}, template, "payout")
         count, law = saved["count"], saved["law"]
         if not (law.ndim == 2 and law.shape[1] == 8 and len(law) and (np.diff(law[:, 0]) >= 0.0).all()):
@@ -411,7 +453,7 @@ class PayingOut:
         else:
             self.reel = self._blank(count)
         numbers = np.asarray(given.get("numbers", np.zeros(0)))
-        if numbers.shape in ((p.SIDE,), (p.SPRING,), (p.CHANGED,)):  # of a file of an earlier version
+        if numbers.shape in ((p.SIDE,), (p.SPRING,), (p.CHANGED,), (p.LIFT,)):  # of a file of an earlier version
             given["numbers"] = np.concatenate([numbers, self.reel.numbers[numbers.size :]])
         absent = {"winch": self.winch, "balance": self.reel.balance}
         kept = matched(absent | given, {name: getattr(self.reel, name) for name in KEPT}, "payout")
@@ -426,7 +468,7 @@ class PayingOut:
 
         ValueError: it cannot be so long, or so short.
         """
-        if self.plan.from_outside:
+        if self.plan.from_outside and not self.ended:
             length, rate = asked or (None, length_at(self.law, begin)[1])
             self.drive(begin, end, length, rate)
 
@@ -472,6 +514,8 @@ def length_asked(
     payout = payout_of(scene)
     if payout is None or paying is None:
         raise ValueError("the scene has no ends.end.payout (nor ends.start.payout): the length of its line stays")
+    if paying.ended:
+        raise ValueError("the end at the winch has been let go: no line comes any more")
     if not payout.from_outside:
         raise ValueError(f"{where or winch_at(scene)} gives the length: leave {', '.join(SOURCES)} out to set it")
     for name, x in (("rate", rate), ("length", 0.0 if length is None else length)):

@@ -113,7 +113,9 @@ class NodeChanges:
     def applies(owner: Transient) -> bool:
         """Whether nodes of a run can enter and leave so: nothing asks Python on the way."""
         line = owner.model.line
-        plain = not (line.torsion.size or line.tension_twist.size or line.law.size or line.bend_law.size)
+        plain = not any(
+            getattr(line, name).size for name in ("torsion", "tension_twist", "law", "bend_law", "wake_law")
+        )
         return owner.pays_out and owner.correction is None and plain
 
     @staticmethod

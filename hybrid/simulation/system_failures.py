@@ -68,6 +68,8 @@ class Failures:
     def _break(self, k: int, why: str) -> None:
         run, x = self._run, self.all[k]
         line, end = x.ends[0]
+        if run.payout is not None:
+            run.payout.let_go(x.ends)
         old, before = run.model.models[line], run.state.lines[line]
         self._part(k)
         new, energy = run.model.models[line], 0.0

@@ -6,7 +6,7 @@ a winch Python changes the line, and the system gets another solver.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -41,6 +41,8 @@ class SystemPayout:
         self._run = run
         self.lines = {k: PayingOut(x) for k, x in enumerate(run.model.models) if x.payout is not None}
         self._take({k: x.on(run.model.models[k], run.model.models[k].length) for k, x in self.lines.items()})
+        for k, x in self.lines.items():
+            x.begin_phases(run.model.models[k].line, run.state.lines[k])
 
     def _take(self, models: Mapping[int, Model]) -> None:
         run = self._run
@@ -117,6 +119,15 @@ class SystemPayout:
         self._take({k: model})
         run.state = SystemState(states, run.state.bodies)
         line.take_cells(model)
+
+    def let_go(self, ends: Iterable[tuple[int, int]]) -> None:
+        """Ends (line, 0 or 1) come loose: at a winch no more line comes."""
+        run = self._run
+        for k, end in ends:
+            if k in self.lines and self.lines[k].plan.side == end:
+                model, books = run.model.models[k], run.lines[k].books
+                before = Before(run.state.lines[k], run.t, run.loop.clock, books.tension)
+                books.work[0, b.ZONES] += self.lines[k].end(before, model.line, model.ends.at(run.t))
 
     def limit_step(self) -> None:
         """Of steps that follow the motion: the next one is no longer than the laws of the lengths allow."""

@@ -249,6 +249,8 @@ class Transient:
                 self.stepper.static_friction(model.sea.at(0.0), model.ends.at(0.0), state)
         else:
             state = equilibrium.state.copy()
+        if self.payout is not None:
+            self.payout.begin_phases(model.line, state)
         begun = self.plane_monitor.begin(model, state, self._note)
         if self.envelope is not None:
             self.envelope.count_from(begun, state.r)
@@ -306,6 +308,11 @@ class Transient:
 
     def release(self, k: int, why: str, new_leg: bool = True) -> None:
         """End k (0 or 1) is let go now; new_leg: whether equal steps are counted from here."""
+        if self.payout is not None and k == self.payout.plan.side:
+            from hybrid.simulation.payout import Before
+
+            before = Before(self.state, self.t, self.run.clock, self.run.books.tension)
+            self.run.books.work[0, b.ZONES] += self.payout.end(before, self.model.line, self.model.ends.at(self.t))
         self.set_model(*let_go(self, k, why))
         self.restart(new_leg)
 

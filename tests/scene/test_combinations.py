@@ -57,11 +57,6 @@ SHEDS: dict[str, Any] = {SECTION + "vortices": {}, "environment.fluid": {"densit
 HIGH_WAVES: dict[str, Any] = {"environment.fluid": {
     "density": 1025, "surface": 5, "waves": {"kind": "stream_function", "height": 1, "period": 5, "ramp": 9}}}  # fmt: skip
 RAO = {"rao": str(Path(__file__).parents[1] / "data" / "rao.csv"), "origin": [8, 0, 0], "fairlead": [0, 0, 0]}
-POLYESTER = {
-    SECTION + "axial_stiffness": None,
-    SECTION + "syrope": {"curve": [[0, 0], [0.1, 1e4]], "working": "linear", "k1": 0.3, "highest_tension": 5e3},
-    SECTION + "dynamic_stiffness": {"constant": 3e5, "relaxation_time": 10},
-}
 CLAMPED = {ONE + "connections": {"end": {"kind": "clamped", "tangent": [1, 0, 0]}}}
 SHAPED = {
     "points.b": {"body": "buoy", "place": [0, 0, 0]},
@@ -111,7 +106,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.IN_MOTION, c.ACCURACY): ({"accuracy": "3%"}, "derivatives in motion"),
     (c.DERIVATIVES, c.SETTLED_FRICTION): ({"initial": {"kind": "equilibrium", "friction": "settled"}}, "derivatives"),
     (c.PAYOUT_AT_START, c.PAYOUT_AT_END): (PAID | {"ends.start.payout": {"rate": 0.1, "ramp": 1.0}}, ""),
-    (c.RELEASE_AT_WINCH, c.PAYOUT): (PAID | {END + "release_at": {"time": 2}}, ""),
     (c.TENSION_HELD, c.SEVERAL_LINES): (
         {ONE + "connections.end.payout": {"longest": 12, "winch": {"tension": 50, "inertia": 9}},
          "points.a": {"kind": "free", "mass": 5, "initial_guess": [8, 0, -9]}}, ""
@@ -121,12 +115,9 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     ),
     (c.STIFFNESS_DAMPING, c.PAYOUT): (PAID | {SECTION + "damping": {"stiffness": 0.01}}, ""),
     (c.VORTICES, c.PLANE): (SHEDS | {"dimension": 2}, ""),
-    (c.VORTICES, c.PAYOUT): (SHEDS | PAID, ""),
     (c.VORTICES, c.RESPONSE): (SHEDS, "response"),
     (c.FINITE_WAVES, c.RESPONSE): (HIGH_WAVES, "response"),
     (c.BY_RAO, c.FINITE_WAVES): (HIGH_WAVES | {END + "motion": {"vessel": RAO}}, ""),
-    (c.SYROPE, c.PAYOUT): (POLYESTER | PAID, ""),
-    (c.TORQUE_OF_TENSION, c.PAYOUT): (TORQUE | PAID, ""),
     (c.LAYERS, c.PAYOUT): (PAID | {"resolution": {"cells_per_layer": 2}}, ""),
     (c.BREAKS_OFF_CLAMP, c.CLAMPED_CONNECTION): (CLAMPED | {"points.b.break_at": {"time": 2}}, ""),
     (c.CLAMPED_TO_FREE, c.MOVING_ZONES): (

@@ -484,9 +484,6 @@ def test_other_refusals() -> None:
     scene = exchanged(hanging({"rate": -20.0, "ramp": 1}, 6.0))
     assert "ends.start.payout" in refused(scene)
     scene = hanging(RATE, 5.0)
-    scene["ends"]["end"]["release_at"] = {"time": 2.0}
-    assert "release_at" in refused(scene)
-    scene = hanging(RATE, 5.0)
     scene["cable"]["attachments"] = [{"kind": "clump", "at": 39.0, "mass": 5.0}]
     assert "cells" in refused(scene)
 

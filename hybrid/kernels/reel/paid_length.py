@@ -15,6 +15,8 @@ import numpy as np
 from hybrid.kernels.laws.axial_law import has_law
 from hybrid.kernels.laws.bending_law import HALF_A, HALF_B, LAST_A, LAST_B
 from hybrid.kernels.laws.element import put_spring
+from hybrid.kernels.laws.tension_torque import couples
+from hybrid.kernels.laws.vortices import LIFT_A, LIFT_B
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.mesh.fill_line import B_1, COLUMNS, fill_cell, fill_element, fill_node
 from hybrid.kernels.reel.reel import (
@@ -24,6 +26,7 @@ from hybrid.kernels.reel.reel import (
     EASING,
     FAR,
     LENGTH,
+    LIFT,
     PLACE,
     RATE,
     RIDING_ON,
@@ -36,7 +39,7 @@ from hybrid.kernels.reel.winch import (
     TENSION,
     TRUE_NOW,
 )
-from hybrid.kernels.state.forces import BENDING_LAW
+from hybrid.kernels.state.forces import BENDING_LAW, VORTICES
 
 
 @inner
@@ -114,6 +117,10 @@ def fill_between(line, reel, i, a, ha, b, hb):
         fill_element(line, i, reel.made, a, ha, b, hb, line.kb[i, 2] == 0.0)
         if line.bits & BENDING_LAW:
             fill_table(line, i, 0.5 * (ha + hb))
+    if line.bits & VORTICES:
+        before, after = (ha, hb) if reel.numbers[SIDE] > 0.0 else (hb, ha)
+        half = 0.5 * reel.numbers[LIFT]
+        line.wake_law[i, LIFT_A], line.wake_law[i, LIFT_B] = half * before, half * after
 
 
 @inner
@@ -134,6 +141,8 @@ def fill_cells(line, reel):
         fill_cell(line, c, made, b, h)
         if has_law(line, c):  # which is linearised anew in every iteration, and is one for all that is on the reel
             line.ck[c] = ck
+        if couples(line) and line.tension_torque[c] != 0.0:
+            line.tension_twist[c] = 0.5 * h * line.tension_torque[c] / made[b, B_1 + 2]
         a, b, before, begin = b, a, h, end
     i = node(line, reel, n)
     fill_between(line, reel, i, a, before, b, 0.0)

@@ -435,6 +435,18 @@ def iterate(table):
 
 
 @kernel
+def end_payout(table):
+    """Let the nodes that ride, and the fairlead, go on with the material that is there now; none comes any more."""
+    job = read(table)
+    line, reel = job.line, job.reel
+    state, n, g = job.new if job.counts[b.PARITY] else job.old, line.h.shape[0], growing(line, reel)
+    for i in range(g + 1, n + 1):
+        v = velocity_at(line, state, reel, i, reel.numbers[RATE], g)
+        for j in range(3):
+            state.v[node(line, reel, i), j] = v[j]
+
+
+@kernel
 def fit_line(table):
     """The line with the length that its reel has, at clock[NOW]."""
     job = read(table)

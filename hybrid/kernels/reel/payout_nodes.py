@@ -15,6 +15,7 @@ import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
 from hybrid.kernels.laws.axial_law import strain_and_energy
+from hybrid.kernels.laws.tension_torque import couples, stretch_factor, torque_beside
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.reel.paid_length import cell, length_at, made_between, node
@@ -147,6 +148,10 @@ def move_state(state, out, forward, cut, step):
     move_row(state.wd, out.wd, forward, cut, step)
     if state.slow.shape[0] > 0:
         move_row(state.slow, out.slow, forward, cut, step)
+    if state.peak.shape[0] > 0:
+        move_row(state.peak, out.peak, forward, cut, step)
+    if state.wake.shape[0] > 0:
+        move_rows(state.wake, out.wake, forward, cut, step)
     for k in range(state.turn.shape[0]):
         for j in range(3):
             out.turn[k, j] = state.turn[k, j]
@@ -216,7 +221,9 @@ def lack_rate(reel, t, c):
 
 @inner
 def strain_of(line, state, c):
-    """Strain of cell c (of the line) under its tension."""
+    """Strain of cell c (of the line) under its tension, and a torque where tension makes one."""
+    if couples(line):
+        return stretch_factor(line, state, c, torque_beside(line, state, c)) - 1.0
     strain, _ = strain_and_energy(line, state, c)
     return strain
 
@@ -367,6 +374,10 @@ def enter(job, flow, g):
         put_director(job, c, get3(state.a1, cut), e_old, side * rate * middle)
         if state.slow.shape[0] > 0:
             out.slow[k] = state.slow[cut] + slope * middle
+        if state.peak.shape[0] > 0 and c == i:  # what comes off the reel has had no more than the tension there
+            out.peak[k] = out.slow[k]
+    for c in range(g, g + 2):
+        length = place - place_of(line, reel, g) if c == g else place_of(line, reel, i) - place
         grows = flow.rate if c == i else 0.0
         let_lack(job, flow, c, length, grows, rises, kept * length / h, span_of(job, flow, g))
 

@@ -40,8 +40,9 @@ FEWEST_STEPS = 8
     FAR,  # m, arc length of the far end
     SPRING,  # N m/rad, of an angular spring between the fairlead and a clamped line; infinite: rigid
     CHANGED, EASING,  # s, when the last node entered or left; over which forces that balance its neighbours end
-) = range(15)  # fmt: skip
-NUMBERS = 15
+    LIFT,  # kg/m2, lift per length of what sheds vortices (kernels.laws.vortices): rho/2 D Cv
+) = range(16)  # fmt: skip
+NUMBERS = 16
 # Parts of `Reel.stage`.
 RIDING_ON, BALANCE_ON, UNBALANCED = range(3)
 

@@ -1,0 +1,235 @@
+"""Lines that are paid out with torque of tension, polyester, vortices, and whose end at the winch is let go."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_payout import G, clamped, exchanged, hanging, kicks, sagging
+
+import hybrid
+from hybrid.errors import SceneError
+from hybrid.kernels.laws.vortices import LIFT_A, LIFT_B, PHASE
+from hybrid.model.build import build
+from hybrid.scene.read import as_scene
+from hybrid.simulation.payout import PayingOut
+
+TORQUE = {"tension_torque": 2e-3, "torsional_stiffness": 2e4}
+CURVE = [[0, 0], [0.01, 1500], [0.02, 4000], [0.06, 20000]]
+POLYESTER = {
+    "syrope": {"curve": CURVE, "working": "linear", "k1": 0.4, "highest_tension": 1800.0},
+    "dynamic_stiffness": {"constant": 8e5, "per_tension": 10.0, "relaxation_time": 2.0},
+    "axial_stiffness": None,
+}
+SHEDS = {"vortices": {"ramp": 2.0}, "drag": {"normal": 1.2}}
+SEA = {"fluid": {"density": 1025, "current": [0.0, 0.6, 0]}}
+
+
+def paid(section: dict[str, Any], clamp: bool = True, step: float = 0.05, **more: Any) -> dict[str, Any]:
+    scene = sagging(step=step, duration=8.0, **more)
+    own = scene["cable"]["sections"][0] | section
+    scene["cable"]["sections"] = [{key: x for key, x in own.items() if x is not None}]
+    if clamp:
+        scene = clamped(scene)
+        scene["ends"]["start"] = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -0.5]}
+    return scene
+
+
+def twisting(step: float = 0.05) -> dict[str, Any]:
+    return paid(TORQUE, step=step, model="rod", EA=2e6, EI=2e4)
+
+
+def polyester(step: float = 0.05) -> dict[str, Any]:
+    return paid(POLYESTER, False, step)
+
+
+def shedding(step: float = 0.02) -> dict[str, Any]:
+    return paid(SHEDS, step=step, model="rod", EA=2e6, EI=2e4) | {"environment": SEA}
+
+
+SCENES = {"torque": twisting, "polyester": polyester, "vortices": shedding}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_resumed_bit_for_bit(tmp_path: Path, name: str) -> None:
+    scene = SCENES[name](0.05)
+    scene["ends"]["end"]["payout"]["longest"] = 120.0
+    whole = hybrid.run(scene, output=tmp_path / "whole.h5")
+    hybrid.run({**scene, "time": {"duration": 5.0, "step": 0.05}}, output=tmp_path / "part.h5")
+    resumed = hybrid.resume(tmp_path / "part.h5", until=8.0)
+    for what in ("position", "tension", "reaction_end", "energy/stretch", "work/end", "work/zones", "work/scheme"):
+        assert np.array_equal(whole[what], resumed[what]), what
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_energy_is_balanced(name: str) -> None:
+    """What is left is of second order in the steps, through nodes that enter."""
+    left, put_in = [], 0.0
+    for step in (0.1, 0.05) if name != "vortices" else (0.04, 0.02):
+        found = hybrid.run(SCENES[name](step))
+        left.append(np.abs(found["work/scheme"]).max())
+        put_in = np.abs(found["work/end"]).max()
+    assert left[1] < 1e-3 * put_in
+    assert left[0] > 2.0 * left[1]
+
+
+@pytest.mark.parametrize("name", ["torque", "polyester"])
+def test_the_mirror_image_pays_out_the_same(name: str) -> None:
+    scene = SCENES[name](0.05)
+    one, other = hybrid.run(scene), hybrid.run(exchanged(scene))
+    for mine, its in (("reaction_end", "reaction_start"), ("work/end", "work/start")):
+        assert np.abs(other[its] - one[mine]).max() < 1e-6 * np.abs(one[mine]).max(), mine
+    assert np.abs(other.position[:, ::-1] - one.position).max() < 1e-7 * 100.0
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_node_that_enters_does_not_kick(name: str) -> None:
+    scene = SCENES[name](0.05)
+    scene["time"]["duration"] = 14.0
+    if name == "vortices":  # 40 cells are too few for how it vibrates: 1e-2
+        scene["mesh"] = {"cells": 80}
+    assert max(kicks(scene)) < 2e-3
+
+
+def test_a_torque_of_tension_is_that_of_a_line_of_the_final_length() -> None:
+    """Slowly out, hanging straight between clamps: link stays, so Q = GJ tau + c T along it with the twist over L."""
+    c, GJ, EA, w = 5e-3, 60.0, 1e5, 4.0 * G
+    up = {"tangent": [0, 0, 1], "normal": [1, 0, 0]}
+    section = {"length": 10.0, "mass": 4.0, "axial_stiffness": EA, "bending_stiffness": 200, "torsional_stiffness": GJ,
+               "tension_torque": c, "damping": {"mass": 2.0}}  # fmt: skip
+    scene = hanging({"lengths": [[0, 10], [10, 13], [20, 16]]}, 30.0, model="rod", mesh={"cells": 20})
+    scene["cable"]["sections"], scene["output"] = [section], {"every": 30.0, "points": 17}
+    scene["ends"]["start"] = {"kind": "guided", **up, "force": [0, 0, -800]}
+    scene["ends"]["end"] |= {"kind": "clamped", **up}
+    found = hybrid.run(scene)
+    length = found["payout/length"][-1]
+    assert length == pytest.approx(16.0)
+    mean = 800.0 + 0.5 * w * length
+    torque = c * mean  # twist against the frames of both clamps stays 0: all of the mean is torque
+    assert np.abs(found["torque"][-1] / torque - 1.0).max() < 2e-3
+    # eps = T/EA - c tau/... with GJ tau = Q - c T, which has no mean
+    assert found.position[-1, 0, 2] == pytest.approx(-length * (1.0 + mean / EA), rel=2e-5)
+
+
+def test_polyester_that_stays_below_its_highest_tension_is_a_longer_rope() -> None:
+    """A straight working curve from e0 on, strain = e0 + f T: a rope (1 + e0) times as long, of stiffness (1 + e0)/f."""
+    highest, at, k1, E = 4000.0, 0.02, 0.5, 9e5
+    e0 = k1 * at
+    f, grown = (at - e0) / highest, 1.0 + k1 * at
+    law = {"syrope": {"curve": [[0, 0], [at, highest], [0.1, 6000]], "working": "linear", "k1": k1,
+                      "highest_tension": highest},
+           "dynamic_stiffness": {"constant": E, "relaxation_time": 2.0}, "axial_stiffness": None}  # fmt: skip
+    same = {"tension_strain": [[0, 0], [f * highest / grown, highest]],
+            "dynamic_stiffness": {"constant": E * grown, "relaxation_time": 2.0}}  # fmt: skip
+    one = paid(law, False)
+    other = paid(same, False)
+    section = other["cable"]["sections"][0]
+    section["length"], section["mass"] = 100.0 * grown, 5.0 / grown
+    other["ends"]["end"]["payout"]["rate"] = 0.8 * grown
+    a, b = hybrid.run(one), hybrid.run(other)
+    assert np.abs(a.position - b.position).max() < 1e-6 * 100.0
+    assert np.abs(a["reaction_end"] - b["reaction_end"]).max() < 1e-6 * np.abs(a["reaction_end"]).max()
+
+
+def test_lift_grows_with_the_length_that_is_out() -> None:
+    """A node that enters takes lift from its neighbours and has their phase: of what is out all sheds, and no more."""
+    scene = as_scene(shedding())
+    model = build(scene)
+    paying = PayingOut(model)
+    line = paying.on(model, 107.3).line
+    paying.reel.numbers[0] = 107.3
+    paying._fit(line, paying.reel, 107.3, 0.0)
+    total = line.wake_law[:, LIFT_A].sum() + line.wake_law[:, LIFT_B].sum()
+    assert total == pytest.approx(107.3 * 0.5 * 1025 * 0.05 * 1.2, rel=1e-12)
+    with hybrid.Simulation(shedding()) as sim:
+        before = []
+        while sim.t < 6.0:
+            sim.step()
+            wake = sim._loop.run.state.wake
+            if before and len(wake) > len(before[-1]):
+                grown = len(wake) - len(before[-1])
+                assert grown == 1
+                apart = np.abs(np.diff(wake[:, PHASE])).max()
+                assert apart < np.abs(np.diff(before[-1][:, PHASE])).max() + 0.2
+            before.append(wake.copy())
+    assert len(before[-1]) > len(before[0])
+
+
+def test_what_differs_on_the_reel_is_refused() -> None:
+    for scene, key in ((twisting(), "tension_torque"), (shedding(), "vortices"), (polyester(), "syrope")):
+        section = dict(scene["cable"]["sections"][0])
+        other = {"tension_torque": 1e-3, "vortices": {"lift": 0.5}}.get(key)
+        changed = section | {key: other} if other else section | {key: section[key] | {"highest_tension": 2500.0}}
+        scene["ends"]["end"]["payout"]["reel"] = [changed]
+        with pytest.raises(SceneError) as refused:
+            hybrid.plan(scene)
+        assert f"ends.end.payout.reel[0].{key}" in str(refused.value) or key == "syrope"
+
+
+# --- the end at the winch is let go -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("clamp", [False, True])
+@pytest.mark.parametrize("rate", [1.0, -0.8])
+def test_what_is_out_falls_as_it_moves(rate: float, clamp: bool) -> None:
+    """A straight line that comes out steadily, and is let go: all of it falls freely with the rate that it had."""
+    scene = hanging({"rate": rate, "ramp": 1.0}, 4.0, model="rod", output={"every": 0.25})
+    scene["cable"]["sections"][0] |= {"bending_stiffness": 50.0, "torsional_stiffness": 50.0}
+    scene["ends"]["end"]["release_at"] = {"time": 3.0}
+    if clamp:
+        scene = clamped(scene, [0.0, 0.0, 1.0])
+    found = hybrid.run(scene)
+    at = int(np.abs(found.t - 3.0).argmin())
+    assert found["payout/rate"][at + 1 :] == pytest.approx(0.0)
+    assert np.ptp(found["payout/length"][at:]) < 1e-12
+    out = found["s"] <= found["payout/length"][at] + 1e-9
+    z0 = found.position[at, out, 2]
+    for k in range(at, len(found.t)):
+        t = found.t[k] - 3.0
+        assert np.abs(found.position[k, out, 2] - (z0 - rate * t - 0.5 * G * t * t)).max() < 1e-7 * 40.0
+    assert np.abs(found["tension"][at + 1 :, out]).max() < 1e-6 * 2.0 * G * 40.0
+
+
+def released(step: float = 0.05) -> dict[str, Any]:
+    scene = clamped(sagging("rod", 2e6, 2e4, step=step, duration=6.0))
+    scene["ends"]["end"]["release_at"] = {"time": 4.0}
+    return scene
+
+
+def test_a_release_is_resumed_bit_for_bit_and_balanced(tmp_path: Path) -> None:
+    scene = released()
+    scene["ends"]["end"]["payout"]["longest"] = 110.0
+    whole = hybrid.run(scene, output=tmp_path / "whole.h5")
+    for until in (3.0, 5.0):
+        hybrid.run({**scene, "time": {"duration": until, "step": 0.05}}, output=tmp_path / "part.h5")
+        resumed = hybrid.resume(tmp_path / "part.h5", until=6.0)
+        for what in ("position", "tension", "reaction_start", "payout/length", "work/end", "work/zones", "work/scheme"):
+            assert np.array_equal(whole[what], resumed[what]), (until, what)
+    # Accelerations jump, so that it is of first order, as of a line of a fixed length.
+    left, finer = (np.abs(x["work/scheme"]).max() for x in (whole, hybrid.run(released(0.025))))
+    assert left < 1e-2 * whole["energy/kinetic"].max() and finer < 0.6 * left
+
+
+def test_it_is_released_from_outside_and_as_a_system() -> None:
+    scene = released()
+    whole = hybrid.run(scene)
+    del scene["ends"]["end"]["release_at"]
+    with hybrid.Simulation(scene) as sim:
+        while sim.t < 3.99:
+            sim.step()
+        sim.release("end")
+        while sim.t < 5.99:
+            sim.step()
+        found = sim.result()
+    assert np.abs(found.position[-1] - whole.position[-1]).max() < 1e-6
+    ends, cable = scene["ends"], scene["cable"]
+    held = {key: ends["end"][key] for key in ("kind", "tangent", "payout")}
+    line = {"start": "a", "end": "b", **cable, "model": "rod", "mesh": scene["mesh"], "connections": {"end": held},
+            "break_at": {"end": "end", "time": 4.0}}  # fmt: skip
+    points = {"a": {"position": [0, 0, 0]}, "b": {"position": [80, 0, 0], "motion": ends["end"]["motion"]}}
+    kept = {key: scene[key] for key in ("time", "output")}
+    other = hybrid.run({**kept, "points": points, "lines": {"one": line}}).lines["one"]
+    assert np.abs(other.position - whole.position).max() < 1e-6
+    assert other["work/zones"][-1] == pytest.approx(whole["work/zones"][-1], rel=1e-6)
