@@ -29,6 +29,9 @@ WRITE = os.environ.get("HYBRID_DIGESTS") == "write"
 SAME = 1e-12  # of the root mean square
 LEAST_SCENES = 60
 WEIGHTS = 3
+# Sizes below which a quantity is held against these, not against its own: what Newton's method leaves of a velocity near
+# rest is round-off of forces, 1e-14 m/s, and of another compilation another one.
+SMALLEST = {"velocity": 0.05, "energy": 1e-9, "work": 100.0}  # m/s or rad/s, J, J
 # Clocks, and numbers that go by them.
 CLOCKS = ("steps/cpu",)
 Digest = dict[str, list[float]]
@@ -55,7 +58,8 @@ def difference(old: Digest, new: Digest) -> tuple[float, str]:
         a, b = old.get(name), new.get(name)
         if a is None or b is None or a[0] != b[0]:
             return np.inf, f"{name}: {'missing' if b is None else 'new' if a is None else 'of another size'}"
-        scale = max(abs(a[1]), abs(b[1])) or 1.0
+        least = max((size for part, size in SMALLEST.items() if part in name), default=0.0)
+        scale = max(abs(a[1]), abs(b[1]), least) or 1.0
         worst = max(worst, (float(np.abs(np.subtract(a[1:], b[1:])).max()) / scale, name))
     return worst
 
