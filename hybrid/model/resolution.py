@@ -390,12 +390,12 @@ def model_is_free(scene: Scene, moves: bool = True) -> bool:
 
     moves: in motion, by a pre-run; else an equilibrium.
 
-    Where the scene gives steps and asks for no accuracy, places the cells, lets the line touch itself, wants criteria
-    as fields, or says anything of its zones, zones move.
+    Where the scene gives steps and asks for no accuracy, places the cells, lets the line touch itself or obstacles,
+    wants criteria as fields, or says anything of its zones, zones move.
     """
     named = scene.model != AdaptiveModel()
     wants = (scene.time is not None or not moves) and requested_accuracy(scene) is not None and mesh_is_free(scene)
-    return wants and not named and not scene.output.criteria and not scene.contact.self
+    return wants and not (named or scene.output.criteria or scene.contact.self or scene.obstacles)
 
 
 def first_resolution(scene: Scene) -> Resolution:

@@ -334,6 +334,11 @@ def _free_sheaves(tables: Tables) -> Iterator[Place]:
     return (("obstacles", name, "bearing") for name, x in found.items() if getattr(x, "bearing", None) is not None)
 
 
+def _moving_obstacles(tables: Tables) -> Iterator[Place]:
+    """Obstacles that move, turn or are set from outside."""
+    return (("obstacles", name) for name, x in (tables.get("obstacles") or {}).items() if getattr(x, "moves", False))
+
+
 def _lines_touch(tables: Tables) -> Iterator[Place]:
     """A line of several that touches another one."""
     if SYSTEM in tables and any(tables[LINE] in pair for pair in tables[SYSTEM].touching_pairs):
@@ -456,6 +461,11 @@ SHEAVES = Feature("sheaves that turn freely", "obstacles.NAME.bearing", _free_sh
 LINES_TOUCH = Feature("contact of lines with each other", "contact", _lines_touch)
 PUSHED = Feature("obstacles, contact of lines with each other", "obstacles, contact",
                  _either(OBSTACLES, LINES_TOUCH))  # fmt: skip
+GOES_ITS_WAY = Feature(
+    "contact of lines with each other, with bodies, with obstacles that move",
+    "contact, bodies.NAME.shape, obstacles.NAME.motion",
+    _either(LINES_TOUCH, SHAPES, Feature("obstacles that move", "motion", _moving_obstacles)),
+)
 MOVED_BY_LINES = Feature("contact of lines with each other, with bodies, with sheaves",
                          "contact, bodies.NAME.shape, obstacles.NAME.bearing",
                          _either(LINES_TOUCH, SHAPES, SHEAVES))  # fmt: skip
@@ -576,8 +586,8 @@ REFUSALS: tuple[Refusal, ...] = (
         PAYOUT, PUSHED, "not worked out", "nodes that enter and leave know no obstacles and no other lines ({key})"
     ),
     Refusal(
-        MOVING_ZONES, PUSHED, "not worked out",
-        f"{TOUCHES}, and no criterion looks at what that does to a catenary",
+        MOVING_ZONES, GOES_ITS_WAY, "not worked out",
+        "what touches ({key}) moves, and no criterion looks at what that does to a catenary",
         "rod, catenary or zones", "write `model: rod`",
     ),
     Refusal(

@@ -83,7 +83,7 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.SHORTEST_CELLS, c.STAYING_CELLS): ({"model": {"kind": "adaptive", "rod_cell": 0.1}}, ""),
     (c.LAYERS, c.FOLLOWING_CELLS): ({"resolution": {"cells_per_layer": 2}} | FOLLOWING, ""),
     (c.PLANE, c.OBSTACLES): (BALL | {"dimension": 2}, ""),
-    (c.MOVING_ZONES, c.PUSHED): (BALL | MOVING, ""),
+    (c.MOVING_ZONES, c.GOES_ITS_WAY): ({"obstacles.ball": BALL["obstacles"]["ball"] | {"from_outside": True}} | MOVING, ""),
     (c.PAYOUT, c.PUSHED): (BALL | PAID, ""),
     (c.SHEAVES, c.SEVERAL_LINES): (SHEAVE | {ONE + "contact": {"self": False}}, ""),
     (c.SHEAVES, c.MAY_TOUCH): (SHEAVE, ""),

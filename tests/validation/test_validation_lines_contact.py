@@ -390,7 +390,7 @@ def bare(tables: Tables, name: str) -> None:
         (lambda x: x["contact"].update(between=[["upper", "lowest"]]), "contact.between[0][1]", "name of a line"),
         (lambda x: x["contact"].update(between=[["upper", "upper"]]), "contact.between[0]", "lines.NAME.contact"),
         (lambda x: bare(x, "lower"), "lines.lower.sections[0].diameter", "touch each other"),
-        (lambda x: x["lines"]["upper"].update(model="adaptive"), "lines.upper.model", "touch each other"),
+        (lambda x: x["lines"]["upper"].update(model="adaptive"), "lines.upper.model", "moves, and no criterion"),
         (lambda x: x.update(accuracy="3%"), "accuracy", "a fifth of the truth"),
         (lambda x: x["output"].update(errors=True), "output.errors", "a fifth of the truth"),
     ],

@@ -157,7 +157,6 @@ def test_a_body_makes_obstacles_stiff_enough() -> None:
 @pytest.mark.parametrize(
     ("change", "where", "says"),
     [
-        ({"lines.rope.model": "adaptive"}, "lines.rope.model", "obstacles"),
         ({"points.top.position": [0, 0, DRUM]}, "points.top.position", "obstacles.drum"),
         ({"lines.rope.initial.friction": "settled"}, "lines.rope.initial.friction", "obstacles"),
     ],

@@ -16,6 +16,7 @@ from hybrid.kernels.algebra.rotations import dot, get3
 from hybrid.kernels.laws.axial_law import has_law, stretch_work
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.end_motion import end_turn
+from hybrid.kernels.laws.obstacles import beside
 from hybrid.kernels.laws.tension_torque import twist_of_line
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller, reader
@@ -48,6 +49,8 @@ from hybrid.kernels.mesh.zone_criteria import (
 )
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import COUNT_SIZE, WORKS
+from hybrid.kernels.state.forces import OBSTACLES
+from hybrid.kernels.state.obstacle_rows import STRAND
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
 
 # How far a falling tension is extrapolated, in ramp times; the rate is taken over one or two samples.
@@ -271,6 +274,18 @@ def weigh_contact(near, zones):
 
 
 @inner
+def weigh_obstacles(line, sea, state, zones, horizon):
+    """What is near an obstacle at rest, or will be within a horizon, s, as what is near the line itself."""
+    rows, of, last = sea.obstacles, zones.kinds.base_of_cell, zones.kinds.base_of_cell.shape[0] - 1
+    for i in range(state.r.shape[0]):
+        x, v = get3(state.r, i), get3(state.v, i)
+        for k in range(rows.shape[0]):
+            gap, n, _, _ = beside(rows, k, x)
+            gap, wide = max(gap + min(horizon * dot(n, v), 0.0), 0.0), 2.0 * rows[k, STRAND]
+            raise_ratio(zones.ratios, CONTACT, of[max(i - 1, 0)], of[min(i, last)], 2.0 * wide / (gap + wide))
+
+
+@inner
 def find_shares(line, state, zones):
     """What may be left out of each quantity, and what lengths may make, by the largest of late."""
     kinds, z, n = zones.kinds, zones.clock, line.h.shape[0]
@@ -327,6 +342,8 @@ def evaluate(line, sea, ends, state, zones, near, dt):
     if flags[LOADED]:
         weigh_moments(state, zones)
     weigh_contact(near, zones)
+    if line.bits & OBSTACLES:
+        weigh_obstacles(line, sea, state, zones, LOOKAHEAD * z[PACE])
     z[LOUDEST] = largest_ratio(line, zones.kinds, zones.ratios)
 
 

@@ -1,0 +1,54 @@
+"""Zones that move on obstacles: rods where a line touches, and the answer of rods everywhere."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from tests.validation.test_validation_obstacles_accuracy import DRAGGED, HEAVE, PIPE, as_system
+
+Tables = dict[str, Any]
+MOVING = {"kind": "adaptive", "always_move": True, "tolerance": 1e-3}
+
+
+def fixed(tables: Tables, model: Any) -> Tables:
+    """The scene on given cells in given steps."""
+    duration = tables["time"]["duration"]
+    return tables | {"model": model, "mesh": {"cells": 96}, "time": {"duration": duration, "step": 0.01},
+                     "output": {"every": 0.1, "points": 97}}  # fmt: skip
+
+
+def apart(a: Any, b: Any) -> float:
+    return float(np.linalg.norm(np.array(a.position) - np.array(b.position), axis=2).max())
+
+
+@pytest.mark.parametrize("tables", [HEAVE, DRAGGED], ids=["heave", "dragged"])
+def test_a_line_is_rod_where_it_touches_and_moves_as_one_that_is_rod_everywhere(tables: Tables) -> None:
+    """Catenaries everywhere are off by 3 cm; zones by less than ten times their tolerance, as without the pipe."""
+    rods, zones, catenary = (hybrid.run(fixed(tables, x)) for x in ("rod", MOVING, "catenary"))
+    axis, s = np.array(PIPE["axis"]) / np.linalg.norm(PIPE["axis"]), np.array(zones.s)
+    w = np.array(zones.position) - np.array(PIPE["at"])
+    gap = np.linalg.norm(w - (w @ axis)[..., None] * axis, axis=2) - PIPE["radius"] - 0.025
+    kinds = set()
+    for row, here in zip(zones.zones, gap, strict=True):
+        kinds |= {x.kind for x in row}
+        touched = s[here < 0.02 * 0.05]
+        assert all(any(x.kind == "rod" and x.s_a <= at <= x.s_b for x in row) for at in touched)
+    assert kinds == {"rod", "catenary"} and (gap < 0.0).any()
+    assert apart(catenary, rods) > 0.025
+    assert 1e-4 < apart(zones, rods) < 0.01
+    system = hybrid.run(as_system(fixed(tables, MOVING))).lines["one"]
+    assert apart(system, zones) < 1e-4
+
+
+def test_cells_that_follow_the_curvature_show_a_pipe() -> None:
+    """The curvature on it and elsewhere to the share that is asked."""
+    tables = fixed(DRAGGED, {"kind": "adaptive", "curvature_error": 0.05})
+    del tables["mesh"]
+    follows, rods = hybrid.run(tables), hybrid.run(fixed(DRAGGED, "rod") | {"mesh": {"cells": 384}})
+    kappa = np.array(rods["curvature"])
+    error = np.abs(np.array(follows["curvature"]) - kappa).max() / kappa.max()
+    assert 1e-3 < error < 0.05
