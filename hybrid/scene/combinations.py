@@ -324,10 +324,6 @@ def _shapes(tables: Tables) -> Iterator[Place]:
     return (("bodies", name, "shape") for name in (tables[SYSTEM].shaped if SYSTEM in tables else ()))
 
 
-def _may_touch(tables: Tables) -> Iterator[Place]:
-    return iter([("contact", "self")] if "contact" in tables and tables["contact"].self is not False else [])
-
-
 def _free_sheaves(tables: Tables) -> Iterator[Place]:
     """Obstacles that turn freely."""
     found = tables.get("obstacles") or {}
@@ -456,7 +452,6 @@ TURNING = Feature("free bodies, points that lines are clamped to", "bodies", _tu
 CLAMPED_TO_FREE = Feature("a line that is clamped to a free point or body", "lines.NAME.connections", _clamped_to_free)
 OBSTACLES = Feature("obstacles", "obstacles", _obstacles)
 SHAPES = Feature("bodies that lines touch", "bodies.NAME.shape", _shapes)
-MAY_TOUCH = Feature("contact of a line with itself, unless it is switched off", "contact.self", _may_touch)
 SHEAVES = Feature("sheaves that turn freely", "obstacles.NAME.bearing", _free_sheaves)
 LINES_TOUCH = Feature("contact of lines with each other", "contact", _lines_touch)
 PUSHED = Feature("obstacles, contact of lines with each other", "obstacles, contact",
@@ -569,14 +564,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         PLANE, OBSTACLES, "not worked out", "contact with obstacles ({key}) is computed in space", "3 or nothing",
         "leave it out",
-    ),
-    Refusal(
-        SHEAVES, SEVERAL_LINES, "not worked out", "all lines ({key}) would turn a sheave together",
-        fix="give it a spin, or compute one line",
-    ),
-    Refusal(
-        SHEAVES, MAY_TOUCH, "not worked out", "the solve of contact ({key}) knows no sheaves",
-        fix="write `self: false` in contact, or give it a spin",
     ),
     Refusal(
         SHAPES, STIFFNESS, "not worked out", "contact of lines with a body opens and closes",

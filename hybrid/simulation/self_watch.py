@@ -390,7 +390,7 @@ def let_touch_itself(run: CompiledRun, scene: Scene, model: Model, work: Work) -
     )
     if before is not None:
         contact.restore(before.checkpoint(run.t), remeshed=True)
-    run.touch_itself(contact, model.line, model.ends.values, work)
+    run.touch_itself(contact, model.line, model.sea.values, model.ends.values, work)
 
 
 def within_itself(contact: SelfContact, model: Model) -> str:

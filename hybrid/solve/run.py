@@ -165,9 +165,9 @@ class CompiledRun:
         """From now on steps look how near the line comes to itself (kernels.contact.self_distance)."""
         self.table.bind(itself=address, itself_table=table)
 
-    def touch_itself(self, contact: SelfContact, line: Line, ends: Ends, work: Work) -> None:
+    def touch_itself(self, contact: SelfContact, line: Line, sea: Sea, ends: Ends, work: Work) -> None:
         """The line touches itself from now on (kernels.contact.self_contact)."""
-        table = contact.attach(line, ends, self.states, work, self.books)
+        table = contact.attach(line, ends, self.states, work, self.books, sea)
         self.table.bind(contact=contact.call, contact_table=table)
         self.contact = contact
 

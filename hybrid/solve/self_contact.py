@@ -42,7 +42,7 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.forces import ROTARY
 from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY
-from hybrid.kernels.state.state import Ends, Floats, Line, State, Work
+from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work
 from hybrid.kernels.step.newton import ADDRESS, ASKED, NEAR, REST
 
 # Sample points of a piece lie at most this part of a diameter apart, but for round-off, which must not decide how many
@@ -266,9 +266,13 @@ class SelfContact(ContactBooks):
         """The states from which and to which the next step leads, where they do not take turns."""
         self._job.bind(old=old, new=new)
 
-    def attach(self, line: Line, ends: Ends, states: tuple[State, State], work: Work, books: Books) -> np.ndarray:
-        """The table of the kernel for a run; `call` has its address then."""
+    def attach(
+        self, line: Line, ends: Ends, states: tuple[State, State], work: Work, books: Books, sea: Sea | None = None
+    ) -> np.ndarray:
+        """The table of the kernel for a run; `call` has its address then.  sea: where sheaves turn with the line."""
         old, new = states
+        if sea is not None and sea.rolling.size:
+            self._job.bind(carried=sea.carried, rolling=sea.rolling)
         self._job.bind(
             line=line, ends=ends, old=old, new=new, work=work, clock=books.clock, counts=books.counts, call=self.call,
             contact=self.contact, touch=books.touch, velocity=books.velocity, power=books.power, report=books.report,

@@ -23,6 +23,7 @@ from hybrid.kernels.junctions.body_contact import meet_bodies
 from hybrid.kernels.junctions.body_forces import EACH_BODY, TOUCHED, blank_meeting_job
 from hybrid.kernels.junctions.carried_frames import ANSWER, SEAT, TURNS
 from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL
+from hybrid.kernels.junctions.joined_sheaves import blank_spinning_job, spin_sheaves
 from hybrid.kernels.junctions.junctions import HANDED
 from hybrid.kernels.junctions.system_contact import blank_touching_job, room_for_products, touch_system
 from hybrid.kernels.junctions.system_job import ASKED, blank_system_job
@@ -34,6 +35,7 @@ from hybrid.kernels.run.run import in_space
 from hybrid.kernels.run.system import JUNCTIONS, book_system_step, solve_system
 from hybrid.kernels.state.books import NOW, PARITY, Books, blank_books
 from hybrid.kernels.state.forces import FRICTION, WAVES
+from hybrid.kernels.state.obstacle_rows import FREE
 from hybrid.kernels.state.report import LOCAL_ERROR, NET_A, RESIDUAL, USED_RHO
 from hybrid.kernels.state.state import Floats, State, Work, state_for
 from hybrid.kernels.step.job import blank_job
@@ -109,7 +111,8 @@ class SystemSolver:
         self._contacts, self.shared = {k: x for k, x in enumerate(contacts) if x is not None}, shared
         touch = {*self._contacts, *(shared.lines if shared is not None else ())}
         self._rides = lines[0].rides  # obstacles are those of all lines
-        touch |= {*range(len(lines))} if self._rides.size else set()
+        self._sheaves = int((lines[0].line.moved == FREE).sum())
+        touch |= {*range(len(lines))} if self._rides.size or self._sheaves else set()
         self.work = [_room(x, k in touch) for k, x in enumerate(lines)]
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
         self._floors = np.array([-np.inf if x.slackens else x.floor for x in lines])
@@ -177,6 +180,9 @@ class SystemSolver:
         self._meeting = [Table(blank_meeting_job), Table(blank_meeting_job)] if self._rides.size else []
         if self._rides.size:
             self._meet()
+        self._spinning = [Table(blank_spinning_job), Table(blank_spinning_job)] if self._sheaves else []
+        if self._sheaves:
+            self._spin()
         self._touching = Table(blank_touching_job), Table(blank_touching_job)
         self._at_rest = np.zeros(1, np.int64)
 
@@ -217,6 +223,22 @@ class SystemSolver:
                 meet_table=meeting.numbers,
             )
 
+    def _spin(self) -> None:
+        """Lines turn the sheaves among the obstacles."""
+        nodes, bodies = [x.line.s.size for x in self.lines], len(self.bodies)
+        room = {
+            "gaps": np.zeros_like(self._gaps), "phase": self._phase, "asked": self._asked,
+            "begins": np.append(0, np.cumsum(nodes)[:-1]).astype(np.int64), "marks": np.zeros(sum(nodes), np.int64),
+            "kept": np.zeros((sum(nodes), SIZE)), "moved": np.zeros((bodies, 6)),
+            "turned": np.zeros((self._sheaves, bodies, 6)),
+        }  # fmt: skip
+        for meeting, spinning in zip(self._meeting, self._spinning, strict=False):
+            spinning.bind(meet=meet_bodies.address(meeting.numbers), meet_table=meeting.numbers)
+        for job, spinning, numbers in zip(self._jobs, self._spinning, self._numbers, strict=True):
+            spinning.bind(**self._of_lines(numbers), **room)
+            at = spin_sheaves.address(spinning.numbers)
+            job.bind(phase=self._phase, spin=at, spin_table=spinning.numbers)
+
     def _of_lines(self, numbers: NDArray[np.int64]) -> dict[str, Any]:
         """What those share that put contact into the corrections of all lines, of jobs `numbers`."""
         return {
@@ -242,10 +264,12 @@ class SystemSolver:
         room = {
             "gaps": np.zeros_like(self._gaps), "kept": np.zeros((nodes, SIZE)), "asked": self._at_rest,
             "moved": np.zeros((len(self.bodies), 6)), "hessenberg": room_for_products(), "shared": shared,
-            "contacts": tables,
+            "contacts": tables, "phase": self._phase,
         }  # fmt: skip
         for meeting, touching in zip(self._meeting, self._touching, strict=False):
-            touching.bind(phase=self._phase, meet=meet_bodies.address(meeting.numbers), meet_table=meeting.numbers)
+            touching.bind(meet=meet_bodies.address(meeting.numbers), meet_table=meeting.numbers)
+        for spinning, touching in zip(self._spinning, self._touching, strict=False):
+            touching.bind(spin=spin_sheaves.address(spinning.numbers), spin_table=spinning.numbers)
         for job, touching, numbers in zip(self._jobs, self._touching, self._numbers, strict=True):
             touching.bind(**self._of_lines(numbers), **room)
             job.bind(touch=touch_system.address(touching.numbers), touch_table=touching.numbers)
@@ -309,8 +333,9 @@ class SystemSolver:
             jobs[parity].bind(old=old.bodies, new=new.bodies)
         if self._contacts or self.shared is not None:
             self._touching[parity].bind(old=old.bodies, new=new.bodies)
-        if self._meeting:
-            self._meeting[parity].bind(old=old.bodies, new=new.bodies)
+        for jobs in (self._meeting, self._spinning):
+            if jobs:
+                jobs[parity].bind(old=old.bodies, new=new.bodies)
 
     def _solve(self, task: Task, old: SystemState, new: SystemState, t: float = 0.0) -> SystemTaken:
         self.turns = None
@@ -321,7 +346,7 @@ class SystemSolver:
         limits = task.limits
         self._asked[:] = (
             task.what, task.dt, task.before, task.rho, task.cv, task.ca, limits.reach, limits.scale, limits.most,
-            task.rho_before, task.fixed, t,
+            task.rho_before, task.fixed, t, 1.0,
         )  # fmt: skip
         outcome, iterations, left, line, where = solve_system(self._jobs[0].numbers)
         return SystemTaken(Outcome(outcome), iterations, left, line, where, self.residual())

@@ -104,6 +104,10 @@ FEATURES: dict[str, tuple[Tables, str]] = {
                                 "friction": 0.3, "motion": {"travel": {"by": [0.05, 0.1, 0.08], "over": 0.4}}}}},
         "obstacles",
     ),
+    "sheave": (
+        {"obstacles": {"pipe": {"kind": "cylinder", "at": [4, 0, -2], "axis": [0.1, 1, 0.05], "radius": 0.8,
+                                "friction": 0.3, "bearing": {"inertia": 0.5, "damping": 0.1}}}}, "obstacles",
+    ),
     "layers": ({"resolution": {"cells_per_layer": 3}, "mesh": None}, "model"),
     "chosen steps": ({"time.tolerance": 1e-4, "time.step": None}, "time"),
 }  # fmt: skip

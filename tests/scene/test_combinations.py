@@ -38,10 +38,6 @@ SECTION, END, ONE = "cable.sections.0.", "ends.end.", "lines.one."
 TORQUE = {SECTION + "tension_torque": 1e-3}
 SWIVEL = {"cable.attachments": [{"kind": "swivel", "at": 5}], END + "normal": [0, 1, 0]}
 BALL: dict[str, Any] = {"obstacles": {"ball": {"kind": "sphere", "at": [4, 0, -9], "radius": 1}}}
-SHEAVE: dict[str, Any] = {
-    "obstacles": {"sheave": {"kind": "cylinder", "at": [4, 0, -9], "axis": [0, 1, 0], "radius": 1,
-                             "bearing": {"inertia": 1}}}
-}  # fmt: skip
 PAID: dict[str, Any] = {END + "payout": {"rate": 0.1, "ramp": 1.0}}
 MOVING = {"model": {"kind": "adaptive"}}
 FOLLOWING = {"model": {"kind": "adaptive", "curvature_error": 0.05}}
@@ -85,8 +81,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.PLANE, c.OBSTACLES): (BALL | {"dimension": 2}, ""),
     (c.MOVING_ZONES, c.GOES_ITS_WAY): ({"obstacles.ball": BALL["obstacles"]["ball"] | {"from_outside": True}} | MOVING, ""),
     (c.PAYOUT, c.PUSHED): (BALL | PAID, ""),
-    (c.SHEAVES, c.SEVERAL_LINES): (SHEAVE | {ONE + "contact": {"self": False}}, ""),
-    (c.SHEAVES, c.MAY_TOUCH): (SHEAVE, ""),
     (c.SHAPES, c.STIFFNESS): (SHAPED | {ONE + "contact": {"self": False}}, "stiffness"),
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
     (c.SETTLED_FRICTION, c.PUSHED): (BALL | {"initial": {"kind": "equilibrium", "friction": "settled"}}, ""),

@@ -226,18 +226,11 @@ def test_a_run_over_a_sheave_goes_on_and_is_taken_back_bit_for_bit(rolled: Any, 
     assert abs(drum.rotation[0, 0]) == pytest.approx(np.cos(turned), abs=1e-9)
 
 
-def test_sheaves_that_cannot_be_computed_are_refused() -> None:
-    with pytest.raises(SceneError, match="knows no sheaves") as refused:
-        hybrid.validate_scene(weights(0.1, contact={}))
-    assert [x.where for x in refused.value.complaints] == ["obstacles.drum.bearing"]
+def test_a_sheave_has_no_spin_that_is_given() -> None:
     tables = weights(0.1)
     tables["obstacles"]["drum"]["spin"] = {"rate": 1.0, "ramp": 1.0}
     with pytest.raises(SceneError, match="because the spin is given"):
         hybrid.validate_scene(tables)
-    tables = pushed()
-    tables["obstacles"]["bar"]["bearing"] = {"inertia": 1.0}
-    with pytest.raises(SceneError, match="would turn a sheave together"):
-        hybrid.validate_scene(as_system(tables))
 
 
 # --- frames of reference --------------------------------------------------------------------------------

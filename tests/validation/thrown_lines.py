@@ -14,6 +14,7 @@ from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, PLACE, STATE, V, W
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.march.energies import observe
 from hybrid.kernels.state.books import SHORTEST, blank_books
+from hybrid.kernels.state.obstacle_rows import INERTIA, SPIN
 from hybrid.model.bodies import body_model
 from hybrid.model.build import build
 from hybrid.model.lines_contact import Touching
@@ -57,13 +58,14 @@ def straight(length: float, at: Floats, along: Floats, cells: int) -> Floats:
 def throw(
     shapes: list[Floats], speeds: list[Floats], step: float, duration: float, friction: float = 0.0,
     width: float = WIDTH, kind: str = "rod", turn: Floats | None = None, body: FreeBody | None = None,
+    sheaves: dict[str, Any] | None = None,
 ) -> Throw:  # fmt: skip
     """Lines with nodes (N+1, 3) m and velocities (N+1, 3) m/s fly; steps (s) that fail are halved.
 
-    turn: (3, 3), of everything; body: a free one with a shape, which spins.
+    turn: (3, 3), of everything; body: a free one with a shape, which spins; sheaves: obstacles that turn freely.
     """
     models, lines, states = [], [], []
-    surface = {} if body is None else {"obstacles": body.surface("ball")}
+    around = {"obstacles": sheaves if body is None else body.surface("ball")} if body or sheaves else {}
     rides = np.zeros(0 if body is None else 1, np.int64)
     own = () if body is None else (body_model("ball", body, 0.0, 0.0),)
     numbers = np.array([x.numbers for x in own]).reshape(len(own), NUMBERS)
@@ -77,7 +79,7 @@ def throw(
             "contact": {"self": True}, "ends": {"start": "free", "end": "free"}, "model": kind,
             "mesh": {"nodes": s.tolist()}, "initial": {"kind": "points", "points": r.tolist()}, "dimension": 3,
             "time": {"duration": 1.0, "step": 0.1},
-        } | surface))  # fmt: skip
+        } | around))  # fmt: skip
         state = model.start.copy()
         state.v[:] = v if turn is None else v @ turn.T
         x = JoinedLine(
@@ -136,8 +138,10 @@ def energy(
         parts, room = np.zeros(5), np.zeros((x.T.size + 1, 3))
         observe(model.line, model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, room, room.copy(), parts)
         total += float(parts[:4].sum())
-        if len(bodies):
+        if model.line.moved.size:
             total += float(stored_energy(model.line, joined.sea, x.r))
+    if states.lines[0].sheave.size:
+        total += 0.5 * float(lines[0].sea.carried[:, INERTIA] @ states.lines[0].sheave[:, SPIN] ** 2)
     for numbers, row in zip(bodies, states.bodies, strict=True):
         total += 0.5 * float(_rates(row) @ numbers[:36].reshape(6, 6) @ _rates(row))
     return total

@@ -76,7 +76,19 @@ from hybrid.kernels.state.books import (
     TRY_END,
 )
 from hybrid.kernels.state.report import FORCE_A, NET_A, REPORT_SIZE, SELF_FRICTION_WORK
-from hybrid.kernels.state.state import Ends, Floats, Line, State, Work, blank_line, blank_state, no_ends, no_work
+from hybrid.kernels.state.state import (
+    NO_CARRIED,
+    NO_ROOM,
+    Ends,
+    Floats,
+    Line,
+    State,
+    Work,
+    blank_line,
+    blank_state,
+    no_ends,
+    no_work,
+)
 from hybrid.kernels.step.generalized_alpha import before_fixed, radius_of_step, scheme
 from hybrid.kernels.step.newton import ASKED, FIND, FINISH, GAIN, LIMIT, NEAR, PREPARE, RADIUS, REST, TOUCH
 
@@ -97,6 +109,8 @@ class ContactJob(NamedTuple):
     velocity: Floats  # (2, 3) m/s
     power: Floats  # (2, RATES) W
     report: Floats  # (3, REPORT_SIZE)
+    carried: Floats  # of kernels.state.state.Sea, where a sheave turns freely; else empty
+    rolling: Floats
 
 
 def blank_contact_job() -> ContactJob:
@@ -106,7 +120,7 @@ def blank_contact_job() -> ContactJob:
     call = np.zeros(3, np.int64)
     return ContactJob(
         blank_line(1), no_ends(), state, state, no_work(), clock, counts, call, blank_contact(1),
-        np.zeros((3, 2)), np.zeros((2, 3)), np.zeros((2, RATES)), np.zeros((3, REPORT_SIZE)),
+        np.zeros((3, 2)), np.zeros((2, 3)), np.zeros((2, RATES)), np.zeros((3, REPORT_SIZE)), NO_CARRIED, NO_ROOM,
     )  # fmt: skip
 
 
@@ -338,6 +352,8 @@ def contact_task(table):
     if phase != TOUCH:
         return numbers[ENERGY] + (numbers[TRIED] if rubs else 0.0)
     charge(line, contact, job.counts)
-    if contact.counts[OVERFLOW] or (contact.counts[POINTS] > 0 and not solve_contact(ends, contact, work)):
+    if contact.counts[OVERFLOW] or (
+        contact.counts[POINTS] > 0 and not solve_contact(ends, contact, work, job.carried, job.rolling)
+    ):
         return 0.0
     return 1.0

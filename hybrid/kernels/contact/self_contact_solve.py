@@ -13,6 +13,7 @@ from hybrid.kernels.algebra.kept_factors import carry_given, prepare_sweep, solv
 from hybrid.kernels.contact.self_contact_friction import add_held, add_held_product
 from hybrid.kernels.contact.self_contact_law import add_gradient, add_product
 from hybrid.kernels.contact.self_contact_pairs import FRICTION, MOST_PRODUCTS, NODES, POINTS, PRODUCTS, ROLLS, WIDEST
+from hybrid.kernels.laws.sheaves import turn_along
 from hybrid.kernels.machine.compile import called, inner
 
 # GMRES leaves a part of its first residual: of what Newton's method leaves of the correction, its size in diameters, a
@@ -54,9 +55,23 @@ def first_node(contact):
     return first
 
 
+@inner
+def first_moved(rolling, before):
+    """The first node that moves sheaves; `before`: none does before that node."""
+    for j in range(2, rolling.shape[0], 3):
+        for i in range(before):
+            if rolling[j, i, 1] != 0.0 or rolling[j, i, 2] != 0.0 or rolling[j, i, 3] != 0.0:
+                before = i
+                break
+    return before
+
+
 @called
-def respond(ends, contact, work, with_gradient, begin):
-    """contact.z = A^-1 (H x + g) from node `begin` on, g where asked; x of the nodes in contact."""
+def respond(ends, contact, work, carried, rolling, with_gradient, begin):
+    """contact.z = A^-1 (H x + g) from node `begin` on, g where asked; x of the nodes in contact.
+
+    carried, rolling: of sheaves that turn freely (kernels.laws.sheaves), which A has too; empty: there are none.
+    """
     find_forces(contact, with_gradient)
     y, z = contact.y, contact.z
     last = y.shape[0] - 1
@@ -67,15 +82,17 @@ def respond(ends, contact, work, with_gradient, begin):
         for j in range(3):
             z[i, 1 + j] = 0.0 if held else y[i, j]
         z[i, 4] = y[i, 3] * contact.rolls[i]
-    if begin == 0:
-        for i in range(first_node(contact)):
-            for j in range(5):
-                z[i, j] = 0.0
+    first = first_node(contact)
+    for i in range(begin, first):
+        for j in range(5):
+            z[i, j] = 0.0
     if with_gradient:
-        carry_given(work.X, work.W, contact.marks, z, False, max(begin, first_node(contact)))
+        carry_given(work.X, work.W, contact.marks, z, False, first)
     else:
-        sweep(work.X, work.W, contact.sweep, contact.marks, z, False, begin)
-    return solve_backward(work.X, z, begin)
+        sweep(work.X, work.W, contact.sweep, contact.marks, z, False, first)
+    good = solve_backward(work.X, z, begin)
+    turn_along(carried, rolling, rolling.shape[0] // 3, z)
+    return good
 
 
 @inner
@@ -150,7 +167,7 @@ def take_vector(contact, column):
 
 
 @inner
-def find_solution(ends, contact, work):
+def find_solution(ends, contact, work, carried, rolling):
     """GMRES: contact.x = the correction of the nodes in contact; False: not finite.
 
     It begins at zero, where the residual is A^-1 (b + g), which falls as Newton converges.  The correction x0 of a line
@@ -160,11 +177,15 @@ def find_solution(ends, contact, work):
     count, per, rhs, solution = contact.counts[NODES], unknowns(contact), MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
     begin = first_node(contact)
     prepare_sweep(work.X, work.W, contact.sweep, begin, contact.z.shape[0] - 1)
+    begin = first_moved(rolling, begin)
+    for i in range(begin if rolling.shape[0] > 0 else 0):
+        for j in range(5):
+            z[i, j] = 0.0
     for k in range(count):
         i = contact.nodes[k]
         for j in range(per):
             x[i, j] = 0.0
-    if not respond(ends, contact, work, True, begin):
+    if not respond(ends, contact, work, carried, rolling, True, begin):
         return False
     s = 0.0
     for k in range(count):
@@ -184,7 +205,7 @@ def find_solution(ends, contact, work):
         left, most = s, enough(s, contact.numbers[WIDEST], per * count)
         while done < min(MOST_PRODUCTS, per * count) and left > most:
             take_vector(contact, done)
-            if not respond(ends, contact, work, False, begin):
+            if not respond(ends, contact, work, carried, rolling, False, begin):
                 return False
             for k in range(count):
                 i = contact.nodes[k]
@@ -210,9 +231,11 @@ def find_solution(ends, contact, work):
 
 
 @inner
-def solve_contact(ends, contact, work):
+def solve_contact(ends, contact, work, carried, rolling):
     """Put contact into the correction work.x of a line without it; False if it is not finite."""
-    if not find_solution(ends, contact, work) or not respond(ends, contact, work, True, 0):
+    if not find_solution(ends, contact, work, carried, rolling):
+        return False
+    if not respond(ends, contact, work, carried, rolling, True, 0):
         return False
     z = contact.z
     for i in range(work.x.shape[0]):

@@ -47,9 +47,9 @@ from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.step.job import read
 
 # What is asked: shapes are brought to where their bodies are; forces of contact are found; these and R are put into the
-# equations of the bodies; corrections of lines and bodies are coupled; turns that contact does not hold get a spring; other
-# corrections of the same iteration are coupled.
-CARRY, PRESS, STIFFEN, COUPLE, HOLD, AGAIN = range(6)
+# equations of the bodies; corrections of lines and bodies are coupled; turns that contact does not hold get a spring; of other
+# corrections of the same iteration: R is put into the equations, and they are coupled.
+CARRY, PRESS, STIFFEN, COUPLE, HOLD, RESIST, AGAIN = range(7)
 
 
 @inner
@@ -287,7 +287,7 @@ def substitute_small(A, order):
 
 @kernel
 def meet_bodies(table):
-    """Do what is asked of lines that touch bodies (CARRY, PRESS, STIFFEN, COUPLE, HOLD, AGAIN); 0: it fails."""
+    """Do what is asked of lines that touch bodies (CARRY, PRESS, STIFFEN, COUPLE, HOLD, RESIST, AGAIN); 0: it fails."""
     job = read_meeting(table)
     task, phase = read(job.tables[0]).task, job.phase[0]
     if phase == CARRY:
@@ -299,6 +299,8 @@ def meet_bodies(table):
         push_bodies(job)
     elif phase == HOLD:
         hold_rolling(job)
+    elif phase == RESIST:
+        stiffen(job)
     elif phase == AGAIN:
         if job.found[0] > 0:
             apply(job)

@@ -27,10 +27,11 @@ from hybrid.kernels.contact.self_contact_solve import (
     unknowns,
 )
 from hybrid.kernels.junctions.bodies import NUMBERS, STATE, WORK, X
-from hybrid.kernels.junctions.body_contact import AGAIN
 from hybrid.kernels.junctions.carried_frames import ANSWER, SEAT
-from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL, last_block, solve_dense
-from hybrid.kernels.junctions.junctions import END, HANDED, START, assemble_junctions, correct_all
+from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL, last_block
+from hybrid.kernels.junctions.joined_sheaves import TURN_ALONG
+from hybrid.kernels.junctions.junctions import END, HANDED, START
+from hybrid.kernels.junctions.right_sides import answer_right_sides
 from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.machine.references import caller, reader
 from hybrid.kernels.march.assembly import JOINED
@@ -68,9 +69,11 @@ class TouchingJob(NamedTuple):
     moved: Floats  # (B, 6) likewise of bodies
     hessenberg: Floats  # as kernels.contact.self_contact_pairs.Contact has it
     asked: NDArray[np.int64]  # (1,) 1: of a state in which no step is tried
-    phase: NDArray[np.int64]  # (1,) what is asked of meet_bodies
+    phase: NDArray[np.int64]  # (1,) what is asked of meet_bodies and spin_sheaves
     meet_table: NDArray[np.int64]  # of kernels.junctions.body_contact.meet_bodies
-    meet: int = 0  # its address; 0: no body has a shape
+    spin_table: NDArray[np.int64]  # of kernels.junctions.joined_sheaves.spin_sheaves
+    meet: int = 0  # address of meet_bodies; 0: no body has a shape
+    spin: int = 0  # of spin_sheaves; 0: no sheave turns freely
 
 
 def blank_touching_job() -> TouchingJob:
@@ -80,7 +83,7 @@ def blank_touching_job() -> TouchingJob:
         z((1, 1), whole), z((1, 2), whole), z((1, 2, SEAT)), z((1, 2, 3)), z((1, 2, 3)), z(1, whole), z((3, 1, SIZE)),
         z(FUNCTIONAL), z((2, ANSWER)), z((1, 3)), z((1, NUMBERS)), z((1, STATE)), z((1, STATE)), z((1, WORK)),
         z((HANDED - 1, HANDED)), z((2, 6, 6)), z((4, 2)), z(COLUMNS), z((1, 2), whole), z((1, 1), whole), z((2, SIZE)), z((1, 6)), room_for_products(),
-        z(1, whole), z(1, whole), z(1, whole),
+        z(1, whole), z(1, whole), z(1, whole), z(1, whole),
     )  # fmt: skip
 
 
@@ -90,7 +93,7 @@ def room_for_products() -> Floats:
 
 
 read_job = reader(blank_touching_job())
-call_meet = caller(0)
+call_spin = caller(0)
 
 
 @inner
@@ -144,7 +147,6 @@ def set_right_side(l, line_job, contact, first, joints, touches, exactly):
 @called
 def respond(job, cv, ca, with_gradient):
     """Corrections work.x of all lines by the forces of contact at contact.x; False if they are not finite."""
-    m = job.A.shape[1] - 1
     for l in range(job.tables.shape[0]):
         if touching(job, l) > 0:
             find_forces(read_contact(job.contacts[l]).contact, with_gradient)
@@ -154,14 +156,11 @@ def respond(job, cv, ca, with_gradient):
         if job.shared[l, 0] >= 0:
             touches = contact.counts[POINTS] > 0
         set_right_side(l, read(job.tables[l]), contact, job.shared[l, 1], job.joints, touches, with_gradient)
-    assemble_junctions(job, m, cv, ca, False)
-    if m > 0 and not solve_dense(job.A, m):
+    if not answer_right_sides(job, cv, ca, job.asked[0] == 0):
         return False
-    if correct_all(job, job.net.shape[0], m) >= 0:
-        return False
-    if job.meet != 0 and not job.asked[0]:
-        job.phase[0] = AGAIN
-        return call_meet(job.meet, job.meet_table) != 0
+    if job.spin != 0 and cv > 0.0:
+        job.phase[0] = TURN_ALONG
+        return call_spin(job.spin, job.spin_table) != 0
     return True
 
 

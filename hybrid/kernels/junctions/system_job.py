@@ -44,16 +44,19 @@ class SystemJob(NamedTuple):
     A: Floats  # (m+3, m+1)
     touch_table: NDArray[np.int64]  # of kernels.junctions.system_contact.touch_system
     rides: NDArray[np.int64]  # (M,) the body that carries an obstacle, -1: none does; empty: no body has a shape
-    phase: NDArray[np.int64]  # (1,) what is asked of meet_bodies
+    phase: NDArray[np.int64]  # (1,) what is asked of meet_bodies and spin_sheaves
     meet_table: NDArray[np.int64]  # of kernels.junctions.body_contact.meet_bodies
+    spin_table: NDArray[np.int64]  # of kernels.junctions.joined_sheaves.spin_sheaves
     solver: int = 0  # address of the kernel that marches a line
     touch: int = 0  # of touch_system; 0: no line touches itself
     meet: int = 0  # of meet_bodies; 0: no body has a shape
+    spin: int = 0  # of spin_sheaves; 0: no sheave turns freely
 
 
-# Numbers of `asked`: of the task (kernels.step.newton.Task), and the time of the new states, s.
-(WHAT, DT, BEFORE, RHO_OF_STEP, CV, CA, REACH, SCALE, MOST, RHO_OF_LAST, FIXED, TIME) = range(12)
-ASKED = 12
+# Numbers of `asked`: of the task (kernels.step.newton.Task), the time of the new states, s, and the part of a correction
+# that is made.
+(WHAT, DT, BEFORE, RHO_OF_STEP, CV, CA, REACH, SCALE, MOST, RHO_OF_LAST, FIXED, TIME, PART) = range(13)
+ASKED = 13
 
 
 def blank_system_job() -> SystemJob:
@@ -62,7 +65,7 @@ def blank_system_job() -> SystemJob:
     return SystemJob(
         z(ASKED), two, z((1, 1)), two, z((1, 2, 3)), z((1, 2, 1)), z((1, 2, 3)), z((1, 2, 3)), z(1), z(1), one,
         z((1, 1, 1)), z(1), z((2, 1)), z(1), z((1, 3)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)), z((1, 1)),
-        z((2, 6, 6)), z((1, 1)), one, one, one, one,
+        z((2, 6, 6)), z((1, 1)), one, one, one, one, one,
     )  # fmt: skip
 
 

@@ -6,10 +6,14 @@
     tau      way of the surface at a node by phi, axis x arm                    m
     p        force of friction on a node by phi                                 N
     M        moment of the line about the axis, - sum of tau . f                N m
+    q        change of M by the places of nodes: p where what touches sticks,   N
+             and what their pressure does to friction
 
 A step has I w' + c w = M at its end, in the scheme of the line.  With y what a correction of the line is without phi and
-z what it is by phi (A z = -p), phi changes by - (g + p . y)/(p . z - sum of tau . p - I ca - c cv), g = M - I w' - c w.
-That N changes with the line is left out of dM, which slows Newton's method where it does, and touches nothing else.
+z what it is by phi (A z = -p), phi changes by - (g + q . y)/(q . z + d), d = - sum of tau . p - I ca - c cv,
+g = M - I w' - c w.  Of several sheaves each is put into corrections after those before it, which turn in its z; whatever else
+is added to a correction (contact of the line with itself), each turns by - (g + q . x)/d with the whole of it, x.
+How normals turn along the sheave is left out of q.
 """
 
 from __future__ import annotations
@@ -18,19 +22,21 @@ import math
 
 from hybrid.kernels.algebra.kept_factors import solve_again
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, mat_vec, scale, sub
-from hybrid.kernels.laws.obstacle_grip import pressed
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles, row3, row9, way_along
+from hybrid.kernels.laws.obstacles import normal_force
 from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.state.forces import FRICTION
 from hybrid.kernels.state.obstacle_rows import (
     ALGORITHMIC,
+    ALONE,
     ANGLE,
     BEARING,
     EACH,
     ENDED,
     FREE,
     INERTIA,
+    LEFT_OVER,
     MU,
-    ROLL,
     ROLLED,
     ROLLED_BEFORE,
     ROLLING,
@@ -39,6 +45,7 @@ from hybrid.kernels.state.obstacle_rows import (
     STILL_AXIS,
     TRUE,
     TURNED,
+    YIELDING,
 )
 
 
@@ -59,7 +66,7 @@ def predict_sheaves(line, sea, old, new, s):
 
 @inner
 def friction_by_turn(t, n, N, mu, sl, tau):
-    """Friction on a node pressed by N after the way t, and how it changes with the angle."""
+    """Friction on a node pressed by N after the way t, over N, and how it changes with the angle."""
     q = sub(t, scale(dot(n, t), n))
     size = math.sqrt(dot(q, q))
     c = 1.0 / sl if size <= sl else 1.0 / size
@@ -67,75 +74,121 @@ def friction_by_turn(t, n, N, mu, sl, tau):
     if size > sl:
         d = scale(c, q)
         y = sub(y, scale(dot(d, y), d))
-    return scale(-mu * c * N, q), scale(mu * c * N, y)
+    return scale(-mu * c, q), scale(mu * c * N, y)
 
 
 @inner
-def moments(line, sea, r, u, state, k, b):
-    """M of sheave k and its derivative by phi; b: (N+1, 5) gets - p."""
+def add_to_row(rows, i, part, x):
+    """Add a part of a vector to the places in row i of (N+1, 5)."""
+    for a in range(3):
+        rows[i, 1 + a] += part * x[a]
+
+
+@inner
+def moments(line, sea, r, u, state, k, b, q, cv):
+    """M of sheave k and its derivative by phi; b: (N+1, 5) gets - p, q: (N+1, 5) the derivative of M by the places."""
     moment = slope = 0.0
-    axis = mat_vec(row9(sea.carried, k, TURNED), row3(sea.carried, k, STILL_AXIS))
-    for i in range(u.shape[0]):
+    axis, last = mat_vec(row9(sea.carried, k, TURNED), row3(sea.carried, k, STILL_AXIS)), u.shape[0] - 1
+    for i in range(last + 1):
         for j in range(5):
-            b[i, j] = 0.0
+            b[i, j] = q[i, j] = 0.0
+    for i in range(last + 1 if line.bits & FRICTION else 0):
         x = add(get3(r, i), get3(u, i))
-        N, n, _, _ = pressed(line, sea, k, i, x, state)
+        N, _, n, _, _, dN, before, after = normal_force(line, sea, True, k, i, x, state.v, state.e, cv)
         if N > 0.0:
             t = way_along(sea.carried, k, row3(sea.grip, i, EACH * k), x, get3(u, i))
             tau = cross(axis, sub(x, row3(sea.carried, k, ENDED)))
-            f, p = friction_by_turn(t, n, N, sea.obstacles[k, MU], sea.obstacles[k, SLIP], tau)
-            moment -= dot(tau, f)
+            g, p = friction_by_turn(t, n, N, sea.obstacles[k, MU], sea.obstacles[k, SLIP], tau)
+            by_force = -dot(tau, g)
+            moment += by_force * N
             slope -= dot(tau, p)
-            b[i, 1], b[i, 2], b[i, 3] = -p[0], -p[1], -p[2]
+            add_to_row(b, i, -1.0, p)
+            add_to_row(q, i, 1.0, p)
+            add_to_row(q, i, by_force, dN)
+            if i > 0:
+                add_to_row(q, i - 1, by_force, before)
+            if i < last:
+                add_to_row(q, i + 1, by_force, after)
     return moment, slope
 
 
 @inner
-def along(b, x):
-    """p . x of a correction."""
+def along(q, x):
+    """Change of M by a correction x (N+1, 5)."""
     total = 0.0
-    for i in range(b.shape[0]):
-        total -= b[i, 1] * x[i, 1] + b[i, 2] * x[i, 2] + b[i, 3] * x[i, 3]
+    for i in range(q.shape[0]):
+        total += q[i, 1] * x[i, 1] + q[i, 2] * x[i, 2] + q[i, 3] * x[i, 3]
     return total
+
+
+@inner
+def turn_along(carried, rolling, count, x):
+    """Put the first `count` sheaves into a correction x (N+1, 5) that was found without them."""
+    j = 0
+    for k in range(carried.shape[0]):
+        if carried[k, INERTIA] > 0.0:
+            if j < count and carried[k, YIELDING] != 0.0:
+                z = rolling[3 * j + 1]
+                change = -along(rolling[3 * j + 2], x) / carried[k, YIELDING]
+                for i in range(z.shape[0]):
+                    for c in range(5):
+                        x[i, c] += change * z[i, c]
+            j += 1
 
 
 @kernel
 def turn_with(line, sea, ends, r, state, work, cv, ca):
-    """Put sheaves into a correction that was found without them; how far they turn is in carried[:, ROLL].
+    """Put sheaves into a correction that was found without them.
 
-    r: (N+1, 3) m, before the step.  Each of several is corrected after those before it.
+    r: (N+1, 3) m, before the step.
     """
     j, last = 0, work.x.shape[0] - 1
     for k in range(line.moved.shape[0]):
         if line.moved[k] != FREE:
             continue
-        b, z = sea.rolling[2 * j], sea.rolling[2 * j + 1]
-        j += 1
-        moment, slope = moments(line, sea, r, work.u, state, k, b)
+        b, z, q = sea.rolling[3 * j], sea.rolling[3 * j + 1], sea.rolling[3 * j + 2]
+        moment, slope = moments(line, sea, r, work.u, state, k, b, q, cv)
         for end in range(2):
             if ends.held[end]:
                 for i in range(5):
-                    b[end * last, i] = 0.0
+                    b[end * last, i] = q[end * last, i] = 0.0
         inertia, bearing = sea.carried[k, INERTIA], sea.carried[k, BEARING]
         left = moment - inertia * state.sheave[k, TRUE] - bearing * state.sheave[k, SPIN]
         solve_again(work.X, work.W, b, z)
-        change = -(left + along(b, work.x)) / (along(b, z) + slope - inertia * ca - bearing * cv)
-        sea.carried[k, ROLL] = change
+        turn_along(sea.carried, sea.rolling, j, z)
+        sea.carried[k, LEFT_OVER], sea.carried[k, ALONE] = left, slope - inertia * ca - bearing * cv
+        sea.carried[k, YIELDING] = along(q, z) + sea.carried[k, ALONE]
+        change = -(left + along(q, work.x)) / sea.carried[k, YIELDING]
         for i in range(z.shape[0]):
             for c in range(5):
                 work.x[i, c] += change * z[i, c]
+        j += 1
+
+
+@inner
+def roll_sheave(sea, new, k, change, cv, ca):
+    """Sheave k turns by a change, rad."""
+    new.sheave[k, ANGLE] += change
+    new.sheave[k, SPIN] += cv * change
+    new.sheave[k, TRUE] += ca * change
+    sea.carried[k, ROLLED], sea.carried[k, ROLLING] = new.sheave[k, ANGLE], new.sheave[k, SPIN]
 
 
 @kernel
-def roll_on(line, sea, old, new, s, part):
-    """Sheaves turn by the part of their correction that is made."""
+def roll_on(line, sea, new, s, part, x):
+    """Sheaves turn with the part that is made of the correction x (N+1, 5)."""
+    j = 0
     for k in range(line.moved.shape[0]):
         if line.moved[k] == FREE:
-            change = part * sea.carried[k, ROLL]
-            new.sheave[k, ANGLE] += change
-            new.sheave[k, SPIN] += s.cv * change
-            new.sheave[k, TRUE] += s.ca * change
-            w, wa = old.sheave[k, SPIN], old.sheave[k, ALGORITHMIC]
-            new.sheave[k, ALGORITHMIC] = (new.sheave[k, SPIN] - w - s.dt * (1.0 - s.ga) * wa) / (s.ga * s.dt)
-            sea.carried[k, ROLLED], sea.carried[k, ROLLING] = new.sheave[k, ANGLE], new.sheave[k, SPIN]
+            change = -part * (sea.carried[k, LEFT_OVER] + along(sea.rolling[3 * j + 2], x)) / sea.carried[k, ALONE]
+            roll_sheave(sea, new, k, change, s.cv, s.ca)
+            j += 1
     carry_obstacles(sea.now[0] - s.dt, sea.now[0], sea)
+
+
+@kernel
+def find_rates_of_sheaves(old, new, s):
+    """Algorithmic accelerations of sheaves at the end of a step."""
+    for k in range(new.sheave.shape[0]):
+        w, wa = old.sheave[k, SPIN], old.sheave[k, ALGORITHMIC]
+        new.sheave[k, ALGORITHMIC] = (new.sheave[k, SPIN] - w - s.dt * (1.0 - s.ga) * wa) / (s.ga * s.dt)

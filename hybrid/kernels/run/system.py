@@ -26,6 +26,7 @@ from hybrid.kernels.junctions.bodies import (
 from hybrid.kernels.junctions.body_contact import CARRY, COUPLE, HOLD, PRESS, STIFFEN
 from hybrid.kernels.junctions.carried_frames import turns
 from hybrid.kernels.junctions.joined_lines import solve_dense
+from hybrid.kernels.junctions.joined_sheaves import ROLL_ON, TURN
 from hybrid.kernels.junctions.junctions import (
     END,
     START,
@@ -37,7 +38,7 @@ from hybrid.kernels.junctions.junctions import (
     move_joints,
     place_ends,
 )
-from hybrid.kernels.junctions.system_job import DT, TIME, read_system, task_of
+from hybrid.kernels.junctions.system_job import DT, PART, TIME, read_system, task_of
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.machine.compile import inner, kernel
@@ -94,7 +95,7 @@ from hybrid.kernels.step.step import LARGEST_STEP_TURN, begin_step, end_step, fi
 from hybrid.kernels.watch.extremes import first_strains, note_extremes
 
 JUNCTIONS = 5
-call_solver, call_touch, call_meet = caller((0, 0, 0.0, 0)), caller(0), caller(0)
+call_solver, call_touch, call_meet, call_spin = caller((0, 0, 0.0, 0)), caller(0), caller(0), caller(0)
 # Where cv and ca of the task are among the numbers of a job, whose first field it is.
 TASK_CV, TASK_CA, TASK_DT = Task._fields.index("cv"), Task._fields.index("ca"), Task._fields.index("dt")
 
@@ -106,6 +107,15 @@ def ask_bodies(system, phase):
         return 1
     system.phase[0] = phase
     return call_meet(system.meet, system.meet_table)
+
+
+@inner
+def ask_sheaves(system, phase):
+    """What is asked of sheaves that turn freely (kernels.junctions.joined_sheaves); 0: it fails."""
+    if system.spin == 0:
+        return 1
+    system.phase[0] = phase
+    return call_spin(system.spin, system.spin_table)
 
 
 @inner
@@ -455,6 +465,9 @@ def solve_system(table):
         if task.what != CORRECTION and ask_bodies(system, COUPLE) == 0:
             outcome = SINGULAR
             break
+        if task.what == STEP and ask_sheaves(system, TURN) == 0:
+            outcome = SINGULAR
+            break
         correct_torques(tables, s.cv)
         if touch != 0 and call_touch(touch, system.touch_table) == 0:
             before = math.inf
@@ -477,6 +490,9 @@ def solve_system(table):
             job = read(tables[l])
             update(None, 1, job.line, job.new, s.cv, s.ca, part, False, job.work)
         move_bodies(new, work, s.cv, s.ca, part)
+        if task.what == STEP:
+            asked[PART] = part
+            ask_sheaves(system, ROLL_ON)
         outcome, left = has_converged(size, before, it, part)
         before = size if part == 1.0 else math.inf
         if task.what == EQUILIBRIUM:

@@ -26,13 +26,15 @@ PIECE_END, THINNER, OF_PIECE = 0, 1, 2
 # Of Sea.carried, of obstacles that move: c at the begin and the end of the step (m); R R0^T; v (m/s), w (1/s) and R at the
 # end (kernels.laws.obstacle_motion); the axis at t = 0, the rate of the spin about it (1/s) and the time over which it
 # grows (s); of sheaves that turn freely the inertia (kg m2) and the damping of the bearing (N m s), angles at the begin and
-# the end of the step and the next correction (rad), and their rate (1/s).
+# the end of the step (rad), and their rate (1/s); what the line leaves of the moment (N m), and its derivatives by the angle
+# where the line stays and where it yields (N m; 0: the sheave is held).
 BEGAN, ENDED, SWEEP, SPEED, TURNING, TURNED, STILL_AXIS, RATE, RAMP = 0, 3, 6, 15, 18, 21, 30, 33, 34
-INERTIA, BEARING, ROLLED_BEFORE, ROLLED, ROLL, ROLLING = 35, 36, 37, 38, 39, 40
+INERTIA, BEARING, ROLLED_BEFORE, ROLLED, ROLLING = 35, 36, 37, 38, 39
+LEFT_OVER, ALONE, YIELDING = 46, 47, 48
 # Of a line that is fixed to the body which carries an obstacle: from which arc length and up to which (m) it meets that; of
 # what a body carries its place and whether one does (1.0), in axes of the body, as the axis at t = 0 is.
-MEETS_FROM, MEETS_TO, OFFSET, RIDES = 41, 42, 43, 46
-CARRIED = 47
+MEETS_FROM, MEETS_TO, OFFSET, RIDES = 40, 41, 42, 45
+CARRIED = 49
 # Of Line.moved; of a row of State.sheave: angle (rad), rate, algorithmic and true acceleration.
 FIXED, MOVES, FREE = 0, 1, 2
 ANGLE, SPIN, ALGORITHMIC, TRUE = 0, 1, 2, 3

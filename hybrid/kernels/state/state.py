@@ -217,7 +217,7 @@ class Sea(NamedTuple):
     courses: Moves  # how obstacles move, a row each; empty: none does
     carried: Floats  # (M, CARRIED) how far they have (kernels.laws.obstacle_motion); empty: none does
     grip: Floats  # (N+1, 6 M) as `State.grip`, at the start of the step; empty: no obstacle moves
-    rolling: Floats  # (2 K, N+1, 5) room for answers to K sheaves that turn freely (kernels.laws.sheaves)
+    rolling: Floats  # (3 K, N+1, 5) room for answers to K sheaves that turn freely (kernels.laws.sheaves)
 
 
 class State(NamedTuple):

@@ -258,7 +258,7 @@ def solve(
         update(plane, space, line, new, cv, ca, part, task.turning, work)
         if space is not None:
             if new.sheave.shape[0] > 0 and task.what == STEP:
-                roll_on(line, sea, old, new, s, part)
+                roll_on(line, sea, new, s, part, work.x)
         turn = max(turn, WHOLE * shift / reach)
         size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
         outcome, left = has_converged(size, before, it, part)

@@ -13,7 +13,7 @@ from hybrid.kernels.laws.obstacle_grip import book_obstacles, grip_obstacles, me
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.obstacles import normal_at, passes, stored_in_contact
 from hybrid.kernels.laws.out_of_plane import step_out_of_plane
-from hybrid.kernels.laws.sheaves import predict_sheaves
+from hybrid.kernels.laws.sheaves import find_rates_of_sheaves, predict_sheaves
 from hybrid.kernels.laws.vortices import advance_wake
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
@@ -156,6 +156,9 @@ def find_rates(space, line, sea, old, new, u, s):
         if space is not None:
             if line.spin[i]:
                 new.wa[i] = (new.w[i] - old.w[i] - dt * (1.0 - ga) * old.wa[i]) / (ga * dt)
+    if space is not None:
+        if new.sheave.shape[0] > 0:
+            find_rates_of_sheaves(old, new, s)
 
 
 @inner
