@@ -623,12 +623,7 @@ class Transient:
         if self.correction is not None and self.correction.model is not model:
             self.correction.switch(model)
         touches = bool(model.line.bits & SELF_CONTACT)
-        keep = (
-            touches
-            or state.sheave.size > 0
-            or self.correction is not None
-            or (self.payout is not None and self.payout.solves_twice)
-        )
+        keep = touches or self.correction is not None or (self.payout is not None and self.payout.solves_twice)
         self.stepper = Stepper(model.line, model.length, model.tension_scale, keep=keep)
         books.hinges[:] = model.cable.hinges
         self.run.clock[b.WAVE_STEP] = wave_step(model.line, model.tension_scale)

@@ -101,7 +101,7 @@ class _Solver:
         fold between two cells is none of a rod: FOLDED.
         """
         new = start.copy()
-        for still in (new.v, new.a, new.vd, new.w, new.wa, new.wd):
+        for still in (new.v, new.a, new.vd, new.w, new.wa, new.wd, new.sheave):
             still[:] = 0.0
         limits = Limits(REACH * self.length, self.scale, MOST_TURNING if turning else MOST_ITERATIONS)
         for _ in range(BALANCING):

@@ -333,9 +333,9 @@ class SystemSolver:
             jobs[parity].bind(old=old.bodies, new=new.bodies)
         if self._contacts or self.shared is not None:
             self._touching[parity].bind(old=old.bodies, new=new.bodies)
-        for jobs in (self._meeting, self._spinning):
-            if jobs:
-                jobs[parity].bind(old=old.bodies, new=new.bodies)
+        for both in (self._meeting, self._spinning):
+            if both:
+                both[parity].bind(old=old.bodies, new=new.bodies)
 
     def _solve(self, task: Task, old: SystemState, new: SystemState, t: float = 0.0) -> SystemTaken:
         self.turns = None
@@ -650,7 +650,7 @@ class SystemSolver:
         """As `newton`, whatever the state is in which all forces balance."""
         new = start.copy()
         for state in new.lines:
-            for still in (state.v, state.a, state.vd, state.w, state.wa, state.wd):
+            for still in (state.v, state.a, state.vd, state.w, state.wa, state.wd, state.sheave):
                 still[:] = 0.0
         new.bodies[:, V:] = 0.0
         taken = SystemTaken(Outcome.NOT_CONVERGED, 0, np.inf, -1, -1, np.inf)

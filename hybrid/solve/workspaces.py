@@ -7,6 +7,7 @@ from functools import cache
 from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
 from hybrid.kernels.run import entry
 from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.obstacle_rows import FREE
 from hybrid.kernels.state.state import Line, Work, blank_line, blank_state, no_ends
 
 
@@ -17,7 +18,8 @@ def _torque_address() -> int:
 
 
 def workspace_of(line: Line, keep: bool = False) -> Work:
-    """As kernels.run.entry.workspace_of."""
+    """As kernels.run.entry.workspace_of; keep: factors stay, as they do where sheaves turn with the line."""
+    keep = keep or bool((line.moved == FREE).any())
     if not line.torsion.size or line.bits & PLANAR:
         return entry.workspace_of(line, keep)
     work = entry.workspace_of(line._replace(torsion=line.torsion[:0]), keep=True)
