@@ -10,7 +10,8 @@ import numpy as np
 
 from hybrid.errors import SceneError
 from hybrid.kernels.laws.drag_law import body, half_cell, split
-from hybrid.kernels.state.forces import BODIES, DRAG, FLOW, SURFACE
+from hybrid.kernels.laws.obstacles import distances
+from hybrid.kernels.state.forces import BODIES, DRAG, FLOW, OBSTACLES, SURFACE
 from hybrid.kernels.state.state import Floats, Line, Sea, State
 from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
 from hybrid.model.ends import EndConditions, EndLoad, Motion, end_load, first_director, transported
@@ -24,6 +25,7 @@ from hybrid.scene.sea import Seabed
 
 SHORTEST_SPAN = 1e-3  # of the length: a line between nearer ends has no straight span to start from
 DRAG_ROUNDS = 4  # of the first shape: drag follows the shape, half of it first
+WAYS_OUT = 100  # places to which a node that is in an obstacle may be moved
 
 
 def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
@@ -178,6 +180,26 @@ def hung(scene: Scene, line: Line, sea: Sea, clamp_leads: bool = True) -> Hangin
                 found = moored(loads + drag, lift, sea.surface, line.h, line.ck, held, place, on_bed)
         if found is None or not _has_directions(found.r):
             return None
+    if found is not None and line.bits & OBSTACLES and all(places):
+        found = found._replace(r=beside_obstacles(found.r, line.s, sea))
+        return found if _has_directions(found.r) else None
+    return found
+
+
+def beside_obstacles(r: Floats, s: Floats, sea: Sea) -> Floats:
+    """Nodes (N+1, 3) m of a first shape, those in an obstacle moved out of it towards the straight span of the ends.
+
+    A line that is pulled taut comes to the span on the side of an obstacle on which it lies; a node whose place on the
+    span is in an obstacle as well stays where it is.
+    """
+    way = r[0] + (s / s[-1])[:, None] * (r[-1] - r[0]) - r
+    inside = np.flatnonzero(distances(sea.obstacles, r).min(axis=0) < 0.0)
+    part = np.linspace(0.0, 1.0, 1 + WAYS_OUT)[:, None, None]
+    tried = r[inside] + part * way[inside]
+    free = (distances(sea.obstacles, tried.reshape(-1, 3)).min(axis=0) >= 0.0).reshape(tried.shape[:2])
+    first = np.where(free.any(axis=0), free.argmax(axis=0), 0)
+    found = r.copy()
+    found[inside] = tried[first, np.arange(inside.size)]
     return found
 
 

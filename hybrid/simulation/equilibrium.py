@@ -11,7 +11,7 @@ import numpy as np
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.march.link import LINK, holds_twist, link_of
 from hybrid.kernels.mesh.zone_criteria import twist_of_rods
-from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, PLANAR
+from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, OBSTACLES, PLANAR
 from hybrid.kernels.state.state import Line, State
 from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
@@ -21,6 +21,7 @@ from hybrid.model.self_reach import touching
 from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.schema import Scene
 from hybrid.simulation.contact_equilibrium import with_contact
+from hybrid.simulation.diagnostics import borne_strain, most_stretched
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import PUSHED, Equilibrium, solve_statics
 
@@ -112,11 +113,11 @@ def _count_link(scene: Scene, model: Model, t: float, state: State) -> None:
 
 def solve_model(
     model: Model, t: float, start: State, settle: str, quick: bool = False, take_slack: bool = False,
-    others: Sequence[tuple[str, State]] = (), keeps_turns: Callable[[State], bool] | None = None,
+    others: Sequence[tuple[str, State]] = (), refused: Callable[[State], tuple[Outcome, int]] | None = None,
 ) -> Equilibrium:  # fmt: skip
     """Equilibrium of a model with the loads of time t: in its plane where it holds in space too, else in space.
 
-    settle, quick, take_slack, others, keeps_turns: as of `solve_statics`.
+    settle, quick, take_slack, others, refused: as of `solve_statics`.
     """
     sea, ends = model.sea.at(t), model.ends.at(t)
     rest = model.length, model.tension_scale, model.slack_floor
@@ -134,7 +135,7 @@ def solve_model(
             pass
     return solve_statics(
         model.line, sea, ends, start, *rest, take_slack=take_slack, shape=model.start_shape, settle=settle,
-        others=others, quick=quick, keeps_turns=keeps_turns,
+        others=others, quick=quick, refused=refused,
     )  # fmt: skip
 
 
@@ -156,8 +157,21 @@ def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equil
             return False
         return True
 
-    counts = keeps_turns if scene.ends.turns and keeps_turns(model.start) else None  # too few cells: no way helps
-    return solve_model(model, t, model.start, settle, quick, slack, model.other_starts, counts)
+    counts = bool(scene.ends.turns) and keeps_turns(model.start)  # else too few cells: no way helps
+    lies = bool(model.line.bits & OBSTACLES)
+
+    def refused(state: State) -> tuple[Outcome, int]:
+        if counts and not keeps_turns(state):
+            return Outcome.TURNS_LOST, -1
+        if lies:  # a line can be in balance on the wrong side of an obstacle, stretched round it
+            cell = most_stretched(model, state)
+            if abs(np.linalg.norm(state.e[cell]) / model.line.h[cell] - 1.0) > borne_strain(model)[cell]:
+                return Outcome.OVERSTRETCHED, cell
+        return Outcome.OK, -1
+
+    return solve_model(
+        model, t, model.start, settle, quick, slack, model.other_starts, refused if counts or lies else None
+    )
 
 
 def _settles(scene: Scene, model: Model, t: float) -> bool:

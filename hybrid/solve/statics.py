@@ -355,7 +355,7 @@ def solve_statics(
     settle: str = "",
     others: Sequence[tuple[str, State]] = (),
     quick: bool = False,
-    keeps_turns: Callable[[State], bool] | None = None,
+    refused: Callable[[State], tuple[Outcome, int]] | None = None,
 ) -> Equilibrium:
     """Equilibrium of a line from a starting shape, however poor.
 
@@ -364,7 +364,7 @@ def solve_statics(
     start is, for people; settle: on a bed with friction, "start": let it come to rest from the start and try nothing
     else, "pull": pull it tight from where it would lie without tension along the equilibrium without friction, else
     the same; others: further starts with their names; quick: try nothing but Newton from the start;
-    keeps_turns: whether a state has the turns of the ends, where Newton may end without: the next way is tried then.
+    refused: why a state in balance is not the one that is sought, and its cell or node; the next way is tried then.
 
     Tries Newton; then a soft line that is hardened; then Newton with turning chords along
     ladders of end loads; then a damped motion that settles, and Newton again; then a push
@@ -391,8 +391,9 @@ def solve_statics(
             yield rough, _settled(rough, ends, start, shape)
 
     for solver, (how, reached, where, state) in roads():
-        lost = reached == Outcome.OK and keeps_turns is not None and not keeps_turns(state)
-        outcome = Outcome.TURNS_LOST if lost else reached
+        outcome = reached
+        if reached == Outcome.OK and refused is not None:
+            outcome, where = refused(state)
         path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations in all)")
         if outcome == Outcome.OK:
             return _found(solver, ends, state, path)

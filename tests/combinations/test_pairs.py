@@ -73,8 +73,6 @@ def test_every_pair_is_read_or_refused_by_the_table(said: Callable[[Tables], Tab
 
 # Of a system the search is not pushed off an equilibrium in which it would turn over: refused, with the reason.
 REFUSED_AS_SYSTEM = {("body", "two stiffnesses")}
-# On base cells seen from its other end the search for the equilibrium ends on the other side of the obstacle, stretched.
-OTHER_SIDE = {("cells that follow", "obstacle")}
 # m, where steps that follow the motion begin anew after an end is let go: as long as their tolerance lets them differ.
 BY_STEPS = {("release", "chosen steps"): 1e-4}
 
@@ -100,7 +98,7 @@ def differ(names: Sequence[str], said: Callable[[Tables], Tables | None]) -> str
     other = said(scene)
     if other is None or refusal(scene) or refusal(other) or (said is turned and ONE_WAY in names):
         return ""
-    if tuple(names) in BY_TOLERANCE or (tuple(names) in OTHER_SIDE and said is turned):
+    if tuple(names) in BY_TOLERANCE:
         return ""
     one, two = answer(scene), answer(other)
     if isinstance(one, str) or isinstance(two, str):

@@ -43,7 +43,8 @@ def test_a_frozen_application_does_not_start_itself(frozen: bool, monkeypatch: p
 
 
 def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
-    """All entries that take a table, of which none is forgotten."""
+    """All entries that take a table, of which none is forgotten, but for what a line of several and a release ask for."""
+    others = {"stand_among", "end_payout"}
     entry = type(payout_run.go_on)
     used = {
         x.__qualname__
@@ -51,7 +52,7 @@ def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
         for x in vars(module).values()
         if isinstance(x, entry) and list(x.py_func.__code__.co_varnames[: x.py_func.__code__.co_argcount]) == ["table"]
     }
-    assert used <= {x.__qualname__ for x in first_use.payout_kernels()}
+    assert used - others <= {x.__qualname__ for x in first_use.payout_kernels()}
     ends = {"start": {"kind": "free"}, "end": {"kind": "pinned", "position": [0, 0, 0], "payout": {"longest": 60}}}
     scene = hybrid.validate_scene({
         "cable": {"sections": [{"length": 40.0, "mass": 2.0}]}, "ends": ends, "initial": "equilibrium",

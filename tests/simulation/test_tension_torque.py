@@ -171,13 +171,3 @@ def test_cells_that_follow_the_curvature_carry_it():
     assert apart < 1.2 * apart_without < 1e-2
     changes, of_plain = (abs(x["work/zones"][-1]) for x in (found, without))
     assert changes < 1.2 * of_plain < 1.0
-
-
-def test_a_line_that_is_paid_out_refuses_it():
-    end = {"kind": "pinned", "position": [0, 0, -L], "payout": {"rate": 0.1, "ramp": 1.0, "longest": L + 5.0}}
-    scene = {
-        "environment": {"gravity": G}, "cable": {"sections": [section()]}, "initial": "equilibrium", "model": "rod",
-        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end}, "time": {"duration": 1.0, "step": 0.1},
-    }  # fmt: skip
-    with pytest.raises(hybrid.SceneError, match=r"line is paid out \(ends.end.payout\) and its twist"):
-        hybrid.validate_scene(scene)
