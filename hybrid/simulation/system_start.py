@@ -10,7 +10,7 @@ import numpy as np
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.junctions.bodies import NUMBERS
 from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
-from hybrid.kernels.state.forces import FRICTION
+from hybrid.kernels.state.forces import FRICTION, OBSTACLES
 from hybrid.kernels.state.state import Floats
 from hybrid.model.system import SystemModel, balanced_places, starts_between
 from hybrid.scene.bodies import FixedBody
@@ -18,6 +18,7 @@ from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.simulation.blended import blended_text, rotate_ends_in
+from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.equilibrium import count_turns, settling
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.system_contact_equilibrium import settle, solve_with_contact
@@ -152,7 +153,7 @@ def joined_lines(model: SystemModel, t: float) -> list[JoinedLine]:
         lines.append(
             JoinedLine(
                 x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints, fairleads, seats, slackens,
-                model.rides,
+                model.rides, borne_strain(x) if x.line.bits & OBSTACLES else np.zeros(0),
             )
         )  # fmt: skip
     return lines

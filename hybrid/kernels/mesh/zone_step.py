@@ -55,6 +55,7 @@ from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, blank_lin
 
 # How far a falling tension is extrapolated, in ramp times; the rate is taken over one or two samples.
 LOOKAHEAD, LONGEST_LOOKAHEAD = 0.125, 2.0
+STRAIGHT = 1e-6  # rad: a line that turns through no more at its largest curvature is straight but for round-off
 SAMPLES = 16  # of the tension per ramp time
 REJECT_RATIO = 4.0  # a step that ends with a catenary above this is rejected, and repeated with more rod
 
@@ -302,7 +303,7 @@ def find_shares(line, state, zones):
         zones.shares[k], zones.limits[k] = share if share > 0.0 else math.inf, math.inf
     finer = 1.0 / (z[FINENESS] * z[FINENESS])  # of second order
     zones.shares[POSITION], zones.limits[POSITION] = z[TOLERANCE] / z[LEFT], z[TOLERANCE] * finer
-    if z[SHARE] > 0.0 and zones.largest[CURVATURE] > 0.0:
+    if z[SHARE] > 0.0 and zones.largest[CURVATURE] * (line.s[n] - line.s[0]) > STRAIGHT:
         zones.limits[CURVATURE] = z[SHARE] * zones.largest[CURVATURE] * finer
 
 
