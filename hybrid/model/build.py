@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.mesh.cell_lengths import SLACK_SHARE
+from hybrid.kernels.mesh.cell_lengths import COMPRESSED_SHARE, FLANK, SHARP
 from hybrid.kernels.state.forces import FRICTION, SEABED
 from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.model.catenary_guess import Hanging
@@ -377,7 +377,8 @@ def _following_parts(scene: Scene, cable: Material, base: Floats, resolution: Re
     twisted = TWIST / np.maximum(twist_rate(scene, cable, middle), TWIST / scene.length)
     share = scene.model.curvature_error
     assert share is not None
-    part = min(FOLLOWING_CELL, 0.45 * float(np.sqrt(8.0 * SLACK_SHARE * share)))
+    # of a kink of a compressed line, whose curvature is about 1/bend
+    part = min(FOLLOWING_CELL, FLANK * SHARP * float(np.sqrt(8.0 * COMPRESSED_SHARE * share)))
     cell = np.minimum(scene.model.rod_cell or part * bend, twisted) / resolution.fineness
     halvings = np.ceil(np.log2(np.maximum(np.diff(base) / cell, 1.0)) - 1e-9)
     return np.asarray(np.minimum(2 ** halvings.astype(int), MOST_FOLLOWING))

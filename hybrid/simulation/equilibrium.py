@@ -21,7 +21,8 @@ from hybrid.model.self_reach import touching
 from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.schema import Scene
 from hybrid.simulation.contact_equilibrium import with_contact
-from hybrid.simulation.diagnostics import borne_strain, most_stretched
+from hybrid.simulation.diagnostics import borne_strain
+from hybrid.solve.flaws import overstretched_cell
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import PUSHED, Equilibrium, solve_statics
 
@@ -163,10 +164,8 @@ def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equil
     def refused(state: State) -> tuple[Outcome, int]:
         if counts and not keeps_turns(state):
             return Outcome.TURNS_LOST, -1
-        if lies:  # a line can be in balance on the wrong side of an obstacle, stretched round it
-            cell = most_stretched(model, state)
-            if abs(np.linalg.norm(state.e[cell]) / model.line.h[cell] - 1.0) > borne_strain(model)[cell]:
-                return Outcome.OVERSTRETCHED, cell
+        if lies and (cell := overstretched_cell(model.line, state, borne_strain(model))) >= 0:
+            return Outcome.OVERSTRETCHED, cell
         return Outcome.OK, -1
 
     return solve_model(

@@ -72,6 +72,15 @@ def folds(line: Line, state: State) -> Floats:
     return turn
 
 
+def overstretched_cell(line: Line, state: State, borne: Floats) -> int:
+    """The cell that is stretched or compressed most, of those that are beyond the strain that they bear; -1: none is.
+
+    borne: (N,).  A line can be in balance on the wrong side of an obstacle, stretched round it.
+    """
+    part = np.abs(np.linalg.norm(state.e, axis=1) / line.h - 1.0) / borne
+    return int(np.argmax(part)) if part.max() > 1.0 else -1
+
+
 def fold_text(line: Line, state: State, node: int) -> str:
     """How sharp the fold at a node is, and the cells that show a bend in its place."""
     turn = float(folds(line, state)[node])

@@ -8,7 +8,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.state.state import State
-from hybrid.solve.flaws import flaw_of_line, lowest_tension
+from hybrid.solve.flaws import flaw_of_line, lowest_tension, overstretched_cell
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.stability import Stability, is_judged
 from hybrid.solve.statics import LEAST_TENSION
@@ -29,10 +29,8 @@ def flaw_of_lines(lines: Sequence[JoinedLine], states: SystemState) -> tuple[Out
     """The outcome (OK: there is none), the line, and its node or cell, as `flaw_of_line` finds them."""
     for k, (x, state) in enumerate(zip(lines, states.lines, strict=True)):
         outcome, where = flaw_of_line(x.line, x.sea, state, x.length, at_rest(x))
-        if outcome == Outcome.OK and x.borne.size:  # a line can be in balance on the wrong side of an obstacle
-            part = np.abs(np.linalg.norm(state.e, axis=1) / x.line.h - 1.0) / x.borne
-            if part.max() > 1.0:
-                outcome, where = Outcome.OVERSTRETCHED, int(np.argmax(part))
+        if outcome == Outcome.OK and x.borne.size and (cell := overstretched_cell(x.line, state, x.borne)) >= 0:
+            outcome, where = Outcome.OVERSTRETCHED, cell
         if outcome != Outcome.OK:
             return outcome, k, where
     return Outcome.OK, -1, -1

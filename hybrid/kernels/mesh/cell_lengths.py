@@ -40,9 +40,12 @@ from hybrid.kernels.state.forces import SEABED
 TURN = 0.3  # rad that a cell turns through
 TWIST = 0.25  # rad that a cell of a rod is twisted by: cells that stay have as much (model.build)
 SHORTEST_CELL, SHORTEST_SLACK = 0.6, 0.25  # of l0; where a line is slack, layers in motion are sharper than at rest
-SLACK_SHARE = 0.1  # of the share: what interpolation may make wrong where a line is slack, because a bend wanders there
+COMPRESSED_SHARE = (
+    0.1  # of the share: what interpolation may make wrong where a line is compressed and its bend wanders
+)
 JOINT_LAYER = 3.0  # of l0: over which a rod bends less beside a hinge, which is no bend of the line
 SHARP = 0.5  # rad: a kink that runs along a line may be as short as this over its curvature, which l0 at rest is not
+FLANK = 0.9  # of the cell that interpolates such a kink within its share
 NEAR = 3  # nodes to either side whose curvature counts
 EDGE_CELL, EDGE_WIDTH = 1.0, 3.0  # of l0: cells beside a contact edge, and how far from it
 FARTHEST = 30.0  # of l0: how far an edge is foreseen to go in a step
@@ -67,7 +70,7 @@ def is_slack(EI, w, T):
 
 @inner
 def part_of_share(line, sea, state, kinds, i):
-    """The part of its share that interpolation may make wrong at node i: SLACK_SHARE where the line is compressed.
+    """The part of its share that interpolation may make wrong at node i: COMPRESSED_SHARE where the line is compressed.
 
     A bend that nothing but weight holds wanders by what its cells make of it, and is off by some ten times what a cell
     interpolates wrongly; from T0 on, and on the bed, a line is off by less than that.
@@ -75,7 +78,7 @@ def part_of_share(line, sea, state, kinds, i):
     EI, w, T = kinds.EI[i], kinds.w[i], tension_beside(state.T, i)
     if not is_slack(EI, w, T) or (line.bits & SEABED and depth(sea, state.r, i) > 0.0):
         return 1.0
-    return SLACK_SHARE + (1.0 - SLACK_SHARE) * max(T, 0.0) / (EI * w * w) ** (1.0 / 3.0)
+    return COMPRESSED_SHARE + (1.0 - COMPRESSED_SHARE) * max(T, 0.0) / (EI * w * w) ** (1.0 / 3.0)
 
 
 @inner
@@ -86,7 +89,7 @@ def shortest_length(kinds, T, i, kappa, part, limits, finer):
     least = (SHORTEST_SLACK if is_slack(EI, w, low) else SHORTEST_CELL) * l0 / finer
     if kappa > 0.0:
         share = limits[CURVATURE] * part
-        least = min(least, 0.9 * math.sqrt(8.0 * share / kappa) * min(l0, SHARP / kappa))
+        least = min(least, FLANK * math.sqrt(8.0 * share / kappa) * min(l0, SHARP / kappa))
     return least
 
 
@@ -373,8 +376,8 @@ def plan_cells(line, sea, state, zones, dt, finer):
         begin += size
     zones.plan[begin] = True
     gone = 0
-    for k in range(zones.plan.shape[0]):
-        gone += zones.here[k] and not zones.plan[k]
+    for i in range(zones.place.shape[0]):
+        gone += not zones.plan[zones.place[i]]
     return at_once or gone > SAVED * line.h.shape[0]
 
 
