@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.special import ndtr
 
+from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacles import distances, thinner_nodes
 from hybrid.kernels.state.forces import OBSTACLES, SEABED
 from hybrid.kernels.state.state import Floats
@@ -68,8 +69,9 @@ def _touchdown(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     """What of the line lifts off the bed or comes down on it."""
     if not x.line.bits & SEABED or not x.sea.stiffness > 0.0:
         return
-    gap = found.mean_position @ x.sea.normal - x.sea.offset
-    yield from _crossing(x, gap, found.position @ x.sea.normal, "the bed")
+    normals, depths = planes_under(x.sea, found.mean_position)
+    way = np.einsum("fni,ni->fn", found.position, normals)
+    yield from _crossing(x, 0.5 * x.sea.onset - depths, way, "the bed")
 
 
 def _on_obstacles(x: LoadedLine, found: LineResponse) -> Iterator[str]:

@@ -372,12 +372,6 @@ def _by_rao(tables: Tables) -> Iterator[Place]:
             yield (*at, "motion", "vessel", "rao")
 
 
-def _depths(tables: Tables) -> Iterator[Place]:
-    bed = getattr(tables.get("environment"), "seabed", None)
-    if getattr(bed, "depths", None) is not None:
-        yield "environment", "seabed", "depths"
-
-
 def _turning(tables: Tables) -> Iterator[Place]:
     """Free bodies, and free points that lines are clamped to: they turn by the moments of their lines."""
     if SYSTEM in tables:
@@ -478,7 +472,6 @@ ABOUT_REST = Feature("natural modes, response to a sea, derivatives at rest", "h
                      _used("about rest", "derivatives"))  # fmt: skip
 RESPONSE = Feature("response to a sea", "hybrid response", _used("response"))
 DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("derivatives"))
-DEPTHS = Feature("a bed of depths", "seabed.depths", _depths)
 IN_MOTION = Feature("derivatives in motion", "hybrid sensitivity --motion", _used("derivatives in motion"))
 FOLLOWED = Feature("steps that follow the motion", "no time.step, time.tolerance",
                    _asks("time", "step", lambda x: x.controlled))  # fmt: skip
@@ -608,11 +601,6 @@ REFUSALS: tuple[Refusal, ...] = (
         DERIVATIVES, TURNING, "not worked out",
         "what turns by the moments of its lines ({key}) has no derivatives yet", "points that lines pull at alone",
         "hold the body, or take differences of two equilibria",
-    ),
-    Refusal(
-        DERIVATIVES, DEPTHS, "not worked out",
-        "how the normal of such a bed ({key}) turns along it is not in the matrix, and derivatives are off by 1 %",
-        "a bed that is a plane", "give z and slope alone, or take differences of two equilibria",
     ),
     Refusal(
         IN_MOTION, FOLLOWED, "not worked out",

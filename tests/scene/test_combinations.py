@@ -92,10 +92,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
         {"points.b": {"body": "buoy", "place": [0, 0, 0]},
          "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0]}}, "derivatives"
     ),
-    (c.DERIVATIVES, c.DEPTHS): (
-        {"environment.seabed": {"z": -9, "stiffness": 1e4, "depths": {"x": [-9, 0, 9, 18], "y": [-9, 0, 9, 18],
-                                                                     "depth": [[0, 0, 0, 0.1]] * 4}}}, "derivatives"
-    ),
     (c.IN_MOTION, c.FOLLOWED): ({"time": {"duration": 3.0, "tolerance": 1e-3}}, "derivatives in motion"),
     (c.IN_MOTION, c.ACCURACY): ({"accuracy": "3%"}, "derivatives in motion"),
     (c.DERIVATIVES, c.SETTLED_FRICTION): ({"initial": {"kind": "equilibrium", "friction": "settled"}}, "derivatives"),
