@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -14,9 +15,9 @@ from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.march.zone_torque import TORQUE
 from hybrid.kernels.run.entry import assembly, workspace_of
 from hybrid.kernels.state.forces import FRICTION, PLANAR, WAVES
-from hybrid.kernels.state.report import NET_A
+from hybrid.kernels.state.report import MOMENT_A, NET_A
 from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, batch_of_one
-from hybrid.modal.matrices import ANCHOR
+from hybrid.modal.matrices import ANCHOR, rotation
 from hybrid.model.build import Model
 from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.probes import PROBES, Observer
@@ -73,18 +74,24 @@ class Beside(NamedTuple):
     sea: Sea
 
 
+# Frames (9,) of ends that turn with what they are joined to, by end.
+Frames = Mapping[int, Floats]
+NO_FRAMES: Frames = MappingProxyType({})
+
+
 class LineAtRest:
     """One line in the equilibrium of a scene, and lines beside it, of scenes with other numbers."""
 
     def __init__(
-        self, scene: Scene, model: Model, state: State, wanted: Sequence[Wanted], free: Sequence[int] = ()
-    ) -> None:
-        """wanted: results; free: ends (0, 1) that are joined to free points.
+        self, scene: Scene, model: Model, state: State, wanted: Sequence[Wanted], free: Sequence[int] = (),
+        frames: Frames = NO_FRAMES,
+    ) -> None:  # fmt: skip
+        """wanted: results; free: ends (0, 1) that are joined to free points or bodies; frames: of those that turn with
 
-        SceneError: the line has no result of that name, or they have no derivative.
+        them.  SceneError: the line has no result of that name, or they have no derivative.
         """
         self.model, self.state, self.wanted, self._free = model, state, tuple(wanted), list(free)
-        self.here = Beside(scene, model, self._ends(model), model.sea.at(np.inf))
+        self.here = Beside(scene, model, self._ends(model, frames), model.sea.at(np.inf))
         self._at = [x.at for x in wanted if x.at is not None]
         self._nodes = any(x.extreme for x in wanted) or not self._at
         self._observer, self._node_of = self._observed(self.here), dict[Wanted, int]()
@@ -96,12 +103,14 @@ class LineAtRest:
             expected = "an equilibrium in which no torque passes through catenary zones"
             raise SceneError([Complaint("model", "a torque through a catenary zone", expected, "model: rod")])
 
-    def _ends(self, model: Model) -> Ends:
-        """The ends of a line, those at free points joined to these."""
+    def _ends(self, model: Model, frames: Frames) -> Ends:
+        """The ends of a line, those at free points and bodies joined to these."""
         ends = model.ends.at(np.inf)
-        held = ends.held.copy()
+        held, frame = ends.held.copy(), ends.frame.copy()
         held[self._free] = JOINED
-        return ends._replace(held=held)
+        for k, x in frames.items():
+            frame[k] = x
+        return ends._replace(held=held, frame=frame)
 
     def joined(self, x: Beside) -> JoinedLine:
         """The line with ends that nothing holds."""
@@ -119,9 +128,9 @@ class LineAtRest:
             right[-k, 1:4] = work.report[NET_A + 3 * k : NET_A + 3 * k + 3]
         return right.ravel(), work.report.copy()
 
-    def beside(self, scene: Scene, model: Model) -> Beside:
+    def beside(self, scene: Scene, model: Model, frames: Frames = NO_FRAMES) -> Beside:
         """The line of another scene; what is around it is evaluated where it is not what is here."""
-        ends = self.here.ends if model.ends is self.model.ends else self._ends(model)
+        ends = self.here.ends if model.ends is self.model.ends and not frames else self._ends(model, frames)
         sea = self.here.sea if model.sea is self.model.sea else model.sea.at(np.inf)
         return Beside(scene, model, ends, sea)
 
@@ -139,18 +148,26 @@ class LineAtRest:
         self._values = self._results(found, [(observer.s, self.model.line.s)])[0]
         return self._values
 
-    def by_state(self, q: Floats) -> Floats:
-        """(P, W) derivatives of results along movements (P, N+1, 5) of the state."""
-        steps = _steps(self.state, q)
+    def by_state(self, q: Floats, turns: Floats | None = None) -> Floats:
+        """(P, W) derivatives of results along movements (P, N+1, 5) of the state.
+
+        turns: (P, 2, 3) rad, of the frames of ends; None: they stay.
+        """
+        steps = _steps(self.state, q, turns)
         moved = _moved(self.state, np.repeat(q, 2, axis=0), (steps[:, None] * (1.0, -1.0)).ravel())
         batch = _repeated(self._output(self.here, self._work.report), 2 * len(q))._replace(**cast(Any, moved))
         for end in self._free:
             batch.position[:, end] = batch.r[:, -end]
+        ends = self.here.ends
+        if turns is not None:
+            for k, part in enumerate((steps[:, None] * (1.0, -1.0)).ravel()):
+                batch.frame[k] = _turned(ends.frame, part * turns[k // 2])
         for k in range(2 * len(q)):
             for name, x in moved.items():
                 getattr(self._tried, name)[:] = x[k]
             self._work.report[:] = 0.0
-            assembly(self._line, self.here.sea, self.here.ends, self._tried, 0.0, 0.0, self._work)
+            here = ends if turns is None else ends._replace(frame=batch.frame[k].copy())
+            assembly(self._line, self.here.sea, here, self._tried, 0.0, 0.0, self._work)
             batch.report[k] = self._work.report
         found = self._of_states(batch)
         return self._slopes(found[::2], found[1::2], steps)
@@ -281,11 +298,26 @@ def _repeated(batch: Batch, count: int) -> Batch:
     return Batch(*rows)
 
 
-def _steps(state: State, q: Floats) -> Floats:
-    """(P,) how many times movements q (P, N+1, 5) are taken so that chords and tensions change by a part ALONG."""
+def moment_on_body(report: Floats, k: int) -> Floats:
+    """Moment (3,) N m of the clamped end k of a line on what holds it."""
+    return np.asarray(report[MOMENT_A + 3 * k : MOMENT_A + 3 * k + 3] * (1.0 - 2.0 * k))
+
+
+def _turned(frames: Floats, turns: Floats) -> Floats:
+    """Frames (2, 9) turned by small angles (2, 3) rad."""
+    return np.stack([(rotation(n) @ x.reshape(3, 3)).ravel() for x, n in zip(frames, turns, strict=True)])
+
+
+def _steps(state: State, q: Floats, turns: Floats | None = None) -> Floats:
+    """(P,) how many times movements q (P, N+1, 5), turns (P, 2, 3), are taken so that chords and tensions change by a
+
+    part ALONG.
+    """
     chord = np.linalg.norm(np.diff(q[:, :, 1:4], axis=1), axis=2) / np.linalg.norm(state.e, axis=1)
     tension = np.abs(q[:, :, 0]) / max(float(np.abs(state.T).max()), 1e-300)
     most = np.maximum(np.maximum(chord.max(axis=1), tension.max(axis=1)), np.abs(q[:, :-1, 4]).max(axis=1))
+    if turns is not None:
+        most = np.maximum(most, np.abs(turns).max(axis=(1, 2)))
     return np.asarray(ALONG / np.maximum(most, 1e-300))
 
 

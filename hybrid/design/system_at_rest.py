@@ -1,6 +1,7 @@
 """The equilibrium of several lines, and what results of them answer to numbers of the scene.
 
-As of one cable (design.cable_at_rest), with the matrix of the network: lines that meet at free points move with them.
+As of one cable (design.cable_at_rest), with the matrix of the network: lines that meet at free points move with them,
+and those at bodies turn with these (design.bodies_at_rest).
 """
 
 from __future__ import annotations
@@ -8,20 +9,23 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from hybrid.design.bodies_at_rest import BodiesAtRest
 from hybrid.design.cable_at_rest import PART
-from hybrid.design.line_at_rest import LEFT_OUT, Beside, LineAtRest, Wanted, parse_result
+from hybrid.design.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, Wanted, moment_on_body, parse_result
 from hybrid.design.numbers import is_allowed, number_of, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
 from hybrid.modal.matrices import linear_network
-from hybrid.model.nearby import nearby
-from hybrid.model.system import SystemResolution
+from hybrid.model.build import Model
+from hybrid.model.nearby import nearby, same_nodes
+from hybrid.model.system import SystemModel, SystemResolution, build_system
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
@@ -44,6 +48,14 @@ def parse_result_of(system: System, text: str) -> tuple[str, Wanted]:
         raise SceneError([Complaint("of", text, f"LINE/NAME@S, max LINE/NAME or min LINE/NAME, of {names}", example)])
     text = f"{found[1]} {found[3]}" if found[1] else found[3]
     return name, parse_result(text, system.lines[name].cable.length)
+
+
+class _Changed(NamedTuple):
+    """A scene with another number: its lines, arms (L, 2, 3) m of their ends at bodies, what acts on these (B, 6)."""
+
+    lines: list[Beside]
+    arms: Floats
+    own: Floats
 
 
 class SystemAtRest:
@@ -71,14 +83,20 @@ class SystemAtRest:
         ]
         self._free = [[k for k in (0, 1) if x.joints[k] >= 0] for x in joined]
         self._order = [(name, k) for name in self._names for k, (line, _) in enumerate(wanted) if line == name]
+        solver = SystemSolver(joined, len(run.found.solver.net), run.found.solver.bodies)
+        self._bodies, self._model = BodiesAtRest(solver, run.state, run.model), run.model
+        self._network = linear_network(solver, run.state, self._names, sticks=False, quick=False)
         rows = zip(self._names, run.model.models, run.state.lines, self._free, strict=True)
         self.lines = [
-            LineAtRest(self._scenes[name], model, state, [x for line, x in wanted if line == name], free)
-            for name, model, state, free in rows
-        ]
-        solver = SystemSolver(joined, len(run.found.solver.net), run.found.solver.bodies)
-        self._network = linear_network(solver, run.state, self._names, sticks=False, quick=False)
-        self._factors = splu(sparse.csc_array(self._network.stiffness + self._network.skew))
+            LineAtRest(
+                self._scenes[name], model, state, [x for line, x in wanted if line == name], free,
+                self._bodies.frames(l, solver.lines[l].seats),
+            )
+            for l, (name, model, state, free) in enumerate(rows)
+        ]  # fmt: skip
+        A = sparse.csc_array(self._network.stiffness + self._network.skew)
+        self._factors = splu(A + self._bodies.stiffness_besides(A) if self._bodies.count else A)
+        self._here = self._arms(run.model), self._bodies.own(run.model)
         self.values = self._in_order([x.values() if x.wanted else np.zeros(0) for x in self.lines])
 
     def number(self, key: str) -> float:
@@ -92,27 +110,60 @@ class SystemAtRest:
         numbers = np.array([number_of(self.scene, key) for key in keys])
         steps = np.where(numbers == 0.0, PART, PART * np.abs(numbers))
         network, rights, shifts, reports = self._network, [], [], []
-        pairs = [self._beside(*row) for row in zip(keys, numbers.tolist(), steps.tolist(), strict=True)]
+        every = [x for row in zip(keys, numbers.tolist(), steps.tolist(), strict=True) for x in self._beside(*row)]
+        on_bodies = _slope([x.own for x in every], steps)
         for l, line in enumerate(self.lines):
-            both = [x[l] for pair in pairs for x in pair]
+            both = [x.lines[l] for x in every]
             left, report = zip(*(line.left(x) for x in both), strict=True)
-            right = np.stack([x - y for x, y in zip(left[::2], left[1::2], strict=True)], axis=1) / (2.0 * steps)
-            shift = np.zeros((right.shape[0] // SIZE, SIZE, len(keys)))
-            for k in {0, 1} - {*self._free[l]}:
-                if line.here.ends.held[k]:
-                    places = np.stack([x.ends.position[k] for x in both], axis=1)
-                    shift[-k, 1:4] = (places[:, ::2] - places[:, 1::2]) / (2.0 * steps)
-            shift = shift.reshape(right.shape)
-            rights.append(right - network.lines[l].stiffness @ shift)
-            shifts.append(shift)
+            shift = self._shift(l, every, steps)
+            rights.append(_slope(left, steps) - network.lines[l].stiffness @ shift.reshape(-1, len(keys)))
+            for k in (0, 1):
+                if (b := self._bodies.body_at(l, k)) >= 0:
+                    on_bodies[b, 3:] += np.cross(shift[-k, 1:4], network.lines[l].net[k], axisa=0, axisc=0)
+                    if k in self._bodies.turns(l):
+                        on_bodies[b, 3:] += _slope([moment_on_body(x, k) for x in report], steps)
+                        on_bodies[b, 3:] -= network.lines[l].turned[k] @ shift.reshape(-1, len(keys))
+            shifts.append(shift.reshape(-1, len(keys)))
             reports.append([*zip(both, report, strict=True)])
-        q = np.asarray(network.place @ self._factors.solve(np.asarray(network.place.T @ np.concatenate(rights))))
+        right = np.asarray(network.place.T @ np.concatenate(rights))
+        first = network.size - 6 * self._bodies.count
+        right[first:] += on_bodies.reshape(-1, len(keys))
+        free = self._factors.solve(right)
+        q, turned = np.asarray(network.place @ free), free[first:].reshape(-1, 6, len(keys))[:, 3:]
         out = []
         for l, line in enumerate(self.lines):
             moved = (q[network.at[l] : network.at[l + 1]] + shifts[l]).T.copy().reshape(len(keys), -1, SIZE)
             blank = np.zeros((len(keys), 0))
-            out.append(line.by_state(moved) + line.by_scene(reports[l], steps) if line.wanted else blank)
+            by_state = line.by_state(moved, self._turns(l, turned)) if line.wanted else blank
+            out.append(by_state + line.by_scene(reports[l], steps) if line.wanted else blank)
         return self._in_order(out)
+
+    def _shift(self, l: int, every: Sequence[_Changed], steps: Floats) -> Floats:
+        """(N+1, 5, P) what a line is shifted by with numbers where it is held, and where its place on a body changes.
+
+        every: with more and with less of each number, in turn.
+        """
+        line, shift = self.lines[l], np.zeros((self._network.lines[l].free.size // SIZE, SIZE, len(steps)))
+        for k in (0, 1):
+            if self._bodies.body_at(l, k) >= 0:
+                shift[-k, 1:4] = _slope([x.arms[l, k] for x in every], steps)
+            elif k not in self._free[l] and line.here.ends.held[k]:
+                shift[-k, 1:4] = _slope([x.lines[l].ends.position[k] for x in every], steps)
+        return shift
+
+    def _turns(self, l: int, turned: Floats) -> Floats | None:
+        """(P, 2, 3) rad, turns of the ends of a line, of those (B, 3, P) of bodies; None: no end turns with one."""
+        ends = self._bodies.turns(l)
+        if not ends:
+            return None
+        out = np.zeros((turned.shape[2], 2, 3))
+        for k in ends:
+            out[:, k] = turned[self._bodies.body_at(l, k)].T
+        return out
+
+    def _arms(self, model: SystemModel) -> Floats:
+        """(L, 2, 3) m from the origins of bodies to the ends of lines on them."""
+        return np.stack([self._bodies.arms(l, x) for l, x in enumerate(model.fairleads)])
 
     def _in_order(self, of_lines: Sequence[Floats]) -> Floats:
         """(.., W) results in the order in which they are wanted, of those of each line."""
@@ -126,26 +177,52 @@ class SystemAtRest:
         """A line with the free points that it carries, and others where they are first."""
         return system.scene_of(name, system.carried(name), system.guesses)
 
-    def _beside(self, key: str, number: float, step: float) -> tuple[list[Beside], list[Beside]]:
-        """All lines with a number that is more by a step, and less."""
+    def _beside(self, key: str, number: float, step: float) -> tuple[_Changed, _Changed]:
+        """The scene with a number that is more by a step, and less."""
         more, less = (with_number(self.scene, key, number + d) for d in (step, -step))
         if not is_allowed(more):
             fix = "a number that others do not have to match, as lengths of zones have to"
             raise SceneError([Complaint("by", key, "a number that may change by itself", fix)])
-        return self._lines_of(more, key), self._lines_of(less, key)
+        return self._changed(more, key), self._changed(less, key)
 
-    def _lines_of(self, system: System, key: str) -> list[Beside]:
-        """All lines of a changed scene."""
+    def _changed(self, system: System, key: str) -> _Changed:
+        """A changed scene.  What turns with bodies is built anew: how a clamp is seated hangs on all of the scene."""
         same = all(getattr(system, x) is getattr(self.scene, x) for x in OF_ALL)
+        seated = [bool(self._bodies.turns(l)) for l in range(len(self.lines))]
+        built = build_system(system, self._resolution) if self._bodies.count and (any(seated) or not same) else None
         out = []
-        for name, line in zip(self._names, self.lines, strict=True):
-            if same and system.lines[name] is self.scene.lines[name]:
+        for l, (name, line) in enumerate(zip(self._names, self.lines, strict=True)):
+            scene = self._scene_of(system, name)
+            if built is not None and seated[l]:
+                model = _on_same_cells(built.models[l], line.model)
+                frames = self._bodies.frames(l, built.seats[l])
+            elif same and system.lines[name] is self.scene.lines[name]:
                 out.append(line.here)
                 continue
-            scene = self._scene_of(system, name)
-            model = nearby(line.model, self._scenes[name], scene, self._resolution.lines[name], LEFT_OUT)
+            else:
+                model = nearby(line.model, self._scenes[name], scene, self._resolution.lines[name], LEFT_OUT)
+                frames = NO_FRAMES
             if model is None:
-                detail = f"{key}: a change of it changes the number of cells; give `mesh: {{cells: ..}}`"
-                raise ComputationError(Outcome.NOT_CONVERGED, None, None, detail)
-            out.append(line.beside(scene, model))
-        return out
+                raise _other_cells(key)
+            out.append(line.beside(scene, model, frames))
+        if built is None:
+            return _Changed(out, *self._here)
+        try:
+            return _Changed(out, self._arms(built), self._bodies.own(built))
+        except ValueError:
+            raise _other_cells(key) from None
+
+
+def _on_same_cells(model: Model, of: Model) -> Model | None:
+    """The model; None: its cells are others than those of another one."""
+    return model if same_nodes(model.line.s, of.line.s) else None
+
+
+def _other_cells(key: str) -> ComputationError:
+    detail = f"{key}: a change of it changes the number of cells; give `mesh: {{cells: ..}}`"
+    return ComputationError(Outcome.NOT_CONVERGED, None, None, detail)
+
+
+def _slope(values: Sequence[Floats], steps: Floats) -> Floats:
+    """(.., P) change by numbers of what has values (..) with more and with less of each, in turn."""
+    return np.stack([x - y for x, y in zip(values[::2], values[1::2], strict=True)], axis=-1) / (2.0 * steps)

@@ -161,6 +161,8 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: boo
         K = K - sparse.diags_array(_spin_springs(line))
     if line.torsion.size:
         K = K + _through_zones(line)
+    if line.tension_twist.size:
+        K = _by_length(K)
     if (turning := bed_turns(line, x.sea, state.r)) is not None:
         K = K + turning
     free = np.ones((count, SIZE), bool)
@@ -229,6 +231,19 @@ def _spin_springs(line: Line) -> Floats:
     return out.ravel()
 
 
+def _by_length(K: sparse.csr_array) -> sparse.csr_array:
+    """A line whose tension makes a torque, with forces and torques by tension from the law of length: A is symmetric
+
+    there.  Block rows do not reach the tension of the cell after next (kernels.laws.tension_torque).
+    """
+    entries = K.tocoo()
+    tension = np.arange(K.shape[0]) % SIZE == 0
+    kept = tension[entries.row] | ~tension[entries.col]
+    lengths = sparse.csr_array(sparse.diags_array(tension.astype(float)) @ K @ sparse.diags_array(1.0 - tension))
+    values, places = entries.data[kept], (entries.row[kept], entries.col[kept])
+    return sparse.csr_array(sparse.csr_array((values, places), shape=K.shape) + lengths.T)
+
+
 def _through_zones(line: Line) -> sparse.csr_array:
     """How catenary zones that a torque passes through join the twist of the rods beside them."""
     size = SIZE * line.s.size
@@ -242,7 +257,7 @@ def _through_zones(line: Line) -> sparse.csr_array:
 
 
 def by_turn(line: Line, x: JoinedLine, ends: Ends, state: State, k: int) -> tuple[Floats, Floats]:
-    """What turns of the frame of end k do: (3, 5 (N+1)) to the balances of nodes and spins, (3, 3) to its own moment.
+    """What turns of the frame of end k do: (3, 5 (N+1)) to lengths, balances and spins, (3, 3) to its own moment.
 
     By differences, so that every law of the element counts.
     """
@@ -252,18 +267,18 @@ def by_turn(line: Line, x: JoinedLine, ends: Ends, state: State, k: int) -> tupl
     for axis in range(3):
         for sign in (1.0, -1.0):
             frames = ends.frame.copy()
-            frames[k] = (_rotation(sign * FRAME_TURN * np.eye(3)[axis]) @ frame).ravel()
+            frames[k] = (rotation(sign * FRAME_TURN * np.eye(3)[axis]) @ frame).ravel()
             rows = np.zeros((count, SIZE * WIDTH))
             report = rows_at_rest(line, x, ends._replace(frame=frames), state, (0.0, ANCHOR), rows)
             right = rows.reshape(count, SIZE, WIDTH)[:, :, -1].copy()  # minus the balance, minus the spin's
-            right[:, 0] = 0.0
+            right[:, 0] *= -1.0  # where tension makes a torque, the length of a cell hangs on the turn
             forces[axis] += sign * right.ravel() / (2.0 * FRAME_TURN)
             moment = report[MOMENT_A + 3 * k : MOMENT_A + 3 * k + 3] * (1.0 if k == 0 else -1.0)
             moments[:, axis] -= sign * moment / (2.0 * FRAME_TURN)
     return forces, moments
 
 
-def _rotation(n: Floats) -> Floats:
+def rotation(n: Floats) -> Floats:
     """exp([n]x) of a small rotation vector, to the fourth order."""
     S = _hat(n)
     return np.asarray(np.eye(3) + S + S @ S / 2.0 + S @ S @ S / 6.0)
@@ -394,7 +409,7 @@ def _own_stiffness(solver: SystemSolver, states: SystemState, b: int) -> Floats:
             if k < 3:
                 moved.bodies[b, PLACE + k] += sign * shift
             else:
-                R = _rotation(sign * TURN * np.eye(3)[k - 3]) @ row[FRAME:V].reshape(3, 3)
+                R = rotation(sign * TURN * np.eye(3)[k - 3]) @ row[FRAME:V].reshape(3, 3)
                 moved.bodies[b, FRAME:V] = R.ravel()
             solver.evaluate_forces(moved, 0.0)
             own = solver.body_work[b, OWN : OWN + 6]

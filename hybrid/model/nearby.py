@@ -95,7 +95,7 @@ def _built(model: Model, scene: Scene, resolution: Resolution) -> Model | None:
         layout = found.layout._replace(rod=here.rod, here=here.here)
         line = found.on_base.line(layout, found.line.bits, found.line.plane)
         found = replace(found, line=line, zones=layout.zones, layout=layout, sea=found.sea.on(line.h.size))
-    return found if _near(found.line.s, model.line.s) else None
+    return found if same_nodes(found.line.s, model.line.s) else None
 
 
 def _cells(
@@ -112,9 +112,9 @@ def _cells(
             return None
         layout = layout._replace(rod=model.layout.rod, here=model.layout.here)
         s, zones = layout.nodes, layout.zones
-    return (layout, s, zones) if _near(s, model.line.s) else None
+    return (layout, s, zones) if same_nodes(s, model.line.s) else None
 
 
-def _near(s: Floats, old: Floats) -> bool:
+def same_nodes(s: Floats, old: Floats) -> bool:
     """Whether nodes (N+1,) m are where they were, but for a small part of the length."""
     return s.size == old.size and float(np.abs(s - old).max()) <= SHIFT * float(old[-1])

@@ -372,13 +372,6 @@ def _by_rao(tables: Tables) -> Iterator[Place]:
             yield (*at, "motion", "vessel", "rao")
 
 
-def _turning(tables: Tables) -> Iterator[Place]:
-    """Free bodies, and free points that lines are clamped to: they turn by the moments of their lines."""
-    if SYSTEM in tables:
-        yield from (("bodies", name) for name in tables[SYSTEM].free_bodies)
-        yield from (("points", name) for name in tables[SYSTEM].rigid)
-
-
 def _several(tables: Tables) -> Iterator[Place]:
     return iter([("lines",)] if SYSTEM in tables else [])
 
@@ -442,7 +435,6 @@ LAYERS = Feature("cells to a boundary layer", "resolution.cells_per_layer",
 CLAMPED_CONNECTION = Feature("a clamped connection", "lines.NAME.connections", _clamped)
 BREAKS_OFF_CLAMP = Feature("a break at a clamp", "break_at", _breaks_off_clamp)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
-TURNING = Feature("free bodies, points that lines are clamped to", "bodies", _turning)
 CLAMPED_TO_FREE = Feature("a line that is clamped to a free point or body", "lines.NAME.connections", _clamped_to_free)
 OBSTACLES = Feature("obstacles", "obstacles", _obstacles)
 SHAPES = Feature("bodies that lines touch", "bodies.NAME.shape", _shapes)
@@ -596,11 +588,6 @@ REFUSALS: tuple[Refusal, ...] = (
         BY_RAO, FINITE_WAVES, "physics",
         "an RAO is of linear waves, and the harmonics of one wave of finite height ({key}) travel with it",
         fix="waves: {{kind: regular}}, or the motion from a file",
-    ),
-    Refusal(
-        DERIVATIVES, TURNING, "not worked out",
-        "what turns by the moments of its lines ({key}) has no derivatives yet", "points that lines pull at alone",
-        "hold the body, or take differences of two equilibria",
     ),
     Refusal(
         IN_MOTION, FOLLOWED, "not worked out",

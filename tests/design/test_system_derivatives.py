@@ -103,11 +103,7 @@ def test_pretension_of_a_mooring():
 
 
 def test_what_is_refused():
-    body = {"mass": 5e3, "inertia": [1e3, 1e3, 1e3], "volume": 30.0, "initial_guess": [0, 0, 0]}
-    turning = moored({"body": "hull", "place": [0, 0, 0]}) | {"bodies": {"hull": body}}
     key = "lines.east.sections[0].mass"
-    with pytest.raises(hybrid.SceneError, match="turns by the moments of its lines"):
-        hybrid.sensitivity(turning, ["east/tension@end"], [key])
     for of, words in (("tension@end", "LINE/NAME@S"), ("west/tension@end", "east, north, south"),
                       ("east/tension@999", "between 0 and 185 m"), ("east/tensoin@0", "one of .*tension")):  # fmt: skip
         with pytest.raises(hybrid.SceneError, match=words):

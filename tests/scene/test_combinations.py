@@ -88,10 +88,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.OTHER_MOTIONS, c.RESPONSE): (
         {"ends.end": {"kind": "free", "force": {"value": [1, 0, 0], "until": 2}}}, "response"
     ),
-    (c.DERIVATIVES, c.TURNING): (
-        {"points.b": {"body": "buoy", "place": [0, 0, 0]},
-         "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0]}}, "derivatives"
-    ),
     (c.IN_MOTION, c.FOLLOWED): ({"time": {"duration": 3.0, "tolerance": 1e-3}}, "derivatives in motion"),
     (c.IN_MOTION, c.ACCURACY): ({"accuracy": "3%"}, "derivatives in motion"),
     (c.DERIVATIVES, c.SETTLED_FRICTION): ({"initial": {"kind": "equilibrium", "friction": "settled"}}, "derivatives"),
@@ -144,7 +140,6 @@ def _of_several(pair: tuple[c.Feature, c.Feature]) -> bool:
         c.MOVED_BY_LINES,
         c.CLAMPED_TO_FREE,
         c.CLAMPED_CONNECTION,
-        c.TURNING,
         c.SHAPES,
     )
     return any(x in names for x in pair)

@@ -1,0 +1,103 @@
+"""Free bodies, and points that lines are clamped to, at rest: what their equations leave over when their scene changes.
+
+Of a body that lines pull at with forces f at arms a, and with moments m where they are clamped,
+
+    R = (F + sum f,  M + sum (a x f + m)),
+
+a change of the scene changes its own F and M (weight, water, loads), the arms, and the forces and moments of the same
+shapes of the lines.  What lines leave over at their ends comes through the place of the ends (modal.matrices).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from hybrid.design.line_at_rest import Frames
+from hybrid.kernels.junctions.bodies import FRAME, OWN, PIECES, PLACE, SOFTEST, V
+from hybrid.kernels.junctions.carried_frames import TURNS
+from hybrid.kernels.state.state import Floats
+from hybrid.modal.matrices import SHIFT, TURN, rotation
+from hybrid.model.system import SystemModel
+from hybrid.solve.joined import SystemState
+from hybrid.solve.system import SystemSolver
+
+
+class BodiesAtRest:
+    """What turns by the moments of its lines, in the equilibrium of a scene."""
+
+    def __init__(self, solver: SystemSolver, states: SystemState, model: SystemModel) -> None:
+        """solver: of the lines in their equilibrium, whose numbers of bodies are those there."""
+        self._solver, self._states, self._model = solver, states, model
+        self.count, self._points = len(solver.bodies), len(solver.net)
+        self._numbers = solver.bodies.copy()
+
+    def axes(self, b: int) -> Floats:
+        """Axes (3, 3) of a body, as columns."""
+        return np.asarray(self._states.bodies[b, FRAME:V].reshape(3, 3))
+
+    def body_at(self, l: int, k: int) -> int:
+        """The body at end k of line l; -1: there is none."""
+        return max(int(self._solver.joints[l, k]) - self._points, -1)
+
+    def turns(self, l: int) -> list[int]:
+        """Ends of line l whose frames turn with a body."""
+        return [k for k in (0, 1) if self.body_at(l, k) >= 0 and self._solver.lines[l].seats[k, TURNS] != 0.0]
+
+    def frames(self, l: int, seats: Floats) -> Frames:
+        """Frames of the ends of line l that turn with bodies, with seats (2, SEAT) in these."""
+        return {k: (self.axes(self.body_at(l, k)) @ seats[k, :TURNS].reshape(3, 3)).ravel() for k in self.turns(l)}
+
+    def arms(self, l: int, fairleads: Floats) -> Floats:
+        """(2, 3) m from the origin of the body to each end of line l, inertial, with fairleads (2, 3) on it."""
+        bodies = [self.body_at(l, k) for k in (0, 1)]
+        return np.stack([self.axes(b) @ x if b >= 0 else np.zeros(3) for b, x in zip(bodies, fairleads, strict=True)])
+
+    def own(self, model: SystemModel, states: SystemState | None = None) -> Floats:
+        """(B, 6) N, N m, on the bodies but for their lines, as a model has them where they are.
+
+        states: where they are; None: in the equilibrium.  ValueError: the model has other members.
+        """
+        states = self._states if states is None else states
+        numbers = model.body_numbers(np.inf)
+        if numbers.shape != self._numbers.shape or not np.array_equal(numbers[:, PIECES], self._numbers[:, PIECES]):
+            raise ValueError("other pieces of members")
+        model.stir(np.inf, states.bodies, 0.0, numbers)
+        return self._own(numbers, states)
+
+    def _own(self, numbers: Floats, states: SystemState) -> Floats:
+        self._solver.bodies[:] = numbers
+        try:
+            self._solver.evaluate_forces(states, 0.0)
+            return np.asarray(self._solver.body_work[:, OWN : OWN + 6].copy())
+        finally:
+            self._solver.bodies[:] = self._numbers
+
+    def stiffness_besides(self, stiffness: sparse.csc_array) -> sparse.csc_array:
+        """What the matrix of the network (q, q) leaves out of its bodies, the last of q: water around members that is
+
+        another where they go, and a spring against turns that nothing holds, as Newton's method has it.
+        """
+        first = stiffness.shape[0] - 6 * self.count
+        blocks = [sparse.csc_array((first, first))]
+        diagonal = np.abs(stiffness.diagonal()[first:].reshape(-1, 6))
+        for b in range(self.count):
+            block = self._by_water(b) if self._numbers[b, PIECES] > 0 else np.zeros((6, 6))
+            stiffest = float(diagonal[b, 3:].max())
+            block[3:, 3:] += SOFTEST * (stiffest or 1.0) * np.eye(3)
+            blocks.append(sparse.csc_array(block))
+        return sparse.csc_array(sparse.block_diag(blocks, format="csc"))
+
+    def _by_water(self, b: int) -> Floats:
+        """(6, 6) stiffness of the water around the members of a body, which changes as it shifts and turns."""
+        K, step = np.zeros((6, 6)), np.repeat([SHIFT * self._solver.length, TURN], 3)
+        for k in range(6):
+            for sign in (1.0, -1.0):
+                moved = self._states.copy()
+                if k < 3:
+                    moved.bodies[b, PLACE + k] += sign * step[k]
+                else:
+                    moved.bodies[b, FRAME:V] = (rotation(sign * step[k] * np.eye(3)[k - 3]) @ self.axes(b)).ravel()
+                change = self.own(self._model, moved)[b] - self._own(self._numbers, moved)[b]
+                K[:, k] -= sign * change / (2.0 * step[k])
+        return K

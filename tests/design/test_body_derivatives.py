@@ -1,0 +1,176 @@
+"""Derivatives beside free bodies, and points that lines are clamped to, against differences of equilibria."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.design import line_at_rest
+from hybrid.design.cable_at_rest import CableAtRest
+from hybrid.design.line_at_rest import parse_result
+from hybrid.design.numbers import changed_scene, with_number
+from hybrid.design.sensitivity import at_rest
+from hybrid.kernels.algebra.block_elimination import SIZE
+from hybrid.modal.matrices import linear_line
+from hybrid.scene.read import as_scene_or_system
+from tests.design.test_system_derivatives import ANCHORS, BUOY, CHAIN, HOSE, SEA, moored
+
+HULL = {
+    "mass": 5e3, "inertia": [1e4, 1e4, 1e4], "volume": 30.0, "centre": [0.1, 0, -1.0],
+    "centre_of_buoyancy": [0, 0.05, 0.5], "moment": [1e4, 2e4, 0], "initial_guess": [0, 0, 0],
+}  # fmt: skip
+FLOAT = {
+    "mass": 2e4, "inertia": [1e5, 1e5, 1e5], "initial_guess": [0, 0, 27],
+    "hydrostatics": {"level": 28.0, "heave": 3e4, "roll": 2e5, "pitch": 3e5},
+}  # fmt: skip
+SPAR = {
+    "mass": 3e3, "inertia": [1e4, 1e4, 1e4], "volume": 1.0, "centre": [0.1, 0, -1.0], "force": [0, 0, 1.5e5],
+    "initial_guess": [0, 0, 24],
+    "members": [{"start": [0, 0, -9], "end": [0, 0, 9], "diameter": 2.0, "drag": 1.0, "axial_drag": 0.1}],
+}  # fmt: skip
+SHEARED = [
+    {"z": -100, "velocity": [0.1, 0, 0]},
+    {"z": 0, "velocity": [0.4, 0.1, 0]},
+    {"z": 30, "velocity": [1.2, 0.3, 0]},
+]
+ROD = HOSE | {"torsional_stiffness": 300.0}
+CLAMPED = {"kind": "clamped", "tangent": [1, 0, 1]}
+
+
+def held_by_three(body, length=185.0, **hose):
+    """A body on three lines, each at its own place, and a hose from it that is clamped there."""
+    places = {"east": [3, 0, -2], "north": [-1.5, 2.6, -2], "south": [-1.5, -2.6, -2]}
+    points = {x: {"position": place} for x, place in ANCHORS.items()}
+    points |= {f"at_{x}": {"body": "hull", "place": place} for x, place in places.items()}
+    section = CHAIN | {"length": length}
+    lines = {x: {"start": x, "end": f"at_{x}", "sections": [section], "mesh": {"cells": 20}} for x in ANCHORS}
+    if hose:
+        points |= {"out": {"body": "hull", "place": [1, 0.5, 1]}, "vessel": {"position": [60, 0, 20]}}
+        rod = {"start": "out", "end": "vessel", "sections": [ROD], "model": "rod", "mesh": {"cells": 30}}
+        lines["hose"] = rod | {"connections": {"start": CLAMPED}} | hose
+    return {"environment": SEA, "points": points, "lines": lines, "bodies": {"hull": body}}
+
+
+def one_fairlead():
+    """Nothing holds the body against turning about the vertical."""
+    tables = held_by_three(HULL | {"moment": [0, 0, 0]})
+    for name in ANCHORS:
+        tables["points"][f"at_{name}"]["place"] = [0, 0, -2]
+    return tables
+
+
+def two_bodies():
+    """A hose whose tension makes a torque, clamped to two bodies."""
+    hose = {"sections": [ROD | {"tension_torque": 0.01}]}
+    hose["connections"] = {"start": CLAMPED | {"normal": [0, 1, 0]}, "end": {"kind": "clamped", "tangent": [1, 0, 0.6]}}
+    tables = held_by_three(HULL, **hose)
+    tables["bodies"]["ship"] = FLOAT | {"initial_guess": [70, 0, 27]}
+    tables["points"] |= {
+        "vessel": {"body": "ship", "place": [-1, 0, -2]},
+        "fair": {"body": "ship", "place": [1, 0, -2]},
+    }
+    tables["points"]["far"] = {"position": [150, 20, -100]}
+    chain = {"start": "far", "end": "fair", "sections": [CHAIN | {"length": 165.0}], "mesh": {"cells": 20}}
+    tables["lines"]["hold"] = chain
+    return tables
+
+
+def clamped_to_a_point():
+    """Two lines that a free point with mass and volume turns with."""
+    tables = moored(BUOY, True)
+    clamp, rod = {"connections": {"start": {"kind": "clamped"}}}, {"model": "rod", "mesh": {"cells": 20}}
+    tables["points"]["weight"] = {"kind": "free", "initial_guess": [0, 0, -20], "mass": 100.0}
+    tables["lines"]["hose"] |= clamp | rod | {"sections": [ROD]}
+    tail = {"start": "top", "end": "weight", "sections": [ROD | {"length": 20.0}]}
+    tables["lines"]["tail"] = clamp | rod | tail
+    return tables
+
+
+def spar():
+    """Members in a current that changes with height, through the surface."""
+    tables = held_by_three(SPAR, 200.0)
+    tables["environment"] = SEA | {"fluid": SEA["fluid"] | {"current": {"kind": "profile", "table": SHEARED}}}
+    return tables
+
+
+OF = ["east/tension@end", "north/reaction_start.x", "south/position.z@end", "south/reaction_end.x"]
+OF_HOSE = [*OF, "max hose/curvature", "hose/tension@start", "hose/position.z@47"]
+SCENES = {
+    "a body": (held_by_three(HULL), OF, [
+        "bodies.hull.mass", "bodies.hull.centre[0]", "points.at_east.place[2]", "lines.east.sections[0].length",
+        "environment.fluid.current[1]",
+    ]),
+    "what floats": (held_by_three(FLOAT), OF, [
+        "bodies.hull.hydrostatics.pitch", "bodies.hull.hydrostatics.level", "points.east.position[0]",
+    ]),
+    "a clamp": (held_by_three(HULL, mesh={"cells": 30}), OF_HOSE, [
+        "lines.hose.connections.start.tangent[0]", "points.out.place[0]", "lines.hose.sections[0].bending_stiffness",
+        "bodies.hull.moment[1]",
+    ]),
+    "one fairlead": (one_fairlead(), OF, ["lines.east.sections[0].length", "bodies.hull.centre[0]"]),
+    "two bodies": (two_bodies(), OF_HOSE, ["lines.hose.sections[0].length", "bodies.ship.hydrostatics.roll"]),
+    "a point": (clamped_to_a_point(), [*OF_HOSE, "tail/tension@start"], [
+        "points.top.volume", "points.weight.mass", "lines.hose.sections[0].length", "points.vessel.position[2]",
+    ]),
+    "members": (spar(), OF, [
+        "bodies.hull.members[0].diameter", "bodies.hull.force[2]", "points.at_east.place[2]", "environment.fluid.surface",
+    ]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", SCENES)
+def test_differences_of_equilibria(what):
+    """Bodies shift and turn with what holds them."""
+    tables, of, keys = SCENES[what]
+    made = as_scene_or_system(tables)
+    rest = at_rest(made, of)
+    for key, ours in zip(keys, rest.by(keys), strict=True):
+        number = rest.number(key)
+        d = 3e-5 * abs(number)
+        more, less = (at_rest(with_number(made, key, number + x), of).values for x in (d, -d))
+        floor = 1e-3 * np.abs(rest.values) / abs(number)
+        off = np.abs(ours - (more - less) / (2.0 * d)) / np.maximum(np.abs(ours), floor)
+        assert off.max() < 3e-6, (key, off)
+
+
+def with_torque():
+    """A cable in a current, clamped at both ends, whose tension makes a torque."""
+    section = ROD | {"tension_torque": 0.05}
+    start = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 1], "normal": [0, 1, 0]}
+    end = {"kind": "clamped", "position": [60, 0, 20], "tangent": [1, 0, 0.6]}
+    return hybrid.validate_scene({
+        "environment": {"fluid": SEA["fluid"]}, "cable": {"sections": [section]}, "ends": {"start": start, "end": end},
+        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 16},
+    })  # fmt: skip
+
+
+def test_torque_of_tension():
+    """Without the tension of the cell after next, height by mass was off by a fifth, and twist by an eighth."""
+    made, of = with_torque(), ["tension@0", "max curvature", "position.z@50", "twist@50"]
+    wanted = [parse_result(x, made.length) for x in of]
+    rest = CableAtRest(made, 1.0, wanted)
+    for key in ("cable.sections[0].mass", "ends.end.position[0]", "cable.sections[0].tension_torque"):
+        number = rest.number(key)
+        ours, d = rest.by([key])[0], 1e-5 * number
+        more, less = (CableAtRest(changed_scene(made, key, number + x), 1.0, wanted).values for x in (d, -d))
+        np.testing.assert_allclose(ours, (more - less) / (2.0 * d), rtol=1e-5, err_msg=key)
+
+
+def test_the_matrix_is_what_the_equations_change_by():
+    """Of each unknown of that cable, moved both ways."""
+    made = with_torque()
+    rest = CableAtRest(made, 1.0, [parse_result("tension@0", made.length)])
+    line, state, free = rest.line, rest.line.state.copy(), rest._free
+    K = linear_line(line.joined(line.here), "cable", state, sticks=False, quick=False).stiffness.toarray()
+    for unknown in free:
+        step = 1e-6 if unknown % SIZE else 1e-2
+        q = np.zeros((2, len(state.r), SIZE))
+        q[:, unknown // SIZE, unknown % SIZE] = 1.0
+        moved, left = line_at_rest._moved(state, q, np.array([step, -step])), []
+        for k in (0, 1):
+            for name, x in moved.items():
+                getattr(line._still, name)[:] = x[k]
+            left.append(line.left(line.here)[0])
+        column = -(left[0] - left[1])[free] / (2.0 * step)
+        np.testing.assert_allclose(K[free, unknown], column, rtol=0, atol=3e-9 * max(np.abs(K).max(), 1.0))
