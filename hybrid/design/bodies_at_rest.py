@@ -14,10 +14,10 @@ import numpy as np
 from scipy import sparse
 
 from hybrid.design.line_at_rest import Frames
-from hybrid.kernels.junctions.bodies import FRAME, OWN, PIECES, PLACE, SOFTEST, V
+from hybrid.kernels.junctions.bodies import FRAME, OWN, PIECES, SOFTEST, V
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.state.state import Floats
-from hybrid.modal.matrices import SHIFT, TURN, rotation
+from hybrid.modal.loaded_members import stiffness_by_water
 from hybrid.model.system import SystemModel
 from hybrid.solve.joined import SystemState
 from hybrid.solve.system import SystemSolver
@@ -53,22 +53,18 @@ class BodiesAtRest:
         bodies = [self.body_at(l, k) for k in (0, 1)]
         return np.stack([self.axes(b) @ x if b >= 0 else np.zeros(3) for b, x in zip(bodies, fairleads, strict=True)])
 
-    def own(self, model: SystemModel, states: SystemState | None = None) -> Floats:
+    def own(self, model: SystemModel) -> Floats:
         """(B, 6) N, N m, on the bodies but for their lines, as a model has them where they are.
 
-        states: where they are; None: in the equilibrium.  ValueError: the model has other members.
+        ValueError: the model has other members.
         """
-        states = self._states if states is None else states
         numbers = model.body_numbers(np.inf)
         if numbers.shape != self._numbers.shape or not np.array_equal(numbers[:, PIECES], self._numbers[:, PIECES]):
             raise ValueError("other pieces of members")
-        model.stir(np.inf, states.bodies, 0.0, numbers)
-        return self._own(numbers, states)
-
-    def _own(self, numbers: Floats, states: SystemState) -> Floats:
+        model.stir(np.inf, self._states.bodies, 0.0, numbers)
         self._solver.bodies[:] = numbers
         try:
-            self._solver.evaluate_forces(states, 0.0)
+            self._solver.evaluate_forces(self._states, 0.0)
             return np.asarray(self._solver.body_work[:, OWN : OWN + 6].copy())
         finally:
             self._solver.bodies[:] = self._numbers
@@ -82,22 +78,13 @@ class BodiesAtRest:
         blocks = [sparse.csc_array((first, first))]
         diagonal = np.abs(stiffness.diagonal()[first:].reshape(-1, 6))
         for b in range(self.count):
-            block = self._by_water(b) if self._numbers[b, PIECES] > 0 else np.zeros((6, 6))
+            block = self._by_water(b)
             stiffest = float(diagonal[b, 3:].max())
             block[3:, 3:] += SOFTEST * (stiffest or 1.0) * np.eye(3)
             blocks.append(sparse.csc_array(block))
         return sparse.csc_array(sparse.block_diag(blocks, format="csc"))
 
     def _by_water(self, b: int) -> Floats:
-        """(6, 6) stiffness of the water around the members of a body, which changes as it shifts and turns."""
-        K, step = np.zeros((6, 6)), np.repeat([SHIFT * self._solver.length, TURN], 3)
-        for k in range(6):
-            for sign in (1.0, -1.0):
-                moved = self._states.copy()
-                if k < 3:
-                    moved.bodies[b, PLACE + k] += sign * step[k]
-                else:
-                    moved.bodies[b, FRAME:V] = (rotation(sign * step[k] * np.eye(3)[k - 3]) @ self.axes(b)).ravel()
-                change = self.own(self._model, moved)[b] - self._own(self._numbers, moved)[b]
-                K[:, k] -= sign * change / (2.0 * step[k])
-        return K
+        """(6, 6) stiffness of the water around the members of a body; zeros: it has none."""
+        members = self._model.bodies[b].members if b < len(self._model.bodies) else None
+        return np.zeros((6, 6)) if members is None else stiffness_by_water(self._solver, self._states, b, members)

@@ -19,6 +19,7 @@ from hybrid.kernels.state.obstacle_rows import ONSET_OF
 from hybrid.kernels.state.state import Floats
 from hybrid.modal.eigen import Eigen, lowest_modes
 from hybrid.modal.matrices import LinearLine, LinearNetwork, linear_network
+from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model
 from hybrid.model.payout import payout_of
 from hybrid.model.resolution import Resolution
@@ -176,7 +177,7 @@ def _touched(rest: Rest) -> Iterator[str]:
 class Rest:
     """The equilibrium of a scene as a network, of one line or of several; points and bodies by name, those that are
 
-    free, and models of the lines.
+    free, models of the lines and of the bodies.
     """
 
     solver: SystemSolver
@@ -185,6 +186,7 @@ class Rest:
     models: tuple[Model, ...]
     points: tuple[str, ...] = ()
     bodies: tuple[str, ...] = ()
+    floats: tuple[BodyModel, ...] = ()
 
 
 def equilibrium_of(asked: Scene | System, cells: float = 1.0) -> Rest:
@@ -221,8 +223,11 @@ def _of_system(system: System, cells: float) -> Rest:
     bodies = (*(body.name for body in run.model.bodies), *run.model.rigid)
     found = run.found.solver  # which knows neither waves nor friction
     lines = [x._replace(line=model.line) for x, model in zip(found.lines, run.model.models, strict=True)]
-    solver = SystemSolver(lines, len(found.net), found.bodies)
-    return Rest(solver, run.state, tuple(run.model.names), run.model.models, tuple(run.model.free), bodies)
+    for body, state, row in zip(run.model.bodies, run.state.bodies, found.bodies, strict=False):
+        body.take_added_mass(state)  # as it is wet at rest
+        row[MASS : MASS + 36] = body.numbers[MASS : MASS + 36]
+    solver, model = SystemSolver(lines, len(found.net), found.bodies), run.model
+    return Rest(solver, run.state, tuple(model.names), model.models, tuple(model.free), bodies, model.bodies)
 
 
 def _refuse_contact(where: str) -> None:

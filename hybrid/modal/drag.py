@@ -1,7 +1,8 @@
 """Drag that stands for the quadratic one in a Gaussian motion: the mean of its derivative (docs/theory.md, 21).
 
 For f = c |u| u of a velocity u = U + x with x normal and of covariance S,  E[df/du] = c E[|u| 1 + u u^T/|u|];
-it is the linear law that leaves least in the mean square.
+it is the linear law that leaves least in the mean square.  That of a single harmonic, which is not normal, is the one
+with the same first harmonic:  E[f x^T] E[x x^T]^-1  over its phases.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from hybrid.kernels.state.state import Floats
 ANGLES, RADII, POINTS = 40, 4, 10
 # Standard deviations beyond which a normal velocity is its mean.
 FAR = 30.0
-# Of a single harmonic: 8/(3 pi) of its amplitude in place of sqrt(8/pi) of its standard deviation.
-HARMONIC = 8.0 / (3.0 * math.pi) * math.sqrt(2.0) / math.sqrt(8.0 / math.pi)
+# Phases of a single harmonic, and the part of its largest square below which a direction counts as one without motion.
+PHASES, STILL = 128, 1e-8
 
 
 @cache
@@ -62,6 +63,62 @@ def along(mean: Floats, deviation: Floats) -> Floats:
     ratio = np.clip(mean / s, -FAR, FAR)
     gauss = s * math.sqrt(2.0 / math.pi) * np.exp(-0.5 * ratio**2)
     return np.asarray(2.0 * (gauss + mean * erf(ratio / math.sqrt(2.0))))
+
+
+def of_harmonic(mean: Floats, amplitude: Floats) -> Floats:
+    """The law (n, m, m) of a harmonic about mean velocities (n, m), of complex amplitudes (n, m); m = 1, 2 or 3.
+
+    In directions without motion, E[df/du].
+    """
+    angle = 2.0 * np.pi * (np.arange(PHASES) + 0.5) / PHASES
+    x = (amplitude[:, None, :] * np.exp(-1j * angle)[None, :, None]).real
+    u = mean[:, None, :] + x
+    speed = np.linalg.norm(u, axis=2)
+    covariance = np.einsum("npi,npj->nij", x, x) / PHASES
+    inverse = np.linalg.pinv(covariance, rcond=STILL, hermitian=True)
+    B = np.einsum("np,npi,npj->nij", speed, u, x) / PHASES @ inverse
+    scaled = u / np.sqrt(np.maximum(speed, 1e-300))[:, :, None]
+    mean_slope = np.einsum("npi,npj->nij", scaled, scaled) / PHASES
+    mean_slope += speed.mean(axis=1)[:, None, None] * np.eye(mean.shape[1])
+    return np.asarray(B + mean_slope @ (np.eye(mean.shape[1]) - covariance @ inverse))
+
+
+def linear_law(mean: Floats, u: Floats) -> Floats:
+    """The law (n, m, m) by mean velocities (n, m) and amplitudes (F, n, m); m = 2 or 3."""
+    if len(u) == 1:
+        return of_harmonic(mean, u[0])
+    return across(mean, covariance_of(u))
+
+
+def covariance_of(u: Floats) -> Floats:
+    """(n, m, m) of amplitudes (F, n, m)."""
+    return np.asarray(0.5 * np.einsum("fhm,fhn->hmn", u, u.conj()).real)
+
+
+def axes_across(d: Floats) -> Floats:
+    """Two axes (H, 2, 3) across each direction (H, 3)."""
+    first = np.cross(d, np.eye(3)[np.abs(d).argmin(axis=1)])
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([first, np.cross(d, first)], axis=1)
+
+
+def of_cylinders(
+    d: Floats, axes: Floats, drag: tuple[Floats, Floats], current: Floats, u: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Linear drag (H, 3, 3) N s/m of cylinders along d (H, 3) with axes (H, 2, 3) across, by a relative velocity of the
+
+    water with a mean (H, 3) m/s and amplitudes u (F, H, 3); its covariance (H, 2, 2) and mean (H, 2) across.
+    drag: across and along, (H,) N s^2/m^2.
+    """
+    un, ut = np.einsum("fhi,hmi->fhm", u, axes), np.einsum("fhi,hi->fh", u, d)
+    mean, forth = np.einsum("hi,hmi->hm", current, axes), np.einsum("hi,hi->h", current, d)
+    B = np.einsum("hmi,hmn,hnj->hij", axes, linear_law(mean, un), axes) * drag[0][:, None, None]
+    if len(u) == 1:
+        t = of_harmonic(forth[:, None], ut[0, :, None])[:, 0, 0]
+    else:
+        t = along(forth, np.sqrt(0.5 * (np.abs(ut) ** 2).sum(axis=0)))
+    B += (drag[1] * t)[:, None, None] * d[:, :, None] * d[:, None, :]
+    return B, covariance_of(un), mean
 
 
 def size_deviation(mean: Floats, covariance: Floats) -> Floats:

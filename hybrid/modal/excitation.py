@@ -5,7 +5,7 @@ Everything is  Re(X exp(-i w t)),  so that velocities are -i w X and acceleratio
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,9 +40,9 @@ class Excitation:
     turns: Floats
 
 
-def frequencies_of(models: tuple[Model, ...]) -> Floats:
-    """All frequencies (F,) 1/s that excite lines, increasing."""
-    found = [np.zeros(0)]
+def frequencies_of(models: tuple[Model, ...], waves: Iterable[Floats] = ()) -> Floats:
+    """All frequencies (F,) 1/s that excite lines, increasing; waves: (K, 6) that excite bodies."""
+    found = [np.zeros(0), *(x[:, 1] for x in waves)]
     for model in models:
         if model.line.bits & WAVES or _follows(model):
             found.append(model.sea.values.waves[:, 1])
@@ -108,20 +108,45 @@ def excitations_of(model: Model, line: Line, state: State, omegas: Floats, rows_
 
 def _of_wave(line: Line, sea: Sea, state: State, wave: Floats, rows_of: RowsOf) -> tuple[Floats, Floats]:
     """Forces (N+1, 3) N but drag, and velocities (N+1, 3) m/s of the water, by a wave of amplitude 1 m and phase 0."""
-    small = SMALL_WAVE * 2.0 * np.pi / wave[5]
-    one, still = wave[None].copy(), np.zeros_like(state.r)
     found = []
-    for amplitude, phase in ((0.0, 0.0), (small, 0.0), (small, -0.5 * np.pi)):  # none; its cosine; its sine
-        one[0, 0], one[0, 4] = amplitude, phase
-        there = sea._replace(
-            waves=one, orbits=one[:, 0] * one[:, 1], now=np.array([0.0, sea.now[1], 1.0, 0.0]),
-            flow=np.zeros((line.s.size, 7)), lanes=np.zeros((12, LANES)),
-        )  # fmt: skip
-        wave_kinematics(there, state.r, still)
+    for there in _small_seas(sea, wave, line.s.size):
+        wave_kinematics(there, state.r, np.zeros_like(state.r))
         forces = -rows_of(there).reshape(-1, SIZE, WIDTH)[:, 1:4, -1]
         found.append(np.concatenate([forces, there.flow[:, :3]], axis=1))
-    both = ((found[1] - found[0]) + 1j * (found[2] - found[0])) / small
+    both = _amplitudes(found, wave)
     return both[:, :3], both[:, 3:]
+
+
+def water_of_wave(sea: Sea, wave: Floats, places: Floats) -> Floats:
+    """Velocity and acceleration of the water at places (n, 3), and rise of the surface above them, (n, 7) by a wave of
+
+    amplitude 1 m and phase 0.
+    """
+    found = []
+    for there in _small_seas(sea, wave, len(places)):
+        wave_kinematics(there, places, np.zeros_like(places))
+        found.append(there.flow.copy())
+    return _amplitudes(found, wave)
+
+
+def _small_seas(sea: Sea, wave: Floats, places: int) -> Iterator[Sea]:
+    """The sea without waves, with the cosine and with the sine of one that is small."""
+    small, one = _small(wave), wave[None].copy()
+    for amplitude, phase in ((0.0, 0.0), (small, 0.0), (small, -0.5 * np.pi)):
+        one[0, 0], one[0, 4] = amplitude, phase
+        yield sea._replace(
+            waves=one, orbits=one[:, 0] * one[:, 1], now=np.array([0.0, sea.now[1], 1.0, 0.0]),
+            flow=np.zeros((places, 7)), lanes=np.zeros((12, LANES)),
+        )  # fmt: skip
+
+
+def _small(wave: Floats) -> float:
+    return float(SMALL_WAVE * 2.0 * np.pi / wave[5])
+
+
+def _amplitudes(found: list[Floats], wave: Floats) -> Floats:
+    """Complex amplitudes by a wave of 1 m, of what was found in each of its seas."""
+    return np.asarray(((found[1] - found[0]) + 1j * (found[2] - found[0])) / _small(wave))
 
 
 def half_cells(line: Line, sea: Sea, state: State) -> tuple[np.ndarray, Floats, Floats, Floats, Floats]:

@@ -13,7 +13,7 @@ from hybrid.kernels.laws.bending_law import RIGID, parts_without_spring
 from hybrid.kernels.laws.hinge_layer import FADED
 from hybrid.kernels.state.forces import BODIES, DRAG, WAVES
 from hybrid.kernels.state.state import Floats, Line, Sea
-from hybrid.modal.drag import HARMONIC, across, along
+from hybrid.modal.drag import axes_across, linear_law, of_cylinders
 from hybrid.modal.excitation import Excitation, current_at, excitations_of, half_cells
 from hybrid.modal.matrices import ANCHOR, LinearLine, by_turn, rows_at_rest, sparse_rows
 from hybrid.modal.response_results import LineResponse
@@ -48,9 +48,7 @@ class LoadedLine:
         rows_at_rest(calm, x, x.ends, state, (1.0, ANCHOR), moving)
         self.damping = sparse_rows(moving - still)  # of the sections and of the bed
         self.node, self.d, self.cn, self.ct, self.current = half_cells(self.line, self.sea, state)
-        e1 = np.cross(self.d, np.eye(3)[np.abs(self.d).argmin(axis=1)])
-        e1 /= np.linalg.norm(e1, axis=1)[:, None]
-        self.axes = np.stack([e1, np.cross(self.d, e1)], axis=1)  # (H, 2, 3)
+        self.axes = axes_across(self.d)
         self.point_drag = np.nan_to_num(self.line.point_drag) if self.line.bits & BODIES else np.zeros(count)
         self.q = np.zeros((len(omegas), count, SIZE), complex)
         self.omegas = omegas
@@ -64,28 +62,19 @@ class LoadedLine:
         relative = math.sqrt(len(self.omegas) / which.size) * (water - motion)  # (F, N+1, 3)
         blocks = np.zeros((self.line.s.size, 3, 3))
         self.left = np.zeros(self.line.s.size)  # N, what linear drag leaves of the quadratic one, standard deviation
-        factor = HARMONIC if len(self.omegas) == 1 else 1.0
         used = (self.cn > 0.0) | (self.ct > 0.0)
         if used.any():
             node, d, axes = self.node[used], self.d[used], self.axes[used]
-            u = relative[:, node]
-            un = np.einsum("fhi,hmi->fhm", u, axes)
-            covariance = 0.5 * np.einsum("fhm,fhn->hmn", un, un.conj()).real
-            mean = np.einsum("hi,hmi->hm", self.current[used], axes)
+            drag = self.cn[used], self.ct[used]
+            B, covariance, mean = of_cylinders(d, axes, drag, self.current[used], relative[:, node])
             square = np.linalg.eigvalsh(covariance)[:, -1]
             part = np.minimum(np.linalg.norm(mean, axis=1) / np.sqrt(np.maximum(square, 1e-300)), 1.0)
             np.add.at(self.left, node, self.cn[used] * square * (LEFT_STILL + part * (LEFT_IN_FLOW - LEFT_STILL)))
-            B = np.einsum("hmi,hmn,hnj->hij", axes, across(mean, covariance), axes) * self.cn[used][:, None, None]
-            ut = np.einsum("fhi,hi->fh", u, d)
-            t = along(np.einsum("hi,hi->h", self.current[used], d), np.sqrt(0.5 * (np.abs(ut) ** 2).sum(axis=0)))
-            B += (self.ct[used] * t)[:, None, None] * d[:, :, None] * d[:, None, :]
-            np.add.at(blocks, node, factor * B)
+            np.add.at(blocks, node, B)
         at = np.flatnonzero(self.point_drag)
         if at.size:
-            u = relative[:, at]
-            covariance = 0.5 * np.einsum("fni,fnj->nij", u, u.conj()).real
             flow = current_at(self.line, self.sea, self.linear.r[at])
-            blocks[at] += factor * self.point_drag[at][:, None, None] * across(flow, covariance)
+            blocks[at] += self.point_drag[at][:, None, None] * linear_law(flow, relative[:, at])
         return blocks
 
     def full_damping(self) -> sparse.csr_array:

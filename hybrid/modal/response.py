@@ -18,16 +18,17 @@ from scipy.sparse.linalg import splu
 
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
-from hybrid.kernels.junctions.bodies import DAMPING, FRAME, PIECES, V
+from hybrid.kernels.junctions.bodies import DAMPING, FRAME, V
 from hybrid.kernels.state.state import Floats
 from hybrid.modal.api import Rest, equilibrium_of, of_first_length
 from hybrid.modal.check import compared
 from hybrid.modal.excitation import frequencies_of, refuse_motions
 from hybrid.modal.loaded_line import LoadedLine
+from hybrid.modal.loaded_members import LoadedMembers, stiffness_by_water, turning_doubts
 from hybrid.modal.matrices import linear_network
 from hybrid.modal.response_results import Response
 from hybrid.modal.validity import doubts_of
-from hybrid.scene.combinations import RESPONSE_OF_MEMBERS, refuse_use
+from hybrid.scene.combinations import refuse_use
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.system import System
 
@@ -52,12 +53,10 @@ def response(scene: SceneLike | System, friction: bool = True, check: float | No
     refuse_use(asked, "response")
     rest = equilibrium_of(asked)
     refuse_motions(rest.models, rest.names)
-    omegas = frequencies_of(rest.models)
+    omegas = frequencies_of(rest.models, [x.members.sea.waves for x in rest.floats if x.members is not None])
     if not omegas.size:
         expected = "waves, or ends that move as harmonics"
         raise SceneError([Complaint("environment.fluid.waves", "nothing that moves", expected, "add `waves`")])
-    if any(row[PIECES] > 0 for row in rest.solver.bodies):
-        raise RESPONSE_OF_MEMBERS.error("bodies", "members")
     run = _Linear(rest, omegas, friction)
     rounds = run.settle()
     lines = {x.name: x.result() for x in run.lines}
@@ -101,29 +100,35 @@ class _Linear:
             LoadedLine(x, linear, model, omegas)
             for x, linear, model in zip(rest.solver.lines, self.network.lines, rest.models, strict=True)
         ]
-        first = self.network.size - 3 * self.network.points - 6 * self.network.bodies
-        entries, size = [np.zeros((0, 3))], self.network.size
+        self.first = self.network.size - 6 * self.network.bodies  # of the unknowns of bodies
+        damping, stiffness = [], []
+        self.members: dict[int, LoadedMembers] = {}
         for b, (row, state) in enumerate(zip(rest.solver.bodies, rest.states.bodies, strict=True)):
             R = np.kron(np.eye(2), state[FRAME:V].reshape(3, 3))
-            C = R @ row[DAMPING : DAMPING + 36].reshape(6, 6) @ R.T
-            at = first + 3 * self.network.points + 6 * b
-            i, j = np.nonzero(C)
-            entries.append(np.column_stack([at + i, at + j, C[i, j]]))
-        every = np.concatenate(entries)
-        places = every[:, 0].astype(int), every[:, 1].astype(int)
-        self.of_bodies = sparse.csr_array((every[:, 2], places), shape=(size, size))
-        self.vectors = np.zeros((len(omegas), size), complex)
+            damping.append(R @ row[DAMPING : DAMPING + 36].reshape(6, 6) @ R.T)
+            stiffness.append(np.zeros((6, 6)))
+            members = rest.floats[b].members if b < len(rest.floats) else None
+            if members is not None:
+                self.members[b] = LoadedMembers(rest.bodies[b], members, state, omegas)
+                stiffness[b] = stiffness_by_water(rest.solver, rest.states, b, members)
+        self.damping, self.by_water = damping, self._of_bodies(stiffness)
+        self.loaded: list[LoadedLine | LoadedMembers] = [*self.lines, *self.members.values()]
+        self.vectors = np.zeros((len(omegas), self.network.size), complex)
+
+    def _of_bodies(self, blocks: Sequence[Floats]) -> sparse.csc_array:
+        """(q, q) of matrices (6, 6) of the bodies, which are the last of q."""
+        return sparse.csc_array(sparse.block_diag([sparse.csc_array((self.first, self.first)), *blocks], format="csc"))
 
     def settle(self) -> int:
         """Iterate the linear drag, first by some of the frequencies; rounds that it took."""
         every = np.arange(len(self.omegas))
         some = every[len(every) % FEWER // 2 :: FEWER] if len(every) >= LEAST_FREQUENCIES * FEWER else every
-        for x in self.lines:
+        for x in self.loaded:
             x.blocks = x.drag_blocks(every, start=True)
         for round_ in range(1, ROUNDS + 1):
             self._solve(some)
             worst = 0.0
-            for x in self.lines:
+            for x in self.loaded:
                 new = x.drag_blocks(some, start=False)
                 size = float(np.abs(new).max(initial=0.0))
                 if size > 0.0:
@@ -139,11 +144,15 @@ class _Linear:
         """The motion at some of the frequencies, with the drag as it is."""
         P = self.network.place
         dampings = [x.full_damping() for x in self.lines]
-        C = sparse.csc_array(P.T @ sparse.block_diag(dampings, format="csr") @ P) + self.of_bodies
-        parts, pattern = _aligned([self.network.stiffness + self.network.skew, self.network.mass, C])
+        of_bodies = [x + self.members[b].damping() if b in self.members else x for b, x in enumerate(self.damping)]
+        C = sparse.csc_array(P.T @ sparse.block_diag(dampings, format="csr") @ P) + self._of_bodies(of_bodies)
+        stiffness = self.network.stiffness + self.network.skew + self.by_water
+        parts, pattern = _aligned([stiffness, self.network.mass, C])
         right = P.T @ np.concatenate(
             [x.loads(which, damping) for x, damping in zip(self.lines, dampings, strict=True)], axis=0
         )
+        for b, members in self.members.items():
+            right[self.first + 6 * b : self.first + 6 * b + 6] += members.loads(which)
         for column, f in enumerate(which):
             w = self.omegas[f]
             pattern.data = parts[0] - w * w * parts[1] - 1j * w * parts[2]
@@ -155,6 +164,8 @@ class _Linear:
         whole = (P @ self.vectors[which].T).T
         for x, a, b in zip(self.lines, self.network.at[:-1], self.network.at[1:], strict=True):
             x.take(which, whole[:, a:b].reshape(which.size, -1, SIZE))
+        for b, members in self.members.items():
+            members.q[which] = self.vectors[which, self.first + 6 * b : self.first + 6 * b + 6]
 
     def points(self) -> dict[str, Floats]:
         """Complex shifts (F, 3) m of free points."""
@@ -163,7 +174,7 @@ class _Linear:
 
     def bodies(self) -> dict[str, Floats]:
         """Complex shifts and turns (F, 6) m, rad of free bodies."""
-        first = self.network.size - 6 * self.network.bodies
+        first = self.first
         return {name: self.vectors[:, first + 6 * k : first + 6 * k + 6] for k, name in enumerate(self.rest.bodies)}
 
     def notes(self) -> Iterator[str]:
@@ -171,3 +182,7 @@ class _Linear:
         for x in self.lines:
             name = f"line {x.name}: " if len(self.lines) > 1 else ""
             yield from (f"{name}not valid: {text}" for text in doubts_of(x))
+        for name, q in self.bodies().items():
+            yield from (f"not valid: {text}" for text in turning_doubts(name, q))
+        for members in self.members.values():
+            yield from (f"not valid: {text}" for text in members.doubts())

@@ -10,7 +10,7 @@ from hybrid.kernels.junctions.bodies import STATE
 from hybrid.kernels.junctions.members_water import blank_members_job, stir_members
 from hybrid.kernels.laws.members import ALONG, CM, CN, CT, MIDDLE, PIECE, WET
 from hybrid.kernels.machine.binding import Table
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.sea import Surroundings
 from hybrid.scene.bodies import FreeBody
 
@@ -50,6 +50,21 @@ class Members:
             sea=self._sea.values, pieces=pieces, sizes=sizes, places=places, still=still, state=self._state,
             dt=self._asked[0], waves=self._asked[1],
         )  # fmt: skip
+
+    @property
+    def sea(self) -> Sea:
+        """The sea around the pieces, with room for as many places, as it was last asked for."""
+        return self._sea.values
+
+    @property
+    def lengths(self) -> Floats:
+        """(n,) m of the pieces."""
+        return self._sizes[:, 1]
+
+    def heights(self, axes: Floats) -> Floats:
+        """(n,) m over which the pieces become wet, of a body with axes (3, 3)."""
+        up = np.minimum(np.abs(self.pieces[:, ALONG:CN] @ axes[2]), 1.0)
+        return np.asarray(up * self._sizes[:, 1] + np.sqrt(1.0 - up**2) * self._sizes[:, 2])
 
     def added_mass(self, row: Floats) -> Floats:
         """(6, 6) about the origin in axes of the body, of the pieces as far as they are wet in a row of a state."""

@@ -472,7 +472,6 @@ OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change
                         "motion.file, motion.travel, force.history", _changing_loads)  # fmt: skip
 FINITE_WAVES = Feature("waves of finite height", "waves.kind: stream_function", _finite_waves)
 BY_RAO = Feature("a vessel that moves by an RAO", "motion.vessel.rao", _by_rao)
-MEMBERS = Feature("free bodies with members", "bodies.NAME.members", lambda tables: ())
 
 # Of one cable alone, by keys that several lines do not have.
 ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
@@ -482,10 +481,6 @@ ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
 RESPONSE_TO_MOTION = Refusal(
     OTHER_MOTIONS, RESPONSE, "physics", "a response by frequency is of what is constant or a sum of harmonics",
     "harmonics, and loads that stay", "hybrid run computes it in time",
-)  # fmt: skip
-RESPONSE_OF_MEMBERS = Refusal(
-    MEMBERS, RESPONSE, "not worked out", "their drag and wetting are no part of a response by frequency",
-    "bodies without members", "hybrid run computes them in time",
 )  # fmt: skip
 PAID = "line is paid out ({key})"
 TOUCHES = "there are obstacles or lines that touch each other ({key})"
@@ -579,7 +574,6 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     # --- response and derivatives ---
     RESPONSE_TO_MOTION,
-    RESPONSE_OF_MEMBERS,
     Refusal(
         FINITE_WAVES, RESPONSE, "physics", "a response by frequency is linear in the waves, and these are not",
         "waves of another kind", "kind: regular has the same height and period; hybrid run computes these in time",

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import hybrid
 from hybrid.cli.commands import app
 from hybrid.modal.drag import across, along, size_deviation
-from hybrid.scene.combinations import RESPONSE_OF_MEMBERS, RESPONSE_TO_MOTION
+from hybrid.scene.combinations import RESPONSE_TO_MOTION
 
 REGULAR = {"kind": "regular", "height": 1.0, "period": 7.0, "ramp": 10, "depth": 100}
 STORM = {"kind": "jonswap", "significant_height": 4.0, "peak_period": 12.0, "direction": 30, "ramp": 10, "depth": 100}
@@ -224,19 +224,6 @@ def test_what_is_refused():
     travel = {"travel": {"by": [1, 0, 0], "over": 10.0}}
     with pytest.raises(hybrid.SceneError, match=RESPONSE_TO_MOTION.why):
         hybrid.response(hung(REGULAR, motion=travel))
-    body = {
-        "initial_guess": [0, 0, -30], "mass": 800.0, "inertia": [900.0, 900.0, 40.0], "volume": 4.0,
-        "members": [{"start": [0, 0, -2], "end": [0, 0, 2], "diameter": 0.5, "drag": 1.0}],
-    }  # fmt: skip
-    line = {"start": "anchor", "end": "under", "sections": hung()["cable"]["sections"], "mesh": {"cells": 10}}
-    held = {
-        "environment": {"fluid": {"density": 1025, "surface": 0, "waves": STORM}},
-        "points": {"anchor": {"position": [0, 0, -95]}, "under": {"body": "float", "place": [0, 0, -2]}},
-        "bodies": {"float": body},
-        "lines": {"hung": line},
-    }
-    with pytest.raises(hybrid.SceneError, match=RESPONSE_OF_MEMBERS.why):
-        hybrid.response(held)
 
 
 def test_the_command_and_its_check(tmp_path, monkeypatch):

@@ -1,0 +1,147 @@
+"""Response and modes of bodies with members, and drag of a single harmonic: closed forms, and runs in time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.modal.drag import of_harmonic
+from hybrid.modal.loaded_members import turning_doubts
+from tests.simulation.test_members import RHO, G, body, floating, scene
+
+ANCHORS = {"east": (150.0, 0.0), "north": (-75.0, 130.0), "south": (-75.0, -130.0)}
+CHAIN = {"mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}
+REGULAR = {"kind": "regular", "period": 7.0, "direction": 30.0, "ramp": 20.0}
+# A slender frame, whose drag is as large as its inertia, and turns it about all axes.
+FRAME = {
+    "mass": 2.5e4, "inertia": [2e5, 2e5, 2e5], "volume": 45.0, "centre": [0, 0, -1.5], "centre_of_buoyancy": [0, 0, 0.5],
+    "initial_guess": [0, 0, -12],
+    "members": [
+        {"start": [0, 0, -6], "end": [0, 0, 6], "diameter": 0.5, "drag": 4.0, "axial_drag": 0.05, "added_mass": 1.0},
+        {"start": [-4, 2, -1], "end": [5, 2, 1], "diameter": 0.5, "drag": 4.0, "axial_drag": 0.1, "added_mass": 0.8},
+        {"start": [1, -4, 2], "end": [2, 4, 5], "diameter": 0.6, "drag": 4.0, "added_mass": 0.8},
+    ],
+}  # fmt: skip
+SPAR = {
+    "mass": 4e4, "inertia": [3e6, 3e6, 3e4], "centre": [0, 0, -1.5], "initial_guess": [0, 0, -12],
+    "hydrostatics": {"level": -9.0, "heave": 1.78e4, "roll": 1.5e6, "pitch": 1.5e6},
+    "members": [{"start": [0, 0, -15], "end": [0, 0, 15], "diameter": 1.5, "drag": 1.0, "added_mass": 1.0}],
+}  # fmt: skip
+
+
+def moored(given, length, height, current=(0.0, 0.0, 0.0)):
+    """A body on three lines in regular waves."""
+    places = {"east": [1, 0, -3], "north": [-0.5, 0.87, -3], "south": [-0.5, -0.87, -3]}
+    points = {x: {"position": [*place, -100]} for x, place in ANCHORS.items()}
+    points |= {f"at_{x}": {"body": "hull", "place": place} for x, place in places.items()}
+    section = CHAIN | {"length": length}
+    lines = {x: {"start": x, "end": f"at_{x}", "sections": [section], "mesh": {"cells": 16}} for x in ANCHORS}
+    fluid = {"density": 1025, "surface": 0.0, "current": [*current], "waves": REGULAR | {"height": height}}
+    bed = {"z": -100.0, "stiffness": 1e4}
+    return {"environment": {"fluid": fluid, "seabed": bed}, "points": points, "bodies": {"hull": given}, "lines": lines}
+
+
+def deviations(tables, until, since):
+    """Of shifts and turns of the body and of tensions at the fairleads: by frequency, and in time."""
+    found = hybrid.response(tables)
+    here = np.sqrt(0.5 * (np.abs(found.bodies["hull"]) ** 2).sum(axis=0))
+    pulls = [x.deviation("tension")[-1] for x in found.lines.values()]
+    time = {"time": {"duration": until, "step": 0.1}, "output": {"every": 0.25, "points": 17}}
+    with hybrid.run(tables | time) as run:
+        late = run.t > since
+        moved, turned = run["bodies/hull/position"][late].std(axis=0), run["bodies/hull/rotation"][late].std(axis=0)
+        tension = [run.lines[x].tension[late][:, -1].std() for x in found.lines]
+    return np.array([*here, *pulls]), np.array([*moved, *np.radians(turned), *tension]), found
+
+
+@pytest.mark.parametrize(("current", "most"), [((0.0, 0.0, 0.0), 0.02), ((0.5, 0.1, 0.0), 0.02)])
+def test_a_frame_of_members_swings_as_in_time(current, most):
+    """All six motions and tensions, in still water and in a current that is faster than the waves."""
+    here, there, found = deviations(moored(FRAME, 167.0, 1.0, current), 260.0, 190.0)
+    assert found.valid, found.notes
+    np.testing.assert_allclose(here, there, rtol=most)
+
+
+def test_a_spar_through_the_surface_swings_as_in_time():
+    """In surge, sway, roll and pitch (it heaves by less than a millimetre); waves wet and dry a tenth of it."""
+    here, there, found = deviations(moored(SPAR, 182.0, 2.0), 360.0, 290.0)
+    assert not any("body hull" in x for x in found.notes)
+    moves = [0, 1, 3, 4]
+    np.testing.assert_allclose(here[moves], there[moves], rtol=0.025)
+
+
+def test_a_small_body_goes_with_the_water():
+    """Three cylinders across each other, each direction across two of them: (1 + 2/3 Ca) a = 2/3 (1 + Ca) a_water."""
+    ends = ([-0.1, 0, 0], [0.1, 0, 0]), ([0, -0.1, 0], [0, 0.1, 0]), ([0, 0, -0.1], [0, 0, 0.1])
+    members = [{"start": a, "end": b, "diameter": 0.1, "added_mass": 1.0, "pieces": 2} for a, b in ends]
+    volume = 3 * 0.25 * math.pi * 0.01 * 0.2
+    given = body(members=members, mass=RHO * volume, volume=volume, inertia=[0.1, 0.1, 0.1], initial_guess=[0, 0, -50])
+    waves = {"kind": "regular", "height": 1.0, "period": 8.0}
+    made = scene({"surface": 0.0, "waves": waves}, given)
+    soft = {"length": 59.0, "mass": 1e-4, "diameter": 3e-4, "axial_stiffness": 0.05, "max_strain": 0.9}
+    made["points"]["west"]["position"], made["points"]["east"]["position"] = [-61, 0, -10], [61, 0, -10]
+    for line in made["lines"].values():
+        line["sections"] = [soft]
+    with hybrid.static(made) as rest:
+        depth = -rest["bodies/it/position"][-1, 2]
+    moved = hybrid.response(made).bodies["it"][0]
+    exact = 0.8 * 0.5 * math.exp(-((2.0 * math.pi / 8.0) ** 2) * depth / G)
+    np.testing.assert_allclose(np.abs(moved[[0, 2]]), exact, rtol=1e-3)
+    assert abs(np.angle(moved[2] / moved[0])) == pytest.approx(0.5 * math.pi, abs=1e-3)
+    assert abs(moved[1]) < 1e-9 * exact
+
+
+def test_it_says_where_members_are_not_linear():
+    wetted = hybrid.response(moored(FRAME, 176.0, 3.0))
+    assert any("of the members of body hull come out of the water" in x for x in wetted.notes) and not wetted.valid
+    turn = np.array([[0.0, 0.0, 0.0, 0.0, 0.3, 0.0]], complex)
+    assert not list(turning_doubts("hull", 0.9 * turn))
+    assert list(turning_doubts("hull", turn)) == ["body hull turns by 0.21 rad (standard deviation)"]
+
+
+BUOY = {
+    "mass": 1.5e4, "inertia": [2e5, 2e5, 2e4], "centre": [0, 0, -1], "initial_guess": [0, 0, 0],
+    "hydrostatics": {"level": 1.0, "heave": 5e4, "roll": 8e5, "pitch": 8e5},
+    "members": [{"start": [0, 0, -6], "end": [0, 0, 6], "diameter": 0.6, "drag": 8.0, "added_mass": 1.0, "pieces": 40}],
+}  # fmt: skip
+
+
+def test_how_much_of_the_members_waves_may_wet():
+    """A buoy of 6 m draft in waves of 1 and 2 m, which reach a quarter and half of it: told where it matters."""
+    for height, most, told in ((1.0, 0.04, False), (2.0, 0.15, True)):
+        here, there, found = deviations(moored(BUOY, 190.0, height), 260.0, 190.0)
+        np.testing.assert_allclose(here[[0, 1, 3, 4]], there[[0, 1, 3, 4]], rtol=most)
+        assert any("come out of the water" in x for x in found.notes) == told
+
+
+def test_modes_have_the_added_mass_of_the_wetted_length_at_rest():
+    """Whatever the first guess, as in a motion."""
+    periods = []
+    for guess in (-6.0, 0.0, 4.0):
+        made = floating(initial_guess=[0, 0, guess])
+        made["environment"]["fluid"]["current"] = [0, 0, 0]
+        periods.append([x.period for x in hybrid.modes(made, count=6).modes])
+    np.testing.assert_allclose(periods[1:], [periods[0]] * 2, rtol=1e-6)
+
+
+def test_drag_of_a_single_harmonic():
+    """8/(3 pi) of an amplitude along one way, the radius of a circle, and the tangent in a fast current."""
+    ways = np.array([[0.7, 0.0], [0.7, 0.7j], [0.35 - 0.1j, 0.2j]])
+    forth, circle, _ = of_harmonic(np.zeros((3, 2)), ways)
+    assert forth[0, 0] == pytest.approx(8.0 / (3.0 * math.pi) * 0.7, rel=2e-4) and abs(forth[1, 0]) < 1e-12
+    np.testing.assert_allclose(circle, 0.7 * np.eye(2), atol=1e-12)
+    fast = np.array([3.0, 4.0]) / 5.0
+    near = of_harmonic(100.0 * fast[None], ways[2:])[0]
+    np.testing.assert_allclose(near, 100.0 * (np.eye(2) + np.outer(fast, fast)), atol=2e-3)
+    # what the law makes of an ellipse in a current is the first harmonic of |u| u
+    mean, x = np.array([[0.2, -0.1]]), ways[2:]
+    angle = np.linspace(0.0, 2.0 * math.pi, 4001)[:-1]
+    u = mean + (x * np.exp(-1j * angle)[:, None]).real
+    first = 2.0 * (np.linalg.norm(u, axis=1)[:, None] * u * np.exp(1j * angle)[:, None]).mean(axis=0)
+    np.testing.assert_allclose(of_harmonic(mean, x)[0] @ x[0], first, rtol=1e-4)
+    line = of_harmonic(np.array([[0.3]]), np.array([[0.5 + 0j]]))[0, 0, 0]
+    speed = 0.3 + 0.5 * np.cos(angle)
+    assert line == pytest.approx(2.0 * (np.abs(speed) * speed * np.cos(angle)).mean() / 0.5, rel=1e-4)
