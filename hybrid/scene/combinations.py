@@ -28,7 +28,7 @@ Tables = Mapping[str, Any]
 Kind = Literal["physics", "not worked out", "several lines"]
 # Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
 USE, SYSTEM, LINE = "use", "system", "line"
-Use = Literal["", "about rest", "response", "derivatives", "derivatives in motion", "stiffness"]
+Use = Literal["", "about rest", "response", "derivatives", "derivatives in motion"]
 LEAVE_OUT = "leave it out"
 ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
@@ -467,7 +467,7 @@ DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("deriva
 IN_MOTION = Feature("derivatives in motion", "hybrid sensitivity --motion", _used("derivatives in motion"))
 FOLLOWED = Feature("steps that follow the motion", "no time.step, time.tolerance",
                    _asks("time", "step", lambda x: x.controlled))  # fmt: skip
-STIFFNESS = Feature("stiffness and offsets of a point or body", "--stiffness, --offsets", _used("stiffness"))
+HELD_BESIDE = Feature("offsets of a body from its equilibrium", "--offsets", lambda tables: ())
 OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change in time",
                         "motion.file, motion.travel, force.history", _changing_loads)  # fmt: skip
 FINITE_WAVES = Feature("waves of finite height", "waves.kind: stream_function", _finite_waves)
@@ -481,6 +481,10 @@ ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
 RESPONSE_TO_MOTION = Refusal(
     OTHER_MOTIONS, RESPONSE, "physics", "a response by frequency is of what is constant or a sum of harmonics",
     "harmonics, and loads that stay", "hybrid run computes it in time",
+)  # fmt: skip
+OFFSETS_OF_SHAPE = Refusal(
+    HELD_BESIDE, SHAPES, "not worked out", "a body that is held has no shape, and this one has ({key})",
+    "another body, or a point", "--stiffness has what it takes to shift it a little",
 )  # fmt: skip
 PAID = "line is paid out ({key})"
 TOUCHES = "there are obstacles or lines that touch each other ({key})"
@@ -545,10 +549,7 @@ REFUSALS: tuple[Refusal, ...] = (
         PLANE, OBSTACLES, "not worked out", "contact with obstacles ({key}) is computed in space", "3 or nothing",
         "leave it out",
     ),
-    Refusal(
-        SHAPES, STIFFNESS, "not worked out", "contact of lines with a body opens and closes",
-        "no shape", "leave it out where no line touches the body",
-    ),
+    OFFSETS_OF_SHAPE,
     Refusal(
         PAYOUT, PUSHED, "not worked out", "nodes that enter and leave know no obstacles and no other lines ({key})"
     ),

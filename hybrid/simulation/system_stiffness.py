@@ -10,13 +10,14 @@ import numpy as np
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.junctions.bodies import ARM, FORCE, FRAME, MASS, PLACE, STATE, STIFFNESS, V
 from hybrid.kernels.march.assembly import JOINED
+from hybrid.kernels.state.obstacle_rows import STRAND
 from hybrid.kernels.state.report import FORCE_A, MOMENT_A
 from hybrid.kernels.state.state import Floats
 from hybrid.model.bodies import angles_of, frame_of
 from hybrid.model.clamps import seat_of, seated
 from hybrid.model.system import SystemModel, build_system
 from hybrid.scene.bodies import FixedBody, FreeBody
-from hybrid.scene.combinations import refuse_use
+from hybrid.scene.combinations import OFFSETS_OF_SHAPE
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene_text
 from hybrid.scene.suggestions import nearest
@@ -32,7 +33,8 @@ from hybrid.solve.system_statics import SystemEquilibrium
 
 VERTICAL = np.array([0.0, 0.0, 1.0])
 # Where the stiffness is that between equilibria: how far these are apart, of the longest line, and rad; where lines
-# touch themselves, of the narrowest diameter, over a part of which contact stiffens, but no less than a part of that.
+# touch themselves or bodies, of the narrowest diameter, over a part of which contact stiffens, but no less than a part
+# of that.
 SMALL_SHIFT, SMALL_TURN = 2e-5, 2e-4
 OF_DIAMETER, LEAST_PART = 1e-3, 0.05
 # Springs that hold a body while a force acts on it resist as it does itself, and at least as this part of the stiffest.
@@ -80,7 +82,6 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     SceneError where the scene has no such point or body, ComputationError where no equilibrium is found.
     """
     system = _system(scene)
-    refuse_use(system, "stiffness")
     kind, name = target_of(system, at)
     model = build_system(system)
     found = _equilibrium(system, model)
@@ -123,8 +124,8 @@ def _stiffness(solver: SystemSolver, state: SystemState, first: int, size: int, 
     """(size, size) N/m, N/rad, .. of the point or body that begins at `first` of `SystemSolver.compliance`; points: how
     many there are.  None: the system is singular.
 
-    From the factors; where a torque passes through catenaries, which they know roughly, or lines touch themselves, from
-    equilibria under small forces and moments both ways.
+    From the factors; where a torque passes through catenaries, which they know roughly, or lines touch themselves or
+    bodies, from equilibria under small forces and moments both ways.
     """
     solver.evaluate_forces(state, 0.0)
     found = solver.compliance(state, solver.anchor)
@@ -141,9 +142,11 @@ def _stiffness(solver: SystemSolver, state: SystemState, first: int, size: int, 
         for some in (slice(0, 3), slice(3, size)):
             held = np.abs(K.diagonal()[some])
             springs[some] = np.maximum(held, LEAST_SPRING * held.max(initial=0.0))
+        if solver.presses_bodies:  # which may hold it, with what lines give way by
+            springs = np.maximum(springs, solver.scale / solver.length * np.repeat([1.0, solver.arm**2], 3))
         for some in (slice(0, 3), slice(3, 6)):  # in axes of the body
             mass[some, some] += R.T @ np.diag(springs[some] / solver.anchor) @ R
-    near = max(min(OF_DIAMETER * solver.narrowest / (SMALL_SHIFT * solver.length), 1.0), LEAST_PART)
+    near = max(min(OF_DIAMETER * _narrowest(solver) / (SMALL_SHIFT * solver.length), 1.0), LEAST_PART)
     for k in range(size):
         small = near * (SMALL_SHIFT * solver.length if k < 3 else SMALL_TURN)
         part, moved = small * (abs(float(K[k, k])) + springs[k]), []
@@ -172,8 +175,15 @@ def _inverse(C: Floats) -> Floats | None:
 
 
 def _needs_equilibria(solver: SystemSolver) -> bool:
-    """Whether the factors know the answer of some line only roughly, or not that it touches itself."""
-    return any(x.line.torsion.size for x in solver.lines) or bool(solver.in_contact())
+    """Whether the factors know the answer of some line only roughly, or not that it touches itself or a body."""
+    return any(x.line.torsion.size for x in solver.lines) or bool(solver.in_contact()) or solver.presses_bodies
+
+
+def _narrowest(solver: SystemSolver) -> float:
+    """The least diameter, m, of lines that touch; infinite: none does."""
+    if solver.presses_bodies:
+        return 2.0 * float(solver.lines[0].sea.obstacles[:, STRAND].min())
+    return solver.narrowest
 
 
 def _load_on(solver: SystemSolver, points: int, first: int, state: SystemState) -> Floats:
@@ -216,8 +226,9 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
     Errors: as of `stiffness`; the distance at which no equilibrium is found is in the message.
     """
     system = _system(scene)
-    refuse_use(system, "stiffness")
     kind, name = target_of(system, at)
+    if kind == "body" and name in system.shaped:
+        raise OFFSETS_OF_SHAPE.error("offsets", at)
     try:
         known = bool(len(distances)) and bool(np.isfinite([*distances, heading]).all())
     except (TypeError, ValueError):

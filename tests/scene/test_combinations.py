@@ -81,7 +81,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.PLANE, c.OBSTACLES): (BALL | {"dimension": 2}, ""),
     (c.MOVING_ZONES, c.GOES_ITS_WAY): ({"obstacles.ball": BALL["obstacles"]["ball"] | {"from_outside": True}} | MOVING, ""),
     (c.PAYOUT, c.PUSHED): (BALL | PAID, ""),
-    (c.SHAPES, c.STIFFNESS): (SHAPED | {ONE + "contact": {"self": False}}, "stiffness"),
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
     (c.SETTLED_FRICTION, c.PUSHED): (BALL | {"initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
     (c.ABOUT_REST, c.MOVED_BY_LINES): (TWO_LINES, "about rest"),
@@ -125,6 +124,7 @@ OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"output.errors": True}, ""),
     ((c.ABOUT_REST, c.MOVED_BY_LINES), TWO_LINES, "derivatives"),
 )
+OF_ARRAYS = [c.OFFSETS_OF_SHAPE]
 
 
 def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
@@ -151,7 +151,7 @@ def _id(x: object) -> str:
 def test_every_refusal_has_an_example() -> None:
     pairs = [(x.feature, x.beside) for x in REFUSALS]
     assert len(set(pairs)) == len(pairs)
-    assert set(pairs) == {*EXAMPLES, *((x.feature, x.beside) for x in BY_SCHEMA)}
+    assert set(pairs) == {*EXAMPLES, *((x.feature, x.beside) for x in (*BY_SCHEMA, *OF_ARRAYS))}
 
 
 @pytest.mark.parametrize(("pair", "changes", "use"), [*((k, *x) for k, x in EXAMPLES.items()), *OTHERS], ids=_id)

@@ -94,6 +94,45 @@ def _rows(tables: Tables) -> Any:
     return build_system(system).models[0].sea.values.obstacles
 
 
+def test_stiffness_of_a_ball_on_two_lines_is_that_of_equilibria_under_forces() -> None:
+    """Across the lines and upwards; about its middle nothing holds it."""
+    found = hybrid.stiffness(on_two_lines(), "body:ball")
+    size = np.abs(found.matrix[1:3, 1:3]).max()
+    for axis, force in ((1, 0.5), (2, 1.0)):
+        ways = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+        ways[0][axis], ways[1][axis] = force, -force
+        there, back = (hybrid.static(on_two_lines(force=x))["bodies/ball/position"][-1] for x in ways)
+        assert found.matrix[axis, axis] == pytest.approx(2.0 * force / (there - back)[axis], rel=2e-4)
+    np.testing.assert_allclose(found.matrix[3:], 0.0, atol=1e-6 * size)
+    np.testing.assert_allclose(found.lines, found.matrix, atol=1e-9 * size)
+
+
+def tied_down(knot: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Tables:
+    """The ball on two lines, with a stay from its lowest place over a free point to the ground."""
+    tables = on_two_lines()
+    tables["points"] |= {
+        "low": {"body": "ball", "place": [0, 0, -0.3]}, "ground": {"position": [5.3, 0.05, -3.0]},
+        "knot": {"kind": "free", "initial_guess": [5.1, 0.02, -1.3], "mass": 0.5, "force": list(knot)},
+    }  # fmt: skip
+    section = {"length": 1.6, "mass": 0.05, "diameter": 2 * STRAND, "axial_stiffness": 1e5}
+    stay = {"sections": [section], "contact": {"self": False}, "mesh": {"cells": 8}}
+    tables["lines"] |= {
+        "upper": {"start": "low", "end": "knot"} | stay,
+        "lower": {"start": "knot", "end": "ground"} | stay,
+    }
+    return tables
+
+
+def test_stiffness_and_offsets_of_points_beside_a_body_that_lines_touch() -> None:
+    """The ball gives way with its lines: of a free point by forces on it, of one that is held by shifts."""
+    found, force = hybrid.stiffness(tied_down(), "point:knot").matrix, np.array([0.03, 0.01, 0.05])
+    there, back = (hybrid.static(tied_down(tuple(x))).lines["upper"].position[-1][-1] for x in (force, -force))
+    np.testing.assert_allclose(found @ (there - back) / 2.0, force, rtol=1e-4)
+    held = hybrid.stiffness(tied_down(), "point:ground").matrix
+    shifted = hybrid.offsets(tied_down(), "point:ground", [-1e-4, 1e-4]).force
+    np.testing.assert_allclose((shifted[0] - shifted[1]) / 2e-4, held[:, 0], rtol=5e-5)
+
+
 # --- in motion --------------------------------------------------------------------------------------
 
 
@@ -362,10 +401,10 @@ def test_newtons_method_converges_quadratically() -> None:
 # --- what is refused --------------------------------------------------------------------------------
 
 
-def test_a_shape_has_the_name_of_no_obstacle_and_no_stiffness_is_known_beside_it() -> None:
+def test_a_shape_has_the_name_of_no_obstacle_and_no_body_that_is_held_has_one() -> None:
     tables = on_two_lines()
-    with pytest.raises(SceneError, match="opens and closes"):
-        hybrid.stiffness(tables, "body:ball")
+    with pytest.raises(SceneError, match="a body that is held has no shape"):
+        hybrid.offsets(tables, "body:ball", [0.1])
     tables["obstacles"] = {"ball": {"kind": "sphere", "at": [0, 0, 9], "radius": 1}}
     with pytest.raises(SceneError, match="no obstacle has"):
         hybrid.static(tables)
