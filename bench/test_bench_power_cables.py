@@ -12,148 +12,30 @@ finer mesh to 0.5 %, at rest in time to 1e-5.  A line that is too long for its s
 
 from __future__ import annotations
 
-import json
-import time
-from pathlib import Path
-from typing import Any, NamedTuple
-
 import numpy as np
 import pytest
-
-import hybrid
-from hybrid.errors import ComputationError
+from power_cables import solve_all
 
 pytestmark = pytest.mark.bench
-DATA = Path(__file__).with_name("power_cables.json")
-ROOT, REFERENCE, SHORT = 0.15, 0.01, 0.05
-MOVED, FINER, AT_REST = 1e-6, 5e-3, 1e-5
-REST = {"duration": 1.0, "step": 0.05}
-PARENTS = ("twin_of", "mesh_of", "rest_of")
-
-
-class Answer(NamedTuple):
-    """Tension at the start (N; of a motion at all times), cells, events, refusal, CPU time (s)."""
-
-    tension: Any
-    cells: int
-    events: tuple[str, ...]
-    refused: str
-    cpu: float
-
-
-def rows() -> dict[str, dict[str, Any]]:
-    """The cases by id, each with all that it has from the case that it is a twin of."""
-    whole = dict[str, dict[str, Any]]()
-    given = {row["id"]: row for row in json.loads(DATA.read_text(encoding="utf-8"))["cases"]}
-
-    def of(name: str) -> dict[str, Any]:
-        row = given[name]
-        parent = next((row[key] for key in PARENTS if row.get(key)), None)
-        kept = {k: v for k, v in of(parent).items() if k not in (*PARENTS, "expect")} if parent else {}
-        return kept | row
-
-    for name in given:
-        whole[name] = of(name)
-    return whole
-
-
-def scene_of(row: dict[str, Any], cells: int | None = None) -> dict[str, Any]:
-    """The scene of a case; a bed of so many N/m per m^2 has that times the diameter per metre of cable."""
-    sections = []
-    for kind, length, _ in row["sections"]:
-        diameter, mass, EA, EI, drag_n, drag_t, added = row["types"][kind]
-        sections.append({
-            "length": length, "diameter": diameter, "mass": mass, "axial_stiffness": EA, "bending_stiffness": EI,
-            "drag": {"normal": drag_n, "tangential": drag_t}, "added_mass": {"normal": added},
-        })  # fmt: skip
-    ends = {}
-    for name, place, clamp in (("start", "start", "clamp_a"), ("end", "end", "clamp_b")):
-        ends[name] = {"kind": "pinned", "position": row[place]}
-        if row.get(clamp):
-            stiffness, tangent = row[clamp]
-            ends[name] |= {"kind": "clamped", "tangent": tangent}
-            ends[name] |= {} if stiffness is None else {"bend_stiffness": stiffness}
-    environment: dict[str, Any] = {
-        "gravity": 9.80665, "fluid": {"density": 1025.0, "surface": 0.0, "current": row.get("current", [0, 0, 0])},
-    }  # fmt: skip
-    bed = row["bed"]
-    if bed:
-        x, y, depth = bed.get("grid", (None, None, None))
-        environment["seabed"] = {
-            "z": 0.0 if x else -bed["depth"], "stiffness": bed["stiffness"] * sections[0]["diameter"],
-            **({"depths": {"x": x, "y": y, "depth": depth}} if x else {"slope": [bed.get("slope", 0.0), 0.0]}),
-            **({"friction": bed["friction"]} if bed.get("friction") else {}),
-        }  # fmt: skip
-    return {
-        "environment": environment, "cable": {"sections": sections}, "ends": ends, "initial": "equilibrium",
-        **({"mesh": {"cells": cells}} if cells else {}),
-        **({"time": REST} if row.get("rest_of") else {}),
-    }  # fmt: skip
-
-
-def answer_of(scene: dict[str, Any]) -> Answer:
-    begin = time.process_time()
-    try:
-        found = hybrid.run(scene, None) if "time" in scene else hybrid.static(scene)
-    except ComputationError as error:
-        return Answer(np.nan, 0, (), str(error).splitlines()[0], time.process_time() - begin)
-    cpu = time.process_time() - begin
-    tension = np.linalg.norm(found.reaction_start, axis=1)
-    return Answer(tension, found.mesh[0].s.size - 1, tuple(sorted({x.kind for x in found.events})), "", cpu)
-
-
-def bound_of(row: dict[str, Any], tension: float) -> tuple[float, float]:
-    """How far a tension (N) is from what it is compared with, as a part of that, and how far it may be; nan: nothing."""
-    if row.get("reference"):
-        return abs(tension / row["reference"] - 1.0), REFERENCE
-    if row["roots"]:
-        off = min(abs(tension / root - 1.0) for root in row["roots"])
-        return off, ROOT if row["bending_length"] < SHORT else np.inf
-    return np.nan, np.inf
-
-
-def twin_bound(row: dict[str, Any]) -> tuple[str, float]:
-    """The case that a case is a twin of, and how far it may be from that; "": none.
-
-    A bed of depths may differ from a plane one, and friction is left out: they are as near.
-    """
-    for key, bound in zip(PARENTS, (MOVED, FINER, AT_REST), strict=True):
-        if row.get(key):
-            return row[key], bound
-    return "", np.inf
 
 
 def test_power_cables(capsys: pytest.CaptureFixture[str]) -> None:
-    cases, answers, lines, wrong = rows(), dict[str, Answer](), list[str](), list[str]()
-    admissible, solved, off_all, cpu, silent = 0, 0, list[float](), list[float](), list[str]()
-    for name, row in cases.items():
-        parent, bound = twin_bound(row)
-        cells = row["finer"] * answers[parent].cells if row.get("mesh_of") else None
-        if row.get("rest_of") and answers[parent].cells:
-            cells = answers[parent].cells
-        answer = answers[name] = answer_of(scene_of(row, cells))
-        tension = float(answer.tension[-1]) if answer.cells else np.nan
-        off, most = bound_of(row, tension)
-        apart = np.nan
-        if parent and answer.cells and answers[parent].cells:
-            apart = float(np.abs(answer.tension / answers[parent].tension[-1] - 1.0).max())
-        good = bool(answer.cells) and not off > most and not apart > bound
-        if row["expect"] in ("admissible", "fine_mesh"):  # the mesh of the deck is not that of ours
-            admissible, solved = admissible + 1, solved + good
-            if not good:
-                wrong.append(name)
-        elif answer.cells and not answer.events:
-            silent.append(name)
-        cpu.append(answer.cpu)
-        if row["roots"] and row["bending_length"] < SHORT and answer.cells:
-            off_all.append(off)
-        said = answer.refused or ", ".join(answer.events)
-        lines.append(f"{name:20s} {row['expect'][:12]:12s} {tension:12.1f} N {100 * off:7.2f} % "
-                     f"twin {apart:8.1e} {answer.cells:5d} cells {answer.cpu:6.2f} s  {said}")  # fmt: skip
+    found = solve_all()
+    admissible = [name for name, x in found.items() if x.admissible]
+    wrong = [name for name in admissible if not found[name].good]
+    silent = [name for name, x in found.items() if x.silent]
+    off = [x.off for x in found.values() if x.judged_by_root]
+    cpu = [x.answer.cpu for x in found.values()]
+    lines = [
+        f"{name:20s} {x.row['expect'][:12]:12s} {x.tension:12.1f} N {100 * x.off:7.2f} % twin {x.apart:8.1e} "
+        f"{x.answer.cells:5d} cells {x.answer.cpu:6.2f} s  {x.answer.refused or ', '.join(x.answer.events)}"
+        for name, x in found.items()
+    ]
+    solved = len(admissible) - len(wrong)
     with capsys.disabled():
         print("\n" + "\n".join(lines))
-        print(f"{len(cases)} cases: {solved} of {admissible} admissible solved within the bounds; "
-              f"{np.median(off_all) * 100:.2f} % off in the median, {max(off_all) * 100:.1f} % at most; "
+        print(f"{len(found)} cases: {solved} of {len(admissible)} admissible solved within the bounds; "
+              f"{np.median(off) * 100:.2f} % off in the median, {max(off) * 100:.1f} % at most; "
               f"CPU {np.median(cpu):.2f} s in the median, {max(cpu):.1f} s at most")  # fmt: skip
         print(f"not within: {', '.join(wrong) or 'none'}; in compression without a word: {', '.join(silent) or 'none'}")
-    assert solved >= 0.97 * admissible
+    assert solved >= 0.97 * len(admissible)
