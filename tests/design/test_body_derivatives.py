@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.design import line_at_rest
 from hybrid.design.cable_at_rest import CableAtRest
 from hybrid.design.line_at_rest import parse_result
 from hybrid.design.numbers import changed_scene, with_number
 from hybrid.design.sensitivity import at_rest
-from hybrid.kernels.algebra.block_elimination import SIZE
-from hybrid.modal.matrices import linear_line
 from hybrid.scene.read import as_scene_or_system
 from tests.design.test_system_derivatives import ANCHORS, BUOY, CHAIN, HOSE, SEA, moored
 
@@ -155,22 +152,3 @@ def test_torque_of_tension():
         ours, d = rest.by([key])[0], 1e-5 * number
         more, less = (CableAtRest(changed_scene(made, key, number + x), 1.0, wanted).values for x in (d, -d))
         np.testing.assert_allclose(ours, (more - less) / (2.0 * d), rtol=1e-5, err_msg=key)
-
-
-def test_the_matrix_is_what_the_equations_change_by():
-    """Of each unknown of that cable, moved both ways."""
-    made = with_torque()
-    rest = CableAtRest(made, 1.0, [parse_result("tension@0", made.length)])
-    line, state, free = rest.line, rest.line.state.copy(), rest._free
-    K = linear_line(line.joined(line.here), "cable", state, sticks=False, quick=False).stiffness.toarray()
-    for unknown in free:
-        step = 1e-6 if unknown % SIZE else 1e-2
-        q = np.zeros((2, len(state.r), SIZE))
-        q[:, unknown // SIZE, unknown % SIZE] = 1.0
-        moved, left = line_at_rest._moved(state, q, np.array([step, -step])), []
-        for k in (0, 1):
-            for name, x in moved.items():
-                getattr(line._still, name)[:] = x[k]
-            left.append(line.left(line.here)[0])
-        column = -(left[0] - left[1])[free] / (2.0 * step)
-        np.testing.assert_allclose(K[free, unknown], column, rtol=0, atol=3e-9 * max(np.abs(K).max(), 1.0))
