@@ -20,6 +20,9 @@ import hybrid
 from hybrid.design.cable_at_rest import CableAtRest
 from hybrid.design.line_at_rest import Wanted, parse_result
 from hybrid.design.numbers import with_number
+from hybrid.design.sensitivity import at_rest
+from hybrid.scene.read import as_scene_or_system
+from tests.design.test_body_derivatives import SCENES as SCENES_OF_BODIES
 
 pytestmark = pytest.mark.bench
 ROUNDS, SCENES = 9, int(os.environ.get("SCENES", "200"))
@@ -76,6 +79,16 @@ def test_a_derivative_over_its_equilibrium(model: str, cells: int) -> None:
         f"{model}, {cells} cells: equilibrium {1e3 * static:.1f} ms; one more derivative {(all_ - one) / more / static:.3f} "
         f"of it, with its error {(error - once) / more / static:.3f}"
     )
+
+
+@pytest.mark.parametrize("what", ["a body", "two bodies"])
+def test_a_derivative_beside_bodies(what: str) -> None:
+    """Lines that turn freely at a body, and a hose that is clamped to two."""
+    tables, of, _ = SCENES_OF_BODIES[what]
+    scene = as_scene_or_system(tables)
+    rest, keys = at_rest(scene, of), ["bodies.hull.mass"]
+    static, one, six = spent(lambda: hybrid.static(scene), lambda: rest.by(keys), lambda: rest.by(6 * keys))
+    print(f"{what}: equilibrium {1e3 * static:.1f} ms; one more derivative {(six - one) / 5 / static:.2f} of it")
 
 
 def believed(differences: list[np.ndarray]) -> np.ndarray:

@@ -10,6 +10,8 @@ shapes of the lines.  What lines leave over at their ends comes through the plac
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy import sparse
 
@@ -18,7 +20,9 @@ from hybrid.kernels.junctions.bodies import FRAME, OWN, PIECES, SOFTEST, V
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.state.state import Floats
 from hybrid.modal.loaded_members import stiffness_by_water
-from hybrid.model.system import SystemModel
+from hybrid.model.system import SystemModel, bodies_of
+from hybrid.scene.points import Fairlead
+from hybrid.scene.system import System
 from hybrid.solve.joined import SystemState
 from hybrid.solve.system import SystemSolver
 
@@ -88,3 +92,13 @@ class BodiesAtRest:
         """(6, 6) stiffness of the water around the members of a body; zeros: it has none."""
         members = self._model.bodies[b].members if b < len(self._model.bodies) else None
         return np.zeros((6, 6)) if members is None else stiffness_by_water(self._solver, self._states, b, members)
+
+
+def with_bodies(model: SystemModel, system: System) -> SystemModel:
+    """The model with the bodies of a changed scene in whose lines none turns with a body: these stay as they are."""
+    free = system.free_bodies
+    held = [[system.points[x] for x in (line.start, line.end)] for line in system.lines.values()]
+    places = [
+        [x.place if isinstance(x, Fairlead) and x.body in free else (0.0, 0.0, 0.0) for x in pair] for pair in held
+    ]
+    return replace(model, bodies=bodies_of(system), fairleads=np.array(places))

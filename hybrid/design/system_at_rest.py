@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from hybrid.design.bodies_at_rest import BodiesAtRest
+from hybrid.design.bodies_at_rest import BodiesAtRest, with_bodies
 from hybrid.design.cable_at_rest import PART
 from hybrid.design.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, Wanted, moment_on_body, parse_result
 from hybrid.design.numbers import is_allowed, number_of, with_number
@@ -186,10 +186,14 @@ class SystemAtRest:
         return self._changed(more, key), self._changed(less, key)
 
     def _changed(self, system: System, key: str) -> _Changed:
-        """A changed scene.  What turns with bodies is built anew: how a clamp is seated hangs on all of the scene."""
+        """A changed scene.  Lines that turn with bodies are built anew: how a clamp is seated hangs on all of it."""
         same = all(getattr(system, x) is getattr(self.scene, x) for x in OF_ALL)
         seated = [bool(self._bodies.turns(l)) for l in range(len(self.lines))]
-        built = build_system(system, self._resolution) if self._bodies.count and (any(seated) or not same) else None
+        built = None
+        if any(seated):
+            built = build_system(system, self._resolution)
+        elif self._bodies.count and not same:
+            built = with_bodies(self._model, system)
         out = []
         for l, (name, line) in enumerate(zip(self._names, self.lines, strict=True)):
             scene = self._scene_of(system, name)

@@ -175,10 +175,7 @@ def _touched(rest: Rest) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Rest:
-    """The equilibrium of a scene as a network, of one line or of several; points and bodies by name, those that are
-
-    free, models of the lines and of the bodies.
-    """
+    """The equilibrium of a scene as a network; points and bodies that are free by name, models of lines and bodies."""
 
     solver: SystemSolver
     states: SystemState

@@ -163,14 +163,7 @@ def build_system(
     Raises SceneError where a line cannot be meshed.
     """
     rigid = system.rigid
-    environment = system.environment
-    density = environment.fluid.density if environment.fluid is not None else 0.0
-    around = None
-    if any(body.members for body in system.free_bodies.values()):
-        around = surroundings(system.scene_of(next(iter(system.lines))), 1)
-    made = tuple(
-        body_model(name, body, density, environment.gravity, around) for name, body in system.free_bodies.items()
-    )
+    made = bodies_of(system)
     points = np.zeros((len(rigid), STATE))
     points[:, PLACE:FRAME] = np.array([system.first_place(x) for x in rigid]).reshape(-1, 3)
     points[:, FRAME:V] = np.eye(3).ravel()
@@ -205,6 +198,17 @@ def build_system(
         maker.seats, known, maker.scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
         touching, rides=rides,
     )  # fmt: skip
+
+
+def bodies_of(system: System) -> tuple[BodyModel, ...]:
+    """The free bodies of a system as numbers."""
+    environment, around = system.environment, None
+    density = environment.fluid.density if environment.fluid is not None else 0.0
+    if any(body.members for body in system.free_bodies.values()):
+        around = surroundings(system.scene_of(next(iter(system.lines))), 1)
+    return tuple(
+        body_model(name, body, density, environment.gravity, around) for name, body in system.free_bodies.items()
+    )
 
 
 def _leave_own_bodies(system: System, models: Sequence[Model]) -> NDArray[np.int64]:
