@@ -37,7 +37,7 @@ from hybrid.scene.analysis import (
 )
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.body_shapes import Carried
-from hybrid.scene.cable import Cable, Contact, Environment
+from hybrid.scene.cable import Cable, Contact, Environment, Section
 from hybrid.scene.ends import Clamped, Ends, Free, Pinned
 from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.plane import TYPED, plane_of
@@ -138,6 +138,10 @@ OF_A_REEL = {
 }
 
 
+def _damping_of_stiffness(section: Section) -> float:
+    return section.damping.stiffness if section.damping is not None else 0.0
+
+
 def _laws_on_a_reel(cable: Cable, ends: Ends) -> Iterator[Finding]:
     """Sections on a reel that stretch, or bend, by another table than that at the winch."""
     paid = [name for name, x in ends.named().items() if isinstance(x, Pinned | Clamped) and x.payout is not None]
@@ -154,6 +158,9 @@ def _laws_on_a_reel(cable: Cable, ends: Ends) -> Iterator[Finding]:
                 if getattr(section, key) != getattr(own, key):
                     at = ("ends", name, "payout", "reel", i, *[key][: bool(getattr(section, key))])
                     yield Finding(at, f"{what} of the section at the winch ({key})", "give it the same")
+            if _damping_of_stiffness(section) != _damping_of_stiffness(own):
+                at = ("ends", name, "payout", "reel", i, *["damping"][: section.damping is not None])
+                yield Finding(at, "the damping.stiffness of the section at the winch", "give it the same")
             if own.vortices and section.diameter != own.diameter:
                 at = ("ends", name, "payout", "reel", i, "diameter")
                 yield Finding(at, "the diameter of the section at the winch, which sheds vortices", "give it the same")

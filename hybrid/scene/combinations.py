@@ -216,6 +216,23 @@ def holds_rod(model: Any, end: str, length: float) -> bool:
     return isinstance(model, RodModel) or isinstance(zone, RodZone)
 
 
+def _damped(section: Section) -> bool:
+    return section.damping is not None and bool(section.damping.stiffness)
+
+
+def _damped_otherwise(tables: Tables) -> Iterator[Place]:
+    """Sections with damping in proportion to stiffness where the stiffness is not constant, tension makes a torque, or
+
+    the line is clamped to what turns by the moments of its lines.
+    """
+    cable: Cable | None = tables.get("cable")
+    sections = [section for _, section in _sections(tables)]
+    restrictors = [x for x in (cable.attachments if cable is not None else ()) if x.kind == "bend_restrictor"]
+    laws = any(x.curve or x.dynamic_stiffness or x.moment_curvature or x.tension_torque for x in sections)
+    if laws or restrictors or (SYSTEM in tables and any(_clamped_to_free(tables))):
+        yield from _in_sections("damping", "stiffness", of=_damped)(tables)
+
+
 def _turns(tables: Tables) -> Iterator[Place]:
     ends: Ends | None = tables.get("ends")
     for name, end in ends.named().items() if ends else ():
@@ -409,9 +426,10 @@ VORTICES = Feature("vortex-induced vibration", "vortices", _in_sections("vortice
 RESTRICTOR = Feature("bend restrictors", "attachments: kind: bend_restrictor", _attached("bend_restrictor"))
 TABLE_BESIDE = Feature("a section with a table of moment over curvature beside one of two bending stiffnesses",
                        "moment_curvature", _tables_beside_two_stiffnesses)  # fmt: skip
-STIFFNESS_DAMPING = Feature("damping proportional to stiffness", "damping.stiffness",
-                            _in_sections("damping", "stiffness",
-                                         of=lambda x: x.damping is not None and x.damping.stiffness))  # fmt: skip
+DAMPED_OTHERWISE = Feature(
+    "damping proportional to stiffness of laws and tables, with torque of tension, of a line clamped to what turns",
+    "damping.stiffness", _damped_otherwise,
+)  # fmt: skip
 SWIVEL = Feature("swivels on the line", "attachments: kind: swivel", _swivels)
 DIRECTED = Feature(
     "sections that have a direction about their axis", "bending_stiffness: [EI_1, EI_2], intrinsic_curvature",
@@ -609,8 +627,9 @@ REFUSALS: tuple[Refusal, ...] = (
         ZONES_OF_SEVERAL, PAYOUT, "several lines", f"{PAID}", "rod, catenary or zones", "write `model: rod`",
     ),
     Refusal(
-        STIFFNESS_DAMPING, PAYOUT, "not worked out",
-        "a line that is paid out ({key}) has no stiffness-proportional damping",
+        DAMPED_OTHERWISE, PAYOUT, "not worked out",
+        "how the material flows through it as line is paid out ({key}) is known of damping in proportion to constant "
+        "stiffnesses, without torque of tension, between ends that do not turn by what pulls there",
         fix="leave it out; damping.mass can stay",
     ),
     Refusal(

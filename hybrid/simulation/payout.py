@@ -30,6 +30,7 @@ from hybrid.kernels.reel.reel import MovingZones, Reel, blank_reel, blank_reel_j
 from hybrid.kernels.run.payout_run import energy_of
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import CLOCK_SIZE
+from hybrid.kernels.state.forces import STIFFNESS_DAMPING
 from hybrid.kernels.state.report import LENGTH_OUT, PAYOUT_RATE
 from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, State, state_for
 from hybrid.model.build import Model
@@ -86,7 +87,9 @@ class PayingOut:
     def _blank(self, material: int) -> Reel:
         """Arrays of a line of so many material nodes, none of whose cells lacks anything."""
         plan = self.plan
-        reel = blank_reel(material + self.rides, self.law, plan.pieces, self.winch, plan.layer, self.solves_twice)
+        reel = blank_reel(
+            material + self.rides, self.law, plan.pieces, self.winch, plan.layer, self.solves_twice, self.damped
+        )
         numbers = reel.numbers
         numbers[p.SIDE], numbers[p.FAR] = (1.0 if plan.side else -1.0), plan.far
         numbers[p.SPRING] = plan.cable.springs[plan.side]
@@ -138,7 +141,7 @@ class PayingOut:
             zones=moving,
         )  # fmt: skip
         numbers = self.table.numbers
-        asks = self.holds_tension or self.rides
+        asks = self.holds_tension or self.rides or self.damped
         run.pay_out(self.table, pay_out.address(numbers), iterate.address(numbers) if asks else 0)
 
     @property
@@ -160,6 +163,11 @@ class PayingOut:
     def solves_twice(self) -> bool:
         """Whether a winch holds a tension at the start, or at a clamp: an iteration takes another right-hand side."""
         return self.holds_tension and (not self.plan.side or self.rides > 0)
+
+    @property
+    def damped(self) -> bool:
+        """Whether the line has damping in proportion to its stiffness."""
+        return bool(self.plan.cable.bits & STIFFNESS_DAMPING)
 
     @property
     def holds_tension(self) -> bool:
@@ -296,7 +304,7 @@ class PayingOut:
 
         Those within a step are between its ends, where the length that is out need not be; the stretch would be off.
         """
-        if line.law.size:
+        if line.law.size or line.bits & STIFFNESS_DAMPING:  # whose strain is not that of the tension
             return e
         at, out = np.flatnonzero(self._changing_on(reel)), e.copy()
         size = np.linalg.norm(out[:, at], axis=2)

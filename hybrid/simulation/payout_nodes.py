@@ -88,11 +88,12 @@ class NodeChanges:
         assert owner.payout is not None
         self._owner, self._run, self._paying = owner, owner.run, owner.payout
         self._fixed_to = self._key(owner)
-        plan, model, reel = owner.payout.plan, owner.model, owner.payout.reel
+        plan, model, reel, damped = owner.payout.plan, owner.model, owner.payout.reel, owner.payout.damped
         self.most = plan.nodes.size - 2 + owner.payout.rides
         some, twice = owner.envelope is not None, owner.payout.solves_twice
         extra = int((marks_on(model.line.s, owner.marked) != 0).sum())
-        reels = Packed(lambda n: blank_reel(n, reel.law, reel.pieces, reel.winch, reel.layer, twice), given=OF_REEL)
+        shared = reel.law, reel.pieces, reel.winch, reel.layer, twice, damped
+        reels = Packed(lambda n: blank_reel(n, *shared), given=OF_REEL)
         kept = Packed(lambda n: blank_kept(n, extra, some))
         self._sides = Side(self.most, reels, kept), Side(self.most, reels, kept)
         self._sea = Room(seas, self.most)

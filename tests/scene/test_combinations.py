@@ -98,7 +98,7 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.ZONES_OF_SEVERAL, c.PAYOUT): (
         {ONE + "connections.end.payout": {"rate": 0.1, "ramp": 1.0}, ONE + "model": MOVING["model"]}, ""
     ),
-    (c.STIFFNESS_DAMPING, c.PAYOUT): (PAID | {SECTION + "damping": {"stiffness": 0.01}}, ""),
+    (c.DAMPED_OTHERWISE, c.PAYOUT): (PAID | ROPE | {SECTION + "damping": {"stiffness": 0.01}}, ""),
     (c.VORTICES, c.PLANE): (SHEDS | {"dimension": 2}, ""),
     (c.VORTICES, c.RESPONSE): (SHEDS, "response"),
     (c.FINITE_WAVES, c.RESPONSE): (HIGH_WAVES, "response"),

@@ -70,8 +70,9 @@ def is_same(one: hybrid.Result, other: hybrid.Result, most: float) -> None:
         cable(model="rod", EA=2e6, EI=2e4, clamp=True),
         cable(model="rod", EI=2e4, rate=-0.8),
         cable(TABLE | ROPE, clamp=True, model="rod", EA=2e6, EI=2e4),
+        cable({"damping": {"stiffness": 0.05}}, clamp=True, model="rod", EA=2e6, EI=2e4),
     ],
-    ids=["catenary", "clamp", "rod, taken in", "tables"],
+    ids=["catenary", "clamp", "rod, taken in", "tables", "damped"],
 )
 def test_a_system_of_one_line_is_the_cable(scene: dict[str, Any]) -> None:
     is_same(hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"], 1e-9)

@@ -26,12 +26,14 @@ from hybrid.kernels.reel.reel import (
     EASING,
     FAR,
     LENGTH,
+    LENGTH_OF,
     LIFT,
     PLACE,
     RATE,
     RIDING_ON,
     SIDE,
     SPRING,
+    STRAIN_OF,
 )
 from hybrid.kernels.reel.winch import (
     LENGTH_NOW,
@@ -167,6 +169,16 @@ def set_lengths(line, reel, t):
 
 
 @inner
+def lack_rate(reel, t, c):
+    """Rate, m/s, at which what cell c lacks changes."""
+    if reel.since[c] == -np.inf:
+        return 0.0
+    x = min(max((t - reel.since[c]) / reel.span[c], 0.0), 1.0)
+    slope = -reel.lack[c] / reel.span[c] * 30.0 * x * x * (1.0 - x) ** 2
+    return slope + reel.rate[c] * (1.0 - x) ** 2 * (1.0 + 2.0 * x - 15.0 * x * x)
+
+
+@inner
 def find_length(reel, t):
     """How long the line is at t, of what is prescribed, or of a winch before a step."""
     numbers, winch = reel.numbers, reel.winch
@@ -177,9 +189,23 @@ def find_length(reel, t):
 
 
 @inner
+def take_flow_off(line, reel):
+    """The line without it, to the last bit."""
+    flow = reel.flow
+    for i in range(line.h.shape[0]):
+        line.h[i] = flow[i, LENGTH_OF]
+    for k in range(growing(line, reel), line.h.shape[0] + 1):
+        i = node(line, reel, k)
+        for j in range(3):
+            line.k0[i, j] = flow[i, STRAIN_OF + j]
+
+
+@inner
 def take_riding_off(line, reel):
-    """The forces on the line without those by which nodes that ride have more."""
+    """The forces on the line without those by which nodes that ride have more; the line without the flow of damping."""
     if reel.stage[RIDING_ON] > 0.0:
+        if reel.flow.shape[0] > 0:
+            take_flow_off(line, reel)
         first = growing(line, reel) + 1
         for k in range(reel.layer.shape[0]):
             i = node(line, reel, first + k)

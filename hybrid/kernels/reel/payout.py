@@ -28,6 +28,13 @@ from hybrid.kernels.laws.element import relative_rotation
 from hybrid.kernels.laws.node_forces import Z3, inertia_and_water
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.assembly import JOINED
+from hybrid.kernels.reel.damping import (
+    correct_damping_power,
+    correct_end,
+    damped_stretch_work,
+    power_of_flow,
+    put_flow_on,
+)
 from hybrid.kernels.reel.paid_length import (
     cell,
     eased,
@@ -45,6 +52,7 @@ from hybrid.kernels.reel.reel import (
     ACCELERATION,
     DUE,
     FEWEST_STEPS,
+    FLOW_KNOWN,
     FLUX,
     FLUX_BEFORE,
     LENGTH,
@@ -154,7 +162,10 @@ def is_joined(ends, reel):
 
 @inner
 def put_riding_on(line, sea, ends, state, reel, t):
-    """The forces on the line with those by which nodes that ride, and a fairlead that is joined, have more; t: s."""
+    """The forces on the line with those by which nodes that ride, and a fairlead that is joined, have more; t: s.
+
+    A line that is damped in proportion to stiffness has the flow of its damping, too.
+    """
     first, rides = growing(line, reel) + 1, reel.layer.shape[0] - 1
     for k in range(rides + (1 if is_joined(ends, reel) else 0)):
         more, _ = of_material(line, sea, ends, state, reel, first + k)
@@ -166,6 +177,9 @@ def put_riding_on(line, sea, ends, state, reel, t):
         i = node(line, reel, first + k)
         for j in range(3):
             line.force[i, j] += reel.riding[k, j]
+    if reel.flow.shape[0] > 0:
+        put_flow_on(line, ends, state, reel, t)
+        reel.stage[FLOW_KNOWN] = 1.0
     reel.stage[RIDING_ON] = 1.0
 
 
@@ -292,7 +306,11 @@ def book(line, old, new, reel, dt):
     for c in range(n):
         more = line.h[c] - before[c, 0]
         if more != 0.0 and changes_length(line, reel, c):
-            booked -= 0.5 * more * (stretch_work(line, old, c) + stretch_work(line, new, c))
+            if reel.flow.shape[0] > 0:
+                taken = damped_stretch_work(line, old, c, before[c, 0]) + damped_stretch_work(line, new, c, line.h[c])
+            else:
+                taken = stretch_work(line, old, c) + stretch_work(line, new, c)
+            booked -= 0.5 * more * taken
     for j in range(growing(line, reel), n + 1):
         i = node(line, reel, j)
         va, vb = get3(old.v, i), get3(new.v, i)
@@ -363,10 +381,13 @@ def pay_out(table):
         take_riding_off(line, reel)
         take_balance_off(line, reel)
         pull = correct_force(line, job.sea, job.ends, tried, job.velocity, reel, job.report, clock[b.TRY_END])
+        if reel.flow.shape[0] > 0:
+            numbers[FLUX] += power_of_flow(line, job.ends, tried, reel)
         note_pull(reel, clock[b.TRY_END], pull)
         leave_to_reel(line, job.zones, reel)
         return 0
     # a step is accepted, and the states have changed places
+    reel.stage[FLOW_KNOWN] = 0.0
     state, before = job.old, job.new
     if count[b.PARITY]:
         state, before = before, state
@@ -392,28 +413,26 @@ def iterate(table):
     job = read(table)
     line, reel, clock = job.line, job.reel, job.clock
     numbers, winch, t = reel.numbers, reel.winch, clock[b.TRY_END]
+    state = job.old if job.counts[b.PARITY] else job.new
     if reel.stage[RIDING_ON] == 0.0:
-        put_riding_on(line, job.sea, job.ends, job.old if job.counts[b.PARITY] else job.new, reel, t)
+        put_riding_on(line, job.sea, job.ends, state, reel, t)
         return 0
+    if reel.flow.shape[0] > 0:
+        correct_damping_power(line, job.ends, state, reel, job.report, True)
     take_riding_off(line, reel)
     if t <= winch[BEGIN] or not winch[TENSION] > 0.0:
         return 0
-    state, at, n, g = (
-        job.old if job.counts[b.PARITY] else job.new,
-        last_change(line),
-        line.h.shape[0],
-        growing(line, reel),
-    )
+    at, n, g = last_change(line), line.h.shape[0], growing(line, reel)
     apart = end_of(reel) == 0 or g < n - 1  # the cell that grows is not the last one of the line
     more, slope = of_material(line, job.sea, job.ends, state, reel, n)
     more = sub(more, sum_of_balance(reel, t))
     force, _ = force_of_fairlead(reel, job.report, more)
     if apart:
         answer, more_pull = answer_of_cell(
-            line, state, job.X, job.W, reel.columns, cell(line, reel, g), n if end_of(reel) else 1
+            line, state, winch, job.X, job.W, reel.columns, cell(line, reel, g), n if end_of(reel) else 1
         )
     else:
-        answer, more_pull = softness(line, state, job.X), job.X[at]
+        answer, more_pull = softness(line, state, winch, job.X), job.X[at]
     pull = pull_at(force, slope) + more_pull
     lost, steep = losses(winch, numbers[RATE])
     left = winch[INERTIA] * numbers[ACCELERATION] + lost + tension_held(winch, t) - pull
@@ -490,16 +509,23 @@ def take_forces_off(table):
 @inner
 def stand(job):
     """The line at clock[NOW], and the force of its fairlead, for a state that no step has led to."""
-    find_length(job.reel, job.clock[b.NOW])
-    prepare(job.line, job.reel, job.clock[b.NOW])
+    was_on, damped, t = job.reel.stage[FLOW_KNOWN] > 0.0, job.reel.flow.shape[0] > 0, job.clock[b.NOW]
     state = job.new if job.counts[b.PARITY] else job.old
-    if job.reel.stage[UNBALANCED] > 0.0:
-        put_riding_on(job.line, job.sea, job.ends, state, job.reel, job.clock[b.NOW])
-        find_balance(job.line, job.sea, job.ends, state, job.reel)
+    find_length(job.reel, t)
+    prepare(job.line, job.reel, t)
+    if damped or job.reel.stage[UNBALANCED] > 0.0:
+        put_riding_on(job.line, job.sea, job.ends, state, job.reel, t)
+        if job.reel.stage[UNBALANCED] > 0.0:
+            find_balance(job.line, job.sea, job.ends, state, job.reel)
+        if damped:
+            correct_damping_power(job.line, job.ends, state, job.reel, job.report, was_on)
+        if damped and not was_on:
+            correct_end(job.line, job.ends, state, job.reel, job.report)
         take_riding_off(job.line, job.reel)
-        job.reel.stage[UNBALANCED] = 0.0
-    t = job.clock[b.NOW]
+        job.reel.stage[UNBALANCED], job.reel.stage[FLOW_KNOWN] = 0.0, 0.0
     pull = correct_force(job.line, job.sea, job.ends, state, job.velocity, job.reel, job.report, t)
+    if damped:
+        job.reel.numbers[FLUX] += power_of_flow(job.line, job.ends, state, job.reel)
     note_pull(job.reel, t, pull)
     remember(job.line, job.reel)
 

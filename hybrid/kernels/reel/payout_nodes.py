@@ -18,7 +18,8 @@ from hybrid.kernels.laws.axial_law import strain_and_energy
 from hybrid.kernels.laws.tension_torque import couples, stretch_factor, torque_beside
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
-from hybrid.kernels.reel.paid_length import cell, length_at, made_between, node
+from hybrid.kernels.reel.damping import strain_at
+from hybrid.kernels.reel.paid_length import cell, lack_rate, length_at, made_between, node
 from hybrid.kernels.reel.payout import slope_at, velocity_at
 from hybrid.kernels.reel.reel import (
     CHANGED,
@@ -38,7 +39,7 @@ from hybrid.kernels.reel.reel import (
 )
 from hybrid.kernels.reel.winch import ALGORITHMIC_NOW, RATE_NOW, TENSION, TRUE_NOW
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.forces import PLANAR, STIFFNESS_DAMPING
 from hybrid.kernels.state.state import Floats, Line, State, blank_line, blank_state
 from hybrid.kernels.step.generalized_alpha import lead
 
@@ -212,16 +213,20 @@ def material_at(line, state, reel, flow, g):
 
 
 @inner
-def lack_rate(reel, t, c):
-    """Rate, m/s, at which what cell c lacks changes."""
-    x = min(max((t - reel.since[c]) / reel.span[c], 0.0), 1.0)
-    slope = -reel.lack[c] / reel.span[c] * 30.0 * x * x * (1.0 - x) ** 2
-    return slope + reel.rate[c] * (1.0 - x) ** 2 * (1.0 + 2.0 * x - 15.0 * x * x)
+def is_damped(line, c):
+    """Whether part of the tension of cell c (of the line) is of damping."""
+    return line.bits & STIFFNESS_DAMPING != 0 and line.ck[c] > 0.0 and line.tau[c] > 0.0
+
+
+@inner
+def late_strain(line, state, c):
+    """By how much damping makes the strain of cell c (of the line) less than its tension would."""
+    return line.ck[c] * state.T[c] - strain_at(line, state, c) if is_damped(line, c) else 0.0
 
 
 @inner
 def strain_of(line, state, c):
-    """Strain of cell c (of the line) under its tension, and a torque where tension makes one."""
+    """Strain of cell c (of the line) under its tension without damping, and a torque where tension makes one."""
     if couples(line):
         return stretch_factor(line, state, c, torque_beside(line, state, c)) - 1.0
     strain, _ = strain_and_energy(line, state, c)
@@ -229,8 +234,10 @@ def strain_of(line, state, c):
 
 
 @inner
-def tension_rate(state, clock, tension, c):
-    """Rate, N/s, of the tension of cell c (of the line) over the last step."""
+def tension_rate(line, state, clock, tension, c):
+    """Rate, N/s, of the tension of cell c (of the line) over the last step, or of its material now if it is damped."""
+    if is_damped(line, c):
+        return late_strain(line, state, c) / (line.tau[c] * line.ck[c])
     dt = clock[b.LAST_DT]
     return (state.T[c] - tension[0, c]) / dt if dt > 0.0 else 0.0
 
@@ -240,10 +247,12 @@ def mismatch(job, flow, g, c):
     """By how much, m/s, the rate of the chord of cell c misses that of its length."""
     line, state, reel, clock = job.line, job.state, job.reel, job.clock
     k, e = cell(line, reel, c), chord_at(line, state, reel, c)
+    if is_damped(line, k):  # its tension is that of its rate
+        return 0.0
     ends = sub(get3(state.v, node(line, reel, c + 1)), get3(state.v, node(line, reel, c)))
     along = dot(e, ends) / math.sqrt(dot(e, e))
     grows = (flow.rate if c == g else 0.0) - lack_rate(reel, clock[b.NOW], c)
-    rises = tension_rate(state, clock, job.tension, k)
+    rises = tension_rate(line, state, clock, job.tension, k)
     return along - grows * (1.0 + strain_of(line, state, k)) - line.h[k] * line.ck[k] * rises
 
 
@@ -283,15 +292,16 @@ def put_director(job, c, a, e, turn):
 
 
 @inner
-def let_lack(job, flow, c, true, grows, rises, kept, span):
+def let_lack(job, flow, c, true, grows, rises, kept, late, span):
     """Cell c of the new line lacks what its law of length misses, and gets it in `span`, s.
 
-    true: m, its length; grows: m/s, its rate; rises: N/s; kept: m/s, mismatch that it keeps.
+    true: m, its length; grows: m/s, its rate; rises: N/s; kept: m/s, mismatch that it keeps; late: as of
+    `late_strain`.
     """
     target, out, new = job.target, job.out, job.new
     k, e = cell(target, new, c), chord_at(target, out, new, c)
     ends = sub(get3(out.v, node(target, new, c + 1)), get3(out.v, node(target, new, c)))
-    l, strain = math.sqrt(dot(e, e)), strain_of(target, out, k)
+    l, strain = math.sqrt(dot(e, e)), strain_of(target, out, k) - late
     new.lack[c] = true - l / (1.0 + strain)
     new.rate[c] = grows - (dot(e, ends) / l - kept - true * target.ck[k] * rises) / (1.0 + strain)
     new.since[c], new.span[c] = job.clock[b.NOW], span
@@ -355,7 +365,8 @@ def enter(job, flow, g):
     put(out.slip, at, add(scale(1.0 - part, get3(state.slip, before)), scale(part, get3(state.slip, behind))))
     cut, last = cell(line, reel, g), cell(line, reel, g - 1)
     slope = (state.T[cut] - state.T[last]) / (0.5 * (line.h[last] + h))
-    kept, rises = mismatch(job, flow, g, g), tension_rate(state, job.clock, job.tension, cut)
+    kept, rises = mismatch(job, flow, g, g), tension_rate(line, state, job.clock, job.tension, cut)
+    late, flows = late_strain(line, state, cut), 0.5 * flow.rate * slope if is_damped(line, cut) else 0.0
     twist, side = twist_rate(line, state, reel, g), reel.numbers[SIDE]
     ahead = twist_rate(line, state, reel, i)
     if ahead == 0.0:
@@ -379,7 +390,8 @@ def enter(job, flow, g):
     for c in range(g, g + 2):
         length = place - place_of(line, reel, g) if c == g else place_of(line, reel, i) - place
         grows = flow.rate if c == i else 0.0
-        let_lack(job, flow, c, length, grows, rises, kept * length / h, span_of(job, flow, g))
+        more = flows if c == i else 0.0  # the cell that grows has other material, which bears more
+        let_lack(job, flow, c, length, grows, rises + more, kept * length / h, late, span_of(job, flow, g))
 
 
 @inner
@@ -400,11 +412,15 @@ def leave(job, flow, g):
         out.slow[k] = a * state.slow[last] + z * state.slow[cut]
     put_director(job, c, get3(state.a1, last), e, 0.5 * reel.numbers[SIDE] * twist_rate(line, state, reel, g) * hb)
     kept = mismatch(job, flow, g, c) + mismatch(job, flow, g, g)
-    rises = a * tension_rate(state, job.clock, job.tension, last) + z * tension_rate(state, job.clock, job.tension, cut)
+    rises = a * tension_rate(line, state, job.clock, job.tension, last)
+    rises += z * tension_rate(line, state, job.clock, job.tension, cut)
+    late = a * late_strain(line, state, last) + z * late_strain(line, state, cut)
+    if is_damped(line, cut):
+        rises += flow.rate * (state.T[cut] - state.T[last]) / (ha + hb)
     for j in range(c):
         new.lack[j], new.rate[j], new.since[j], new.span[j] = reel.lack[j], reel.rate[j], reel.since[j], reel.span[j]
     true = place_of(line, reel, g + 1) - place_of(line, reel, c)
-    let_lack(job, flow, c, true, flow.rate, rises, kept, span_of(job, flow, g))
+    let_lack(job, flow, c, true, flow.rate, rises, kept, late, span_of(job, flow, g))
 
 
 @inner

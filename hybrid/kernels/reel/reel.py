@@ -44,7 +44,10 @@ FEWEST_STEPS = 8
 ) = range(16)  # fmt: skip
 NUMBERS = 16
 # Parts of `Reel.stage`.
-RIDING_ON, BALANCE_ON, UNBALANCED = range(3)
+RIDING_ON, BALANCE_ON, UNBALANCED, FLOW_KNOWN = range(4)
+# Columns of `Reel.flow`.
+LENGTH_OF, FLOW, STRAIN_OF, TURN_FLOW = 0, 1, 2, 5
+FLOWS = 8
 
 
 class Reel(NamedTuple):
@@ -68,18 +71,23 @@ class Reel(NamedTuple):
     # (m+1, 3) N, by which the forces on them are more because they do not move as the material does; on the fairlead 0
     # where it is held
     riding: Floats
-    stage: Floats  # (3,) 1 while these, or `balance`, are among the forces on the line; while `balance` is to be found
+    # (4,) 1 while these, or `balance`, are among the forces on the line; while `balance` is to be found; where the last
+    # assembly since the last step had `flow` in it
+    stage: Floats
     balance: Floats  # (N+1, 3) N, forces on nodes, in the order of the line, that balanced them at CHANGED
     plain: Floats  # (N+1, 3) N, the forces on the line without them
     winch: Floats  # (WINCH,) of a winch that holds a tension (kernels.reel.winch)
+    # (N+1, FLOWS) of a line that is damped in proportion to stiffness, else empty: of cells length and flow, m/s, of
+    # elements strain without stress and flow, rad/s (kernels.reel.damping)
+    flow: Floats
     columns: Floats  # (3, N+1, 5) that such a winch at the start, or at a clamp, works in; else empty
 
 
 def blank_reel(
     cells: int, law: Floats | None = None, pieces: Floats | None = None, winch: Floats | None = None,
-    layer: Floats | None = None, columns: bool = False,
+    layer: Floats | None = None, columns: bool = False, damped: bool = False,
 ) -> Reel:  # fmt: skip
-    """A reel of a line of so many cells; columns: whether such a winch needs another right-hand side."""
+    """A reel of a line of so many cells; columns: whether such a winch needs another right-hand side; damped: see `flow`."""
     z = np.zeros
     numbers = z(NUMBERS)
     numbers[CHANGED] = -np.inf
@@ -87,8 +95,8 @@ def blank_reel(
         numbers, z((1, 8)) if law is None else law, z((1, 1 + COLUMNS)) if pieces is None else pieces,
         z((1, COLUMNS)), z(1), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 1, 9)),
         z(REPORT_SIZE), z((2, COLUMNS)), z(1) if layer is None else layer,
-        z((1 if layer is None else layer.size, 3)), z(3), z((cells + 1, 3)), z((cells + 1, 3)), z(WINCH) if winch is None else winch,
-        z((3, cells + 1, 5) if columns else (3, 0, 5)),
+        z((1 if layer is None else layer.size, 3)), z(4), z((cells + 1, 3)), z((cells + 1, 3)), z(WINCH) if winch is None else winch,
+        z((cells + 1 if damped else 0, FLOWS)), z((3, cells + 1, 5) if columns else (3, 0, 5)),
     )  # fmt: skip
 
 

@@ -27,7 +27,7 @@ from hybrid.kernels.algebra.rotations import get3
 from hybrid.kernels.laws.axial_law import SHIFT, has_law
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.forces import PLANAR, STIFFNESS_DAMPING
 from hybrid.kernels.step.generalized_alpha import radius_of_step, scheme
 
 # Numbers of a winch.
@@ -102,7 +102,20 @@ def last_change(line):
 
 
 @inner
-def softness(line, state, X):
+def by_length(line, state, winch, c):
+    """How the law of length of cell c answers to its length, which grows at a rate that answers with it."""
+    shift = line.law[c, SHIFT] if has_law(line, c) else 0.0
+    return (1.0 + shift + line.ck[c] * state.T[c]) * grown(line, winch, c)
+
+
+@inner
+def grown(line, winch, c):
+    """1 + tau cv of cell c, if it is damped: how its damped length answers to its length."""
+    return 1.0 + line.tau[c] * winch[CV] if line.bits & STIFFNESS_DAMPING and line.ck[c] > 0.0 else 1.0
+
+
+@inner
+def softness(line, state, winch, X):
     """How the tension of the last cell answers to its unstretched length, N/m, in the equations eliminated in X.
 
     The fairlead stays, so that the law of length of that cell alone has the new length; what stands before it answers
@@ -117,13 +130,11 @@ def softness(line, state, X):
         d, _, _ = chord(get3(state.e, c))
         p = c * ROW
         moves = d[0] * X[p + SPAN] + d[1] * X[p + 2 * SPAN] + d[2] * X[p + 3 * SPAN]
-    ck = line.ck[c]
-    shift = line.law[c, SHIFT] if has_law(line, c) else 0.0
-    return (1.0 + shift + ck * state.T[c]) / (moves - line.h[c] * ck)
+    return by_length(line, state, winch, c) / (grown(line, winch, c) * moves - line.h[c] * line.ck[c])
 
 
 @inner
-def answer_of_cell(line, state, X, W, columns, c, at):
+def answer_of_cell(line, state, winch, X, W, columns, c, at):
     """The same of any cell c, behind nodes that ride or with the fairlead at the start: how the tension before node
 
     `at` answers to its length, N/m, and the change of that tension in the equations eliminated in X, N.  X has room for
@@ -135,8 +146,7 @@ def answer_of_cell(line, state, X, W, columns, c, at):
     for i in range(n + 1):
         for k in range(5):
             x[i, k] = 0.0
-    shift = line.law[c, SHIFT] if has_law(line, c) else 0.0
-    x[c + 1, 0] = 1.0 + shift + line.ck[c] * state.T[c]
+    x[c + 1, 0] = by_length(line, state, winch, c)
     if line.bits & PLANAR:
         solve_forward_planar(line.plane, X, x, forward)
     else:

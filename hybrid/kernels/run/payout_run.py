@@ -21,7 +21,7 @@ from hybrid.kernels.mesh.fill_line import copy_cell, copy_node, move_line
 from hybrid.kernels.mesh.zone_transfer import carry_push
 from hybrid.kernels.reel.paid_length import cell, node, prepare
 from hybrid.kernels.reel.payout_nodes import CarryJob, blank_carry_job, move_row, place_reel
-from hybrid.kernels.reel.reel import BALANCE_ON, DUE, FAR, LONGEST, RIDING_ON, SIDE, Reel, blank_reel
+from hybrid.kernels.reel.reel import BALANCE_ON, DUE, FAR, FLOW_KNOWN, LONGEST, RIDING_ON, SIDE, Reel, blank_reel
 from hybrid.kernels.reel.winch import at_its_end
 from hybrid.kernels.run.following_run import call, call_count, call_solver, put, put_at
 from hybrid.kernels.state import books as b
@@ -194,7 +194,7 @@ def change_line(table):
     reel, new = job.reel, job.new
     for k in range(reel.numbers.shape[0]):
         new.numbers[k] = reel.numbers[k]
-    new.stage[RIDING_ON], new.stage[BALANCE_ON], new.numbers[DUE] = 0.0, 0.0, 0.0
+    new.stage[RIDING_ON], new.stage[BALANCE_ON], new.stage[FLOW_KNOWN], new.numbers[DUE] = 0.0, 0.0, 0.0, 0.0
     place_reel(new, job.nodes, job.target.h.shape[0] - reel.layer.shape[0] + 1)
     line_as(job.line, read_node(table).whole, job.target, new)
 

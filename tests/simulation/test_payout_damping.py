@@ -1,0 +1,155 @@
+"""Lines that are paid out and damped in proportion to their stiffness: the material alone is strained, not what flows."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_payout import G, clamped, exchanged, hanging, kicks, refused, sagging
+
+import hybrid
+
+TAU = 0.05
+
+
+def damped(scene: dict[str, Any], tau: float = TAU) -> dict[str, Any]:
+    scene = deepcopy(scene)
+    scene["cable"]["sections"][0]["damping"] = {"stiffness": tau}
+    return scene
+
+
+def rod(rate: float, step: float = 0.05, duration: float = 8.0) -> dict[str, Any]:
+    return clamped(sagging("rod", 2e6, 2e4, rate, step, duration, output={"every": 1.0}))
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("rate", [0.5, -0.5])
+def test_steady_payout_strains_nothing(dimension: int, rate: float) -> None:
+    """40 m that hang at a steady rate: strain and pull are those of the weight below, for a damping time of 0.3 s.
+
+    Without the flow the cell that grows would be strained at c/h, and the pull be EA tau c/h = 7.5 kN more.
+    """
+    EA, w = 1e5, 2.0 * G
+    scene = damped(hanging({"rate": rate, "begin": 0.5, "ramp": 4.0}, 16.0, dimension=dimension), 0.3)
+    scene["cable"]["sections"][0]["axial_stiffness"] = EA
+    result = hybrid.run(scene)
+    steady, length = result.t > 6.0, result["payout/length"]
+    assert np.abs(result["reaction_end"][steady, 2] / (w * length[steady]) - 1.0).max() < 2e-5
+    z = -length * (1.0 + 0.5 * w * length / EA)
+    assert np.abs(result.position[:, 0, 2] - z)[steady].max() < 1e-5
+    assert np.abs(result["work/stiffness_damping"][-1]) < 1e-5 * np.abs(result["work/end"][-1])
+
+
+@pytest.mark.parametrize("rate", [1.0, -1.0])
+def test_the_bend_behind_a_clamp_flows_with_the_material(rate: float) -> None:
+    """A taut rod that leaves a clamp at an angle phi to its pull P, and is straight on the reel.
+
+    At a distance x the material bends by M = EI (kappa + tau c dkappa/dx), and M' = P (theta - theta of the pull): the
+    rod is off the line of its pull by the integral of theta, of roots r < 0 of lam^2 r^2 (1 + tau c r) = 1.
+    """
+    EI, pull, mass, phi, tau = 4000.0, 1000.0, 1.0, 0.05, 0.5
+    section = {"length": 20.0, "mass": mass, "bending_stiffness": EI, "damping": {"stiffness": tau, "mass": 1.0}}
+    scene = {
+        "environment": {"gravity": 0.0}, "cable": {"sections": [section]},
+        "ends": {
+            "start": {"kind": "free", "force": [-pull, 0, 0]},
+            "end": {"kind": "clamped", "position": [0, 0, 0], "tangent": [np.cos(phi), 0, np.sin(phi)],
+                    "payout": {"rate": rate, "ramp": 4.0}},
+        },
+        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 40}, "time": {"duration": 12.0, "step": 0.04},
+        "output": {"every": 1.0},
+    }  # fmt: skip
+    square, flow = EI / (pull - mass * rate**2), tau * rate
+    roots = np.roots([flow * square, square, 0.0, -1.0])
+    roots = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
+    roots = roots[roots < 0.0]
+    if rate > 0.0:
+        parts = np.linalg.solve([[1.0, 1.0], roots], [phi, 0.0])  # theta = phi and kappa = 0 at the clamp
+    else:
+        roots, parts = roots[-1:], np.array([phi])
+    exact = float((parts / -roots).sum())
+    assert abs(exact / (phi * np.sqrt(square)) - 1.0) > 0.1  # what the flow makes of it
+    assert abs(hybrid.run(scene).position[-1, 0, 2]) == pytest.approx(exact, rel=6e-3)
+
+
+@pytest.mark.parametrize("rate", [0.8, -0.8])
+def test_energy_is_balanced_to_second_order(rate: float) -> None:
+    """What is left is of second order in the steps, through nodes that enter and leave, behind a clamp."""
+    one, other = (hybrid.run(damped(rod(rate, step))) for step in (0.1, 0.05))
+    left = [np.abs(x["work/scheme"]).max() for x in (one, other)]
+    assert left[1] < 1e-4 * np.abs(other["work/end"]).max()
+    assert left[0] > 3.0 * left[1]
+    assert other["work/stiffness_damping"][-1] < -10.0
+
+
+@pytest.mark.parametrize("kind", ["catenary", "rod", "clamped"])
+def test_a_node_that_enters_does_not_kick(kind: str) -> None:
+    """The tension of damping is carried on where the cell that grows is cut: as without damping."""
+    scene = damped(sagging("catenary" if kind == "catenary" else "rod", 2e6, None if kind == "catenary" else 2e4))
+    scene["time"]["duration"] = 13.5
+    assert max(kicks(clamped(scene) if kind == "clamped" else scene)) < 6e-4
+
+
+def test_a_line_that_stays_as_long_is_a_fixed_line() -> None:
+    """A rate of zero: what a line without payout does, to round-off."""
+    scene = damped(sagging("rod", 2e6, 2e4, 0.0, duration=2.0))
+    paid = hybrid.run(scene)
+    del scene["ends"]["end"]["payout"]
+    fixed = hybrid.run(scene)
+    assert np.abs(paid.position - fixed.position).max() < 1e-12 * 100.0
+    np.testing.assert_allclose(paid["reaction_end"], fixed["reaction_end"], rtol=0, atol=1e-9 * 3000.0)
+    np.testing.assert_allclose(paid["work/stiffness_damping"], fixed["work/stiffness_damping"], rtol=1e-9, atol=1e-9)
+
+
+def test_halving_the_step_gives_second_order() -> None:
+    """Before the first node enters, behind a clamp that surges: against a sixteenth of the step."""
+    found = [hybrid.run(damped(rod(0.8, step, 4.0))) for step in (0.08, 0.04, 0.005)]
+    off = [np.abs(x.position[-1] - found[-1].position[-1]).max() for x in found[:2]]
+    assert 3.0 < off[0] / off[1] < 5.5
+
+
+def test_the_mirror_image_does_the_same_and_it_is_resumed_bit_for_bit(tmp_path: Path) -> None:
+    """The same with the winch at the start; and what is resumed is what was run, to the last bit."""
+    scene = damped(rod(0.8))
+    scene["ends"]["end"]["payout"]["longest"] = 120.0
+    one, other = hybrid.run(scene, output=tmp_path / "whole.h5"), hybrid.run(exchanged(scene))
+    assert np.abs(other["reaction_start"] - one["reaction_end"]).max() < 1e-6 * np.abs(one["reaction_end"]).max()
+    assert np.abs(other.position[:, ::-1] - one.position).max() < 1e-7 * 100.0
+    hybrid.run({**scene, "time": {"duration": 5.0, "step": 0.05}}, output=tmp_path / "part.h5")
+    resumed = hybrid.resume(tmp_path / "part.h5", until=8.0)
+    for what in ("position", "tension", "reaction_end", "work/end", "work/stiffness_damping", "work/scheme"):
+        assert np.array_equal(one[what], resumed[what]), what
+
+
+def test_zones_that_move_do_as_rods() -> None:
+    scene = damped(sagging("rod", 2e6, 2e4, 0.8, duration=8.0, output={"every": 1.0}))
+    rods, zones = hybrid.run(scene), hybrid.run(scene | {"model": {"kind": "adaptive", "tolerance": 0.1}})
+    assert np.abs(zones.position - rods.position).max() < 0.1
+    pull = np.linalg.norm(rods["reaction_end"], axis=1)
+    assert np.abs(np.linalg.norm(zones["reaction_end"], axis=1) - pull).max() < 4e-3 * pull.mean()
+
+
+def test_a_winch_that_holds_a_tension() -> None:
+    """It goes on as the strain of the line lets it, damped or not: energy of second order, the same length in the end."""
+    scene = sagging("rod", 2e6, 2e4, duration=8.0, output={"every": 1.0})
+    scene["ends"]["end"]["payout"] = {"longest": 130, "winch": {"tension": 2500, "inertia": 300, "damping": 900}}
+    left = []
+    for step in (0.1, 0.05):
+        scene["time"]["step"] = step
+        found = hybrid.run(damped(scene))
+        left.append(np.abs(found["work/scheme"]).max())
+    assert left[1] < 5e-4 * np.abs(found["work/end"]).max()
+    assert left[0] > 3.0 * left[1]
+    assert found["payout/length"][-1] == pytest.approx(hybrid.run(scene)["payout/length"][-1], abs=0.02)
+
+
+def test_what_is_not_known_is_refused() -> None:
+    law = damped(sagging("catenary"))
+    law["cable"]["sections"][0] |= {"tension_strain": [[0, 0], [0.01, 1e4]]}
+    assert "damping.stiffness" in refused(law)
+    other = damped(sagging("catenary", 2e6))
+    other["ends"]["end"]["payout"]["reel"] = [{"length": 100.0, "mass": 5.0, "axial_stiffness": 2e6}]
+    assert "the damping.stiffness of the section at the winch" in refused(other)
