@@ -8,46 +8,26 @@ pytest bench/test_bench_suspension.py -m bench -n 0 -s
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 
 import numpy as np
 import pytest
-from peers import exudyn_suspension, pyelastica_suspension, suspension
-
-import hybrid
+from peers import exudyn_suspension, hybrid_suspension, pyelastica_suspension, suspension
+from peers.hybrid_suspension import OURS
+from peers.suspension import EXUDYN, PART
 
 pytestmark = pytest.mark.bench
 ROUNDS = 3
-OURS = (
-    (hybrid.run, ["mesh.cells=120", "time.step=0.1"]),
-    (hybrid.run, ["mesh.cells=120", "time.step=0.1", "output.errors=true"]),
-    (hybrid.run, ["accuracy={position: 0.3 mm}"]),
-    (hybrid.static, ["mesh.cells=120", "output.errors=true"]),
-)
-EXUDYN = ((40, 0.02), (44, 0.05), (44, 0.02), (50, 0.05), (50, 0.02))  # elements and step, s: fewer are farther off
-# PyElastica would take 10 to 50 minutes to come to rest: so many seconds of motion are run, and the time is multiplied.
-PART = 0.1
-
-
-def ours(path: Path, command: Callable[..., hybrid.Result], sets: list[str]) -> tuple[float, float]:
-    """CPU time (s) of a whole run, and the largest distance (m) to the truth at its end."""
-    begin = time.process_time()
-    result = command(hybrid.load_scene(suspension.SCENE, sets), path)
-    spent = time.process_time() - begin
-    s, r = np.asarray(result.s), np.asarray(result.position[-1])
-    result.close()
-    path.unlink()
-    return spent, suspension.distance(s, r[:, 0], r[:, 2])
 
 
 def test_a_rod_that_comes_to_rest(tmp_path: Path) -> None:
     for what in OURS:  # what is needed is loaded
-        ours(tmp_path / "run.h5", *what)
+        hybrid_suspension.run(tmp_path / "run.h5", *what)
     runs = {
-        " ".join([command.__name__, *sets]): [ours(tmp_path / "run.h5", command, sets) for _ in range(ROUNDS)]
+        " ".join([command.__name__, *sets]): [
+            hybrid_suspension.run(tmp_path / "run.h5", command, sets) for _ in range(ROUNDS)
+        ]
         for command, sets in OURS
     }
     spent = {name: median(x[0] for x in found) for name, found in runs.items()}

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from board.__main__ import PROBLEMS
 from board.answers import Answer, Problem, references
-from board.page import page, within
+from board.page import falls_short, page, within
 from board.picture import draw
 from board.problems import first_harmonic, helix
 from numpy import arange, cos, pi
@@ -22,7 +22,8 @@ def test_every_problem_has_a_statement_and_every_value_a_source() -> None:
     for name, problem in table["problems"].items():
         assert problem["title"] and problem["statement"], name
         for quantity, values in problem["quantities"].items():
-            assert values and set(values) <= set(table["sources"]), quantity
+            known = {*values, *([problem["computed"]] if "computed" in problem else [])}
+            assert known and known <= set(table["sources"]), quantity
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +56,14 @@ def test_where_references_disagree_the_page_says_which_is_within_the_error() -> 
     quantities = {"a": {"one": 1.0, "two": 2.0}, "b": {"one": 1.0, "two": 2.0}}
     found = Problem("", "", "", quantities, [Answer("hybrid", {"a": 1.9, "b": 1.2}, {"a": 0.2, "b": 0.1})])
     assert found.disputed and within(found).endswith("a: two (nearest two); b: none (nearest one).")
+
+
+def test_the_page_says_where_ours_falls_short() -> None:
+    def problem(title: str, *values: float) -> Problem:
+        return Problem("", title, "", {"a": {"one": 1.0}}, [Answer("hybrid", {"a": x}) for x in values])
+
+    found = falls_short([problem("Near", 1.1, 1.001), problem("Far", 0.98, 1.03)])
+    assert found.endswith("from the first reference: far (2 %).")
 
 
 def test_a_harmonic_is_that_of_its_signal() -> None:

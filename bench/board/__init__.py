@@ -4,5 +4,5 @@
 
 It prints and writes docs/board.md and docs/pictures/board.png.  `references.json` holds statements and published values
 with their sources; every other number is computed when the command is called.  A problem is a function of
-`problems.py`; it returns what each program found and what it cost.
+`problems.py` or `against_peers.py`; it returns what each program found and what it cost.
 """

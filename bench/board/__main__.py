@@ -10,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import hybrid
+from board import against_peers
 from board import problems as ours
 from board.answers import Answer, Problem, references
 from board.page import page
@@ -17,12 +18,15 @@ from board.picture import draw
 
 DOCS = Path(__file__).parents[2] / "docs"
 PROBLEMS: dict[str, Callable[[str], list[Answer]]] = {
-    "lazy_wave_80": ours.lazy_wave,
-    "span_80": ours.span,
-    "lazy_wave_800": ours.lazy_wave,
+    "lazy_wave_80": lambda name: ours.lazy_wave(name) + against_peers.cabledyn_on(name),
+    "span_80": lambda name: ours.span(name) + against_peers.cabledyn_on(name),
+    "lazy_wave_800": lambda name: ours.lazy_wave(name) + against_peers.cabledyn_on(name),
     "touchdown_bending": ours.touchdown_bending,
     "chain_current": ours.chain_current,
     "chain_heave": ours.chain_heave,
+    "touchdown": against_peers.touchdown,
+    "mooring": against_peers.mooring,
+    "suspension": against_peers.suspended,
     "power_cables": ours.power_cables,
     "helix": ours.helix,
 }
@@ -36,9 +40,13 @@ PACKAGES = {
 
 
 def solved(name: str) -> Problem:
-    """A problem of the table with what was computed."""
+    """A problem of the table with what was computed; a reference that a program computes is taken from its answers."""
     table = references()["problems"][name]
-    return Problem(name, table["title"], table["statement"], table["quantities"], PROBLEMS[name](name))
+    quantities, answers = table["quantities"], PROBLEMS[name](name)
+    source = table.get("computed")
+    for answer in (x for x in answers if x.program == source):
+        quantities = {quantity: {source: value} for quantity, value in answer.values.items()}
+    return Problem(name, table["title"], table["statement"], quantities, [x for x in answers if x.program != source])
 
 
 def programs() -> tuple[str, str]:

@@ -34,8 +34,8 @@ def drawn(problems: list[Problem]) -> list[Problem]:
 
 
 def limits(values: list[float]) -> tuple[float, float]:
-    """Whole decades with room beside the outermost."""
-    return (10.0 ** math.floor(math.log10(min(values)) - 0.2), 10.0 ** math.ceil(math.log10(max(values)) + 0.2))
+    """With room beside the outermost."""
+    return min(values) / 2.5, max(values) * 2.5
 
 
 def percent(value: float, _: object = None) -> str:
@@ -48,7 +48,7 @@ def seconds(value: float, _: object = None) -> str:
 
 def panel(axes: Axes, problem: Problem) -> None:
     """One problem."""
-    for answer, error, cpu in points(problem):
+    for answer, error, cpu in reversed(points(problem)):  # ours, which come first, on top
         marker, colour = LOOKS[answer.program.split()[0]]
         axes.loglog(
             error, cpu, marker, color=colour, markersize=8, markeredgecolor="white", markeredgewidth=0.8, zorder=3
@@ -84,7 +84,7 @@ def figure(problems: list[Problem], columns: int = 3) -> Figure:
             axes.xaxis.set_tick_params(labelbottom=True)
     grid[0][0].set_xlim(*limits([error for _, error, _ in everything]))
     grid[0][0].set_ylim(*limits([cpu for _, _, cpu in everything]))
-    drawing.supxlabel("largest error against the reference", fontsize=9.5, color=INK)
+    drawing.supxlabel("largest error against the reference (left and down is better)", fontsize=9.5, color=INK)
     drawing.supylabel("CPU time", fontsize=9.5, color=INK)
     marks = [drawing.axes[0].plot([], [], LOOKS[x][0], color=LOOKS[x][1], markersize=8, label=x)[0] for x in used]
     drawing.legend(handles=marks, loc="outside upper left", ncols=len(used), frameon=False, fontsize=9.5)

@@ -27,6 +27,9 @@ DAMPING = 2.0  # 1/s, proportional to mass
 TANGENT, FORCE = (math.sqrt(0.75), -0.5), (0.005, 0.01 * math.sqrt(0.75))  # of the guided end; N
 DURATION = 20.0  # s
 CLOSE = 3.0e-4  # m, the distance to the truth that is asked for
+EXUDYN = ((40, 0.02), (44, 0.05), (44, 0.02), (50, 0.05), (50, 0.02))  # elements and step, s: fewer are farther off
+# PyElastica would take 10 to 50 minutes to come to rest: so many seconds of motion are run, and the time is multiplied.
+PART = 0.1
 
 
 def distance(s: NDArray[np.float64], x: NDArray[np.float64], z: NDArray[np.float64]) -> float:
