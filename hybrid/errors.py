@@ -125,6 +125,7 @@ EVENTS_BY_WEIGHT = (
     "kink at joint",
     "deep in the seabed",
     "deep in an obstacle",
+    "unresolved contact",
     "numerical dissipation",
     "vibrations damped",
     "snap",

@@ -48,6 +48,10 @@ class Surroundings:
                 grip=np.zeros((cells + 1, self.values.grip.shape[1])),
                 rolling=np.zeros((len(self.values.rolling), cells + 1, 5)),
             )
+        return self.with_values(values)
+
+    def with_values(self, values: Sea) -> Surroundings:
+        """The same sea and obstacles, with arrays of their own."""
         return Surroundings(values, self.names, self.driven)
 
     def at(self, t: float) -> Sea:

@@ -40,7 +40,6 @@ from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import RUN, Task
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
 from hybrid.model.mesh import Zone
-from hybrid.model.sea import Surroundings
 from hybrid.simulation.cell_arrays import (
     REST_OF_SEA,
     Kept,
@@ -449,7 +448,7 @@ class CellChanges:
         zones, sea, work, books = self._on.zones(k, n), self._on.sea_on(n), self._on.work_on(n), self._on.books(n)
         now = sea.now.copy()
         layout = model.layout._replace(rod=zones.rod.copy(), here=zones.here.copy() if self._follows else None)
-        model = replace(model, line=line, layout=layout, zones=layout.zones, sea=Surroundings(sea))
+        model = replace(model, line=line, layout=layout, zones=layout.zones, sea=model.sea.with_values(sea))
         sea.now[:] = now
         run.books, run.states = books, (self._on.state(k, 0, n), self._on.state(k, 1, n))
         if run.push.size:

@@ -14,7 +14,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, put_obstacles
+from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, distances, put_obstacles
 from hybrid.kernels.march.resolution_checks import lowest
 from hybrid.kernels.run.entry import sharpest
 from hybrid.kernels.state import books as b
@@ -25,6 +25,7 @@ from hybrid.kernels.state.report import BEND, TWIST_NODE
 from hybrid.kernels.state.state import Batch, Ends, Floats, State, ends_in, state_in
 from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.model.build import Model
+from hybrid.model.first_state import HUNG
 from hybrid.model.obstacles import CELLS_PER_RADIUS
 from hybrid.outputs.joined_lines import JoinedObservation, Output
 from hybrid.outputs.observation import Observation
@@ -33,6 +34,7 @@ from hybrid.simulation.events import EventLog
 from hybrid.simulation.hockling_watch import LOOP, note_hockling, note_loops
 from hybrid.simulation.section_layers import ASKEW, hidden_layer, layer_text
 from hybrid.simulation.slack_bends import TURNS, too_long_for_weight, turns_by_weight, weight_text
+from hybrid.solve.flaws import TOUCHING, behind_obstacles, obstacles_left
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium
 
@@ -45,8 +47,6 @@ OFF = 0.02
 KINK = 0.35
 # Depth in the seabed, as a part of the line's length, that no bed of real soil allows.
 SUNK = 0.01
-# Of its radius: from how near an obstacle on a line counts as on it.
-TOUCHING = 0.01
 # Energy that the scheme creates, as a part of what work, fall and start have put in: beyond the first it is
 # noted (a healthy run stays below 1 %), at the second the motion is the scheme's own and the run stops.
 GAIN_NOTED, GAIN_STOPS = 0.05, 1.0
@@ -77,7 +77,7 @@ LET_GO = 0.01
 NOWHERE: Floats = np.zeros((0, 3))
 # What a checkpoint holds of it as plain values.
 REMEMBERED = (
-    "_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_off", "_gain", "_loss", "_rested",
+    "_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_between", "_off", "_gain", "_loss", "_rested",
     "_left_out", "_jump", "_put_in", "_potential", "_alive", "_loop", "_writhe", "_writhes", "_section", "_kink",
     "_weight",
 )  # fmt: skip
@@ -90,6 +90,7 @@ UNWATCHED = {
     "_kink": KINK,
     "_within": 1.0,
     "_round": False,
+    "_between": False,
     "_weight": False,
 }
 
@@ -144,7 +145,7 @@ class Diagnostics:
         self._bend = self._twist = UNRESOLVED
         self._slack = model.slack_floor
         self._fold, self._sunk = UNRESOLVED, SUNK * model.length
-        self._within, self._round = 1.0, False
+        self._within, self._round, self._between = 1.0, False, False
         self._off = OFF * model.length
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
         self._rested = self._left_out = self._section = self._weight = False
@@ -234,6 +235,33 @@ class Diagnostics:
             s, tension = float(self._model.line.s[slack]), float(state.T[slack])
             text = f"the only equilibrium found has a tension of {tension:.3g} N in a catenary at s = {s:g} m"
             self.note(0.0, slack, "slack", f"{text}: it stands like a strut, which no cable does")
+        if self._model.line.bits & OBSTACLES:
+            if self._model.start_shape == HUNG:
+                self._lies_behind(state)
+            else:
+                self._has_left(state)
+
+    def _lies_behind(self, state: State) -> None:
+        """An obstacle on the side of which the line was not begun that is away from the straight span of its ends."""
+        line, sea = self._model.line, self._model.sea
+        for which, node in behind_obstacles(line, sea.values, state):
+            text = (
+                f"the line lies on the side of obstacle {sea.names[which]} that is away from the straight span of its "
+                f"ends, at s = {line.s[node]:g} m: on the other it may rest as well, and which is found depends on the "
+                f"mesh; initial.points near one choose it"
+            )
+            self.note(0.0, node, "several equilibria", text)
+
+    def _has_left(self, state: State) -> None:
+        """An obstacle on which the shape given lies, and the equilibrium does not."""
+        line, sea = self._model.line, self._model.sea
+        for which, node in obstacles_left(line, sea.values, self._model.start, state):
+            text = (
+                f"the shape given lies on obstacle {sea.names[which]} at s = {line.s[node]:g} m, and this equilibrium "
+                f"does not touch it: on this mesh none was found there; more cells, or initial.points nearer to one, "
+                f"may lead to it"
+            )
+            self.note(0.0, node, "several equilibria", text)
 
     def still(self, ends: Ends, state: State) -> Stop:
         """As `shape`, for a state that no step has led to."""
@@ -430,7 +458,10 @@ class Diagnostics:
             self._obstacles(batch)
 
     def _obstacles(self, batch: Batch) -> None:
-        """A line that lies deep in an obstacle or has passed through it, and cells that do not follow its radius."""
+        """A line that lies deep in an obstacle or has passed through it, cells that do not follow its radius, and cells
+
+        between whose nodes it may pass.
+        """
         line, sea = self._model.line, self._model.sea
         rows = sea.values.obstacles.copy()
         longest = np.maximum(np.append(line.h, 0.0), np.append(0.0, line.h))
@@ -463,6 +494,27 @@ class Diagnostics:
                 )
                 self.note(t, node, "unresolved bend", text)
                 self._round = True
+            elif not self._between:
+                self._pass_between(t, r, rows, met)
+
+    def _pass_between(self, t: float, r: Floats, rows: Floats, met: Floats | None) -> None:
+        """Cells longer than an obstacle is thick, and so near to it that it may pass between their nodes untouched."""
+        h, gap = self._model.line.h, distances(rows, r)
+        gap = np.maximum(np.minimum(gap[:, :-1], gap[:, 1:]), 0.0)  # of the nearer node of each cell
+        missed = (rows[:, KIND] == ROUND)[:, None] & (h > 2.0 * rows[:, RADIUS, None]) & (gap < 0.5 * h)
+        if met is not None:
+            missed &= met > 0.0
+        if not missed.any():
+            return
+        which, cell = (int(i) for i in np.argwhere(missed)[0])
+        name, thick = self._model.sea.names[which], 2.0 * rows[which, RADIUS]
+        text = (
+            f"at s = {self._model.line.s[cell]:g} m the line is {gap[which, cell]:.2g} m from obstacle {name}, which "
+            f"may pass between two nodes without touching one: cells are {h[cell]:.2g} m long, and cells of "
+            f"{thick:.2g} m would meet it"
+        )
+        self.note(t, cell, "unresolved contact", text)
+        self._between = True
 
     def _note_fold(self, t: float, turn: Floats) -> None:
         node = int(np.argmax(turn)) + 1

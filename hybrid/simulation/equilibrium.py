@@ -16,13 +16,14 @@ from hybrid.kernels.state.state import Line, State
 from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
 from hybrid.model.equilibrium_hints import reasons_against
+from hybrid.model.first_state import HUNG
 from hybrid.model.plane import leaves_plane, planar, untwist
 from hybrid.model.self_reach import touching
 from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.schema import Scene
 from hybrid.simulation.contact_equilibrium import with_contact
 from hybrid.simulation.diagnostics import borne_strain
-from hybrid.solve.flaws import overstretched_cell
+from hybrid.solve.flaws import behind_obstacles, overstretched_cell
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import PUSHED, Equilibrium, solve_statics
 
@@ -168,9 +169,19 @@ def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equil
             return Outcome.OVERSTRETCHED, cell
         return Outcome.OK, -1
 
-    return solve_model(
-        model, t, model.start, settle, quick, slack, model.other_starts, refused if counts or lies else None
-    )
+    def behind(state: State) -> tuple[Outcome, int]:
+        outcome, cell = refused(state)
+        node = next((node for _, node in behind_obstacles(model.line, model.sea.values, state)), -1)
+        return (Outcome.BURIED, node) if outcome == Outcome.OK and node >= 0 else (outcome, cell)
+
+    solve = partial(solve_model, model, t, model.start, settle, quick, slack, model.other_starts)
+    if lies and model.start_shape == HUNG:
+        try:
+            return solve(behind)
+        except ComputationError:  # where no way leads to the side of the span, the other may be meant
+            if quick:
+                raise
+    return solve(refused if counts or lies else None)
 
 
 def _settles(scene: Scene, model: Model, t: float) -> bool:

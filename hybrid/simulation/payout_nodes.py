@@ -44,7 +44,6 @@ from hybrid.kernels.state.state import (
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import RUN, Task
 from hybrid.model.line import lines
-from hybrid.model.sea import Surroundings
 from hybrid.outputs.joined_lines import Output
 from hybrid.simulation.cell_arrays import REST_OF_SEA, Kept, Shaped, blank_kept, seas
 from hybrid.simulation.envelope import marks_on
@@ -331,9 +330,8 @@ class NodeChanges:
             self._line(k, n), self._sea_on(n), self._work_on(n), self._books(k, n), self._reel(k, n),
         )  # fmt: skip
         now, length = sea.now.copy(), float(line.s[-1] - line.s[0])
-        model = replace(
-            owner.model, line=line, zones=paying.plan.zones_of(length), sea=Surroundings(sea), length=length
-        )
+        around = owner.model.sea.with_values(sea)
+        model = replace(owner.model, line=line, zones=paying.plan.zones_of(length), sea=around, length=length)
         sea.now[:] = now
         paying.count, paying.reel = n - paying.rides, reel
         run.books, run.states = books, (self._state(k, 0, n), self._state(k, 1, n))

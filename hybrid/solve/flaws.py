@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles
+from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, distances
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held
 from hybrid.kernels.state.forces import BODIES, FRICTION, OBSTACLES, SEABED
+from hybrid.kernels.state.obstacle_rows import AXIS, HALF_LENGTH, KIND, PLACE, RADIUS, ROUND
 from hybrid.kernels.state.state import Floats, Line, Sea, State
 
 # A line that lies this part of its length, and this many onsets of contact, under the bed has gone through it.
@@ -20,6 +23,10 @@ BURIED, BURIED_ONSETS = 0.02, 100.0
 FOLDED = 0.5 * np.pi
 HARDLY = 1e-3  # of the tension scale: a catenary that is compressed by less is slack
 RESOLVED = 0.3  # rad from one cell to the next, of a bend that cells show
+# From how near an obstacle on a line counts as on it, as a part of how deep it may lie.
+TOUCHING = 0.01
+# Of its radius squared: how far a line is on the other side of an obstacle than the straight span of its ends.
+BEHIND = 0.05
 
 
 def lowest_tension(line: Line, sea: Sea, state: State) -> tuple[float, int]:
@@ -79,6 +86,39 @@ def overstretched_cell(line: Line, state: State, borne: Floats) -> int:
     """
     part = np.abs(np.linalg.norm(state.e, axis=1) / line.h - 1.0) / borne
     return int(np.argmax(part)) if part.max() > 1.0 else -1
+
+
+def behind_obstacles(line: Line, sea: Sea, state: State) -> Iterator[tuple[int, int]]:
+    """Obstacles that a line touches on the side that is away from the straight span of its ends, and a node there.
+
+    A line that hangs through an obstacle is begun on the side of the span.
+    """
+    rows, way = sea.obstacles, state.r[-1] - state.r[0]
+    met = cells_met(sea.carried, line.s) if sea.carried.size else None
+    touched = depths_in_obstacles(rows, state.r, line.s, met) > -TOUCHING
+    for which, (row, nodes) in enumerate(zip(rows, touched, strict=True)):
+        if row[KIND] != ROUND or not nodes.any():
+            continue
+        axis, place, r = row[AXIS : AXIS + 3], row[PLACE : PLACE + 3], state.r[nodes]
+        along = np.clip((r - place) @ axis, -row[HALF_LENGTH], row[HALF_LENGTH])
+        middle = place + along.mean() * axis
+        part = np.clip((middle - state.r[0]) @ way / (way @ way), 0.0, 1.0) if way.any() else 0.0
+        span, side = state.r[0] + part * way - middle, (r - middle).mean(axis=0)
+        if row[HALF_LENGTH] > 0.0:  # of a cylinder what counts is across its axis
+            span, side = span - (span @ axis) * axis, side - (side @ axis) * axis
+        if span @ side < -BEHIND * row[RADIUS] ** 2:
+            yield which, int(np.flatnonzero(nodes)[0])
+
+
+def obstacles_left(line: Line, sea: Sea, start: State, state: State) -> Iterator[tuple[int, int]]:
+    """Obstacles that a line touches at its start and not in a state, and the node that is nearest there."""
+    rows = sea.obstacles
+    met = cells_met(sea.carried, line.s) if sea.carried.size else None
+    touched = depths_in_obstacles(rows, state.r, line.s, met).max(axis=1) > -TOUCHING
+    gaps = distances(rows, start.r)
+    for which, gap in enumerate(gaps):
+        if rows[which, KIND] == ROUND and not touched[which] and gap.min() < BEHIND * rows[which, RADIUS]:
+            yield which, int(np.argmin(gap))
 
 
 def fold_text(line: Line, state: State, node: int) -> str:

@@ -58,6 +58,7 @@ DOUBTS: Doubtful = {
     "unresolved change of section": (BENDING, "accuracy: {curvature: 5%}, with model: rod"),
     "deep in the seabed": (ALL, "check seabed.stiffness, in N/m per m"),
     "deep in an obstacle": (ALL, "a larger stiffness of the obstacle, or more cells"),
+    "unresolved contact": (ALL, "cells as short as its note says"),
     "numerical dissipation": (ALL, SHORTER),
     "vibrations damped": (ALL, "a time.step that follows them"),
     "snap": (PULL, "give axial_stiffness"),

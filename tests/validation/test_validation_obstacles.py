@@ -259,3 +259,27 @@ def test_an_equilibrium_within_an_obstacle_is_refused() -> None:
 
 def test_a_drum_is_wider_than_its_radius_by_the_strand() -> None:
     assert pytest.approx(DRUM + STRAND) == CENTRELINE
+
+
+@pytest.mark.parametrize(("cells", "said"), [(31, True), (120, False)])
+def test_a_thin_pipe_that_may_pass_between_nodes_is_said(cells: int, said: bool) -> None:
+    """It goes through 31 cells of 0.32 m untouched, at a node in none of 16 outputs; 120 cells of 0.08 m stop it."""
+    cable = {"length": 10.02, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e5, "bending_stiffness": 1.0}
+    travel = {"travel": {"by": [0, 0, -1.0], "over": 1.0}}
+    result = ran(
+        {
+            "cable": {"sections": [cable | {"damping": {"mass": 0.5}}]},
+            "ends": {
+                "start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [10, 0, 0]},
+            },
+            "obstacles": {
+                "p": {"kind": "cylinder", "at": [5.0, 0, 0.3], "axis": [0, 1, 0], "radius": 0.05, "motion": travel},
+            },
+            "initial": "equilibrium", "model": "rod", "mesh": {"cells": cells},
+            "time": {"duration": 1.5, "step": 0.01}, "output": {"every": 0.1},
+        }
+    )  # fmt: skip
+    assert (result.position[-1, :, 2].min() > -0.7) == said  # it is in the way of the line, or above it
+    found = [x for x in result.events if x.kind == "unresolved contact"]
+    assert bool(found) == said
+    assert all("cells of 0.12 m would meet it" in x.text for x in found)
