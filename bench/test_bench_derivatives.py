@@ -17,12 +17,12 @@ import pytest
 from derivative_scenes import KINDS, keys_of, scene_at_rest
 
 import hybrid
-from hybrid.design.cable_at_rest import CableAtRest
-from hybrid.design.line_at_rest import Wanted, parse_result
-from hybrid.design.numbers import with_number
-from hybrid.design.sensitivity import at_rest
+from hybrid.designs.cable_at_rest import CableAtRest
+from hybrid.designs.line_at_rest import Wanted, parse_result
+from hybrid.designs.numbers import with_number
+from hybrid.designs.sensitivity import at_rest
 from hybrid.scene.read import as_scene_or_system
-from tests.design.test_body_derivatives import SCENES as SCENES_OF_BODIES
+from tests.designs.test_body_derivatives import SCENES as SCENES_OF_BODIES
 
 pytestmark = pytest.mark.bench
 ROUNDS, SCENES = 9, int(os.environ.get("SCENES", "200"))

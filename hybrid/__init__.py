@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from hybrid.accuracy.run_forecast import plan
     from hybrid.adapt.user_criterion import NodeState
     from hybrid.couple.fmu_export import export_fmu
-    from hybrid.design.seek import seek
-    from hybrid.design.sensitivity import sensitivity
+    from hybrid.designs.seek import seek
+    from hybrid.designs.sensitivity import sensitivity
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.exports.api import export
     from hybrid.interop.moordyn import export_moordyn, import_moordyn
@@ -86,8 +86,8 @@ _HOME = {
     "resume": ("hybrid.accuracy.api", "resume"),
     "run": ("hybrid.accuracy.api", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
-    "seek": ("hybrid.design.seek", "seek"),
-    "sensitivity": ("hybrid.design.sensitivity", "sensitivity"),
+    "seek": ("hybrid.designs.seek", "seek"),
+    "sensitivity": ("hybrid.designs.sensitivity", "sensitivity"),
     "static": ("hybrid.accuracy.api", "static"),
     "stiffness": ("hybrid.simulation.system_stiffness", "stiffness"),
     "study": ("hybrid.studies.study", "study"),

@@ -36,7 +36,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "interop": ("errors", "scene"),
     "modal": (*COMPUTING, "simulation", "accuracy"),
     "studies": (*COMPUTING, "simulation", "accuracy", "view"),
-    "design": (*COMPUTING, "simulation", "accuracy", "modal", "studies"),
+    "designs": (*COMPUTING, "simulation", "accuracy", "modal", "studies"),
     "couple": (*COMPUTING, "simulation", "accuracy", "interop"),
     "live": (*COMPUTING, "simulation", "accuracy", "view"),
     "cli": (
@@ -50,7 +50,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "couple",
         "live",
         "modal",
-        "design",
+        "designs",
         "__init__",
     ),
     "__init__": (
@@ -58,7 +58,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "simulation",
         "accuracy",
         "modal",
-        "design",
+        "designs",
         "view",
         "exports",
         "interop",
@@ -70,7 +70,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
 
 # Packages from outside that only these rooms may import.
 ONLY = {
-    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "simulation", "accuracy", "modal", "design", "view", "exports", "studies"),
+    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "simulation", "accuracy", "modal", "designs", "view", "exports", "studies"),
     "numba": ("kernels",),
     "h5py": ("store", "exports"),
     "matplotlib": ("view",),

@@ -15,7 +15,7 @@ PICTURE = ROOT / "docs" / "pictures" / "rooms.svg"
 # Floors from the top; in each room's entry its column and what it does.
 FLOORS = (
     {"cli": (2.3, "commands, console, tables")},
-    {"design": (1.1, "derivatives at rest")},
+    {"designs": (1.1, "derivatives, goal seek, design")},
     {
         "studies": (0.05, "many runs, other programs"),
         "couple": (1.1, "FMU"),

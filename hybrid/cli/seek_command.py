@@ -11,7 +11,7 @@ import hybrid
 from hybrid.cli.app import Json, Quiet, SceneFile, Settings, UsageError, app, load_either, session, words
 
 if TYPE_CHECKING:
-    from hybrid.design.seek import Sought
+    from hybrid.designs.seek import Sought
 
 
 @app.command()

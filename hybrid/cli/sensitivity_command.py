@@ -12,7 +12,7 @@ import hybrid
 from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, flag, load_either, session, words
 
 if TYPE_CHECKING:
-    from hybrid.design.sensitivity import Derivative
+    from hybrid.designs.sensitivity import Derivative
     from hybrid.scene.schema import Scene
     from hybrid.scene.system import System
 

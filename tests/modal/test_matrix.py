@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.design import line_at_rest
-from hybrid.design.cable_at_rest import CableAtRest
-from hybrid.design.line_at_rest import parse_result
+from hybrid.designs import line_at_rest
+from hybrid.designs.cable_at_rest import CableAtRest
+from hybrid.designs.line_at_rest import parse_result
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.modal.matrices import linear_line
 from tests.solve.test_bed_of_depths import hill, mooring

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.design.cable_at_rest import CableAtRest
-from hybrid.design.line_at_rest import parse_result
-from hybrid.design.numbers import changed_scene
+from hybrid.designs.cable_at_rest import CableAtRest
+from hybrid.designs.line_at_rest import parse_result
+from hybrid.designs.numbers import changed_scene
 from hybrid.scene.depths import Depths
 from tests.solve.test_bed_of_depths import PLANE, SLOPE, hill, mooring
 

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
-from hybrid.design.in_motion import in_motion
-from hybrid.design.numbers import changed_scene, number_of
+from hybrid.designs.in_motion import in_motion
+from hybrid.designs.numbers import changed_scene, number_of
 
 G, A, PERIOD = 9.81, 1.0, 8.0
 W = 2.0 * np.pi / PERIOD
@@ -103,7 +103,7 @@ def test_what_is_refused():
 
 def test_steps_that_are_divided_are_no_neighbours(monkeypatch):
     """Runs whose steps are others give no derivative, but say which number did it."""
-    from hybrid.design import in_motion as room
+    from hybrid.designs import in_motion as room
 
     scene, plain = hybrid.validate_scene(heaved()), room.changed_scene
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybrid.design.numbers import changed_scene
-from hybrid.design.sensitivity import at_rest
+from hybrid.designs.numbers import changed_scene
+from hybrid.designs.sensitivity import at_rest
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.read import SceneLike, as_scene_or_system

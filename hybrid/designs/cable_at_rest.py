@@ -13,8 +13,8 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from hybrid.accuracy.api import resolution_at_rest
-from hybrid.design.line_at_rest import LEFT_OUT, Beside, LineAtRest, Wanted
-from hybrid.design.numbers import is_allowed, number_of, with_number
+from hybrid.designs.line_at_rest import LEFT_OUT, Beside, LineAtRest, Wanted
+from hybrid.designs.numbers import is_allowed, number_of, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats

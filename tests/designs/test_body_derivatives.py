@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.design.cable_at_rest import CableAtRest
-from hybrid.design.line_at_rest import parse_result
-from hybrid.design.numbers import changed_scene, with_number
-from hybrid.design.sensitivity import at_rest
+from hybrid.designs.cable_at_rest import CableAtRest
+from hybrid.designs.line_at_rest import parse_result
+from hybrid.designs.numbers import changed_scene, with_number
+from hybrid.designs.sensitivity import at_rest
 from hybrid.scene.read import as_scene_or_system
-from tests.design.test_system_derivatives import ANCHORS, BUOY, CHAIN, HOSE, SEA, moored
+from tests.designs.test_system_derivatives import ANCHORS, BUOY, CHAIN, HOSE, SEA, moored
 
 HULL = {
     "mass": 5e3, "inertia": [1e4, 1e4, 1e4], "volume": 30.0, "centre": [0.1, 0, -1.0],

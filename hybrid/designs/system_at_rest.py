@@ -15,10 +15,10 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from hybrid.design.bodies_at_rest import BodiesAtRest, with_bodies
-from hybrid.design.cable_at_rest import PART
-from hybrid.design.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, Wanted, moment_on_body, parse_result
-from hybrid.design.numbers import is_allowed, number_of, with_number
+from hybrid.designs.bodies_at_rest import BodiesAtRest, with_bodies
+from hybrid.designs.cable_at_rest import PART
+from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, Wanted, moment_on_body, parse_result
+from hybrid.designs.numbers import is_allowed, number_of, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import sparse
 
-from hybrid.design.line_at_rest import Frames
+from hybrid.designs.line_at_rest import Frames
 from hybrid.kernels.junctions.bodies import FRAME, OWN, PIECES, SOFTEST, V
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.state.state import Floats

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from hybrid.design.numbers import changed_scene, is_allowed, number_of, with_number
+from hybrid.designs.numbers import changed_scene, is_allowed, number_of, with_number
 from hybrid.errors import SceneError
 from hybrid.scene.read import as_scene_or_system
 

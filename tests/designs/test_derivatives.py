@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
-from hybrid.design.cable_at_rest import CableAtRest
-from hybrid.design.line_at_rest import parse_result
-from hybrid.design.numbers import changed_scene
+from hybrid.designs.cable_at_rest import CableAtRest
+from hybrid.designs.line_at_rest import parse_result
+from hybrid.designs.numbers import changed_scene
 
 G = 9.81
 

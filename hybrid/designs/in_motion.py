@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.accuracy.api import run
-from hybrid.design.line_at_rest import AXES
-from hybrid.design.numbers import changed_scene, number_of
+from hybrid.designs.line_at_rest import AXES
+from hybrid.designs.numbers import changed_scene, number_of
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES

@@ -9,11 +9,11 @@ from typing import Any, NamedTuple, overload
 
 import numpy as np
 
-from hybrid.design.cable_at_rest import CableAtRest
-from hybrid.design.in_motion import in_motion
-from hybrid.design.line_at_rest import parse_result
-from hybrid.design.numbers import number_of
-from hybrid.design.system_at_rest import SystemAtRest
+from hybrid.designs.cable_at_rest import CableAtRest
+from hybrid.designs.in_motion import in_motion
+from hybrid.designs.line_at_rest import parse_result
+from hybrid.designs.numbers import number_of
+from hybrid.designs.system_at_rest import SystemAtRest
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
@@ -58,7 +58,7 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
 
     of: results such as `tension@0` (at s, m), `max curvature`, `position.z@125`, `reaction_end.x`; of several lines
     `east/tension@end`, `max hose/curvature`.  by: keys of numbers such as `cable.sections[0].length`.  Friction of the
-    bed is left out.  motion: of a run with friction, of results such as `max tension@end` (`hybrid.design.in_motion`),
+    bed is left out.  motion: of a run with friction, of results such as `max tension@end` (`hybrid.designs.in_motion`),
     with errors by the step of the difference.  SceneError: a key or result that the scene does not have, or what has
     no derivative; ComputationError: no equilibrium, or runs that do not go on as the one between them.
     """

@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
-from hybrid.design.numbers import with_number
-from hybrid.design.sensitivity import at_rest
+from hybrid.designs.numbers import with_number
+from hybrid.designs.sensitivity import at_rest
 from hybrid.scene.read import as_scene_or_system
 
 CHAIN = {"length": 185.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}
