@@ -69,6 +69,25 @@ def shape(line: str) -> str:
     return " ".join(re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", line).split())
 
 
+def figures(line: str) -> str:
+    """A pattern of a line in which every number is a group, but times, which a peak of many may change."""
+    parts = re.split(r"((?:t = )?[-+]?\d[\d.]*(?:e[-+]?\d+)?)", " ".join(line.split()))
+    number = r"[-+]?\d[\d.]*(?:e[-+]?\d+)?"
+    holes = [rf"t = {number}" if part.startswith("t = ") else f"({number})" for part in parts[1::2]]
+    texts = [re.escape(part) for part in parts[::2]]
+    return "".join(text + hole for text, hole in zip(texts, [*holes, ""], strict=True))
+
+
+def shown(line: str, said: str) -> bool:
+    """Whether a program said this line, each number within 2 % of that on the page."""
+    pattern = figures(line)
+    on_page = re.fullmatch(pattern, " ".join(line.split()))
+    assert on_page
+    wanted = [float(x) for x in on_page.groups()]
+    said_now = [map(float, found.groups()) for found in re.finditer(pattern, " ".join(said.split()))]
+    return any(all(abs(x - w) <= 0.02 * abs(w) for x, w in zip(now, wanted, strict=True)) for now in said_now)
+
+
 def in_shell(command: list[str]) -> str:
     """Run it in this folder as a user would; what it says."""
     here = os.environ | {"PYTHONPATH": str(ROOT)}
@@ -103,19 +122,30 @@ def test_every_block_runs(
             flat = " ".join(map(shape, said.splitlines()))
             for line in block.text.splitlines():
                 assert shape(line) in flat, f"{page.name} shows what the program does not say: {line}"
+        if block.language == "text" and page.parent.name == "howto":
+            for line in block.text.splitlines():
+                assert shown(line, said), f"{page.name} shows what the program does not say: {line}\n{said}"
         if block.unrun != "" or (page.name == "examples.md" and checked(block)):
             continue
         if block.language == "python":
             exec(compile(block.text, page.name, "exec"), names)
         elif block.language == "bash" and (ours := commands(block.text)) is not None:
+            said = ""
             for words in ours:  # as the shell would, without a second to start each
                 with pytest.raises(SystemExit) as left:
                     main(words)
                 told = capsys.readouterr()
                 assert not left.value.code, f"{page.name}: hybrid {shlex.join(words)}\n{told.out}{told.err}"
-                said = told.out + told.err
+                said += told.out + told.err
         elif block.language == "bash":
             said = in_shell(["bash", "-euo", "pipefail", "-c", block.text])
+
+
+def test_what_a_page_shows_is_compared_with_what_is_said() -> None:
+    said = "largest  tension 1000.4 N at s = 2.5e+2 m,\nt = 77.3 s"
+    assert shown("largest tension   1000 N at s = 250 m, t = 12 s", said)
+    assert not shown("largest tension   1030 N at s = 250 m, t = 77.3 s", said)
+    assert not shown("smallest tension   1000 N", said)
 
 
 def test_blocks_that_are_not_run_say_why() -> None:

@@ -41,7 +41,8 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     name = page.file.src_uri
     if name in WIDE:
         page.meta |= {"hide": ["toc"], "search": {"boost": 0.2}}
-    markdown = markdown.replace("](../examples/", "](examples/")
+    up = "../" * name.count("/")  # to the root of the site, which has no folder `docs`
+    markdown = markdown.replace(f"]({up}../examples/", f"]({up}examples/")
     markdown = NAMED.sub(lambda m: f"[{title(m[1])}](", markdown)
     return equations.page(markdown, "theory.md" if name != "theory.md" else "") if name in WITH_EQUATIONS else markdown
 
