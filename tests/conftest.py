@@ -5,7 +5,7 @@ them as they come.  With
 
     pytest tests/validation -m "not bench" --write-validation
 
-the figures of that session become docs/validation.md.
+the figures of that session become docs/evidence/validation.md.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-PAGE = Path(__file__).parents[1] / "docs" / "validation.md"
+PAGE = Path(__file__).parents[1] / "docs" / "evidence" / "validation.md"
 HEAD = """\
 # Validation
 
@@ -49,8 +49,8 @@ Report = Callable[[str, str, str, str], None]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--write-validation", action="store_true", help="write the figures to docs/validation.md")
-    parser.addoption("--write-extremes", action="store_true", help="write the cases to docs/extremes.md")
+    parser.addoption("--write-validation", action="store_true", help="write the figures to docs/evidence/validation.md")
+    parser.addoption("--write-extremes", action="store_true", help="write the cases to docs/evidence/extremes.md")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -59,7 +59,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture
 def report(request: pytest.FixtureRequest) -> Report:
-    """`report(case, source, figure, acceptance)`: show a figure, and keep it for docs/validation.md."""
+    """`report(case, source, figure, acceptance)`: show a figure, and keep it for docs/evidence/validation.md."""
 
     def keep(case: str, source: str, figure: str, acceptance: str) -> None:
         request.config.stash[ROWS].append(Row(case, source, figure, acceptance, request.node.nodeid))

@@ -132,7 +132,7 @@ def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
         file, _, anchor = target.partition("#")
         there = page.parent / file if file else page
-        if there == ROOT / "docs" / "validation.md":
+        if there == ROOT / "docs" / "evidence" / "validation.md":
             continue  # the tests write it
         assert there.exists(), f"{page.name} links to {target}"
         if anchor:
@@ -153,9 +153,21 @@ def test_generated_pages_are_fresh(name: str, script: str) -> None:
     assert page == make["page"](), f"run: python docs/make_{script}.py"
 
 
-def test_trade_page_begins_as_its_script_says() -> None:
-    head = runpy.run_path(str(ROOT / "docs" / "make_trade.py"))["HEAD"]
-    assert (ROOT / "docs" / "trade.md").read_text(encoding="utf-8").startswith(head)
+def test_trade_pages_begin_as_their_script_says() -> None:
+    heads = runpy.run_path(str(ROOT / "docs" / "make_trade.py"))["HEADS"]
+    for name, head in heads.items():
+        assert (ROOT / "docs" / "evidence" / f"{name}.md").read_text(encoding="utf-8").startswith(head)
+
+
+def test_pages_of_evidence_are_short_and_name_their_commands() -> None:
+    made = runpy.run_path(str(ROOT / "docs" / "make_evidence.py"))
+    pages = sorted((ROOT / "docs" / "evidence").glob("*.md"))
+    assert set(made["WRITTEN"]) < {page.stem for page in pages}
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        assert len(text.splitlines()) <= 300, page.name
+        found = made["commands"](page)
+        assert found and all(f"`{command}`" in text for command in found), f"{page.name} names no command"
 
 
 def test_cited_files_exist() -> None:
@@ -163,7 +175,7 @@ def test_cited_files_exist() -> None:
     for page in PAGES:
         text = re.sub(r"^```diff\n.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
         for name in re.findall(r"\b((?:hybrid|tests|docs|examples)/[\w/]+\.(?:py|md|yaml|png))", text):
-            assert (ROOT / name).exists() or name == "docs/validation.md", f"{page.name} names {name}"
+            assert (ROOT / name).exists() or name == "docs/evidence/validation.md", f"{page.name} names {name}"
 
 
 def test_cited_equations_exist() -> None:

@@ -277,7 +277,7 @@ def test_quoted_tests_exist(collected: dict[str, Any]) -> None:
 
 @pytest.mark.slow
 def test_tests_named_in_validation_exist(collected: dict[str, Any]) -> None:
-    page = (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "evidence" / "validation.md").read_text(encoding="utf-8")
     named = re.findall(r"`(test_\w+\.py::[^`]+)` \|$", page, re.MULTILINE)
     rows = [line for line in page.splitlines() if line.startswith("| ") and not line.startswith("| case")]
     assert len(named) == len(rows) > 100, "every row names its test"

@@ -17,7 +17,8 @@ import equations  # noqa: E402
 
 WITH_EQUATIONS = {"theory.md", "zones.md", "accuracy.md", "extend.md"}
 KINDS = {".yaml", ".py", ".csv", ".txt"}  # of files of examples/; results that a reader has made there are no part
-WIDE = {"validation.md", "extremes.md", "trade.md"}  # tables that need the room of a list of contents
+# Tables that need the room of a list of contents.
+WIDE = {f"evidence/{name}.md" for name in ("validation", "extremes", "trade", "levels")}
 # In docstrings: a parameter, or several, and what it is, at the beginning of a paragraph or after a sentence.
 PARAMETER = re.compile(r"(<p>|[.;]\s+)((?:[a-z_]+,\s+)*[a-z_]+):\s+(?=\S)")
 SHIM = "https://unpkg.com/iframe-worker/shim"  # which the plugin `offline` asks of another host
@@ -33,7 +34,8 @@ def on_files(files: Files, config: Any) -> Files:
 
 def title(name: str) -> str:
     """What a page is called where it is linked to by its file: its heading, as far as a colon."""
-    heading = (DOCS / name).read_text(encoding="utf-8").partition("\n")[0]
+    page = next(DOCS / folder / name for folder in ("", "evidence", "howto") if (DOCS / folder / name).exists())
+    heading = page.read_text(encoding="utf-8").partition("\n")[0]
     return heading.lstrip("# ").partition(":")[0]
 
 

@@ -1,4 +1,4 @@
-"""Judging extreme cases, and the page that they become: docs/extremes.md (--write-extremes)."""
+"""Judging extreme cases, and the page that they become: docs/evidence/extremes.md (--write-extremes)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 
 import pytest
-from every import CASES, PAGE, listed, page
+from every import CASES, listed, rows, write
 from extreme import Case, Verdict, check, compute, judge
 
 import hybrid
@@ -26,7 +26,7 @@ def warm() -> None:
 
 @pytest.fixture
 def honest(request: pytest.FixtureRequest) -> Callable[[Case], None]:
-    """`honest(case)`: it ends as it must, and as docs/extremes.md says."""
+    """`honest(case)`: it ends as it must, and as docs/evidence/extremes.md says."""
     writes = request.config.getoption("--write-extremes")
 
     def look(case: Case) -> None:
@@ -49,4 +49,4 @@ def pytest_sessionfinish(session: pytest.Session) -> Iterator[None]:
     yield
     judged = session.config.stash.get(JUDGED, {})
     if session.config.getoption("--write-extremes") and len(judged) == len(CASES):
-        PAGE.write_text(page([judged[case.key] for case in CASES]), encoding="utf-8")
+        write(rows([judged[case.key] for case in CASES]))

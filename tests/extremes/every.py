@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -17,7 +18,9 @@ import pytest
 import rods
 from extreme import MODELS, Case, Verdict
 
-PAGE = Path(__file__).parents[2] / "docs" / "extremes.md"
+EVIDENCE = Path(__file__).parents[2] / "docs" / "evidence"
+PAGE, TABLE = EVIDENCE / "extremes.md", EVIDENCE / "extremes.csv"
+COLUMNS = ("family", "case", "model", "outcome", "figure", "error", "tolerance", "truth", "said")
 CASES: list[Case] = [*lines.CASES, *rods.CASES, *motions.CASES, *chains.CASES]
 
 FAMILIES = list(dict.fromkeys(case.family for case in CASES))
@@ -41,23 +44,24 @@ def parameters(cases: Sequence[Case]) -> list[Any]:
 
 @cache
 def listed() -> dict[str, str]:
-    """Outcomes of docs/extremes.md by the key of their case."""
-    found, family = {}, ""
-    for row in PAGE.read_text(encoding="utf-8").splitlines() if PAGE.exists() else ():
-        if row.startswith("## "):
-            family = next((x for x in FAMILIES if x.lower() == row[3:].lower()), "")
-        elif family and row.startswith("| ") and not row.startswith("| case "):
-            name, model, outcome = row[2:].split(" | ")[:3]
-            found[f"{family} | {name} | {model}"] = outcome
-    return found
+    """Outcomes of docs/evidence/extremes.csv by the key of their case."""
+    return {" | ".join((row["family"], row["case"], row["model"])): row["outcome"] for row in read()}
+
+
+def read() -> list[dict[str, str]]:
+    """The rows of the table; empty if it has not been written."""
+    if not TABLE.exists():
+        return []
+    with TABLE.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
 HEAD = """\
 # Extreme cases
 
 Use this page to see where each model holds, where it warns, and where it refuses.
-Every line below was computed, and this page written, by
-`pytest tests/extremes -m "not bench" --write-extremes`.
+Every case was computed, and this page and its table written, by
+`pytest tests/extremes -m "not bench" --write-extremes`; [extremes.csv](extremes.csv) has all cases, one a row.
 
 *Right*: within the tolerance of the truth, by the figure that comes nearest to it.  *Warned*: not within it, and the
 result says so in an event.  *Refused*: a scene that is refused or a computation that stops, with its true cause.
@@ -68,36 +72,44 @@ The families, their truths and the reasons for the tolerances are in tests/extre
 """
 
 
-def page(judged: Sequence[tuple[Case, Verdict]]) -> str:
-    """docs/extremes.md: the summary of family x model, and every case."""
-    rows = sorted(judged, key=lambda x: FAMILIES.index(x[0].family))
-    text = HEAD + f"{len(rows)} cases.\n\n| family | " + " | ".join(MODELS) + " | worst error / tolerance |\n"
+def rows(judged: Sequence[tuple[Case, Verdict]]) -> list[dict[str, str]]:
+    """The table of all cases, by family."""
+    ordered = sorted(judged, key=lambda x: FAMILIES.index(x[0].family))
+    return [row(case, verdict) for case, verdict in ordered]
+
+
+def row(case: Case, v: Verdict) -> dict[str, str]:
+    """One case of the table."""
+    figures = ("", "", "") if v.outcome == "refused" else (v.what, f"{v.error:.1e}", f"{v.tolerance:.1e}")
+    said = v.said.splitlines()
+    brief = said[0] if v.outcome == "refused" and len(said) == 1 else " ".join(x.strip() for x in said[:2])
+    values = (case.family, case.name, case.model, v.outcome, *figures, case.source, re.sub(r"\s+", " ", brief)[:160])
+    return dict(zip(COLUMNS, values, strict=True))
+
+
+def page(table: Sequence[dict[str, str]]) -> str:
+    """docs/evidence/extremes.md: the summary of family x model, and what each family is compared with."""
+    text = HEAD + f"{len(table)} cases.\n\n| family | " + " | ".join(MODELS) + " | worst error / tolerance |\n"
     text += "|---" * (len(MODELS) + 2) + "|\n"
-    tables = ""
-    for family, members in groupby(rows, key=lambda x: x[0].family):
+    truths = "\n## Truths\n\n"
+    for family, members in groupby(table, key=lambda x: x["family"]):
         cases = list(members)
         cells = []
         for model in MODELS:
-            count = Counter(verdict.outcome for case, verdict in cases if case.model == model)
+            count = Counter(x["outcome"] for x in cases if x["model"] == model)
             cells.append(
                 ", ".join(f"{count[x]} {x}" for x in ("right", "warned", "refused", "wrong") if count[x]) or "–"
             )
-        worst = max((v.ratio for _, v in cases if v.outcome == "right"), default=0.0)
+        worst = max((float(x["error"]) / float(x["tolerance"]) for x in cases if x["outcome"] == "right"), default=0.0)
         text += f"| {family} | " + " | ".join(cells) + f" | {worst:.2g} |\n"
-        sources = list(dict.fromkeys(case.source for case, _ in cases))
-        tables += f"\n## {family.capitalize()}\n\n" + "".join(f"{k}. {x}\n" for k, x in enumerate(sources, 1))
-        tables += f'\n<details markdown="1">\n<summary>{len(cases)} cases</summary>\n'
-        tables += "\n| case | model | outcome | error | tolerance | truth | warnings or refusal |\n|---|---|---|---|---|---|---|\n"
-        for case, v in cases:
-            tables += line(case, v, sources.index(case.source) + 1) + "\n"
-        tables += "\n</details>\n"
-    return text + tables
+        truths += f"- **{family.capitalize()}**: " + "; or ".join(dict.fromkeys(x["truth"] for x in cases)) + "\n"
+    return text + truths
 
 
-def line(case: Case, v: Verdict, source: int) -> str:
-    """One row of a family's table."""
-    figures = ("", "") if v.outcome == "refused" else (f"{v.what} {v.error:.1e}", f"{v.tolerance:.1e}")
-    said = v.said.splitlines()
-    brief = said[0] if v.outcome == "refused" and len(said) == 1 else " ".join(x.strip() for x in said[:2])
-    brief = re.sub(r"\s+", " ", brief).replace("|", "\\|")
-    return f"| {case.name} | {case.model} | {v.outcome} | {figures[0]} | {figures[1]} | {source} | {brief[:160]} |"
+def write(table: Sequence[dict[str, str]]) -> None:
+    """The table of all cases, and the page made from it."""
+    with TABLE.open("w", encoding="utf-8", newline="") as file:
+        out = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        out.writeheader()
+        out.writerows(table)
+    PAGE.write_text(page(table), encoding="utf-8")

@@ -8,7 +8,7 @@ A case is a scene, a model and a truth.  It ends in one of three ways that are h
 
 and in one that is not: *wrong*, which no case may be.  `must` says which end is expected, and `cause` what the
 event or the error has to say, so that a case that comes to hold where it did not fails as well.  Where round-off or
-the luck of a coarse step decides, `must` allows two ends; docs/extremes.md says which one it was.
+the luck of a coarse step decides, `must` allows two ends; docs/evidence/extremes.md says which one it was.
 """
 
 from __future__ import annotations

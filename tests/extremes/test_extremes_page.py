@@ -1,8 +1,8 @@
-"""docs/extremes.md lists every case, and the cases cover what they say they cover."""
+"""docs/evidence/extremes.csv lists every case, and the cases cover what they say they cover."""
 
 from __future__ import annotations
 
-from every import CASES, FAMILIES, PAGE, listed
+from every import CASES, FAMILIES, PAGE, listed, page, read
 from extreme import MODELS
 
 
@@ -10,7 +10,8 @@ def test_the_page_lists_every_case(pytestconfig):
     if pytestconfig.getoption("--write-extremes"):
         return
     assert set(listed()) == {case.key for case in CASES}, "run: pytest tests/extremes -m 'not bench' --write-extremes"
-    assert f"{len(CASES)} cases" in PAGE.read_text(encoding="utf-8")
+    text = PAGE.read_text(encoding="utf-8")
+    assert f"{len(CASES)} cases" in text and text == page(read()), "the page is that of its table"
     assert "wrong" not in listed().values()
 
 
