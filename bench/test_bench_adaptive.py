@@ -335,7 +335,7 @@ def test_adaptive_speed(name: str) -> None:
             f" {own[1][1]:.2%}, {own[2]:.0%} rod: CPU {a:.3f} / {b:.3f} s = {a / b:.2f};"
             f" all rod with the manager's cells / adaptive {c / b:.2f}"
         )
-        assert a / b >= 0.7 and c / b >= 0.9  # asked: 5; docs/zones.md says what limits
+        assert a / b >= 0.7 and c / b >= 0.9  # asked: 5; docs/evidence/zones.md says what limits
 
 
 # --- slack that others cannot do ------------------------------------------------------------------------------------
@@ -440,7 +440,7 @@ LIMITS = {
 
 @pytest.mark.parametrize("name", LIMITS)
 def test_adaptive_limits(name: str) -> None:
-    """Scenes with which adversaries have shown what the tolerance does not cover; and clamps kept, as docs/zones.md says."""
+    """Scenes with which adversaries have shown what the tolerance does not cover; and clamps kept, as docs/evidence/zones.md says."""
     make, bound = LIMITS[name]
     text = make()
     L, tolerance = length(text), text["model"]["tolerance"]

@@ -1,4 +1,4 @@
-"""Error figures of vibrations that last: taut lines and cantilevers in vacuum and air.  docs/accuracy.md"""
+"""Error figures of vibrations that last: taut lines and cantilevers in vacuum and air.  docs/evidence/accuracy.md"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Error figures of shocks: lines let go straight, ends let go in mid-motion, bodies that fall.  docs/accuracy.md"""
+"""Error figures of shocks: lines let go straight, ends let go in mid-motion, bodies that fall.  docs/evidence/accuracy.md"""
 
 from __future__ import annotations
 

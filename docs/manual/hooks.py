@@ -15,7 +15,7 @@ sys.path.insert(0, str(HERE))
 
 import equations  # noqa: E402
 
-WITH_EQUATIONS = {"theory.md", "zones.md", "error_figures.md", "extend.md"}
+WITH_EQUATIONS = {"theory.md", "zones.md", "zone_rules.md", "errors.md", "extend.md"}
 KINDS = {".yaml", ".py", ".csv", ".txt"}  # of files of examples/; results that a reader has made there are no part
 # Tables that need the room of a list of contents.
 WIDE = {f"evidence/{name}.md" for name in ("validation", "extremes", "trade", "levels")}

@@ -2,7 +2,7 @@
 
 First the result, which stands from then on, then the runs that its errors are estimated by; where these are larger
 than asked, finer results follow, each from what the one before has shown.
-docs/accuracy.md
+docs/errors.md
 """
 
 from __future__ import annotations

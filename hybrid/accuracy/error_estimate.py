@@ -2,7 +2,7 @@
 
 A run with longer cells and steps shows what both do, a second with longer steps what the steps do, a third with which
 order errors fall.  Together they cost less than half of the result.
-docs/accuracy.md
+docs/errors.md
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ from hybrid.simulation.run_sample import (
 from hybrid.store.named_arrays import Tree, matched
 
 # Errors by mesh and time step add with their signs, as in the difference of two runs that they follow from; the sum is
-# this much larger, and this part of it is that of their sizes.  docs/accuracy.md has what it has been worth.
+# this much larger, and this part of it is that of their sizes.  docs/evidence/accuracy.md has what it was worth.
 SAFETY, OF_SIZES = 1.2, 0.2
 # Equilibria whose positions differ by more than this part of what those of coarser cells differed by, and of the
 # largest coordinate, are different solutions; and the event that says so.
@@ -134,7 +134,7 @@ class Estimate:
         self.has_mesh = bool(self.order) and result.cells >= LEAST_RATIO * coarse.cells
         # Steps of the result are shorter than those of the coarser run, and what that does is not known.
         self.share_unknown = not self.has_step and coarse.steps > 0 and self._shorter(result, coarse) >= LEAST_RATIO
-        # Outputs of which the runs with longer steps do not show it either (docs/accuracy.md).  Forces at ends after a
+        # Outputs of which the runs with longer steps do not show it either (docs/errors.md).  Forces at ends after a
         # shock are of order 1 to 1.5 whatever lasts: their slow fall is in their order.
         slow = {name for name, x in fall.items() if name not in own and max(x.mean, x.largest) > SLOWLY_CONVERGES}
         mixed = {name for name in slow if step_share(name, coarse, rough, coarsest) > MOST_BY_STEPS}

@@ -17,10 +17,10 @@ from hybrid.simulation.run_sample import END_FORCES, RunSample, every_of
 ORDER, ORDERS, MOST_ORDER = 1.5, (1.5, 2.0), 3.0
 # The same of forces at the ends where a motion begins from what is no equilibrium.  At its first output the half cell
 # at a held end bears the load that the line beside it falls with, w h/2, which is of order 1; and the waves that begin
-# there have all lengths, of which finer cells carry shorter ones (docs/accuracy.md): more than ORDER is shown by runs
+# there have all lengths, of which finer cells carry shorter ones (docs/errors.md): more than ORDER is shown by runs
 # that are too coarse to carry them.
 START_ORDERS = (1.0, ORDER)
-# Tension along a line that rubs on obstacles jumps where contact with friction begins: of order 1 (docs/accuracy.md).
+# Tension along a line that rubs on obstacles jumps where contact with friction begins: of order 1 (docs/errors.md).
 RUBBING_ORDERS = (1.0, ORDERS[1])
 # So it is where a ramp has set off vibrations along the line and a halving of cells and steps leaves more than this of
 # what forces at the ends differ by, root mean square: less than first order.

@@ -2,7 +2,7 @@
 
 Where a line snaps or the sea is irregular, runs differ at an instant however fine they are: a snap comes a little
 earlier or later.  Extremes over windows and standard deviations converge, and mostly the largest value of a run.
-docs/accuracy.md
+docs/errors.md
 """
 
 from __future__ import annotations

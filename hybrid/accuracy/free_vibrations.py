@@ -3,7 +3,7 @@
 A forced motion forgets, a free vibration does not: its phase is late by a part of a radian in every radian, and steps
 take a part of its energy.  Runs with longer steps have lost what the result has lost, and their differences do not show
 it.  Here the line is linear about its first output: nodes with its masses, joined by its tension and its stiffness.
-docs/accuracy.md
+docs/errors.md
 """
 
 from __future__ import annotations

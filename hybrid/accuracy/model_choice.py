@@ -1,7 +1,7 @@
 """The model of a scene that leaves the choice: rods, catenaries or zones that move, whichever costs least.
 
 A pre-run of rods shows where the cable bends and how tension goes; what each kind would cost follows from the cells
-that it needs.  docs/zones.md
+that it needs.  docs/zone_rules.md
 """
 
 from __future__ import annotations

@@ -97,7 +97,7 @@ def structural(scene: Scene, cable: Material) -> str:
 
 
 def ratios(scene: Scene, model: Model, demand: Demand, tolerance: float, along: Floats) -> tuple[Floats, ...]:
-    """Criteria bend, slack and edge (K,) of docs/zones.md, from extremes, and what is asked along the line.
+    """Criteria bend, slack and edge (K,) of docs/zone_rules.md, from extremes, and what is asked along the line.
 
     tolerance: m; along: (K,) what catenaries lack of that.
     """

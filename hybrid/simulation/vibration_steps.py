@@ -1,4 +1,4 @@
-"""Steps that show a vibration along the line while it lasts, and longer ones once it has died out (docs/accuracy.md).
+"""Steps that show a vibration along the line while it lasts, and longer ones once it has died out (docs/errors.md).
 
 Drag and slack may set it off again in every period of the motion: it has died out where a whole period shows little.
 """

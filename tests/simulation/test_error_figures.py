@@ -1,4 +1,4 @@
-"""Error figures beside the truth, in scenes where they were once much too small.  docs/accuracy.md"""
+"""Error figures beside the truth, in scenes where they were once much too small.  docs/evidence/accuracy.md"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a refinement returns is never worse than the run before it.  docs/accuracy.md"""
+"""What a refinement returns is never worse than the run before it.  docs/evidence/accuracy.md"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Error figures of vibrations that nothing damps, and of forces that are nothing.  docs/accuracy.md"""
+"""Error figures of vibrations that nothing damps, and of forces that are nothing.  docs/evidence/accuracy.md"""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ def test_a_checkpoint_goes_on_and_a_forged_one_does_not():
 
 
 def test_steps_are_longer_where_it_has_died_out_and_forces_stay_right():
-    """Of 40 s with short steps throughout there were 8949 (docs/accuracy.md); drag stops the vibration in 2 s."""
+    """Of 40 s with short steps throughout there were 8949 (docs/evidence/accuracy.md); drag stops the vibration in 2 s."""
     result = hybrid.run(sag())
     t, step = np.array(result.steps["t"]), first_resolution(sag()).step
     dt = np.diff(t)
