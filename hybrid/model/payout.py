@@ -28,7 +28,7 @@ MOST_LEVELS = 30  # of halvings, far beyond what cells have
 # Nodes that ride with the fairlead behind a clamp, where the line bends most, and of other rods.
 RIDE_BEHIND_CLAMP, RIDE = 8, 4
 # More of them behind a clamp, where cells are short: so many times sqrt(EI/T), with the weight of the line for T.  In
-# the sagging line of docs/payout.md, 80 cells, the pull is 0.31 % off with half of it, 0.10 % with this.
+# the sagging line of docs/evidence/payout.md, 80 cells, the pull is 0.31 % off with half of it, 0.10 % with this.
 BENDING_LENGTHS = 10.0
 
 

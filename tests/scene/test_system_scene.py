@@ -13,7 +13,7 @@ from hybrid.scene.points import Fairlead, FixedPoint, FreePoint
 from hybrid.scene.read import parse_either, scene_text
 from hybrid.scene.system import JoinedLine, System, SystemOutput
 
-PAGE = Path(__file__).parents[2] / "docs" / "lines.md"
+PAGE = Path(__file__).parents[2] / "docs" / "scene.md"
 TEXT = """\
 environment:
   fluid: {density: 1025, surface: 30}
