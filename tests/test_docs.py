@@ -16,7 +16,9 @@ from ruamel.yaml import YAML
 
 import hybrid
 from hybrid.cli.commands import app, main
-from hybrid.scene.read import parse_either
+from hybrid.designs.problem import scenes_of
+from hybrid.scene.design import DESIGN
+from hybrid.scene.read import as_scene_or_system, parse_either
 from hybrid.scene.study import study_from
 from hybrid.studies.cases import cases_of
 
@@ -108,7 +110,10 @@ def test_ci_reads_its_commands_from_the_readme() -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_scenes_on_pages_load(page: Path) -> None:
     for text in blocks(page, "yaml"):
-        if "\nscene:" in text:
+        if re.search(r"^unknowns:", text, re.MULTILINE):
+            task = DESIGN.of_data(YAML(typ="safe").load(text), ROOT / "examples" / "designs")
+            scenes_of(task, as_scene_or_system(task.asked.scene))
+        elif "\nscene:" in text:
             cases_of(study_from(YAML(typ="safe").load(text), ROOT / "examples" / "studies"))
         else:
             hybrid.plan(parse_either(text, str(page))[0])
