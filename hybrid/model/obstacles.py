@@ -72,7 +72,7 @@ def _pieces(scene: Scene) -> Floats:
 
 
 def pull_on_obstacles(scene: Scene) -> float:
-    """The tension, N, with which a line of a scene lies on obstacles; of one that is paid out the largest by its length."""
+    """The tension, N, with which a line of a scene lies on obstacles; of one that is paid out, when it is longest."""
     pull = tension_scale(scene, merged_sections(scene.cable.sections), False)
     longer = longest_out(scene)
     if longer > scene.length:

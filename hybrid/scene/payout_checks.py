@@ -27,7 +27,8 @@ def reel_has_diameters(ends: Ends, contact: Contact, obstacles: Obstacles) -> It
         return
     name = found[0]
     if contact.self or obstacles:
-        how = "which parts of the cable keep apart (contact.self)" if contact.self else "with which it touches obstacles"
+        apart = "which parts of the cable keep apart (contact.self)"
+        how = apart if contact.self else "with which it touches obstacles"
         for i, section in enumerate(getattr(ends, name).payout.reel or ()):
             if section.diameter is None:
                 expected = f"a number > 0, in m, {how}"

@@ -57,10 +57,8 @@ class SystemPayout:
             x.table.bind(**self._job(solver, k))
             numbers = x.table.numbers
             joined = solver.lines[k].joints[x.plan.side] >= 0
-            asks = joined or x.asks(solver.lines[k].line)
-            solver.bind_line(
-                k, reel=stand_among.address(numbers), reel_table=numbers, iterated=iterate.address(numbers) if asks else 0
-            )
+            asked = iterate.address(numbers) if joined or x.asks(solver.lines[k].line) else 0
+            solver.bind_line(k, reel=stand_among.address(numbers), reel_table=numbers, iterated=asked)
 
     def _job(self, solver: SystemSolver, k: int) -> dict[str, Any]:
         """What changes the length of a line, whose state of now is that before a step and after it."""

@@ -18,8 +18,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from hybrid.kernels.algebra.rotations import add, dot, frame, get3, log_rotation, scale, sub
 from hybrid.kernels.laws.axial_law import stretch_work
 from hybrid.kernels.laws.bending_law import energy_share, has_bend_law
