@@ -160,7 +160,9 @@ def _solved(task: TaskFile[Design], asked: AnyScene, problem: Problem, file: str
     point = best.point
     _refuse_what_fights(problem, point)
     notes, finer = _checked(problem, point)
-    if objective is not None and best.left > SETTLED:
+    if best.stopped:
+        notes.append(f"the search ended where it could not go on: {best.stopped}")
+    elif objective is not None and best.left > SETTLED:
         notes.append(
             f"the search has not settled: {100 * best.left:.2g} % of the slopes of what is minimised are held up by no "
             "limit; try another start, or more cells"
@@ -243,7 +245,7 @@ def _reached(problem: Problem) -> Optimum:
     bounds = np.full((point.x.size, 2), np.nan)
     for x in _at_bounds(problem.space, point):
         bounds[problem.space.names.index(x.name), 0 if x.which == "low" else 1] = 0.0
-    return Optimum(point, tuple(prices), bounds, 0.0)
+    return Optimum(point, tuple(prices), bounds, 0.0, "")
 
 
 def _kept(c: Constraint, price: Price, point: Point, finer: Floats | None) -> Kept:
@@ -273,8 +275,7 @@ def _refuse_what_fights(problem: Problem, point: Point) -> None:
     ]
     what = "these cannot all be kept" if len(fights) > 1 else "this cannot be kept"
     detail = f"{what}; nearest is " + "; ".join(told) + ", with " + ", ".join(at)
-    first = "wider limits or bounds, more unknowns, or another start: the nearest is that around where it began"
-    raise ComputationError(Outcome.NOT_CONVERGED, None, None, detail, first=first)
+    raise ComputationError(Outcome.NOT_REACHED, None, None, detail)
 
 
 def _checked(problem: Problem, point: Point) -> tuple[list[str], Floats | None]:

@@ -22,11 +22,12 @@ KEPT, ACTIVE, AT_BOUND = 1e-6, 1e-4, 1e-6
 # Part of what is minimised within which it is least; steps of one search, and searches.
 EXACT, ITERATIONS, SEARCHES = 1e-7, 60, 3
 # Steps as parts of unknowns: the first, the longest is that of `nearest`, the shortest before it is given up.
-FIRST_STEP, SHORTEST = 0.2, 1e-7
+FIRST_STEP, SHORTEST = 0.2, 1e-6
 # Of what was foretold: what a step has to gain, and from which on longer ones are believed.
 ACCEPTED, TRUSTED = 0.1, 0.7
-# A box is made narrower by this; a step has to come so much nearer to limits as can be, but for this part.
-SHRUNK, NEARER = 0.4, 0.3
+# A box is made narrower by SHRUNK, where there is no equilibrium by CUT; a step has to come so much nearer to limits
+# as can be, but for the part NEARER.
+SHRUNK, CUT, NEARER = 0.4, 0.2, 0.3
 # Curvature of the model at first; what a part of a limit counts at first, and at most.
 CURVATURE, PENALTY, MOST_PENALTY = 1e-2, 2.0, 1e6
 
@@ -42,13 +43,15 @@ class Optimum(NamedTuple):
     """Where it is, prices of constraints, and of lower and upper bounds of each unknown (n, 2); NaN: not at it.
 
     left: what of the slopes of what is minimised no limit holds up, as a part of them, of those where the search began
-    or of its value, whichever is largest: 0 at an optimum.
+    or of its value, whichever is largest: 0 at an optimum.  stopped: why the search could not go on beyond it; "":
+    there was nothing to gain.
     """
 
     point: Point
     prices: tuple[Price, ...]
     bounds: Floats
     left: float
+    stopped: str
 
 
 def reach(problem: Problem, start: Floats | None = None) -> Rows:
@@ -86,7 +89,8 @@ def optimum(problem: Problem, objective: Objective) -> Optimum:
     """
     x, best = problem.space.start, None
     for _ in range(SEARCHES):
-        point = _Search(problem, objective, x).run()
+        search = _Search(problem, objective, x)
+        point = search.run()
         if not kept(problem, point):
             point = reach(problem, point.x).point
             if not kept(problem, point):
@@ -94,9 +98,10 @@ def optimum(problem: Problem, objective: Objective) -> Optimum:
         if best is not None and objective.value(point) >= objective.value(best) * (1.0 - EXACT):
             break
         best, x = point, point.x
-        if priced(problem, objective, point).left < ACTIVE:
+        if search.stopped or priced(problem, objective, point).left < ACTIVE:
             break
-    return priced(problem, objective, point if best is None else best)
+    found = priced(problem, objective, point if best is None else best)
+    return found._replace(stopped=search.stopped) if found.left > ACTIVE else found
 
 
 class _Search:
@@ -112,6 +117,7 @@ class _Search:
         self._sizes = problem.space.sizes(start)
         self._scale = max(abs(objective.value(self._here)), 1e-300)
         self._hessian, self._penalty = CURVATURE * np.eye(start.size), PENALTY
+        self.stopped = ""  # why the last trial could not be computed
 
     def run(self) -> Point:
         """The point where nothing is gained any more."""
@@ -132,7 +138,7 @@ class _Search:
                 self._here = there
                 width = min(2.0 * width, STEP) if gained >= TRUSTED * foretold else width
             else:
-                width = SHRUNK * min(width, float(np.abs(step).max()))
+                width = (SHRUNK if there is not None else CUT) * min(width, float(np.abs(step).max()))
                 if width < SHORTEST:
                     break
         return self._here
@@ -141,9 +147,12 @@ class _Search:
         """The point after a step; None: there is no equilibrium, or no such scene."""
         space = self._problem.space
         try:
-            return self._problem.equilibria.at(np.clip(self._here.x + self._sizes * step, space.low, space.high))
-        except (ComputationError, SceneError):
+            point = self._problem.equilibria.at(np.clip(self._here.x + self._sizes * step, space.low, space.high))
+        except (ComputationError, SceneError) as error:
+            self.stopped = " ".join(str(error).split())
             return None
+        self.stopped = ""
+        return point
 
     def _gained(self, there: Point | None) -> float:
         """By how much a point is better than where it is now."""
@@ -254,4 +263,4 @@ def priced(problem: Problem, objective: Objective, point: Point) -> Optimum:
     bounds = np.full((sizes.size, 2), np.nan)
     for (i, k), multiplier in zip(edges, multipliers[len(held) :], strict=True):
         bounds[i, k] = -multiplier if k else multiplier
-    return Optimum(point, tuple(prices), bounds, left)
+    return Optimum(point, tuple(prices), bounds, left, "")

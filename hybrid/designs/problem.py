@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.designs.equilibria import AnyScene, Equilibria, Point
+from hybrid.designs.in_motion import COMPUTING
 from hybrid.designs.nearest import Space
 from hybrid.designs.numbers import number_of
 from hybrid.designs.sensitivity import EDGES
@@ -191,6 +192,9 @@ def space_of(
 def _key_findings(
     key: str, place: Place, scenes: Mapping[str, AnyScene], cases: Mapping[str, Any], taken: Sequence[str]
 ) -> Iterator[Finding]:
+    if computing := [x for x in re.findall(r"\w+", key) if x in COMPUTING]:
+        expected = f"a key of what is there, not of how it is computed, as {computing[0]} is"
+        yield Finding(place, expected, "cable.sections[0].length, for example", given=key)
     if key in taken:
         yield Finding(place, "a key that no other unknown sets")
     for case, changes in cases.items():

@@ -64,7 +64,7 @@ def seek(scene: SceneLike | System, targets: Mapping[str, float], by: Sequence[s
     text = ", ".join(f"{key} = {x:.6g}" for key, x in zip(by, numbers, strict=True))
     detail = f"{list(targets)[worst]} comes to {results[worst]:.6g}, not {goal[worst]:.6g}, with {text}"
     first = "other numbers (--by) that it answers to, or a target nearer to what it is"
-    raise ComputationError(Outcome.NOT_CONVERGED, None, None, detail, first=first)
+    raise ComputationError(Outcome.NOT_REACHED, None, None, detail, first=first)
 
 
 def signed(names: tuple[str, ...], start: Floats) -> Space:

@@ -120,6 +120,7 @@ def test_what_cannot_be_reached_says_which_limits_fight():
     with pytest.raises(hybrid.ComputationError) as raised:
         hybrid.design(HANGING, unknowns=unknowns, limits=limits)
     text = str(raised.value)
+    assert raised.value.outcome == hybrid.Outcome.NOT_REACHED
     assert "these cannot all be kept" in text and "top: tension@start may be at most 1000" in text
     assert "weight: reaction_start.z has to be at least 2500" in text and "mass = 5 (its bound)" in text
     with pytest.raises(hybrid.ComputationError, match=r"this cannot be kept.*top: .* and is 1962"):
@@ -128,6 +129,17 @@ def test_what_cannot_be_reached_says_which_limits_fight():
         hybrid.ComputationError, match=r"top: tension@start is to be 3000, and is 2746.8, with mass = 7"
     ):
         hybrid.design(HANGING, unknowns=unknowns, targets={"top": TOP | {"value": 3000.0}})
+
+
+def test_an_end_of_what_can_be_is_said():
+    """The shortest line between two places: beyond it the line would stretch by more than its 5 %."""
+    ends = {k: {"kind": "pinned", "position": [x, 0, 0]} for k, x in (("start", 0.0), ("end", 100.0))}
+    section = {"length": 105.0, "mass": 4.0, "axial_stiffness": 1e5}
+    scene = HANGING | {"cable": {"sections": [section]}, "ends": ends}
+    found = hybrid.design(scene, unknowns={"length": {"key": LENGTH, "low": 50, "high": 140}}, minimise="length")
+    (note,) = (x for x in found.notes if x.startswith("the search ended where it could not go on"))
+    assert "max_strain" in note or "stretch" in note
+    assert found.numbers["length"] == pytest.approx(100.0 / 1.05, rel=5e-3) and found.equilibria < 40
 
 
 SCENE = """\
@@ -188,6 +200,8 @@ def test_the_scene_found_stands_by_itself_where_its_text_cannot_be_changed(folde
 
 REFUSED = {
     "a key that is none": ("sections[0].length", "sections[0].lenght", "design.yaml:4:17: unknowns.length.key", "number"),
+    "a key of how it is computed": ("cable.sections[0].length", "mesh.cells", "design.yaml:4:17: unknowns.length.key",
+                                    "as mesh is"),
     "bounds": ("high: 90", "high: 5", "design.yaml:4:60: unknowns.length.high", "above low, 10"),
     "a start out of bounds": ("low: 10", "low: 60", "design.yaml:4:11: unknowns.length", "the number of the scene, 40"),
     "a quantity": ("quantity: tension", "quantity: tensoin", "design.yaml:7:19: limits.top.quantity", "one of"),
