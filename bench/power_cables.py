@@ -115,6 +115,19 @@ def twin_bound(row: dict[str, Any]) -> tuple[str, float]:
     return "", np.inf
 
 
+def twin_answer(row: dict[str, Any], parent: Answer) -> tuple[Answer, Answer]:
+    """The answer of a twin, and that which it is compared with.
+
+    A motion from rest has as many equal cells as its parent has, which may be graded: it is compared with the
+    equilibrium on its own mesh.
+    """
+    if not row.get("rest_of") or not parent.cells:
+        cells = row["finer"] * parent.cells if row.get("mesh_of") else None
+        return answer_of(scene_of(row, cells)), parent
+    scene = scene_of(row, parent.cells)
+    return answer_of(scene), answer_of({key: value for key, value in scene.items() if key != "time"})
+
+
 class Solved(NamedTuple):
     """What came of one case: its answer, tension at the start (N), distances to what it is compared with, verdict.
 
@@ -149,13 +162,10 @@ def solve_all() -> dict[str, Solved]:
     cases, found = rows(), dict[str, Solved]()
     for name, row in cases.items():
         parent, bound = twin_bound(row)
-        other = found[parent].answer if parent else None
-        cells = None
-        if other is not None and row.get("mesh_of"):
-            cells = row["finer"] * other.cells
-        elif other is not None and row.get("rest_of") and other.cells:
-            cells = other.cells
-        answer = answer_of(scene_of(row, cells))
+        if parent:
+            answer, other = twin_answer(row, found[parent].answer)
+        else:
+            answer, other = answer_of(scene_of(row)), None
         tension = float(answer.tension[-1]) if answer.cells else np.nan
         off, most = bound_of(row, tension)
         apart = np.nan

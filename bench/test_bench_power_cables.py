@@ -7,7 +7,7 @@ lazy, steep and lazy S waves, hung lines, slopes, rough beds, currents, friction
 their data.  Each is computed as an engineer would: the data, and nothing else given.  The tension at the start is
 compared with the nearest catenary between the ends without bending (15 %, where sqrt(EI/T) is below a twentieth of the
 length), or with the value of OrcaFlex (1 %).  Twins agree with what they are twins of: moved or turned to 1e-6, on a
-finer mesh to 0.5 %, at rest in time to 1e-5.  A line that is too long for its span, or compressed, is refused or said.
+finer mesh to 0.5 %, in a motion from rest to 1e-5 of the equilibrium on its mesh.  A line that is too long for its span, or compressed, is refused or said.
 """
 
 from __future__ import annotations
@@ -38,4 +38,4 @@ def test_power_cables(capsys: pytest.CaptureFixture[str]) -> None:
               f"{np.median(off) * 100:.2f} % off in the median, {max(off) * 100:.1f} % at most; "
               f"CPU {np.median(cpu):.2f} s in the median, {max(cpu):.1f} s at most")  # fmt: skip
         print(f"not within: {', '.join(wrong) or 'none'}; in compression without a word: {', '.join(silent) or 'none'}")
-    assert solved >= 0.97 * len(admissible)
+    assert not wrong

@@ -30,7 +30,6 @@ from hybrid.kernels.state.forces import AXIAL_LAW, FRICTION, PLANAR, ROTARY, WAV
 from hybrid.kernels.state.report import MOMENT_A
 from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, State, no_torsion
 from hybrid.kernels.step.step import friction_axes
-from hybrid.modal.bed_turns import bed_turns
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.stability import ANCHOR as STATIC_ANCHOR
 from hybrid.solve.system import SystemSolver
@@ -163,8 +162,6 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: boo
         K = K + _through_zones(line)
     if line.tension_twist.size:
         K = _by_length(K)
-    if (turning := bed_turns(line, x.sea, state.r)) is not None:
-        K = K + turning
     free = np.ones((count, SIZE), bool)
     free[0, 0], free[-1, 4] = False, False
     free[:-1, 4] = line.spin != 0

@@ -569,8 +569,7 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     OFFSETS_OF_SHAPE,
     Refusal(
-        PAYOUT, GOES_ITS_WAY, "not worked out",
-        "what touches ({key}) moves, and nodes that enter and leave do not know it",
+        PAYOUT, PUSHED, "not worked out", "nodes that enter and leave know no obstacles and no other lines ({key})"
     ),
     Refusal(
         MOVING_ZONES, GOES_ITS_WAY, "not worked out",

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from hybrid.scene.base import Finding
 from hybrid.scene.cable import Contact
 from hybrid.scene.ends import Clamped, Ends, Pinned
-from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.payout import Payout
 
 
@@ -20,16 +19,14 @@ def _winch(ends: Ends) -> tuple[str, Pinned | Clamped, Payout] | None:
     return found
 
 
-def reel_has_diameters(ends: Ends, contact: Contact, obstacles: Obstacles) -> Iterator[Finding]:
-    """Contact of the line with itself, and with obstacles, knows the diameters on the reel."""
+def payout_stands_alone(ends: Ends, contact: Contact) -> Iterator[Finding]:
+    """Contact with itself knows the diameters on the reel."""
     found = _winch(ends)
     if found is None:
         return
     name = found[0]
-    if contact.self or obstacles:
-        apart = "which parts of the cable keep apart (contact.self)"
-        how = apart if contact.self else "with which it touches obstacles"
+    if contact.self:
         for i, section in enumerate(getattr(ends, name).payout.reel or ()):
             if section.diameter is None:
-                expected = f"a number > 0, in m, {how}"
+                expected = "a number > 0, in m, which parts of the cable keep apart (contact.self)"
                 yield Finding(("ends", name, "payout", "reel", i, "diameter"), expected, "add `diameter: ...` (m)")

@@ -21,15 +21,16 @@ from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import NO_PUSH, Limits, block_rows, out_of_balance
 from hybrid.kernels.run.run import in_space
 from hybrid.kernels.state.books import CONTROLLED, NOW, PARITY, STEP_BEFORE, TRY_END, blank_books
-from hybrid.kernels.state.forces import FRICTION, MASS_DAMPING, ROTARY, SELF_FRICTION, WAVES
+from hybrid.kernels.state.forces import FRICTION, SELF_FRICTION, WAVES
 from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY, TWIST
 from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State, Work
 from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import EQUILIBRIUM, STEP, Task
 from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.settling import CALM, damped, nudged
 from hybrid.solve.stability import Stability
-from hybrid.solve.statics import BALANCED, BALANCING, CALM, GYRATION, MOST_ITERATIONS, REACH, Equilibrium, nudged
+from hybrid.solve.statics import BALANCED, BALANCING, MOST_ITERATIONS, REACH, Equilibrium
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
 from hybrid.solve.workspaces import workspace_of
 
@@ -173,17 +174,6 @@ def stop(state: State) -> None:
         still[:] = 0.0
 
 
-def damped(line: Line, length: float, time_scale: float) -> Line:
-    """The line with damping by mass, and inertia of spin as statics.relax lends it."""
-    gyration = line.spin * 0.5 * (line.mass[:-1] + line.mass[1:]) * (GYRATION * length) ** 2
-    return line._replace(
-        damp=np.nan_to_num(line.damp) + DAMPING * line.mass / time_scale,
-        polar=np.nan_to_num(line.polar) + gyration,
-        rotary=np.nan_to_num(line.rotary),
-        bits=line.bits | MASS_DAMPING | ROTARY,
-    )
-
-
 def calming(job: Moving, time_scale: float, length: float) -> Iterator[int]:
     """The damped motion: iterations so far, each time that it has calmed by another order, and at its end."""
     dt, before, calm, total, orders = 1e-3 * time_scale, 0.0, 0, 0, list(CALMER)
@@ -228,7 +218,7 @@ def settled(
     time_scale = float(np.sqrt(line.mass.sum() * length / scale))
     first = start.copy() if near else nudged(smooth, start, length, time_scale)
     limits, total, path = Limits(REACH * length, scale, MOST_OF_STEP), 0, []
-    moving = _Job(damped(smooth, length, time_scale), sea, ends, contact, (first, first.copy()), limits)
+    moving = _Job(damped(smooth, length, time_scale, DAMPING), sea, ends, contact, (first, first.copy()), limits)
     anchor = Stability(smooth, sea, length, scale).anchor
     for iterations in chain([0] if near else [], calming(moving, time_scale, length)):
         rest = moving.state.copy()

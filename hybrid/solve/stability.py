@@ -6,6 +6,7 @@ In a plane the stiffness falls apart in two, within the plane and across it.
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import eig_banded
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.algebra.block_elimination_plane import WIDE
@@ -54,11 +55,11 @@ def _stiffness(rows: Floats, axial: Floats, plane: Floats | None) -> Floats:
     return K
 
 
-def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray, plane: Floats | None = None) -> bool:
-    """True when the stiffness in the block rows of the march, made symmetric, is positive definite.
+def _band(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray, plane: Floats | None) -> tuple[Floats, np.ndarray]:
+    """Lower band of the stiffness in the block rows of the march, made symmetric, and which of its unknowns are held.
 
-    axial: (N, 3, 3) N/m, of each cell; held nodes and cells without spin are left out.  plane: (3, 3) rows p, q,
-    normal, where the rows are those of a line in that plane.
+    axial: (N, 3, 3) N/m, of each cell; held nodes and cells without spin are left out, with 1 on the diagonal.
+    plane: (3, 3) rows p, q, normal, where the rows are those of a line in that plane.
     """
     K = _stiffness(rows, axial, plane)
     n, _, m, _ = K.shape
@@ -81,7 +82,7 @@ def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray,
     for j in range(reach + 1):
         band[j, : m * n - j] *= ~(held[: m * n - j] | held[j:])
     band[0, held] = 1.0
-    return bool(is_definite(band))
+    return band, held
 
 
 def is_judged(line: Line, ends: Ends, length: float) -> bool:
@@ -126,8 +127,32 @@ class Stability:
         self.blurred = bool(lost * float(mass.sum()) > HIDDEN * 3.0 * EI / self.length**3)
         return True
 
+    def softest_motion(self, ends: Ends, state: State, polar: Floats) -> tuple[float, Floats]:
+        """Square (1/s^2, below 0: it grows) and shape (N+1, 3), at most 1, of the softest motion about an equilibrium.
+
+        polar: (N,) kg m^2, the inertia of the spin of each cell.
+        """
+        line = self.line
+        band, held = self._band(ends, state, 0.0)
+        weights = np.repeat(line.mass[:, None], band.shape[0] // 3, axis=1)  # 4 unknowns a node, 2 in a plane
+        if not line.bits & PLANAR:
+            weights[:-1, 3], weights[-1, 3] = np.where(line.spin != 0, polar, 1.0), 1.0
+        inverse = 1.0 / np.sqrt(weights.ravel())
+        inverse[held] = 1.0
+        for j in range(band.shape[0]):
+            band[j, : inverse.size - j] *= inverse[: inverse.size - j] * inverse[j:]
+        band[0, held] = 2.0 * np.abs(band).sum(axis=0).max()  # what is held moves last
+        values, vectors = eig_banded(band, lower=True, select="i", select_range=(0, 0))
+        shape = (inverse * vectors[:, 0]).reshape(weights.shape)
+        moved = shape @ line.plane[:2] if line.bits & PLANAR else shape[:, :3]
+        return float(values[0]), moved / max(float(np.abs(moved).max()), 1e-300)
+
     def _definite(self, ends: Ends, state: State, soft: float) -> bool:
-        """Whether a Cholesky factor of the stiffness exists, with springs of `soft` (1/s^2) times the mass.
+        """Whether a Cholesky factor of the stiffness exists, with springs of `soft` (1/s^2) times the mass."""
+        return bool(is_definite(self._band(ends, state, soft)[0]))
+
+    def _band(self, ends: Ends, state: State, soft: float) -> tuple[Floats, np.ndarray]:
+        """Band of the stiffness, and what of it is held, with springs of `soft` (1/s^2) times the mass.
 
         Axial stiffness is lowered to CHECKED_COMPLIANCE for this: it has no part in buckling,
         and at its real size its round-off would hide the softest modes of a long line.
@@ -138,7 +163,7 @@ class Stability:
         d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
         stiff = 1.0 / (line.h * np.maximum(line.ck, CHECKED_COMPLIANCE / self.scale))
         plane = line.plane if line.bits & PLANAR else None
-        return positive_definite(rows, stiff[:, None, None] * d[:, :, None] * d[:, None, :], ends, line.spin, plane)
+        return _band(rows, stiff[:, None, None] * d[:, :, None] * d[:, None, :], ends, line.spin, plane)
 
     def _definite_across(self, ends: Ends, state: State, soft: float) -> bool:
         """Whether all pivots of the stiffness across the plane are positive, with springs as of `_definite`."""

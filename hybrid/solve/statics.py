@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,20 +16,17 @@ from hybrid.kernels.state.forces import (
     AXIAL_LAW,
     FLOW,
     FRICTION,
-    MASS_DAMPING,
     OBSTACLES,
-    PLANAR,
-    ROTARY,
     SEABED,
     TOUCHES,
     WAVES,
 )
-from hybrid.kernels.state.obstacle_rows import FREE, MOVES
 from hybrid.kernels.state.report import RESIDUAL, RESIDUAL_NODE
-from hybrid.kernels.state.state import NO_ADDRESS, NO_SHEAVES, Ends, Floats, Line, Sea, State
+from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
 from hybrid.kernels.step.step import friction_axes
 from hybrid.solve.flaws import flaw_of_line, fold_text, lowest_tension
 from hybrid.solve.laid import laid_on_bed
+from hybrid.solve.settling import Settling, gyration
 from hybrid.solve.softened import softened, softest
 from hybrid.solve.stability import Stability, is_judged
 from hybrid.solve.stepper import Stepper
@@ -46,13 +44,11 @@ HARDENING = 8  # parts of the way from a soft, short line to the real one; a par
 LEAST_TENSION = 1e-3  # of the slack floor of a motion, with the opposite sign
 # The way to an equilibrium that has a mirror image on the other side, or may have: which it is hangs on round-off.
 PUSHED = "pushed off an unstable equilibrium"
-PUSH, TURN = 1e-2, 0.1  # the push off an unstable equilibrium: of the length per time scale, and rad about the chord
 # Of the length: unstable equilibria that are nearer than this are one; the most of them that a line is pushed off.
 SAME, MOST_PUSHES = 1e-3, 12
-RELAXING_STEPS = 2000  # of the pseudo-transient, at most
+# The most of them that it is let fall from, slowly, to both sides, those that grow least first.
+MOST_FALLS = 16
 LIMP = 1e-3  # part of the bending stiffness there
-GYRATION = 0.02  # of the length: radius of gyration lent to the spin of a line that settles
-CALM = 1e-4  # of the length: movement in a step below which Newton is tried again
 
 
 @dataclass(frozen=True)
@@ -83,12 +79,21 @@ class Equilibrium:
         return f"{self.path[-1].split(':')[0]}, {self.iterations} iterations{others}"
 
 
+class _Fall(NamedTuple):
+    """An unstable equilibrium and its softest motion, as of `Stability.softest_motion`."""
+
+    square: float
+    shape: Floats
+    state: State
+
+
 class _Solver:
     def __init__(self, line: Line, sea: Sea, length: float, scale: float, floor: float) -> None:
         self.line, self.sea, self.length, self.scale, self.floor = line, sea, length, scale, floor
         self.work = workspace_of(line)
         self.stability = Stability(line, sea, length, scale)
         self.anchor = self.stability.anchor
+        self.settling = Settling(line, sea, length, scale)
         self.total = 0
 
     def newton(
@@ -135,6 +140,18 @@ class _Solver:
         if outcome == Outcome.OK and judged and not self.stability.holds(ends, new):
             outcome, where = Outcome.UNSTABLE, int(np.argmin(new.T))
         return Outcome(outcome), int(where), new
+
+    def relaxed(self, ends: Ends, state: State) -> State:
+        """Where a damped motion leads to."""
+        rest, iterations = self.settling.rest(ends, state)
+        self.total += iterations
+        return rest
+
+    def fallen(self, ends: Ends, state: State, square: float, shape: Floats) -> State:
+        """Where a line comes to, slowly, from an unstable equilibrium: `Settling.fallen`."""
+        rest, iterations = self.settling.fallen(ends, state, square, shape)
+        self.total += iterations
+        return rest
 
     def is_balanced(self, ends: Ends, state: State) -> bool:
         """Whether what is out of balance at the nodes is round-off of the forces."""
@@ -224,69 +241,11 @@ def _eased(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, int
     return f"from {', '.join(eased)} in {steps} steps", outcome, where, state
 
 
-def _relax(solver: _Solver, ends: Ends, state: State) -> State:
-    """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until the line hardly moves.
-
-    Sheaves are held: without friction nothing turns them, and their correction takes factors that are not kept here.
-    """
-    line, length = solver.line, solver.length
-    time_scale = np.sqrt(float(line.mass.sum()) * length / solver.scale)
-    damp = 2.0 * line.mass / time_scale
-    # a spin without inertia would follow Newton to any equilibrium, stable or not: give it some to fall with
-    gyration = line.spin * 0.5 * (line.mass[:-1] + line.mass[1:]) * (GYRATION * length) ** 2
-    damped = line._replace(
-        damp=np.nan_to_num(line.damp) + damp,
-        polar=np.nan_to_num(line.polar) + gyration,
-        rotary=np.nan_to_num(line.rotary),
-        bits=line.bits | MASS_DAMPING | ROTARY,
-        moved=np.where(line.moved == FREE, MOVES, line.moved).astype(np.int8),
-    )
-    stepper = Stepper(damped, length, solver.scale)
-    old = state._replace(sheave=NO_SHEAVES).copy()
-    new = old.copy()
-    dt = 1e-3 * time_scale
-    calm = 0
-    for _ in range(RELAXING_STEPS):
-        taken = stepper.step(solver.sea, ends, old, new, dt, 0.0, dt)
-        solver.total += taken.iterations
-        if taken.outcome != Outcome.OK:
-            dt *= 0.25
-            if dt < 1e-9 * time_scale:
-                break
-            old.a[:], old.vd[:], old.v[:] = 0.0, 0.0, 0.0
-            old.wa[:], old.wd[:], old.w[:] = 0.0, 0.0, 0.0
-            continue
-        moved = float(np.abs(new.r - old.r).max())
-        old, new = new, old
-        if taken.iterations <= 5:
-            dt = min(2.0 * dt, time_scale)
-        calm = calm + 1 if moved < CALM * length * dt / time_scale else 0
-        if calm >= 3:
-            break
-    return old._replace(sheave=state.sheave.copy())
-
-
-def nudged(line: Line, state: State, length: float, time_scale: float) -> State:
-    """A state given a small push in all three directions and a turn about itself, off an unstable equilibrium."""
-    pushed = state.copy()
-    x = line.s / length
-    speed = PUSH * length / time_scale
-    for k in range(3):
-        pushed.v[:, k] = speed * np.sin((k + 1) * np.pi * x + 0.3 * k)
-    if line.bits & PLANAR:
-        pushed.v[:] -= np.outer(pushed.v @ line.plane[2], line.plane[2])
-        return pushed
-    d = pushed.e / np.linalg.norm(pushed.e, axis=1)[:, None]
-    turned = np.cos(TURN) * pushed.a1 + np.sin(TURN) * np.cross(d, pushed.a1)
-    pushed.a1[:] = np.where(line.spin[:, None] == 1, turned, pushed.a1)
-    return pushed
-
-
 def _settled(solver: _Solver, ends: Ends, start: State, shape: str) -> tuple[str, Outcome, int, State]:
     """Where friction alone keeps a line: let it settle from its start, with friction, then Newton from there."""
     rest = start.copy()
     Stepper(solver.line, solver.length, solver.scale).static_friction(solver.sea, ends, rest)
-    return f"settled with friction from {shape}", *solver.newton(solver.line, ends, _relax(solver, ends, rest))
+    return f"settled with friction from {shape}", *solver.newton(solver.line, ends, solver.relaxed(ends, rest))
 
 
 def _pulled(
@@ -317,9 +276,6 @@ def _attempts(
             flawed.append(state)
         return way
 
-    def relaxed(other: State) -> State:
-        return _relax(solver, ends, other)
-
     first = noted((f"Newton from {shape}", *solver.newton(solver.line, ends, start)))
     yield first
     if solver.line.bits & (TOUCHES | FLOW):
@@ -332,14 +288,32 @@ def _attempts(
         how, outcome, where, state = noted(_hardened(solver, ends, other))
         yield f"{how}, from {name}", outcome, where, state
     yield from map(noted, _loaded(solver, ends, start))
-    time_scale = float(np.sqrt(float(solver.line.mass.sum()) * solver.length / solver.scale))
     pushed = 0
     for name, other in (("", start), *((f" from {name}", other) for name, other in others)):
-        yield noted((f"damped motion to rest{name}, then Newton", *solver.newton(solver.line, ends, relaxed(other))))
+        yield noted(
+            (
+                f"damped motion to rest{name}, then Newton",
+                *solver.newton(solver.line, ends, solver.relaxed(ends, other)),
+            )
+        )
         while pushed < min(len(flawed), MOST_PUSHES):
-            fallen = relaxed(nudged(solver.line, flawed[pushed], solver.length, time_scale))
+            fallen = solver.relaxed(ends, solver.settling.nudged(flawed[pushed]))
             pushed += 1
             yield noted((PUSHED, *solver.newton(solver.line, ends, fallen)))
+    seen, slow = 0, list[_Fall]()
+    for _ in range(MOST_FALLS):
+        for state in flawed[seen:]:
+            slow.append(
+                _Fall(*solver.stability.softest_motion(ends, state, gyration(solver.line, solver.length)), state)
+            )
+        seen, slow = len(flawed), sorted((x for x in slow if x.square < 0.0), key=lambda x: x.square)
+        if not slow:
+            break
+        fall = slow.pop()
+        for way in (1.0, -1.0):
+            if len(flawed) == seen:  # else it has led to one that is not known, from which it goes on
+                state = solver.fallen(ends, fall.state, fall.square, way * fall.shape)
+                yield noted((f"{PUSHED}, along its softest motion", *solver.newton(solver.line, ends, state)))
 
 
 def solve_statics(

@@ -17,11 +17,11 @@ from hybrid.kernels.state.forces import FRICTION, SELF_FRICTION, WAVES
 from hybrid.kernels.state.report import TWIST
 from hybrid.kernels.state.state import Floats, State
 from hybrid.kernels.step.accept import LARGEST_TWIST
-from hybrid.solve.contact_statics import MOST_SPIN, ROAD, calming, damped, stop
+from hybrid.solve.contact_statics import DAMPING, MOST_SPIN, ROAD, calming, stop
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.self_contact import SelfContact
+from hybrid.solve.settling import damped, nudged
 from hybrid.solve.shared_contact import SharedContact
-from hybrid.solve.statics import nudged
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium, damped_bodies
 
@@ -96,7 +96,7 @@ def settled_system(
     found = touching_solver(smooth, points, bodies, contacts)
     mass = sum(float(x.line.mass.sum()) for x in lines) + float(bodies[:, MASS].sum())
     time_scale, path, total = float(np.sqrt(mass * found.length / found.scale)), list[str](), 0
-    slow = [x._replace(line=damped(x.line, x.length, time_scale), slackens=True) for x in smooth]
+    slow = [x._replace(line=damped(x.line, x.length, time_scale, DAMPING), slackens=True) for x in smooth]
     first = start.copy()
     if not near:
         pushed = [_pushed(x, state, x.length, time_scale) for x, state in zip(smooth, start.lines, strict=True)]

@@ -12,12 +12,15 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.junctions.bodies import DAMPING, FRAME, MASS, V
 from hybrid.kernels.state.forces import AXIAL_LAW, FLOW, FRICTION, TOUCHES, WAVES
 from hybrid.kernels.state.state import NO_ADDRESS, Floats
-from hybrid.solve.contact_statics import damped, stop
+from hybrid.solve.contact_statics import DAMPING as SLOWED
+from hybrid.solve.contact_statics import stop
 from hybrid.solve.flaws import fold_text, lowest_tension, slack_text
 from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
 from hybrid.solve.laid import laid_on_bed
+from hybrid.solve.settling import CALM, GROWN, RELAXING_STEPS, along, damped, growth_time, gyration, nudged
 from hybrid.solve.softened import softened, softest
-from hybrid.solve.statics import CALM, HARDENING, LIMP, NEARLY_STIFF, PUSHED, RELAXING_STEPS, nudged
+from hybrid.solve.stability import Stability
+from hybrid.solve.statics import HARDENING, LIMP, MOST_FALLS, NEARLY_STIFF, PUSHED, SAME
 from hybrid.solve.stepper import Stepper
 from hybrid.solve.system import SystemSolver
 
@@ -170,7 +173,7 @@ def _failed(
 def _attempts(solver: SystemSolver, points: int, starts: Iterable[Start]) -> Iterator[_Attempt]:
     """Ways to an equilibrium, the quickest first; each is tried only when those before it failed."""
     given: list[Start] = []
-    flawed: list[SystemState] = []
+    flawed: list[tuple[SystemTaken, SystemState]] = []
     for name, start in starts:
         given.append((name, start))
         yield _Attempt(f"Newton from {name}", *solver.newton(start))
@@ -189,11 +192,66 @@ def _attempts(solver: SystemSolver, points: int, starts: Iterable[Start]) -> Ite
             if slack.outcome == Outcome.SLACK:  # what has no tension has no one place that Newton could find
                 taken, states = slack, rest
         yield _Attempt(f"damped motion to rest from {name}, then Newton", taken, states)
+        flawed.append((taken, states))
+    for taken, states in flawed.copy():
         if taken.outcome in (Outcome.UNSTABLE, Outcome.FOLDED):
-            flawed.append(states)
-    for states in flawed:
-        rest, _ = _relax(solver, points, pushed(solver, states))
-        yield _Attempt(PUSHED, *solver.newton(rest))
+            rest, _ = _relax(solver, points, pushed(solver, states))
+            taken, states = solver.newton(rest)
+            yield _Attempt(PUSHED, taken, states)
+            flawed.append((taken, states))
+    yield from _falls(solver, points, flawed)
+
+
+class _Fall(NamedTuple):
+    """A line that buckles, and its softest motion there, as of `Stability.softest_motion`."""
+
+    square: float
+    shape: Floats
+    line: int
+    states: SystemState
+
+    @classmethod
+    def of(cls, solver: SystemSolver, taken: SystemTaken, states: SystemState) -> _Fall | None:
+        """None where no line of these states buckles between its ends."""
+        if taken.outcome != Outcome.UNSTABLE or taken.line < 0:
+            return None
+        x, k = solver.lines[taken.line], taken.line
+        ends = x.ends._replace(held=np.minimum(x.ends.held, 1))
+        stability = Stability(x.line, x.sea, x.length, x.scale)
+        return cls(*stability.softest_motion(ends, states.lines[k], gyration(x.line, x.length)), k, states)
+
+    def pushed(self, solver: SystemSolver, way: float, time_scale: float) -> SystemState:
+        """The states with a push of the line along that motion (way 1) or against it (-1)."""
+        out = self.states.copy()
+        out.lines[self.line].v[:] = way * along(self.shape, solver.lines[self.line].length, time_scale, SLOWED)
+        return out
+
+
+def _falls(solver: SystemSolver, points: int, flawed: Sequence[tuple[SystemTaken, SystemState]]) -> Iterator[_Attempt]:
+    """Slow falls from states in which a line buckles, as of one cable, from that which grows least first."""
+    time_scale = _time_scale(solver)
+    met, known = list(flawed), list[_Fall]()
+    for _ in range(MOST_FALLS):
+        for fall in (_Fall.of(solver, *x) for x in met):
+            if fall is not None and fall.square < 0.0 and not any(_same(solver, fall, x) for x in known):
+                known.append(fall)
+        met.clear()
+        left = [x for x in known if np.isfinite(x.square)]
+        if not left:
+            return
+        fall = max(left, key=lambda x: x.square)
+        known[known.index(fall)] = fall._replace(square=-np.inf)
+        for way in (1.0, -1.0):
+            longest = GROWN * growth_time(fall.square, time_scale, SLOWED)
+            rest, _ = _relax(solver, points, fall.pushed(solver, way, time_scale), longest)
+            met.append(solver.newton(rest))
+            yield _Attempt(f"{PUSHED}, along its softest motion", *met[-1])
+
+
+def _same(solver: SystemSolver, one: _Fall, other: _Fall) -> bool:
+    """Whether the line of a fall lies as it does in another."""
+    apart = np.abs(one.states.lines[one.line].r - other.states.lines[one.line].r).max()
+    return one.line == other.line and float(apart) <= SAME * solver.lines[one.line].length
 
 
 def _easier(x: JoinedLine, part: float) -> JoinedLine:
@@ -282,12 +340,18 @@ def pushed(solver: SystemSolver, states: SystemState) -> SystemState:
     return SystemState(out, states.bodies.copy())
 
 
-def _relax(solver: SystemSolver, points: int, start: SystemState) -> tuple[SystemState, bool]:
-    """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until the lines hardly move; and whether
-    they came to that."""
+def _time_scale(solver: SystemSolver) -> float:
+    """s, in which the lines and bodies settle."""
     mass = sum(float(x.line.mass.sum()) for x in solver.lines) + float(solver.bodies[:, MASS].sum())
-    time_scale = float(np.sqrt(mass * solver.length / solver.scale))
-    lines = [x._replace(line=damped(x.line, x.length, time_scale), slackens=True) for x in solver.lines]
+    return float(np.sqrt(mass * solver.length / solver.scale))
+
+
+def _relax(solver: SystemSolver, points: int, start: SystemState, longest: float = 0.0) -> tuple[SystemState, bool]:
+    """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until the lines hardly move; and whether
+    they came to that.  longest: s, of the steps; at least the time scale."""
+    time_scale = _time_scale(solver)
+    longest = max(longest, time_scale)
+    lines = [x._replace(line=damped(x.line, x.length, time_scale, SLOWED), slackens=True) for x in solver.lines]
     here = SystemSolver(lines, points, damped_bodies(solver.bodies, time_scale))
     old, new = start.copy(), start.copy()
     dt, calm = 1e-3 * time_scale, 0
@@ -305,9 +369,9 @@ def _relax(solver: SystemSolver, points: int, start: SystemState) -> tuple[Syste
         if here.meets:  # what nothing but contact holds may still fall where lines are at rest
             moved = max(moved, float(np.abs(new.bodies[:, :FRAME] - old.bodies[:, :FRAME]).max()))
         old, new = new, old
-        calm = calm + 1 if moved < CALM * solver.length * dt / time_scale else 0
+        calm = calm + 1 if moved < CALM * solver.length * dt / longest else 0
         if taken.iterations <= 5:
-            dt = min(2.0 * dt, time_scale)
+            dt = min(2.0 * dt, longest)
         if calm >= 3:
             return old, True
     return old, False

@@ -21,6 +21,7 @@ from hybrid.kernels.algebra.rotations import add, dot, scale
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.state import Floats, Sea
 
+Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 HEIGHTS = 4  # numbers of a point of the grid: z, zx, zy, zxy
 
 
@@ -83,6 +84,57 @@ def height_on_grid(sea, x, y):
         twist = weigh(heights, da, db, k, rows)
     z = weigh(heights, a, b, k, rows) + over_x * zx + over_y * zy + over_x * over_y * twist
     return z, zx + over_y * twist, zy + over_x * twist
+
+
+@inner
+def hermite_bends(t, h):
+    """Second derivatives of the weights of `hermite`."""
+    return (12.0 * t - 6.0) / (h * h), (6.0 - 12.0 * t) / (h * h), (6.0 * t - 4.0) / h, (6.0 * t - 2.0) / h
+
+
+@inner
+def bends_on_grid(sea, x, y):
+    """zxx, zxy, zyy of a bed of depths, 1/m; on a line of the grid those of one side."""
+    i, j = interval(sea.bed_x, x), interval(sea.bed_y, y)
+    h, g = sea.bed_x[i + 1] - sea.bed_x[i], sea.bed_y[j + 1] - sea.bed_y[j]
+    t, s = (x - sea.bed_x[i]) / h, (y - sea.bed_y[j]) / g
+    at, to = min(max(t, 0.0), 1.0), min(max(s, 0.0), 1.0)
+    a, da = hermite(at, h)
+    b, db = hermite(to, g)
+    rows = sea.bed_y.shape[0]
+    k = i * rows + j
+    heights = sea.bed_heights
+    zxx = zyy = 0.0
+    if t == at:  # straight beyond the grid
+        bend = hermite_bends(at, h)
+        zxx = weigh(heights, bend, b, k, rows) + (s - to) * g * weigh(heights, bend, db, k, rows)
+    if s == to:
+        bend = hermite_bends(to, g)
+        zyy = weigh(heights, a, bend, k, rows) + (t - at) * h * weigh(heights, da, bend, k, rows)
+    return zxx, weigh(heights, da, db, k, rows), zyy
+
+
+@kernel
+def normal_turns(sea, x, n):
+    """dn_i/dx_j of the bed under a point x on a bed of depths: -n_z (I - n n^T) H, H the second derivatives of z."""
+    zxx, zxy, zyy = bends_on_grid(sea, x[0], x[1])
+    # n . H
+    a, b = n[0] * zxx + n[1] * zxy, n[0] * zxy + n[1] * zyy
+    return (
+        n[2] * (n[0] * a - zxx), n[2] * (n[0] * b - zxy), 0.0,
+        n[2] * (n[1] * a - zxy), n[2] * (n[1] * b - zyy), 0.0,
+        n[2] * n[2] * a, n[2] * n[2] * b, 0.0,
+    )  # fmt: skip
+
+
+@inner
+def depth_falls(sea, x, n, p):
+    """g of dp = -g . dx at a point x, from n and p there, and dn_i/dx_j."""
+    if sea.bed_x.shape[0] == 0:
+        return n, Z9
+    W = normal_turns(sea, x, n)
+    c = (p - 0.5 * sea.onset) / n[2]
+    return (n[0] - c * W[6], n[1] - c * W[7], n[2]), W
 
 
 @inner

@@ -7,7 +7,7 @@ and kernels.laws.seabed.
 from __future__ import annotations
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, madd, mat_vec, mscale, outer, scale, sub
-from hybrid.kernels.laws.bed import bed_before, bed_beside, bed_under
+from hybrid.kernels.laws.bed import Z9, bed_before, bed_beside, bed_under, depth_falls
 from hybrid.kernels.laws.loads import body_drag, half_cell_added_mass, half_cell_drag
 from hybrid.kernels.laws.obstacles import obstacle_forces
 from hybrid.kernels.laws.seabed import contact, friction, pressure
@@ -31,7 +31,6 @@ from hybrid.kernels.state.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_PO
 
 WATER = DRAG | ADDED_MASS | SURFACE | WAVES | BODIES
 Z3 = (0.0, 0.0, 0.0)
-Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 UP = (0.0, 0.0, 1.0)
 
 
@@ -126,21 +125,22 @@ def body_water(line, i, z, eta, u, U1, vi, b, af, cv, ca):
 def seabed_forces(line, sea, i, x, u, v, e, cv, report):
     """Contact and friction at node i: whether there are any, F, D, GL, GR."""
     n, p = bed_under(sea, x)
-    left = right = n  # normals of the bed under the nodes beside this one
+    left = right = n  # normals of the bed under the nodes beside this one, and how deep these are
+    pl = pr = p
     pd = -dot(n, get3(v, i))
     N = DN = NL = NR = 0.0  # force along n; its derivatives by the penetration of node i, and by those beside it
     if i > 0:
-        left, po = bed_before(sea, n, p, x, get3(e, i - 1))
-        if p > 0.0 or po > 0.0:
+        left, pl = bed_before(sea, n, p, x, get3(e, i - 1))
+        if p > 0.0 or pl > 0.0:
             h = line.h[i - 1]
-            f, f0, f1, g0, g1 = contact(p, po, pd, -dot(left, get3(v, i - 1)), h, sea.stiffness, sea.damping, sea.onset)
+            f, f0, f1, g0, g1 = contact(p, pl, pd, -dot(left, get3(v, i - 1)), h, sea.stiffness, sea.damping, sea.onset)
             N, NL, DN = N + f, f1 + cv * g1, DN + f0 + cv * g0
     if i < line.h.shape[0]:
-        right, po = bed_beside(sea, n, p, x, get3(e, i))
-        if p > 0.0 or po > 0.0:
+        right, pr = bed_beside(sea, n, p, x, get3(e, i))
+        if p > 0.0 or pr > 0.0:
             h = line.h[i]
             f, f0, f1, g0, g1 = contact(
-                p, po, pd, -dot(right, get3(v, i + 1)), h, sea.stiffness, sea.damping, sea.onset
+                p, pr, pd, -dot(right, get3(v, i + 1)), h, sea.stiffness, sea.damping, sea.onset
             )
             N, NR, DN = N + f, f1 + cv * g1, DN + f0 + cv * g0
     if line.footing[i] > 0.0 and p > 0.0:
@@ -164,10 +164,15 @@ def seabed_forces(line, sea, i, x, u, v, e, cv, report):
         F, slope, q = add(F, f), add(n, g), scale(part, q)
     sea.slid[i, 0], sea.slid[i, 1], sea.slid[i, 2] = q
     sea.bed[i, 0], sea.bed[i, 1], sea.bed[i, 2] = F
-    # penetrations: dp_i = -n.dr_i, dp_{i-1} = -n.(dr_i - de), dp_{i+1} = -n.(dr_i + de), each with n where it is; how
-    # n turns with x is left out: p times the curvature of the bed
+    # penetrations: dp_i = -g.dr_i, dp_{i-1} = -g.(dr_i - de), dp_{i+1} = -g.(dr_i + de), each with g where it is, the
+    # normal but for how that turns on a bed of depths
+    g, W = depth_falls(sea, x, n, p)
+    D = madd(D, madd(mscale(N, W), mscale(-DN, outer(slope, g))))
+    if NL != 0.0 and i > 0:
+        left, _ = depth_falls(sea, sub(x, get3(e, i - 1)), left, pl)
+    if NR != 0.0 and i < line.h.shape[0]:
+        right, _ = depth_falls(sea, add(x, get3(e, i)), right, pr)
     L, R = mscale(NL, outer(slope, left)), mscale(NR, outer(slope, right))
-    D = madd(D, mscale(-DN, outer(slope, n)))
     return True, F, madd(D, mscale(-1.0, madd(L, R))), L, mscale(-1.0, R)
 
 

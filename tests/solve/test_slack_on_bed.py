@@ -1,0 +1,99 @@
+"""Lines that lie slack on a bed: bows of the elastica, however soft they are; lines along ridges and over rough ground."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
+
+import hybrid
+from hybrid.scene.depths import Depths
+
+SPAN, WEIGHT = 100.0, 50.0 * 9.81
+
+
+def lying(length: float, bed: dict[str, Any], end: float = SPAN, **section: float) -> dict[str, Any]:
+    """A line on a bed, between ends that lie on it SPAN apart, or `end`."""
+    one = {"length": length, "diameter": 0.1, "mass": 50.0, "axial_stiffness": 1e8} | section
+    places = {"start": [0.0, 0.0, 0.0], "end": [end, 0.0, 0.0]}
+    return {
+        "environment": {"gravity": 9.81, "seabed": {"z": 0.0, "stiffness": 5e4} | bed},
+        "cable": {"sections": [one]}, "ends": {k: {"kind": "pinned", "position": x} for k, x in places.items()},
+        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 100},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("EI", "longer", "several"),
+    [(100.0, 1.001, False), (100.0, 1.05, False), (1e4, 1.01, False), (100.0, 1.001, True), (1e4, 1.01, True)],
+)
+def test_a_slack_line_lies_in_a_bow_of_the_elastica(EI: float, longer: float, several: bool) -> None:
+    """Which it falls into, sideways, in some hours: the time scale of the line is 10 s."""
+    length = longer * SPAN
+    scene = lying(length, {}, bending_stiffness=EI)
+    if several:
+        one = scene["cable"] | {"start": "start", "end": "end", "model": "rod", "mesh": scene["mesh"]}
+        points = {name: {"position": x["position"]} for name, x in scene["ends"].items()}
+        scene = {"environment": scene["environment"], "points": points, "lines": {"only": one}}
+    with hybrid.static(scene) as result:
+        found = result.lines["only"] if several else result
+        T, r = found.tension[-1], found.position[-1]
+        assert {x.kind for x in result.events} == {"several equilibria"}
+    k = brentq(lambda k: 2.0 * ellipe(k * k) / ellipk(k * k) - 1.0 - SPAN / length, 1e-6, 0.9)
+    crest = len(T) // 2
+    assert T[crest] == pytest.approx(-EI * (2.0 * ellipk(k * k) / length) ** 2, rel=3e-3)
+    bow = k * length / ellipk(k * k)
+    assert abs(r[crest, 1]) == pytest.approx(bow, rel=3e-3)
+    assert np.abs(r[:, 2]).max() < 2.0 * WEIGHT / 5e4
+
+
+def ridge() -> tuple[dict[str, Any], float]:
+    """A ridge along x, and its curvature at the top."""
+    y = np.linspace(-8, 8, 17)
+    depths = {"x": [-50.0, 0.0, 100.0, 150.0], "y": y.tolist(), "depth": [(0.025 * y**2).tolist()] * 4}
+    slopes = [Depths(**depths).surface.at(50.0, side)[2] for side in (-1e-3, 1e-3)]
+    return {"depths": depths}, (slopes[1] - slopes[0]) / 2e-3
+
+
+@pytest.mark.parametrize("part", [0.9, 1.1])
+def test_a_line_stays_on_a_ridge_under_enough_tension(part: float) -> None:
+    """T pi^2/L^2 + EI pi^4/L^4 against w kappa: below it slides off to one side."""
+    bed, kappa = ridge()
+    EI, q = 100.0, math.pi / SPAN
+    T = part * (WEIGHT * kappa - EI * q**4) / q**2
+    scene = lying(SPAN, bed, SPAN * (1.0 + T / 1e8), bending_stiffness=EI)
+    with hybrid.static(scene) as found:
+        aside = float(np.abs(found.position[-1][:, 1]).max())
+        said = {x.kind for x in found.events}
+    if part > 1.0:
+        assert aside < 1e-6
+        assert not said
+    else:
+        assert 0.1 < aside < 8.0
+        assert said == {"several equilibria"}
+
+
+@pytest.mark.parametrize("seed", [1, 3, 4])
+def test_a_line_is_found_across_rough_ground(seed: int) -> None:
+    """Without friction the turning normal is all that holds it in the hollows.  A rod and a catenary, coarse and fine."""
+    rng = np.random.default_rng(seed)
+    x, y = np.arange(-50.0, 551.0, 25.0), np.arange(-50.0, 51.0, 25.0)
+    depth = 100.0 + rng.uniform(-0.5, 0.5, (x.size, y.size))
+    bed = {"stiffness": 2e4, "depths": {"x": x.tolist(), "y": y.tolist(), "depth": depth.tolist()}}
+    ends = {"start": [0.0, 0.0, -10.0], "end": [450.0, 0.0, -100.0]}
+    pull, aside = [], []
+    for model, cells in (("rod", 400), ("rod", 100), ("catenary", 200)):
+        scene = lying(520.0, bed, diameter=0.2, mass=250.0, axial_stiffness=1e9, bending_stiffness=1e4)
+        scene |= {"ends": {k: {"kind": "pinned", "position": z} for k, z in ends.items()}}
+        with hybrid.static(scene | {"model": model, "mesh": {"cells": cells}}) as found:
+            pull.append(found.tension[-1][[0, -1]])
+            aside.append(float(np.abs(found.position[-1][:, 1]).max()))
+            assert not found.events
+    np.testing.assert_allclose(pull[1], pull[0], rtol=0.03)
+    np.testing.assert_allclose(pull[2], pull[0], rtol=3e-3)
+    assert aside == pytest.approx([aside[0]] * 3, rel=0.02)
+    assert aside[0] > 1.0
