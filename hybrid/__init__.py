@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from hybrid.accuracy.run_forecast import plan
     from hybrid.adapt.user_criterion import NodeState
     from hybrid.couple.fmu_export import export_fmu
+    from hybrid.designs.design import design
     from hybrid.designs.seek import seek
     from hybrid.designs.sensitivity import sensitivity
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
@@ -61,6 +62,7 @@ _HOME = {
     "SystemSimulation": ("hybrid.simulation.system_stepping", "SystemSimulation"),
     "System": ("hybrid.scene.system", "System"),
     "compare": ("hybrid.view.comparison", "write_comparison"),
+    "design": ("hybrid.designs.design", "design"),
     "export_fmu": ("hybrid.couple.fmu_export", "export_fmu"),
     "export": ("hybrid.exports.api", "export"),
     "export_moordyn": ("hybrid.interop.moordyn", "export_moordyn"),
@@ -111,6 +113,7 @@ __all__ = [
     "System",
     "SystemSimulation",
     "compare",
+    "design",
     "export",
     "export_fmu",
     "export_moordyn",

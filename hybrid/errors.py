@@ -80,6 +80,7 @@ class Outcome(IntEnum):
     WINCH_AT_END = 13
     FOLDED = 14
     COLLAPSED = 15
+    NOT_REACHED = 16
 
     @property
     def cause(self) -> str:
@@ -205,6 +206,7 @@ _CAUSE = {
     Outcome.FOLDED: "the only equilibrium found has a fold: a rod turns by more than 90 deg from one cell to the next, "
     "and stands on it",
     Outcome.COLLAPSED: "steps have become so short that the run would not end",
+    Outcome.NOT_REACHED: "what is asked of the scene is not reached from where the search began",
     Outcome.OVERSTRETCHED: "the cable is stretched, or compressed, beyond what a section bears",
 }
 
@@ -220,6 +222,7 @@ _REMEDY = {
     Outcome.BURIED: "another start (initial.points); check stiffness and place of the bed and of obstacles",
     Outcome.TURNS_LOST: "add cells, hold the cable tauter, or turn the end in time (ends.*.motion), with damping",
     Outcome.WINCH_AT_END: "another winch.tension, a longer payout.longest, more cells, or a shorter time.duration",
+    Outcome.NOT_REACHED: "wider limits or bounds, more unknowns, or another start",
     Outcome.COLLAPSED: "what cuts the steps has to go: see what the message names, and where",
     Outcome.OVERSTRETCHED: "check axial_stiffness (N), mass (kg/m), lengths (m), loads (N); max_strain is the limit",
     Outcome.FOLDED: "add cells where it bends (mesh), or begin nearer to the shape at rest (initial_guess)",

@@ -11,11 +11,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import typer
 from ruamel.yaml import YAML
 
 import hybrid
-from hybrid.cli.commands import main
-from hybrid.scene.read import parse_either
+from hybrid.cli.commands import app, main
+from hybrid.designs.problem import scenes_of
+from hybrid.scene.design import DESIGN
+from hybrid.scene.read import as_scene_or_system, parse_either
 from hybrid.scene.study import study_from
 from hybrid.studies.cases import cases_of
 
@@ -31,9 +34,9 @@ def blocks(page: Path, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
 
 
-def commands() -> Iterator[list[str]]:
-    """Arguments of every `hybrid ...` in the README's shell blocks, in order."""
-    for block in blocks(README, "bash"):
+def commands(page: Path = README) -> Iterator[list[str]]:
+    """Arguments of every `hybrid ...` in a page's shell blocks, in order."""
+    for block in blocks(page, "bash"):
         for line in block.splitlines():
             for part in line.split("&&"):
                 words = shlex.split(part, comments=True)
@@ -50,25 +53,12 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow  # half a minute
-def test_readme_commands_run(clone: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands_run(clone: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(clone)
-    found = list(commands())
-    assert {arguments[0] for arguments in found} == {
-        "run",
-        "plan",
-        "static",
-        "plot",
-        "report",
-        "stats",
-        "export",
-        "schema",
-        "trade",
-        "resume",
-        "import",
-        "modes",
-        "response",
-        "sensitivity",
-    }
+    page = ROOT / "docs" / "commands.md"
+    found = [*commands(), *commands(page)]
+    named = {arguments[0] for arguments in found} | set(re.findall(r"`hybrid (\w+)", page.read_text(encoding="utf-8")))
+    assert named == set(typer.main.get_command(app).commands), "the page has every command"
     for arguments in found:
         with pytest.raises(SystemExit) as left:
             main(arguments)
@@ -111,7 +101,7 @@ def test_ci_reads_its_commands_from_the_readme() -> None:
     )
     assert second == "pytest\n"
     later = [line for block in blocks(README, "bash")[2:] for line in block.splitlines()]
-    assert all(line.startswith("hybrid ") for line in later), "test_readme_commands_run runs these and no others"
+    assert all(line.startswith("hybrid ") for line in later), "test_commands_run runs these and no others"
     script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     assert "first=$(block 1)" in script and "second=$(block 2)" in script
     assert "pip install" not in script
@@ -120,7 +110,10 @@ def test_ci_reads_its_commands_from_the_readme() -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_scenes_on_pages_load(page: Path) -> None:
     for text in blocks(page, "yaml"):
-        if "\nscene:" in text:
+        if re.search(r"^unknowns:", text, re.MULTILINE):
+            task = DESIGN.of_data(YAML(typ="safe").load(text), ROOT / "examples" / "designs")
+            scenes_of(task, as_scene_or_system(task.asked.scene))
+        elif "\nscene:" in text:
             cases_of(study_from(YAML(typ="safe").load(text), ROOT / "examples" / "studies"))
         else:
             hybrid.plan(parse_either(text, str(page))[0])

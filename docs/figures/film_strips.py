@@ -1,4 +1,4 @@
-"""Draw the strips of films of docs/loops.md into docs/pictures: frames of `hybrid plot --animate` at chosen times.
+"""Draw the strips of films of docs/evidence/loops.md into docs/pictures: frames of `hybrid plot --animate`.
 
 python docs/figures/film_strips.py [name ...]
 """

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybrid
-import hybrid.cli.modes_command  # registers its command
+import hybrid.cli.design_command  # registers its command
+import hybrid.cli.modes_command
 import hybrid.cli.response_command
 import hybrid.cli.result_commands
 import hybrid.cli.seek_command

@@ -6,7 +6,9 @@ each number, in place of two equilibria.  dR/dp is the change of the block rows 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 from scipy import sparse
@@ -19,13 +21,16 @@ from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
 from hybrid.modal.matrices import linear_line
-from hybrid.model.build import Model
+from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby
 from hybrid.model.resolution import Resolution
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.schema import Scene
 from hybrid.simulation.static_case import StaticCase
 
+# Places of nodes (`Resolution.places`) by line, "" of one that is alone; empty: as the scene asks for.
+Places = Mapping[str, tuple[float, ...]]
+NO_PLACES: Places = MappingProxyType({})
 # Part of a number by which lines are differentiated; one that is 0 is changed by this, in its own unit.
 PART = 1e-4
 
@@ -33,14 +38,19 @@ PART = 1e-4
 class CableAtRest:
     """The equilibrium on one mesh, its factors, and the values of results."""
 
-    def __init__(self, scene: Scene, cells: float, wanted: Sequence[Wanted]) -> None:
-        """cells: how many times as long as usual; SceneError, ComputationError: as of `hybrid.sensitivity`."""
+    def __init__(self, scene: Scene, cells: float, wanted: Sequence[Wanted], places: Places = NO_PLACES) -> None:
+        """cells: their lengths over the usual, 0.5 or more; places: those of an equilibrium whose cells it has.
+
+        SceneError, ComputationError: as of `hybrid.sensitivity`.
+        """
         case = StaticCase(scene)
         resolution: Resolution = resolution_at_rest(case)
         self.scene = case.scene
         refuse_use(self.scene, "derivatives", given="hybrid sensitivity")  # with the model that accuracy has chosen
-        self.resolution = resolution.coarser(cells=cells) if cells > 1.0 else resolution
-        self.model, found = case.at_rest(self.resolution)
+        resolution = replace(resolution, places=places.get("", ())).of_cells(cells)
+        self.model, found = case.at_rest(resolution)
+        self.places = {"": places_of(self.model, self.scene)}
+        self.resolution = replace(resolution, places=self.places[""], parts=1)
         if found.touch.size:
             expected = "an equilibrium in which the line does not touch itself"
             raise SceneError([Complaint("contact.self", "a line that touches itself", expected, "another shape")])

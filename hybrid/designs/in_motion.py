@@ -29,7 +29,7 @@ PARTS = (1e-3, 2e-3)
 # Coordinates differ by parts of this part of the longest line: what they are depends on where the origin is.
 PLACE, OF_LENGTH = re.compile(r"(position\[\d\]|\.z|\.surface|\.at\[\d\])$"), 0.1
 # Tables of how a scene is computed and written.
-COMPUTING = ("time", "output", "mesh", "accuracy", "model")
+COMPUTING = ("time", "output", "mesh", "accuracy", "model", "resolution")
 # Of the length, by which zones of two runs may differ that are the same.
 SAME_ZONE = 0.005
 

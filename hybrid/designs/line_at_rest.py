@@ -27,6 +27,7 @@ from hybrid.solve.joined import JoinedLine
 from hybrid.solve.stepper import POWERS
 
 NAME = re.compile(r"^(?:(max|min) )?([a-z_]\w*)(?:\.([xyz]))?(?:@(.+))?$")
+OF_SECTION = re.compile(r"^sections\[(\d+)\]$")
 AXES = "xyz"
 # How far a state is moved to differentiate its results: a part of chords, and of the largest tension.
 ALONG = 1e-5
@@ -40,13 +41,14 @@ TURNED = 1e-9  # N m over N m, torque through catenary zones that is none
 class Wanted(NamedTuple):
     """A result in parts: `max` or `min` of a quantity or "", its name, its component or "", and its place, m; the end
 
-    of the line, wherever that is, is at infinity.
+    of the line, wherever that is, is at infinity.  section: along which alone an extreme is taken; None: all of them.
     """
 
     extreme: str
     name: str
     axis: str
     at: float | None
+    section: int | None = None
 
 
 def parse_result(text: str, length: float) -> Wanted:
@@ -56,6 +58,11 @@ def parse_result(text: str, length: float) -> Wanted:
     if found is None:
         raise SceneError([Complaint("of", text, expected, "tension@0")])
     extreme, name, axis, at = found.groups()
+    section = OF_SECTION.match(at or "")
+    if section is not None:
+        if not extreme:
+            raise SceneError([Complaint("of", text, expected, f"max {text}")])
+        return Wanted(extreme, name, axis or "", None, int(section[1]))
     try:
         s = {None: None, "start": 0.0, "end": length}.get(at) if at in (None, "start", "end") else float(at)
     except ValueError:
@@ -72,6 +79,31 @@ class Beside(NamedTuple):
     model: Model
     ends: Ends
     sea: Sea
+
+
+class Peak(NamedTuple):
+    """Where an extreme is: nodes (1 or 3,) beside each other, and what each counts there."""
+
+    nodes: np.ndarray
+    weights: Floats
+
+
+def _peak(s: Floats, values: Floats, sign: float) -> Peak:
+    """Where values (n,) at nodes s, m, are largest (sign 1) or least (-1): at the top of the parabola through the node
+
+    that is and its neighbours.  Its place goes from node to node, and its value has no kink there.
+    """
+    k = int((sign * values).argmax())
+    if not 0 < k < s.size - 1:
+        return Peak(np.array([k]), np.ones(1))
+    i = np.array([k - 1, k, k + 1])
+    left, right = (values[k] - values[k - 1]) / (s[k] - s[k - 1]), (values[k + 1] - values[k]) / (s[k + 1] - s[k])
+    bent = (right - left) / (s[k + 1] - s[k - 1])
+    if sign * bent >= 0.0 or not np.isfinite(bent):
+        return Peak(np.array([k]), np.ones(1))
+    top = 0.5 * (s[k - 1] + s[k]) - 0.5 * left / bent
+    others = np.array([[s[m] for m in i if m != n] for n in i])
+    return Peak(i, np.prod((top - others) / (s[i][:, None] - others), axis=1))
 
 
 # Frames (9,) of ends that turn with what they are joined to, by end.
@@ -94,7 +126,7 @@ class LineAtRest:
         self.here = Beside(scene, model, self._ends(model, frames), model.sea.at(np.inf))
         self._at = [x.at for x in wanted if x.at is not None]
         self._nodes = any(x.extreme for x in wanted) or not self._at
-        self._observer, self._node_of = self._observed(self.here), dict[Wanted, int]()
+        self._observer, self._peak_of = self._observed(self.here), dict[Wanted, Peak]()
         self._values = np.zeros(len(self.wanted))
         self._line = _at_rest(model.line)
         self._work, self._still, self._tried = workspace_of(self._line), _without_rates(state), _without_rates(state)
@@ -143,10 +175,24 @@ class LineAtRest:
         for x in self.wanted:
             if x.extreme and "s" in observer.dims(x.name):
                 value = _component(x, np.asarray(found[x.name][0]))
-                at_nodes = value[np.searchsorted(observer.s, self.model.line.s)]
-                self._node_of[x] = int(at_nodes.argmax() if x.extreme == "max" else at_nodes.argmin())
+                nodes = self._along(x)
+                at_nodes = value[np.searchsorted(observer.s, self.model.line.s[nodes])]
+                self._peak_of[x] = _peak(self.model.line.s[nodes], at_nodes, 1.0 if x.extreme == "max" else -1.0)
+                self._peak_of[x].nodes[:] = nodes[self._peak_of[x].nodes]
         self._values = self._results(found, [(observer.s, self.model.line.s)])[0]
         return self._values
+
+    def _along(self, x: Wanted) -> np.ndarray:
+        """Of which nodes an extreme is taken; SceneError: the line has no such section."""
+        s, sections = self.model.line.s, self.here.scene.cable.sections
+        if x.section is None:
+            return np.arange(s.size)
+        if x.section >= len(sections):
+            expected = f"a section of the line, which has {len(sections)}, counted from 0"
+            raise SceneError([Complaint("of", f"sections[{x.section}]", expected, f"sections[{len(sections) - 1}]")])
+        ends = np.cumsum([0.0, *(each.length for each in sections)])
+        near = 1e-9 * s[-1]
+        return np.flatnonzero((s >= ends[x.section] - near) & (s <= ends[x.section + 1] + near))
 
     def by_state(self, q: Floats, turns: Floats | None = None) -> Floats:
         """(P, W) derivatives of results along movements (P, N+1, 5) of the state.
@@ -258,14 +304,15 @@ class LineAtRest:
         return out
 
     def _result(self, x: Wanted, s: Floats, nodes: Floats, value: Floats) -> float:
-        """One result; an extreme is that of the node where it is in the equilibrium."""
+        """One result; an extreme is that of the place, among nodes, where it is in the equilibrium."""
         dims, value = self._observer.dims(x.name), _component(x, value)
         if "edge" in dims:  # where contact begins and ends: the last of them
             return float(np.append(np.nan, value[np.isfinite(value)])[-1])
         if "s" not in dims:
             return float(value)
         if x.extreme:
-            return float(value[np.searchsorted(s, nodes[self._node_of[x]])])
+            peak = self._peak_of[x]
+            return float(peak.weights @ value[np.searchsorted(s, nodes[peak.nodes])])
         assert x.at is not None
         return float(np.interp(x.at, s, value))
 

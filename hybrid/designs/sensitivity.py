@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, overload
 
 import numpy as np
 
-from hybrid.designs.cable_at_rest import CableAtRest
+from hybrid.designs.cable_at_rest import NO_PLACES, CableAtRest, Places
 from hybrid.designs.in_motion import in_motion
 from hybrid.designs.line_at_rest import parse_result
 from hybrid.designs.numbers import number_of
@@ -93,11 +93,14 @@ def _refuse_edges(of: Sequence[str]) -> None:
             raise SceneError([Complaint("of", text, expected, "compare two `hybrid static`; `hybrid seek` finds it")])
 
 
-def at_rest(asked: Scene | System, of: Sequence[str], cells: float = 1.0) -> CableAtRest | SystemAtRest:
-    """The equilibrium of one cable or of several lines; cells: how many times as long as usual; of: results.
+def at_rest(
+    asked: Scene | System, of: Sequence[str], cells: float = 1.0, places: Places = NO_PLACES
+) -> CableAtRest | SystemAtRest:
+    """The equilibrium of one cable or of several lines; of: results.
 
+    cells: their lengths over the usual, 0.5 or more; places: those of an equilibrium whose cells it has.
     SceneError: what has no derivative; ComputationError: there is no equilibrium.
     """
     if isinstance(asked, Scene):
-        return CableAtRest(asked, cells, [parse_result(x, asked.length) for x in of])
-    return SystemAtRest(asked, cells, of)
+        return CableAtRest(asked, cells, [parse_result(x, asked.length) for x in of], places)
+    return SystemAtRest(asked, cells, of, places)

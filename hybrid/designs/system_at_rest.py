@@ -16,14 +16,14 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from hybrid.designs.bodies_at_rest import BodiesAtRest, with_bodies
-from hybrid.designs.cable_at_rest import PART
+from hybrid.designs.cable_at_rest import NO_PLACES, PART, Places
 from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, Wanted, moment_on_body, parse_result
 from hybrid.designs.numbers import is_allowed, number_of, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
 from hybrid.modal.matrices import linear_network
-from hybrid.model.build import Model
+from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby, same_nodes
 from hybrid.model.system import SystemModel, SystemResolution, build_system
 from hybrid.scene.combinations import refuse_use
@@ -61,23 +61,27 @@ class _Changed(NamedTuple):
 class SystemAtRest:
     """The equilibrium on one mesh, its factors, and the values of results."""
 
-    def __init__(self, system: System, cells: float, of: Sequence[str]) -> None:
-        """cells: how many times as long as usual; of: results.
+    def __init__(self, system: System, cells: float, of: Sequence[str], places: Places = NO_PLACES) -> None:
+        """cells: their lengths over the usual, 0.5 or more; of: results; places: as of `CableAtRest`.
 
         SceneError, ComputationError: as of `hybrid.sensitivity`.
         """
         refuse_use(system, "derivatives", given="hybrid sensitivity")
         wanted = [parse_result_of(system, x) for x in of]
         resolution = SystemResolution.first(system)
-        if cells > 1.0:
-            resolution = replace(resolution, lines={k: x.coarser(cells=cells) for k, x in resolution.lines.items()})
+        finely = {k: replace(x, places=places.get(k, ())).of_cells(cells) for k, x in resolution.lines.items()}
+        resolution = replace(resolution, lines=finely)
         run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
         assert run.found is not None
         if run.found.settled:
             expected = "an equilibrium in which no line touches itself"
             raise SceneError([Complaint("lines", "contact of a line with itself", expected, "a shape that is apart")])
-        self.scene, self._resolution, self._names = system, resolution, run.model.names
+        self.scene, self._names = system, run.model.names
         self._scenes = {name: self._scene_of(system, name) for name in self._names}
+        of_lines = zip(self._names, run.model.models, strict=True)
+        self.places = {name: places_of(model, self._scenes[name]) for name, model in of_lines}
+        finely = {name: replace(x, places=self.places[name], parts=1) for name, x in finely.items()}
+        self._resolution = replace(resolution, lines=finely)
         joined = [
             x._replace(line=model.line) for x, model in zip(run.found.solver.lines, run.model.models, strict=True)
         ]

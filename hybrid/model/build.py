@@ -32,7 +32,7 @@ from hybrid.model.layout import Layout, of_rods
 from hybrid.model.line import line_on, spins_freely
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import STIFFENER_CELLS, Material
-from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
+from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, divided, given_nodes, place_nodes, refuse_too_many, thinned
 from hybrid.model.obstacles import kind_of, least_cells, obstacle_bits
 from hybrid.model.payout import PayoutPlan, cable_of, payout_of, payout_plan, shorter_behind_clamp
 from hybrid.model.plane import in_plane, planar
@@ -228,13 +228,48 @@ def place_cells(
         return mesh, mesh.nodes, mesh.zones
     if mesh is not None:
         return None, *mesh
-    cuts = sorted({*cable.cuts, *corners(scene)})
+    cuts = _cuts(scene, cable)
     if isinstance(scene.model, AdaptiveModel):
-        wanted = (*(scene.model.force_rod or ()), *(scene.model.force_catenary or ()))
-        edges = {min(x, scene.length) for stretch in wanted for x in stretch} - {0.0, scene.length}
-        layout = _layout(scene, cable, sorted({*cuts, *edges}), resolution)
+        layout = _layout(scene, cable, cuts, resolution)
         return layout, layout.nodes, layout.zones
     return None, *_placed(scene, cable, zone_plans(scene), cuts, resolution, DEFAULT_CELLS)
+
+
+def _cuts(scene: Scene, cable: Material) -> list[float]:
+    """Arc lengths, m, at which a node must lie: of sections, loads, obstacles, and zones that the scene asks for."""
+    cuts = {*cable.cuts, *corners(scene)}
+    if isinstance(scene.model, AdaptiveModel):
+        wanted = (*(scene.model.force_rod or ()), *(scene.model.force_catenary or ()))
+        cuts |= {min(x, scene.length) for stretch in wanted for x in stretch} - {0.0, scene.length}
+    return sorted(cuts)
+
+
+def _knots(scene: Scene, plans: Sequence[ZonePlan], cuts: Sequence[float]) -> list[float]:
+    """The same with both ends, and those of zones."""
+    bounds = np.cumsum([plan.length for plan in plans])[:-1]
+    return sorted({0.0, *cuts, *bounds.tolist(), scene.length})
+
+
+def places_of(model: Model, scene: Scene) -> tuple[float, ...]:
+    """`Resolution.places` of the cells of a model; empty where what else makes them goes by no places."""
+    if stiffeners_of(scene) or payout_of(scene) is not None or follows_curvature(scene):
+        return ()
+    nodes = model.line.s if model.layout is None else model.layout.base
+    plans = zone_plans(scene) if model.layout is None else (ZonePlan("rod", scene.length),)
+    knots = _knots(scene, plans, _cuts(scene, model.cable))
+    return tuple(np.interp(nodes, knots, np.arange(len(knots))).tolist())
+
+
+def _at_places(
+    scene: Scene, plans: Sequence[ZonePlan], cuts: Sequence[float], resolution: Resolution
+) -> tuple[Floats, tuple[Zone, ...]] | None:
+    """Nodes and zones by `Resolution.places`; None: there are others."""
+    knots = _knots(scene, plans, cuts)
+    if not resolution.places or resolution.places[-1] != len(knots) - 1:
+        return None
+    edges = [0.0, *np.cumsum([plan.length for plan in plans])[:-1].tolist(), scene.length]
+    zones = tuple(Zone(plan.kind, a, b) for plan, (a, b) in zip(plans, pairwise(edges), strict=True))
+    return divided(np.interp(resolution.places, np.arange(len(knots)), knots), resolution.parts), zones
 
 
 LEAST_WEIGHT = 1e-3  # of the weight in air: a cable that floats bends under what is left of its weight
@@ -298,6 +333,8 @@ def _placed(
     usual: int,
 ) -> tuple[Floats, tuple[Zone, ...]]:  # fmt: skip
     """Nodes and zones; usual: cells of a line whose scene does not say."""
+    if (placed := _at_places(scene, plans, cuts, resolution)) is not None:
+        return placed
     s, zones = _placed_by_mesh(scene, cable, plans, cuts, resolution, usual)
     if scene.mesh is not None and scene.mesh.nodes is not None:
         return s, zones
@@ -347,7 +384,7 @@ def _placed_by_mesh(
         s, zones = place_nodes(plans, cuts, given, ratio, usual)
     if resolution.fineness < 1.0:
         s = thinned(s, [z.s_b for z in zones[:-1]] + list(cuts), round(1.0 / resolution.fineness))
-    return s, zones
+    return divided(s, resolution.parts), zones
 
 
 def _layout(scene: Scene, cable: Material, cuts: Sequence[float], resolution: Resolution) -> Layout:

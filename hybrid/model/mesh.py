@@ -119,6 +119,11 @@ def thinned(s: Floats, fixed: Sequence[float], parts: int) -> Floats:
     return s[np.concatenate(kept)]
 
 
+def divided(s: Floats, parts: int) -> Floats:
+    """Nodes s with every cell in so many parts."""
+    return s if parts == 1 else np.interp(np.arange((s.size - 1) * parts + 1) / parts, np.arange(s.size), s)
+
+
 def _with_cuts(nodes: Floats, cuts: Sequence[float]) -> list[float]:
     """`nodes` with each cut as a node: those before a cut are done, those behind it as they were."""
     behind, tolerance = nodes.tolist(), 1e-9 * float(nodes[-1] - nodes[0])

@@ -27,6 +27,7 @@ from hybrid.kernels.state.obstacle_rows import (
     STRAND,
 )
 from hybrid.kernels.state.state import NO_OBSTACLES, Floats
+from hybrid.model.payout import longest_out, whole_scene, winch_side
 from hybrid.model.scales import tension_scale
 from hybrid.model.sections import merged_sections
 from hybrid.scene.base import unit
@@ -55,22 +56,34 @@ def kind_of(obstacle: Obstacle) -> int:
 
 
 def strand_radius(scene: Scene) -> float:
-    """Radius of the line that touches obstacles, where it is thickest, m."""
-    return 0.5 * max(x.diameter or 0.0 for x in scene.cable.sections)
+    """Radius of the line that touches obstacles, where it is thickest, on the reel from which it is paid out too, m."""
+    return 0.5 * max(x.diameter or 0.0 for x in whole_scene(scene)[0].cable.sections)
 
 
 def _pieces(scene: Scene) -> Floats:
     """Of a line of several diameters, what rows have behind their OBSTACLE columns; of others nothing."""
-    radii = np.array([0.5 * (x.diameter or 0.0) for x in scene.cable.sections])
+    whole, begin = whole_scene(scene)
+    sections = whole.cable.sections
+    radii = np.array([0.5 * (x.diameter or 0.0) for x in sections])
     if (radii == radii[0]).all():
         return np.zeros(0)
-    ends = np.cumsum([x.length for x in scene.cable.sections])
+    ends = begin + np.cumsum([x.length for x in sections])
     return np.column_stack([ends, radii.max() - radii]).ravel()
 
 
 def pull_on_obstacles(scene: Scene) -> float:
-    """The tension, N, with which a line of a scene lies on obstacles."""
-    return tension_scale(scene, merged_sections(scene.cable.sections), False)
+    """The tension, N, with which a line of a scene lies on obstacles; of one that is paid out, when it is longest."""
+    pull = tension_scale(scene, merged_sections(scene.cable.sections), False)
+    longer = longest_out(scene)
+    if longer > scene.length:
+        whole, _ = whole_scene(scene)
+        left, sections = longer, []
+        for x in whole.cable.sections[:: 1 if winch_side(scene) else -1]:
+            if left > 0.0:
+                sections.append(x.model_copy(update={"length": min(x.length, left)}))
+            left -= x.length
+        pull = max(pull, tension_scale(scene, merged_sections(sections), False))
+    return pull
 
 
 def obstacle_rows(scene: Scene, pull: float | None = None) -> Floats:
@@ -78,14 +91,15 @@ def obstacle_rows(scene: Scene, pull: float | None = None) -> Floats:
 
     pull: N, tension with which the line lies on them; None: what the scene asks for.
     """
+    if not scene.obstacles:
+        return NO_OBSTACLES
     pieces = _pieces(scene)
     rows = np.zeros((len(scene.obstacles), OBSTACLE + pieces.size))
-    if not len(rows):
-        return NO_OBSTACLES
     rows[:, OBSTACLE:] = pieces
     strand = strand_radius(scene)
-    least = 0.5 * min(x.diameter or 0.0 for x in scene.cable.sections)  # by which how hard an obstacle is goes
-    weight = max(x.mass for x in scene.cable.sections) * (scene.environment.gravity or 1.0)
+    sections = whole_scene(scene)[0].cable.sections
+    least = 0.5 * min(x.diameter or 0.0 for x in sections)  # by which how hard an obstacle is goes
+    weight = max(x.mass for x in sections) * (scene.environment.gravity or 1.0)
     pull = pull_on_obstacles(scene) if pull is None else pull
     for row, x in zip(rows, scene.obstacles.values(), strict=True):
         row[PLACE : PLACE + 3], row[STRAND] = x.at, strand

@@ -197,6 +197,8 @@ class Resolution:
     bends: error of curvature that is asked, as a part of the largest that a pre-run has shown; infinite: none is.
     rods: stretches (from, to, m; the lack over what is allowed) of which a pre-run has shown that catenaries will lack
     what is asked along the line: zones that move begin with rods there.
+    parts: of every cell of a mesh that the scene gives.  places: of nodes among the places where nodes have to be, the
+    k-th of these at k: cells go along with their sections; empty: as the scene or the program places them.
     """
 
     fineness: float
@@ -210,13 +212,24 @@ class Resolution:
     still: float = 0.0
     bends: float = inf
     rods: tuple[tuple[float, float, float], ...] = ()
+    parts: int = 1
+    places: tuple[float, ...] = ()
+
+    def halved(self) -> Resolution:
+        """With cells half as long, also those of a mesh that the scene gives."""
+        return replace(self, fineness=2.0 * self.fineness, parts=2 * self.parts)
+
+    def of_cells(self, times: float) -> Resolution:
+        """With cells longer by a factor, 2 or more, or half as long (0.5)."""
+        return self if times == 1.0 else self.halved() if times == 0.5 else self.coarser(cells=times)
 
     def coarser(self, cells: float = 1.0, steps: float = 1.0) -> Resolution:
         """With cells and steps longer by these factors; the error of a step is of third order."""
         local = None if self.local is None else self.local * steps**3
         every = round(steps) if steps > 1.0 else 1
         step, later = self.step * steps, self.later * steps
-        return replace(self, fineness=self.fineness / cells, step=step, local=local, every=every, later=later)
+        fineness = self.fineness / cells
+        return replace(self, fineness=fineness, step=step, local=local, every=every, later=later, places=())
 
     @property
     def turn(self) -> float:

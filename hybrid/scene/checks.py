@@ -405,5 +405,5 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _mesh_spans,
     _layers_are_meshed,
     _output_on_cable,
-    payout_checks.payout_stands_alone,
+    payout_checks.reel_has_diameters,
 )

@@ -569,7 +569,8 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     OFFSETS_OF_SHAPE,
     Refusal(
-        PAYOUT, PUSHED, "not worked out", "nodes that enter and leave know no obstacles and no other lines ({key})"
+        PAYOUT, GOES_ITS_WAY, "not worked out",
+        "what touches ({key}) moves, and nodes that enter and leave do not know it",
     ),
     Refusal(
         MOVING_ZONES, GOES_ITS_WAY, "not worked out",

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from hybrid.scene.base import Finding
 from hybrid.scene.cable import Contact
 from hybrid.scene.ends import Clamped, Ends, Pinned
+from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.payout import Payout
 
 
@@ -19,14 +20,16 @@ def _winch(ends: Ends) -> tuple[str, Pinned | Clamped, Payout] | None:
     return found
 
 
-def payout_stands_alone(ends: Ends, contact: Contact) -> Iterator[Finding]:
-    """Contact with itself knows the diameters on the reel."""
+def reel_has_diameters(ends: Ends, contact: Contact, obstacles: Obstacles) -> Iterator[Finding]:
+    """Contact of the line with itself, and with obstacles, knows the diameters on the reel."""
     found = _winch(ends)
     if found is None:
         return
     name = found[0]
-    if contact.self:
+    if contact.self or obstacles:
+        apart = "which parts of the cable keep apart (contact.self)"
+        how = apart if contact.self else "with which it touches obstacles"
         for i, section in enumerate(getattr(ends, name).payout.reel or ()):
             if section.diameter is None:
-                expected = "a number > 0, in m, which parts of the cable keep apart (contact.self)"
+                expected = f"a number > 0, in m, {how}"
                 yield Finding(("ends", name, "payout", "reel", i, "diameter"), expected, "add `diameter: ...` (m)")

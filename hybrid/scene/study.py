@@ -7,13 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
-from hybrid.errors import Complaint, SceneError
 from hybrid.scene.base import Before, Finding, Number, Positive, Table, Text, Truth, Whole, Words, refuse, table_or_list
-from hybrid.scene.read import complaint_of, in_order, text_of
-from hybrid.scene.schema_messages import explain
-from hybrid.scene.yaml_source import Node, Unreadable, from_data, from_text
+from hybrid.scene.task_file import Kind
 
 # Cases of a study: each is a row in memory.
 MOST_CASES = 1_000_000
@@ -261,36 +258,14 @@ def _wrapped(data: Any) -> Any:
     return {**data, "vary": {k: {"values": x} if isinstance(x, list | tuple) else x for k, x in vary.items()}}
 
 
+STUDY = Kind(Study, "study", "what is varied", "studies.md", ("scene", "cases"), _wrapped)
+
+
 def read_study(path: str | Path) -> Study:
     """Read a study file; paths in it become absolute.  SceneError with every complaint, with line and column."""
-    try:
-        root, complaints = from_text(text_of(path))
-    except Unreadable as error:
-        raise SceneError([error.complaint], str(path)) from None
-    return _validated(root.plain(), root, complaints, str(path), Path(path).parent)
+    return STUDY.read(path).asked
 
 
 def study_from(data: Mapping[str, Any], folder: str | Path = ".") -> Study:
     """A study from Python data; files in it are relative to `folder`."""
-    try:
-        return _validated(dict(data), from_data(dict(data)), [], "", Path(folder))
-    except RecursionError:  # a table that is deep, or holds itself
-        fix = "a study is a few tables within tables"
-        raise SceneError([Complaint("study", "nested too deeply", "a study", fix)]) from None
-
-
-def _validated(data: Any, root: Node, complaints: list[Complaint], file: str, folder: Path) -> Study:
-    if isinstance(data, dict) and "scene" not in data and {"cable", "lines"} & set(data):
-        fix = "a file with `scene: scene.yaml` and `vary: ...`, see docs/studies.md"
-        raise SceneError([Complaint("study", "a scene", "a study, which names a scene and what is varied", fix)], file)
-    if not isinstance(data, dict):
-        raise SceneError([Complaint("study", "no table", "a table with scene and vary", "see docs/studies.md")], file)
-    try:
-        study = Study.model_validate(_wrapped(data))
-    except ValidationError as error:
-        found = [each for one in error.errors(include_url=False) for each in explain(Study, one)]
-        raise SceneError(in_order(complaints + [complaint_of(root, *each) for each in found]), file) from None
-    if complaints:
-        raise SceneError(in_order(complaints), file)
-    paths = {name: str((folder / given).absolute()) for name in ("scene", "cases") if (given := getattr(study, name))}
-    return study.model_copy(update=paths)
+    return STUDY.of_data(data, folder).asked

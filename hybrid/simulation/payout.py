@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.kernels.laws.axial_law import SHIFT, stretch_energy
+from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.laws.vortices import PHASE
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.reel import reel as p
@@ -30,9 +31,9 @@ from hybrid.kernels.reel.reel import MovingZones, Reel, blank_reel, blank_reel_j
 from hybrid.kernels.run.payout_run import energy_of
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import CLOCK_SIZE
-from hybrid.kernels.state.forces import STIFFNESS_DAMPING
+from hybrid.kernels.state.forces import FRICTION, STIFFNESS_DAMPING, TOUCHES
 from hybrid.kernels.state.report import LENGTH_OUT, PAYOUT_RATE
-from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, State, state_for
+from hybrid.kernels.state.state import ALONG_LINE, Batch, Ends, Floats, Line, Sea, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout, on_other_parts
 from hybrid.model.line_on_base import LineOnBase
@@ -141,8 +142,13 @@ class PayingOut:
             zones=moving,
         )  # fmt: skip
         numbers = self.table.numbers
-        asks = self.holds_tension or self.rides or self.damped
-        run.pay_out(self.table, pay_out.address(numbers), iterate.address(numbers) if asks else 0)
+        asked = iterate.address(numbers) if self.asks(model.line) else 0
+        run.pay_out(self.table, pay_out.address(numbers), asked)
+
+    def asks(self, line: Line) -> bool:
+        """Whether iterations of Newton's method need something of the reel: friction is on the material that passes."""
+        rubs = line.bits & FRICTION and line.bits & TOUCHES
+        return bool(self.holds_tension or self.rides or self.damped or rubs)
 
     @property
     def length(self) -> float:
@@ -259,7 +265,8 @@ class PayingOut:
         if carry is not None:
             carry(changed, source, of_base)
         ends = model.ends.at(run.t)
-        more = energy(changed.line, ends, out) - energy(model.line, ends, state)
+        sea = model.sea.values
+        more = energy(changed.line, ends, out, sea) - energy(model.line, ends, state, sea)
         if model.line.law.size:
             more += stretch_energy(changed.line, out) - stretch_energy(model.line, state)
         return changed, out, more
@@ -549,7 +556,8 @@ def own_arrays(line: Line) -> Line:
     return own
 
 
-def energy(line: Line, ends: Ends, state: State) -> float:
-    """Kinetic, elastic and potential energy, J."""
+def energy(line: Line, ends: Ends, state: State, sea: Sea | None = None) -> float:
+    """Kinetic, elastic and potential energy, J; sea: with what contact with it has stored."""
     n = line.s.size
-    return float(energy_of(line, ends, state, np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(5)))
+    found = float(energy_of(line, ends, state, np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(5)))
+    return found + float(stored_energy(line, sea, state.r)) if sea is not None and line.bits & TOUCHES else found

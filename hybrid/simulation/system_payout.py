@@ -57,8 +57,8 @@ class SystemPayout:
             x.table.bind(**self._job(solver, k))
             numbers = x.table.numbers
             joined = solver.lines[k].joints[x.plan.side] >= 0
-            asks = iterate.address(numbers) if x.holds_tension or x.rides or x.damped or joined else 0
-            solver.bind_line(k, reel=stand_among.address(numbers), reel_table=numbers, iterated=asks)
+            asked = iterate.address(numbers) if joined or x.asks(solver.lines[k].line) else 0
+            solver.bind_line(k, reel=stand_among.address(numbers), reel_table=numbers, iterated=asked)
 
     def _job(self, solver: SystemSolver, k: int) -> dict[str, Any]:
         """What changes the length of a line, whose state of now is that before a step and after it."""

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import json
 import math
 import re
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
@@ -22,7 +20,8 @@ from hybrid.scene.read import as_scene_or_system, parse_either, text_of
 from hybrid.scene.schema import Scene
 from hybrid.scene.study import MOST_CASES, TAKEN, Study
 from hybrid.scene.system import System
-from hybrid.store.selection import optional_package
+from hybrid.studies.csv_table import read_table
+from hybrid.studies.expressions import evaluated
 from hybrid.studies.sensitivity import DESIGNS, design
 
 Row = dict[str, Any]
@@ -185,24 +184,9 @@ def scaled(points: np.ndarray, bounds: Mapping[str, tuple[Any, Any]]) -> list[li
 def _read_table(study: Study) -> list[Row]:
     """Rows of the CSV file of cases: numbers where they are, else words."""
     assert study.cases is not None
-    lines = text_of(study.cases).splitlines()
-    numbered = [(i + 1, line) for i, line in enumerate(lines) if line.strip() and not line.startswith("#")]
-    if len(numbered) < 2:
-        raise SceneError([Complaint("cases", study.cases, "a header and a row for each case")], study.cases)
-    header = [x.strip() for x in next(csv.reader([numbered[0][1]]))]
-    if len(set(header)) < len(header) or not all(header):
-        raise SceneError(
-            [Complaint("cases", ",".join(header), "a name for each column", line=numbered[0][0])], study.cases
-        )
-    rows = []
-    for line, text in numbered[1:]:
-        found = [_number_or_word(x.strip()) for x in next(csv.reader([text]))]
-        if len(found) != len(header):
-            raise SceneError(
-                [Complaint("cases", f"{len(found)} values", f"{len(header)}, one for each column", line=line)],
-                study.cases,
-            )
-        rows.append(dict(zip(header, found, strict=True)))
+    table = read_table(study.cases, "cases")
+    header = table.header
+    rows = [dict(zip(header, map(_number_or_word, cells), strict=True)) for _, cells in table.rows]
     empty = [name for name, each in study.vary.items() if each.listed() is None and each.low is None]
     if absent := [name for name in (*study.carry, *empty) if name not in header]:
         expected = f"columns of the table: {', '.join(header)}"
@@ -226,32 +210,11 @@ def _chosen(study: Study, rows: list[Row]) -> list[Row]:
     """The rows that fulfil the condition."""
     if study.only_if is None:
         return rows
-    return [row for row, is_in in zip(rows, _evaluated("only_if", study.only_if, rows), strict=True) if is_in]
+    return [row for row, is_in in zip(rows, evaluated("only_if", study.only_if, rows), strict=True) if is_in]
 
 
 def _derived(study: Study, rows: list[Row]) -> dict[str, np.ndarray]:
-    return {name: np.array(_evaluated(f"derive.{name}", text, rows)) for name, text in study.derive.items()}
-
-
-def _evaluated(where: str, text: str, rows: list[Row]) -> list[Any]:
-    """The value of an expression for each row; SceneError for what is none, or a name that is not known."""
-    package = optional_package("simpleeval", "a condition", "studies")
-    functions = {name: getattr(math, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "radians", "pi")}
-    pi = functions.pop("pi")
-    functions |= {"abs": abs, "min": min, "max": max, "round": round}
-    evaluator = package.SimpleEval(functions=functions)
-    try:
-        found = []
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # an assignment, m = 5 for m == 5, is only warned of
-            tree = evaluator.parse(text)
-            for row in rows:
-                evaluator.names = {"pi": pi} | row
-                found.append(evaluator.eval(text, tree))
-        return found
-    except Exception as error:
-        expected = f"arithmetic and comparisons of {', '.join(rows[0])}"
-        raise SceneError([Complaint(where, text, expected, str(error))]) from None
+    return {name: np.array(evaluated(f"derive.{name}", text, rows)) for name, text in study.derive.items()}
 
 
 def _check_keys(text: str, file: str, keys: Mapping[str, Sequence[str]], row: Row) -> None:

@@ -52,7 +52,7 @@ def plot_modes(found: DrawnModes, target: Path) -> None:
 
 
 def _page(found: DrawnModes) -> Page:
-    view = _view(found.position)
+    view = oblique_view(found.position)
     places = {name: np.asarray(r) @ view.T for name, r in found.position.items()}
     every = np.concatenate(list(places.values()))
     extent = np.ptp(np.concatenate([np.asarray(r) for r in found.position.values()]), axis=0)
@@ -80,8 +80,8 @@ def _page(found: DrawnModes) -> Page:
     )
 
 
-def _view(position: Mapping[str, Any]) -> Any:
-    """(2, 3): to the right and upwards in the picture."""
+def oblique_view(position: Mapping[str, Any]) -> Any:
+    """(2, 3): to the right and upwards in the picture, from beside the widest direction and above."""
     every = np.concatenate([np.asarray(r) for r in position.values()])
     flat = every[:, :2] - every[:, :2].mean(axis=0)
     _, _, axes = np.linalg.svd(flat, full_matrices=False)

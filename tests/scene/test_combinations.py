@@ -61,6 +61,7 @@ SHAPED = {
 }  # fmt: skip
 OTHER_LINE = {"start": "a", "end": "b", "sections": [{"length": 9.5, "mass": 1, "diameter": 0.02}]}
 TWO_LINES = {"lines.two": OTHER_LINE, "contact": {}}
+PAID_LINE = {ONE + "connections.start.payout": {"rate": 0.1, "ramp": 1.0}}
 
 # By the pair: what makes a scene of CABLE, or of LINES, that has both, and what is done with it.
 EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
@@ -80,7 +81,7 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.LAYERS, c.FOLLOWING_CELLS): ({"resolution": {"cells_per_layer": 2}} | FOLLOWING, ""),
     (c.PLANE, c.OBSTACLES): (BALL | {"dimension": 2}, ""),
     (c.MOVING_ZONES, c.GOES_ITS_WAY): ({"obstacles.ball": BALL["obstacles"]["ball"] | {"from_outside": True}} | MOVING, ""),
-    (c.PAYOUT, c.PUSHED): (BALL | PAID, ""),
+    (c.PAYOUT, c.GOES_ITS_WAY): ({"obstacles.ball": BALL["obstacles"]["ball"] | {"from_outside": True}} | PAID, ""),
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
     (c.SETTLED_FRICTION, c.PUSHED): (BALL | {"initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
     (c.ABOUT_REST, c.MOVED_BY_LINES): (TWO_LINES, "about rest"),
@@ -123,6 +124,8 @@ OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"time": {"duration": 3.0}}, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"output.errors": True}, ""),
     ((c.ABOUT_REST, c.MOVED_BY_LINES), TWO_LINES, "derivatives"),
+    ((c.PAYOUT, c.GOES_ITS_WAY), TWO_LINES | PAID_LINE, ""),
+    ((c.PAYOUT, c.GOES_ITS_WAY), SHAPED | PAID_LINE, ""),
 )
 OF_ARRAYS = [c.OFFSETS_OF_SHAPE]
 
@@ -131,17 +134,8 @@ def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
     return parse_either(yaml.safe_dump(tables_with(LINES if several else CABLE, changes), sort_keys=False))[0]
 
 
-def _of_several(pair: tuple[c.Feature, c.Feature]) -> bool:
-    names = (
-        c.SEVERAL_LINES,
-        c.ZONES_OF_SEVERAL,
-        c.LINES_TOUCH,
-        c.MOVED_BY_LINES,
-        c.CLAMPED_TO_FREE,
-        c.CLAMPED_CONNECTION,
-        c.SHAPES,
-    )
-    return any(x in names for x in pair)
+def _of_several(changes: dict[str, Any]) -> bool:
+    return any(key.startswith("lines.") for key in changes)
 
 
 def _id(x: object) -> str:
@@ -161,7 +155,7 @@ def test_it_is_refused_with_its_reason_and_remedy(
     """With the reason, what to do and, where the scene alone asks for both, the line of the file."""
     refusal = next(x for x in REFUSALS if (x.feature, x.beside) == pair)
     with pytest.raises(SceneError) as told:
-        refuse_use(_scene(changes, _of_several(pair)), use, "asked")
+        refuse_use(_scene(changes, _of_several(changes)), use, "asked")
     pattern = re.escape(f"{refusal.expected}, because {refusal.why}").replace(r"\{key\}", r"[\w.\[\]]+")
     mine = [x for x in told.value.complaints if re.fullmatch(pattern, x.expected)]
     assert mine, told.value

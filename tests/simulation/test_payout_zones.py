@@ -10,6 +10,7 @@ import pytest
 from test_payout_stretch import EA, ROPE, SAME, TABLE
 
 import hybrid
+from tests.combinations.pairs import scene_of, seen_by
 
 ADAPTIVE = {"kind": "adaptive", "tolerance": 1e-3, "hold_time": 1.0}
 CHANGES = ("grow", "split", "shrink", "merge")
@@ -58,6 +59,16 @@ def test_zones_move_while_line_is_taken_in_at_the_start() -> None:
     assert [len(x) for x in found.zones] == [len(x) for x in mirror.zones]
     np.testing.assert_allclose(mirror["position"][:, ::-1], found["position"], atol=1e-6)
     np.testing.assert_allclose(mirror["reaction_start"], found["reaction_end"], atol=1e-5 * 4000.0)
+
+
+def test_zones_that_move_in_a_current_across_are_those_of_the_turned_scene() -> None:
+    """In space, where the cell that grows has no inertia about its chord that others do not have."""
+    c, s = np.cos(0.3), np.sin(0.3)
+    M = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    scene = scene_of("payout", "water", "zones that move")
+    found, turned = hybrid.run(scene), hybrid.run(seen_by(M, scene))
+    assert np.abs(turned.position - found.position @ M.T).max() < 1e-6
+    assert np.abs(found.position[-1, :, 1]).max() > 0.1
 
 
 def test_resumed_to_the_last_bit(tmp_path: Path) -> None:

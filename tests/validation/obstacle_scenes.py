@@ -71,3 +71,28 @@ def over_pipe(**more: Any) -> Tables:
         "initial": "equilibrium", "model": "rod", "mesh": {"cells": 64}, "contact": {"self": False},
         "time": {"duration": 2.0, "step": 0.02}, "output": {"every": 0.2, "points": 65},
     } | more  # fmt: skip
+
+
+def paid_over_drum(
+    friction: float, rate: float, clear: float = 0.3, model: str = "rod", clamp: bool = False, winch: str = "end",
+    h: float = 0.03, **more: Any,
+) -> Tables:  # fmt: skip
+    """A weightless line, pulled by 8 N, that a winch pays out over two radians of a drum; clear: m, from drum to winch."""
+    turn, far = 2.0, 1.0
+    arc = np.array([[np.cos(x), 0.0, np.sin(x)] for x in np.linspace(0.0, turn, 25)]) * CENTRELINE
+    along = np.array([-np.sin(turn), 0.0, np.cos(turn)])
+    points = [[CENTRELINE, 0.0, -far], *arc.tolist(), *([(arc[-1] + clear * along).tolist()] if clear else [])]
+    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    section = {"length": length, "mass": 0.1, "diameter": 2 * STRAND, "axial_stiffness": 2e4,
+               "bending_stiffness": 0.01, "damping": {"mass": 0.5}}  # fmt: skip
+    held = {"kind": "pinned", "position": points[-1], "payout": {"rate": rate, "ramp": 0.4}}
+    if clamp:
+        held |= {"kind": "clamped", "tangent": (along if winch == "end" else -along).tolist()}
+    pulled = {"kind": "free", "force": [0, 0, -8.0]}
+    ends = {"start": pulled, "end": held} if winch == "end" else {"start": held, "end": pulled}
+    return {
+        "environment": {"gravity": 0}, "cable": {"sections": [section]}, "obstacles": drum(friction), "ends": ends,
+        "initial": {"kind": "equilibrium", "points": points if winch == "end" else points[::-1]},
+        "model": model, "mesh": {"cells": round(length / h)}, "contact": {"self": False},
+        "time": {"duration": 3.0, "step": 0.01}, "output": {"every": 0.05, "points": 41},
+    } | more  # fmt: skip

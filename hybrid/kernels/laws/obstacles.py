@@ -28,7 +28,7 @@ import numpy as np
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, madd, mat_vec, mscale, outer, scale, sub
 from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.laws.obstacle_motion import row3, surface_velocity, swept, way_along
-from hybrid.kernels.laws.seabed import contact, stored, with_cell
+from hybrid.kernels.laws.seabed import contact, depth_of, stored, with_cell
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SEABED
 from hybrid.kernels.state.obstacle_rows import (
@@ -282,6 +282,24 @@ def stored_in_contact(line, sea, r):
         energy = stored(line, sea, r)
     if line.bits & OBSTACLES:
         energy += stored_on_obstacles(line, sea, r)
+    return energy
+
+
+@inner
+def stored_along(line, sea, r, c):
+    """Energy per length (J/m) that the bed and fixed obstacles have stored against cell c."""
+    energy = 0.0
+    if line.bits & SEABED:
+        p0, p1 = depth_of(sea, r, c), depth_of(sea, r, c + 1)
+        if p0 > 0.0 or p1 > 0.0:
+            energy = with_cell(energy, p0, p1, 1.0, sea.stiffness, sea.onset)
+    if line.bits & OBSTACLES:
+        rows = sea.obstacles
+        for k in range(rows.shape[0]):
+            thin = thinner(line, rows, k, c) if rows.shape[1] > OBSTACLE else 0.0
+            p0, p1 = depth_in(rows, k, r, c) - thin, depth_in(rows, k, r, c + 1) - thin
+            if p0 > 0.0 or p1 > 0.0:
+                energy = with_cell(energy, p0, p1, 1.0, rows[k, STIFFNESS], rows[k, ONSET_OF])
     return energy
 
 

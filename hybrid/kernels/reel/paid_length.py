@@ -103,6 +103,13 @@ def growing(line, reel):
 
 
 @inner
+def changes_length(line, reel, c):
+    """Whether the length of cell c of the line changes because line is paid out, and not because zones move."""
+    k = cell(line, reel, c)  # and back
+    return k >= growing(line, reel) or reel.since[k] > -np.inf
+
+
+@inner
 def fill_table(line, i, half):
     """The length, m, of the element at node i, if it has a table of moment: that of both halves, as on all of the reel."""
     if line.bend_law[i, LAST_A] > 0.0:

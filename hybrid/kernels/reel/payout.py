@@ -18,8 +18,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from hybrid.kernels.algebra.rotations import add, dot, frame, get3, log_rotation, scale, sub
 from hybrid.kernels.laws.axial_law import stretch_work
 from hybrid.kernels.laws.bending_law import energy_share, has_bend_law
@@ -37,6 +35,7 @@ from hybrid.kernels.reel.damping import (
 )
 from hybrid.kernels.reel.paid_length import (
     cell,
+    changes_length,
     eased,
     find_length,
     growing,
@@ -48,6 +47,7 @@ from hybrid.kernels.reel.paid_length import (
     take_riding_off,
 )
 from hybrid.kernels.reel.payout_balance import find_balance
+from hybrid.kernels.reel.payout_contact import contact_that_came, friction_of_flow, let_material_rub, rubs
 from hybrid.kernels.reel.reel import (
     ACCELERATION,
     DUE,
@@ -56,6 +56,7 @@ from hybrid.kernels.reel.reel import (
     FLUX,
     FLUX_BEFORE,
     LENGTH,
+    LENGTH_BEFORE,
     LONGEST,
     RATE,
     RIDING_ON,
@@ -82,6 +83,7 @@ from hybrid.kernels.reel.winch import (
     tension_held,
 )
 from hybrid.kernels.state import books as b
+from hybrid.kernels.state.forces import TOUCHES
 from hybrid.kernels.state.report import FORCE_A, FORCE_B, LENGTH_OUT, NET_A, PAYOUT_POWER, PAYOUT_RATE
 
 # --- the force of the fairlead --------------------------------------------------------------------
@@ -276,14 +278,7 @@ def remember(line, reel):
         before[i, 1], before[i, 2] = line.mass[i], line.force[i, 2]
         for k in range(3):
             before[i, 3 + k], before[i, 6 + k] = line.kb[i, k], line.k0[i, k]
-    reel.numbers[FLUX_BEFORE] = reel.numbers[FLUX]
-
-
-@inner
-def changes_length(line, reel, c):
-    """Whether the length of cell c of the line changes because line is paid out, and not because zones move."""
-    k = cell(line, reel, c)  # and back
-    return k >= growing(line, reel) or reel.since[k] > -np.inf
+    reel.numbers[FLUX_BEFORE], reel.numbers[LENGTH_BEFORE] = reel.numbers[FLUX], reel.numbers[LENGTH]
 
 
 @inner
@@ -322,6 +317,15 @@ def book(line, old, new, reel, dt):
                 then = before[i]
                 booked += 0.25 * (bend_that_came(line, old, i, more, then) + bend_that_came(line, new, i, more, then))
     return booked
+
+
+@inner
+def book_contact(line, sea, old, new, reel, work):
+    """Work of contact through an accepted step that is of the material which came: friction on it, what it stores."""
+    rubbed, stored = friction_of_flow(line, sea, old, new, reel), contact_that_came(line, sea, old, new, reel)
+    work[0, b.FRICTION] += rubbed
+    work[0, b.CONTACT] -= stored
+    work[0, end_of(reel)] += stored - rubbed
 
 
 @inner
@@ -395,6 +399,8 @@ def pay_out(table):
         accept(winch, numbers[LENGTH], numbers[RATE], numbers[ACCELERATION])
     job.work[0, end_of(reel)] += book(line, before, state, reel, clock[b.LAST_DT])
     job.work[0, b.ZONES] += work_of_balance(before, state, reel, clock[b.NOW], clock[b.LAST_DT])
+    if line.bits & TOUCHES:
+        book_contact(line, job.sea, before, state, reel, job.work)
     remember(line, reel)
     if count[b.CONTROLLED]:
         limit_step(reel, clock)
@@ -407,8 +413,8 @@ def pay_out(table):
 def iterate(table):
     """What an iteration of Newton's method does before it assembles its equations, and after it has eliminated them.
 
-    Nodes that ride with the fairlead have the inertia, the drag and the added mass of the material that they pass; a
-    winch that holds a tension corrects the length, and the equations with it.
+    Nodes that ride with the fairlead have the inertia, the drag, the added mass and the friction of the material that
+    they pass; a winch that holds a tension corrects the length, and the equations with it.
     """
     job = read(table)
     line, reel, clock = job.line, job.reel, job.clock
@@ -416,6 +422,8 @@ def iterate(table):
     state = job.old if job.counts[b.PARITY] else job.new
     if reel.stage[RIDING_ON] == 0.0:
         put_riding_on(line, job.sea, job.ends, state, reel, t)
+        if rubs(line):
+            let_material_rub(line, job.sea, job.new if job.counts[b.PARITY] else job.old, reel)
         return 0
     if reel.flow.shape[0] > 0:
         correct_damping_power(line, job.ends, state, reel, job.report, True)

@@ -331,6 +331,16 @@ def span_of(job, flow, g):
 
 
 @inner
+def travel_between(state, i, k, part):
+    """Travel of friction at a place between nodes i and k; that of the one that touches where the other does not."""
+    a, z = get3(state.bed, i), get3(state.bed, k)
+    one, other = dot(a, a) > 0.0, dot(z, z) > 0.0
+    if one != other:
+        return get3(state.slip, i if one else k)
+    return add(scale(1.0 - part, get3(state.slip, i)), scale(part, get3(state.slip, k)))
+
+
+@inner
 def enter(job, flow, g):
     """One more node, in the cell that grows."""
     line, target, state, out, reel, new = job.line, job.target, job.state, job.out, job.reel, job.new
@@ -362,7 +372,7 @@ def enter(job, flow, g):
     put(out.vd, at, true)
     h = place_of(line, reel, i) - place_of(line, reel, g)
     part = (place - place_of(line, reel, g)) / h
-    put(out.slip, at, add(scale(1.0 - part, get3(state.slip, before)), scale(part, get3(state.slip, behind))))
+    put(out.slip, at, travel_between(state, before, behind, part))
     cut, last = cell(line, reel, g), cell(line, reel, g - 1)
     slope = (state.T[cut] - state.T[last]) / (0.5 * (line.h[last] + h))
     kept, rises = mismatch(job, flow, g, g), tension_rate(line, state, job.clock, job.tension, cut)

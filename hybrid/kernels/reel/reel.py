@@ -32,7 +32,7 @@ FEWEST_STEPS = 8
     LENGTH, RATE, ACCELERATION,  # L, c and the rate of c at the end of the try
     PLACE,  # p
     LONGEST, SHORTEST,  # m, the last cell: beyond the first a node enters, below the second one leaves
-    SPARE,  # in checkpoints of earlier versions
+    LENGTH_BEFORE,  # L before the last step
     DUE,  # 1 when a node is to enter or to leave
     FLUX,  # W, into the line by what the corrected force of the fairlead does not do
     FLUX_BEFORE,  # and before the last step

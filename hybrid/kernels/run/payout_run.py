@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.contact.self_distance import boxes_of
+from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.march.energies import observe
@@ -26,6 +27,7 @@ from hybrid.kernels.reel.winch import at_its_end
 from hybrid.kernels.run.following_run import call, call_count, call_solver, put, put_at
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, blank_books, sample_size
+from hybrid.kernels.state.forces import TOUCHES
 from hybrid.kernels.state.state import (
     Ends,
     Floats,
@@ -213,7 +215,10 @@ def book_change(table):
     more = 0.0
     for k in range(2):  # one call for both: it is compiled once
         line, state = (job.carry.target, job.carry.out) if k else (job.carry.line, job.carry.state)
-        more = energy_of(line, job.ends, state, job.moment, job.strain, job.energy) - more
+        found = energy_of(line, job.ends, state, job.moment, job.strain, job.energy)
+        if line.bits & TOUCHES:
+            found += stored_in_contact(line, job.sea, state.r)
+        more = found - more
     job.before.work[0, b.ZONES] += more
 
 

@@ -1,0 +1,84 @@
+"""Designs: how many equilibria they take, from where they find the same, and how often stated intervals hold.
+
+pytest bench/test_bench_design.py -m bench -s
+
+RECORDS=100 makes so many random records in place of 400, which take a minute.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import norm, t
+
+import hybrid
+from hybrid.scene.design import DESIGN
+
+pytestmark = pytest.mark.bench
+RECORDS = int(os.environ.get("RECORDS", "400"))
+DESIGNS = Path(__file__).parents[1] / "examples" / "designs"
+# Of the lazy wave: diameter of the buoyancy, lengths of lower, buoyant and upper section.
+STARTS = ((0.45, 130, 50, 90), (0.5, 110, 60, 80), (0.6, 120, 30, 100), (0.42, 140, 70, 85), (0.7, 120, 25, 110))
+
+
+def test_pretension_of_a_buoy_on_three_lines() -> None:
+    found = hybrid.design(DESIGNS / "pretension.yaml")
+    print(f"pretension of three lines: {found.equilibria} equilibria, that of the check on twice the cells included")
+    assert found.equilibria <= 6
+
+
+def test_lazy_wave_from_five_starts() -> None:
+    asked = DESIGN.read(DESIGNS / "lazy_wave.yaml").asked
+    values = []
+    for start in STARTS:
+        each = zip(asked.unknowns.items(), start, strict=True)
+        unknowns = {name: x.model_copy(update={"start": float(value)}) for (name, x), value in each}
+        more = {x: getattr(asked, x) for x in ("cases", "limits", "minimise")}
+        found = hybrid.design(asked.scene, unknowns=unknowns, **more)
+        values.append(found.minimised)
+        rounds = found.equilibria / len(asked.cases)
+        print(
+            f"lazy wave from {start}: {found.minimised:.4f} m3, {found.equilibria} equilibria, {rounds:.0f} of each case"
+        )
+        assert rounds <= 40
+    assert max(values) < 1.001 * min(values)
+
+
+def test_stated_intervals_hold_the_truth(tmp_path: Path) -> None:
+    """EI of a sagging rod from records of its height at eight places, with noise of 2 % of its sag.
+
+    Chance of the records themselves is 1.1 of 100; beside it stands what linear least squares by hand has of them.
+    """
+    key, truth = "cable.sections[0].bending_stiffness", 8.0
+    scene = hybrid.load_scene(DESIGNS / "rod.yaml", [f"{key}={truth}", "mesh.cells=20"])
+    rest, s = hybrid.static(scene), np.linspace(0.25, 2.0, 8)
+    z = np.interp(s, rest.s, rest.position[-1][:, 2])
+    slopes = [
+        x.derivative for x in hybrid.sensitivity(scene, [f"position.z@{a if a < 2.0 else 'end'}" for a in s], [key])
+    ]
+    along = np.array(slopes) / np.linalg.norm(slopes)
+    noise, rng, within = 0.02 * abs(z[-1]), np.random.default_rng(0), []
+    for _ in range(RECORDS):
+        e = rng.standard_normal(s.size)
+        rows = "".join(f"{a:g},{b:.9g}\n" for a, b in zip(s, z + noise * e, strict=True))
+        (tmp_path / "record.csv").write_text("s,z\n" + rows)
+        shift = float(e @ along)
+        left = float(np.linalg.norm(e - shift * along)) / np.sqrt(s.size - 1.0)
+        linear = abs(shift) <= norm.ppf(0.975), abs(shift) <= left * t.ppf(0.975, s.size - 1)
+        for stated, by_hand in zip(({"deviation": float(noise)}, {}), linear, strict=True):
+            found = hybrid.design(
+                scene, unknowns={"EI": {"key": key, "start": 12.0}},
+                measured={"file": str(tmp_path / "record.csv")} | stated,
+            )  # fmt: skip
+            (estimate,) = found.estimates
+            within.append((estimate.low <= truth <= estimate.high, by_hand))
+    for k, what in enumerate(("stated", "of the scatter")):
+        held, by_hand = 100.0 * np.mean(within[k::2], axis=0)
+        print(
+            f"deviation {what}: EI within its 95 % in {held:.1f} of 100 of {RECORDS} records, {by_hand:.1f} by linear "
+            "least squares by hand"
+        )
+        assert abs(held - by_hand) <= 1.0

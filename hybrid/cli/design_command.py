@@ -1,0 +1,133 @@
+"""The command design: numbers of a scene for which its equilibrium is what is asked."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import hybrid
+from hybrid.cli.app import Json, Quiet, app, session
+
+if TYPE_CHECKING:
+    from hybrid.designs.design import Found, Identified, Kept
+
+WORDS = {0: "=", 1: "<=", -1: ">="}
+
+
+@app.command()
+def design(
+    source: Annotated[Path, typer.Argument(metavar="DESIGN.yaml", help="The design file.", show_default=False)],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write the scene with the numbers found.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", metavar="FILE", help="Draw before and after into a PNG, PDF or SVG.")
+    ] = None,
+    quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Find numbers of a scene for which its equilibrium is what is asked: within limits, least of something."""
+    with session(as_json, quiet) as console:
+        from hybrid.designs.design import Identified
+        from hybrid.view.save import PICTURES, check_target
+
+        console.source = ""
+        picture = check_target(plot, PICTURES) if plot is not None else None
+        if output is not None and output.exists():
+            raise hybrid.ResultError(f"{output} exists\n    try:      another name")
+        found = hybrid.design(source)
+        if output is not None:
+            output.write_text(found.scene_text(output.parent), encoding="utf-8")
+        if picture is not None:
+            from hybrid.view.design import plot_design
+
+            plot_design(found, picture)
+        console.show(lambda: _identified(found) if isinstance(found, Identified) else _tables(found))
+        for note in found.notes:
+            console.note(f"note: {note}")
+        console.json("design", **_as_data(found), scene=None if output is None else str(output),
+                     picture=None if picture is None else str(picture))  # fmt: skip
+
+
+def _as_data(found: Found) -> dict[str, Any]:
+    own = {f.name for f in dataclasses.fields(found)} & {"estimates", "apart", "count", "scatter", "stated"}
+    more: dict[str, Any] = {name: getattr(found, name) for name in sorted(own)}
+    for name in {"estimates", "apart"} & own:
+        more[name] = [x._asdict() for x in more[name]]
+    if own:
+        more["correlations"] = found.correlations.tolist()  # type: ignore[attr-defined]
+    return more | {
+        "title": found.title, "numbers": dict(found.numbers), "start": dict(found.start),
+        "kept": [dataclasses.asdict(x) for x in found.kept], "bounds": [dataclasses.asdict(x) for x in found.bounds],
+        "minimised": found.minimised, "minimised_at_start": found.minimised_at_start, "equilibria": found.equilibria,
+        "notes": list(found.notes),
+    }  # fmt: skip
+
+
+def _tables(found: Found) -> Any:
+    from rich.console import Group
+    from rich.table import Table
+
+    head = f"{found.title or 'found'}: {found.equilibria} equilibria"
+    numbers = Table(title=head, title_justify="left", box=None, padding=(0, 2), min_width=min(len(head), 80))
+    for name in ("", "found", "start", ""):
+        numbers.add_column(name, justify="left" if not name else "right")
+    at = {x.name: x for x in found.bounds}
+    for name, x in found.numbers.items():
+        bound = at.get(name)
+        word = "" if bound is None else f"at its bound ({bound.which})"
+        if bound is not None and bound.price:
+            word += f", price {bound.price:.3g}"
+        numbers.add_row(name, f"{x:.6g}", f"{found.start[name]:.6g}", word)
+    if found.minimised is not None:
+        numbers.add_row("minimised", f"{found.minimised:.6g}", f"{found.minimised_at_start:.6g}", "")
+    if not found.kept:
+        return numbers
+    kept = Table(box=None, padding=(0, 2), title_justify="left")
+    for name in ("", "result", "value", "asked", "2 x cells", "price"):
+        kept.add_column(name, justify="left" if name in ("", "result") else "right", no_wrap=name not in ("", "result"))
+    for row in shown(found.kept):
+        name = f"{row.name} ({row.case})" if row.case else row.name
+        price = f"{row.price:.3g}" if row.active and found.minimised is not None else "active" * row.active
+        finer = "" if row.finer is None else f"{row.finer:.6g}"
+        kept.add_row(name, row.result, f"{row.value:.6g}", f"{WORDS[row.side]} {row.bound:.6g}", finer, price)
+    return Group(numbers, "", kept)
+
+
+def _identified(found: Identified) -> Any:
+    from rich.console import Group
+    from rich.table import Table
+
+    left = f"{found.scatter:.3g}" + (" of the stated deviation" if found.stated else "")
+    head = f"{found.title or 'found'}: {found.count} numbers, {found.equilibria} equilibria; left over {left} (r.m.s.)"
+    table = Table(title=head, title_justify="left", box=None, padding=(0, 2), min_width=min(len(head), 80))
+    for name in ("", "found", "deviation", "95 % from", "to", "by cells", "start"):
+        table.add_column(name, justify="right" if name else "left")
+    for x in found.estimates:
+        spread = [f"{x.deviation:.3g}", f"{x.low:.6g}", f"{x.high:.6g}"]
+        spread = spread if x.deviation < float("inf") else ["not known", "", ""]
+        by_cells = f"{x.by_cells:.2g}" if x.by_cells == x.by_cells else ""
+        table.add_row(x.name, f"{x.value:.6g}", *spread, by_cells, f"{found.start[x.name]:.6g}")
+    parts: list[Any] = [table, *(f"  not told apart: {x.text}" for x in found.apart)]
+    if len(found.estimates) > 1 and (found.correlations == found.correlations).sum() > len(found.estimates):
+        related = Table(title="correlations", title_justify="left", box=None, padding=(0, 2))
+        for name in ("", *found.numbers):
+            related.add_column(name, justify="right" if name else "left")
+        for name, row in zip(found.numbers, found.correlations.tolist(), strict=True):
+            related.add_row(name, *(f"{y:.3f}" if y == y else "" for y in row))
+        parts += ["", related]
+    return Group(*parts)
+
+
+def shown(kept: tuple[Kept, ...]) -> list[Kept]:
+    """Of each limit and case what is active, else what is nearest to its bound."""
+    groups: dict[tuple[str, str, int], list[Kept]] = {}
+    for x in kept:
+        groups.setdefault((x.name, x.case, x.side), []).append(x)
+    out = []
+    for group in groups.values():
+        active = [x for x in group if x.active]
+        out += active or [min(group, key=lambda x: abs(x.value - x.bound))]
+    return out

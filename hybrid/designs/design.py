@@ -1,0 +1,298 @@
+"""Numbers of a scene for which its equilibrium is what is asked: least of something, within limits, as measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybrid.designs.equilibria import FINER, AnyScene, Equilibria, Point, scene_with
+from hybrid.designs.found_scene import text_of_found
+from hybrid.designs.identify import Apart, Estimate, fit
+from hybrid.designs.measured import Measurements, measurements
+from hybrid.designs.nearest import Space
+from hybrid.designs.optimum import ACTIVE, AT_BOUND, KEPT, Optimum, Price, is_active, optimum, reach
+from hybrid.designs.problem import Constraint, Problem, as_asked, begun, problem_of, refused_result, scenes_of, space_of
+from hybrid.errors import ComputationError, Outcome, SceneError
+from hybrid.kernels.state.state import Floats
+from hybrid.scene.design import DESIGN, Design
+from hybrid.scene.read import SceneLike
+from hybrid.scene.system import System
+from hybrid.scene.task_file import TaskFile
+
+# Parts of the largest that limits are beyond in the nearest that was found, from which one is said to be in the way.
+IN_THE_WAY = 1e-3
+# What of the slopes at an optimum may be left without a word.
+SETTLED = 1e-2
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What a target or a limit came to.
+
+    name, case, result: of which number; value: with the numbers found; bound: what it is to be, at most or at least,
+    by side (0, 1, -1); active: whether it is at its bound; price: by how much a unit more of the bound changes what is
+    minimised (0 without); finer: the value on cells half as long; None: there is no equilibrium on these.
+    """
+
+    name: str
+    case: str
+    result: str
+    value: float
+    bound: float
+    side: int
+    active: bool
+    price: float
+    finer: float | None
+
+    @property
+    def word(self) -> str:
+        return {0: "value", 1: "largest", -1: "smallest"}[self.side]
+
+
+@dataclass(frozen=True)
+class AtBound:
+    """An unknown at a bound of its own: `low` or `high`, and its price."""
+
+    name: str
+    which: str
+    price: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """Numbers that were found.
+
+    numbers, start: of unknowns, by name; kept: targets and limits; bounds: unknowns that are at one; minimised: its
+    value, and where the search began (None: nothing is); equilibria: that were computed; notes: what is doubtful.
+    scene: with the numbers, without changes of cases; scenes: of each case; before, after: places of nodes (n, 3), m,
+    by case and line; bed: height of a level seabed, m, None: none; file: the scene file, "": none.
+    """
+
+    title: str
+    numbers: Mapping[str, float]
+    start: Mapping[str, float]
+    kept: tuple[Kept, ...]
+    bounds: tuple[AtBound, ...]
+    minimised: float | None
+    minimised_at_start: float | None
+    equilibria: int
+    notes: tuple[str, ...]
+    keys: Mapping[str, tuple[str, ...]]
+    scene: AnyScene
+    scenes: Mapping[str, AnyScene]
+    before: Mapping[str, Mapping[str, Floats]]
+    after: Mapping[str, Mapping[str, Floats]]
+    bed: float | None = None
+    file: str = ""
+
+    def scene_text(self, folder: str | Path | None = None) -> str:
+        """The scene as YAML; where it was read from a file, and folder is its own, that text with other numbers."""
+        return text_of_found(self.scene, self.file, self.keys, self.numbers, folder)
+
+
+@dataclass(frozen=True)
+class Identified(Found):
+    """Numbers that were found from what was measured.
+
+    estimates: with standard deviations and 95 % intervals; correlations (n, n), NaN where not known; apart: what cannot
+    be told apart; count: numbers that were measured; scatter: root mean square of what is left, in stated deviations
+    (stated) or in the unit of what was measured; measured: places (m, 3), m, by case and line.
+    """
+
+    estimates: tuple[Estimate, ...] = ()
+    correlations: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    apart: tuple[Apart, ...] = ()
+    count: int = 0
+    scatter: float = 0.0
+    stated: bool = True
+    measured: Mapping[str, Mapping[str, Floats]] = field(default_factory=dict)
+
+
+def design(
+    source: str | PathLike[str] | Mapping[str, Any] | SceneLike | System | Design,
+    *,
+    unknowns: Mapping[str, Any] | None = None,
+    **more: Any,
+) -> Found:
+    """Find numbers of a scene for which its equilibrium is what is asked.
+
+    source: the path of a design file; or, with `unknowns`, a scene, or its path.  unknowns and more (cases, results,
+    targets, limits, minimise, measured, title): as the keys of a design file, docs/design.md.  What was measured gives
+    an `Identified`.
+
+    SceneError: the design or its scene is refused; ComputationError: there is no equilibrium where the search begins,
+    or limits and targets cannot be kept together: it says which are in the way.
+    """
+    task, scene = _task(source, unknowns, more)
+    asked = as_asked(scene, task)
+    file = task.asked.scene if scene is None else ""
+    if task.asked.measured is not None:
+        return _identified(task, asked, file)
+    problem = problem_of(task, asked)
+    try:
+        problem = begun(problem)
+    except SceneError as error:
+        raise refused_result(task, error) from None
+    return _solved(task, asked, problem, file)
+
+
+def _task(source: Any, unknowns: Mapping[str, Any] | None, more: Mapping[str, Any]) -> tuple[TaskFile[Design], Any]:
+    """The design, and the scene that it is of; None: that of the file that it names."""
+    if unknowns is None:
+        if more:
+            raise TypeError(f"{', '.join(more)}: without unknowns the source is a design file, which says it")
+        if isinstance(source, Mapping):
+            return DESIGN.of_data(source), None
+        return DESIGN.read(source), None
+    named = isinstance(source, str | PathLike)
+    data = {"scene": str(source) if named else "scene", "unknowns": unknowns, **more}
+    return DESIGN.of_data(data), None if named else source
+
+
+def _solved(task: TaskFile[Design], asked: AnyScene, problem: Problem, file: str) -> Found:
+    objective, first = problem.objective, problem.equilibria.at(problem.space.start)
+    best = _reached(problem) if objective is None else optimum(problem, objective)
+    point = best.point
+    _refuse_what_fights(problem, point)
+    notes, finer = _checked(problem, point)
+    if best.stopped:
+        notes.append(f"the search ended where it could not go on: {best.stopped}")
+    elif objective is not None and best.left > SETTLED:
+        notes.append(
+            f"the search has not settled: {100 * best.left:.2g} % of the slopes of what is minimised are held up by no "
+            "limit; try another start, or more cells"
+        )
+    space, rows = problem.space, zip(problem.constraints, best.prices, strict=True)
+    at = [
+        AtBound(name, which, float(best.bounds[i, k]))
+        for i, name in enumerate(space.names) for k, which in enumerate(("low", "high"))
+        if np.isfinite(best.bounds[i, k])
+    ]  # fmt: skip
+    return Found(
+        kept=tuple(_kept(c, price, point, finer) for c, price in rows), bounds=tuple(at),
+        minimised=None if objective is None else objective.value(point),
+        minimised_at_start=None if objective is None else objective.value(first), notes=tuple(notes),
+        **_common(task, asked, problem.equilibria, space, point, file),
+    )  # fmt: skip
+
+
+def _common(
+    task: TaskFile[Design], asked: AnyScene, equilibria: Equilibria, space: Space, point: Point, file: str
+) -> dict[str, Any]:
+    """What a `Found` has whatever was asked."""
+    return {
+        "title": task.asked.title, "numbers": dict(zip(space.names, point.x.tolist(), strict=True)),
+        "start": dict(zip(space.names, space.start.tolist(), strict=True)), "equilibria": equilibria.count,
+        "keys": dict(zip(space.names, equilibria.keys, strict=True)),
+        "scene": scene_with(asked, equilibria.keys, point.x),
+        "scenes": {case: equilibria.scene(case, point.x) for case in equilibria.scenes},
+        "before": equilibria.at(space.start).shapes(), "after": point.shapes(), "bed": _bed(asked), "file": file,
+    }  # fmt: skip
+
+
+def _identified(task: TaskFile[Design], asked: AnyScene, file: str) -> Identified:
+    measured = measurements(task, asked)
+    scenes = scenes_of(task, asked)
+    space, keys = space_of(task, asked, scenes)
+    equilibria = Equilibria(scenes, keys, measured.wanted)
+    found = fit(measured, equilibria, space)
+    edges = _at_bounds(space, found.point)
+    notes = list(found.notes)
+    notes += [f"{x.name} is at its bound ({x.which}): what was measured would have it beyond" for x in edges]
+    return Identified(
+        kept=(), bounds=tuple(edges), minimised=None, minimised_at_start=None, notes=tuple(notes),
+        estimates=found.estimates, correlations=found.correlations, apart=found.apart, count=found.count,
+        scatter=found.scatter, stated=measured.deviations is not None, measured=_places(measured, found.point),
+        **_common(task, asked, equilibria, space, found.point, file),
+    )  # fmt: skip
+
+
+def _at_bounds(space: Space, point: Point) -> list[AtBound]:
+    """Unknowns at their bounds, where nothing has a price."""
+    sizes, out = space.sizes(point.x), []
+    for name, x, low, high, size in zip(space.names, point.x, space.low, space.high, sizes, strict=True):
+        out += [
+            AtBound(name, which, 0.0) for which, b in (("low", low), ("high", high)) if abs(x - b) <= AT_BOUND * size
+        ]
+    return out
+
+
+def _places(measured: Measurements, point: Point) -> dict[str, dict[str, Floats]]:
+    """Places that were measured, with coordinates of the line that was found where they were not."""
+    out: dict[str, dict[str, Floats]] = {}
+    for (case, name), (s, places) in measured.places.items():
+        nodes, r = point.nodes(case, name), point.shapes()[case][name]
+        found = np.stack([np.interp(s, nodes, r[:, k]) for k in range(3)], axis=1)
+        seen = np.isfinite(places).any(axis=1)
+        out.setdefault(case, {})[name] = np.where(np.isfinite(places), places, found)[seen]
+    return out
+
+
+def _bed(scene: AnyScene) -> float | None:
+    seabed = scene.environment.seabed
+    return seabed.z if seabed is not None and seabed.is_level else None
+
+
+def _reached(problem: Problem) -> Optimum:
+    """Where targets and limits are kept, where nothing is minimised."""
+    point = reach(problem).point
+    prices = [Price(is_active(c, point), 0.0) for c in problem.constraints]
+    bounds = np.full((point.x.size, 2), np.nan)
+    for x in _at_bounds(problem.space, point):
+        bounds[problem.space.names.index(x.name), 0 if x.which == "low" else 1] = 0.0
+    return Optimum(point, tuple(prices), bounds, 0.0, "")
+
+
+def _kept(c: Constraint, price: Price, point: Point, finer: Floats | None) -> Kept:
+    return Kept(
+        c.name, c.case, c.result, float(point.values[c.row]), c.bound, c.side, price.active, price.price,
+        None if finer is None else float(finer[c.row]),
+    )  # fmt: skip
+
+
+def _refuse_what_fights(problem: Problem, point: Point) -> None:
+    """ComputationError: what cannot be kept, by how much, and with which unknowns at their bounds."""
+    off = [(c.off(point.values[c.row]), c) for c in problem.constraints]
+    most = max((abs(x) for x, _ in off), default=0.0)
+    if most <= KEPT:
+        return
+    fights = sorted((x for x in off if abs(x[0]) > IN_THE_WAY * most), key=lambda x: -abs(x[0]))
+    words = {0: "is to be", 1: "may be at most", -1: "has to be at least"}
+    told = [
+        f"{c.name}{f' ({c.case})' if c.case else ''}: {c.result} {words[c.side]} {c.bound:.6g}, and is "
+        f"{point.values[c.row]:.6g}"
+        for _, c in fights
+    ]  # fmt: skip
+    space, sizes = problem.space, problem.space.sizes(point.x)
+    at = [
+        f"{name} = {x:.6g}{' (its bound)' if min(abs(x - low), abs(x - high)) <= AT_BOUND * size else ''}"
+        for name, x, low, high, size in zip(space.names, point.x, space.low, space.high, sizes, strict=True)
+    ]
+    what = "these cannot all be kept" if len(fights) > 1 else "this cannot be kept"
+    detail = f"{what}; nearest is " + "; ".join(told) + ", with " + ", ".join(at)
+    raise ComputationError(Outcome.NOT_REACHED, None, None, detail)
+
+
+def _checked(problem: Problem, point: Point) -> tuple[list[str], Floats | None]:
+    """What is broken on cells half as long, and results there; None: there is no equilibrium."""
+    try:
+        finer = problem.equilibria.at(point.x, FINER).values
+    except ComputationError as error:
+        first = str(error).splitlines()[0]
+        return [f"not checked on twice the cells: {first}"], None
+    notes = []
+    for c in problem.constraints:
+        off = abs(c.off(finer[c.row]))
+        if off > ACTIVE and c.side != 0:
+            place = f"{c.name}{f' ({c.case})' if c.case else ''}"
+            change = abs(finer[c.row] - point.values[c.row])
+            notes.append(
+                f"{place}: on twice the cells {c.result} is {finer[c.row]:.6g}, {100.0 * off:.2g} % beyond its limit; "
+                f"ask for a limit that is {change:.2g} tighter, or for more cells"
+            )
+    return notes, finer

@@ -1,0 +1,111 @@
+"""Results of equilibria by unknowns, of one scene or of the cases of a design."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hybrid.designs.cable_at_rest import NO_PLACES, CableAtRest, Places
+from hybrid.designs.numbers import changed_scene, is_allowed, with_number
+from hybrid.designs.sensitivity import at_rest
+from hybrid.designs.system_at_rest import SystemAtRest
+from hybrid.kernels.state.state import Floats
+from hybrid.scene.schema import Scene
+from hybrid.scene.system import System
+
+AnyScene = Scene | System
+FINER = 0.5  # length of cells of the equilibria that check what was found, over that of others
+
+
+class Point:
+    """Equilibria of all cases with the same values of unknowns: results (R,), and what they answer to unknowns."""
+
+    def __init__(self, x: Floats, rests: Mapping[str, CableAtRest | SystemAtRest], equilibria: Equilibria) -> None:
+        self.x, self.rests, self._of = x, rests, equilibria
+        self.values = np.zeros(len(equilibria.wanted))
+        for case, rows in equilibria.rows.items():
+            self.values[rows] = rests[case].values
+        self._slopes: Floats | None = None
+
+    @property
+    def slopes(self) -> Floats:
+        """(R, n) derivatives of results by unknowns."""
+        if self._slopes is None:
+            self._slopes = np.zeros((self.values.size, self.x.size))
+            keys = [key for group in self._of.keys for key in group]
+            owner = np.repeat(np.arange(self.x.size), [len(group) for group in self._of.keys])
+            for case, rows in self._of.rows.items():
+                if rows.size:
+                    by_key = self.rests[case].by(keys).T
+                    np.add.at(self._slopes, (rows[:, None], owner[None, :]), by_key)
+        return self._slopes
+
+    def nodes(self, case: str, name: str) -> Floats:
+        """Arc lengths (N+1,) of the nodes of a line, m."""
+        rest = self.rests[case]
+        if isinstance(rest, CableAtRest):
+            return rest.model.line.s
+        return rest.lines[list(rest.scene.lines).index(name)].model.line.s
+
+    def shapes(self) -> dict[str, dict[str, Floats]]:
+        """Places (N+1, 3) of the nodes of every line, m, by case; "" is the name of a line that is alone."""
+        return {case: _shapes(x) for case, x in self.rests.items()}
+
+
+def _shapes(rest: CableAtRest | SystemAtRest) -> dict[str, Floats]:
+    if isinstance(rest, CableAtRest):
+        return {"": rest.line.state.r.copy()}
+    return {name: line.state.r.copy() for name, line in zip(rest.scene.lines, rest.lines, strict=True)}
+
+
+class Equilibria:
+    """Computes equilibria, and counts them."""
+
+    def __init__(
+        self, scenes: Mapping[str, AnyScene], keys: Sequence[tuple[str, ...]], wanted: Sequence[tuple[str, str]]
+    ) -> None:
+        """scenes: by case; keys: of each unknown; wanted: case and result, such as `tension@end`, in any order."""
+        self.scenes, self.keys, self.wanted = dict(scenes), list(keys), list(wanted)
+        self.rows = {case: np.array([k for k, x in enumerate(wanted) if x[0] == case], int) for case in scenes}
+        self.count = 0
+        self._kept: dict[bytes, Point] = {}
+        self._places: dict[str, Places] = {}  # cells of the first: others would make results jump
+
+    def at(self, x: Floats, cells: float = 1.0) -> Point:
+        """Equilibria with values (n,) of unknowns; cells: how many times as long as usual.
+
+        SceneError: a scene may not have these; ComputationError: there is no equilibrium.
+        """
+        kept = self._kept.get(x.tobytes()) if cells == 1.0 else None
+        if kept is not None:
+            return kept
+        rests = {}
+        for case in self.scenes:
+            self.count += 1
+            of = [self.wanted[k][1] for k in self.rows[case]]
+            rests[case] = at_rest(self.scene(case, x), of, cells, self._places.get(case, NO_PLACES))
+            self._places.setdefault(case, rests[case].places)
+        point = Point(x.copy(), rests, self)
+        if cells == 1.0:
+            first = [*self._kept.items()][:1]  # where a search began is asked for once more at its end
+            self._kept = dict(first + [*self._kept.items()][1:][-1:]) | {x.tobytes(): point}
+        return point
+
+    def scene(self, case: str, x: Floats) -> Any:
+        """The scene of a case with values of unknowns; SceneError: it may not have these."""
+        return scene_with(self.scenes[case], self.keys, x)
+
+
+def scene_with(scene: AnyScene, keys: Sequence[tuple[str, ...]], x: Floats) -> AnyScene:
+    """A scene with values at keys of each unknown; SceneError: it may not have these."""
+    given = [(key, float(value)) for group, value in zip(keys, x, strict=True) for key in group]
+    changed = scene
+    for key, value in given:
+        changed = with_number(changed, key, value)
+    if not is_allowed(changed):
+        for key, value in given:
+            scene = changed_scene(scene, key, value)
+        return scene
+    return changed

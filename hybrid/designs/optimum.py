@@ -1,0 +1,266 @@
+"""The least value of an expression within limits: sequential quadratic programming with exact derivatives.
+
+At an optimum the slopes of what is minimised are those of the limits that hold it up, each times its multiplier: the
+price of the limit, what a unit of it is worth.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import lsq_linear, minimize
+
+from hybrid.designs.equilibria import Point
+from hybrid.designs.nearest import STEP, Rows, nearest
+from hybrid.designs.problem import Constraint, Objective, Problem
+from hybrid.errors import ComputationError, SceneError
+from hybrid.kernels.state.state import Floats
+
+# Parts of a limit within which it is kept, and active; parts of a bound's size within which an unknown is at it.
+KEPT, ACTIVE, AT_BOUND = 1e-6, 1e-4, 1e-6
+# Part of what is minimised within which it is least; steps of one search, and searches.
+EXACT, ITERATIONS, SEARCHES = 1e-7, 60, 3
+# Steps as parts of unknowns: the first, the longest is that of `nearest`, the shortest before it is given up.
+FIRST_STEP, SHORTEST = 0.2, 1e-6
+# Of what was foretold: what a step has to gain, and from which on longer ones are believed.
+ACCEPTED, TRUSTED = 0.1, 0.7
+# A box is made narrower by SHRUNK, where there is no equilibrium by CUT; a step has to come so much nearer to limits
+# as can be, but for the part NEARER.
+SHRUNK, CUT, NEARER = 0.4, 0.2, 0.3
+# Curvature of the model at first; what a part of a limit counts at first, and at most.
+CURVATURE, PENALTY, MOST_PENALTY = 1e-2, 2.0, 1e6
+
+
+class Price(NamedTuple):
+    """What a limit or a bound is worth: change of what is minimised by a unit more of it."""
+
+    active: bool
+    price: float
+
+
+class Optimum(NamedTuple):
+    """Where it is, prices of constraints, and of lower and upper bounds of each unknown (n, 2); NaN: not at it.
+
+    left: what of the slopes of what is minimised no limit holds up, as a part of them, of those where the search began
+    or of its value, whichever is largest: 0 at an optimum.  stopped: why the search could not go on beyond it; "":
+    there was nothing to gain.
+    """
+
+    point: Point
+    prices: tuple[Price, ...]
+    bounds: Floats
+    left: float
+    stopped: str
+
+
+def reach(problem: Problem, start: Floats | None = None) -> Rows:
+    """The values nearest to keeping all constraints; residuals are by how many parts each is off."""
+
+    def off(x: Floats) -> Rows:
+        point = problem.equilibria.at(x)
+        values = np.array([c.off(point.values[c.row]) for c in problem.constraints])
+        return Rows(point, values, lambda: np.stack([_slopes(c, point) for c in problem.constraints]))
+
+    space = problem.space if start is None else problem.space._replace(start=start)
+    return nearest(off, space)
+
+
+def _slopes(constraint: Constraint, point: Point) -> Floats:
+    """(n,) slopes of how far a constraint is off: none where it is kept."""
+    if constraint.side == 0:
+        return np.asarray(point.slopes[constraint.row] / constraint.scale)
+    off = constraint.off(point.values[constraint.row]) > 0.0
+    return np.asarray(constraint.side * off * point.slopes[constraint.row] / constraint.scale)
+
+
+def kept(problem: Problem, point: Point) -> bool:
+    return all(abs(c.off(point.values[c.row])) <= KEPT for c in problem.constraints)
+
+
+def is_active(constraint: Constraint, point: Point) -> bool:
+    return bool(abs(point.values[constraint.row] - constraint.bound) <= ACTIVE * constraint.scale)
+
+
+def optimum(problem: Problem, objective: Objective) -> Optimum:
+    """Where the expression is least and all constraints are kept, or the nearest to keeping them that is found.
+
+    ComputationError, SceneError: where it begins there is no equilibrium, or no such scene.
+    """
+    x, best = problem.space.start, None
+    for _ in range(SEARCHES):
+        search = _Search(problem, objective, x)
+        point = search.run()
+        if not kept(problem, point):
+            point = reach(problem, point.x).point
+            if not kept(problem, point):
+                break
+        if best is not None and objective.value(point) >= objective.value(best) * (1.0 - EXACT):
+            break
+        best, x = point, point.x
+        if search.stopped or priced(problem, objective, point).left < ACTIVE:
+            break
+    found = priced(problem, objective, point if best is None else best)
+    return found._replace(stopped=search.stopped) if found.left > ACTIVE else found
+
+
+class _Search:
+    """Steps within a box in which linear constraints and a quadratic model are believed (Sl1QP of Fletcher).
+
+    Unknowns count in parts of their sizes where it begins, constraints in parts of their bounds, what is minimised in
+    parts of its value there.
+    """
+
+    def __init__(self, problem: Problem, objective: Objective, start: Floats) -> None:
+        self._problem, self._objective = problem, objective
+        self._here = problem.equilibria.at(start)
+        self._sizes = problem.space.sizes(start)
+        self._scale = max(abs(objective.value(self._here)), 1e-300)
+        self._hessian, self._penalty = CURVATURE * np.eye(start.size), PENALTY
+        self.stopped = ""  # why the last trial could not be computed
+
+    def run(self) -> Point:
+        """The point where nothing is gained any more."""
+        width = FIRST_STEP
+        for _ in range(ITERATIONS):
+            values, slopes = self._rows(self._here)
+            step, foretold = self._step(values, slopes, width)
+            if foretold <= EXACT:
+                break
+            there = self._tried(step)
+            gained = self._gained(there)
+            if there is not None and gained < ACCEPTED * foretold:  # limits are bent: once more with what they came to
+                step, _ = self._step(self._rows(there)[0] - slopes @ step, slopes, width)
+                there = self._tried(step)
+                gained = self._gained(there)
+            if there is not None and gained >= ACCEPTED * foretold:
+                self._learn(there)
+                self._here = there
+                width = min(2.0 * width, STEP) if gained >= TRUSTED * foretold else width
+            else:
+                width = (SHRUNK if there is not None else CUT) * min(width, float(np.abs(step).max()))
+                if width < SHORTEST:
+                    break
+        return self._here
+
+    def _tried(self, step: Floats) -> Point | None:
+        """The point after a step; None: there is no equilibrium, or no such scene."""
+        space = self._problem.space
+        try:
+            point = self._problem.equilibria.at(np.clip(self._here.x + self._sizes * step, space.low, space.high))
+        except (ComputationError, SceneError) as error:
+            self.stopped = " ".join(str(error).split())
+            return None
+        self.stopped = ""
+        return point
+
+    def _gained(self, there: Point | None) -> float:
+        """By how much a point is better than where it is now."""
+        return -np.inf if there is None else self._merit(self._here) - self._merit(there)
+
+    def _merit(self, point: Point) -> float:
+        off = float(self._values(point).max(initial=0.0))
+        return self._objective.value(point) / self._scale + self._penalty * off
+
+    def _values(self, point: Point) -> Floats:
+        """Constraints as numbers (M,) that may not be above 0; targets count to both sides."""
+        out = []
+        for c in self._problem.constraints:
+            value = c.evened(point.values[c.row])[0]
+            out += [value, -value] if c.side == 0 else [c.side * value]
+        return np.array(out, float)
+
+    def _rows(self, point: Point) -> tuple[Floats, Floats]:
+        """The same, and their slopes (M, n)."""
+        slopes = [np.zeros((0, self._sizes.size))]
+        for c in self._problem.constraints:
+            slope = c.evened(point.values[c.row])[1] * point.slopes[c.row] * self._sizes
+            slopes.append(np.stack([slope, -slope]) if c.side == 0 else c.side * slope[None])
+        return self._values(point), np.concatenate(slopes)
+
+    def _step(self, values: Floats, slopes: Floats, width: float) -> tuple[Floats, float]:
+        """The best step by the model within a box, and by how much it foretells that to be better."""
+        gradient = self._objective.slopes(self._here) * self._sizes / self._scale
+        most = max(0.0, float(values.max(initial=0.0)))
+        p, left = self._of_model(gradient, self._hessian, values, slopes, width)
+        if left > KEPT and most > KEPT:  # limits come first: as near to them as the box lets
+            _, least = self._of_model(np.zeros_like(gradient), 0.0 * self._hessian, values, slopes, width)
+            while left - least > NEARER * (most - least) and self._penalty < MOST_PENALTY:
+                self._penalty *= 4.0
+                p, left = self._of_model(gradient, self._hessian, values, slopes, width)
+        better = -float(gradient @ p + 0.5 * p @ self._hessian @ p) + self._penalty * (most - left)
+        return p, better
+
+    def _of_model(
+        self, gradient: Floats, hessian: Floats, values: Floats, slopes: Floats, width: float
+    ) -> tuple[Floats, float]:
+        """The least of a model with a penalty on the worst of constraints, and how far that is off."""
+        space, x, n, penalty = self._problem.space, self._here.x, self._sizes.size, self._penalty
+        low = np.maximum((space.low - x) / self._sizes, -width)
+        high = np.minimum((space.high - x) / self._sizes, width)
+        inside = [] if not values.size else [{
+            "type": "ineq", "fun": lambda p: p[n] - values - slopes @ p[:n],
+            "jac": lambda p: np.hstack([-slopes, np.ones((values.size, 1))]),
+        }]  # fmt: skip
+        found = minimize(
+            lambda p: float(gradient @ p[:n] + 0.5 * p[:n] @ hessian @ p[:n] + penalty * p[n]),
+            np.append(np.zeros(n), max(0.0, float(values.max(initial=0.0)))), method="SLSQP", constraints=inside,
+            jac=lambda p: np.append(gradient + hessian @ p[:n], penalty),
+            bounds=[*zip(low, high, strict=True), (0.0, None)], options={"ftol": 1e-14, "maxiter": 200},
+        )  # fmt: skip
+        p = np.clip(found.x[:n], low, high)
+        return p, max(0.0, float((values + slopes @ p).max(initial=0.0)))
+
+    def _learn(self, there: Point) -> None:
+        """Damped BFGS update of the Hessian of the Lagrangian."""
+        prices = np.array([-x.price for x in priced(self._problem, self._objective, there).prices])
+        s = (there.x - self._here.x) / self._sizes
+
+        def lagrangian(point: Point) -> Floats:
+            out = self._objective.slopes(point)
+            for c, price in zip(self._problem.constraints, prices, strict=True):
+                if price:
+                    out = out + price * point.slopes[c.row]
+            return np.asarray(out * self._sizes / self._scale)
+
+        y, B = lagrangian(there) - lagrangian(self._here), self._hessian
+        curved, bent = float(s @ y), float(s @ B @ s)
+        if bent <= 0.0:
+            return
+        if curved < 0.2 * bent:
+            part = 0.8 * bent / (bent - curved)
+            y = part * y + (1.0 - part) * B @ s
+        self._hessian = B + np.outer(y, y) / float(s @ y) - np.outer(B @ s, B @ s) / bent
+
+
+def priced(problem: Problem, objective: Objective, point: Point) -> Optimum:
+    """Prices of what holds the optimum: the multipliers that leave least of the slopes of what is minimised."""
+    space, constraints = problem.space, problem.constraints
+    sizes = space.sizes(point.x)
+    gradient = objective.slopes(point) * sizes
+    held = [k for k, c in enumerate(constraints) if is_active(c, point)]
+    at = np.stack(
+        [np.abs(point.x - space.low) <= AT_BOUND * sizes, np.abs(point.x - space.high) <= AT_BOUND * sizes], 1
+    )
+    columns = [(constraints[k].side or 1) * point.slopes[constraints[k].row] * sizes for k in held]
+    least = [-np.inf if constraints[k].side == 0 else 0.0 for k in held]
+    edges = [(i, k) for i, k in np.argwhere(at).tolist()]
+    for i, k in edges:
+        columns.append(np.eye(sizes.size)[i] * (1.0 if k else -1.0) * sizes[i])
+        least.append(0.0)
+    first = objective.slopes(problem.equilibria.at(space.start)) * space.sizes(space.start)
+    size = max(float(np.linalg.norm(gradient)), float(np.linalg.norm(first)), abs(objective.value(point)), 1e-300)
+    multipliers, left = np.zeros(len(columns)), float(np.linalg.norm(gradient)) / size
+    if columns:
+        matrix = np.stack(columns, axis=1)
+        norms = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
+        found = lsq_linear(matrix / norms, -gradient, (np.array(least), np.inf), "bvls")
+        multipliers = found.x / norms
+        left = float(np.linalg.norm(matrix @ multipliers + gradient)) / size
+    prices = [Price(False, 0.0) for _ in constraints]
+    for k, multiplier in zip(held, multipliers, strict=False):
+        prices[k] = Price(True, float(-(constraints[k].side or 1) * multiplier))
+    bounds = np.full((sizes.size, 2), np.nan)
+    for (i, k), multiplier in zip(edges, multipliers[len(held) :], strict=True):
+        bounds[i, k] = -multiplier if k else multiplier
+    return Optimum(point, tuple(prices), bounds, left, "")

@@ -1,0 +1,307 @@
+"""A design file as a problem: unknowns, equilibria of cases, what results have to keep, what is minimised."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybrid.designs.equilibria import AnyScene, Equilibria, Point
+from hybrid.designs.in_motion import COMPUTING
+from hybrid.designs.nearest import Space
+from hybrid.designs.numbers import number_of
+from hybrid.designs.sensitivity import EDGES
+from hybrid.errors import SceneError
+from hybrid.kernels.state.state import Floats
+from hybrid.outputs.probes import PROBES
+from hybrid.scene.base import Finding, Place
+from hybrid.scene.design import Design, OfEquilibrium, Unknown
+from hybrid.scene.read import as_scene_or_system, parse_either, scene_text
+from hybrid.scene.schema import Scene
+from hybrid.scene.task_file import TaskFile
+from hybrid.studies.expressions import evaluated
+
+# Part of a variable of an expression by which it is differentiated.
+PART = 1e-6
+
+
+class Constraint(NamedTuple):
+    """What one result has to keep.
+
+    name: of its target or limit; result: as of `hybrid.sensitivity`; row: of the results; side: 1: at most the bound,
+    -1: at least, 0: that; scale: what differences are parts of.
+    """
+
+    name: str
+    case: str
+    result: str
+    row: int
+    bound: float
+    side: int
+    scale: float
+
+    def off(self, value: float) -> float:
+        """By how many parts a value is beyond the bound; of a target with its sign."""
+        part = (value - self.bound) / self.scale
+        return part if self.side == 0 else max(self.side * part, 0.0)
+
+    def evened(self, value: float) -> tuple[float, float]:
+        """A number that is 0 at the bound, about as far from it as `off`, and its slope by the value: the logarithm of
+
+        what is positive, which changes more evenly with lengths.
+        """
+        if self.bound > 0.0 and value > 0.0:
+            return float(np.log(value / self.bound)), 1.0 / value
+        return (value - self.bound) / self.scale, 1.0 / self.scale
+
+
+class Objective:
+    """The expression that is minimised."""
+
+    def __init__(self, text: str, unknowns: Sequence[str], results: Mapping[str, int], task: TaskFile[Design]) -> None:
+        """results: rows of those that it may speak of, by name."""
+        self.text, self._unknowns, self._results, self._task = text, list(unknowns), dict(results), task
+
+    def value(self, point: Point) -> float:
+        """SceneError: it is no number there."""
+        return self._values([self._names(point)])[0]
+
+    def slopes(self, point: Point) -> Floats:
+        """(n,) derivatives by unknowns."""
+        names, rows, steps = self._names(point), [], []
+        for name, x in names.items():
+            steps.append(PART * (abs(x) or 1.0))
+            rows += [names | {name: x + steps[-1]}, names | {name: x - steps[-1]}]
+        values = np.array(self._values(rows))
+        by_name = dict(zip(names, (values[::2] - values[1::2]) / (2.0 * np.array(steps)), strict=True))
+        out = np.array([by_name[x] for x in self._unknowns])
+        for name, row in self._results.items():
+            if by_name[name] != 0.0:
+                out += by_name[name] * point.slopes[row]
+        return out
+
+    def _names(self, point: Point) -> dict[str, float]:
+        own = dict(zip(self._unknowns, point.x.tolist(), strict=True))
+        return own | {name: float(point.values[row]) for name, row in self._results.items()}
+
+    def _values(self, rows: Sequence[dict[str, float]]) -> list[float]:
+        try:
+            found = evaluated("minimise", self.text, rows)
+        except SceneError as error:
+            first = error.complaints[0]
+            raise self._task.refusal([Finding(("minimise",), first.expected, first.fix)]) from None
+        if any(isinstance(x, bool) or not isinstance(x, int | float) or not np.isfinite(x) for x in found):
+            expected = f"arithmetic that gives a number; with the values tried it gives {found[0]}"
+            raise self._task.refusal([Finding(("minimise",), expected)])
+        return [float(x) for x in found]
+
+
+class Problem(NamedTuple):
+    """objective: None: nothing is minimised."""
+
+    space: Space
+    equilibria: Equilibria
+    constraints: tuple[Constraint, ...]
+    objective: Objective | None
+
+
+def problem_of(task: TaskFile[Design], scene: AnyScene) -> Problem:
+    """The problem of a design; SceneError: keys, cases or results that the scene does not have."""
+    asked = task.asked
+    scenes = scenes_of(task, scene)
+    space, keys = space_of(task, scene, scenes)
+    wanted: dict[tuple[str, str], int] = {}
+    constraints, spoken = [], {}
+
+    def row(case: str, result: str) -> int:
+        return wanted.setdefault((case, result), len(wanted))
+
+    for name, aim in asked.targets.items():
+        case, result = aim.case or next(iter(scenes)), _result(task, ("targets", name), aim, aim.take or "", scene)
+        constraints.append(Constraint(name, case, result, row(case, result), aim.value, 0, abs(aim.value)))
+    for name, limit in asked.limits.items():
+        for case in limit.cases or scenes:
+            for bound, side in ((limit.largest, 1), (limit.smallest, -1)):
+                if bound is not None:
+                    for result in _pieces(task, ("limits", name), limit, "max" if side > 0 else "min", scene):
+                        constraint = Constraint(name, case, result, row(case, result), bound, side, abs(bound))
+                        constraints.append(constraint)
+    for name, each in asked.results.items():
+        case, result = each.case or next(iter(scenes)), _result(task, ("results", name), each, each.take or "", scene)
+        spoken[name] = row(case, result)
+    equilibria = Equilibria(scenes, keys, list(wanted))
+    objective = Objective(asked.minimise, space.names, spoken, task) if asked.minimise is not None else None
+    return Problem(space, equilibria, tuple(constraints), objective)
+
+
+def begun(problem: Problem) -> Problem:
+    """The problem with scales of what has to be 0: what it is where the search begins.
+
+    ComputationError: there is no equilibrium there; SceneError: results that are not there.
+    """
+    point = problem.equilibria.at(problem.space.start)
+    if problem.objective is not None:
+        problem.objective.value(point)  # refused before the search
+    scaled = [x._replace(scale=x.scale or abs(float(point.values[x.row])) or 1.0) for x in problem.constraints]
+    return problem._replace(constraints=tuple(scaled))
+
+
+def scenes_of(task: TaskFile[Design], scene: AnyScene) -> dict[str, AnyScene]:
+    """The scene of each case; "": there are none.  SceneError: one is refused."""
+    if not task.asked.cases:
+        return {"": scene}
+    text, scenes = scene_text(scene), {}
+    for name, changes in task.asked.cases.items():
+        try:
+            settings = [f"{key}={json.dumps(value)}" for key, value in changes.items()]
+            scenes[name] = parse_either(text, overrides=settings)[0]
+        except SceneError as error:
+            raise _moved(task, ("cases", name), error) from None
+    return scenes
+
+
+def space_of(
+    task: TaskFile[Design], scene: AnyScene, scenes: Mapping[str, AnyScene]
+) -> tuple[Space, list[tuple[str, ...]]]:
+    """The unknowns, and the keys of each; SceneError: keys that are none or of a case, starts out of bounds."""
+    found: list[Finding] = []
+    start, low, high = list[float](), list[float](), list[float]()
+    keys: list[tuple[str, ...]] = []
+    for name, each in task.asked.unknowns.items():
+        group = each.keys_of(name)
+        place: Place = (
+            ("unknowns", name, "keys" if each.keys else "key") if each.key or each.keys else ("unknowns", name)
+        )
+        for key in group:
+            found += _key_findings(key, place, scenes, task.asked.cases, [x for y in keys for x in y])
+        keys.append(group)
+        if not found:
+            begin = each.start if each.start is not None else number_of(next(iter(scenes.values())), group[0])
+            bounds = _bounds(each, begin)
+            found += _start_findings(name, begin, *bounds)
+            for values, x in zip((start, low, high), (begin, *bounds), strict=True):
+                values.append(x)
+    if found:
+        raise task.refusal(found)
+    return Space(tuple(task.asked.unknowns), np.array(start), np.array(low), np.array(high)), keys
+
+
+def _key_findings(
+    key: str, place: Place, scenes: Mapping[str, AnyScene], cases: Mapping[str, Any], taken: Sequence[str]
+) -> Iterator[Finding]:
+    if computing := [x for x in re.findall(r"\w+", key) if x in COMPUTING]:
+        expected = f"a key of what is there, not of how it is computed, as {computing[0]} is"
+        yield Finding(place, expected, "cable.sections[0].length, for example", given=key)
+    if key in taken:
+        yield Finding(place, "a key that no other unknown sets")
+    for case, changes in cases.items():
+        if key in changes:
+            yield Finding(place, f"a key that no case sets, as {case} does")
+    try:
+        for scene in scenes.values():
+            number_of(scene, key)
+    except SceneError as error:
+        yield Finding(place, error.complaints[0].expected, error.complaints[0].fix, given=key)
+
+
+def _bounds(each: Unknown, begin: float) -> tuple[float, float]:
+    """An unknown without any bound keeps its sign."""
+    low, high = (-np.inf if each.low is None else each.low), (np.inf if each.high is None else each.high)
+    if each.low is None and begin > 0.0 and high > 0.0:
+        low = 0.0
+    if each.high is None and begin < 0.0 and low < 0.0:
+        high = 0.0
+    return low, high
+
+
+def _start_findings(name: str, begin: float, low: float, high: float) -> Iterator[Finding]:
+    if begin == 0.0 and not (np.isfinite(low) and np.isfinite(high)):
+        yield Finding(
+            ("unknowns", name), "low and high, or a start that is not 0", "low: 1, high: 3", given="0 to start"
+        )
+    elif not low <= begin <= high:
+        expected = f"a start between low and high: the number of the scene, {begin:g}, is not"
+        yield Finding(("unknowns", name, "start"), expected)
+
+
+def _moved(task: TaskFile[Design], at: Place, error: SceneError) -> SceneError:
+    """What was refused of a scene, at a place of the design."""
+    found = []
+    for x in error.complaints:
+        changed = task.asked.cases[str(at[1])] if at[0] == "cases" else {}
+        place = (*at, x.where) if x.where in changed else at
+        found.append(Finding(place, x.expected, x.fix, given=f"{x.where}: {x.value}"))
+    return task.refusal(found)
+
+
+def _result(task: TaskFile[Design], at: Place, asked: OfEquilibrium, take: str, scene: AnyScene) -> str:
+    """A result as `hybrid.sensitivity` names it; SceneError: the scene has no such line or section."""
+    quantity = asked.quantity.split(".")[0]
+    if quantity in EDGES and at[0] != "targets":
+        fix = "a target, which takes it as it is"
+        expected = "a result that changes evenly: where contact begins goes by the nodes that come to the bed"
+        raise task.refusal([Finding((*at, "quantity"), expected, fix)])
+    several = not isinstance(scene, Scene)
+    names = [] if isinstance(scene, Scene) else list(scene.lines)
+    if several and asked.line not in names:
+        raise task.refusal([Finding((*at, "line"), f"one of: {', '.join(names)}")])
+    if not several and asked.line is not None:
+        raise task.refusal([Finding((*at, "line"), "nothing: the scene has one line")])
+    place = f"@sections[{asked.section}]" if asked.section is not None else ""
+    if asked.at is not None:
+        place = f"@{asked.at}" if isinstance(asked.at, str) else f"@{asked.at!r}"
+    sections = cable_of(scene, asked.line).sections
+    if asked.section is not None and asked.section >= len(sections):
+        expected = f"a section of the line, which has {len(sections)}, counted from 0"
+        raise task.refusal([Finding((*at, "section"), expected)])
+    if _has_places(asked) and asked.at is None and not take:
+        raise task.refusal([Finding((*at, "at"), "a place, or take: max or min along the line", "at: end")])
+    extreme = f"{take} " if _has_places(asked) and asked.at is None else ""
+    return f"{extreme}{f'{asked.line}/' if several else ''}{asked.quantity}{place}"
+
+
+def _has_places(asked: OfEquilibrium) -> bool:
+    """Whether a quantity has a value at every place of a line."""
+    name = asked.quantity.split(".")[0]
+    return name in PROBES and "s" in PROBES[name].dims
+
+
+def _pieces(task: TaskFile[Design], at: Place, asked: OfEquilibrium, take: str, scene: AnyScene) -> Iterable[str]:
+    """The results that a limit holds: of all of a line one for each section, whose largest values change evenly where
+
+    the largest of all jumps from one to another.
+    """
+    whole = _result(task, at, asked, take, scene)
+    count = len(cable_of(scene, asked.line).sections)
+    if asked.at is not None or asked.section is not None or count == 1 or not _has_places(asked):
+        return [whole]
+    return [_result(task, at, asked.model_copy(update={"section": k}), take, scene) for k in range(count)]
+
+
+def cable_of(scene: AnyScene, line: str | None) -> Any:
+    """The cable of a line; None: of a scene of one."""
+    return scene.cable if isinstance(scene, Scene) else scene.lines[line or ""].cable
+
+
+def refused_result(task: TaskFile[Design], error: SceneError) -> SceneError:
+    """What was refused of results when they were first computed, at the table that asks for them."""
+    found = []
+    for x in error.complaints:
+        places = [
+            (table, name, "quantity") for table in ("targets", "limits", "results")
+            for name, each in getattr(task.asked, table).items()
+            if each.quantity == x.value or re.search(rf"(^|[ /]){re.escape(each.quantity)}($|@)", x.value)
+            or each.quantity.split(".")[0] == x.value
+        ]  # fmt: skip
+        if x.where != "of" or not places:
+            return error
+        found.append(Finding(places[0], x.expected, x.fix))
+    return task.refusal(found)
+
+
+def as_asked(scene: Any, task: TaskFile[Design]) -> AnyScene:
+    """The scene of a design; None: that of the file that it names."""
+    return as_scene_or_system(task.asked.scene if scene is None else scene)

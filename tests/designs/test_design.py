@@ -1,0 +1,290 @@
+"""Designs against closed forms: what is found, prices of limits, refusals that say what is in the way."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from typer.testing import CliRunner
+
+import hybrid
+from hybrid.cli.commands import app
+
+G = 9.81
+HANGING = {
+    "environment": {"gravity": G},
+    "cable": {"sections": [{"length": 40.0, "mass": 5.0, "axial_stiffness": 1e12}]},
+    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
+    "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 10},
+}  # fmt: skip
+LENGTH, MASS = "cable.sections[0].length", "cable.sections[0].mass"
+TOP = {"quantity": "tension", "at": "start"}
+
+
+def test_length_of_an_inextensible_catenary_for_a_tension():
+    """Ends level and 100 m apart: T = w a cosh(50 / a), length 2 a sinh(50 / a); on 400 cells to 1e-5."""
+    ends = {k: {"kind": "pinned", "position": [x, 0, 0]} for k, x in (("start", 0.0), ("end", 100.0))}
+    section = {"length": 110.0, "mass": 4.0}
+    scene = HANGING | {"cable": {"sections": [section]}, "ends": ends, "mesh": {"cells": 400}}
+    found = hybrid.design(
+        scene, unknowns={"length": {"key": LENGTH, "low": 102, "high": 140}},
+        targets={"top": {"quantity": "tension", "at": "end", "value": 4000.0}},
+    )  # fmt: skip
+    a = brentq(lambda a: 4.0 * G * a * math.cosh(50.0 / a) - 4000.0, 60.0, 500.0)
+    assert found.numbers["length"] == pytest.approx(2.0 * a * math.sinh(50.0 / a), rel=2e-5)
+    assert found.kept[0].active and found.minimised is None and found.equilibria < 12
+    sought = hybrid.seek(scene, {"tension@end": 4000.0}, [LENGTH])
+    assert sought.numbers[LENGTH] == pytest.approx(found.numbers["length"], rel=1e-8)
+
+
+def test_stiffness_of_a_cantilever_for_a_deflection():
+    """w L^4 / 8 EI, of a deflection of 1 % of the length, whose square it leaves out."""
+    section = {
+        "length": 2.0,
+        "mass": 0.5,
+        "axial_stiffness": 1e8,
+        "bending_stiffness": 300.0,
+        "torsional_stiffness": 1e3,
+    }
+    clamp = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}
+    scene = HANGING | {"cable": {"sections": [section]}, "ends": {"start": clamp, "end": "free"}, "model": "rod",
+                       "mesh": {"cells": 80}}  # fmt: skip
+    found = hybrid.design(
+        scene, unknowns={"cable.sections[0].bending_stiffness": {"low": 50, "high": 5000}},
+        targets={"tip": {"quantity": "position.z", "at": "end", "value": -0.02}},
+    )  # fmt: skip
+    (EI,) = found.numbers.values()
+    assert pytest.approx(0.5 * G * 2.0**4 / (8 * 0.02), rel=1e-3) == EI
+
+
+def test_an_optimum_with_its_multiplier():
+    """The least of (mass - 6)^2 + ((length - 50) / 10)^2 where mass x length x g is at most 1962 N: by hand."""
+    found = hybrid.design(
+        HANGING, unknowns={"mass": {"key": MASS, "low": 1, "high": 20}, "length": {"key": LENGTH, "low": 10, "high": 90}},
+        limits={"top": TOP | {"largest": 1962.0}}, minimise="(mass - 6)**2 + ((length - 50) / 10)**2",
+    )  # fmt: skip
+
+    def along(mass: float) -> float:  # slope of what is minimised along mass x length = 200
+        length = 200.0 / mass
+        return 2 * (mass - 6) - 2 * (length - 50) / 100 * 200.0 / mass**2
+
+    mass = brentq(along, 4.0, 6.0)
+    length = 200.0 / mass
+    assert found.numbers == pytest.approx({"mass": mass, "length": length}, rel=1e-5)
+    (top,) = found.kept
+    assert top.active and top.finer == pytest.approx(1962.0, rel=1e-9)
+    assert top.price == pytest.approx(2 * (mass - 6) / (G * length), rel=1e-4)  # less where more is allowed
+    more = hybrid.design(
+        HANGING, unknowns={"mass": {"key": MASS, "low": 1, "high": 20}, "length": {"key": LENGTH, "low": 10, "high": 90}},
+        limits={"top": TOP | {"largest": 1972.0}}, minimise="(mass - 6)**2 + ((length - 50) / 10)**2",
+    )  # fmt: skip
+    assert more.minimised - found.minimised == pytest.approx(10 * top.price, rel=0.02)
+
+
+def test_a_bound_and_its_price():
+    found = hybrid.design(HANGING, unknowns={"length": {"key": LENGTH, "low": 10, "high": 90}}, minimise="-3*length")
+    assert found.numbers["length"] == 90.0 and not found.kept
+    (bound,) = found.bounds
+    assert (bound.name, bound.which) == ("length", "high") and bound.price == pytest.approx(-3.0, rel=1e-6)
+
+
+def test_the_least_within_bounds_needs_no_limit():
+    found = hybrid.design(
+        HANGING, unknowns={"length": {"key": LENGTH, "low": 10, "high": 90}}, results={"top": TOP},
+        minimise="(top / 1000 - 1.5)**2",
+    )  # fmt: skip
+    assert found.numbers["length"] == pytest.approx(1500.0 / 5.0 / G, rel=1e-4) and not found.notes
+
+
+def test_limits_hold_in_all_cases():
+    """The longest line of which a heavier end, in one case, may pull at 3 kN."""
+    found = hybrid.design(
+        HANGING, unknowns={"length": {"key": LENGTH, "low": 10, "high": 90}}, minimise="-length",
+        cases={"light": {}, "heavy": {"ends.end": {"kind": "free", "force": [0, 0, -1000.0]}}},
+        limits={"top": TOP | {"largest": 3000.0}},
+    )  # fmt: skip
+    assert found.numbers["length"] == pytest.approx(2000.0 / 5.0 / G, rel=1e-6)
+    assert {x.case: x.active for x in found.kept} == {"light": False, "heavy": True}
+    assert found.kept[1].price == pytest.approx(-1.0 / 5.0 / G, rel=1e-5)
+    assert found.scene.ends.end.force is None and found.scenes["heavy"].ends.end.force is not None
+
+
+def test_what_cannot_be_reached_says_which_limits_fight():
+    """5 to 7 kg/m of 40 m pull with 1962 N at least; as far beyond one as beyond the other, in squares of parts."""
+    unknowns = {"mass": {"key": MASS, "low": 5, "high": 7}}
+    limits = {"top": TOP | {"largest": 1000.0}, "weight": {"quantity": "reaction_start.z", "smallest": 2500.0}}
+    with pytest.raises(hybrid.ComputationError) as raised:
+        hybrid.design(HANGING, unknowns=unknowns, limits=limits)
+    text = str(raised.value)
+    assert raised.value.outcome == hybrid.Outcome.NOT_REACHED
+    assert "these cannot all be kept" in text and "top: tension@start may be at most 1000" in text
+    assert "weight: reaction_start.z has to be at least 2500" in text and "mass = 5 (its bound)" in text
+    with pytest.raises(hybrid.ComputationError, match=r"this cannot be kept.*top: .* and is 1962"):
+        hybrid.design(HANGING, unknowns=unknowns, limits={"top": limits["top"]}, minimise="mass")
+    with pytest.raises(
+        hybrid.ComputationError, match=r"top: tension@start is to be 3000, and is 2746.8, with mass = 7"
+    ):
+        hybrid.design(HANGING, unknowns=unknowns, targets={"top": TOP | {"value": 3000.0}})
+
+
+def test_an_end_of_what_can_be_is_said():
+    """The shortest line between two places: beyond it the line would stretch by more than its 5 %."""
+    ends = {k: {"kind": "pinned", "position": [x, 0, 0]} for k, x in (("start", 0.0), ("end", 100.0))}
+    section = {"length": 105.0, "mass": 4.0, "axial_stiffness": 1e5}
+    scene = HANGING | {"cable": {"sections": [section]}, "ends": ends}
+    found = hybrid.design(scene, unknowns={"length": {"key": LENGTH, "low": 50, "high": 140}}, minimise="length")
+    (note,) = (x for x in found.notes if x.startswith("the search ended where it could not go on"))
+    assert "max_strain" in note or "stretch" in note
+    assert found.numbers["length"] == pytest.approx(100.0 / 1.05, rel=5e-3) and found.equilibria < 40
+
+
+SCENE = """\
+# A line that hangs.
+environment: {gravity: 9.81}
+cable:
+  sections:
+    - {length: 40, mass: 5, axial_stiffness: 1.0e+12}   # of steel
+ends:
+  start: {kind: pinned, position: [0, 0, 0]}
+  end: free
+initial: equilibrium
+model: catenary
+mesh: {cells: 10}
+"""
+DESIGN = """\
+title: As long as can be
+scene: line.yaml
+unknowns:
+  length: {key: "cable.sections[0].length", low: 10, high: 90}
+minimise: -length
+limits:
+  top: {quantity: tension, at: start, largest: 3000}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("line.yaml").write_text(SCENE)
+    Path("design.yaml").write_text(DESIGN)
+    return tmp_path
+
+
+def test_the_command(folder):
+    told = CliRunner().invoke(app, ["design", "design.yaml", "-o", "found.yaml", "--plot", "found.svg"])
+    assert told.exit_code == 0, told.output
+    assert "As long as can be" in told.output and "<= 3000" in told.output and "-0.0204" in told.output
+    text = Path("found.yaml").read_text()
+    assert "# A line that hangs." in text and "# of steel" in text and "length: 40" not in text
+    assert hybrid.load_scene("found.yaml").cable.length == pytest.approx(3000 / 5 / G, rel=1e-6)
+    assert "<svg" in Path("found.svg").read_text()
+    assert CliRunner().invoke(app, ["design", "design.yaml", "-o", "found.yaml"]).exit_code == 1  # it is there
+    told = CliRunner().invoke(app, ["design", "design.yaml", "--json"])
+    (row,) = [x for x in map(json.loads, told.output.splitlines()) if "numbers" in x]
+    assert row["kept"][0]["active"] and row["minimised"] == pytest.approx(-3000 / 5 / G, rel=1e-6)
+
+
+def test_the_scene_found_stands_by_itself_where_its_text_cannot_be_changed(folder):
+    """A number of an alias is that of other places, too."""
+    first = "    - {length: 40, mass: 5, axial_stiffness: 1.0e+12}   # of steel\n"
+    second = "    - {length: *l, mass: 5, axial_stiffness: 1.0e+12}\n"
+    Path("line.yaml").write_text(SCENE.replace(first, first.replace("length: 40", "length: &l 40") + second))
+    text = hybrid.design("design.yaml").scene_text(folder)
+    lengths = [x.length for x in hybrid.parse_scene(text).cable.sections]
+    assert lengths == pytest.approx([3000 / 5 / G - 40.0, 40.0], rel=1e-5)
+
+
+REFUSED = {
+    "a key that is none": ("sections[0].length", "sections[0].lenght", "design.yaml:4:17: unknowns.length.key", "number"),
+    "a key of how it is computed": ("cable.sections[0].length", "mesh.cells", "design.yaml:4:17: unknowns.length.key",
+                                    "as mesh is"),
+    "bounds": ("high: 90", "high: 5", "design.yaml:4:60: unknowns.length.high", "above low, 10"),
+    "a start out of bounds": ("low: 10", "low: 60", "design.yaml:4:11: unknowns.length", "the number of the scene, 40"),
+    "a quantity": ("quantity: tension", "quantity: tensoin", "design.yaml:7:19: limits.top.quantity", "one of"),
+    "no limit": (", largest: 3000", "", "design.yaml:7:8: limits.top", "largest, smallest, or both"),
+    "an expression": ("-length", "-lenght", "design.yaml:5:11: minimise", "arithmetic"),
+    "no number": ("-length", "length > 3", "design.yaml:5:11: minimise", "gives a number"),
+    "in motion": ("at: start,", "at: start, in: motion,", "design.yaml:7:39: limits.top.in", "hybrid sensitivity --motion"),
+    "a line": ("at: start,", "at: start, line: east,", "design.yaml:7:45: limits.top.line", "one line"),
+    "a section": ("at: start,", "section: 1,", "design.yaml:7:37: limits.top.section", "has 1"),
+    "a place": ("at: start,", "at: 50,", "design.yaml:7:19: limits.top.quantity", "between 0 and 40"),
+    "an edge of contact": ("quantity: tension", "quantity: touchdown", "design.yaml:7:19: limits.top.quantity", "evenly"),
+    "a case": ("at: start,", "at: start, cases: [far],", "design.yaml:7:46: limits.top.cases", "there are no cases"),
+    "nothing asked": (DESIGN[DESIGN.index("minimise") :], "", "design.yaml:1:1: scene", "what is asked"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_bad_files_are_refused_with_their_line(folder, name):
+    old, new, place, expected = REFUSED[name]
+    assert old in DESIGN
+    Path("design.yaml").write_text(DESIGN.replace(old, new))
+    with pytest.raises(hybrid.SceneError) as raised:
+        hybrid.design("design.yaml")
+    assert place in str(raised.value) and expected in str(raised.value), raised.value
+
+
+def test_bad_cases_are_refused_with_their_line(folder):
+    cases = 'cases:\n  far: {"cable.sections[0].lenght": 3}\n'
+    Path("design.yaml").write_text(DESIGN + cases)
+    with pytest.raises(
+        hybrid.SceneError, match=r"design\.yaml:9:37: cases\.far\.cable\.sections\[0\]\.lenght[^$]*did you mean length"
+    ):
+        hybrid.design("design.yaml")
+    Path("design.yaml").write_text(DESIGN + 'cases:\n  far: {"cable.sections[0].length": 30}\n')
+    with pytest.raises(hybrid.SceneError, match=r"design\.yaml:4:17: unknowns\.length\.key[^$]*no case sets, as far"):
+        hybrid.design("design.yaml")
+    Path("design.yaml").write_text(DESIGN + "cases: {a: {}, b: {}}\nresults: {end: {quantity: tension, at: end}}\n")
+    with pytest.raises(hybrid.SceneError, match=r"results\.end\.case[^$]*the case in which it is meant, one of: a, b"):
+        hybrid.design("design.yaml")
+
+
+def test_extremes_of_sections():
+    """Sections whose largest curvatures differ; the whole has the largest of them."""
+    rope = {"mass": 5.0, "axial_stiffness": 1e8, "bending_stiffness": 50.0}
+    ends = {k: {"kind": "pinned", "position": [x, 0, 0]} for k, x in (("start", 0.0), ("end", 25.0))}
+    scene = hybrid.validate_scene(HANGING | {
+        "cable": {"sections": [rope | {"length": 20.0}, rope | {"length": 20.0, "mass": 9.0}]}, "ends": ends,
+        "model": "rod", "mesh": {"cells": 80},
+    })  # fmt: skip
+    of = ["max curvature", "max curvature@sections[0]", "max curvature@sections[1]", "min position.z@sections[0]"]
+    found = [x.result for x in hybrid.sensitivity(scene, of, [LENGTH])]
+    rest = hybrid.static(scene)
+    first = rest.s <= 20.0 + 1e-9
+    curvature, z = rest.curvature[-1], rest.position[-1][:, 2]
+    theirs = [curvature.max(), curvature[first].max(), curvature[~first].max(), z[first].min()]
+    np.testing.assert_allclose(found, theirs, rtol=5e-3)
+    assert found[0] == max(found[1:3])
+    with pytest.raises(hybrid.SceneError, match=r"which has 2, counted from 0"):
+        hybrid.sensitivity(scene, ["max curvature@sections[2]"], [LENGTH])
+
+
+def test_cells_go_along_with_their_sections():
+    """Where a length would give a section another number of its cells, they stay, and there is a derivative."""
+    rope = {"mass": 5.0, "axial_stiffness": 1e7}
+    ends = {k: {"kind": "pinned", "position": [x, 0, 0]} for k, x in (("start", 0.0), ("end", 25.0))}
+    scene = hybrid.validate_scene(HANGING | {
+        "cable": {"sections": [rope | {"length": 10.0}, rope | {"length": 20.0}]}, "ends": ends, "mesh": {"cells": 40},
+    })  # fmt: skip
+    rounds = [x for x in np.linspace(10.0, 10.3, 31) if _cells(scene, x * (1 - 1e-4)) != _cells(scene, x * (1 + 1e-4))]
+    exact = [hybrid.sensitivity(scene, ["tension@end"], ["cable.sections[0].length"])[0]]
+    for x in rounds[:1] or [10.128205]:
+        changed = hybrid.validate_scene(_with(scene, x))
+        exact.append(hybrid.sensitivity(changed, ["tension@end"], ["cable.sections[0].length"])[0])
+    assert exact[1].derivative == pytest.approx(exact[0].derivative, rel=0.2)
+
+
+def _with(scene, length):
+    tables = scene.model_dump(mode="json", exclude_none=True)
+    tables["cable"]["sections"][0]["length"] = float(length)
+    return tables
+
+
+def _cells(scene, length):
+    from hybrid.model.build import build
+
+    return int(np.searchsorted(build(hybrid.validate_scene(_with(scene, length))).line.s, length - 1e-6))

@@ -1,0 +1,143 @@
+"""Numbers from what was measured: closed forms of their deviations, and what cannot be told apart."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import hybrid
+from hybrid.cli.commands import app
+
+EI, MASS = "cable.sections[0].bending_stiffness", "cable.sections[0].mass"
+G, W = 9.81, 0.05
+TRUE = 12.0  # N m2
+SCENE = f"""\
+environment: {{gravity: {G}}}
+cable: {{sections: [{{length: 2, mass: {W}, axial_stiffness: 1.0e+8, bending_stiffness: 20, torsional_stiffness: 20}}]}}
+ends:
+  start: {{kind: clamped, position: [0, 0, 0], tangent: [1, 0, 0]}}
+  end: free
+initial: equilibrium
+model: rod
+mesh: {{cells: 40}}
+"""
+DESIGN = f"""\
+scene: rod.yaml
+unknowns:
+  EI: {{key: "{EI}", low: 2, high: 200}}
+measured: {{file: shape.csv, deviation: 0.001}}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("rod.yaml").write_text(SCENE)
+    Path("design.yaml").write_text(DESIGN)
+    write(shape())
+    return tmp_path
+
+
+def shape(columns=("z",), s=(2.0,), mass=W):
+    """What a rod of TRUE has at places."""
+    rest = hybrid.static(hybrid.load_scene("rod.yaml", [f"{EI}={TRUE}", f"{MASS}={mass}"]))
+    of = {"x": rest.position[-1][:, 0], "z": rest.position[-1][:, 2], "tension": rest.tension[-1]}
+    return {"s": np.array(s)} | {x: np.interp(s, rest.s, of[x]) for x in columns}
+
+
+def write(table):
+    rows = [",".join(f"{x:.12g}" for x in row) for row in zip(*table.values(), strict=True)]
+    Path("shape.csv").write_text("\n".join(["# measured", ",".join(table), *rows]) + "\n")
+
+
+def test_stiffness_and_its_deviation(folder):
+    """z = -w L^4 / 8 EI at the tip: d EI = EI d z / z, of a deflection of 4 % of the length within 1 %."""
+    found = hybrid.design("design.yaml")
+    (estimate,) = found.estimates
+    assert estimate.value == pytest.approx(TRUE, rel=1e-6) and found.equilibria < 10
+    sag = W * G * 2.0**4 / (8 * TRUE)
+    assert estimate.deviation == pytest.approx(TRUE * 0.001 / sag, rel=0.01)
+    assert estimate.high - estimate.low == pytest.approx(2 * 1.96 * estimate.deviation, rel=1e-3)
+    assert not found.apart and found.count == 1
+    assert abs(estimate.by_cells) < 1e-3 * TRUE and estimate.by_cells != 0.0
+
+
+def test_only_the_ratio_of_stiffness_and_mass_is_known(folder):
+    write(shape(("x", "z"), np.linspace(0.25, 2.0, 8)))
+    Path("design.yaml").write_text(
+        DESIGN.replace("measured:", f'  mass: {{key: "{MASS}", low: 0.01, high: 1}}\nmeasured:')
+    )
+    told = CliRunner().invoke(app, ["design", "design.yaml"])
+    assert told.exit_code == 0, told.output
+    assert f"EI and mass: only their ratio is known, EI / mass = {TRUE / W:.0f}" in told.output
+    assert told.output.count("not known") == 2
+    found = hybrid.design("design.yaml")
+    assert all(np.isinf(x.deviation) for x in found.estimates)
+    assert found.numbers["EI"] / found.numbers["mass"] == pytest.approx(TRUE / W, rel=1e-5)
+    (apart,) = found.apart
+    assert apart.parts == pytest.approx({"EI": 1.0, "mass": 1.0}, rel=1e-3)
+
+
+def test_another_kind_of_measurement_tells_them_apart(folder):
+    """The tension half way is the weight of what hangs beyond times the slope, which mass alone scales."""
+    write(shape(("z", "tension"), (1.0, 2.0)))
+    text = DESIGN.replace("measured:", f'  mass: {{key: "{MASS}", low: 0.01, high: 1}}\nmeasured:')
+    Path("design.yaml").write_text(text.replace("deviation: 0.001", "deviations: {z: 0.001, tension: 0.0005}"))
+    found = hybrid.design("design.yaml")
+    assert not found.apart and found.numbers == pytest.approx({"EI": TRUE, "mass": W}, rel=1e-5)
+    assert found.correlations[0, 1] > 0.5  # both rise together
+    Path("design.yaml").write_text(text)
+    assert hybrid.design("design.yaml").estimates[1].deviation > found.estimates[1].deviation  # 1 mN for 0.5 mN
+
+
+def test_what_was_measured_scatters(folder):
+    """Without a deviation that of the scatter, with Student's factor of 7; one that is too small is said."""
+    s = np.linspace(0.25, 2.0, 8)
+    table = shape(("z",), s)
+    table["z"] = table["z"] + 0.002 * np.array([1, -1, -1, 1, 1, -1, -1, 1])
+    write(table)
+    Path("design.yaml").write_text(DESIGN.replace(", deviation: 0.001", ""))
+    free = hybrid.design("design.yaml")
+    assert free.scatter == pytest.approx(0.002, rel=0.05) and not free.notes
+    (estimate,) = free.estimates
+    assert (estimate.high - estimate.value) / estimate.deviation == pytest.approx(2.3646, rel=1e-3)
+    Path("design.yaml").write_text(DESIGN.replace("0.001", "0.0005"))
+    (note,) = hybrid.design("design.yaml").notes
+    assert note.startswith("what is left is 4.") and "times the stated deviation" in note
+
+
+def test_a_bound_that_is_in_the_way_is_said(folder):
+    Path("design.yaml").write_text(DESIGN.replace("low: 2,", "low: 15,"))
+    found = hybrid.design("design.yaml")
+    assert found.numbers["EI"] == 15.0 and any("EI is at its bound (low)" in x for x in found.notes)
+
+
+BAD = {
+    "no s": ("x,z\n2,-0.08\n", "shape.csv:1: measured.file", "a column s"),
+    "an unknown column": ("s,zz\n2,-0.08\n", "shape.csv:1: measured.file", "a column of x, y, z, or one of: tension"),
+    "no number": ("s,z\n1,-0.02\n2,low\n", "shape.csv:3: z", "a number, or nothing"),
+    "beyond the end": ("s,z\n\n2.5,-0.08\n", "shape.csv:3: s", "between 0 and 2 m"),
+    "a short row": ("s,z\n2\n", "shape.csv:2: measured.file", "2, one for each column"),
+    "nothing": ("s,z\n2,\n", "shape.csv: measured.file", "at least one number"),
+    "two kinds": ("s,z,tension\n2,1,1\n", "design.yaml", "a deviation of every column"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_tables_are_refused_with_their_line(folder, name):
+    text, place, expected = BAD[name]
+    Path("shape.csv").write_text(text)
+    if name == "two kinds":
+        Path("design.yaml").write_text(DESIGN.replace(", deviation: 0.001", ""))
+    with pytest.raises(hybrid.SceneError) as raised:
+        hybrid.design("design.yaml")
+    assert place in str(raised.value) and expected in str(raised.value), raised.value
+
+
+def test_nothing_else_is_asked_beside_what_was_measured(folder):
+    Path("design.yaml").write_text(DESIGN + "minimise: EI\n")
+    with pytest.raises(hybrid.SceneError, match=r"design\.yaml:5:11: minimise[^$]*found from what was measured"):
+        hybrid.design("design.yaml")
