@@ -252,6 +252,7 @@ class PayingOut:
         if model.line.law.size:  # laws as the last step has linearised them
             changed.line.ck[:], changed.line.law[:, SHIFT:] = model.line.ck[source], model.line.law[source, SHIFT:]
         reel, out = self._blank(material), state_for(changed.line)
+        self._fit(changed.line, reel, length, run.t)  # what new cells lack goes by what they are made of
         self._carrying.bind(
             line=model.line, target=changed.line, state=state, out=out, reel=old, new=reel, clock=run.clock,
             tension=run.tension, nodes=self._nodes,

@@ -161,6 +161,37 @@ def test_heavier_line_on_the_reel() -> None:
     assert np.abs(result["work/scheme"]).max() < 1e-3 * np.abs(result["work/end"]).max()
 
 
+def test_softer_line_on_the_reel() -> None:
+    """Hanging: pull = w L + damping but for the wave that softer material sends as it comes, 0.4 %; its length at rest.
+
+    A node that enters at the change of section parts a cell of both: what each part lacks is by its own stiffness.
+    """
+    section = {"length": 40.0, "mass": 2.0, "axial_stiffness": 1e5, "damping": {"mass": 0.3}}
+    reel = [section | {"length": 3.3}, section | {"length": 50.0, "axial_stiffness": 5e4}]
+    scene = hanging({"rate": 0.5, "ramp": 2.0, "until": 20.0, "reel": reel}, 40.0, output={"every": 0.1})
+    scene["cable"] = {"sections": [section]}
+    result = hybrid.run(scene)
+    length, t = result["payout/length"], result.t
+    held = 2.0 * length * (G - 0.3 * result["payout/rate"])
+    off = np.abs(result["reaction_end"][:, 2] / held - 1.0)[(t > 4.0) & (t < 19.0)]
+    assert 1e-3 < off.max() < 5e-3
+    out, stiff = length[-1], 43.3
+    stretch = G * (stiff**2 / 1e5 + (out**2 - stiff**2) / 5e4)
+    assert result.position[-1, 0, 2] == pytest.approx(-(out + stretch), rel=1e-5)
+    assert np.abs(result["work/scheme"]).max() < 3e-5 * np.abs(result["work/end"]).max()
+
+
+@pytest.mark.parametrize(("EA", "EI"), [(2e6, 8e4), (5e5, 2e4)])
+def test_energy_is_balanced_as_another_section_leaves_a_clamp(EA: float, EI: float) -> None:
+    """Its stiffness changes in all elements that ride, that at the clamp too, and its compliance in the cells."""
+    scene = clamped(sagging("rod", 2e6, 2e4, duration=12.0))
+    section = scene["cable"]["sections"][0]
+    other = section | {"length": 50.0, "axial_stiffness": EA, "bending_stiffness": EI}
+    scene["ends"]["end"]["payout"]["reel"] = [section | {"length": 1.3}, other]
+    result = hybrid.run(scene)
+    assert np.abs(result["work/scheme"]).max() < 1e-4 * np.abs(result["work/end"]).max()
+
+
 @pytest.mark.parametrize("clamp", [False, True])
 def test_out_and_back_is_where_it_was(clamp: bool) -> None:
     section = {"length": 100.0, "mass": 5.0, "axial_stiffness": 2e6, "damping": {"mass": 3.0}}

@@ -23,6 +23,7 @@ FIRST = 7
 PER_LENGTH = tuple(name for name, field in FIELDS.items() if field.rule in (MEAN, HALF, ROD, SHARED))
 OF_POINTS = tuple(name for name, field in FIELDS.items() if field.rule == POINT)
 COLUMNS = FIRST + len(PER_LENGTH)
+COMPLIANCE = FIRST + PER_LENGTH.index("ck")
 
 _at = places(blank_line(1))
 

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.algebra.rotations import add, dot, frame, get3, log_rotation, scale, sub
-from hybrid.kernels.laws.axial_law import stretch_work
+from hybrid.kernels.algebra.rotations import add, dot, frame, get3, get9, log_rotation, scale, sub
+from hybrid.kernels.laws.axial_law import has_law, stretch_work
 from hybrid.kernels.laws.bending_law import energy_share, has_bend_law
 from hybrid.kernels.laws.cell import Chord, chord
 from hybrid.kernels.laws.element import relative_rotation
@@ -240,15 +240,26 @@ def correct_force(line, sea, ends, state, velocity, reel, report, t):
 
 
 @inner
-def bend_that_came(line, state, i, k, before):
+def turn_at(line, ends, state, i):
+    """Turn, rad, of the element at node i: between its cells, at an end between its cell and what holds that."""
+    n = line.h.shape[0]
+    if i == 0 or i == n:
+        c, held = min(i, n - 1), get9(ends.frame, 0 if i == 0 else 1)
+        d, _, _ = chord(get3(state.e, c))
+        beside = frame(get3(state.a1, c), d)
+        return log_rotation(relative_rotation(held, beside) if i == 0 else relative_rotation(beside, held))
+    da, _, _ = chord(get3(state.e, i - 1))
+    db, _, _ = chord(get3(state.e, i))
+    return log_rotation(relative_rotation(frame(get3(state.a1, i - 1), da), frame(get3(state.a1, i), db)))
+
+
+@inner
+def bend_that_came(line, turn, i, k, before):
     """Twice the energy, J, that a change k of its stiffness (N m) and one of its strain without load make of the element
-    at node i, bent as it is; before: (9,) of `Reel.before`.
+    at node i, turned by `turn`, rad; before: (10,) of `Reel.before`.
 
     With x the strain now and d what it was more before:  (kb + k) x^2 - kb (x + d)^2 = k x^2 - kb (2 x + d) d.
     """
-    da, _, _ = chord(get3(state.e, i - 1))
-    db, _, _ = chord(get3(state.e, i))
-    turn = log_rotation(relative_rotation(frame(get3(state.a1, i - 1), da), frame(get3(state.a1, i), db)))
     x, d = sub(turn, get3(line.k0, i)), sub(get3(line.k0, i), (before[6], before[7], before[8]))
     if has_bend_law(line, i):
         return bend_by_table_that_came(line, i, x, d, k, before)
@@ -268,16 +279,19 @@ def bend_by_table_that_came(line, i, x, d, k, before):
 
 
 @inner
-def remember(line, reel):
+def remember(line, ends, state, reel):
     """Lengths, and mass, weight, stiffness and bend without load of the nodes that change, for the next step."""
     n, before = line.h.shape[0], reel.before
     for c in range(n):
-        before[c, 0] = line.h[c]
+        before[c, 0], before[c, 9] = line.h[c], line.ck[c]
     for j in range(growing(line, reel), n + 1):
         i = node(line, reel, j)
         before[i, 1], before[i, 2] = line.mass[i], line.force[i, 2]
         for k in range(3):
             before[i, 3 + k], before[i, 6 + k] = line.kb[i, k], line.k0[i, k]
+    i = node(line, reel, n)
+    if line.element[i]:
+        reel.clamp[0], reel.clamp[1], reel.clamp[2] = turn_at(line, ends, state, i)
     reel.numbers[FLUX_BEFORE], reel.numbers[LENGTH_BEFORE] = reel.numbers[FLUX], reel.numbers[LENGTH]
 
 
@@ -294,7 +308,7 @@ def leave_to_reel(line, zones, reel):
 
 
 @inner
-def book(line, old, new, reel, dt):
+def book(line, ends, old, new, reel, dt):
     """Energy, J, that came in with material through an accepted step of dt, and with lengths that were not true."""
     n, before, numbers = line.h.shape[0], reel.before, reel.numbers
     booked = 0.5 * dt * (numbers[FLUX] + numbers[FLUX_BEFORE])
@@ -306,16 +320,20 @@ def book(line, old, new, reel, dt):
             else:
                 taken = stretch_work(line, old, c) + stretch_work(line, new, c)
             booked -= 0.5 * more * taken
+        softer = line.ck[c] - before[c, 9]
+        if softer != 0.0 and cell(line, reel, c) >= growing(line, reel) and not has_law(line, c):
+            booked -= 0.25 * line.h[c] * softer * (old.T[c] * old.T[c] + new.T[c] * new.T[c])
     for j in range(growing(line, reel), n + 1):
         i = node(line, reel, j)
         va, vb = get3(old.v, i), get3(new.v, i)
         booked += 0.25 * (line.mass[i] - before[i, 1]) * (dot(va, va) + dot(vb, vb))
         booked -= 0.5 * (line.force[i, 2] - before[i, 2]) * (old.r[i, 2] + new.r[i, 2])
-        if j < n and line.element[i]:
+        if line.element[i]:
             more = (line.kb[i, 0] - before[i, 3], line.kb[i, 1] - before[i, 4], line.kb[i, 2] - before[i, 5])
             if more[0] != 0.0 or more[1] != 0.0 or more[2] != 0.0:
-                then = before[i]
-                booked += 0.25 * (bend_that_came(line, old, i, more, then) + bend_that_came(line, new, i, more, then))
+                was = (reel.clamp[0], reel.clamp[1], reel.clamp[2]) if j == n else turn_at(line, ends, old, i)
+                done = bend_that_came(line, was, i, more, before[i])
+                booked += 0.25 * (done + bend_that_came(line, turn_at(line, ends, new, i), i, more, before[i]))
     return booked
 
 
@@ -397,11 +415,11 @@ def pay_out(table):
         state, before = before, state
     if winch[TENSION] > 0.0:
         accept(winch, numbers[LENGTH], numbers[RATE], numbers[ACCELERATION])
-    job.work[0, end_of(reel)] += book(line, before, state, reel, clock[b.LAST_DT])
+    job.work[0, end_of(reel)] += book(line, job.ends, before, state, reel, clock[b.LAST_DT])
     job.work[0, b.ZONES] += work_of_balance(before, state, reel, clock[b.NOW], clock[b.LAST_DT])
     if line.bits & TOUCHES:
         book_contact(line, job.sea, before, state, reel, job.work)
-    remember(line, reel)
+    remember(line, job.ends, state, reel)
     if count[b.CONTROLLED]:
         limit_step(reel, clock)
     last = reel.true[growing(line, reel)]
@@ -482,11 +500,11 @@ def fit_line(table):
 
 @kernel
 def lengthen(table):
-    """The line as it is at clock[NOW], without a look at its state."""
+    """The line as it is at clock[NOW]."""
     job = read(table)
     find_length(job.reel, job.clock[b.NOW])
     prepare(job.line, job.reel, job.clock[b.NOW])
-    remember(job.line, job.reel)
+    remember(job.line, job.ends, job.new if job.counts[b.PARITY] else job.old, job.reel)
     leave_to_reel(job.line, job.zones, job.reel)
 
 
@@ -535,7 +553,7 @@ def stand(job):
     if damped:
         job.reel.numbers[FLUX] += power_of_flow(job.line, job.ends, state, job.reel)
     note_pull(job.reel, t, pull)
-    remember(job.line, job.reel)
+    remember(job.line, job.ends, state, job.reel)
 
 
 @kernel

@@ -14,10 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
-from hybrid.kernels.laws.axial_law import strain_and_energy
+from hybrid.kernels.laws.axial_law import has_law, strain_and_energy
 from hybrid.kernels.laws.tension_torque import couples, stretch_factor, torque_beside
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
+from hybrid.kernels.mesh.fill_line import COMPLIANCE
 from hybrid.kernels.reel.damping import strain_at
 from hybrid.kernels.reel.paid_length import cell, lack_rate, length_at, made_between, node
 from hybrid.kernels.reel.payout import slope_at, velocity_at
@@ -243,6 +244,18 @@ def tension_rate(line, state, clock, tension, c):
 
 
 @inner
+def flow_stretch(line, state, reel, rate, c):
+    """By how much, m/s, the cell that grows, c, becomes longer because what comes into it stretches otherwise than it.
+
+    0 where the reel holds no sections of another compliance.
+    """
+    k, end, at = cell(line, reel, c), reel.numbers[LENGTH] - reel.layer[0], 0
+    while at + 1 < reel.pieces.shape[0] and reel.pieces[at + 1, 0] < end:
+        at += 1
+    return rate * state.T[k] * (reel.pieces[at, 1 + COMPLIANCE] - line.ck[k]) if not has_law(line, k) else 0.0
+
+
+@inner
 def mismatch(job, flow, g, c):
     """By how much, m/s, the rate of the chord of cell c misses that of its length."""
     line, state, reel, clock = job.line, job.state, job.reel, job.clock
@@ -253,7 +266,8 @@ def mismatch(job, flow, g, c):
     along = dot(e, ends) / math.sqrt(dot(e, e))
     grows = (flow.rate if c == g else 0.0) - lack_rate(reel, clock[b.NOW], c)
     rises = tension_rate(line, state, clock, job.tension, k)
-    return along - grows * (1.0 + strain_of(line, state, k)) - line.h[k] * line.ck[k] * rises
+    found = along - grows * (1.0 + strain_of(line, state, k)) - line.h[k] * line.ck[k] * rises
+    return found - flow_stretch(line, state, reel, flow.rate, c) if c == g else found
 
 
 @inner
@@ -302,6 +316,8 @@ def let_lack(job, flow, c, true, grows, rises, kept, late, span):
     k, e = cell(target, new, c), chord_at(target, out, new, c)
     ends = sub(get3(out.v, node(target, new, c + 1)), get3(out.v, node(target, new, c)))
     l, strain = math.sqrt(dot(e, e)), strain_of(target, out, k) - late
+    if grows != 0.0 and not is_damped(target, k):
+        kept += flow_stretch(target, out, new, grows, c)
     new.lack[c] = true - l / (1.0 + strain)
     new.rate[c] = grows - (dot(e, ends) / l - kept - true * target.ck[k] * rises) / (1.0 + strain)
     new.since[c], new.span[c] = job.clock[b.NOW], span

@@ -63,8 +63,10 @@ class Reel(NamedTuple):
     rate: Floats  # (N,) m/s, its rate then
     since: Floats  # (N,) s, when that was
     span: Floats  # (N,) s, over which they get it
-    # (N+1, 9) before the last step, of cells or nodes: length; mass, weight, stiffness (3), strain without load (3)
+    # (N+1, 10) before the last step, of cells or nodes: length; mass, weight, stiffness (3), strain without load (3);
+    # compliance of cells
     before: Floats
+    clamp: Floats  # (3,) rad, turn of the element at a clamp, before the last step
     report: Floats  # (REPORT_SIZE,) this and the next: work arrays
     made: Floats  # (2, COLUMNS)
     layer: Floats  # (m+1,) m, how far before the fairlead the nodes that ride with it are; that is the last, 0
@@ -93,8 +95,8 @@ def blank_reel(
     numbers[CHANGED] = -np.inf
     return Reel(
         numbers, z((1, 8)) if law is None else law, z((1, 1 + COLUMNS)) if pieces is None else pieces,
-        z((1, COLUMNS)), z(1), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 1, 9)),
-        z(REPORT_SIZE), z((2, COLUMNS)), z(1) if layer is None else layer,
+        z((1, COLUMNS)), z(1), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 1, 10)),
+        z(3), z(REPORT_SIZE), z((2, COLUMNS)), z(1) if layer is None else layer,
         z((1 if layer is None else layer.size, 3)), z(4), z((cells + 1, 3)), z((cells + 1, 3)), z(WINCH) if winch is None else winch,
         z((cells + 1 if damped else 0, FLOWS)), z((3, cells + 1, 5) if columns else (3, 0, 5)),
     )  # fmt: skip

@@ -199,6 +199,7 @@ def change_line(table):
     new.stage[RIDING_ON], new.stage[BALANCE_ON], new.stage[FLOW_KNOWN], new.numbers[DUE] = 0.0, 0.0, 0.0, 0.0
     place_reel(new, job.nodes, job.target.h.shape[0] - reel.layer.shape[0] + 1)
     line_as(job.line, read_node(table).whole, job.target, new)
+    prepare(job.target, new, job.clock[b.NOW])  # what new cells lack goes by what they are made of
 
 
 @kernel
