@@ -19,8 +19,8 @@ BY_HAND = [
     for page in sorted(DOCS.rglob("*.md"))
     if page.parent.name == "howto" or (page.parent == DOCS and page.stem not in MADE | FOR_DEVELOPERS)
 ]
-MOST_LINES, MOST_WORDS = 4000, 30
-HISTORY = {"changes"}  # whose sentences name several keys and figures
+MOST_LINES, MOST_WORDS = 3850, 30
+HISTORY = {"changes"}  # which grows, and whose sentences name several keys and figures
 
 
 def lines(page: Path) -> int:
@@ -44,7 +44,7 @@ def words(sentence: str) -> int:
 
 def test_the_manual_by_hand_is_short() -> None:
     assert len(BY_HAND) > 30, "pages are found"
-    total = sum(map(lines, BY_HAND))
+    total = sum(lines(page) for page in BY_HAND if page.stem not in HISTORY)
     assert total <= MOST_LINES, f"{total} lines: what is measured goes to docs/evidence, what is repeated goes"
 
 
@@ -71,4 +71,6 @@ def test_a_long_sentence_is_noticed() -> None:
 if __name__ == "__main__":
     for page in sorted(BY_HAND, key=lines):
         print(lines(page), page.relative_to(DOCS))
-    print(sum(map(lines, BY_HAND)), "of at most", MOST_LINES)
+    history = sum(lines(page) for page in BY_HAND if page.stem in HISTORY)
+    total = sum(map(lines, BY_HAND))
+    print(f"{total} with the history of changes, {total - history} without, of at most {MOST_LINES}")
