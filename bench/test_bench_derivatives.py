@@ -51,12 +51,12 @@ def hung(model: str, cells: int) -> hybrid.Scene:
     )  # fmt: skip
 
 
-def spent(*what: Callable[[], Any]) -> list[float]:
+def spent(*what: Callable[[], Any], rounds: int = ROUNDS) -> list[float]:
     """Least CPU time, s, of each, taken in turn after a first call."""
     least = [np.inf] * len(what)
     for x in what:
         x()
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         for k, x in enumerate(what):
             begin = clock.process_time()
             x()
@@ -81,14 +81,16 @@ def test_a_derivative_over_its_equilibrium(model: str, cells: int) -> None:
     )
 
 
-@pytest.mark.parametrize("what", ["a body", "two bodies"])
+@pytest.mark.parametrize("what", SCENES_OF_BODIES)
 def test_a_derivative_beside_bodies(what: str) -> None:
-    """Lines that turn freely at a body, and a hose that is clamped to two."""
-    tables, of, _ = SCENES_OF_BODIES[what]
+    """Lines that turn freely at a body, and hoses that are clamped to bodies and points; every number alone."""
+    tables, of, keys = SCENES_OF_BODIES[what]
     scene = as_scene_or_system(tables)
-    rest, keys = at_rest(scene, of), ["bodies.hull.mass"]
-    static, one, six = spent(lambda: hybrid.static(scene), lambda: rest.by(keys), lambda: rest.by(6 * keys))
-    print(f"{what}: equilibrium {1e3 * static:.1f} ms; one more derivative {(six - one) / 5 / static:.2f} of it")
+    rest = at_rest(scene, of)
+    for key in [*keys, *(["bodies.hull.mass"] if "bodies" in tables else [])]:
+        calls = lambda: hybrid.static(scene), lambda k=key: rest.by([k]), lambda k=key: rest.by(6 * [k])
+        static, one, six = spent(*calls, rounds=3)
+        print(f"{what}, {key}: equilibrium {1e3 * static:.1f} ms; one more {(six - one) / 5 / static:.2f} of it")
 
 
 def believed(differences: list[np.ndarray]) -> np.ndarray:

@@ -127,7 +127,7 @@ class LineAtRest:
         self._at = [x.at for x in wanted if x.at is not None]
         self._nodes = any(x.extreme for x in wanted) or not self._at
         self._observer, self._peak_of = self._observed(self.here), dict[Wanted, Peak]()
-        self._values = np.zeros(len(self.wanted))
+        self._values, self._left_here = np.zeros(len(self.wanted)), cast("tuple[Floats, Floats] | None", None)
         self._line = _at_rest(model.line)
         self._work, self._still, self._tried = workspace_of(self._line), _without_rates(state), _without_rates(state)
         self._with_rows = self._work._replace(rows=np.zeros((model.line.s.size, SIZE * WIDTH)))
@@ -151,6 +151,13 @@ class LineAtRest:
 
     def left(self, x: Beside) -> tuple[Floats, Floats]:
         """Right-hand side (5 (N+1),) of the equations of another line at this state, and its report."""
+        if x is not self.here:
+            return self._left(x)
+        if self._left_here is None:
+            self._left_here = self._left(x)
+        return self._left_here
+
+    def _left(self, x: Beside) -> tuple[Floats, Floats]:
         work = self._with_rows
         work.report[:] = 0.0
         assembly(_at_rest(x.model.line), x.sea, x.ends, self._still, 0.0, ANCHOR, work)
@@ -223,9 +230,11 @@ class LineAtRest:
 
         lines: with more and with less of each number, in turn, and their reports.
         """
-        found, observers = np.zeros((len(lines), len(self.wanted))), [self._observer_of(x) for x, _ in lines]
+        found = np.tile(self._values, (len(lines), 1))  # of the line here
+        other = [k for k, (x, _) in enumerate(lines) if x is not self.here]
+        observers = {k: self._observer_of(lines[k][0]) for k in other}
         points = self._observer.s.size
-        together = [k for k, (x, _) in enumerate(lines) if self._looked_at_with(x) and observers[k].s.size == points]
+        together = [k for k in other if self._looked_at_with(lines[k][0]) and observers[k].s.size == points]
         if together:
             outputs = [Output(x.model.line, x.model.zones, self._output(x, y)) for x, y in (lines[k] for k in together)]
             of = [observers[k] for k in together]
@@ -233,7 +242,7 @@ class LineAtRest:
             nodes = [lines[k][0].model.line.s for k in together]
             places = list(zip([x.s for x in of], nodes, strict=True))
             found[together] = self._results(observer.values_of(seen), places)
-        for k in sorted({*range(len(lines))} - {*together}):
+        for k in sorted({*other} - {*together}):
             observer = observers[k]
             places = [(observer.s, lines[k][0].model.line.s)]
             found[k] = self._results(observer.values_of(observer.look(self._output(*lines[k]))), places)

@@ -26,7 +26,9 @@ from hybrid.modal.matrices import linear_network
 from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby, same_nodes
 from hybrid.model.system import SystemModel, SystemResolution, build_system
+from hybrid.scene.bodies import FreeBody, RigidBody
 from hybrid.scene.combinations import refuse_use
+from hybrid.scene.points import Fairlead
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
@@ -34,8 +36,13 @@ from hybrid.simulation.system_run import static_system
 from hybrid.solve.system import SystemSolver
 
 OF_LINE = re.compile(r"^(?:(max|min) )?([^/@]+)/(.+)$")
-# Tables of a scene on which every line hangs.
-OF_ALL = ("environment", "points", "bodies", "obstacles", "output")
+# Tables of a scene on which every line hangs; numbers of a free body on which none does.
+OF_ALL = ("environment", "obstacles", "output")
+OF_BODIES = (*OF_ALL, "points", "bodies")
+OF_BODY = {
+    "mass", "centre", "inertia", "added_mass", "damping", "volume", "centre_of_buoyancy", "hydrostatics", "members",
+    "force", "moment",
+}  # fmt: skip
 
 
 def parse_result_of(system: System, text: str) -> tuple[str, Wanted]:
@@ -184,32 +191,47 @@ class SystemAtRest:
     def _beside(self, key: str, number: float, step: float) -> tuple[_Changed, _Changed]:
         """The scene with a number that is more by a step, and less."""
         more, less = (with_number(self.scene, key, number + d) for d in (step, -step))
-        if not is_allowed(more):
+        if more.lines is not self.scene.lines and not is_allowed(more):
             fix = "a number that others do not have to match, as lengths of zones have to"
             raise SceneError([Complaint("by", key, "a number that may change by itself", fix)])
         return self._changed(more, key), self._changed(less, key)
 
+    def _hangs_on(self, system: System, name: str) -> bool:
+        """Whether a line hangs on what a changed scene has changed."""
+        if any(getattr(system, x) is not getattr(self.scene, x) for x in OF_ALL):
+            return True
+        line = system.lines[name]
+        if line is not self.scene.lines[name]:
+            return True
+        changed = {body for body, x in system.bodies.items() if _moves_lines(x, self.scene.bodies[body])}
+        if any(getattr(system.bodies[x], "shape", None) is not None for x in changed):
+            return True  # it is a surface for all lines
+        for point in (line.start, line.end):
+            at = system.points[point]
+            if at is not self.scene.points[point] or (isinstance(at, Fairlead) and at.body in changed):
+                return True
+        return False
+
     def _changed(self, system: System, key: str) -> _Changed:
         """A changed scene.  Lines that turn with bodies are built anew: how a clamp is seated hangs on all of it."""
-        same = all(getattr(system, x) is getattr(self.scene, x) for x in OF_ALL)
-        seated = [bool(self._bodies.turns(l)) for l in range(len(self.lines))]
+        anew = [self._hangs_on(system, name) for name in self._names]
+        seated = [new and bool(self._bodies.turns(l)) for l, new in enumerate(anew)]
         built = None
         if any(seated):
             built = build_system(system, self._resolution)
-        elif self._bodies.count and not same:
+        elif self._bodies.count and any(getattr(system, x) is not getattr(self.scene, x) for x in OF_BODIES):
             built = with_bodies(self._model, system)
         out = []
         for l, (name, line) in enumerate(zip(self._names, self.lines, strict=True)):
-            scene = self._scene_of(system, name)
+            if not anew[l]:
+                out.append(line.here)
+                continue
+            scene, frames = self._scene_of(system, name), NO_FRAMES
             if built is not None and seated[l]:
                 model = _on_same_cells(built.models[l], line.model)
                 frames = self._bodies.frames(l, built.seats[l])
-            elif same and system.lines[name] is self.scene.lines[name]:
-                out.append(line.here)
-                continue
             else:
                 model = nearby(line.model, self._scenes[name], scene, self._resolution.lines[name], LEFT_OUT)
-                frames = NO_FRAMES
             if model is None:
                 raise _other_cells(key)
             out.append(line.beside(scene, model, frames))
@@ -219,6 +241,16 @@ class SystemAtRest:
             return _Changed(out, self._arms(built), self._bodies.own(built))
         except ValueError:
             raise _other_cells(key) from None
+
+
+def _moves_lines(body: RigidBody, of: RigidBody) -> bool:
+    """Whether lines at a body hang on what has changed of it."""
+    if body is of:
+        return False
+    fields = type(of).model_fields
+    return not isinstance(of, FreeBody) or any(
+        getattr(body, x) is not getattr(of, x) for x in fields if x not in OF_BODY
+    )
 
 
 def _on_same_cells(model: Model, of: Model) -> Model | None:
