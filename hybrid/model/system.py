@@ -371,7 +371,7 @@ class _Lines:
     def _shape(self, name: str, directions: Mapping[str, Any] | None) -> Model:
         scene, mesh = self._scene(name, (), directions), self.meshes.get(name)
         with said_of_line(name):
-            return build(scene, self._resolution[name], mesh, spare=False)
+            return build(scene, self._resolution[name], mesh, spare=bool(scene.obstacles))
 
     def _scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> Scene:
         """The scene of a line between the places of its points; of one that is carried, with the point."""

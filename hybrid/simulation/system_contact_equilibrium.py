@@ -6,15 +6,18 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
 
+from hybrid.errors import Outcome
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.march.link import LINK, holds_twist, link_of
-from hybrid.kernels.state.forces import SELF_CONTACT
+from hybrid.kernels.state.forces import OBSTACLES, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
+from hybrid.model.first_state import HUNG
 from hybrid.model.system import SystemModel
 from hybrid.simulation.contact_equilibrium import KEPT, contact_of
 from hybrid.simulation.lines_contact import crossed, shared_of
 from hybrid.solve.contact_statics import contact_energy
+from hybrid.solve.flaws import behind_obstacles
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.shared_contact import SharedContact
@@ -35,7 +38,7 @@ def solve_with_contact(
     starts: begins anew at every call.  An equilibrium within itself comes back where no start is apart.
     """
     try:
-        found = solve_system_statics(lines, len(model.free), bodies, starts())
+        found = _on_the_side_of_the_span(model, lines, bodies, starts)
     except LineFailed as failed:
         if not any(_touch(lines)) or (first := _first_apart(model, lines, bodies, starts())) is None:
             raise
@@ -55,6 +58,43 @@ def solve_with_contact(
     last: list[Start] = [] if lost else [("the equilibrium without contact", found.state)]
     first = _first_apart(model, lines, bodies, chain(starts(), last))
     return found if first is None else settle(model, lines, bodies, first)
+
+
+def _on_the_side_of_the_span(
+    model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, starts: Callable[[], Iterator[Start]]
+) -> SystemEquilibrium:
+    """As `solve_system_statics`, and where a way leads there, with lines that hang on obstacles on the side of their
+
+    straight spans, as one cable does.
+    """
+    hung = [
+        k for k, x in enumerate(model.models)
+        if x.start_shape == HUNG and x.line.bits & OBSTACLES and len(x.sea.values.obstacles)
+    ]  # fmt: skip
+
+    def behind(states: SystemState) -> tuple[Outcome, int, int]:
+        for k in hung:
+            x = model.models[k]
+            for _, node in behind_obstacles(x.line, x.sea.values, states.lines[k]):
+                return Outcome.BURIED, k, node
+        return Outcome.OK, -1, -1
+
+    if hung:
+        try:
+            every = chain(starts(), _other_starts(model, hung))
+            return solve_system_statics(lines, len(model.free), bodies.copy(), every, behind)
+        except LineFailed:  # where no way leads there, the other side may be meant
+            pass
+    return solve_system_statics(lines, len(model.free), bodies, starts())
+
+
+def _other_starts(model: SystemModel, hung: Sequence[int]) -> Iterator[Start]:
+    """The first shapes with arcs, then with straight spans, for the lines of these numbers."""
+    for name in dict.fromkeys(name for k in hung for name, _ in model.models[k].other_starts):
+        first = [x.start.copy() for x in model.models]
+        for k in hung:
+            first[k] = dict(model.models[k].other_starts).get(name, first[k]).copy()
+        yield f"{name} of lines on obstacles", SystemState(first, model.body_places)
 
 
 def settle(

@@ -65,9 +65,12 @@ FLAWS = (Outcome.SLACK, Outcome.UNSTABLE, Outcome.FOLDED, Outcome.BURIED)
 
 
 def solve_system_statics(
-    lines: Sequence[JoinedLine], points: int, bodies: Floats, starts: Iterable[Start]
-) -> SystemEquilibrium:
+    lines: Sequence[JoinedLine], points: int, bodies: Floats, starts: Iterable[Start],
+    refused: Callable[[SystemState], tuple[Outcome, int, int]] | None = None,
+) -> SystemEquilibrium:  # fmt: skip
     """Equilibrium of a system without friction; starts: shapes to begin with, with their names, made when asked for.
+
+    refused: why an equilibrium is not the one that is sought (OK: it may be), the line, and its node or cell.
 
     Tries Newton from each start; then, over a seabed, on obstacles or in a current, from soft ones and no current on;
     then a damped motion to rest.  Raises LineFailed when none arrives at lines under tension.
@@ -79,6 +82,10 @@ def solve_system_statics(
     for tried in _attempts(solver, points, starts):
         taken = tried.taken
         total += taken.iterations
+        if taken.outcome == Outcome.OK and tried.real and refused is not None:
+            outcome, line, where = refused(tried.states)
+            taken = replace(taken, outcome=outcome, line=line, where=where)
+            tried = tried._replace(taken=taken)
         cause = taken.outcome.cause if taken.outcome else "found"
         cause = cause if tried.real else "stopped on the way"
         path.append(f"{tried.how}: {cause} ({total} iterations in all)")
