@@ -15,7 +15,7 @@ from hybrid.designs.found_scene import text_of_found
 from hybrid.designs.identify import Apart, Estimate, fit
 from hybrid.designs.measured import Measurements, measurements
 from hybrid.designs.nearest import Space
-from hybrid.designs.optimum import ACTIVE, AT_BOUND, KEPT, Optimum, Price, is_active, optimum, reach
+from hybrid.designs.optimum import ACTIVE, AT_BOUND, KEPT, Optimum, Price, is_active, optimum, reached
 from hybrid.designs.problem import Constraint, Problem, as_asked, begun, problem_of, refused_result, scenes_of, space_of
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
@@ -240,7 +240,7 @@ def _bed(scene: AnyScene) -> float | None:
 
 def _reached(problem: Problem) -> Optimum:
     """Where targets and limits are kept, where nothing is minimised."""
-    point = reach(problem).point
+    point = reached(problem, problem.space.start)
     prices = [Price(is_active(c, point), 0.0) for c in problem.constraints]
     bounds = np.full((point.x.size, 2), np.nan)
     for x in _at_bounds(problem.space, point):

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import lsq_linear, minimize
+from scipy.stats import qmc
 
 from hybrid.designs.equilibria import Point
 from hybrid.designs.nearest import STEP, Rows, nearest
@@ -21,6 +22,8 @@ from hybrid.kernels.state.state import Floats
 KEPT, ACTIVE, AT_BOUND = 1e-6, 1e-4, 1e-6
 # Part of what is minimised within which it is least; steps of one search, and searches.
 EXACT, ITERATIONS, SEARCHES = 1e-7, 60, 3
+# Places between the bounds from which limits are sought that are not kept from where the search began.
+STARTS = 6
 # Steps as parts of unknowns: the first, the longest is that of `nearest`, the shortest before it is given up.
 FIRST_STEP, SHORTEST = 0.2, 1e-6
 # Of what was foretold: what a step has to gain, and from which on longer ones are believed.
@@ -66,6 +69,25 @@ def reach(problem: Problem, start: Floats | None = None) -> Rows:
     return nearest(off, space)
 
 
+def reached(problem: Problem, start: Floats) -> Point:
+    """The values nearest to keeping all constraints that are found: from a start, and where that does not do, from
+
+    others between the bounds.
+    """
+    space, best = problem.space, reach(problem, start)
+    if kept(problem, best.point) or not np.isfinite(space.high - space.low).all():
+        return best.point
+    for part in qmc.Halton(start.size, scramble=False).random(STARTS + 1)[1:]:  # the first is the corner of all lows
+        try:
+            other = reach(problem, space.low + part * (space.high - space.low))
+        except (ComputationError, SceneError):
+            continue
+        best = min(best, other, key=lambda x: x.cost)
+        if kept(problem, best.point):
+            break
+    return best.point
+
+
 def _slopes(constraint: Constraint, point: Point) -> Floats:
     """(n,) slopes of how far a constraint is off: none where it is kept."""
     if constraint.side == 0:
@@ -91,14 +113,15 @@ def optimum(problem: Problem, objective: Objective) -> Optimum:
     for _ in range(SEARCHES):
         search = _Search(problem, objective, x)
         point = search.run()
-        if not kept(problem, point):
-            point = reach(problem, point.x).point
+        elsewhere = not kept(problem, point)
+        if elsewhere:
+            point = reached(problem, point.x)
             if not kept(problem, point):
                 break
         if best is not None and objective.value(point) >= objective.value(best) * (1.0 - EXACT):
             break
         best, x = point, point.x
-        if search.stopped or priced(problem, objective, point).left < ACTIVE:
+        if not elsewhere and (search.stopped or priced(problem, objective, point).left < ACTIVE):
             break
     found = priced(problem, objective, point if best is None else best)
     return found._replace(stopped=search.stopped) if found.left > ACTIVE else found

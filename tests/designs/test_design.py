@@ -288,3 +288,38 @@ def _cells(scene, length):
     from hybrid.model.build import build
 
     return int(np.searchsorted(build(hybrid.validate_scene(_with(scene, length))).line.s, length - 1e-6))
+
+
+SAG = {"length": 130.0, "mass": 20.0, "diameter": 0.1, "axial_stiffness": 1e7, "bending_stiffness": 500.0}
+WATER = {"fluid": {"density": 1025}, "seabed": {"z": -40.0, "stiffness": 1e4}}
+
+
+def _sagging(turn, several):
+    """A short and heavy line that pulls with 12 kN at most, and stays 10 m off the bed; turned in plan."""
+    far = [100.0 * math.cos(turn), 100.0 * math.sin(turn), 0.0]
+    places, cells = {"start": [0.0, 0.0, -10.0], "end": far}, {"cells": 40}
+    if several:
+        line = {"start": "start", "end": "end", "sections": [SAG], "model": "rod", "mesh": cells}
+        scene = {"environment": WATER, "points": {k: {"position": x} for k, x in places.items()}, "lines": {"a": line}}
+    else:
+        ends = {k: {"kind": "pinned", "position": x} for k, x in places.items()}
+        scene = {"environment": WATER, "cable": {"sections": [SAG]}, "ends": ends, "initial": "equilibrium",
+                 "model": "rod", "mesh": cells}  # fmt: skip
+    table = "lines.a" if several else "cable"
+    of_line = {"line": "a"} if several else {}
+    return hybrid.design(
+        scene, unknowns={"L": {"key": f"{table}.sections[0].length", "low": 105, "high": 150},
+                         "m": {"key": f"{table}.sections[0].mass", "low": 12, "high": 40}},
+        limits={"top": of_line | {"quantity": "tension", "at": "end", "largest": 12e3},
+                "low": of_line | {"quantity": "position.z", "smallest": -30.0}},
+        minimise="L - 3*m",
+    )  # fmt: skip
+
+
+def test_turned_in_plan_and_written_as_a_system_it_is_the_same():
+    one, turned, system = _sagging(0.0, False), _sagging(0.7, False), _sagging(0.0, True)
+    assert any(x.active for x in one.kept)
+    for other in (turned, system):
+        assert other.numbers == pytest.approx(one.numbers, rel=1e-5)
+        assert [x.price for x in other.kept] == pytest.approx([x.price for x in one.kept], rel=1e-3, abs=1e-9)
+        assert [x.value for x in other.kept] == pytest.approx([x.value for x in one.kept], rel=1e-5)
