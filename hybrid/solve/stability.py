@@ -6,7 +6,6 @@ In a plane the stiffness falls apart in two, within the plane and across it.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import eig_banded
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.algebra.block_elimination_plane import WIDE
@@ -142,6 +141,8 @@ class Stability:
         for j in range(band.shape[0]):
             band[j, : inverse.size - j] *= inverse[: inverse.size - j] * inverse[j:]
         band[0, held] = 2.0 * np.abs(band).sum(axis=0).max()  # what is held moves last
+        from scipy.linalg import eig_banded  # not before it is needed: a short command does without scipy
+
         values, vectors = eig_banded(band, lower=True, select="i", select_range=(0, 0))
         shape = (inverse * vectors[:, 0]).reshape(weights.shape)
         moved = shape @ line.plane[:2] if line.bits & PLANAR else shape[:, :3]
