@@ -131,8 +131,6 @@ class Stability:
 
         polar: (N,) kg m^2, the inertia of the spin of each cell.
         """
-        from scipy.linalg import eig_banded  # slow to import
-
         line = self.line
         band, held = self._band(ends, state, 0.0)
         weights = np.repeat(line.mass[:, None], band.shape[0] // 3, axis=1)  # 4 unknowns a node, 2 in a plane
