@@ -89,8 +89,8 @@ def refused(source: Path) -> Iterator[None]:
 
 
 def resolution_tree(resolution: Resolution) -> Tree:
-    """An resolution for a checkpoint."""
-    tree = {x.name: getattr(resolution, x.name) for x in fields(resolution)}
+    """A resolution for a checkpoint; nodes have no places of their own in a run."""
+    tree = {x.name: getattr(resolution, x.name) for x in fields(resolution) if x.name != "places"}
     grading = resolution.grading
     return tree | {"grading": grading and vars(grading), "rods": np.array(resolution.rods, float).ravel()}
 
@@ -100,7 +100,7 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
     first = first_resolution(scene)
     if "later" not in tree:  # of a checkpoint of before, whose steps were short from one end to the other
         tree = tree | {"later": first.later * tree["step"] / first.step if first.step else 0.0, "still": first.still}
-    later = {"bends": inf, "rods": np.zeros(0)}
+    later = {"bends": inf, "rods": np.zeros(0), "parts": 1}
     saved = matched(later | tree, resolution_tree(first) | {"grading": None}, "resolution")
     for name in ("fineness", "step", "local", "zones", "later", "still"):
         asked, is_ = getattr(first, name), saved[name]

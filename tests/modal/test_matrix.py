@@ -71,7 +71,7 @@ def test_it_is_what_the_equations_change_by(what):
         for k in (0, 1):
             for name, x in moved.items():
                 getattr(line._still, name)[:] = x[k]
-            left.append(line.left(line.here)[0][free])
+            left.append(line._left(line.here)[0][free])
         off = np.abs((left[1] - left[0]) / (2.0 * step) - K[:, unknown])
         for kind in range(SIZE):  # of equations of one unit
             rows, columns = kinds == kind, free[kinds == unknown % SIZE]
