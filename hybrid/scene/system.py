@@ -309,7 +309,7 @@ class System(Table):
         """Names of the lines that meet at a point, each with the end that does; those that break there come last."""
         lines, meeting = self._meetings
         if lines is not self.lines:  # those that this was copied from
-            del self._meetings
+            self.__dict__.pop("_meetings")
             _, meeting = self._meetings
         return [*meeting.get(point, ())]
 
@@ -394,7 +394,7 @@ class System(Table):
         """Scenes of lines that have been made, by line and ends that carry: to validate one takes 2 ms."""
         tables, known = self._made_scenes
         if any(getattr(self, name) is not table for name, table in tables.items()):  # of what this was copied from
-            del self._made_scenes
+            self.__dict__.pop("_made_scenes")  # older pydantic lets nothing be deleted of what is frozen
             _, known = self._made_scenes
         return known
 
