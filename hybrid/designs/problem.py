@@ -12,6 +12,7 @@ import numpy as np
 from hybrid.designs.equilibria import AnyScene, Equilibria, Point
 from hybrid.designs.in_motion import COMPUTING
 from hybrid.designs.nearest import Space
+from hybrid.designs.numbers import PART as KEY_PART
 from hybrid.designs.numbers import number_of
 from hybrid.designs.sensitivity import EDGES
 from hybrid.errors import SceneError
@@ -169,14 +170,15 @@ def space_of(
     """The unknowns, and the keys of each; SceneError: keys that are none or of a case, starts out of bounds."""
     found: list[Finding] = []
     start, low, high = list[float](), list[float](), list[float]()
-    keys: list[tuple[str, ...]] = []
+    keys, taken = list[tuple[str, ...]](), list[str]()
     for name, each in task.asked.unknowns.items():
         group = each.keys_of(name)
         place: Place = (
             ("unknowns", name, "keys" if each.keys else "key") if each.key or each.keys else ("unknowns", name)
         )
         for key in group:
-            found += _key_findings(key, place, scenes, task.asked.cases, [x for y in keys for x in y])
+            found += _key_findings(key, place, scenes, task.asked.cases, taken)
+            taken.append(key)
         keys.append(group)
         if not found:
             begin = each.start if each.start is not None else number_of(next(iter(scenes.values())), group[0])
@@ -195,11 +197,16 @@ def _key_findings(
     if computing := [x for x in re.findall(r"\w+", key) if x in COMPUTING]:
         expected = f"a key of what is there, not of how it is computed, as {computing[0]} is"
         yield Finding(place, expected, "cable.sections[0].length, for example", given=key)
-    if key in taken:
-        yield Finding(place, "a key that no other unknown sets")
+    parts = KEY_PART.findall(key)
+    if parts in [KEY_PART.findall(x) for x in taken]:
+        yield Finding(place, "the key of a number that nothing else sets", given=key)
     for case, changes in cases.items():
-        if key in changes:
-            yield Finding(place, f"a key that no case sets, as {case} does")
+        for (
+            other
+        ) in changes:  # one that holds the number as well: the unknown would stand in place of what the case sets
+            set_by_case = KEY_PART.findall(other)
+            if parts[: len(set_by_case)] == set_by_case:
+                yield Finding(place, f"a key that no case sets, as {case} does with {other}", given=key)
     try:
         for scene in scenes.values():
             number_of(scene, key)

@@ -228,6 +228,17 @@ def test_bad_files_are_refused_with_their_line(folder, name):
     assert place in str(raised.value) and expected in str(raised.value), raised.value
 
 
+def test_a_number_that_two_unknowns_set_is_refused(folder):
+    """In whichever way its key is written, and among the keys of one unknown."""
+    other = "cable.sections.0.length"
+    Path("design.yaml").write_text(DESIGN.replace("minimise", f"  b: {{key: {other}, low: 10, high: 90}}\nminimise"))
+    with pytest.raises(hybrid.SceneError, match=r"design\.yaml:5:12: unknowns\.b\.key[^$]*that nothing else sets"):
+        hybrid.design("design.yaml")
+    Path("design.yaml").write_text(DESIGN.replace(f'key: "{LENGTH}"', f'keys: ["{LENGTH}", {other}]'))
+    with pytest.raises(hybrid.SceneError, match=r"unknowns\.length\.keys[^$]*that nothing else sets"):
+        hybrid.design("design.yaml")
+
+
 def test_bad_cases_are_refused_with_their_line(folder):
     cases = 'cases:\n  far: {"cable.sections[0].lenght": 3}\n'
     Path("design.yaml").write_text(DESIGN + cases)
@@ -237,6 +248,11 @@ def test_bad_cases_are_refused_with_their_line(folder):
         hybrid.design("design.yaml")
     Path("design.yaml").write_text(DESIGN + 'cases:\n  far: {"cable.sections[0].length": 30}\n')
     with pytest.raises(hybrid.SceneError, match=r"design\.yaml:4:17: unknowns\.length\.key[^$]*no case sets, as far"):
+        hybrid.design("design.yaml")
+    place = "ends.start.position"  # holds the number of the unknown: it would stand in place of what the case sets
+    asked = DESIGN.replace("cable.sections[0].length", f"{place}[0]").replace("low: 10", "low: -5, start: 1")
+    Path("design.yaml").write_text(asked + f"cases:\n  far: {{{place}: [3, 0, 0]}}\n")
+    with pytest.raises(hybrid.SceneError, match=rf"unknowns\.length\.key[^$]*as far does with {place}"):
         hybrid.design("design.yaml")
     Path("design.yaml").write_text(DESIGN + "cases: {a: {}, b: {}}\nresults: {end: {quantity: tension, at: end}}\n")
     with pytest.raises(hybrid.SceneError, match=r"results\.end\.case[^$]*the case in which it is meant, one of: a, b"):
