@@ -11,6 +11,7 @@ from hybrid.designs.cable_at_rest import NO_PLACES, CableAtRest, Places
 from hybrid.designs.numbers import changed_scene, is_allowed, with_number
 from hybrid.designs.sensitivity import at_rest
 from hybrid.designs.system_at_rest import SystemAtRest
+from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
@@ -76,7 +77,8 @@ class Equilibria:
     def at(self, x: Floats, cells: float = 1.0) -> Point:
         """Equilibria with values (n,) of unknowns; cells: how many times as long as usual.
 
-        SceneError: a scene may not have these; ComputationError: there is no equilibrium.
+        SceneError: a scene may not have these; ComputationError: there is no equilibrium, or a result is not there in
+        it, such as `touchdown` of a line that does not lie on the bed.
         """
         kept = self._kept.get(x.tobytes()) if cells == 1.0 else None
         if kept is not None:
@@ -88,6 +90,11 @@ class Equilibria:
             rests[case] = at_rest(self.scene(case, x), of, cells, self._places.get(case, NO_PLACES))
             self._places.setdefault(case, rests[case].places)
         point = Point(x.copy(), rests, self)
+        for k in np.flatnonzero(~np.isfinite(point.values))[:1]:
+            case, result = self.wanted[k]
+            given = ", ".join(f"{group[0]} = {value:.6g}" for group, value in zip(self.keys, x, strict=True))
+            detail = f"{result}{f' ({case})' if case else ''} has no value in the equilibrium with {given}"
+            raise ComputationError(Outcome.NOT_REACHED, None, None, detail)
         if cells == 1.0:
             first = [*self._kept.items()][:1]  # where a search began is asked for once more at its end
             self._kept = dict(first + [*self._kept.items()][1:][-1:]) | {x.tobytes(): point}

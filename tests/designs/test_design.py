@@ -142,6 +142,21 @@ def test_an_end_of_what_can_be_is_said():
     assert found.numbers["length"] == pytest.approx(100.0 / 1.05, rel=5e-3) and found.equilibria < 40
 
 
+def test_a_result_that_is_not_there_is_said():
+    """Where a line touches the bed, of a line that hangs above it."""
+    ends = {k: {"kind": "pinned", "position": [x, 0, z]} for k, x, z in (("start", 0.0, -5.0), ("end", 80.0, 0.0))}
+    section = {"length": 84.0, "mass": 20.0, "diameter": 0.1, "axial_stiffness": 1e7}
+    scene = {"environment": WATER, "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium",
+             "model": "catenary", "mesh": {"cells": 40}}  # fmt: skip
+    unknowns = {"length": {"key": LENGTH, "low": 81, "high": 200}}
+    targets = {"top": {"quantity": "tension", "at": "end", "value": 9000.0},
+               "lies": {"quantity": "touchdown", "value": 20.0}}  # fmt: skip
+    with pytest.raises(hybrid.ComputationError, match=r"touchdown has no value in the equilibrium with .*length = 84"):
+        hybrid.design(scene, unknowns=unknowns, targets=targets)
+    with pytest.raises(hybrid.ComputationError, match=r"touchdown has no value in the equilibrium with .*length = 84"):
+        hybrid.seek(scene, {"touchdown": 20.0}, [LENGTH])
+
+
 SCENE = """\
 # A line that hangs.
 environment: {gravity: 9.81}
