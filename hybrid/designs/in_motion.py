@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.accuracy.api import run
-from hybrid.designs.line_at_rest import AXES
+from hybrid.designs.line_at_rest import AXES, refuse_parts
 from hybrid.designs.numbers import changed_scene, number_of
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
@@ -105,6 +105,7 @@ def _parsed(asked: Scene | System, text: str) -> Wanted:
         raise SceneError([Complaint("of", text, "a number of metres behind @", example)]) from None
     if s is not None and not 0.0 <= s <= length:
         raise SceneError([Complaint("of", text, f"an arc length between 0 and {length:g} m", example)])
+    refuse_parts(name, axis or "", "", s)
     if s is None and name in PROBES and "s" in PROBES[name].dims and over not in ("max", "min"):
         raise SceneError([Complaint("of", text, "a place", f"{text}@end")])
     return Wanted(over, line or "", name, axis or "", np.inf if s == length else s)

@@ -271,6 +271,7 @@ class LineAtRest:
             if wanted.name not in observer.names:
                 names = ", ".join(sorted(name for name in observer.names if "/" not in name))
                 raise SceneError([Complaint("of", wanted.name, f"one of {names}", "tension@0")])
+            refuse_parts(wanted.name, wanted.axis, wanted.extreme, wanted.at)
             if "s" in observer.dims(wanted.name) and wanted.at is None and not wanted.extreme:
                 fix = f"{wanted.name}@0, max {wanted.name}"
                 raise SceneError([Complaint("of", wanted.name, "a place or an extreme", fix)])
@@ -324,6 +325,19 @@ class LineAtRest:
             return float(peak.weights @ value[np.searchsorted(s, nodes[peak.nodes])])
         assert x.at is not None
         return float(np.interp(x.at, s, value))
+
+
+def refuse_parts(name: str, axis: str, extreme: str, at: float | None) -> None:
+    """SceneError: a component of what is no vector, an extreme along the line or a place of what has one value."""
+    if name not in PROBES:
+        return
+    dims, whole = PROBES[name].dims, f"{name}.{axis}" if axis else name
+    if axis and dims[-1:] != ("xyz",):
+        raise SceneError([Complaint("of", whole, f"{name}, which has no components", name)])
+    if (extreme or at is not None) and "s" not in dims:
+        place = "" if at is None else f"@{'end' if np.isinf(at) else f'{at:g}'}"
+        expected = f"{whole} alone, which has one value for the whole line"
+        raise SceneError([Complaint("of", f"{extreme} {whole}{place}".lstrip(), expected, whole)])
 
 
 def _component(wanted: Wanted, value: Floats) -> Floats:

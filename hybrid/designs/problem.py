@@ -266,6 +266,8 @@ def _result(task: TaskFile[Design], at: Place, asked: OfEquilibrium, take: str, 
         raise task.refusal([Finding((*at, "section"), expected)])
     if _has_places(asked) and asked.at is None and not take:
         raise task.refusal([Finding((*at, "at"), "a place, or take: max or min along the line", "at: end")])
+    if take and at[0] != "limits" and not _has_places(asked):
+        raise task.refusal([Finding((*at, "take"), f"nothing: {asked.quantity} has one value for the whole line")])
     extreme = f"{take} " if _has_places(asked) and asked.at is None else ""
     return f"{extreme}{f'{asked.line}/' if several else ''}{asked.quantity}{place}"
 

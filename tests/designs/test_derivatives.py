@@ -183,6 +183,9 @@ def test_what_is_refused():
         ("tension", key, "a place or an extreme"),
         ("tension@999", key, "between 0 and 250 m"),
         ("tensoin@0", key, "one of .*tension"),
+        ("tension.x@0", key, "no components"),
+        ("max reaction_end.z", key, "one value for the whole line"),
+        ("reaction_end.z@20", key, "one value for the whole line"),
         ("tension@0", "cable.sections[3].mass", "a key of the scene"),
         ("tension@0", "model", "a number"),
     ):

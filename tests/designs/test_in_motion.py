@@ -93,7 +93,8 @@ def test_what_is_refused():
     scene = heaved()
     key = "cable.sections[0].mass"
     for of, words in (("tension@start", "max, min, mean, std or last"), ("max tensoin@0", "one of position"),
-                      ("std tension", "a place"), ("max tension@99", "between 0 and 40 m")):  # fmt: skip
+                      ("std tension", "a place"), ("max tension.x@0", "no components"),
+                      ("max reaction_end.z@end", "one value"), ("max tension@99", "between 0 and 40 m")):  # fmt: skip
         with pytest.raises(hybrid.SceneError, match=words):
             hybrid.sensitivity(scene, [of], [key], motion=True)
     follows = heaved(time={"duration": 24.0, "tolerance": 1e-3})
