@@ -62,7 +62,7 @@ def _as_data(found: Found) -> dict[str, Any]:
         "title": found.title, "numbers": dict(found.numbers), "start": dict(found.start),
         "kept": [dataclasses.asdict(x) for x in found.kept], "bounds": [dataclasses.asdict(x) for x in found.bounds],
         "minimised": found.minimised, "minimised_at_start": found.minimised_at_start, "equilibria": found.equilibria,
-        "notes": list(found.notes),
+        "settled": found.settled, "notes": list(found.notes),
     }  # fmt: skip
 
 
@@ -82,7 +82,8 @@ def _tables(found: Found) -> Any:
             word += f", price {bound.price:.3g}"
         numbers.add_row(name, f"{x:.6g}", f"{found.start[name]:.6g}", word)
     if found.minimised is not None:
-        numbers.add_row("minimised", f"{found.minimised:.6g}", f"{found.minimised_at_start:.6g}", "")
+        word = "" if found.settled else "no optimum: see the note"
+        numbers.add_row("minimised", f"{found.minimised:.6g}", f"{found.minimised_at_start:.6g}", word)
     if not found.kept:
         return numbers
     kept = Table(box=None, padding=(0, 2), title_justify="left")

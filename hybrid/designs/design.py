@@ -69,6 +69,7 @@ class Found:
 
     numbers, start: of unknowns, by name; kept: targets and limits; bounds: unknowns that are at one; minimised: its
     value, and where the search began (None: nothing is); equilibria: that were computed; notes: what is doubtful.
+    settled: whether what is minimised is least there; False: the search ended before, and a note says why.
     scene: with the numbers, without changes of cases; scenes: of each case; before, after: places of nodes (n, 3), m,
     by case and line; bed: height of a level seabed, m, None: none; file: the scene file, "": none.
     """
@@ -89,6 +90,7 @@ class Found:
     after: Mapping[str, Mapping[str, Floats]]
     bed: float | None = None
     file: str = ""
+    settled: bool = True
 
     def scene_text(self, folder: str | Path | None = None) -> str:
         """The scene as YAML; where it was read from a file, and folder is its own, that text with other numbers."""
@@ -160,12 +162,13 @@ def _solved(task: TaskFile[Design], asked: AnyScene, problem: Problem, file: str
     point = best.point
     _refuse_what_fights(problem, point)
     notes, finer = _checked(problem, point)
+    settled = not best.stopped and best.left <= SETTLED
     if best.stopped:
-        notes.append(f"the search ended where it could not go on: {best.stopped}")
-    elif objective is not None and best.left > SETTLED:
+        notes.append(f"the search ended where it could not go on, which is no optimum: {best.stopped}")
+    elif not settled:
         notes.append(
-            f"the search has not settled: {100 * best.left:.2g} % of the slopes of what is minimised are held up by no "
-            "limit; try another start, or more cells"
+            f"the search has not settled, and this is no optimum: {100 * best.left:.3g} % of the slopes of what is "
+            "minimised are held up by no limit; give low and high of each unknown, another start, or more cells"
         )
     space, rows = problem.space, zip(problem.constraints, best.prices, strict=True)
     at = [
@@ -177,7 +180,7 @@ def _solved(task: TaskFile[Design], asked: AnyScene, problem: Problem, file: str
         kept=tuple(_kept(c, price, point, finer) for c, price in rows), bounds=tuple(at),
         minimised=None if objective is None else objective.value(point),
         minimised_at_start=None if objective is None else objective.value(first), notes=tuple(notes),
-        **_common(task, asked, problem.equilibria, space, point, file),
+        settled=settled, **_common(task, asked, problem.equilibria, space, point, file),
     )  # fmt: skip
 
 

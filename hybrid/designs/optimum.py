@@ -22,6 +22,9 @@ from hybrid.kernels.state.state import Floats
 KEPT, ACTIVE, AT_BOUND = 1e-6, 1e-4, 1e-6
 # Part of what is minimised within which it is least; steps of one search, and searches.
 EXACT, ITERATIONS, SEARCHES = 1e-7, 60, 3
+# How many times what the slopes tell what is minimised counts at most, and the part of it that it counts at least: a
+# constant that is added to it, such as a price that is paid in any case, would hide what there is to gain.
+OF_SLOPES, OF_VALUE = 10.0, 1e-4
 # Places between the bounds from which limits are sought that are not kept from where the search began.
 STARTS = 6
 # Steps as parts of unknowns: the first, the longest is that of `nearest`, the shortest before it is given up.
@@ -46,7 +49,7 @@ class Optimum(NamedTuple):
     """Where it is, prices of constraints, and of lower and upper bounds of each unknown (n, 2); NaN: not at it.
 
     left: what of the slopes of what is minimised no limit holds up, as a part of them, of those where the search began
-    or of its value, whichever is largest: 0 at an optimum.  stopped: why the search could not go on beyond it; "":
+    or of its size there, whichever is largest: 0 at an optimum.  stopped: why the search could not go on beyond it; "":
     there was nothing to gain.
     """
 
@@ -127,18 +130,24 @@ def optimum(problem: Problem, objective: Objective) -> Optimum:
     return found._replace(stopped=search.stopped) if found.left > ACTIVE else found
 
 
+def size_of(objective: Objective, point: Point, sizes: Floats) -> float:
+    """What changes of what is minimised are parts of."""
+    value, slopes = abs(objective.value(point)), float(np.linalg.norm(objective.slopes(point) * sizes))
+    return max(min(value, max(OF_SLOPES * slopes, OF_VALUE * value)), 1e-300)
+
+
 class _Search:
     """Steps within a box in which linear constraints and a quadratic model are believed (Sl1QP of Fletcher).
 
     Unknowns count in parts of their sizes where it begins, constraints in parts of their bounds, what is minimised in
-    parts of its value there.
+    parts of its size there.
     """
 
     def __init__(self, problem: Problem, objective: Objective, start: Floats) -> None:
         self._problem, self._objective = problem, objective
         self._here = problem.equilibria.at(start)
         self._sizes = problem.space.sizes(start)
-        self._scale = max(abs(objective.value(self._here)), 1e-300)
+        self._scale = size_of(objective, self._here, self._sizes)
         self._hessian, self._penalty = CURVATURE * np.eye(start.size), PENALTY
         self.stopped = ""  # why the last trial could not be computed
 
@@ -258,21 +267,20 @@ class _Search:
 
 def priced(problem: Problem, objective: Objective, point: Point) -> Optimum:
     """Prices of what holds the optimum: the multipliers that leave least of the slopes of what is minimised."""
-    space, constraints = problem.space, problem.constraints
-    sizes = space.sizes(point.x)
+    space, constraints, start = problem.space, problem.constraints, problem.equilibria.at(problem.space.start)
+    own, first_sizes = space.sizes(point.x), space.sizes(space.start)
+    sizes = np.maximum(own, first_sizes)  # of an unknown that goes to 0, where a part of itself changes nothing more
     gradient = objective.slopes(point) * sizes
     held = [k for k, c in enumerate(constraints) if is_active(c, point)]
-    at = np.stack(
-        [np.abs(point.x - space.low) <= AT_BOUND * sizes, np.abs(point.x - space.high) <= AT_BOUND * sizes], 1
-    )
+    at = np.stack([np.abs(point.x - space.low) <= AT_BOUND * own, np.abs(point.x - space.high) <= AT_BOUND * own], 1)
     columns = [(constraints[k].side or 1) * point.slopes[constraints[k].row] * sizes for k in held]
     least = [-np.inf if constraints[k].side == 0 else 0.0 for k in held]
     edges = [(i, k) for i, k in np.argwhere(at).tolist()]
     for i, k in edges:
         columns.append(np.eye(sizes.size)[i] * (1.0 if k else -1.0) * sizes[i])
         least.append(0.0)
-    first = objective.slopes(problem.equilibria.at(space.start)) * space.sizes(space.start)
-    size = max(float(np.linalg.norm(gradient)), float(np.linalg.norm(first)), abs(objective.value(point)), 1e-300)
+    first = objective.slopes(start) * first_sizes
+    size = max(*(float(np.linalg.norm(x)) for x in (gradient, first)), size_of(objective, start, first_sizes))
     multipliers, left = np.zeros(len(columns)), float(np.linalg.norm(gradient)) / size
     if columns:
         matrix = np.stack(columns, axis=1)

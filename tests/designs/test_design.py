@@ -98,6 +98,7 @@ def test_the_least_within_bounds_needs_no_limit():
         minimise="(top / 1000 - 1.5)**2",
     )  # fmt: skip
     assert found.numbers["length"] == pytest.approx(1500.0 / 5.0 / G, rel=1e-4) and not found.notes
+    assert found.settled
 
 
 def test_limits_hold_in_all_cases():
@@ -140,6 +141,26 @@ def test_an_end_of_what_can_be_is_said():
     (note,) = (x for x in found.notes if x.startswith("the search ended where it could not go on"))
     assert "max_strain" in note or "stretch" in note
     assert found.numbers["length"] == pytest.approx(100.0 / 1.05, rel=5e-3) and found.equilibria < 40
+    assert not found.settled and "no optimum" in note
+
+
+@pytest.mark.parametrize("low", [{}, {"low": 0, "high": 90}])
+def test_what_runs_off_to_nothing_is_no_optimum(low):
+    """The lightest line within no limit."""
+    found = hybrid.design(HANGING, unknowns={"mass": {"key": MASS} | low}, minimise="mass")
+    (note,) = found.notes
+    assert "no optimum" in note and not found.settled
+
+
+@pytest.mark.parametrize("added", [1e6, 1e9])
+def test_a_constant_that_is_added_hides_no_optimum(added):
+    """A price that is paid in any case: with it the least is where it is without."""
+    found = hybrid.design(
+        HANGING, unknowns={"length": {"key": LENGTH, "low": 10, "high": 90}}, limits={"top": TOP | {"smallest": 1500.0}},
+        minimise=f"{added:.1f} + length",
+    )  # fmt: skip
+    assert found.numbers["length"] == pytest.approx(1500.0 / 5.0 / G, rel=1e-5) and found.settled
+    assert found.kept[0].active and found.kept[0].price == pytest.approx(1.0 / 5.0 / G, rel=1e-2)
 
 
 def test_a_result_that_is_not_there_is_said():
@@ -197,10 +218,18 @@ def test_the_command(folder):
     assert "# A line that hangs." in text and "# of steel" in text and "length: 40" not in text
     assert hybrid.load_scene("found.yaml").cable.length == pytest.approx(3000 / 5 / G, rel=1e-6)
     assert "<svg" in Path("found.svg").read_text()
+    assert "no optimum" not in told.output
     assert CliRunner().invoke(app, ["design", "design.yaml", "-o", "found.yaml"]).exit_code == 1  # it is there
     told = CliRunner().invoke(app, ["design", "design.yaml", "--json"])
     (row,) = [x for x in map(json.loads, told.output.splitlines()) if "numbers" in x]
-    assert row["kept"][0]["active"] and row["minimised"] == pytest.approx(-3000 / 5 / G, rel=1e-6)
+    assert row["settled"] and row["kept"][0]["active"] and row["minimised"] == pytest.approx(-3000 / 5 / G, rel=1e-6)
+
+
+def test_the_command_says_where_there_is_no_optimum(folder):
+    asked = DESIGN.replace(LENGTH, MASS).replace("low: 10, high: 90", "low: 0, high: 90").replace("-length", "length")
+    Path("design.yaml").write_text(asked)
+    told = CliRunner().invoke(app, ["design", "design.yaml"])
+    assert told.exit_code == 0 and "no optimum: see the note" in told.output, told.output
 
 
 def test_the_scene_found_stands_by_itself_where_its_text_cannot_be_changed(folder):
