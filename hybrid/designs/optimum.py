@@ -121,7 +121,7 @@ def optimum(problem: Problem, objective: Objective) -> Optimum:
             point = reached(problem, point.x)
             if not kept(problem, point):
                 break
-        if best is not None and objective.value(point) >= objective.value(best) * (1.0 - EXACT):
+        if best is not None and objective.value(point) >= objective.value(best) - EXACT * abs(objective.value(best)):
             break
         best, x = point, point.x
         if not elsewhere and (search.stopped or priced(problem, objective, point).left < ACTIVE):
@@ -176,10 +176,11 @@ class _Search:
         return self._here
 
     def _tried(self, step: Floats) -> Point | None:
-        """The point after a step; None: there is no equilibrium, or no such scene."""
+        """The point after a step; None: there is no equilibrium, no such scene, or what is minimised is no number."""
         space = self._problem.space
         try:
             point = self._problem.equilibria.at(np.clip(self._here.x + self._sizes * step, space.low, space.high))
+            self._objective.parts(point)
         except (ComputationError, SceneError) as error:
             self.stopped = " ".join(str(error).split())
             return None

@@ -70,14 +70,18 @@ class Objective:
         """SceneError: it is no number there."""
         return self._values([self._names(point)])[0]
 
-    def slopes(self, point: Point) -> Floats:
-        """(n,) derivatives by unknowns."""
+    def parts(self, point: Point) -> dict[str, float]:
+        """Derivatives by unknowns and results, each by itself; SceneError: it is no number there, or beside it."""
         names, rows, steps = self._names(point), [], []
         for name, x in names.items():
             steps.append(PART * (abs(x) or 1.0))
             rows += [names | {name: x + steps[-1]}, names | {name: x - steps[-1]}]
         values = np.array(self._values(rows))
-        by_name = dict(zip(names, (values[::2] - values[1::2]) / (2.0 * np.array(steps)), strict=True))
+        return dict(zip(names, ((values[::2] - values[1::2]) / (2.0 * np.array(steps))).tolist(), strict=True))
+
+    def slopes(self, point: Point) -> Floats:
+        """(n,) derivatives by unknowns."""
+        by_name = self.parts(point)
         out = np.array([by_name[x] for x in self._unknowns])
         for name, row in self._results.items():
             if by_name[name] != 0.0:
@@ -93,10 +97,13 @@ class Objective:
             found = evaluated("minimise", self.text, rows)
         except SceneError as error:
             first = error.complaints[0]
-            raise self._task.refusal([Finding(("minimise",), first.expected, first.fix)]) from None
-        if any(isinstance(x, bool) or not isinstance(x, int | float) or not np.isfinite(x) for x in found):
-            expected = f"arithmetic that gives a number; with the values tried it gives {found[0]}"
-            raise self._task.refusal([Finding(("minimise",), expected)])
+            given = ", ".join(f"{name} = {x:.6g}" for name, x in rows[0].items())
+            raise self._task.refusal([Finding(("minimise",), f"{first.expected} (with {given})")]) from None
+        for names, x in zip(rows, found, strict=True):
+            if isinstance(x, bool) or not isinstance(x, int | float) or not np.isfinite(x):
+                given = ", ".join(f"{name} = {value:.6g}" for name, value in names.items())
+                expected = f"arithmetic that gives a number; with {given} it gives {x}"
+                raise self._task.refusal([Finding(("minimise",), expected)])
         return [float(x) for x in found]
 
 

@@ -28,5 +28,5 @@ def evaluated(where: str, text: str, rows: Sequence[Mapping[str, Any]]) -> list[
                 found.append(evaluator.eval(text, tree))
         return found
     except Exception as error:
-        expected = f"arithmetic and comparisons of {', '.join(rows[0])}"
-        raise SceneError([Complaint(where, text, expected, str(error))]) from None
+        expected = f"arithmetic and comparisons of {', '.join(rows[0])}; {error}"
+        raise SceneError([Complaint(where, text, expected)]) from None

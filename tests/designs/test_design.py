@@ -152,6 +152,20 @@ def test_what_runs_off_to_nothing_is_no_optimum(low):
     assert "no optimum" in note and not found.settled
 
 
+def test_a_step_to_where_what_is_minimised_is_no_number_is_made_shorter():
+    """A logarithm that ends at 38 m; and a root that is least at its end, where it has no slope."""
+    found = hybrid.design(
+        HANGING, unknowns={"length": {"key": LENGTH, "low": 10, "high": 90, "start": 60}},
+        minimise="(length - 39)**2 / 100 - log(length - 38) / 50",
+    )  # fmt: skip
+    # 2 (x - 1) / 100 = 1 / (50 x) with x = length - 38: x^2 - x = 1
+    assert found.numbers["length"] == pytest.approx(38.0 + 0.5 * (1.0 + math.sqrt(5.0)), rel=1e-3) and found.settled
+    wrong = hybrid.design(HANGING, unknowns={"length": {"key": LENGTH, "low": 10, "high": 90}},
+                          minimise="sqrt(length - 38)")  # fmt: skip
+    assert not wrong.settled and wrong.numbers["length"] == pytest.approx(38.0, abs=1e-2)
+    assert "math domain error" in wrong.notes[0]
+
+
 @pytest.mark.parametrize("added", [1e6, 1e9])
 def test_a_constant_that_is_added_hides_no_optimum(added):
     """A price that is paid in any case: with it the least is where it is without."""
@@ -256,6 +270,8 @@ REFUSED = {
                                 "design.yaml:7:41: results.top.take", "one value for the whole line"),
     "no limit": (", largest: 3000", "", "design.yaml:7:8: limits.top", "largest, smallest, or both"),
     "an expression": ("-length", "-lenght", "design.yaml:5:11: minimise", "arithmetic"),
+    "no number where it begins": ("-length", "log(20 - length)", "design.yaml:5:11: minimise",
+                                  "math domain error (with length = 40)"),
     "no number": ("-length", "length > 3", "design.yaml:5:11: minimise", "gives a number"),
     "in motion": ("at: start,", "at: start, in: motion,", "design.yaml:7:39: limits.top.in", "hybrid sensitivity --motion"),
     "a line": ("at: start,", "at: start, line: east,", "design.yaml:7:45: limits.top.line", "one line"),
