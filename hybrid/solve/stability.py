@@ -25,6 +25,7 @@ CHECKED_COMPLIANCE = (
 # What the factor of the stiffness loses of a node's bending stiffness (some fifty rounded operations a row), and the
 # part of the softest bending of the whole line, 3 EI/L^3, beyond which that hides whether it buckles.
 LOST, HIDDEN = 1e-14, 0.1
+SHIFTED = 4.0  # growth of the shift that makes a stiffness definite
 NO_MOMENT = 1e-3  # of EI/L: an end moment below this does not disturb the judgement of stability
 
 
@@ -84,6 +85,30 @@ def _band(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray, plane: Floa
     return band, held
 
 
+def _lowest(band: Floats, least: float) -> tuple[float, Floats]:
+    """The lowest eigenvalue of a symmetric matrix by its lower band, and its vector (n,); least: a shift to begin with.
+
+    By Lanczos' method on the inverse of the matrix shifted until it is definite: work and memory grow with n alone.
+    """
+    # not before they are needed: a short command does without scipy
+    from scipy.linalg import cho_solve_banded, cholesky_banded
+    from scipy.sparse.linalg import LinearOperator, eigsh
+
+    shift, factor, n = least, None, band.shape[1]
+    while factor is None:
+        shifted = band.copy()
+        shifted[0] += shift
+        try:
+            factor = cholesky_banded(shifted, overwrite_ab=True, lower=True)
+        except np.linalg.LinAlgError:
+            shift *= SHIFTED
+    # numbers without a pattern, which no motion is orthogonal to; the same ones every time
+    first = np.random.default_rng(0).standard_normal(n)
+    inverse = LinearOperator((n, n), matvec=lambda x: cho_solve_banded((factor, True), x), dtype=float)
+    values, vectors = eigsh(inverse, k=1, which="LA", v0=first)
+    return float(1.0 / values[0] - shift), vectors[:, 0]
+
+
 def is_judged(line: Line, ends: Ends, length: float) -> bool:
     """Whether the test of stability can speak: there is a rod, and no end moment to speak of.
 
@@ -127,7 +152,7 @@ class Stability:
         return True
 
     def softest_motion(self, ends: Ends, state: State, polar: Floats) -> tuple[float, Floats]:
-        """Square (1/s^2, below 0: it grows) and shape (N+1, 3), at most 1, of the softest motion about an equilibrium.
+        """Square (1/s^2, below 0: it grows) and shape (N+1, 3), of components up to 1, of the softest motion about an equilibrium.
 
         polar: (N,) kg m^2, the inertia of the spin of each cell.
         """
@@ -140,13 +165,11 @@ class Stability:
         inverse[held] = 1.0
         for j in range(band.shape[0]):
             band[j, : inverse.size - j] *= inverse[: inverse.size - j] * inverse[j:]
-        band[0, held] = 2.0 * np.abs(band).sum(axis=0).max()  # what is held moves last
-        from scipy.linalg import eig_banded  # not before it is needed: a short command does without scipy
-
-        values, vectors = eig_banded(band, lower=True, select="i", select_range=(0, 0))
-        shape = (inverse * vectors[:, 0]).reshape(weights.shape)
+        square, vector = _lowest(band, self.anchor)
+        shape = (inverse * vector).reshape(weights.shape)
+        shape[held.reshape(shape.shape)] = 0.0
         moved = shape @ line.plane[:2] if line.bits & PLANAR else shape[:, :3]
-        return float(values[0]), moved / max(float(np.abs(moved).max()), 1e-300)
+        return square, moved / max(float(np.abs(moved).max()), 1e-300)
 
     def _definite(self, ends: Ends, state: State, soft: float) -> bool:
         """Whether a Cholesky factor of the stiffness exists, with springs of `soft` (1/s^2) times the mass."""

@@ -290,12 +290,8 @@ def _attempts(
     yield from map(noted, _loaded(solver, ends, start))
     pushed = 0
     for name, other in (("", start), *((f" from {name}", other) for name, other in others)):
-        yield noted(
-            (
-                f"damped motion to rest{name}, then Newton",
-                *solver.newton(solver.line, ends, solver.relaxed(ends, other)),
-            )
-        )
+        at_rest = solver.newton(solver.line, ends, solver.relaxed(ends, other))
+        yield noted((f"damped motion to rest{name}, then Newton", *at_rest))
         while pushed < min(len(flawed), MOST_PUSHES):
             fallen = solver.relaxed(ends, solver.settling.nudged(flawed[pushed]))
             pushed += 1
@@ -303,9 +299,8 @@ def _attempts(
     seen, slow = 0, list[_Fall]()
     for _ in range(MOST_FALLS):
         for state in flawed[seen:]:
-            slow.append(
-                _Fall(*solver.stability.softest_motion(ends, state, gyration(solver.line, solver.length)), state)
-            )
+            motion = solver.stability.softest_motion(ends, state, gyration(solver.line, solver.length))
+            slow.append(_Fall(*motion, state))
         seen, slow = len(flawed), sorted((x for x in slow if x.square < 0.0), key=lambda x: x.square)
         if not slow:
             break

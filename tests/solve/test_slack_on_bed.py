@@ -11,7 +11,9 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 import hybrid
+from hybrid.model.build import build
 from hybrid.scene.depths import Depths
+from hybrid.solve.stability import Stability
 
 SPAN, WEIGHT = 100.0, 50.0 * 9.81
 
@@ -97,3 +99,27 @@ def test_a_line_is_found_across_rough_ground(seed: int) -> None:
     np.testing.assert_allclose(pull[2], pull[0], rtol=3e-3)
     assert aside == pytest.approx([aside[0]] * 3, rel=0.02)
     assert aside[0] > 1.0
+
+
+@pytest.mark.parametrize("cells", [60, 3000])
+def test_the_softest_motion_of_a_strut_is_that_of_euler(cells: int) -> None:
+    """w^2 = (EI q^2 - P) q^2/m, q = pi/L; of many cells without a dense matrix."""
+    length, EI, P, mass = 10.0, 200.0, 60.0, 2.0
+    scene = hybrid.validate_scene({
+        "environment": {"gravity": 0.0}, "cable": {"sections": [{
+            "length": length, "mass": mass, "bending_stiffness": EI, "torsional_stiffness": 150.0,
+            "axial_stiffness": 1e6}]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [10, 0, 0]}},
+        "initial": {"kind": "straight", "direction": [1, 0, 0]}, "model": "rod", "mesh": {"cells": cells},
+        "dimension": 3, "time": {"duration": 1.0, "step": 0.1},
+    })  # fmt: skip
+    model = build(scene)
+    state = model.start.copy()
+    state.T[:] = -P
+    stability = Stability(model.line, model.sea.at(0.0), model.length, model.tension_scale)
+    square, shape = stability.softest_motion(model.ends.at(0.0), state, np.full(cells, 0.1))
+    q = math.pi / length
+    assert square == pytest.approx((EI * q**2 - P) * q**2 / mass, rel=2e-3)
+    aside = np.hypot(shape[:, 1], shape[:, 2])  # in whichever plane through the line
+    np.testing.assert_allclose(aside / aside.max(), np.sin(q * model.line.s), atol=1e-3)
+    assert 1.0 <= aside.max() < math.sqrt(2.0) + 1e-9
