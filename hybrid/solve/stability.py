@@ -152,9 +152,9 @@ class Stability:
         return True
 
     def softest_motion(self, ends: Ends, state: State, polar: Floats) -> tuple[float, Floats]:
-        """Square (1/s^2, below 0: it grows) and shape (N+1, 3), of components up to 1, of the softest motion about an equilibrium.
+        """Square (1/s^2, below 0: it grows) and shape (N+1, 3) of the softest motion about an equilibrium.
 
-        polar: (N,) kg m^2, the inertia of the spin of each cell.
+        Components of the shape are at most 1.  polar: (N,) kg m^2, the inertia of the spin of each cell.
         """
         line = self.line
         band, held = self._band(ends, state, 0.0)
