@@ -1,0 +1,140 @@
+"""Energy that comes in with material that is paid out, and what a step leaves for the books of the next."""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.rotations import dot, frame, get3, get9, log_rotation, sub
+from hybrid.kernels.laws.axial_law import has_law, stretch_work
+from hybrid.kernels.laws.bending_law import energy_share, has_bend_law
+from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.element import relative_rotation
+from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.reel.damping import damped_stretch_work
+from hybrid.kernels.reel.paid_length import cell, changes_length, eased, growing, node
+from hybrid.kernels.reel.payout_contact import contact_that_came, friction_of_flow
+from hybrid.kernels.reel.reel import FLUX, FLUX_BEFORE, LENGTH, LENGTH_BEFORE, SIDE
+from hybrid.kernels.state import books as b
+
+
+@inner
+def end_of(reel):
+    """Which end of the line the fairlead is: 0 or 1."""
+    return 1 if reel.numbers[SIDE] > 0.0 else 0
+
+
+@inner
+def turn_at(line, ends, state, i):
+    """Turn, rad, of the element at node i: between its cells, at an end between its cell and what holds that."""
+    n = line.h.shape[0]
+    if i == 0 or i == n:
+        c, held = min(i, n - 1), get9(ends.frame, 0 if i == 0 else 1)
+        d, _, _ = chord(get3(state.e, c))
+        beside = frame(get3(state.a1, c), d)
+        return log_rotation(relative_rotation(held, beside) if i == 0 else relative_rotation(beside, held))
+    da, _, _ = chord(get3(state.e, i - 1))
+    db, _, _ = chord(get3(state.e, i))
+    return log_rotation(relative_rotation(frame(get3(state.a1, i - 1), da), frame(get3(state.a1, i), db)))
+
+
+@inner
+def bend_that_came(line, turn, i, k, before):
+    """Twice the energy, J, that a change k of its stiffness (N m) and one of its strain without load make of the element
+    at node i, turned by `turn`, rad; before: (10,) of `Reel.before`.
+
+    With x the strain now and d what it was more before:  (kb + k) x^2 - kb (x + d)^2 = k x^2 - kb (2 x + d) d.
+    """
+    x, d = sub(turn, get3(line.k0, i)), sub(get3(line.k0, i), (before[6], before[7], before[8]))
+    if has_bend_law(line, i):
+        return bend_by_table_that_came(line, i, x, d, k, before)
+    straight = before[3] * (2.0 * x[0] + d[0]) * d[0] + before[4] * (2.0 * x[1] + d[1]) * d[1]
+    straight += before[5] * (2.0 * x[2] + d[2]) * d[2]
+    return k[0] * x[0] * x[0] + k[1] * x[1] * x[1] + k[2] * x[2] * x[2] - straight
+
+
+@inner
+def bend_by_table_that_came(line, i, x, d, k, before):
+    """The same of an element with a table, both halves of one: its share of the stiffness is one of the curvature alone."""
+    y, one = (x[0] + d[0], x[1] + d[1], x[2] + d[2]), line.kb[i, 0] / before[3]
+    now, then = math.sqrt(x[0] * x[0] + x[1] * x[1]), math.sqrt(y[0] * y[0] + y[1] * y[1])
+    more = line.kb[i, 0] * now * now * energy_share(line, i, now)
+    more -= before[3] * then * then * energy_share(line, i, then / one)
+    return more + k[2] * x[2] * x[2] - before[5] * (2.0 * x[2] + d[2]) * d[2]
+
+
+@inner
+def remember(line, ends, state, reel):
+    """Lengths, and mass, weight, stiffness and bend without load of the nodes that change, for the next step."""
+    n, before = line.h.shape[0], reel.before
+    for c in range(n):
+        before[c, 0], before[c, 9] = line.h[c], line.ck[c]
+    for j in range(growing(line, reel), n + 1):
+        i = node(line, reel, j)
+        before[i, 1], before[i, 2] = line.mass[i], line.force[i, 2]
+        for k in range(3):
+            before[i, 3 + k], before[i, 6 + k] = line.kb[i, k], line.k0[i, k]
+    i = node(line, reel, n)
+    if line.element[i]:
+        reel.clamp[0], reel.clamp[1], reel.clamp[2] = turn_at(line, ends, state, i)
+    reel.numbers[FLUX_BEFORE], reel.numbers[LENGTH_BEFORE] = reel.numbers[FLUX], reel.numbers[LENGTH]
+
+
+@inner
+def leave_to_reel(line, zones, reel):
+    """Zones that move book nothing of lengths and stiffness that change because line is paid out."""
+    for c in range(zones.lengths.shape[0]):
+        if changes_length(line, reel, c):
+            zones.lengths[c] = line.h[c]
+    for j in range(growing(line, reel), zones.stiff.shape[0]):
+        i = node(line, reel, j)
+        for k in range(3):
+            zones.stiff[i, k] = line.kb[i, k]
+
+
+@inner
+def book(line, ends, old, new, reel, dt):
+    """Energy, J, that came in with material through an accepted step of dt, and with lengths that were not true."""
+    n, before, numbers = line.h.shape[0], reel.before, reel.numbers
+    booked = 0.5 * dt * (numbers[FLUX] + numbers[FLUX_BEFORE])
+    for c in range(n):
+        more = line.h[c] - before[c, 0]
+        if more != 0.0 and changes_length(line, reel, c):
+            if reel.flow.shape[0] > 0:
+                taken = damped_stretch_work(line, old, c, before[c, 0]) + damped_stretch_work(line, new, c, line.h[c])
+            else:
+                taken = stretch_work(line, old, c) + stretch_work(line, new, c)
+            booked -= 0.5 * more * taken
+        softer = line.ck[c] - before[c, 9]
+        if softer != 0.0 and cell(line, reel, c) >= growing(line, reel) and not has_law(line, c):
+            booked -= 0.25 * line.h[c] * softer * (old.T[c] * old.T[c] + new.T[c] * new.T[c])
+    for j in range(growing(line, reel), n + 1):
+        i = node(line, reel, j)
+        va, vb = get3(old.v, i), get3(new.v, i)
+        booked += 0.25 * (line.mass[i] - before[i, 1]) * (dot(va, va) + dot(vb, vb))
+        booked -= 0.5 * (line.force[i, 2] - before[i, 2]) * (old.r[i, 2] + new.r[i, 2])
+        if line.element[i]:
+            more = (line.kb[i, 0] - before[i, 3], line.kb[i, 1] - before[i, 4], line.kb[i, 2] - before[i, 5])
+            if more[0] != 0.0 or more[1] != 0.0 or more[2] != 0.0:
+                was = (reel.clamp[0], reel.clamp[1], reel.clamp[2]) if j == n else turn_at(line, ends, old, i)
+                done = bend_that_came(line, was, i, more, before[i])
+                booked += 0.25 * (done + bend_that_came(line, turn_at(line, ends, new, i), i, more, before[i]))
+    return booked
+
+
+@inner
+def book_contact(line, sea, old, new, reel, work):
+    """Work of contact through an accepted step that is of the material which came: friction on it, what it stores."""
+    rubbed, stored = friction_of_flow(line, sea, old, new, reel), contact_that_came(line, sea, old, new, reel)
+    work[0, b.FRICTION] += rubbed
+    work[0, b.CONTACT] -= stored
+    work[0, end_of(reel)] += stored - rubbed
+
+
+@inner
+def work_of_balance(old, new, reel, t, dt):
+    """Work, J, through an accepted step of dt of the forces that balanced the neighbours of the last new node."""
+    part, done = 0.5 * (eased(reel, t - dt) + eased(reel, t)), 0.0
+    if part > 0.0:
+        for i in range(reel.balance.shape[0]):
+            done += dot(get3(reel.balance, i), sub(get3(new.r, i), get3(old.r, i)))
+    return part * done
