@@ -13,7 +13,7 @@ from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SEAS, SUSPE
 
 from hybrid.errors import SceneError
 from hybrid.scene import yaml_nodes, yaml_source
-from hybrid.scene.read import as_scene, load_scene, parse_scene, scene_text, validate_scene
+from hybrid.scene.read import as_scene, load_scene, parse_either, parse_scene, scene_text, validate_scene
 from hybrid.scene.schema import (
     Cable,
     CatenaryModel,
@@ -33,6 +33,7 @@ from hybrid.scene.schema import (
     ZonesModel,
     missing_time,
 )
+from hybrid.scene.system import System
 
 ALL = [SUSPENSION, OCEAN, EVERYTHING, EVERYTHING_ELSE, AT_REST, *SEAS.values()]
 
@@ -386,3 +387,30 @@ def test_words_are_what_ruamel_takes_them_for() -> None:
     theirs = [(tag, first, plain(x.pattern)) for versions, tag, x, first in implicit_resolvers if (1, 2) in versions]
     ours = [(f"tag:yaml.org,2002:{tag}", first, plain(pattern)) for tag, first, pattern in yaml_nodes.RULES]
     assert ours == theirs
+
+
+TWO_LINES = """\
+points:
+  west: {position: [-150, 0, -100]}
+  east: {position: [150, 0, -100]}
+  buoy: {kind: free, initial_guess: [0, 0, 5], mass: 1000}
+lines:
+  west: {start: west, end: buoy, sections: [{length: 185, mass: 10, diameter: 0.05, axial_stiffness: 1.0e+7}]}
+  east: {start: buoy, end: east, sections: [{length: 185, mass: 10, diameter: 0.05, axial_stiffness: 1.0e+7}]}
+time: {duration: 20, step: 0.05}
+"""
+
+
+def test_a_copy_of_several_lines_keeps_nothing_of_the_lines_it_was_copied_from() -> None:
+    """Also with the lowest pydantic, in which nothing can be deleted of a frozen model."""
+    system, _ = parse_either(TWO_LINES, "lines.yaml")
+    assert isinstance(system, System)
+    assert system.lines_at("buoy") == [("west", "end"), ("east", "start")]
+    assert system.scene_of("east").length == 185.0
+    longer = {"length": 190.0}
+    section = system.lines["east"].sections[0].model_copy(update=longer)
+    east = system.lines["east"].model_copy(update={"sections": (section,)})
+    other = system.model_copy(update={"lines": {"east": east}})
+    assert other.lines_at("buoy") == [("east", "start")]
+    assert (other.scene_of("east").length, system.scene_of("east").length) == (190.0, 185.0)
+    assert system.lines_at("buoy") == [("west", "end"), ("east", "start")]
