@@ -86,6 +86,10 @@ def flag(*names: str, help: str) -> Any:
     return typer.Option(*names, metavar="", help=help)  # it takes no value, so none is named
 
 
+def plot_option(what: str) -> Any:
+    return typer.Option("--plot", metavar="FILE", help=f"Draw {what} into a PNG, PDF or SVG.")
+
+
 def output_option(help: str) -> Any:
     return typer.Option("--output", "-o", metavar="FILE", help=help)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybrid
-from hybrid.cli.app import Json, Quiet, app, session
+from hybrid.cli.app import Json, Quiet, app, output_option, plot_option, session
 
 if TYPE_CHECKING:
     from hybrid.designs.design import Found, Identified, Kept
@@ -20,12 +20,8 @@ WORDS = {0: "=", 1: "<=", -1: ">="}
 @app.command()
 def design(
     source: Annotated[Path, typer.Argument(metavar="DESIGN.yaml", help="The design file.", show_default=False)],
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write the scene with the numbers found.")
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", metavar="FILE", help="Draw before and after into a PNG, PDF or SVG.")
-    ] = None,
+    output: Annotated[Path | None, output_option("Write the scene with the numbers found.")] = None,
+    plot: Annotated[Path | None, plot_option("before and after")] = None,
     quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
     """Find numbers of a scene for which its equilibrium is what is asked: within limits, least of something."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybrid
-from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, flag, load_either, session
+from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, flag, load_either, plot_option, session
 
 if TYPE_CHECKING:
     from hybrid.modal.api import Modes
@@ -23,9 +23,7 @@ def modes(
     count: Annotated[int, typer.Option("--count", metavar="N", help="How many, the longest periods first.")] = 10,
     near: Annotated[float | None, typer.Option(metavar="S", help="Those nearest to this period (s) instead.")] = None,
     smooth: Annotated[bool, flag("--smooth", help="Without friction of the bed, which else holds the line.")] = False,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", metavar="FILE", help="Draw the shapes into a PNG, PDF or SVG.")
-    ] = None,
+    plot: Annotated[Path | None, plot_option("the shapes")] = None,
     quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
     """Natural periods and shapes of a cable, or of lines with their points and bodies, about the equilibrium."""

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import splu
 
 from hybrid.accuracy.api import resolution_at_rest
 from hybrid.designs.line_at_rest import LEFT_OUT, Beside, LineAtRest, Wanted
-from hybrid.designs.numbers import is_allowed, number_of, with_number
+from hybrid.designs.numbers import OfScene, is_allowed, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
@@ -31,12 +31,12 @@ from hybrid.simulation.static_case import StaticCase
 # Places of nodes (`Resolution.places`) by line, "" of one that is alone; empty: as the scene asks for.
 Places = Mapping[str, tuple[float, ...]]
 NO_PLACES: Places = MappingProxyType({})
-# Part of a number by which lines are differentiated; one that is 0 is changed by this, in its own unit.
-PART = 1e-4
 
 
-class CableAtRest:
+class CableAtRest(OfScene):
     """The equilibrium on one mesh, its factors, and the values of results."""
+
+    scene: Scene
 
     def __init__(self, scene: Scene, cells: float, wanted: Sequence[Wanted], places: Places = NO_PLACES) -> None:
         """cells: their lengths over the usual, 0.5 or more; places: those of an equilibrium whose cells it has.
@@ -71,16 +71,11 @@ class CableAtRest:
         size = SIZE * self.model.line.s.size
         return np.arange(1, 4) + (size - SIZE if k else 0)
 
-    def number(self, key: str) -> float:
-        """The value of a key of the scene."""
-        return number_of(self.scene, key)
-
     def by(self, keys: Sequence[str]) -> Floats:
         """(P, W) derivatives of all results by numbers."""
         if not keys:
             return np.zeros((0, self.values.size))
-        numbers = np.array([number_of(self.scene, key) for key in keys])
-        steps = np.where(numbers == 0.0, PART, PART * np.abs(numbers))
+        numbers, steps = self.numbers_and_steps(keys)
         pairs = [self._beside(*row) for row in zip(keys, numbers.tolist(), steps.tolist(), strict=True)]
         lines = [x for pair in pairs for x in pair]
         left, reports = zip(*(self.line.left(x) for x in lines), strict=True)

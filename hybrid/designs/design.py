@@ -162,10 +162,11 @@ def _solved(task: TaskFile[Design], asked: AnyScene, problem: Problem, file: str
     point = best.point
     _refuse_what_fights(problem, point)
     notes, finer = _checked(problem, point)
-    settled = not best.stopped and best.left <= SETTLED
+    settled = not best.stopped and best.left <= SETTLED and not best.ran_off
+    notes += [_ran_off(problem.space, k, point) for k in best.ran_off]
     if best.stopped:
         notes.append(f"the search ended where it could not go on, which is no optimum: {best.stopped}")
-    elif not settled:
+    elif best.left > SETTLED and not best.ran_off:
         notes.append(
             f"the search has not settled, and this is no optimum: {100 * best.left:.3g} % of the slopes of what is "
             "minimised are held up by no limit; give low and high of each unknown, another start, or more cells"
@@ -182,6 +183,14 @@ def _solved(task: TaskFile[Design], asked: AnyScene, problem: Problem, file: str
         minimised_at_start=None if objective is None else objective.value(first), notes=tuple(notes),
         settled=settled, **_common(task, asked, problem.equilibria, space, point, file),
     )  # fmt: skip
+
+
+def _ran_off(space: Space, k: int, point: Point) -> str:
+    side = "high" if abs(point.x[k]) > abs(space.start[k]) else "low"
+    return (
+        f"{space.names[k]} ran off from {space.start[k]:.6g} to {point.x[k]:.6g}, and further on nothing is "
+        f"worse: this is no optimum; give a {side} that can be built, or a limit that holds it"
+    )
 
 
 def _common(

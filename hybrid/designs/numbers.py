@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
+import numpy as np
+
 from hybrid.errors import Complaint, SceneError
+from hybrid.kernels.state.state import Floats
 from hybrid.scene.base import Invalid, Table
 from hybrid.scene.read import parse_either, scene_text
 from hybrid.scene.schema import Scene
@@ -14,6 +17,8 @@ from hybrid.scene.system import System
 
 AnyScene = TypeVar("AnyScene", bound=Scene | System)
 PART = re.compile(r"[^.\[\]]+")
+# Part of a number by which lines are differentiated; one that is 0 is changed by this, in its own unit.
+OF_NUMBER = 1e-4
 
 
 def number_of(scene: Scene | System, key: str) -> float:
@@ -28,6 +33,21 @@ def number_of(scene: Scene | System, key: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise SceneError([Complaint("by", key, f"a number, which {key} is not in this scene", "another key")])
     return float(value)
+
+
+class OfScene:
+    """What is computed of a scene, and differentiated by its numbers."""
+
+    scene: Scene | System
+
+    def number(self, key: str) -> float:
+        """The value of a key of the scene."""
+        return number_of(self.scene, key)
+
+    def numbers_and_steps(self, keys: Sequence[str]) -> tuple[Floats, Floats]:
+        """(P,) values of keys, and by how much lines with more and with less of each differ from the scene."""
+        numbers = np.array([self.number(key) for key in keys])
+        return numbers, np.where(numbers == 0.0, OF_NUMBER, OF_NUMBER * np.abs(numbers))
 
 
 def changed_scene(scene: AnyScene, key: str, value: float) -> AnyScene:

@@ -34,6 +34,8 @@ ACCEPTED, TRUSTED = 0.1, 0.7
 # A box is made narrower by SHRUNK, where there is no equilibrium by CUT; a step has to come so much nearer to limits
 # as can be, but for the part NEARER.
 SHRUNK, CUT, NEARER = 0.4, 0.2, 0.3
+# Parts of its size by which an unknown has moved from where it began from which on it may have run off.
+FAR = 0.3
 # Curvature of the model at first; what a part of a limit counts at first, and at most.
 CURVATURE, PENALTY, MOST_PENALTY = 1e-2, 2.0, 1e6
 
@@ -50,7 +52,7 @@ class Optimum(NamedTuple):
 
     left: what of the slopes of what is minimised no limit holds up, as a part of them, of those where the search began
     or of its size there, whichever is largest: 0 at an optimum.  stopped: why the search could not go on beyond it; "":
-    there was nothing to gain.
+    there was nothing to gain.  ran_off: numbers of unknowns of which twice as much, or half, is as good.
     """
 
     point: Point
@@ -58,6 +60,7 @@ class Optimum(NamedTuple):
     bounds: Floats
     left: float
     stopped: str
+    ran_off: tuple[int, ...] = ()
 
 
 def reach(problem: Problem, start: Floats | None = None) -> Rows:
@@ -127,7 +130,33 @@ def optimum(problem: Problem, objective: Objective) -> Optimum:
         if not elsewhere and (search.stopped or priced(problem, objective, point).left < ACTIVE):
             break
     found = priced(problem, objective, point if best is None else best)
-    return found._replace(stopped=search.stopped) if found.left > ACTIVE else found
+    if not kept(problem, found.point):
+        return found
+    stopped = search.stopped if found.left > ACTIVE else ""
+    if search.exhausted:
+        stopped = f"{ITERATIONS} steps were not enough"
+    return found._replace(stopped=stopped, ran_off=_ran_off(problem, objective, found.point))
+
+
+def _ran_off(problem: Problem, objective: Objective, point: Point) -> tuple[int, ...]:
+    """Unknowns that went far, and of which further on nothing is worse: what is minimised is least nowhere on that way.
+
+    Slopes do not tell: those of 1/x fall with x, too.
+    """
+    space, equilibria, out = problem.space, problem.equilibria, []
+    sizes = space.sizes(space.start)
+    enough = objective.value(point) + EXACT * size_of(objective, equilibria.at(space.start), sizes)
+    for i, (x, start) in enumerate(zip(point.x, space.start, strict=True)):
+        ahead = 2.0 * x - start if x * start <= 0.0 else 2.0 * x if abs(x) > abs(start) else 0.5 * x
+        if abs(x - start) < FAR * sizes[i] or not space.low[i] <= ahead <= space.high[i]:
+            continue
+        try:
+            there = equilibria.at(np.where(np.arange(space.start.size) == i, ahead, point.x))
+            if objective.value(there) <= enough and kept(problem, there):
+                out.append(i)
+        except (ComputationError, SceneError):
+            continue
+    return tuple(out)
 
 
 def size_of(objective: Objective, point: Point, sizes: Floats) -> float:
@@ -150,6 +179,7 @@ class _Search:
         self._scale = size_of(objective, self._here, self._sizes)
         self._hessian, self._penalty = CURVATURE * np.eye(start.size), PENALTY
         self.stopped = ""  # why the last trial could not be computed
+        self.exhausted = False  # whether there was something to gain after the last step that it may take
 
     def run(self) -> Point:
         """The point where nothing is gained any more."""
@@ -173,6 +203,8 @@ class _Search:
                 width = (SHRUNK if there is not None else CUT) * min(width, float(np.abs(step).max()))
                 if width < SHORTEST:
                     break
+        else:
+            self.exhausted = True
         return self._here
 
     def _tried(self, step: Floats) -> Point | None:

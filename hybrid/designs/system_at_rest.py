@@ -16,9 +16,9 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from hybrid.designs.bodies_at_rest import BodiesAtRest, with_bodies
-from hybrid.designs.cable_at_rest import NO_PLACES, PART, Places
+from hybrid.designs.cable_at_rest import NO_PLACES, Places
 from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, Wanted, moment_on_body, parse_result
-from hybrid.designs.numbers import is_allowed, number_of, with_number
+from hybrid.designs.numbers import OfScene, is_allowed, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
@@ -65,8 +65,10 @@ class _Changed(NamedTuple):
     own: Floats
 
 
-class SystemAtRest:
+class SystemAtRest(OfScene):
     """The equilibrium on one mesh, its factors, and the values of results."""
+
+    scene: System
 
     def __init__(self, system: System, cells: float, of: Sequence[str], places: Places = NO_PLACES) -> None:
         """cells: their lengths over the usual, 0.5 or more; of: results; places: as of `CableAtRest`.
@@ -110,16 +112,11 @@ class SystemAtRest:
         self._here = self._arms(run.model), self._bodies.own(run.model)
         self.values = self._in_order([x.values() if x.wanted else np.zeros(0) for x in self.lines])
 
-    def number(self, key: str) -> float:
-        """The value of a key of the scene."""
-        return number_of(self.scene, key)
-
     def by(self, keys: Sequence[str]) -> Floats:
         """(P, W) derivatives of all results by numbers."""
         if not keys:
             return np.zeros((0, self.values.size))
-        numbers = np.array([number_of(self.scene, key) for key in keys])
-        steps = np.where(numbers == 0.0, PART, PART * np.abs(numbers))
+        numbers, steps = self.numbers_and_steps(keys)
         network, rights, shifts, reports = self._network, [], [], []
         every = [x for row in zip(keys, numbers.tolist(), steps.tolist(), strict=True) for x in self._beside(*row)]
         on_bodies = _slope([x.own for x in every], steps)

@@ -89,10 +89,10 @@ def refused(source: Path) -> Iterator[None]:
 
 
 def resolution_tree(resolution: Resolution) -> Tree:
-    """A resolution for a checkpoint; nodes have no places of their own in a run."""
-    tree = {x.name: getattr(resolution, x.name) for x in fields(resolution) if x.name != "places"}
-    grading = resolution.grading
-    return tree | {"grading": grading and vars(grading), "rods": np.array(resolution.rods, float).ravel()}
+    """A resolution for a checkpoint."""
+    tree = {x.name: getattr(resolution, x.name) for x in fields(resolution)}
+    rows = {x: np.array(getattr(resolution, x), float).ravel() for x in ("rods", "places")}
+    return tree | {"grading": resolution.grading and vars(resolution.grading)} | rows
 
 
 def resolution_from(tree: Any, scene: Scene) -> Resolution:
@@ -100,7 +100,7 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
     first = first_resolution(scene)
     if "later" not in tree:  # of a checkpoint of before, whose steps were short from one end to the other
         tree = tree | {"later": first.later * tree["step"] / first.step if first.step else 0.0, "still": first.still}
-    later = {"bends": inf, "rods": np.zeros(0), "parts": 1}
+    later = {"bends": inf, "rods": np.zeros(0), "parts": 1, "places": np.zeros(0)}  # all cells of before had one part
     saved = matched(later | tree, resolution_tree(first) | {"grading": None}, "resolution")
     for name in ("fineness", "step", "local", "zones", "later", "still"):
         asked, is_ = getattr(first, name), saved[name]
@@ -118,11 +118,17 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
             raise ValueError("cells that no mesh has")
     if not (saved["fineness"] * 100 <= MOST_CELLS and 1 <= saved["every"] <= FARTHEST and saved["bends"] > 0.0):
         raise ValueError("cells that no mesh has")
+    if not (1 <= saved["parts"] <= FARTHEST and (np.diff(saved["places"]) > 0.0).all()):
+        raise ValueError("places of nodes that no mesh has")
     rods = saved["rods"]
     if rods.size % 3 or not np.isfinite(rods).all() or not (rods[::3] <= rods[1::3]).all():
         raise ValueError("stretches that no line has")
     rods = rods.reshape(-1, 3)
-    return Resolution(**saved | {"grading": grading, "rods": tuple((float(a), float(b), float(x)) for a, b, x in rods)})
+    rows = {
+        "rods": tuple((float(a), float(b), float(x)) for a, b, x in rods),
+        "places": tuple(saved["places"].tolist()),
+    }
+    return Resolution(**saved | {"grading": grading} | rows)
 
 
 def restored_points(result: Result, length: float, far: float | None = None) -> OutputPoints:

@@ -152,6 +152,29 @@ def test_what_runs_off_to_nothing_is_no_optimum(low):
     assert "no optimum" in note and not found.settled
 
 
+@pytest.mark.parametrize(
+    ("key", "bounds", "minimise", "side"),
+    [
+        (LENGTH, {}, "-length", "high"), (LENGTH, {}, "1/length", "high"), (LENGTH, {}, "exp(-length/10)", "high"),
+        (LENGTH, {"low": 1, "high": 1e9}, "5 + 1/length", "high"), (LENGTH, {"high": 90}, "length**3", "low"),
+        (MASS, {}, "length**2", "low"), (MASS, {"low": 0, "high": 9}, "length + 1000", "low"),
+    ],
+)  # fmt: skip
+def test_what_runs_off_where_its_slope_falls_too_is_no_optimum(key, bounds, minimise, side):
+    """The slope of what is minimised goes to 0 on the way, as at an optimum; further on it is no worse."""
+    found = hybrid.design(HANGING, unknowns={"length": {"key": key} | bounds}, minimise=minimise)
+    assert not found.settled and not found.bounds
+    assert any(f"no optimum; give a {side} that can be built" in note for note in found.notes)
+
+
+def test_an_optimum_that_is_far_from_where_the_search_began_is_one():
+    """Six times as long, with no bound."""
+    found = hybrid.design(
+        HANGING, unknowns={"length": {"key": LENGTH}}, results={"top": TOP}, minimise="(top / 1000 - 12)**2"
+    )
+    assert found.numbers["length"] == pytest.approx(12e3 / 5.0 / G, rel=1e-3) and found.settled and not found.notes
+
+
 def test_a_step_to_where_what_is_minimised_is_no_number_is_made_shorter():
     """A logarithm that ends at 38 m; and a root that is least at its end, where it has no slope."""
     found = hybrid.design(

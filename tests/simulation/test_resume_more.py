@@ -437,7 +437,9 @@ def test_a_checkpoint_of_odd_things_is_refused_in_words(tmp_path, monkeypatch):
     odd = [
         {"resolution": [1.0]}, {"state": point["rows"]}, {"rows": {"nowhere": 3}}, {"rows": {}}, {"rows": {"t": -1}},
         {"happened": {"merge": "often"}}, {"number": 0.0}, {"t": "now"}, {"t": 0.5}, {"zones": [["rod", 0.0]]},
-        {"resolution": point["resolution"] | {"step": 1e-9}}, {"state": point["state"] | {"t": float("nan")}},
+        {"resolution": point["resolution"] | {"step": 1e-9}}, {"resolution": point["resolution"] | {"parts": 0}},
+        {"resolution": point["resolution"] | {"places": np.array([0.0, 2.0, 1.0])}},
+        {"state": point["state"] | {"t": float("nan")}},
         {"state": point["state"] | {"work": np.zeros(3)}}, {"state": point["state"] | {"plane": np.zeros((2, 3))}},
         {"state": {k: v for k, v in point["state"].items() if k != "dt"}},
     ]  # fmt: skip
