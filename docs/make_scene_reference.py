@@ -76,7 +76,7 @@ TAIL = """\
 Everything below is reported at once, with file, line, column, the value, what was expected and what to try:
 unknown keys and kinds; numbers out of bounds or written as text; two pinned ends farther apart than an inextensible
 cable is long; zones that do not add up to the length; a rod zone, or zones that move, over a section without
-bending stiffness; zones that move with rotary inertia; drag,
+bending stiffness; drag,
 added mass or buoyancy without fluid or diameter; a motion that does not start from rest or whose velocity jumps;
 an initial shape that misses a held end; a normal along its tangent; waves without a surface, or so steep that they
 break (height / length ≥ 0.142 tanh(k depth)); an end in the ground, or carried out of the reach of the cable; a float

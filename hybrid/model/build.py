@@ -29,7 +29,7 @@ from hybrid.model.initial_shape import (
     spare_shapes,
 )
 from hybrid.model.layout import Layout, of_rods
-from hybrid.model.line import line_on, spins_freely
+from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import STIFFENER_CELLS, Material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, divided, given_nodes, place_nodes, refuse_too_many, thinned
@@ -192,7 +192,7 @@ def build(
     touch = 0 if bed is None else SEABED | (FRICTION if rubs(bed) else 0)
     touch |= contact_bits(scene) | obstacle_bits(scene)
     moves = layout is not None
-    line = line_on(cable, s, rod, touch, sections_turn=not moves or spins_freely(cable), comes_and_goes=moves)
+    line = line_on(cable, s, rod, touch, inertia_of_zones(cable) if moves else WITH_SECTIONS)
     if sea.values.carried.size:
         line = line._replace(moved=np.array([kind_of(x) for x in scene.obstacles.values()], np.int8))
 
@@ -324,7 +324,7 @@ def _resists_spin(scene: Scene, cable: Material) -> bool:
     Along round, straight sections without inertia the torque is the same everywhere: an end that turns freely makes it
     0, whatever moment the other one bears, and that moment only bends.
     """
-    inert = not isinstance(scene.model, AdaptiveModel) and bool(cable.polar.any())  # rods that come and go have none
+    inert = bool(cable.polar.any()) and (cable.sections_turn or not isinstance(scene.model, AdaptiveModel))
     return inert or bool(cable.kappa[:, :2].any() or (cable.B[:, 0] != cable.B[:, 1]).any())
 
 

@@ -12,7 +12,7 @@ from hybrid.kernels.state.forces import FRICTION, PLANAR, ROTARY, TOUCHES
 from hybrid.kernels.state.state import Floats, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.ends import first_director
-from hybrid.model.line import line_on
+from hybrid.model.line import NO_INERTIA, WITH_SECTIONS, line_on
 from hybrid.model.plane import planar
 
 FEWER = 4  # cells that become one
@@ -37,10 +37,10 @@ def coarser(model: Model) -> Model | None:
         kept[np.linspace(a, b, max(2, round((b - a) / FEWER)) + 1).astype(int) if b - a > 1 else [a, b]] = True
     at = np.flatnonzero(kept)
     rod = line.spin[at[:-1]] == 1
-    bits, turns = line.bits & (TOUCHES | FRICTION), bool(line.bits & ROTARY)
+    bits, inertia = line.bits & (TOUCHES | FRICTION), WITH_SECTIONS if line.bits & ROTARY else NO_INERTIA
     if at.size == line.s.size:  # every node stays, as beside so many point loads
         return None
-    new = line_on(cable, line.s[at], rod, bits, sections_turn=turns)
+    new = line_on(cable, line.s[at], rod, bits, inertia)
     if line.bits & PLANAR:
         new = planar(new, line.plane)
     start = picked(new, model.start, at, _turns(line, new, model.start))

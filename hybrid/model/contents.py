@@ -248,8 +248,8 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
     entries.append(Entry("buoyancy", scene.environment.fluid is not None, "environment.fluid"))
     entries += (*_idle(scene, line), *_left_out(scene))
     entries += [_force(scene, line, name, bit, needs) for name, (bit, needs) in FORCES.items()]
-    if isinstance(scene.model, AdaptiveModel):
-        why = "rods that come and go have none; fixed zones and `model: rod` do"
+    if isinstance(scene.model, AdaptiveModel) and not any(x.turns for x in scene.cable.sections):
+        why = "rods that come and go have what sections[].rotary_inertia gives; fixed zones and `model: rod` any"
         entries = [replace(x, why=why) if x.what == "rotary inertia" else x for x in entries]
     if scene.ends.turns:
         loose = next((z for z in zones if z.kind != "rod" and not line.torsion.size), None)

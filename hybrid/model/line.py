@@ -28,23 +28,25 @@ from hybrid.kernels.state.state import (
 from hybrid.model.bending_tables import bend_law
 from hybrid.model.material import Material
 
+# What inertia the sections of rods have.
+NO_INERTIA, ABOUT_CHORDS, WITH_SECTIONS = range(3)
+
 lines = Packed(blank_line, given=("bits", "plane", "torsion", *TENSION_TORQUE))
 
 
 def line_on(
-    material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, sections_turn: bool = True,
-    comes_and_goes: bool = False, without: int = 0,
-) -> Line:  # fmt: skip
+    material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, inertia: int = WITH_SECTIONS, without: int = 0
+) -> Line:
     """The line of a material with nodes s (N+1,) and rod cells where `rod` (N,) is true.
 
     more_bits: forces that the surroundings ask for; without: those that are left out all the same.
-    sections_turn: whether cross-sections of rods have inertia.
-    comes_and_goes: its rods do; they have inertia about their chords alone, where nothing else holds their spin.
+    inertia: what cross-sections of rods have; of rods that come and go `inertia_of_zones`.
     """
-    bits, inertia = (material.bits | more_bits) & ~without, NO_INERTIA
-    if sections_turn and rod.any() and (material.polar[material.piece(0.5 * (s[:-1] + s[1:]))] > 0.0).any():
-        bits |= ROTARY
-        inertia = ABOUT_CHORDS if comes_and_goes else WITH_SECTIONS
+    bits = (material.bits | more_bits) & ~without
+    if rod.any() and (material.polar[material.piece(0.5 * (s[:-1] + s[1:]))] > 0.0).any():
+        bits |= ROTARY * (inertia != NO_INERTIA)
+    else:
+        inertia = NO_INERTIA
     if material.curves is not None:
         bits |= AXIAL_LAW
     if material.bends is not None:
@@ -76,10 +78,6 @@ def on_base(
     if material.vortices.size:
         line = line._replace(wake_law=wake_law(material, s, of))
     return line
-
-
-# What inertia the sections of rods have.
-NO_INERTIA, ABOUT_CHORDS, WITH_SECTIONS = range(3)
 
 
 def made_of(material: Material, inertia: int = WITH_SECTIONS) -> Floats:
@@ -126,6 +124,11 @@ def spins_freely(material: Material) -> bool:
     bend turns it: at once by half a turn where the bend goes through zero and nothing has inertia.
     """
     return not material.passes_torque and bool(material.bits & STIFFNESS_DAMPING) and bool(material.polar.any())
+
+
+def inertia_of_zones(material: Material) -> int:
+    """What inertia the sections of rods that come and go have: all that is given, else what nothing but it holds."""
+    return WITH_SECTIONS if material.sections_turn else ABOUT_CHORDS if spins_freely(material) else NO_INERTIA
 
 
 def with_spin_inertia(line: Line, material: Material) -> Line:

@@ -9,7 +9,7 @@ from hybrid.kernels.mesh.zone_criteria import HINGE, NodeKinds, blank_kinds
 from hybrid.kernels.mesh.zone_line import Cable, blank_kinds_job, blank_line_job, fill_kinds
 from hybrid.kernels.state.state import NO_PLANE, Floats, Line
 from hybrid.model.layout import Layout
-from hybrid.model.line import ABOUT_CHORDS, NO_INERTIA, cable_on, on_base, put_points, spins_freely
+from hybrid.model.line import cable_on, inertia_of_zones, on_base, put_points
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR, Material
 
 kinds_of = Packed(lambda n: blank_kinds(n, 1), given=("free",))
@@ -21,7 +21,7 @@ class LineOnBase:
     def __init__(self, material: Material, base: Floats) -> None:
         """base: (n+1,) m, nodes that are always there."""
         self._material, self._place, self._bits = material, material.point_nodes(base), 0
-        self._cable = cable_on(material, base, 0, ABOUT_CHORDS if spins_freely(material) else NO_INERTIA)
+        self._cable = cable_on(material, base, 0, inertia_of_zones(material))
         self._line_job, self._kinds_job = Table(blank_line_job), Table(blank_kinds_job)
 
     @property

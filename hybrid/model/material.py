@@ -108,6 +108,7 @@ class Material:
     around: float = np.inf
     bends: list[Curve | None] | None = None  # (K,) tables of moment over curvature; None: there are none
     tension_torque: Floats = field(default_factory=lambda: np.zeros(0))  # (K,) N m per N; empty: none anywhere
+    sections_turn: bool = False  # whether sections are given an inertia, which rods that come and go have too
 
     @property
     def passes_torque(self) -> bool:
@@ -328,6 +329,7 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         hinged=(not start.acts_by_moment, not end.acts_by_moment),
         at=np.zeros(0), lift=np.zeros(0), footing=np.zeros(0), points={name: np.zeros(0) for name in POINT},
     )  # fmt: skip
+    out.sections_turn = any(x.turns for x in of)
     if any(x.curve for x in of):
         out.curves = [stretch_law(x) for x in of]
     if any(x.tension_torque for x in of):

@@ -12,7 +12,7 @@ from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.build import Model, build, place_cells
 from hybrid.model.initial_shape import end_conditions
 from hybrid.model.layout import Layout
-from hybrid.model.line import line_on
+from hybrid.model.line import NO_INERTIA, WITH_SECTIONS, line_on
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import Zone
@@ -48,8 +48,8 @@ def nearby(model: Model, of: Scene, scene: Scene, resolution: Resolution, withou
     if layout is not None and on_base is not None:
         line = on_base.line(layout, (model.line.bits | cable.bits) & ~without, model.line.plane)
     else:
-        turns, bits = bool(model.line.bits & ROTARY), model.line.bits & ~PLANAR
-        line = line_on(cable, s, model.line.spin == 1, bits, sections_turn=turns, without=without)
+        inertia = WITH_SECTIONS if model.line.bits & ROTARY else NO_INERTIA
+        line = line_on(cable, s, model.line.spin == 1, model.line.bits & ~PLANAR, inertia, without)
         if model.line.bits & PLANAR & ~without:
             line = planar(line, model.line.plane)
     sea = _sea(model, of, scene)

@@ -13,7 +13,7 @@ from hybrid.kernels.reel import winch as w
 from hybrid.kernels.reel.reel import LEAVES
 from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.layout import Layout
-from hybrid.model.line import ABOUT_CHORDS, NO_INERTIA, WITH_SECTIONS, line_on, made_of, spins_freely
+from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on, made_of
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import MOST_CELLS, Zone
@@ -415,7 +415,6 @@ def _whole_material(scene: Scene, nodes: Floats) -> Material:
 
 def _pieces(scene: Scene, cable: Material, side: int, far: float) -> Floats:
     """Where every piece of the material begins, and its row, as of Reel.pieces: with the inertia that cells have."""
-    begins, inertia = (cable.bounds[:-1] if side else far - cable.bounds[1:]), WITH_SECTIONS
-    if isinstance(scene.model, AdaptiveModel):
-        inertia = ABOUT_CHORDS if spins_freely(cable) else NO_INERTIA
+    begins = cable.bounds[:-1] if side else far - cable.bounds[1:]
+    inertia = inertia_of_zones(cable) if isinstance(scene.model, AdaptiveModel) else WITH_SECTIONS
     return np.ascontiguousarray(np.column_stack([begins, made_of(cable, inertia)])[:: 1 if side else -1])

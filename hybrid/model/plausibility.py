@@ -12,7 +12,7 @@ from itertools import accumulate
 from typing import NamedTuple
 
 from hybrid.model.sea import current_table
-from hybrid.model.sections import bending_stiffness, weight
+from hybrid.model.sections import bending_stiffness, rotary_inertia, weight
 from hybrid.scene.attachments import Float
 from hybrid.scene.motion_tables import SHIFTS
 from hybrid.scene.schema import Scene, Section
@@ -53,6 +53,8 @@ STIFFEST_BENDING = 1.0
 # Parts of what a pipe's wall gives, EA and EI, between which coatings and armour may lie, and EA of a line that is
 # meant not to stretch.
 AXIAL_OF_A_PIPE, BENDING_OF_A_PIPE = (0.2, 500.0), (0.2, 5.0)
+# Rotary inertia over that of a thin ring of the diameter: armour is near that, and no section has twice as much.
+WIDEST_INERTIA = 2.0
 # A line at rest sinks into real beds by less than this many of its diameters, or by less than half a metre.
 DEEPEST_TRENCH = (10.0, 0.5)
 # Speed of an end in a liquid, m/s, by its amplitudes and periods: twice that of the fastest ships.
@@ -159,6 +161,12 @@ def _material(section: Section) -> Iterator[Wrong]:
                 f"diameter of {section.diameter:g} m: are mass in kg/m and diameter in m?"
             )
             yield f"a mean density of {density:.3g} kg/m^3, of {section.mass:g} kg/m", "mass", why
+        turning = max(rotary_inertia(section)[0], 0.5 * rotary_inertia(section)[1])
+        most = section.mass * section.diameter**2 / 8.0
+        if turning > WIDEST_INERTIA * most:
+            why = f"expected at most {most:.3g} kg m, that of a ring of its diameter, about the axis {2.0 * most:.3g}"
+            what = f"a rotary inertia of {turning:.3g} kg m across the axis"
+            yield what, "rotary_inertia", f"{why}: is it in kg m? catenaries have none"
     for key, given in (("drag", section.drag), ("added_mass", section.added_mass)):
         largest = max(given.normal, given.tangential) if given is not None else 0.0
         if largest > LARGEST_COEFFICIENT:

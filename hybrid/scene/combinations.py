@@ -411,7 +411,6 @@ STAYING_CELLS = Feature(
     lambda tables: (at for at in _moving(tables) if not tables["model"].curvature_error),
 )  # fmt: skip
 SHORTEST_CELLS = Feature("shortest cells of rods", "model.rod_cell", _of_moving("rod_cell"))
-ROTARY_INERTIA = Feature("rotary inertia", "rotary_inertia", _in_sections("rotary_inertia", of=lambda x: x.turns))
 TWO_STIFFNESSES = Feature(
     "two bending stiffnesses", "bending_stiffness: [EI_1, EI_2]",
     _in_sections("bending_stiffness", of=lambda x: x.anisotropic),
@@ -521,11 +520,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "a table of moment is the same about any axis, and the section beside it is not ({key})",
         "sections of one bending_stiffness beside it",
         "give one number there, or put a short section with one bending_stiffness between them",
-    ),
-    Refusal(
-        ROTARY_INERTIA, MOVING_ZONES, "not worked out",
-        "zones move (model), and rods that come and go have no rotary inertia",
-        "nothing or 0", "leave it out, or write `model: rod`",
     ),
     Refusal(
         TORSION, PLANE, "physics", "dimension is 2 and there is no torsion", "nothing or 0",

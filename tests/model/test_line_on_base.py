@@ -10,7 +10,7 @@ import pytest
 import hybrid
 from hybrid.kernels.state.forces import FRICTION, SEABED
 from hybrid.model.build import build
-from hybrid.model.line import line_on
+from hybrid.model.line import NO_INERTIA, line_on
 from hybrid.model.release import without_hold
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -28,7 +28,7 @@ def test_a_line_on_base_cells_is_that_of_the_material(name: str) -> None:
         rod = random.random(model.layout.rod.size) < 0.5
         layout = model.layout._replace(rod=rod, here=random.random(model.layout.starts[-1] + 1) < 0.5)
         more = model.line.bits & (SEABED | FRICTION)
-        same = line_on(model.cable, layout.nodes, layout.rod_cells, more, sections_turn=False)
+        same = line_on(model.cable, layout.nodes, layout.rod_cells, more, NO_INERTIA)
         line = model.on_base.line(layout, same.bits)
         for field, a, b in zip(line._fields, line, same, strict=True):
             np.testing.assert_allclose(a, b, rtol=ROUND, atol=0.0, err_msg=field)

@@ -74,6 +74,7 @@ SECTIONS = {
     "EI in N mm2": (CHAIN | {"bending_stiffness": 50e6}, "bending_stiffness", "in N mm^2"),
     "EI of a pipe in kN m2": (PIPE | {"bending_stiffness": 9e4}, "bending_stiffness", "kN m^2"),
     "EA of a pipe in kN": (PIPE | {"axial_stiffness": 5e6}, "axial_stiffness", "kN"),
+    "rotary inertia in g m": (CHAIN | {"rotary_inertia": 6.0}, "rotary_inertia", "at most 0.00625 kg m"),
     "drag of a percentage": (CHAIN | {"drag": {"normal": 120}}, "drag", "at most 10"),
     "a rubber cord under its weight": (
         {"mass": 20.0, "diameter": 0.1, "axial_stiffness": 4e3}, "axial_stiffness", "max_strain"),

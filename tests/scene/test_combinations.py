@@ -70,7 +70,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
         TWO | {"cable.attachments": [{"kind": "bend_restrictor", "range": [0, 2], "radius": 2}]}, ""
     ),
     (c.TABLE_BESIDE, c.TWO_STIFFNESSES): (TABLE_BESIDE_TWO, ""),
-    (c.ROTARY_INERTIA, c.MOVING_ZONES): ({SECTION + "rotary_inertia": 1e-3} | MOVING, ""),
     (c.TORSION, c.PLANE): (TORQUE | {"dimension": 2}, ""),
     (c.PLANE, c.SELF_CONTACT): ({"dimension": 2, "contact": {"self": True}}, ""),
     (c.SWIVEL, c.TURNS): (SWIVEL | {END + "turns": 2}, ""),

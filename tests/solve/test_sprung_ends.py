@@ -11,7 +11,7 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.step.newton import TOLERANCE
 from hybrid.model.build import build
-from hybrid.model.line import line_on
+from hybrid.model.line import ABOUT_CHORDS, line_on
 
 LENGTH, CELLS = 30.0, 20
 SECTION = {
@@ -77,7 +77,7 @@ def test_rods_that_come_and_go_have_the_same_springs(k: int) -> None:
     model = build(hybrid.validate_scene(one(*held, cable={"sections": [section]}, model="adaptive")))
     assert model.on_base is not None and model.layout is not None
     line = model.on_base.line(model.layout, model.line.bits)
-    other = line_on(model.cable, model.layout.nodes, model.layout.rod_cells, comes_and_goes=True)
+    other = line_on(model.cable, model.layout.nodes, model.layout.rod_cells, inertia=ABOUT_CHORDS)
     np.testing.assert_allclose(line.kb[-k], other.kb[-k], rtol=1e-14)
     assert line.hn[-k] == pytest.approx(other.hn[-k], rel=1e-14)
     own = 2.0 * 500.0 / line.h[-k]
