@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from tests.combinations.pairs import BASE, S, ZONES, Tables
+from tests.combinations.pairs import BASE, ZONES, S, Tables
 from tests.problems import tables_with
 
 EXACT: Tables = {"output.exact": True}
