@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from hybrid.kernels.junctions.carried_frames import SEAT, TURNS, WITH_BODY
-from hybrid.kernels.state.state import Floats, Line
+from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.ends import first_director, transported
+from hybrid.model.line_on_base import LineOnBase
 from hybrid.scene.ends import Triple
 from hybrid.scene.system import System
 
@@ -97,12 +98,17 @@ def seated(seat: Floats, axes: Floats) -> tuple[Triple, Triple]:
     return tangent, director
 
 
-def with_clamps(model: Model, clamped: Line, ends: Sequence[int]) -> Model:
-    """The model with the elements that another line has at these ends, and its zones that a torque passes through."""
+def with_clamps(model: Model, clamped: Model, ends: Sequence[int]) -> Model:
+    """The model with the elements that another one of the same line has at these ends, and what they hold."""
     line = model.line
     names = ("element", "kb", "k0", "hn", *(("bend_law",) if line.bend_law.size else ()))
     new = {name: getattr(line, name).copy() for name in names}
     for k in ends:
         for name, values in new.items():
-            values[-k] = getattr(clamped, name)[-k]
-    return replace(model, line=line._replace(torsion=clamped.torsion, **new))
+            values[-k] = getattr(clamped.line, name)[-k]
+    line = line._replace(torsion=clamped.line.torsion, **new)
+    if model.layout is None:
+        return replace(model, line=line)
+    held = ("held_tangent", "held_twist", "springs", "hinged")
+    cable = replace(model.cable, **{name: getattr(clamped.cable, name) for name in held})
+    return replace(model, line=line, cable=cable, on_base=LineOnBase(cable, model.layout.base))

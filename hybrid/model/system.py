@@ -415,7 +415,7 @@ class _Lines:
             mesh = self.meshes.get(name)
             other = build(self._scene(name, carried, directions), self._resolution[name], mesh, like=model)
             held = [k for k, end in enumerate(("start", "end")) if clamps[k] is not None]
-            other = with_clamps(other, model.line, held)
+            other = with_clamps(other, model, held)
             other.ends.values.frame[held] = model.ends.values.frame[held]
             model = replace(other, start=model.start, start_shape=model.start_shape)
         for k, point in enumerate((system.lines[name].start, system.lines[name].end)):

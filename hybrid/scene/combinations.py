@@ -642,12 +642,6 @@ REFUSALS: tuple[Refusal, ...] = (
         fix="leave it out, or the clamp; a line may break at its other end",
     ),
     Refusal(
-        CLAMPED_TO_FREE, MOVING_ZONES, "not worked out",
-        "zones move ({key}), and what a rod holds is loose once that is a catenary",
-        "pinned",
-        "write `model: rod`, or leave the clamp out",
-    ),
-    Refusal(
         TURNS, CLAMPED_TO_FREE, "not worked out", "{key} is at what turns freely, by turns that nobody counts",
         "0", "leave it out, or hold both ends of this line at fixed points or bodies; a moment on a body twists it too",
     ),

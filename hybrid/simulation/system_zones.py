@@ -16,6 +16,7 @@ import numpy as np
 from hybrid.adapt.manager import Change, DomainManager
 from hybrid.adapt.user_criterion import UserCriterion, of_line
 from hybrid.errors import ComputationError, Outcome
+from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.zone_step import LOOKAHEAD, follow_zones
 from hybrid.kernels.state import books as b
@@ -59,12 +60,15 @@ class Start(NamedTuple):
 def managers_for(
     scenes: Mapping[str, Scene], model: SystemModel, criterion: UserCriterion | None
 ) -> dict[int, DomainManager]:
-    """The domain managers of lines that are rod wherever they may be."""
-    return {
+    """The domain managers of lines that are rod wherever they may be; at a clamp to what is free they stay rod."""
+    managers = {
         k: manager_for(scenes[name], x, model.resolution.lines[name], of_line(criterion, name))
         for k, (name, x) in enumerate(zip(model.names, model.models, strict=True))
         if isinstance(scenes[name].model, AdaptiveModel)
     }
+    for k, manager in managers.items():
+        manager.given[[0, -1]] = np.where(model.seats[k, :, TURNS] != 0.0, 1, manager.given[[0, -1]])
+    return managers
 
 
 def zones_at_rest(

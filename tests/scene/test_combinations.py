@@ -105,10 +105,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.BY_RAO, c.FINITE_WAVES): (HIGH_WAVES | {END + "motion": {"vessel": RAO}}, ""),
     (c.LAYERS, c.PAYOUT): (PAID | {"resolution": {"cells_per_layer": 2}}, ""),
     (c.BREAKS_OFF_CLAMP, c.CLAMPED_CONNECTION): (CLAMPED | {"points.b.break_at": {"time": 2}}, ""),
-    (c.CLAMPED_TO_FREE, c.MOVING_ZONES): (
-        CLAMPED | {ONE + "model": {"kind": "adaptive"}, "points.b": {"body": "buoy", "place": [0, 0, 0]},
-                   "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0]}}, ""
-    ),
     (c.TURNS, c.CLAMPED_TO_FREE): (
         CLAMPED | {ONE + "connections.end.turns": 2, "points.b": {"body": "buoy", "place": [0, 0, 0]},
                    "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0]}}, ""
