@@ -634,7 +634,6 @@ REFUSALS: tuple[Refusal, ...] = (
         VORTICES, RESPONSE, "not worked out", "lift that locks in to a motion is no part of a response by frequency",
         fix="leave it out; hybrid run computes it in time",
     ),
-    Refusal(LAYERS, PAYOUT, "not worked out", f"{PAID}, and its cells are given", fix="place cells by `mesh`"),
     # --- several lines ---
     Refusal(
         BREAKS_OFF_CLAMP, CLAMPED_CONNECTION, "not worked out",
