@@ -393,10 +393,12 @@ def _layout(scene: Scene, cable: Material, cuts: Sequence[float], resolution: Re
     assert isinstance(model, AdaptiveModel)
     if not follows_curvature(scene):
         return of_rods(_placed(scene, cable, whole, cuts, resolution, DEFAULT_CELLS)[0])
-    finer = resolution.fineness
+    finer, seen = resolution.fineness, resolution.grading
     # base cells stay, whatever the fineness: what is asked of rods decides
     resolution = replace(resolution, grading=None, fineness=max(finer, 1.0))
-    if mesh_is_free(scene):
+    if mesh_is_free(scene) and scene.resolution is not None and seen is not None:
+        base, _ = _placed(scene, cable, whole, cuts, replace(resolution, grading=seen), FOLLOWING_BASE)
+    elif mesh_is_free(scene):
         base, _ = place_nodes(whole, cuts, None, None, FOLLOWING_BASE)
         assert model.curvature_error is not None
         base = _dense_in_stiffeners(scene, base, max(finer, 1.0))

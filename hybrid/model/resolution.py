@@ -382,9 +382,12 @@ def mesh_is_free(scene: Scene) -> bool:
 
 
 def wants_survey(scene: Scene) -> bool:
-    """Whether a coarse run comes first that shows where cells should be short; not where they follow the curvature."""
-    wanted = requested_accuracy(scene) is not None or scene.resolution is not None
-    return mesh_is_free(scene) and wanted and not follows_curvature(scene)
+    """Whether a coarse run comes first that shows where cells should be short; where they follow the curvature, base
+
+    cells of which a scene gives the number to a layer.
+    """
+    wanted = requested_accuracy(scene) is not None and not follows_curvature(scene)
+    return mesh_is_free(scene) and (wanted or scene.resolution is not None)
 
 
 def follows_curvature(scene: Scene) -> bool:

@@ -447,8 +447,6 @@ PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout
 PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out_at("end"))
 TENSION_HELD = Feature("a winch that holds a tension, of a line to what is free", "payout.winch", _tension_held)
 ZONES_OF_SEVERAL = Feature("zones of several lines that move", "lines.NAME.model", _zones_of_several)
-LAYERS = Feature("cells to a boundary layer", "resolution.cells_per_layer",
-                 _asks("resolution", "cells_per_layer", lambda x: True))  # fmt: skip
 CLAMPED_CONNECTION = Feature("a clamped connection", "lines.NAME.connections", _clamped)
 BREAKS_OFF_CLAMP = Feature("a break at a clamp", "break_at", _breaks_off_clamp)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
@@ -551,10 +549,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         SHORTEST_CELLS, STAYING_CELLS, "physics", "rods and catenaries have the cells of one mesh, which stay",
         fix="leave it out and give mesh.cells or mesh.nodes, or write curvature_error for cells that follow",
-    ),
-    Refusal(
-        LAYERS, FOLLOWING_CELLS, "not worked out", "cells follow the curvature, as model.curvature_error has it",
-        fix="leave out the one or the other",
     ),
     # --- obstacles, and other lines ---
     Refusal(

@@ -180,3 +180,15 @@ def test_cells_to_a_layer_show_the_bend_at_both_clamps_of_a_line_that_is_paid_ou
     for count, bound in ((2, 0.02), (4, 0.006), (8, 0.0015)):
         found, cells = at_clamps(paid, mesh=None, resolution={"cells_per_layer": count})
         assert np.abs(found / true - 1.0).max() < bound and cells < 120
+
+
+@pytest.mark.parametrize("paid", [False, True])
+def test_base_cells_to_a_layer_of_cells_that_follow_show_the_bend_at_both_clamps(paid: bool) -> None:
+    payout: Tables = {"payout": {"rate": 0.2, "ramp": 1.0}} if paid else {}
+    true, _ = at_clamps(payout, mesh={"cells": 400})
+    follows: Tables = {"model": {"kind": "adaptive", "curvature_error": 0.1}, "mesh": None}
+    alone, _ = at_clamps(payout, **follows)
+    assert np.abs(alone / true - 1.0).max() > (0.05 if paid else 0.015)
+    for count, bound in ((2, 0.025), (4, 0.01), (8, 0.003)):
+        found, _ = at_clamps(payout, resolution={"cells_per_layer": count}, **follows)
+        assert np.abs(found / true - 1.0).max() < bound

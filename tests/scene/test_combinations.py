@@ -77,7 +77,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.CURLED, c.PIPE_CURLED): (CURVED | {SECTION + "pipe": {"wall": 0.002, "modulus": 2e11}}, ""),
     (c.STRETCH_LAW, c.TORQUE_OF_TENSION): (ROPE | TORQUE, ""),
     (c.SHORTEST_CELLS, c.STAYING_CELLS): ({"model": {"kind": "adaptive", "rod_cell": 0.1}}, ""),
-    (c.LAYERS, c.FOLLOWING_CELLS): ({"resolution": {"cells_per_layer": 2}} | FOLLOWING, ""),
     (c.PLANE, c.OBSTACLES): (BALL | {"dimension": 2}, ""),
     (c.MOVING_ZONES, c.GOES_ITS_WAY): ({"obstacles.ball": BALL["obstacles"]["ball"] | {"from_outside": True}} | MOVING, ""),
     (c.PAYOUT, c.GOES_ITS_WAY): ({"obstacles.ball": BALL["obstacles"]["ball"] | {"from_outside": True}} | PAID, ""),

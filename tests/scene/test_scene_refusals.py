@@ -56,7 +56,6 @@ CASES = {
     "truth for number": (SUSPENSION, MASS, "mass: §true", "cable.sections[0].mass", ""),
     "list for number": (SUSPENSION, MASS, "mass: §[1, 2]", "cable.sections[0].mass", ""),
     "pair of three": (SUSPENSION, BENDING, "bending_stiffness: §[1, 2, 3]", "cable.sections[0].bending_stiffness", "there are 3"),
-    "cells to a layer where they follow": (SUSPENSION, f"model: {MODEL}", "model: {kind: adaptive, curvature_error: 0.05}\nresolution: {cells_per_layer: §3}", "resolution.cells_per_layer", "leave out the one or the other"),
     "one pair for a list of pairs": (SUSPENSION, "{every: 0.1}", "{every: 0.1, elevation: [§0]}", "output.elevation[0]", "`[[x, y]]` where there is one"),
     "inside a pair": (SUSPENSION, BENDING, "bending_stiffness: [1, §-2]", "cable.sections[0].bending_stiffness[1]", "sign"),
     "two coordinates": (SUSPENSION, PINNED, "{kind: pinned, position: §[0, 0]}", "ends.start.position", "there are 2"),
