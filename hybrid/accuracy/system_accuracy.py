@@ -241,8 +241,12 @@ class SystemPasses:
         model, out = build_system(self.system, resolution=coarse), dict(first.lines)
         for name in free:
             scene, of_line = self.scenes[name], model.models[model.names.index(name)]
-            s = output_points(asked.scene_of(name)).s
-            survey = Survey.of(scene, first.lines[name], of_line, s, runs[name].values)
+            paid = of_line.payout
+            reel = (paid.longest, not paid.side) if paid is not None and self.moves else ()
+            s = output_points(asked.scene_of(name), *reel).s
+            out_at_first = (s >= 0.0) & (s <= scene.length)
+            values = {key: x[:, out_at_first] for key, x in runs[name].values.items() if x.shape[1:2] == s.shape}
+            survey = Survey.of(scene, first.lines[name], of_line, s[out_at_first], values)
             out[name] = with_survey(first.lines[name], scene, survey)
         return SystemResolution(out)
 

@@ -324,7 +324,7 @@ class Resolution(Table):
         le=50,
         description="rod cells to a length sqrt(EI/T), over which bending fades beside clamps, joints and point loads, "
         "in the first result; a coarse run before it shows T and where the cable bends; base cells, where cells follow "
-        "the curvature; without this table 3 times the fineness that `accuracy` asks for, which is 0.4 to 1.5 at 1% [-]",
+        "the curvature; without this table 3 times the fineness of `accuracy`, which is 0.4 to 1.5 at 1% [-]",
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from tests.combinations.pairs import BASE, CLAMP, END, FAR, START, ZONES, S, Tables
+from tests.combinations.pairs import BASE, CLAMP, END, FAR, START, ZONES, S, Tables, as_system
 from tests.problems import tables_with
 
 EXACT: Tables = {"output.exact": True}
@@ -192,3 +192,14 @@ def test_base_cells_to_a_layer_of_cells_that_follow_show_the_bend_at_both_clamps
     for count, bound in ((2, 0.025), (4, 0.01), (8, 0.003)):
         found, _ = at_clamps(payout, resolution={"cells_per_layer": count}, **follows)
         assert np.abs(found / true - 1.0).max() < bound
+
+
+def test_cells_to_a_layer_of_several_lines_are_where_the_pre_run_of_one_puts_them() -> None:
+    """Also of a line that doubles its length, of which the pre-run has places on the reel."""
+    paid = {END: BASE["ends"]["end"] | {"motion": None, "payout": {"rate": 6.0, "ramp": 0.5}}}
+    more: Tables = {START: CLAMP, "mesh": None, "resolution": {"cells_per_layer": 3}, S + "damping": {"mass": 8.0}}
+    tables = tables_with(BASE, EXACT | paid | more | {"time": {"duration": 2.0, "step": 0.01}})
+    system = as_system(tables)
+    assert system is not None
+    one, two = hybrid.run(tables).mesh[0].s, hybrid.run(system).lines["one"].mesh[0].s
+    assert np.abs(np.diff(one)[:8] / np.diff(two)[:8] - 1.0).max() < 0.1
