@@ -241,11 +241,12 @@ class SystemPasses:
         model, out = build_system(self.system, resolution=coarse), dict(first.lines)
         for name in free:
             scene, of_line = self.scenes[name], model.models[model.names.index(name)]
-            paid = of_line.payout
-            reel = (paid.longest, not paid.side) if paid is not None and self.moves else ()
-            s = output_points(asked.scene_of(name), *reel).s
+            paid = of_line.payout if self.moves else None
+            longest, at_start = (None, False) if paid is None else (paid.longest, not paid.side)
+            s = output_points(asked.scene_of(name), longest, at_start).s
             out_at_first = (s >= 0.0) & (s <= scene.length)
-            values = {key: x[:, out_at_first] for key, x in runs[name].values.items() if x.shape[1:2] == s.shape}
+            found = runs[name].values
+            values = {x: np.asarray(found[x])[:, out_at_first] for x in ("curvature", "tension", "position")}
             survey = Survey.of(scene, first.lines[name], of_line, s[out_at_first], values)
             out[name] = with_survey(first.lines[name], scene, survey)
         return SystemResolution(out)
