@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.junctions.bodies import FORCE, FRAME, LEVEL, LIFT, MOMENT, NUMBERS, PLACE, STATE, STIFFNESS, V
+from hybrid.kernels.junctions.bodies import FORCE, FRAME, LEVEL, LIFT, MASS, MOMENT, NUMBERS, PLACE, STATE, STIFFNESS, V
 from hybrid.kernels.junctions.carried_frames import SEAT, TURNS, WITH_BODY, WITH_POINT
 from hybrid.kernels.laws.members import PIECE
 from hybrid.kernels.machine.binding import Table
@@ -106,15 +106,28 @@ class SystemModel:
         """
         for body, row in zip(self.bodies, out, strict=False):
             body.load(t, since, row)
-        for moments, row in zip(self.moments, out[len(self.bodies) :], strict=True):
+        for moments, row in zip(self._taken_moments, out[len(self.bodies) :], strict=True):
             row[MOMENT : MOMENT + 3] = sum((x.grown(t) for x in moments if since < x.until), np.zeros(3))
+
+    @property
+    def unheld(self) -> tuple[int, ...]:
+        """Numbers in `rigid` of points to which no line is clamped any longer: nothing asks how they are turned."""
+        first = len(self.free) + len(self.bodies)
+        held = {self.joints[line][k] for line, k in np.argwhere(self.seats[:, :, TURNS] != 0.0)}
+        return tuple(k for k in range(len(self.rigid)) if first + k not in held)
+
+    @property
+    def _taken_moments(self) -> list[tuple[EndLoad, ...]]:
+        """The moments that are given to each of the points in `rigid`, none where nothing takes them."""
+        unheld = self.unheld
+        return [() if k in unheld else x for k, x in enumerate(self.moments)]
 
     def growing_loads(self, since: float) -> list[EndLoad]:
         """All loads of the bodies, and points behind them, on which one grows or follows a table: `end` is their row.
 
         since: as of `load_bodies`.
         """
-        given = [*(body.loads for body in self.bodies), *self.moments]
+        given = [*(body.loads for body in self.bodies), *self._taken_moments]
         return [
             x._replace(end=row)
             for row, loads in enumerate(given)
@@ -131,10 +144,12 @@ class SystemModel:
 
     def body_numbers(self, t: float) -> Floats:
         """(B, NUMBERS or, with pieces of members, more) of the free bodies at t (s), where they are first; behind them
-        those of points, zeros."""
+        those of points, zeros; a turn that nothing holds has an inertia, which nothing feels."""
         out = np.zeros((len(self.body_places), max((x.numbers.size for x in self.bodies), default=NUMBERS)))
         for row, body in zip(out, self.bodies, strict=False):
             row[: body.numbers.size] = body.numbers
+        for k in self.unheld:
+            out[len(self.bodies) + k, MASS + 21 : MASS + 36 : 7] = 1.0
         self.load_bodies(t, out)
         self.stir(t, self.body_places, 0.0, out)
         return out

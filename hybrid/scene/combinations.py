@@ -319,17 +319,6 @@ def _clamped_to_free(tables: Tables) -> Iterator[Place]:
             yield at
 
 
-def _breaks_off_clamp(tables: Tables) -> Iterator[Place]:
-    """A line that breaks at the end at which it is clamped to a free point, or a point that gives way with a clamp."""
-    for _, end in _clamped(tables):
-        system, name = tables[SYSTEM], tables[LINE]
-        point = getattr(system.lines[name], str(end))
-        if system.breaks(name, end) and system.points[point].kind == "free":
-            yield "lines", name, "break_at"
-        if getattr(system.points[point], "break_at", None) is not None:
-            yield "points", point, "break_at"
-
-
 def _obstacles(tables: Tables) -> Iterator[Place]:
     if tables.get("obstacles"):
         yield ("obstacles",)
@@ -447,8 +436,6 @@ PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout
 PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out_at("end"))
 TENSION_HELD = Feature("a winch that holds a tension, of a line to what is free", "payout.winch", _tension_held)
 ZONES_OF_SEVERAL = Feature("zones of several lines that move", "lines.NAME.model", _zones_of_several)
-CLAMPED_CONNECTION = Feature("a clamped connection", "lines.NAME.connections", _clamped)
-BREAKS_OFF_CLAMP = Feature("a break at a clamp", "break_at", _breaks_off_clamp)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
 CLAMPED_TO_FREE = Feature("a line that is clamped to a free point or body", "lines.NAME.connections", _clamped_to_free)
 OBSTACLES = Feature("obstacles", "obstacles", _obstacles)
@@ -629,11 +616,6 @@ REFUSALS: tuple[Refusal, ...] = (
         fix="leave it out; hybrid run computes it in time",
     ),
     # --- several lines ---
-    Refusal(
-        BREAKS_OFF_CLAMP, CLAMPED_CONNECTION, "not worked out",
-        "what breaks turns freely, and a line is clamped there",
-        fix="leave it out, or the clamp; a line may break at its other end",
-    ),
     Refusal(
         TURNS, CLAMPED_TO_FREE, "not worked out", "{key} is at what turns freely, by turns that nobody counts",
         "0", "leave it out, or hold both ends of this line at fixed points or bodies; a moment on a body twists it too",

@@ -16,7 +16,7 @@ from hybrid.scene.motion_tables import Motion
 
 _BREAK = (
     "when what holds the point fails, at a time or after the first step with so large a force of its lines: they hang "
-    "on together, and the point is free; absent: never"
+    "on together, and the point is free; lines that were clamped there turn freely then; absent: never"
 )
 
 # What to do with a key that ends of one cable have.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid.kernels.junctions.bodies import DONE, SPRING
+from hybrid.kernels.junctions.bodies import DONE, SPRING, W
 from hybrid.kernels.state.report import FORCE_A
 from hybrid.kernels.state.state import NO_TURN
 from hybrid.model.failure import Weakness, after_failure, weaknesses
@@ -70,12 +70,14 @@ class Failures:
         line, end = x.ends[0]
         if run.payout is not None:
             run.payout.let_go(x.ends)
-        old, before = run.model.models[line], run.state.lines[line]
+        before, states, energy = run.model.models, run.state.lines, 0.0
         self._part(k)
-        new, energy = run.model.models[line], 0.0
-        if new is not old:
-            energy = elastic(new, run.t, run.state.lines[line]) - elastic(old, run.t, before)
-            run.lines[line].books.work[0, end] += energy
+        for l, e in x.ends:
+            old, new = before[l], run.model.models[l]
+            if new is not old:
+                lost = elastic(new, run.t, run.state.lines[l]) - elastic(old, run.t, states[l])
+                run.lines[l].books.work[0, e] += lost
+                energy += lost
         text = f"{x.name} {why}; what came loose is free from here on"
         s = float(run.model.models[line].line.s[-end])
         run.recorder.event(run.t, s, s, "end released", text, energy=energy)
@@ -93,6 +95,8 @@ class Failures:
             x if x.turn.size == 3 * len(model.line.torsion) else x._replace(turn=NO_TURN)
             for x, model in zip(run.state.lines, run.model.models, strict=True)
         ]
+        for point in run.model.unheld:
+            run.state.bodies[len(run.model.bodies) + point, W:] = 0.0
         run.state = SystemState(states, run.state.bodies)
         done = run.solver.body_work[:, DONE:SPRING].copy()
         run.make_solver()

@@ -203,3 +203,86 @@ def test_cells_to_a_layer_of_several_lines_are_where_the_pre_run_of_one_puts_the
     assert system is not None
     one, two = hybrid.run(tables).mesh[0].s, hybrid.run(system).lines["one"].mesh[0].s
     assert np.abs(np.diff(one)[:8] / np.diff(two)[:8] - 1.0).max() < 0.1
+
+
+# --- breaks at clamps -----------------------------------------------------------------------------
+
+
+def knotted(point: Tables, how: Tables, *weak: str, body: bool = False, third: bool = True) -> hybrid.Result:
+    """Two lines, and a pinned one below, that meet at m; the lines `weak` break from it at 0.3 s, of a body or a point.
+
+    point: what m is, how: how the two are connected to it.
+    """
+    section = {
+        "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 20.0, "torsional_stiffness": 15.0,
+        "damping": {"mass": 0.5},
+    }  # fmt: skip
+    names = {"left": "m1", "right": "m2", "down": "m3"} if body else dict.fromkeys(("left", "right", "down"), "m")
+    tables: Tables = {
+        "points": {"a": {"position": [-9, 0, 0]}, "b": {"position": [9, 0, 1]}, "c": {"position": [0, 0, -9]}},
+        "time": {"duration": 1.0, "step": 0.01}, "output": {"every": 0.05, "points": 13, "exact": True}, "lines": {},
+    }  # fmt: skip
+    places = {name: {"body": "m", "place": [0, 0, 0]} for name in names.values()} if body else {"m": point}
+    tables["points"] |= places
+    tables |= {"bodies": {"m": point}} if body else {}
+    for name, start, end, length in (("left", "a", None, 12), ("right", None, "b", 8), ("down", None, "c", 8)):
+        at = names[name]
+        line: Tables = {"start": start or at, "end": end or at, "sections": [{"length": length} | section]}
+        key = "end" if end is None else "start"
+        line |= {"model": "rod", "mesh": {"cells": 4 * length}} | (
+            {"connections": {key: how}} if name != "down" else {}
+        )
+        line |= {"break_at": {"time": 0.3, "end": key}} if name in weak else {}
+        if third or name != "down":
+            tables["lines"][name] = line
+    if not third:
+        tables["points"].pop("c")
+    return hybrid.run(tables)
+
+
+def test_a_line_that_breaks_off_another_one_leaves_that_as_an_end_that_is_let_go() -> None:
+    """The line that stays clamped to the point, alone, is one cable whose clamp is released."""
+    found = knotted({"kind": "free", "initial_guess": [1, 0, -2]}, {"kind": "clamped"}, "left", third=False)
+    turned = np.radians(found.points["m/rotation"][0])
+    assert not turned[[0, 2]].any()
+    place, tangent = found.lines["right"].position[0, 0], [np.cos(turned[1]), 0.0, -np.sin(turned[1])]
+    section = {"length": 8, "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 20.0, "torsional_stiffness": 15.0,
+               "damping": {"mass": 0.5}}  # fmt: skip
+    released = {"kind": "clamped", "position": place.tolist(), "tangent": tangent, "release_at": {"time": 0.3}}
+    alone = hybrid.run({
+        "cable": {"sections": [section]}, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 32},
+        "ends": {"start": released, "end": {"kind": "pinned", "position": [9, 0, 1]}},
+        "time": {"duration": 1.0, "step": 0.01}, "output": {"every": 0.05, "points": 13, "exact": True},
+    })  # fmt: skip
+    moved = found.lines["right"].position
+    assert np.ptp(moved[:, 0], axis=0).max() > 1.0
+    assert np.abs(alone.position - moved).max() < 1e-7
+
+
+def test_a_point_that_all_clamped_lines_have_left_moves_as_a_body_whose_turns_nothing_feels() -> None:
+    clamp = {"kind": "clamped", "tangent": [1, 0, 0]}
+    mass: Tables = {"mass": 2.0, "initial_guess": [1, 0, -2]}
+    point = knotted({"kind": "free"} | mass, clamp, "left", "right")
+    body = knotted({"inertia": [0.3, 0.3, 0.3]} | mass, clamp, "left", "right", body=True)
+    for name in ("left", "right", "down"):
+        assert np.abs(point.lines[name].position - body.lines[name].position).max() < 1e-8
+    assert np.ptp(point.lines["down"].position[:, 0], axis=0).max() > 0.3
+    assert np.abs(np.diff(point.points["m/rotation"][7:], axis=0)).max() == 0.0
+
+
+def test_clamps_at_a_point_that_gives_way_hold_no_longer_and_their_energy_is_booked() -> None:
+    """Clamps that only hold the twist are pins; rigid ones go with the energy of their bends."""
+    weak: Tables = {"position": [2, 0, -2], "break_at": {"time": 0.3}}
+    pins, soft, rigid = (
+        knotted(weak, how)
+        for how in (
+            {"kind": "pinned"},
+            {"kind": "clamped", "tangent": [1, 0, 0], "bend_stiffness": 0.0},
+            {"kind": "clamped", "tangent": [1, 0, 0]},
+        )
+    )
+    for name in ("left", "right", "down"):
+        assert np.abs(pins.lines[name].position - soft.lines[name].position).max() < 1e-8
+        line = rigid.lines[name]
+        assert np.abs(line["bending_moment"][8:, -1 if name == "left" else 0]).max() < 1e-9
+        assert np.abs(line["work/scheme"]).max() < 0.02 * np.ptp(line["energy/kinetic"])

@@ -456,8 +456,6 @@ def test_rods_that_may_all_spin_find_their_equilibrium_at_once() -> None:
         ("lines.line0.connections.start", lambda t: t["lines"]["line0"].update(model="catenary"), "catenary"),
         ("lines.line1.connections.start", lambda t: t["lines"]["line0"]["connections"].update(end="pinned"), "another line"),
         ("lines.line0.connections.end.tangent", lambda t: t["lines"]["line1"]["connections"].update(start={"tangent": [1, 0, 0]}), "axes of point"),
-        ("lines.line0.break_at", lambda t: t["lines"]["line0"].update(break_at={"time": 1.0, "end": "end"}), "clamped there"),
-        ("points.b.break_at", lambda t: t["points"]["b"].update(break_at={"time": 1.0}), "clamped"),
         ("lines.line0.connections.start.swivel", lambda t: t["lines"]["line0"]["connections"].update(
             start={"tangent": [1, 0, 0], "swivel": True, "bend_stiffness": 0}), "nothing is left"),
         ("lines.line0.connections.start.normal", lambda t: t["lines"]["line0"]["connections"].update(
