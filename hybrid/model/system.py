@@ -37,6 +37,7 @@ from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.body_shapes import way_out
+from hybrid.scene.connections import Connections
 from hybrid.scene.points import Fairlead
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
@@ -89,6 +90,7 @@ class SystemModel:
     scenes: Mapping[str, Scene]  # of the lines by name, with their points where the system has them
     resolution: SystemResolution
     moments: tuple[tuple[EndLoad, ...], ...]  # that are given to each of the points in `rigid`
+    turns: tuple[tuple[float, float], ...]  # by which the start and the end of each line are twisted
     touching: Touching | None = None  # which lines touch each other
     loose: frozenset[tuple[int, int]] = frozenset()  # ends (line, 0 or 1) that have left their points
     # (M,) number of the body that carries an obstacle, -1: none does; empty: no body has a shape
@@ -211,8 +213,13 @@ def build_system(
         tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends), places, made, maker.bodies,
         np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
         maker.seats, known, maker.scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
-        touching, rides=rides,
+        tuple(_turns_of(x.connections) for x in system.lines.values()), touching, rides=rides,
     )  # fmt: skip
+
+
+def _turns_of(held: Connections) -> tuple[float, float]:
+    a, b = (getattr(x, "turns", 0.0) for x in (held.start, held.end))
+    return a, b
 
 
 def bodies_of(system: System) -> tuple[BodyModel, ...]:
@@ -427,8 +434,7 @@ class _Lines:
         model = self._shape(name, directions)
         carried = system.carried(name)
         if carried:
-            mesh = self.meshes.get(name)
-            other = build(self._scene(name, carried, directions), self._resolution[name], mesh, like=model)
+            other = build(self._scene(name, carried, directions), self._resolution[name], model.mesh, like=model)
             held = [k for k, end in enumerate(("start", "end")) if clamps[k] is not None]
             other = with_clamps(other, model, held)
             other.ends.values.frame[held] = model.ends.values.frame[held]

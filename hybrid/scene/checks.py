@@ -275,7 +275,7 @@ def _turns_are_held(cable: Cable, ends: Ends, model: Model) -> Iterator[Finding]
             continue
         here, given = ("ends", name, "turns"), f"{end.held_turns:g}"
         for which, other in ends.named().items():
-            if not other.holds_twist:
+            if not other.is_twisted_against:
                 fix = f"leave turns out, or clamp ends.{which} (guided: give `normal`) without a swivel"
                 yield Finding(here, f"0, because ends.{which} turns freely, so that nothing is twisted", fix, given)
         for i, section in enumerate(cable.sections):

@@ -437,7 +437,6 @@ PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payo
 TENSION_HELD = Feature("a winch that holds a tension, of a line to what is free", "payout.winch", _tension_held)
 ZONES_OF_SEVERAL = Feature("zones of several lines that move", "lines.NAME.model", _zones_of_several)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
-CLAMPED_TO_FREE = Feature("a line that is clamped to a free point or body", "lines.NAME.connections", _clamped_to_free)
 OBSTACLES = Feature("obstacles", "obstacles", _obstacles)
 SHAPES = Feature("bodies that lines touch", "bodies.NAME.shape", _shapes)
 SHEAVES = Feature("sheaves that turn freely", "obstacles.NAME.bearing", _free_sheaves)
@@ -616,10 +615,6 @@ REFUSALS: tuple[Refusal, ...] = (
         fix="leave it out; hybrid run computes it in time",
     ),
     # --- several lines ---
-    Refusal(
-        TURNS, CLAMPED_TO_FREE, "not worked out", "{key} is at what turns freely, by turns that nobody counts",
-        "0", "leave it out, or hold both ends of this line at fixed points or bodies; a moment on a body twists it too",
-    ),
     Refusal(
         FOLLOWING_CELLS, SEVERAL_LINES, "several lines", "cells of several lines have lengths that stay", fix=ALONE
     ),

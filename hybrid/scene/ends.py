@@ -120,6 +120,11 @@ class EndTable(Table):
         return False
 
     @property
+    def is_twisted_against(self) -> bool:
+        """Whether turns of the other end twist the cable."""
+        return self.holds_twist
+
+    @property
     def fixes_frame(self) -> bool:
         """Whether the scene gives the orientation of the material frame at the end, and the end holds it there."""
         return self.holds_twist and self.held_normal is not None

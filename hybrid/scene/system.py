@@ -66,6 +66,14 @@ class _CarriedPin(Pinned):
         return True
 
 
+class _KnottedPin(_JoinedPin):
+    """The same of a free point, without a swivel."""
+
+    @property
+    def is_twisted_against(self) -> bool:
+        return True
+
+
 class _JoinedClamp(Clamped):
     """The same of an end that is clamped there."""
 
@@ -426,13 +434,16 @@ class System(Table):
             if key in carrying and isinstance(point, FreePoint):
                 ends[key] = point.end.model_copy(update={"initial_guess": first[key]} if point.is_body else {})
             elif held is None:
-                carried = _CarriedPin if self.clamp(name, key) is not None else Pinned
-                kind = _JoinedPin if self.may_leave(name, key) else carried
+                tied = self.clamp(name, key)
+                carried = _CarriedPin if tied is not None else Pinned
+                joined = _KnottedPin if tied is not None and not tied.swivel else _JoinedPin
+                kind = joined if self.may_leave(name, key) else carried
                 ends[key] = kind(position=place, motion=motion, payout=payout)
             else:
                 clamp = getattr(line.connections, key)
                 ends[key] = (_JoinedClamp if self.may_leave(name, key) else Clamped)(
-                    position=place, tangent=held[0], normal=held[1], turns=clamp.turns, swivel=clamp.swivel,
+                    position=place, tangent=held[0], normal=held[1], swivel=clamp.swivel,
+                    turns=0.0 if carrying else clamp.turns,  # a first shape is that of the line with no point
                     bend_stiffness=clamp.bend_stiffness, motion=motion, payout=payout,
                 )  # fmt: skip
         initial = line.initial if self.starts_as_placed else _between(line.initial, ends)

@@ -74,23 +74,25 @@ def _without_contact(scene: Scene, model: Model, t: float) -> Equilibrium:
         raise ComputationError(failed.outcome, None, failed.s, because) from None
 
 
-def count_turns(scene: Scene, model: Model, t: float, state: State) -> None:
+def count_turns(scene: Scene, model: Model, t: float, state: State, given: tuple[float, float] | None = None) -> None:
     """ComputationError where a rod between two ends that hold it is not twisted by the turns of the scene.
+
+    given: those of its start and end, of a line of several; None: as of the scene.  What its ends are clamped to may
+    have turned by less than half a turn.
 
     What closes the frames of the initial shape comes to at most half a turn, and the shape itself takes the writhe of
     the equilibrium, less than half a turn unless the cable forms a loop.
     """
-    asked = scene.ends.turns
+    by_end = given or (scene.ends.start.held_turns, scene.ends.end.held_turns)
+    asked, name = by_end[1] - by_end[0], "end" if by_end[1] else "start"
     if not asked:
         return
+    where, s = f"ends.{name}.turns: {by_end[name == 'end']:g}", model.length if name == "end" else 0.0
     if not model.line.element[1:-1].all():
-        _count_link(scene, model, t, state)
+        _count_link(model, t, state, where, s)
         return
     frames = model.ends.at(t).frame
     wound, found = (twist_of_rods(model.line, frames, x.e, x.a1) / (2.0 * np.pi) for x in (model.start, state))
-    name = "end" if scene.ends.end.held_turns else "start"
-    s = model.length if name == "end" else 0.0
-    where = f"ends.{name}.turns: {getattr(scene.ends, name).held_turns:g}"
     if abs(wound - asked) > CLOSING:
         least = int(np.ceil(2.0 * np.pi * abs(asked) / MOST_TWIST))
         detail = f"{where}; {model.cells} cells cannot hold {asked:g} turns, which take at least {least} equal ones"
@@ -100,17 +102,15 @@ def count_turns(scene: Scene, model: Model, t: float, state: State) -> None:
         raise ComputationError(Outcome.TURNS_LOST, None, s, detail)
 
 
-def _count_link(scene: Scene, model: Model, t: float, state: State) -> None:
+def _count_link(model: Model, t: float, state: State, where: str, s: float) -> None:
     """ComputationError where a line with zones has passed through itself, or around a clamp, and lost turns so."""
     if not holds_twist(model.line):
         return
     ends = model.ends.at(t)
     wound, found = (link_of(model.line, ends, x.r, x.e, x.a1, x.turn)[LINK] for x in (model.start, state))
     if abs(found - wound) > 0.5:
-        name = "end" if scene.ends.end.held_turns else "start"
-        where = f"ends.{name}.turns: {getattr(scene.ends, name).held_turns:g}"
         detail = f"{where}; the line starts with a link of {wound:.4g} turns, that of the equilibrium is {found:.4g}"
-        raise ComputationError(Outcome.TURNS_LOST, None, model.length if name == "end" else 0.0, detail)
+        raise ComputationError(Outcome.TURNS_LOST, None, s, detail)
 
 
 def solve_model(

@@ -9,6 +9,7 @@ import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.junctions.bodies import NUMBERS
+from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES
 from hybrid.kernels.state.state import Floats
@@ -120,9 +121,11 @@ def _keep_turns(model: SystemModel, t: float, found: SystemEquilibrium) -> Syste
     """The same equilibrium; LineFailed where a line has lost turns by which its ends, which hold it, twist it."""
     for k, (name, x, state) in enumerate(zip(model.names, model.models, found.state.lines, strict=True)):
         try:
-            count_turns(model.scenes[name], x, t, state)
+            count_turns(model.scenes[name], x, t, state, model.turns[k])
         except ComputationError as failed:
             detail = failed.detail.replace("ends.", f"lines.{name}.connections.")
+            if model.seats[k, :, TURNS].any():
+                detail += "; what it is clamped to may turn by less than half a turn until then (initial_rotation)"
             raise LineFailed(k, failed.outcome, None, failed.s, detail) from None
     return found
 

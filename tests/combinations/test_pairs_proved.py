@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.errors import ComputationError
 from tests.combinations.pairs import BASE, CLAMP, END, FAR, START, ZONES, S, Tables, as_system
 from tests.problems import tables_with
 
@@ -286,3 +287,34 @@ def test_clamps_at_a_point_that_gives_way_hold_no_longer_and_their_energy_is_boo
         line = rigid.lines[name]
         assert np.abs(line["bending_moment"][8:, -1 if name == "left" else 0]).max() < 1e-9
         assert np.abs(line["work/scheme"]).max() < 0.02 * np.ptp(line["energy/kinetic"])
+
+
+# --- turns of lines that are clamped to what is free ------------------------------------------------
+
+
+@pytest.mark.parametrize("model", ["rod", COMES], ids=["rod", "moves"])
+@pytest.mark.parametrize("at", ["start", "end"])
+@pytest.mark.parametrize("body", [True, False])
+def test_turns_of_one_of_two_lines_are_shared_by_both(body: bool, at: str, model: Any) -> None:
+    """What is between two equal lines turns back by half of them, and both have the torque GJ pi N/L.
+
+    By half a turn and more it is refused: nobody could tell how often it has gone round.
+    """
+    far = {"kind": "clamped", "tangent": [1, 0, 0], "normal": [0, 1, 0]}
+    tables = between(body, 0.0, 0.0, far, model=model, mesh={"cells": 30})
+    tables.pop("time"), tables.pop("output")
+    connections = tables["lines"]["left"]["connections"]
+    for turns in (0.25, 0.9, 1.3):
+        sign = 1.0 if at == "end" else -1.0
+        line = tables["lines"]["left"] | {"connections": connections | {at: connections[at] | {"turns": turns}}}
+        scene = tables | {"lines": tables["lines"] | {"left": line}}
+        if turns > 1.0:
+            with pytest.raises(ComputationError, match="not twisted by the turns"):
+                hybrid.static(scene)
+            return
+        found = hybrid.static(scene)
+        rotation = (found.bodies["buoy/rotation"] if body else found.points["m/rotation"])[0]
+        assert rotation == pytest.approx([-sign * 180.0 * turns, 0.0, 0.0], abs=1e-5)
+        for name in ("left", "right"):
+            torque = found.lines[name]["torque"][0]
+            assert torque == pytest.approx(sign * 15.0 * np.pi * turns / SPAN, rel=1e-6)

@@ -102,10 +102,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.VORTICES, c.RESPONSE): (SHEDS, "response"),
     (c.FINITE_WAVES, c.RESPONSE): (HIGH_WAVES, "response"),
     (c.BY_RAO, c.FINITE_WAVES): (HIGH_WAVES | {END + "motion": {"vessel": RAO}}, ""),
-    (c.TURNS, c.CLAMPED_TO_FREE): (
-        CLAMPED | {ONE + "connections.end.turns": 2, "points.b": {"body": "buoy", "place": [0, 0, 0]},
-                   "bodies.buoy": {"mass": 5, "inertia": [1, 1, 1], "initial_guess": [8, 0, 0]}}, ""
-    ),
     (c.FOLLOWING_CELLS, c.SEVERAL_LINES): ({ONE + "model": FOLLOWING["model"]}, ""),
 }  # fmt: skip
 BY_SCHEMA = [x for x in REFUSALS if isinstance(x.feature.places, Absent)]
