@@ -58,7 +58,7 @@ def _as_data(found: Found) -> dict[str, Any]:
         "title": found.title, "numbers": dict(found.numbers), "start": dict(found.start),
         "kept": [dataclasses.asdict(x) for x in found.kept], "bounds": [dataclasses.asdict(x) for x in found.bounds],
         "minimised": found.minimised, "minimised_at_start": found.minimised_at_start, "equilibria": found.equilibria,
-        "settled": found.settled, "notes": list(found.notes),
+        "runs": found.runs, "settled": found.settled, "notes": list(found.notes),
     }  # fmt: skip
 
 
@@ -67,6 +67,8 @@ def _tables(found: Found) -> Any:
     from rich.table import Table
 
     head = f"{found.title or 'found'}: {found.equilibria} equilibria"
+    if found.moving:
+        head += f", {found.runs} runs ({found.runs / found.moving:.3g} of each case)"
     numbers = Table(title=head, title_justify="left", box=None, padding=(0, 2), min_width=min(len(head), 80))
     for name in ("", "found", "start", ""):
         numbers.add_column(name, justify="left" if not name else "right")

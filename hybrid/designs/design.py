@@ -14,8 +14,9 @@ from hybrid.designs.equilibria import FINER, AnyScene, Equilibria, Point, scene_
 from hybrid.designs.found_scene import text_of_found
 from hybrid.designs.identify import Apart, Estimate, fit
 from hybrid.designs.measured import Measurements, measurements
+from hybrid.designs.motions import IN_MOTION
 from hybrid.designs.nearest import Space
-from hybrid.designs.optimum import ACTIVE, AT_BOUND, KEPT, Optimum, Price, is_active, optimum, reached
+from hybrid.designs.optimum import AT_BOUND, SETTLED, Optimum, Price, is_active, optimum, reached
 from hybrid.designs.problem import Constraint, Problem, as_asked, begun, problem_of, refused_result, scenes_of, space_of
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
@@ -26,17 +27,16 @@ from hybrid.scene.task_file import TaskFile
 
 # Parts of the largest that limits are beyond in the nearest that was found, from which one is said to be in the way.
 IN_THE_WAY = 1e-3
-# What of the slopes at an optimum may be left without a word.
-SETTLED = 1e-2
 
 
 @dataclass(frozen=True)
 class Kept:
     """What a target or a limit came to.
 
-    name, case, result: of which number; value: with the numbers found; bound: what it is to be, at most or at least,
-    by side (0, 1, -1); active: whether it is at its bound; price: by how much a unit more of the bound changes what is
-    minimised (0 without); finer: the value on cells half as long; None: there is no equilibrium on these.
+    name, case, result: of which number; value: with the numbers found; bound: what it is to be, at most or least, by
+    side (0, 1, -1); active: whether it is at its bound; price: by how much a unit more of it changes what is
+    minimised (0 without); finer: the value on cells half as long, of a motion in such steps as well; None: there
+    is no equilibrium on these.
     """
 
     name: str
@@ -68,7 +68,8 @@ class Found:
     """Numbers that were found.
 
     numbers, start: of unknowns, by name; kept: targets and limits; bounds: unknowns that are at one; minimised: its
-    value, and where the search began (None: nothing is); equilibria: that were computed; notes: what is doubtful.
+    value, and where the search began (None: nothing is); equilibria: that were computed; runs: what those that were are
+    worth, of `moving` cases; notes: what is doubtful.
     settled: whether what is minimised is least there; False: the search ended before, and a note says why.
     scene: with the numbers, without changes of cases; scenes: of each case; before, after: places of nodes (n, 3), m,
     by case and line; bed: height of a level seabed, m, None: none; file: the scene file, "": none.
@@ -82,6 +83,8 @@ class Found:
     minimised: float | None
     minimised_at_start: float | None
     equilibria: int
+    runs: int
+    moving: int
     notes: tuple[str, ...]
     keys: Mapping[str, tuple[str, ...]]
     scene: AnyScene
@@ -121,7 +124,7 @@ def design(
     unknowns: Mapping[str, Any] | None = None,
     **more: Any,
 ) -> Found:
-    """Find numbers of a scene for which its equilibrium is what is asked.
+    """Find numbers of a scene for which its equilibrium, or its motion, is what is asked.
 
     source: the path of a design file; or, with `unknowns`, a scene, or its path.  unknowns and more (cases, results,
     targets, limits, minimise, measured, title): as the keys of a design file, docs/design.md.  What was measured gives
@@ -200,6 +203,7 @@ def _common(
     return {
         "title": task.asked.title, "numbers": dict(zip(space.names, point.x.tolist(), strict=True)),
         "start": dict(zip(space.names, space.start.tolist(), strict=True)), "equilibria": equilibria.count,
+        "runs": equilibria.motions.count, "moving": len(equilibria.motions.rows),
         "keys": dict(zip(space.names, equilibria.keys, strict=True)),
         "scene": scene_with(asked, equilibria.keys, point.x),
         "scenes": {case: equilibria.scene(case, point.x) for case in equilibria.scenes},
@@ -253,7 +257,7 @@ def _bed(scene: AnyScene) -> float | None:
 def _reached(problem: Problem) -> Optimum:
     """Where targets and limits are kept, where nothing is minimised."""
     point = reached(problem, problem.space.start)
-    prices = [Price(is_active(c, point), 0.0) for c in problem.constraints]
+    prices = [Price(is_active(c, point, problem.within), 0.0) for c in problem.constraints]
     bounds = np.full((point.x.size, 2), np.nan)
     for x in _at_bounds(problem.space, point):
         bounds[problem.space.names.index(x.name), 0 if x.which == "low" else 1] = 0.0
@@ -271,7 +275,7 @@ def _refuse_what_fights(problem: Problem, point: Point) -> None:
     """ComputationError: what cannot be kept, by how much, and with which unknowns at their bounds."""
     off = [(c.off(point.values[c.row]), c) for c in problem.constraints]
     most = max((abs(x) for x, _ in off), default=0.0)
-    if most <= KEPT:
+    if most <= problem.within.kept:
         return
     fights = sorted((x for x in off if abs(x[0]) > IN_THE_WAY * most), key=lambda x: -abs(x[0]))
     words = {0: "is to be", 1: "may be at most", -1: "has to be at least"}
@@ -300,11 +304,13 @@ def _checked(problem: Problem, point: Point) -> tuple[list[str], Floats | None]:
     notes = []
     for c in problem.constraints:
         off = abs(c.off(finer[c.row]))
-        if off > ACTIVE and c.side != 0:
+        if off > problem.within.active and c.side != 0:
             place = f"{c.name}{f' ({c.case})' if c.case else ''}"
             change = abs(finer[c.row] - point.values[c.row])
+            moves = c.result.endswith(IN_MOTION)
+            where = "in a free run, with steps and cells half as long," if moves else "on twice the cells"
             notes.append(
-                f"{place}: on twice the cells {c.result} is {finer[c.row]:.6g}, {100.0 * off:.2g} % beyond its limit; "
+                f"{place}: {where} {c.result} is {finer[c.row]:.6g}, {100.0 * off:.2g} % beyond its limit; "
                 f"ask for a limit that is {change:.2g} tighter, or for more cells"
             )
     return notes, finer

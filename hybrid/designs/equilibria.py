@@ -1,4 +1,4 @@
-"""Results of equilibria by unknowns, of one scene or of the cases of a design."""
+"""Results of equilibria and motions by unknowns, of one scene or of the cases of a design."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.designs.cable_at_rest import NO_PLACES, CableAtRest, Places
+from hybrid.designs.motions import IN_MOTION, Motions, OfMotion
 from hybrid.designs.numbers import changed_scene, is_allowed, with_number
 from hybrid.designs.sensitivity import at_rest
 from hybrid.designs.system_at_rest import SystemAtRest
@@ -18,16 +19,21 @@ from hybrid.scene.system import System
 
 AnyScene = Scene | System
 FINER = 0.5  # length of cells of the equilibria that check what was found, over that of others
+# Part by which unknowns that are alike are told apart: between sections that are alike there need be no node.
+APART = 1e-12
 
 
 class Point:
     """Equilibria of all cases with the same values of unknowns: results (R,), and what they answer to unknowns."""
 
-    def __init__(self, x: Floats, rests: Mapping[str, CableAtRest | SystemAtRest], equilibria: Equilibria) -> None:
-        self.x, self.rests, self._of = x, rests, equilibria
+    def __init__(
+        self, x: Floats, rests: Mapping[str, CableAtRest | SystemAtRest], motion: OfMotion, equilibria: Equilibria
+    ) -> None:
+        self.x, self.rests, self._motion, self._of = x, rests, motion, equilibria
         self.values = np.zeros(len(equilibria.wanted))
         for case, rows in equilibria.rows.items():
             self.values[rows] = rests[case].values
+        equilibria.motions.values(motion, self.values)
         self._slopes: Floats | None = None
 
     @property
@@ -41,7 +47,17 @@ class Point:
                 if rows.size:
                     by_key = self.rests[case].by(keys).T
                     np.add.at(self._slopes, (rows[:, None], owner[None, :]), by_key)
+            if self._of.motions.rows:
+                sizes = np.where(self.x == 0.0, 1.0, np.abs(self.x))
+                self._slopes += self._of.motions.slopes(self._motion, sizes)
         return self._slopes
+
+    def refresh(self, cases: set[str]) -> bool:
+        """Make slopes of motions in these cases those of runs beside; False: they are."""
+        if not self._of.motions.refresh(self._motion, cases):
+            return False
+        self._slopes = None
+        return True
 
     def nodes(self, case: str, name: str) -> Floats:
         """Arc lengths (N+1,) of the nodes of a line, m."""
@@ -62,14 +78,16 @@ def _shapes(rest: CableAtRest | SystemAtRest) -> dict[str, Floats]:
 
 
 class Equilibria:
-    """Computes equilibria, and counts them."""
+    """Computes equilibria and runs, and counts them."""
 
     def __init__(
         self, scenes: Mapping[str, AnyScene], keys: Sequence[tuple[str, ...]], wanted: Sequence[tuple[str, str]]
     ) -> None:
         """scenes: by case; keys: of each unknown; wanted: case and result, such as `tension@end`, in any order."""
         self.scenes, self.keys, self.wanted = dict(scenes), list(keys), list(wanted)
-        self.rows = {case: np.array([k for k, x in enumerate(wanted) if x[0] == case], int) for case in scenes}
+        resting = [k for k, (_, result) in enumerate(wanted) if not result.endswith(IN_MOTION)]
+        self.rows = {case: np.array([k for k in resting if wanted[k][0] == case], int) for case in scenes}
+        self.motions = Motions(self.scenes, self.keys, self.wanted, self.scene)
         self.count = 0
         self._kept: dict[bytes, Point] = {}
         self._places: dict[str, Places] = {}  # cells of the first: others would make results jump
@@ -89,7 +107,7 @@ class Equilibria:
             of = [self.wanted[k][1] for k in self.rows[case]]
             rests[case] = at_rest(self.scene(case, x), of, cells, self._places.get(case, NO_PLACES))
             self._places.setdefault(case, rests[case].places)
-        point = Point(x.copy(), rests, self)
+        point = Point(x.copy(), rests, self.motions.at(x, finer=cells < 1.0), self)
         for k in np.flatnonzero(~np.isfinite(point.values))[:1]:
             case, result = self.wanted[k]
             given = ", ".join(f"{group[0]} = {value:.6g}" for group, value in zip(self.keys, x, strict=True))
@@ -102,7 +120,7 @@ class Equilibria:
 
     def scene(self, case: str, x: Floats) -> Any:
         """The scene of a case with values of unknowns; SceneError: it may not have these."""
-        return scene_with(self.scenes[case], self.keys, x)
+        return scene_with(self.scenes[case], self.keys, x * (1.0 + APART * np.arange(x.size)))
 
 
 def scene_with(scene: AnyScene, keys: Sequence[tuple[str, ...]], x: Floats) -> AnyScene:

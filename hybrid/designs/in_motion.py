@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.accuracy.api import run
+from hybrid.designs.cable_at_rest import Places
 from hybrid.designs.line_at_rest import AXES, refuse_parts
 from hybrid.designs.numbers import changed_scene, number_of
+from hybrid.designs.replay import places_in, replay
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
@@ -24,6 +25,7 @@ from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 
 NAME = re.compile(r"^(max|min|mean|std|last) (?:([^/@]+)/)?([a-z_]\w*)(?:\.([xyz]))?(?:@(.+))?$")
+OF_SECTION = re.compile(r"^sections\[(\d+)\]$")
 # Parts of a number by which runs differ: differences of second order by both, from which one of fourth order follows.
 PARTS = (1e-3, 2e-3)
 # Coordinates differ by parts of this part of the longest line: what they are depends on where the origin is.
@@ -32,16 +34,22 @@ PLACE, OF_LENGTH = re.compile(r"(position\[\d\]|\.z|\.surface|\.at\[\d\])$"), 0.
 COMPUTING = ("time", "output", "mesh", "accuracy", "model", "resolution")
 # Of the length, by which zones of two runs may differ that are the same.
 SAME_ZONE = 0.005
+# Of the length, within which a place is at the end of a section.
+OF_ENDS = 1e-6
 
 
 class Wanted(NamedTuple):
-    """A result over the time of a run, in parts; line: "" of one cable; at: m, infinity: the end, None: all places."""
+    """A result over the time of a run, in parts; line: "" of one cable; at: m, infinity: the end, None: all places, or
+
+    those of a section.
+    """
 
     over: str
     line: str
     name: str
     axis: str
     at: float | None
+    section: int | None = None
 
 
 class Slopes(NamedTuple):
@@ -60,15 +68,17 @@ def in_motion(asked: Scene | System, of: Sequence[str], by: Sequence[str]) -> Sl
     of runs with other numbers are not those of the base run.
     """
     refuse_use(asked, "derivatives in motion", given="hybrid sensitivity --motion")
-    wanted = [_parsed(asked, x) for x in of]
+    wanted = [parse_history(asked, x) for x in of]
     numbers = [number_of(asked, key) for key in by]
-    base = _Run(asked, wanted)
+    base = Motion(asked, wanted, places_in(asked))
     slopes, errors = (np.zeros((len(by), len(of))) for _ in range(2))
     for i, (key, number) in enumerate(zip(by, numbers, strict=True)):
         found = []
         for part in PARTS:
-            d = part * _size_of(asked, key, number)
-            more, less = (_Run(changed_scene(asked, key, number + x), wanted, base) for x in (d, -d))
+            d = part * size_of(asked, key, number)
+            more, less = (
+                Motion(changed_scene(asked, key, number + x), wanted, base.places, base) for x in (d, -d)
+            )  # fmt: skip
             for each in (more, less):
                 each.check(base, key)
             found.append((more.values - less.values) / (2.0 * d))
@@ -77,7 +87,7 @@ def in_motion(asked: Scene | System, of: Sequence[str], by: Sequence[str]) -> Sl
     return Slopes(base.values, slopes, errors)
 
 
-def _size_of(asked: Scene | System, key: str, number: float) -> float:
+def size_of(asked: Scene | System, key: str, number: float) -> float:
     """What runs differ by parts of; SceneError: a number of how the scene is computed, which has no derivative."""
     if key.split(".")[0] in COMPUTING:
         expected = "a number of what is computed: of the cable, its ends, what is around it"
@@ -88,7 +98,7 @@ def _size_of(asked: Scene | System, key: str, number: float) -> float:
     return abs(number) or 1.0
 
 
-def _parsed(asked: Scene | System, text: str) -> Wanted:
+def parse_history(asked: Scene | System, text: str) -> Wanted:
     found = NAME.match(text)
     several = isinstance(asked, System)
     example = "max east/tension@end" if several else "max tension@end"
@@ -96,9 +106,14 @@ def _parsed(asked: Scene | System, text: str) -> Wanted:
         expected = "max, min, mean, std or last, and NAME@S, of several lines LINE/NAME@S"
         raise SceneError([Complaint("of", text, expected, example)])
     over, line, name, axis, at = found.groups()
+    section = OF_SECTION.match(at or "")
+    at = None if section is not None else at
     if isinstance(asked, System) and line not in asked.lines:
         raise SceneError([Complaint("of", text, f"a line of {', '.join(asked.lines)}", example)])
-    length = asked.lines[line].cable.length if isinstance(asked, System) else asked.length
+    cable = asked.lines[line].cable if isinstance(asked, System) else asked.cable
+    length, count = cable.length, len(cable.sections)
+    if section is not None and int(section[1]) >= count:
+        raise SceneError([Complaint("of", text, f"a section of the line, which has {count}, counted from 0", example)])
     try:
         s = {None: None, "start": 0.0, "end": length}[at] if at in (None, "start", "end") else float(at)
     except ValueError:
@@ -108,22 +123,39 @@ def _parsed(asked: Scene | System, text: str) -> Wanted:
     refuse_parts(name, axis or "", "", s)
     if s is None and name in PROBES and "s" in PROBES[name].dims and over not in ("max", "min"):
         raise SceneError([Complaint("of", text, "a place", f"{text}@end")])
-    return Wanted(over, line or "", name, axis or "", np.inf if s == length else s)
+    of_section = None if section is None else int(section[1])
+    return Wanted(over, line or "", name, axis or "", np.inf if s == length else s, of_section)
 
 
-class _Run:
-    """A run, and results of it; extremes are where and when those of the base run are."""
+class Motion:
+    """A run, and results of it; beside a base run extremes are where and when those of that are."""
 
-    def __init__(self, scene: Scene | System, wanted: Sequence[Wanted], base: _Run | None = None) -> None:
-        with run(scene) as result:
+    def __init__(
+        self, scene: Scene | System, wanted: Sequence[Wanted], places: Places, base: Motion | None = None,
+        finer: bool = False, smooth: bool = False,
+    ) -> None:  # fmt: skip
+        """places: of nodes; finer: as of `replay`; smooth: extremes are those of parabolas in time and along the line,
+
+        at whose nodes there are outputs.
+        """
+        self.places = places
+        more = [x.at for x in wanted if x.at is not None and np.isfinite(x.at)] if smooth else None
+        self._cables = {k: x.cable for k, x in scene.lines.items()} if isinstance(scene, System) else {"": scene.cable}
+        with replay(scene, places, finer, more) as result:
             lines: dict[str, Any] = dict(result.lines) or {"": result}
             self.steps = {name: np.array(x["steps/t"]) for name, x in lines.items()}
             self.zones = {name: list(_zones(x)) for name, x in lines.items()}
             self.where: list[Any] = [None] * len(wanted) if base is None else list(base.where)
             self.values = np.zeros(len(wanted))
+            self.shapes: list[tuple[int, ...]] = []
             for k, x in enumerate(wanted):
                 history = self._history(lines[x.line], x)
+                self.shapes.append(history.shape)
+                if base is not None and history.shape != base.shapes[k]:  # it is no neighbour: see check
+                    continue
                 self.values[k], self.where[k] = _over(history, x.over, self.where[k])
+                if smooth and x.over in ("max", "min"):
+                    self.values[k] += _beyond(history, *self.where[k])
 
     def _history(self, result: Any, x: Wanted) -> Floats:
         """(outputs, places or 1) of a result."""
@@ -140,14 +172,18 @@ class _Run:
         if "s" not in dims:
             return value[:, None]
         s = np.asarray(result.s)
+        if x.section is not None:
+            ends = np.cumsum([0.0, *(section.length for section in self._cables[x.line].sections)])
+            near = OF_ENDS * ends[-1]
+            return value[:, (s >= ends[x.section] - near) & (s <= ends[x.section + 1] + near)]
         if x.at is None:
             return value
         return np.array([[np.interp(min(x.at, s[-1]), s, row)] for row in value])
 
-    def check(self, base: _Run, key: str) -> None:
+    def check(self, base: Motion, key: str) -> None:
         """ComputationError where steps or zones are not those of the base run."""
         for name, steps in self.steps.items():
-            what = ""
+            what = "outputs of a section are more or fewer" if self.shapes != base.shapes else ""
             if not np.array_equal(steps, base.steps[name]):
                 what = "a step was divided in one of the runs"
             elif not _alike(self.zones[name], base.zones[name]):
@@ -182,3 +218,18 @@ def _over(history: Floats, over: str, where: Any) -> tuple[float, Any]:
         return float(history[where]), where
     x = history[:, 0]
     return float({"mean": x.mean(), "std": x.std(), "last": x[-1]}[over]), None
+
+
+def _beyond(history: Floats, i: int, k: int) -> float:
+    """By how much the extremes of parabolas through an extreme and its neighbours in time and place are beyond it.
+
+    Outputs and places count as evenly spaced there: it changes evenly where an extreme goes from one to the next.
+    """
+    out = 0.0
+    for row, j in ((history[:, k], i), (history[i], k)):
+        if 0 < j < row.size - 1:
+            before, here, after = row[j - 1 : j + 2]
+            bent = after - 2.0 * here + before
+            if abs(after - before) < 2.0 * abs(bent):  # it is between the neighbours
+                out -= (after - before) ** 2 / (8.0 * bent)
+    return float(out)

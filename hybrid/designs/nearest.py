@@ -51,10 +51,14 @@ class Rows(NamedTuple):
         return 0.5 * float(self.values @ self.values)
 
 
-def nearest(residuals: Callable[[Floats], Rows], space: Space, least: float = 0.0, enough: float = GAIN) -> Rows:
+def nearest(
+    residuals: Callable[[Floats], Rows], space: Space, least: float = 0.0, enough: float = GAIN,
+    refresh: Callable[[Point], bool] = lambda point: False,
+) -> Rows:  # fmt: skip
     """Where the sum of squares of residuals is least, between the bounds.
 
-    least: singular value below which a combination of unknowns stays what it is; enough: in place of GAIN.
+    least: singular value below which a combination of unknowns stays what it is; enough: in place of GAIN;
+    refresh: makes slopes at a point better, False: they are as good as can be.
     ComputationError, SceneError: where it begins there is no equilibrium, or no such scene.
     """
     here = residuals(space.start)
@@ -66,6 +70,8 @@ def nearest(residuals: Callable[[Floats], Rows], space: Space, least: float = 0.
         step = _step(slopes, here, space, sizes, least)
         gain = here.cost - 0.5 * float(np.sum((here.values + slopes @ step) ** 2))
         if gain <= enough * here.cost:
+            if refresh(here.point):
+                continue
             break
         why = ""
         for _ in range(HALVED):
@@ -78,6 +84,8 @@ def nearest(residuals: Callable[[Floats], Rows], space: Space, least: float = 0.
                 break
             step *= 0.5
         else:
+            if refresh(here.point):
+                continue
             return here._replace(stopped=why)
         assert there is not None
         here = there

@@ -14,19 +14,21 @@ from scipy.stats import qmc
 
 from hybrid.designs.equilibria import Point
 from hybrid.designs.nearest import STEP, Rows, nearest
-from hybrid.designs.problem import Constraint, Objective, Problem
+from hybrid.designs.problem import Constraint, Objective, Problem, Within
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.state.state import Floats
 
-# Parts of a limit within which it is kept, and active; parts of a bound's size within which an unknown is at it.
-KEPT, ACTIVE, AT_BOUND = 1e-6, 1e-4, 1e-6
-# Part of what is minimised within which it is least; steps of one search, and searches.
-EXACT, ITERATIONS, SEARCHES = 1e-7, 60, 3
+# Parts of a bound's size within which an unknown is at it; steps of one search, and searches.
+AT_BOUND, ITERATIONS, SEARCHES = 1e-6, 60, 3
+# Part of slopes that no limit holds up, below which a search is not begun once more.
+HELD = 1e-4
 # How many times what the slopes tell what is minimised counts at most, and the part of it that it counts at least: a
 # constant that is added to it, such as a price that is paid in any case, would hide what there is to gain.
 OF_SLOPES, OF_VALUE = 10.0, 1e-4
 # Places between the bounds from which limits are sought that are not kept from where the search began.
 STARTS = 6
+# What of the slopes at an optimum may be left without a word.
+SETTLED = 1e-2
 # Steps as parts of unknowns: the first, the longest is that of `nearest`, the shortest before it is given up.
 FIRST_STEP, SHORTEST = 0.2, 1e-6
 # Of what was foretold: what a step has to gain, and from which on longer ones are believed.
@@ -72,7 +74,7 @@ def reach(problem: Problem, start: Floats | None = None) -> Rows:
         return Rows(point, values, lambda: np.stack([_slopes(c, point) for c in problem.constraints]))
 
     space = problem.space if start is None else problem.space._replace(start=start)
-    return nearest(off, space)
+    return nearest(off, space, refresh=problem.refresh)
 
 
 def reached(problem: Problem, start: Floats) -> Point:
@@ -81,7 +83,7 @@ def reached(problem: Problem, start: Floats) -> Point:
     others between the bounds.
     """
     space, best = problem.space, reach(problem, start)
-    if kept(problem, best.point) or not np.isfinite(space.high - space.low).all():
+    if kept(problem, best.point) or problem.moves or not np.isfinite(space.high - space.low).all():
         return best.point
     for part in qmc.Halton(start.size, scramble=False).random(STARTS + 1)[1:]:  # the first is the corner of all lows
         try:
@@ -103,11 +105,11 @@ def _slopes(constraint: Constraint, point: Point) -> Floats:
 
 
 def kept(problem: Problem, point: Point) -> bool:
-    return all(abs(c.off(point.values[c.row])) <= KEPT for c in problem.constraints)
+    return all(abs(c.off(point.values[c.row])) <= problem.within.kept for c in problem.constraints)
 
 
-def is_active(constraint: Constraint, point: Point) -> bool:
-    return bool(abs(point.values[constraint.row] - constraint.bound) <= ACTIVE * constraint.scale)
+def is_active(constraint: Constraint, point: Point, within: Within) -> bool:
+    return bool(abs(point.values[constraint.row] - constraint.bound) <= within.active * constraint.scale)
 
 
 def optimum(problem: Problem, objective: Objective) -> Optimum:
@@ -115,7 +117,7 @@ def optimum(problem: Problem, objective: Objective) -> Optimum:
 
     ComputationError, SceneError: where it begins there is no equilibrium, or no such scene.
     """
-    x, best = problem.space.start, None
+    x, best, held = problem.space.start, None, SETTLED if problem.moves else HELD
     for _ in range(SEARCHES):
         search = _Search(problem, objective, x)
         point = search.run()
@@ -124,15 +126,17 @@ def optimum(problem: Problem, objective: Objective) -> Optimum:
             point = reached(problem, point.x)
             if not kept(problem, point):
                 break
-        if best is not None and objective.value(point) >= objective.value(best) - EXACT * abs(objective.value(best)):
+        if best is not None and objective.value(point) >= objective.value(best) - problem.within.exact * abs(
+            objective.value(best)
+        ):
             break
         best, x = point, point.x
-        if not elsewhere and (search.stopped or priced(problem, objective, point).left < ACTIVE):
+        if not elsewhere and (search.stopped or priced(problem, objective, point).left < held):
             break
     found = priced(problem, objective, point if best is None else best)
     if not kept(problem, found.point):
         return found
-    stopped = search.stopped if found.left > ACTIVE else ""
+    stopped = search.stopped if found.left > held else ""
     if search.exhausted:
         stopped = f"{ITERATIONS} steps were not enough"
     return found._replace(stopped=stopped, ran_off=_ran_off(problem, objective, found.point))
@@ -145,7 +149,7 @@ def _ran_off(problem: Problem, objective: Objective, point: Point) -> tuple[int,
     """
     space, equilibria, out = problem.space, problem.equilibria, []
     sizes = space.sizes(space.start)
-    enough = objective.value(point) + EXACT * size_of(objective, equilibria.at(space.start), sizes)
+    enough = objective.value(point) + problem.within.exact * size_of(objective, equilibria.at(space.start), sizes)
     for i, (x, start) in enumerate(zip(point.x, space.start, strict=True)):
         ahead = 2.0 * x - start if x * start <= 0.0 else 2.0 * x if abs(x) > abs(start) else 0.5 * x
         if abs(x - start) < FAR * sizes[i] or not space.low[i] <= ahead <= space.high[i]:
@@ -187,19 +191,21 @@ class _Search:
         for _ in range(ITERATIONS):
             values, slopes = self._rows(self._here)
             step, foretold = self._step(values, slopes, width)
-            if foretold <= EXACT:
+            if foretold <= self._problem.within.exact:
+                if self._problem.refresh(self._here):
+                    continue
                 break
             there = self._tried(step)
             gained = self._gained(there)
             if there is not None and gained < ACCEPTED * foretold:  # limits are bent: once more with what they came to
-                step, _ = self._step(self._rows(there)[0] - slopes @ step, slopes, width)
+                step, _ = self._step(self._values(there) - slopes @ step, slopes, width)
                 there = self._tried(step)
                 gained = self._gained(there)
             if there is not None and gained >= ACCEPTED * foretold:
                 self._learn(there)
                 self._here = there
                 width = min(2.0 * width, STEP) if gained >= TRUSTED * foretold else width
-            else:
+            elif there is None or not self._problem.refresh_missed(self._here, there):
                 width = (SHRUNK if there is not None else CUT) * min(width, float(np.abs(step).max()))
                 if width < SHORTEST:
                     break
@@ -248,7 +254,7 @@ class _Search:
         gradient = self._objective.slopes(self._here) * self._sizes / self._scale
         most = max(0.0, float(values.max(initial=0.0)))
         p, left = self._of_model(gradient, self._hessian, values, slopes, width)
-        if left > KEPT and most > KEPT:  # limits come first: as near to them as the box lets
+        if min(left, most) > self._problem.within.kept:  # limits come first: as near to them as the box lets
             _, least = self._of_model(np.zeros_like(gradient), 0.0 * self._hessian, values, slopes, width)
             while left - least > NEARER * (most - least) and self._penalty < MOST_PENALTY:
                 self._penalty *= 4.0
@@ -304,7 +310,7 @@ def priced(problem: Problem, objective: Objective, point: Point) -> Optimum:
     own, first_sizes = space.sizes(point.x), space.sizes(space.start)
     sizes = np.maximum(own, first_sizes)  # of an unknown that goes to 0, where a part of itself changes nothing more
     gradient = objective.slopes(point) * sizes
-    held = [k for k, c in enumerate(constraints) if is_active(c, point)]
+    held = [k for k, c in enumerate(constraints) if is_active(c, point, problem.within)]
     at = np.stack([np.abs(point.x - space.low) <= AT_BOUND * own, np.abs(point.x - space.high) <= AT_BOUND * own], 1)
     columns = [(constraints[k].side or 1) * point.slopes[constraints[k].row] * sizes for k in held]
     least = [-np.inf if constraints[k].side == 0 else 0.0 for k in held]

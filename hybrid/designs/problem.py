@@ -11,6 +11,7 @@ import numpy as np
 
 from hybrid.designs.equilibria import AnyScene, Equilibria, Point
 from hybrid.designs.in_motion import COMPUTING
+from hybrid.designs.motions import IN_MOTION
 from hybrid.designs.nearest import Space
 from hybrid.designs.numbers import PART as KEY_PART
 from hybrid.designs.numbers import number_of
@@ -66,6 +67,11 @@ class Objective:
         """results: rows of those that it may speak of, by name."""
         self.text, self._unknowns, self._results, self._task = text, list(unknowns), dict(results), task
 
+    @property
+    def rows(self) -> list[int]:
+        """Those of the results that it speaks of."""
+        return [*self._results.values()]
+
     def value(self, point: Point) -> float:
         """SceneError: it is no number there."""
         return self._values([self._names(point)])[0]
@@ -107,6 +113,21 @@ class Objective:
         return [float(x) for x in found]
 
 
+class Within(NamedTuple):
+    """Parts of a limit within which it is kept, and active; part of what is minimised within which it is least."""
+
+    kept: float
+    active: float
+    exact: float
+
+
+# Of motions coarser: extremes have kinks, their mesh and steps are worth about as much, and a digit more takes as many
+# runs again.
+AT_REST, MOVING = Within(1e-6, 1e-4, 1e-7), Within(1e-3, 3e-3, 1e-3)
+# Parts of a limit within which it is near.
+NEAR = 0.01
+
+
 class Problem(NamedTuple):
     """objective: None: nothing is minimised."""
 
@@ -114,6 +135,33 @@ class Problem(NamedTuple):
     equilibria: Equilibria
     constraints: tuple[Constraint, ...]
     objective: Objective | None
+
+    @property
+    def moves(self) -> bool:
+        return bool(self.equilibria.motions.rows)
+
+    @property
+    def within(self) -> Within:
+        return MOVING if self.moves else AT_REST
+
+    def refresh(self, point: Point) -> bool:
+        """Take slopes of motions anew in cases that a limit is near in, or what is minimised speaks of; False: they are
+
+        differences of runs already.
+        """
+        spoken = self.objective.rows if self.objective is not None else []
+        near = [c.case for c in self.constraints if (point.values[c.row] - c.bound) * c.side >= -NEAR * c.scale]
+        return self.moves and point.refresh({*near, *(self.equilibria.wanted[k][0] for k in spoken)})
+
+    def refresh_missed(self, point: Point, there: Point) -> bool:
+        """The same in cases in which another point has come nearer to a limit, or beyond it, than slopes foretold."""
+        change = point.slopes @ (there.x - point.x) if self.moves else there.values
+        missed = [
+            c.case for c in self.constraints
+            if (there.values[c.row] - c.bound) * c.side >= -NEAR * c.scale
+            and abs(there.values[c.row] - point.values[c.row] - change[c.row]) > self.within.kept * c.scale
+        ]  # fmt: skip
+        return self.moves and point.refresh({*missed})
 
 
 def problem_of(task: TaskFile[Design], scene: AnyScene) -> Problem:
@@ -267,10 +315,16 @@ def _result(task: TaskFile[Design], at: Place, asked: OfEquilibrium, take: str, 
     place = f"@sections[{asked.section}]" if asked.section is not None else ""
     if asked.at is not None:
         place = f"@{asked.at}" if isinstance(asked.at, str) else f"@{asked.at!r}"
+    if asked.over is not None and scene.time is None:
+        raise task.refusal([Finding((*at, "over"), "a scene with time, which says how long it moves, in which steps")])
     sections = cable_of(scene, asked.line).sections
     if asked.section is not None and asked.section >= len(sections):
         expected = f"a section of the line, which has {len(sections)}, counted from 0"
         raise task.refusal([Finding((*at, "section"), expected)])
+    if asked.over is not None:
+        if _has_places(asked) and asked.at is None and asked.over not in ("max", "min"):
+            raise task.refusal([Finding((*at, "at"), f"the place whose {asked.over} is meant", "at: end")])
+        return f"{asked.over} {f'{asked.line}/' if several else ''}{asked.quantity}{place}{IN_MOTION}"
     if _has_places(asked) and asked.at is None and not take:
         raise task.refusal([Finding((*at, "at"), "a place, or take: max or min along the line", "at: end")])
     if take and at[0] != "limits" and not _has_places(asked):

@@ -16,7 +16,7 @@ _NAME = re.compile(r"[A-Za-z_]\w*")
 NAMED = "a name of letters and digits, of which an expression can speak"
 # Names in expressions that are functions and numbers.
 SPOKEN_FOR = ("pi", "sqrt", "exp", "log", "sin", "cos", "tan", "radians", "abs", "min", "max", "round")
-STATIC = "leave it out: a design is of equilibria; what a motion answers to a number is `hybrid sensitivity --motion`"
+MOTION = "over: max, for example: what of its history in a run"
 
 
 def _place_kind(value: Any) -> str:
@@ -62,7 +62,7 @@ class OfEquilibrium(Table):
     """A number of an equilibrium."""
 
     usual: ClassVar[tuple[str, ...]] = ("quantity",)
-    instead: ClassVar[dict[str, str]] = {"in": STATIC, "range": "section: 0, for example, or at: 120"}
+    instead: ClassVar[dict[str, str]] = {"in": MOTION, "range": "section: 0, for example, or at: 120"}
 
     quantity: Text = Field(
         description="what: all that `hybrid static` records, such as tension, curvature, position.z, reaction_end.x"
@@ -72,11 +72,16 @@ class OfEquilibrium(Table):
     section: Annotated[Whole, Field(ge=0)] | None = Field(
         default=None, description="only along this section, counted from 0"
     )
+    over: Literal["max", "min", "mean", "std", "last"] | None = Field(
+        default=None, description="of the motion: what of its outputs; absent: of the equilibrium"
+    )
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
         if self.at is not None and self.section is not None:
             refuse([Finding(("section",), "nothing, because a place is given by at")])
+        if self.section is not None and self.over not in (None, "max", "min"):
+            refuse([Finding(("over",), "max or min along the section", "over: max")])
         if re.search(r"[@ /]", self.quantity):
             refuse([Finding(("quantity",), "a quantity alone, such as tension or position.z", "at and line say where")])
         return self
@@ -94,7 +99,9 @@ class OneResult(OfEquilibrium):
     def _one_number(self) -> Self:
         if self.at is not None and self.take is not None:
             refuse([Finding(("take",), "nothing, because a place is given by at")])
-        if self.section is not None and self.take is None:
+        if self.over is not None and self.take is not None:
+            refuse([Finding(("take",), "nothing: over says it, of the whole line where no place is given")])
+        if self.section is not None and self.take is None and self.over is None:
             refuse([Finding(("take",), "max or min along the section", "take: max")])
         return self
 

@@ -1,0 +1,123 @@
+"""Designs over motions against closed forms: what is found, prices, runs that it takes, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import hybrid
+from hybrid.designs.motions import PART, Motions
+from tests.designs.test_in_motion import G, W, heaved, on_the_bed
+
+MASS, AMPLITUDE = "cable.sections[0].mass", "ends.start.motion.heave.amplitude"
+TOP = {"quantity": "tension", "at": "start", "over": "max"}
+
+
+def by_hand(mass, amplitude=1.0):
+    """Largest pull of a mass per length, kg/m, below an end that is heaved."""
+    return (40.0 * mass + 60.0) * (G + amplitude * W**2)
+
+
+def test_a_mass_for_a_largest_pull():
+    """One target: (m L + M)(g + A w^2) = 3500 N; linear, so that the second point has it."""
+    found = hybrid.design(
+        heaved(), unknowns={"m": {"key": MASS, "low": 1, "high": 20}}, targets={"top": TOP | {"value": 3500.0}}
+    )
+    m = brentq(lambda m: by_hand(m) - 3500.0, 1.0, 20.0)
+    assert found.numbers["m"] == pytest.approx(m, rel=3e-3)
+    (top,) = found.kept
+    assert top.result == "max tension@start in motion" and top.value == pytest.approx(3500.0, rel=1e-5)
+    assert top.finer == pytest.approx(by_hand(found.numbers["m"]), rel=1e-3)
+    assert found.moving == 1 and found.runs <= 10  # four of them are the free run
+    assert found.minimised is None and not found.notes
+
+
+def test_a_limit_over_two_seas_and_its_price():
+    """As heavy as can be where the largest pull is limited: the higher sea holds, with 1 / dT/dm as its price."""
+    found = hybrid.design(
+        heaved(), unknowns={"m": {"key": MASS, "low": 1, "high": 20}}, minimise="-m",
+        cases={"low": {AMPLITUDE: 0.5}, "high": {AMPLITUDE: 1.0}}, limits={"top": TOP | {"largest": 3500.0}},
+    )  # fmt: skip
+    m = brentq(lambda m: by_hand(m) - 3500.0, 1.0, 20.0)
+    assert found.numbers["m"] == pytest.approx(m, rel=3e-3) and found.settled
+    kept = {x.case: x for x in found.kept}
+    assert kept["high"].active and not kept["low"].active
+    assert kept["high"].price == pytest.approx(-1.0 / (40.0 * (G + W**2)), rel=1e-2)
+    assert found.moving == 2 and found.runs / 2 <= 20
+
+
+def test_results_of_rest_and_motion_together():
+    """Static pull 2500 N from the mass, and a standard deviation of the pull from the amplitude."""
+    rest = {"quantity": "tension", "at": "start", "value": 2500.0}
+    found = hybrid.design(
+        heaved(), unknowns={"m": {"key": MASS, "low": 1, "high": 20}, "a": {"key": AMPLITUDE, "low": 0.1, "high": 3}},
+        targets={"rest": rest, "swing": TOP | {"value": 2900.0}},
+    )  # fmt: skip
+    m = (2500.0 / G - 60.0) / 40.0
+    a = (2900.0 / (40.0 * m + 60.0) - G) / W**2
+    assert found.numbers == pytest.approx({"m": m, "a": a}, rel=2e-2)
+    assert found.numbers["m"] == pytest.approx(m, rel=1e-4)
+
+
+def test_slopes_of_a_motion_are_those_of_central_differences():
+    """Of a touchdown that moves, with a length that cells go along with.
+
+    By the length they go up and down by 3 % within 0.1 m, as nodes come to the bed: less than by which kinks differ.
+    """
+    scene = hybrid.validate_scene(on_the_bed())
+    keys = [("cable.sections[0].drag.normal",), ("cable.sections[0].length",)]
+    of = ["max tension@end", "std position.z@150", "last tension@end"]
+    from hybrid.designs.equilibria import scene_with
+
+    motions = Motions(
+        {"": scene}, keys, [("", f"{x} in motion") for x in of], lambda case, x: scene_with(scene, keys, x)
+    )
+    x = np.array([1.2, 250.0])
+    here = motions.at(x)
+    assert motions.refresh(here, {""}) and not motions.refresh(here, {""})
+    for i in (0, 1):
+        d = 0.4 * PART * x[i] * (np.arange(2) == i)
+        more, less = motions.at(x + d).runs[""].values, motions.at(x - d).runs[""].values
+        np.testing.assert_allclose(here.slopes[:, i], (more - less) / (2.0 * d[i]), rtol=(1e-3, 5e-2)[i])
+    assert motions.count == 1 + 2 + 4
+
+
+def test_written_as_a_system_it_is_the_same():
+    """A line that hangs from a point that is heaved, with a body below: of several lines."""
+    scene = heaved()
+    section, motion = scene["cable"]["sections"][0], scene["ends"]["start"]["motion"]
+    points = {"top": {"kind": "fixed", "position": [0, 0, 0], "motion": motion},
+              "end": {"kind": "free", "initial_guess": [0, 0, -40], "mass": 60.0}}  # fmt: skip
+    line = {"start": "top", "end": "end", "sections": [section], "model": "catenary", "mesh": {"cells": 8}}
+    system = {"points": points, "lines": {"a": line}, "time": scene["time"], "output": scene["output"]}
+    found = hybrid.design(
+        system, unknowns={"m": {"key": "lines.a.sections[0].mass", "low": 1, "high": 20}},
+        targets={"top": TOP | {"line": "a", "value": 3500.0}},
+    )  # fmt: skip
+    assert found.numbers["m"] == pytest.approx(brentq(lambda m: by_hand(m) - 3500.0, 1.0, 20.0), rel=3e-3)
+    assert found.kept[0].result == "max a/tension@start in motion" and found.runs <= 10
+
+
+REFUSED = [
+    ({"top": TOP | {"largest": 3e3, "over": "std", "at": None}}, r"limits\.top\.at[^$]*the place whose std"),
+    ({"top": TOP | {"largest": 3e3, "at": None, "section": 0, "over": "mean"}}, r"limits\.top\.over[^$]*max or min"),
+    ({"top": TOP | {"largest": 3e3, "quantity": "tensoin"}}, r"limits\.top\.quantity"),
+]
+
+
+@pytest.mark.parametrize(("limits", "words"), REFUSED)
+def test_what_is_refused(limits, words):
+    with pytest.raises(hybrid.SceneError, match=words):
+        hybrid.design(heaved(), unknowns={"m": {"key": MASS, "low": 1, "high": 20}}, minimise="-m", limits=limits)
+
+
+def test_scenes_without_steps_of_their_own_are_refused():
+    limits = {"top": TOP | {"largest": 3500.0}}
+    asked = {"unknowns": {"m": {"key": MASS, "low": 1, "high": 20}}, "minimise": "-m", "limits": limits}
+    with pytest.raises(hybrid.SceneError, match="steps follow the motion"):
+        hybrid.design(heaved(time={"duration": 24.0, "tolerance": 1e-3}), **asked)
+    still = heaved()
+    del still["time"], still["ends"]["start"]["motion"]
+    with pytest.raises(hybrid.SceneError, match=r"limits\.top\.over[^$]*a scene with time"):
+        hybrid.design(still, **asked)
