@@ -429,6 +429,14 @@ class Section(Table):
         return min(self.bending_stiffness) if isinstance(self.bending_stiffness, tuple) else self.bending_stiffness
 
     @model_validator(mode="after")
+    def _turns_about_its_axis_too(self) -> Section:
+        if isinstance(self.rotary_inertia, tuple) and self.rotary_inertia[0] > 0.0 == self.rotary_inertia[1]:
+            expected = "a number > 0, in kg m: no section turns across its axis with inertia and about it without"
+            fix = f"twice the transverse one, that of a round section: {2.0 * self.rotary_inertia[0]:g}"
+            refuse([Finding(("rotary_inertia", 1), expected, fix)])
+        return self
+
+    @model_validator(mode="after")
     def _tension_twists(self) -> Section:
         if not self.tension_torque:
             return self

@@ -27,6 +27,7 @@ BENDING = "bending_stiffness: 2.454369e-4"
 
 CASES = {
     # --- keys
+    "no inertia about the axis": (EVERYTHING, "[1.0e-4, 2.0e-4]", "[1.0e-4, §0.0]", "cable.sections[0].rotary_inertia[1]", "a round section: 0.0002"),
     "unknown key": (SUSPENSION, "gravity", "§gravty", "environment.gravty", "did you mean gravity?"),
     "unknown key of a scene": (SUSPENSION, "title:", "§tilte:", "tilte", "did you mean title?"),
     "unknown key of a section": (SUSPENSION, MASS, f"{MASS}\n      §mas: 1", "cable.sections[0].mas", "did you mean mass?"),
