@@ -21,7 +21,6 @@ from hybrid.kernels.algebra.rotations import add, dot, scale
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.state import Floats, Sea
 
-Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 HEIGHTS = 4  # numbers of a point of the grid: z, zx, zy, zxy
 
 
@@ -129,9 +128,7 @@ def normal_turns(sea, x, n):
 
 @inner
 def depth_falls(sea, x, n, p):
-    """g of dp = -g . dx at a point x, from n and p there, and dn_i/dx_j."""
-    if sea.bed_x.shape[0] == 0:
-        return n, Z9
+    """g of dp = -g . dx at a point x of a bed of depths, from n and p there, and dn_i/dx_j."""
     W = normal_turns(sea, x, n)
     c = (p - 0.5 * sea.onset) / n[2]
     return (n[0] - c * W[6], n[1] - c * W[7], n[2]), W

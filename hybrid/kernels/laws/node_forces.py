@@ -7,7 +7,7 @@ and kernels.laws.seabed.
 from __future__ import annotations
 
 from hybrid.kernels.algebra.rotations import add, dot, get3, madd, mat_vec, mscale, outer, scale, sub
-from hybrid.kernels.laws.bed import Z9, bed_before, bed_beside, bed_under, depth_falls
+from hybrid.kernels.laws.bed import bed_before, bed_beside, bed_under, depth_falls
 from hybrid.kernels.laws.loads import body_drag, half_cell_added_mass, half_cell_drag
 from hybrid.kernels.laws.obstacles import obstacle_forces
 from hybrid.kernels.laws.seabed import contact, friction, pressure
@@ -31,6 +31,7 @@ from hybrid.kernels.state.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_PO
 
 WATER = DRAG | ADDED_MASS | SURFACE | WAVES | BODIES
 Z3 = (0.0, 0.0, 0.0)
+Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 UP = (0.0, 0.0, 1.0)
 
 
@@ -166,12 +167,15 @@ def seabed_forces(line, sea, i, x, u, v, e, cv, report):
     sea.bed[i, 0], sea.bed[i, 1], sea.bed[i, 2] = F
     # penetrations: dp_i = -g.dr_i, dp_{i-1} = -g.(dr_i - de), dp_{i+1} = -g.(dr_i + de), each with g where it is, the
     # normal but for how that turns on a bed of depths
-    g, W = depth_falls(sea, x, n, p)
-    D = madd(D, madd(mscale(N, W), mscale(-DN, outer(slope, g))))
-    if NL != 0.0 and i > 0:
-        left, _ = depth_falls(sea, sub(x, get3(e, i - 1)), left, pl)
-    if NR != 0.0 and i < line.h.shape[0]:
-        right, _ = depth_falls(sea, add(x, get3(e, i)), right, pr)
+    g = n
+    if sea.bed_x.shape[0] > 0:
+        g, W = depth_falls(sea, x, n, p)
+        D = madd(D, mscale(N, W))
+        if NL != 0.0 and i > 0:
+            left, _ = depth_falls(sea, sub(x, get3(e, i - 1)), left, pl)
+        if NR != 0.0 and i < line.h.shape[0]:
+            right, _ = depth_falls(sea, add(x, get3(e, i)), right, pr)
+    D = madd(D, mscale(-DN, outer(slope, g)))
     L, R = mscale(NL, outer(slope, left)), mscale(NR, outer(slope, right))
     return True, F, madd(D, mscale(-1.0, madd(L, R))), L, mscale(-1.0, R)
 
