@@ -14,6 +14,7 @@ from hybrid.kernels.state.obstacle_rows import (
     BEGAN,
     CARRIED,
     INERTIA,
+    MEETS_FROM,
     MEETS_TO,
     OFFSET,
     RAMP,
@@ -52,7 +53,7 @@ def courses_of(scene: Scene, rows: Floats, waves: Floats, ramp: float, elevation
     carried[:, STILL_AXIS : STILL_AXIS + 3], carried[:, TURNED : TURNED + 9] = rows[:, AXIS : AXIS + 3], frame
     motions: dict[int, Motion | DrivenEnd] = {}
     driven = {}
-    carried[:, MEETS_TO] = np.inf
+    carried[:, MEETS_FROM], carried[:, MEETS_TO] = -np.inf, np.inf  # what comes off a reel at the start has s < 0
     for k, (name, x) in enumerate(scene.obstacles.items()):
         if isinstance(x, Carried):
             position[k], frame[k] = x.origin, np.array(x.axes).T.ravel()

@@ -143,7 +143,8 @@ class PayoutPlan:
         rod = np.array([x.kind == "rod" for x in self.zones])
         rods = rod[np.minimum(np.searchsorted(ends, middle), len(ends) - 1)]
         line = line_on(cable, s, rods)
-        return line._replace(bits=like.bits, plane=like.plane, footing=self._footing(like, s.size))
+        footing = self._footing(like, s.size)
+        return line._replace(bits=like.bits, plane=like.plane, moved=like.moved, footing=footing)
 
     def layout(self, count: int, length: float, rod: np.ndarray, here: np.ndarray | None = None) -> Layout:
         """The cells of `count` material nodes and a length, m, where zones move; rod, here: as of a Layout."""

@@ -121,7 +121,7 @@ class JoinedObservation(Observation):
             name: _joined([getattr(x, name)[0] for x in batches], False)[None] for name in NODES_OF_BATCH
         }
         of |= {name: _joined([getattr(x, name)[0] for x in batches], True)[None] for name in CELLS_OF_BATCH}
-        rest = [name for name in Batch._fields if name not in (*of, *OF_LINE, "turn", "touch", "obstacles")]
+        rest = [name for name in Batch._fields if name not in (*of, *OF_LINE, "turn", "touch")]
         heads: dict[str, Any] = {name: np.concatenate([getattr(x, name) for x in batches]) for name in rest}
         super().__init__(lines[0]._replace(**along), sea, grid, Batch(**heads, **of))
         self.outputs, self.begin, self._joined_grid = outputs, grid.begin, grid

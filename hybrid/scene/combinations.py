@@ -448,6 +448,8 @@ GOES_ITS_WAY = Feature(
     "contact, bodies.NAME.shape, obstacles.NAME.motion",
     _either(LINES_TOUCH, SHAPES, Feature("obstacles that move", "motion", _moving_obstacles)),
 )
+MEETS_LINES = Feature("contact of lines with each other, with bodies", "contact, bodies.NAME.shape",
+                      _either(LINES_TOUCH, SHAPES))  # fmt: skip
 MOVED_BY_LINES = Feature("contact of lines with each other, with bodies, with sheaves",
                          "contact, bodies.NAME.shape, obstacles.NAME.bearing",
                          _either(LINES_TOUCH, SHAPES, SHEAVES))  # fmt: skip
@@ -543,7 +545,7 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     OFFSETS_OF_SHAPE,
     Refusal(
-        PAYOUT, GOES_ITS_WAY, "not worked out",
+        PAYOUT, MEETS_LINES, "not worked out",
         "what touches ({key}) moves, and nodes that enter and leave do not know it",
     ),
     Refusal(

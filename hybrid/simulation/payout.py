@@ -265,8 +265,7 @@ class PayingOut:
         self._fit(changed.line, reel, length, run.t)
         if carry is not None:
             carry(changed, source, of_base)
-        ends = model.ends.at(run.t)
-        sea = model.sea.values
+        ends, sea = model.ends.at(run.t), model.sea.at(run.t)
         more = energy(changed.line, ends, out, sea) - energy(model.line, ends, state, sea)
         if model.line.law.size:
             more += stretch_energy(changed.line, out) - stretch_energy(model.line, state)

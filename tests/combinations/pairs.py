@@ -101,7 +101,8 @@ FEATURES: dict[str, tuple[Tables, str]] = {
     ),
     "obstacle that moves": (
         {"obstacles": {"pipe": {"kind": "cylinder", "at": [4, 0, -2], "axis": [0.1, 1, 0.05], "radius": 0.8,
-                                "friction": 0.3, "motion": {"travel": {"by": [0.05, 0.1, 0.08], "over": 0.4}}}}},
+                                "friction": 0.3, "motion": {"travel": {"by": [0.05, 0.1, 0.08], "over": 0.4}},
+                                "spin": {"rate": 0.8, "ramp": 0.3}}}},
         "obstacles",
     ),
     "sheave": (
@@ -151,6 +152,8 @@ def seen_by(M: Matrix, tables: Tables) -> Tables:
     odd = float(np.linalg.det(M))
 
     def walk(key: str, x: Any) -> Any:
+        if key == "spin":
+            return x | {"rate": odd * x["rate"]}
         if isinstance(x, dict):
             return {k: walk(k, y) for k, y in x.items()}
         if key == "points" and isinstance(x, list):

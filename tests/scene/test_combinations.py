@@ -79,7 +79,7 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.SHORTEST_CELLS, c.STAYING_CELLS): ({"model": {"kind": "adaptive", "rod_cell": 0.1}}, ""),
     (c.PLANE, c.OBSTACLES): (BALL | {"dimension": 2}, ""),
     (c.MOVING_ZONES, c.GOES_ITS_WAY): ({"obstacles.ball": BALL["obstacles"]["ball"] | {"from_outside": True}} | MOVING, ""),
-    (c.PAYOUT, c.GOES_ITS_WAY): ({"obstacles.ball": BALL["obstacles"]["ball"] | {"from_outside": True}} | PAID, ""),
+    (c.PAYOUT, c.MEETS_LINES): (TWO_LINES | PAID_LINE, ""),
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
     (c.SETTLED_FRICTION, c.PUSHED): (BALL | {"initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
     (c.ABOUT_REST, c.MOVED_BY_LINES): (TWO_LINES, "about rest"),
@@ -112,8 +112,7 @@ OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"time": {"duration": 3.0}}, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"output.errors": True}, ""),
     ((c.ABOUT_REST, c.MOVED_BY_LINES), TWO_LINES, "derivatives"),
-    ((c.PAYOUT, c.GOES_ITS_WAY), TWO_LINES | PAID_LINE, ""),
-    ((c.PAYOUT, c.GOES_ITS_WAY), SHAPED | PAID_LINE, ""),
+    ((c.PAYOUT, c.MEETS_LINES), SHAPED | PAID_LINE, ""),
 )
 OF_ARRAYS = [c.OFFSETS_OF_SHAPE]
 

@@ -286,9 +286,19 @@ def stored_in_contact(line, sea, r):
 
 
 @inner
-def stored_along(line, sea, r, c):
-    """Energy per length (J/m) that the bed and fixed obstacles have stored against cell c."""
-    energy = 0.0
+def depth_before(rows, carried, k, r, i):
+    """p of node i in obstacle k, which moves, both where they were before the step."""
+    d, _, _, _ = beside(rows, k, swept(carried, k, (r[i, 0], r[i, 1], r[i, 2])))
+    return 0.5 * rows[k, ONSET_OF] - d
+
+
+@inner
+def stored_along(line, sea, r, c, before):
+    """Energy per length (J/m) that the bed and obstacles have stored against cell c; before: whether r, and what moves,
+
+    are those before the step.
+    """
+    energy, moves = 0.0, line.moved.shape[0] > 0
     if line.bits & SEABED:
         p0, p1 = depth_of(sea, r, c), depth_of(sea, r, c + 1)
         if p0 > 0.0 or p1 > 0.0:
@@ -297,8 +307,12 @@ def stored_along(line, sea, r, c):
         rows = sea.obstacles
         for k in range(rows.shape[0]):
             thin = thinner(line, rows, k, c) if rows.shape[1] > OBSTACLE else 0.0
-            p0, p1 = depth_in(rows, k, r, c) - thin, depth_in(rows, k, r, c + 1) - thin
-            if p0 > 0.0 or p1 > 0.0:
+            if moves and before:
+                p0, p1 = depth_before(rows, sea.carried, k, r, c), depth_before(rows, sea.carried, k, r, c + 1)
+            else:
+                p0, p1 = depth_in(rows, k, r, c), depth_in(rows, k, r, c + 1)
+            p0, p1 = p0 - thin, p1 - thin
+            if (p0 > 0.0 or p1 > 0.0) and meets(line, sea, moves, k, c):
                 energy = with_cell(energy, p0, p1, 1.0, rows[k, STIFFNESS], rows[k, ONSET_OF])
     return energy
 

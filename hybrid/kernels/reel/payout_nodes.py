@@ -22,6 +22,7 @@ from hybrid.kernels.mesh.fill_line import COMPLIANCE
 from hybrid.kernels.reel.damping import strain_at
 from hybrid.kernels.reel.paid_length import cell, lack_rate, length_at, made_between, node
 from hybrid.kernels.reel.payout import slope_at, velocity_at
+from hybrid.kernels.reel.payout_contact import put_travels
 from hybrid.kernels.reel.reel import (
     CHANGED,
     EASING,
@@ -154,6 +155,11 @@ def move_state(state, out, forward, cut, step):
         move_row(state.peak, out.peak, forward, cut, step)
     if state.wake.shape[0] > 0:
         move_rows(state.wake, out.wake, forward, cut, step)
+    if state.grip.shape[0] > 0:
+        move_rows(state.grip, out.grip, forward, cut, step)
+    for k in range(state.sheave.shape[0]):
+        for j in range(state.sheave.shape[1]):
+            out.sheave[k, j] = state.sheave[k, j]
     for k in range(state.turn.shape[0]):
         for j in range(3):
             out.turn[k, j] = state.turn[k, j]
@@ -347,16 +353,6 @@ def span_of(job, flow, g):
 
 
 @inner
-def travel_between(state, i, k, part):
-    """Travel of friction at a place between nodes i and k; that of the one that touches where the other does not."""
-    a, z = get3(state.bed, i), get3(state.bed, k)
-    one, other = dot(a, a) > 0.0, dot(z, z) > 0.0
-    if one != other:
-        return get3(state.slip, i if one else k)
-    return add(scale(1.0 - part, get3(state.slip, i)), scale(part, get3(state.slip, k)))
-
-
-@inner
 def enter(job, flow, g):
     """One more node, in the cell that grows."""
     line, target, state, out, reel, new = job.line, job.target, job.state, job.out, job.reel, job.new
@@ -388,7 +384,7 @@ def enter(job, flow, g):
     put(out.vd, at, true)
     h = place_of(line, reel, i) - place_of(line, reel, g)
     part = (place - place_of(line, reel, g)) / h
-    put(out.slip, at, travel_between(state, before, behind, part))
+    put_travels(state, out, at, before, behind, part)
     cut, last = cell(line, reel, g), cell(line, reel, g - 1)
     slope = (state.T[cut] - state.T[last]) / (0.5 * (line.h[last] + h))
     kept, rises = mismatch(job, flow, g, g), tension_rate(line, state, job.clock, job.tension, cut)

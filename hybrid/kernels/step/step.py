@@ -167,7 +167,7 @@ def contact_work(line, sea, old, new, u, report):
     moves = line.moved.shape[0] > 0
     if moves:
         report[OBSTACLE_WORK] = 0.0
-        grip_obstacles(line, sea, u, new, old.grip, new.grip)
+        grip_obstacles(line, sea, u, new, sea.grip, new.grip)
         book_obstacles(sea, old, new, u, report)
     for i in range(u.shape[0]):  # force times way: bounded by the energy of a blow, however short the step is not
         b = (0.5 * (old.bed[i, 0] + sea.bed[i, 0]), 0.5 * (old.bed[i, 1] + sea.bed[i, 1]),
