@@ -129,12 +129,13 @@ def _newton(residuals: Callable[[NDArray[Any]], NDArray[Any]], x: Array) -> Arra
     """The root near x, with derivatives by complex steps; None: there is none in reach."""
     for _ in range(ITERATIONS):
         J = np.empty((x.size, x.size))
-        for i in range(x.size):
-            moved = x.astype(complex)
-            moved[i] += 1j * TINY
-            J[:, i] = residuals(moved).imag / TINY
         try:
-            change = np.linalg.solve(J, residuals(x))
+            with np.errstate(over="ignore", invalid="ignore"):  # x that flies off: it is infinite, or no number, then
+                for i in range(x.size):
+                    moved = x.astype(complex)
+                    moved[i] += 1j * TINY
+                    J[:, i] = residuals(moved).imag / TINY
+                change = np.linalg.solve(J, residuals(x))
         except np.linalg.LinAlgError:
             return None
         x = x - change
