@@ -152,6 +152,39 @@ remembered and a wave is not.
 At rest the rope is on the working curve below `highest_tension`, or, under more, on the original one.
 `hybrid import` reads such ropes from decks of MoorDyn; what they lose is in `work/hysteresis`.
 
+## Bending with hysteresis
+
+The armour of a flexible pipe sticks until friction gives way, and then slips: stiff in small bends, soft in large ones,
+and what it loses is the fatigue that it is spared.
+`bending_stiffness` is what is left when all slips; a layer adds its own until its moment is the slip moment.
+
+```yaml
+environment: {fluid: {density: 1025}}
+cable:
+  sections:
+    - length: 120
+      mass: 90
+      diameter: 0.26
+      axial_stiffness: 3.0e+8
+      bending_stiffness: 9.67e+3
+      torsional_stiffness: 1.0e+5
+      bending_slip: [{stiffness: 87.2e+3, moment: 600, per_tension: 0.003}]  # sticks to 0.01 1/m under 90 kN
+ends:
+  start: {kind: pinned, position: [60, 0, -90]}
+  end:
+    kind: clamped
+    position: [0, 0, -2]
+    tangent: [0, 0, 1]
+    motion: {surge: {amplitude: 1.5, period: 9}, ramp: 9}
+initial: equilibrium
+model: rod
+time: {duration: 20, step: 0.05}
+```
+
+A measured curve in place of layers: `moment_curvature: [[0, 0], [0.01, 969], [0.05, 1356]]` and `first_loading: true`.
+An equilibrium is that of a first loading from straight, whatever came before: with layers, there are others.
+What is lost is in `work/hysteresis` ([theory.md](theory.md#layers-that-slip)).
+
 ## Air and wind
 
 A line in air is a line in a fluid of density 1.225 whose current is the wind, here 12 m/s along y:

@@ -251,7 +251,7 @@ class LineAtRest:
     def _looked_at_with(self, x: Beside) -> bool:
         """Whether a line differs from the one here in what may differ among outputs that are looked at together."""
         line = x.model.line
-        more = (line.law, line.bend_law, line.torsion, line.tension_torque, line.wake_law)
+        more = (line.law, line.bend_law, line.torsion, line.tension_torque, line.wake_law, line.slip_law)
         plain = not x.model.attached and x.model.cable.bounds.size == 2  # else what cuts the line moves with its nodes
         same = x.sea is self.here.sea and (plain or np.array_equal(line.s, self.model.line.s))
         return same and not any(a.size for a in more) and self._observer.quantities is None

@@ -9,7 +9,16 @@ from math import inf
 
 from hybrid.errors import OF_AN_END
 from hybrid.kernels.mesh.criteria import CRITERIA
-from hybrid.kernels.state.forces import BENDING_LAW, DRAG, FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION, VORTICES
+from hybrid.kernels.state.forces import (
+    BENDING_LAW,
+    BENDING_SLIP,
+    DRAG,
+    FORCES,
+    MAY_TOUCH,
+    SELF_CONTACT,
+    SELF_FRICTION,
+    VORTICES,
+)
 from hybrid.kernels.state.obstacle_rows import STIFFNESS
 from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.mesh import Zone
@@ -221,6 +230,9 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
     if line.bits & BENDING_LAW:
         why = "sections[].moment_curvature, cable.attachments of kind bend_restrictor"
         entries.append(Entry("moment over curvature by a table", True, why))
+    if line.bits & BENDING_SLIP:
+        why = "sections[].bending_slip, first_loading; in equilibria as on first loading from straight"
+        entries.append(Entry("layers that slip as the line bends", True, why))
     if any(x.dynamic_stiffness is not None for x in scene.cable.sections):
         entries.append(Entry("stiffness that depends on speed and mean tension", True, "sections[].dynamic_stiffness"))
     if "rod" in kinds:

@@ -10,7 +10,16 @@ from hybrid.kernels.laws.vortices import DIAMETER, LIFT_A, LIFT_B, OFFSET, RAMP
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.fill_line import OF_POINTS, PER_LENGTH
 from hybrid.kernels.mesh.zone_line import Cable, blank_line_job, fill_line
-from hybrid.kernels.state.forces import AXIAL_LAW, BENDING_LAW, BODIES, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING
+from hybrid.kernels.state.forces import (
+    AXIAL_LAW,
+    BENDING_LAW,
+    BENDING_SLIP,
+    BODIES,
+    FRICTION,
+    ROTARY,
+    SEABED,
+    STIFFNESS_DAMPING,
+)
 from hybrid.kernels.state.state import (
     NO_ADDRESS,
     NO_LAW,
@@ -25,6 +34,7 @@ from hybrid.kernels.state.state import (
     no_work,
     state_for,
 )
+from hybrid.model.bending_slip import with_slip
 from hybrid.model.bending_tables import bend_law
 from hybrid.model.material import Material
 
@@ -51,6 +61,8 @@ def line_on(
         bits |= AXIAL_LAW
     if material.bends is not None:
         bits |= BENDING_LAW
+    if any(material.layers):
+        bits |= BENDING_SLIP
     return on_base(material, cable_on(material, s, bits, inertia), s, np.arange(rod.size), rod, bits)
 
 
@@ -75,6 +87,8 @@ def on_base(
     if material.bends is not None:
         bent, table = bend_law(material, line, of)
         line = line._replace(bend_law=bent, bend_table=table)
+    if bits & BENDING_SLIP:
+        line = with_slip(line, material, of)
     if material.vortices.size:
         line = line._replace(wake_law=wake_law(material, s, of))
     return line

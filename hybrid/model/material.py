@@ -109,6 +109,8 @@ class Material:
     bends: list[Curve | None] | None = None  # (K,) tables of moment over curvature; None: there are none
     tension_torque: Floats = field(default_factory=lambda: np.zeros(0))  # (K,) N m per N; empty: none anywhere
     sections_turn: bool = False  # whether sections are given an inertia, which rods that come and go have too
+    # (K,) of pieces, of each layer that slips: stiffness, N m2, slip moment, N m, and what it gains by tension, m
+    layers: list[tuple[tuple[float, float, float], ...]] = field(default_factory=list)
 
     @property
     def passes_torque(self) -> bool:
@@ -127,11 +129,12 @@ class Material:
 
     @property
     def mean_bending(self) -> Floats:
-        """(K,) N m2, mean EI of both axes, of a table its steepest: of models that do not know how a section lies, or
+        """(K,) N m2, mean EI of both axes, of a table its steepest, of layers while they stick: of models that do not
 
-        how far it bends (catenaries, criteria).
+        know how a section lies, or how far it bends (catenaries, criteria).
         """
-        return self._of_tables(max, self.mean_initial_bending)
+        stuck = np.array([sum(x[0] for x in layers) for layers in self.layers]) if any(self.layers) else 0.0
+        return self._of_tables(max, self.mean_initial_bending) + stuck
 
     @property
     def hinges(self) -> Floats:
@@ -221,7 +224,8 @@ def material(scene: Scene, nodes: Floats | None = None) -> Material:
         out.mass[on] += m.mass
         out.weight[on] += m.mass * scene.environment.gravity
     _stiffen(out, scene, middle)
-    if restrictors or any(x.moment_curvature for x in of):
+    out.layers = [x.slip_layers for x in of]
+    if restrictors or any(x.elastic_table for x in of):
         out.bends = _bending_tables(out, restrictors, of, middle)
     if scene.environment.fluid is not None:
         _wetted(out, scene, of, middle)
@@ -266,7 +270,7 @@ def _bending_tables(
     found: list[Curve | None] = []
     for section, EI, s in zip(of, out.mean_initial_bending, middle, strict=True):
         own = float(np.mean(section.initial_bending or (0.0, 0.0)))
-        rows = section.moment_curvature
+        rows = section.elastic_table
         if rows is not None and own < EI:
             rows = stiffened(rows, 0.0, float(EI) - own)
         for x in restrictors:

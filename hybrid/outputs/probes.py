@@ -125,14 +125,15 @@ WORK = {
     "zones": "energy that zones, and cells at a winch, put in or take out when they change, and of torque where a "
     "catenary bends without it",
     "obstacles": "work done on the cable by obstacles as they move; of what rubs on a surface that turns, too",
-    "hysteresis": "work of what ropes lose whose stretch depends on their highest tension (syrope)",
+    "hysteresis": "work of what layers lose that slip as the line bends (bending_slip), and ropes whose stretch "
+    "depends on their highest tension (syrope)",
     "scheme": "energy change that no work accounts for: the time scheme's own (negative: dissipated)",
 }
 
 
 def works_of(line: Line) -> list[str]:
     """Names in WORK of what a line can have."""
-    absent = {"obstacles": not line.moved.size, "hysteresis": not remembers(line)}
+    absent = {"obstacles": not line.moved.size, "hysteresis": not (remembers(line) or line.slip_law.size)}
     return [name for name in WORK if not absent.get(name)]
 
 

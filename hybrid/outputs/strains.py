@@ -99,6 +99,8 @@ def _end_rods(view: Observation, out: Floats, spans: Integers) -> None:
     bare = line.element[at.node] == 0  # a joint or an end without element: strain of the moment that is given
     # the moment is one, the stiffness is not
     jumps = ~bare & np.isin(at.node, view.changes) & (line.element[2 * at.cell + 1 - at.node] == 1)
+    if line.slip_law.size:  # an element between layers of two kinds has one curvature
+        jumps &= line.slip_law[at.node, 0] == 0.0
     if (given := np.flatnonzero(bare | jumps)).size:
         out[at.row[given]] = _strain_of_moment(view, at.node[given], at.cell[given])
     # an angular spring at a clamp bends, but does not twist
@@ -258,6 +260,10 @@ def _strain_of_moment(view: Observation, node: Integers, cell: Integers) -> Floa
     k = k0 + np.divide(body, B, out=np.zeros_like(body), where=np.broadcast_to(B > 0, body.shape))
     if line.bend_law.size:
         k[:, :2] = k0[:, :2] + _bend_by_table(line, inner, np.sign(node - inner), body[:, :2], (k - k0)[:, :2])
+    if (
+        line.slip_law.size and (slips := np.flatnonzero(line.slip_law[inner, 0])).size
+    ):  # depends on the way: as beside it
+        k[slips, :2] = (view.element_strains[inner, :2] / hn)[slips]
     found = np.stack([np.hypot(k[:, 0], k[:, 1]), k[:, 2]], axis=1)
     found[line.element[inner] == 0] = 0.0
     return found

@@ -27,9 +27,12 @@ from hybrid.scene.stretch import (
     Curve,
     CurveFile,
     DynamicStiffness,
+    SlipLayer,
     TensionStrain,
     bending_findings,
+    first_loading_findings,
     interpolated,
+    layers_of,
     refuse_rows,
     rows_of,
     slopes,
@@ -291,6 +294,16 @@ class Section(Table):
         "straight between them and beyond the last, the same about any axis, elastic; stiffness-proportional damping "
         "is that of the first piece [1/m, N m]",
     )
+    first_loading: bool = Field(
+        default=False,
+        description="whether moment_curvature is that of a first loading, whose layers slip at its rows: unloading "
+        "goes back along twice the curve (Masing), and the slopes fall from row to row",
+    )
+    bending_slip: tuple[SlipLayer, ...] = Field(
+        default=(),
+        description="layers that slip on each other, beside the bending_stiffness or moment_curvature that is left "
+        "when all of them do: hysteresis of moment over curvature, the same about any axis; absent: none",
+    )
     torsional_stiffness: NonNegative | None = Field(
         default=None,
         description="torsional stiffness GJ; absent: bending stiffness / 1.3, of a table that of its first piece "
@@ -414,12 +427,23 @@ class Section(Table):
 
     @property
     def initial_bending(self) -> tuple[float, float] | None:
-        """Bending stiffness [N m^2] about both axes, of a table that without bend; None if none is given."""
+        """Bending stiffness [N m^2] about both axes, of a table that without bend, without layers; None: not given."""
         if self.moment_curvature is not None:
-            stiffness = slopes(self.moment_curvature)[0]
+            stiffness = slopes(self.moment_curvature)[-1 if self.first_loading else 0]
             return stiffness, stiffness
         b = self.bending_stiffness
         return b if b is None or isinstance(b, tuple) else (b, b)
+
+    @property
+    def elastic_table(self) -> Curve | None:
+        """Rows of curvature and moment of a section that bends elastically by a table; else None."""
+        return None if self.first_loading else self.moment_curvature
+
+    @property
+    def slip_layers(self) -> tuple[tuple[float, float, float], ...]:
+        """Of each layer that slips: stiffness [N m^2], slip moment [N m], and what it gains by tension [m]."""
+        given = tuple((x.stiffness, x.moment, x.per_tension) for x in self.bending_slip)
+        return given + (layers_of(self.moment_curvature) if self.first_loading and self.moment_curvature else ())
 
     @property
     def weakest_bending(self) -> float | None:
@@ -519,6 +543,20 @@ class Section(Table):
             refuse([Finding(("bending_stiffness",), "nothing, because moment_curvature says how it bends", fix)])
         found = bending_findings(self.moment_curvature)
         refuse(Finding(("moment_curvature", *x.at), x.expected, x.fix, x.given) for x in found)
+        return self
+
+    @model_validator(mode="after")
+    def _layers_slip(self) -> Section:
+        found: list[Finding] = []
+        if self.first_loading:
+            found += first_loading_findings(self.moment_curvature)
+        if (self.first_loading or self.bending_slip) and self.torsional_stiffness == 0.0:
+            expected = "a number > 0, in N m^2: layers that have slipped lie in a direction about the axis"
+            found.append(Finding(("torsional_stiffness",), expected, "leave it out for bending stiffness / 1.3"))
+        if self.bending_slip and not self.weakest_bending:
+            expected = "a number > 0, in N m^2: what is left when all layers of bending_slip slip"
+            found.append(Finding(("bending_stiffness",), expected, "add `bending_stiffness: ...` (N m^2)"))
+        refuse(found)
         return self
 
     @model_validator(mode="after")

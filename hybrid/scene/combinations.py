@@ -266,6 +266,30 @@ def _tables_beside_two_stiffnesses(tables: Tables) -> Iterator[Place]:
             yield "cable", "sections", i, "moment_curvature"
 
 
+def _slips(tables: Tables) -> Iterator[Place]:
+    return (
+        (*at, "bending_slip" if x.bending_slip else "first_loading") for at, x in _sections(tables) if x.slip_layers
+    )
+
+
+def _springs_beside_slip(tables: Tables) -> Iterator[Place]:
+    """Angular springs at the ends of a cable whose first or last section has layers that slip."""
+    cable: Cable | None = tables.get("cable")
+    ends: Ends | None = tables.get("ends")
+    for name, of in (("start", 0), ("end", -1)) if cable is not None else ():
+        if not cable.sections[of].slip_layers:  # type: ignore[union-attr]
+            continue
+        for key, table in (("ends", ends.named() if ends is not None else {}), ("connections", vars_of(tables))):
+            if getattr(table.get(name), "bend_stiffness", None) is not None:
+                yield key, name, "bend_stiffness"
+
+
+def vars_of(tables: Tables) -> dict[str, Any]:
+    """How the ends of a line of several are connected."""
+    held = tables.get("connections")
+    return {name: getattr(held, name) for name in ("start", "end")} if held is not None else {}
+
+
 def _swivels_beside(of: Callable[[Section], Any]) -> Callable[[Tables], Iterator[Place]]:
     """Swivels in or beside a section of which `of` is true."""
 
@@ -414,6 +438,8 @@ VORTICES = Feature("vortex-induced vibration", "vortices", _in_sections("vortice
 RESTRICTOR = Feature("bend restrictors", "attachments: kind: bend_restrictor", _attached("bend_restrictor"))
 TABLE_BESIDE = Feature("a section with a table of moment over curvature beside one of two bending stiffnesses",
                        "moment_curvature", _tables_beside_two_stiffnesses)  # fmt: skip
+SLIP = Feature("layers that slip as a line bends", "bending_slip, first_loading", _slips)
+SPRING_BESIDE_SLIP = Feature("an angular spring at a clamp of such a section", "bend_stiffness", _springs_beside_slip)
 DAMPED_OTHERWISE = Feature(
     "damping proportional to stiffness of laws and tables, with torque of tension, of a line clamped to what turns",
     "damping.stiffness", _damped_otherwise,
@@ -500,6 +526,20 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         RESTRICTOR, TWO_STIFFNESSES, "not worked out", "a table of moment is the same about any axis ({key})",
         "a section of one bending_stiffness", "give one number there",
+    ),
+    Refusal(
+        SLIP, MOVING_ZONES, "not worked out",
+        "zones move (model), and a catenary forgets how far its layers have slipped",
+        fix="leave it out, or write `model: rod`",
+    ),
+    Refusal(SLIP, PAYOUT, "not worked out", "layers that slip do not travel with {key}"),
+    Refusal(
+        SLIP, ABOUT_REST, "not worked out", "the stiffness of layers that slip depends on how far the line moves",
+        fix="leave it out, and give the bending_stiffness at that amplitude; hybrid run computes it in time",
+    ),
+    Refusal(
+        SPRING_BESIDE_SLIP, SLIP, "not worked out", "the section there has layers that slip ({key})",
+        fix="leave it out, or put a short section without layers at the clamp",
     ),
     Refusal(
         TABLE_BESIDE, TWO_STIFFNESSES, "not worked out",

@@ -138,6 +138,47 @@ def bending_findings(rows: Curve) -> list[Finding]:
     return []
 
 
+def first_loading_findings(rows: Curve | None) -> list[Finding]:
+    """What is wrong with a table of curvature and moment as one of a first loading."""
+    if rows is None:
+        fix = "give its rows, or leave first_loading out"
+        return [Finding(("moment_curvature",), "rows [curvature, moment], because first_loading is true", fix)]
+    for k, (a, b) in enumerate(pairwise(slopes(rows)), start=1):
+        if not b < a:
+            expected = f"a slope behind it below the one before, {a:g} N m^2, because first_loading is true"
+            fix = "layers that slip soften it; leave rows out on a straight line, or leave first_loading out"
+            return [Finding(("moment_curvature", k), expected, fix)]
+    if len(rows) < 3:
+        return [Finding(("moment_curvature",), "three rows or more: at the second, a layer slips", "add a row")]
+    return []
+
+
+class SlipLayer(Table):
+    """A layer that slips as the section bends: elastic until its moment is the slip moment, which it then keeps."""
+
+    stiffness: Positive = Field(description="bending stiffness that it adds while it sticks [N m^2]")
+    moment: NonNegative = Field(default=0.0, description="slip moment without tension [N m]")
+    per_tension: NonNegative = Field(
+        default=0.0,
+        description="by how much the slip moment grows with tension, that at the start of a step [N m per N]",
+    )
+
+    @model_validator(mode="after")
+    def _bears(self) -> SlipLayer:
+        if self.moment == self.per_tension == 0.0:
+            expected = "a number > 0, in N m, or per_tension: a layer without slip moment does nothing"
+            refuse([Finding(("moment",), expected, "add `moment: ...` (N m)")])
+        return self
+
+
+def layers_of(rows: Curve) -> tuple[tuple[float, float, float], ...]:
+    """Stiffness, slip moment and 0 of the layers whose first loading is a table of moment (N m) over curvature (1/m),
+
+    less what its last piece has from straight on (Masing).
+    """
+    return tuple((a - b, (a - b) * x, 0.0) for (a, b), (x, _) in zip(pairwise(slopes(rows)), rows[1:], strict=False))
+
+
 def slopes(rows: Curve) -> list[float]:
     """Stiffness (N) of each piece of a table."""
     return [(U - T) / (y - x) for (x, T), (y, U) in pairwise(rows)]

@@ -39,7 +39,7 @@ from hybrid.kernels.state.books import (
     sample_size,
 )
 from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, OBSTACLES, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one
+from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one, slip_size
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import output_points
@@ -188,7 +188,7 @@ class LineResult:
     def sample_size(self) -> int:
         """Numbers of an output of the line as it is."""
         line, varies, touches = self.model.line, self.model.layout is not None, self.books.touch.size > 0
-        return sample_size(line.h.size, varies, len(line.torsion), touches, line.moved.size)
+        return sample_size(line.h.size, varies, len(line.torsion), touches, line.moved.size, slip_size(line))
 
     def make_room(self, rows: int) -> None:
         """Room for so many samples of the line as it is; what is there is gone."""
@@ -339,7 +339,7 @@ class LineResult:
         """The outputs that steps have sampled, as many as there are in the buffer; in arrays of their own."""
         line, books = self.model.line, self.books
         varies = self.model.layout is not None
-        sizes = line.h.size, HELD, varies, len(line.torsion), books.touch.shape[1], line.moved.size
+        sizes = line.h.size, HELD, varies, len(line.torsion), books.touch.shape[1], line.moved.size, slip_size(line)
         return batch_of_rows(books.samples[:count].copy(), *sizes)[0]
 
     def state_now(self, t: float, ends: Ends, state: State, work: Work) -> Batch:

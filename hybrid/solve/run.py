@@ -22,7 +22,20 @@ from hybrid.kernels.state.books import blank_books, sample_size
 from hybrid.kernels.state.forces import PLANAR, SELF_CONTACT
 from hybrid.kernels.state.obstacle_rows import EACH, SEEN
 from hybrid.kernels.state.report import REPORT_SIZE
-from hybrid.kernels.state.state import NOT_VARYING, Batch, Ends, Floats, Line, Moves, Sea, State, Work, no_torsion
+from hybrid.kernels.state.state import (
+    NO_LAYERS_SEEN,
+    NOT_VARYING,
+    Batch,
+    Ends,
+    Floats,
+    Line,
+    Moves,
+    Sea,
+    State,
+    Work,
+    no_torsion,
+    slip_size,
+)
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import RUN, Limits, Task
 from hybrid.kernels.watch.named_quantities import note_quantities
@@ -93,7 +106,8 @@ class CompiledRun:
         cells = line.h.size
         followed = corrector.sampled if corrector is not None else np.zeros((2, 0))
         touches = bool(line.bits & SELF_CONTACT)
-        size = sample_size(cells, bool(self.count[b.VARIES]), len(line.torsion), touches, line.moved.size)
+        more = len(line.torsion), touches, line.moved.size, slip_size(line)
+        size = sample_size(cells, bool(self.count[b.VARIES]), *more)
         size += followed.shape[1]
         if not self._room.size:
             self._room = np.empty(max(1, min(self._rows, MOST_SAMPLED // size)) * size)  # some MB, touched as needed
@@ -304,18 +318,26 @@ class CompiledRun:
         """Rows (n, size) of samples of a line of so many cells, as views; ends: as of `samples`."""
         touching, varies = self.books.touch.shape[1], bool(self.count[b.VARIES])
         batch, self.sampled_errors = batch_of_rows(
-            rows, cells, ends.held, varies, len(self.state.turn), touching, self.state.grip.shape[1] // EACH
-        )
+            rows, cells, ends.held, varies, len(self.state.turn), touching, self.state.grip.shape[1] // EACH,
+            self.state.layers.shape[1],
+        )  # fmt: skip
         return batch
 
 
 def batch_of_rows(
-    rows: Floats, cells: int, held: np.ndarray, varies: bool, zones: int, touching: int, obstacles: int = 0
+    rows: Floats,
+    cells: int,
+    held: np.ndarray,
+    varies: bool,
+    zones: int,
+    touching: int,
+    obstacles: int = 0,
+    layers: int = 0,
 ) -> tuple[Batch, Floats]:
     """Samples (n, size) of a line as views (kernels.state.books.sample_size), and the columns behind them.
 
     held: (2,) as `Ends` has it; varies: whether they have lengths and stiffness; zones: that a torque passes through;
-    touching: N+1, or 0 where the line does not touch itself; obstacles: of which one moves.
+    touching: N+1, or 0 where the line does not touch itself; obstacles: of which one moves; layers: numbers of a node.
     """
     at, count = 0, len(rows)
 
@@ -330,10 +352,11 @@ def batch_of_rows(
     e, T, a1, w = take(cells, 3), take(cells), take(cells, 3), take(cells)
     h, kb = (take(cells), take(cells + 1, 3)) if varies else (NOT_VARYING, NOT_VARYING)
     turn, touch, seen = take(zones, 3), take(touching), take(obstacles, SEEN)
+    slipped = take(cells + 1, layers) if layers else NO_LAYERS_SEEN
     ends = np.repeat(held[None], count, axis=0)
     batch = Batch(
         t, r, v, vd, e, T, a1, w, ends, position, frame, spin, force, moment, report, work, sea, h, kb, turn, touch,
-        seen,
+        seen, slipped,
     )  # fmt: skip
     return batch, rows[:, at:]
 

@@ -79,6 +79,11 @@ FEATURES: dict[str, tuple[Tables, str]] = {
         {S + "moment_curvature": [[0, 0], [0.05, 1.0], [0.15, 2.0], [0.3, 8.0]], S + "bending_stiffness": None},
         "bending",
     ),
+    "slip": (
+        {S + "bending_stiffness": 8.0,
+         S + "bending_slip": [{"stiffness": 12.0, "moment": 0.4, "per_tension": 1e-3}, {"stiffness": 5.0, "moment": 0.5}]},
+        "bending",
+    ),
     "stiffness damping": ({S + "damping": {"mass": 0.5, "stiffness": 0.01}}, "damping"),
     # Pinned at both ends and not at rest, a line with a direction about its axis has none that the scene gives.
     "two stiffnesses": ({S + "bending_stiffness": [20.0, 8.0]}, "bending rest"),

@@ -47,6 +47,7 @@ TABLE_BESIDE_TWO = {
     "cable.sections": [_HALF | {"bending_stiffness": [10, 20]}, _HALF | {"moment_curvature": [[0, 0], [1, 10]]}],
     END + "normal": [0, 1, 0],
 }
+SLIPS: dict[str, Any] = {SECTION + "bending_slip": [{"stiffness": 20, "moment": 1}]}
 CURVED = {SECTION + "intrinsic_curvature": [0.01, 0, 0]}
 ROPE = {SECTION + "dynamic_stiffness": {"constant": 2e6, "relaxation_time": 100}}
 SHEDS: dict[str, Any] = {SECTION + "vortices": {}, "environment.fluid": {"density": 1025, "current": [0.3, 0, 0]}}
@@ -69,6 +70,10 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.RESTRICTOR, c.TWO_STIFFNESSES): (
         TWO | {"cable.attachments": [{"kind": "bend_restrictor", "range": [0, 2], "radius": 2}]}, ""
     ),
+    (c.SLIP, c.MOVING_ZONES): (SLIPS | MOVING, ""),
+    (c.SLIP, c.PAYOUT): (SLIPS | PAID, ""),
+    (c.SLIP, c.ABOUT_REST): (SLIPS, "about rest"),
+    (c.SPRING_BESIDE_SLIP, c.SLIP): (SLIPS | {END + "bend_stiffness": 5}, ""),
     (c.TABLE_BESIDE, c.TWO_STIFFNESSES): (TABLE_BESIDE_TWO, ""),
     (c.TORSION, c.PLANE): (TORQUE | {"dimension": 2}, ""),
     (c.PLANE, c.SELF_CONTACT): ({"dimension": 2, "contact": {"self": True}}, ""),
@@ -109,6 +114,7 @@ BY_SCHEMA = [x for x in REFUSALS if isinstance(x.feature.places, Absent)]
 OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.TORSION, c.PLANE), {END + "turns": 2, "dimension": 2}, ""),
     ((c.SWIVEL_BESIDE, c.DIRECTED), SWIVEL | CURVED, ""),
+    ((c.SLIP, c.ABOUT_REST), SLIPS, "derivatives"),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"time": {"duration": 3.0}}, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"output.errors": True}, ""),
     ((c.ABOUT_REST, c.MOVED_BY_LINES), TWO_LINES, "derivatives"),

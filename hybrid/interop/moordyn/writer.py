@@ -335,6 +335,8 @@ class _Writer:
             fix = "give bending_stiffness, at the curvature you expect"
             self._refuse(f"{where}.moment_curvature", "given", "one stiffness, which this export writes", fix)
             return "none"
+        if section.bending_slip:
+            self._refuse(f"{where}.bending_slip", "given", "nothing: this export writes one stiffness", "leave it out")
         if section.tension_torque:
             expected = "nothing or 0, because MoorDyn has no torsion"
             self._refuse(f"{where}.tension_torque", section.tension_torque, expected, "leave it out, for a comparison")

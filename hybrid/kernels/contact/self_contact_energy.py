@@ -23,20 +23,21 @@ from hybrid.kernels.contact.self_contact_pairs import (
     farthest_from_mean,
 )
 from hybrid.kernels.laws.bending_law import energy_share
+from hybrid.kernels.laws.bending_slip import stored_by_slip
 from hybrid.kernels.laws.cell import chord, turning
 from hybrid.kernels.laws.element import strain_of_element
 from hybrid.kernels.laws.tension_torque import couples
 from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.march.energies import observe
-from hybrid.kernels.march.powers import find_powers
+from hybrid.kernels.march.powers import find_powers, loses
 from hybrid.kernels.march.zone_torque import twist_energy
 from hybrid.kernels.state.books import NOW, RATES, STORED, TRY_END
 from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, TOUCHES
 from hybrid.kernels.state.report import (
     CONTACT_WORK,
     FRICTION_WORK,
+    LOST_WORK,
     OBSTACLE_WORK,
-    ROPE_WORK,
     SEABED_ENERGY,
     SELF_CONTACT_ENERGY,
     SELF_FRICTION_WORK,
@@ -77,6 +78,7 @@ def energy_of_line(line, ends, state):
             x = sub(strain_of_element(before, after, kb, k0), k0)
             share = energy_share(line, i, math.sqrt(x[0] * x[0] + x[1] * x[1]))
             bent += 0.5 * share * (kb[0] * x[0] * x[0] + kb[1] * x[1] * x[1])
+            bent += stored_by_slip(line, i, x[0], x[1])
             twisted += 0.5 * kb[2] * x[2] * x[2]
         before = after
     return moving + bent + twisted, longer
@@ -114,8 +116,8 @@ def work_of_try(line, ends, contact, velocity, before, state, work, clock):
         done += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock[STORED] + report[FRICTION_WORK]
     if line.moved.shape[0] > 0:
         done += report[OBSTACLE_WORK]
-    if line.law_at.shape[0] > 0:
-        done += report[ROPE_WORK]
+    if loses(line):
+        done += report[LOST_WORK]
     for i in range(work.u.shape[0]):
         for k in range(3):
             done += line.force[i, k] * work.u[i, k]

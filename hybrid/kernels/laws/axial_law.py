@@ -21,7 +21,7 @@ import math
 
 from hybrid.kernels.algebra.rotations import dot, get3, sub
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.report import ROPE_WORK, STRETCH_ENERGY
+from hybrid.kernels.state.report import LOST_WORK, STRETCH_ENERGY
 from hybrid.kernels.state.state import WORKING
 
 # Columns of Line.law: of a cell, its first row in Line.law_table and the row behind its last (equal: tension is a multiple
@@ -234,7 +234,7 @@ def follow_law(line, old, new, work, dt, _):
         slides = (T - mean) / law[i, RELAXATION] * fast * (c - 1.0 / E - 0.5 * fast * b / (E * E))
         law[i, LOSS] += h * slides
     work.report[STRETCH_ENERGY] = energy
-    work.report[ROPE_WORK] = -lost
+    work.report[LOST_WORK] = -lost
     return 0
 
 

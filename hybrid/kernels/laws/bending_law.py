@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import (
+    add,
     cross,
     dot,
     inverse_left_jacobian,
@@ -28,9 +29,10 @@ from hybrid.kernels.algebra.rotations import (
     vec_mat,
 )
 from hybrid.kernels.laws.axial_law import piece_of
+from hybrid.kernels.laws.bending_slip import slip_moment
 from hybrid.kernels.laws.element import bending, damped_bending, relative_rotation, turns_freely
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import BENDING_LAW
+from hybrid.kernels.state.forces import BENDING_LAW, BENDING_SLIP
 
 # Columns of Line.bend_law: of the half cells before and after a node, their first row in Line.bend_table, the row
 # behind their last, and their length (m; 0: there is none); then the give of an angular spring (rad per N m).
@@ -152,6 +154,16 @@ def direction_of_bend(Ra, Rb, kb, k0):
 
 @inner
 def bending_at(line, i, Ra, Rb, kb, k0):
+    """As `element.bending`, of the element at node i, by its table if it has one, and with layers that slip."""
+    M, C = bending_by_table(line, i, Ra, Rb, kb, k0)
+    if line.bits & BENDING_SLIP:
+        m, c = slip_moment(line, i, Ra, Rb, k0)
+        M, C = add(M, m), madd(C, c)
+    return M, C
+
+
+@inner
+def bending_by_table(line, i, Ra, Rb, kb, k0):
     """As `element.bending`, of the element at node i, by its table if it has one."""
     if not has_bend_law(line, i):
         return bending(Ra, Rb, kb, k0)
@@ -163,7 +175,17 @@ def bending_at(line, i, Ra, Rb, kb, k0):
 
 @inner
 def damped_bending_at(line, i, Ra, Rb, kb, k0, tau, wa, wb):
-    """As `element.damped_bending`, likewise: the damping is that of the stiffness without bend."""
+    """As `element.damped_bending`, likewise: the damping is that of the stiffness without bend and without layers."""
+    M, C, Cd, loss = damped_bending_by_table(line, i, Ra, Rb, kb, k0, tau, wa, wb)
+    if line.bits & BENDING_SLIP:
+        m, c = slip_moment(line, i, Ra, Rb, k0)
+        M, C = add(M, m), madd(C, c)
+    return M, C, Cd, loss
+
+
+@inner
+def damped_bending_by_table(line, i, Ra, Rb, kb, k0, tau, wa, wb):
+    """As `element.damped_bending`, likewise."""
     kd = scale(tau, kb)
     if not has_bend_law(line, i):
         return damped_bending(Ra, Rb, kb, kd, k0, wa, wb)

@@ -33,10 +33,22 @@ from hybrid.kernels.algebra.plane import (
 )
 from hybrid.kernels.algebra.rotations import jacobian_functions
 from hybrid.kernels.laws.bending_law import moment_share
+from hybrid.kernels.laws.bending_slip import slip_about_normal
 from hybrid.kernels.laws.loads import body_drag, half_cell_added_mass, half_cell_drag
 from hybrid.kernels.laws.water import current_at
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
+from hybrid.kernels.state.forces import (
+    ADDED_MASS,
+    BENDING_SLIP,
+    BODIES,
+    DRAG,
+    FLOW,
+    FRICTION,
+    MASS_DAMPING,
+    SEABED,
+    SURFACE,
+    WAVES,
+)
 
 REACH = 4  # an equation of node i reaches to node i + 2, two unknowns a node
 BAND = 2 * REACH + 2  # numbers of an equation: its band and its right-hand side
@@ -151,8 +163,11 @@ def first_joint(line, ends, a1, d):
     ghost = end_chord(plane, ends.frame, 0)
     kappa = angle_between(ghost, d)
     share = moment_share(line, 0, abs(kappa - k0))
-    M = share * k * (kappa - k0)
-    C, _ = moment_stiffness(kappa, M, share * (line.kb[0, 0] + line.kb[0, 1] - k), line.kb[0, 2], ghost)
+    M, out = share * k * (kappa - k0), share * (line.kb[0, 0] + line.kb[0, 1] - k)
+    if line.bits & BENDING_SLIP:
+        m, _, more = slip_about_normal(line, a1, 0, d, 0, kappa - k0)
+        M, out = M + m, out + more
+    C, _ = moment_stiffness(kappa, M, out, line.kb[0, 2], ghost)
     return Joint(M, Z2, Z2, mat_vec2(C, (d[1], -d[0])), mat_vec2(C, d), line.kb[0, 2])
 
 
@@ -166,6 +181,9 @@ def joint_after(line, ends, a1, c, d, dn):
     kappa = angle_between(d, dn if c + 1 < n else end_chord(plane, ends.frame, 1))
     share = moment_share(line, c + 1, abs(kappa - k0))
     M, out = share * k * (kappa - k0), share * (line.kb[c + 1, 0] + line.kb[c + 1, 1] - k)
+    if line.bits & BENDING_SLIP:
+        m, _, more = slip_about_normal(line, a1, c, d, c + 1, kappa - k0)
+        M, out = M + m, out + more
     C, CJ = moment_stiffness(kappa, M, out, line.kb[c + 1, 2], d)
     zn, pn = Z2, Z2
     if c + 1 < n:

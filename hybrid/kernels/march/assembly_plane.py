@@ -28,11 +28,12 @@ from hybrid.kernels.algebra.plane import (
 )
 from hybrid.kernels.laws.axial_law import LOSS, SHIFT
 from hybrid.kernels.laws.bending_law import has_bend_law, shares_of_stiffness
+from hybrid.kernels.laws.bending_slip import slip_about_normal
 from hybrid.kernels.laws.cell import Chord
 from hybrid.kernels.laws.end_forces import note_end
 from hybrid.kernels.laws.node_forces_plane import node_loads2
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
+from hybrid.kernels.state.forces import AXIAL_LAW, BENDING_SLIP, ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.state.report import (
     ASSEMBLED,
     MOMENT_A,
@@ -121,6 +122,16 @@ def elastic(line, i, k, bend):
 
 
 @inner
+def moment_in_plane(line, a1, c, d, i, k, bend):
+    """As `elastic`, with layers that slip; a1, c, d: as of `slip_about_normal`."""
+    M, slope = elastic(line, i, k, bend)
+    if line.bits & BENDING_SLIP:
+        m, more, _ = slip_about_normal(line, a1, c, d, i, bend)
+        M, slope = M + m, slope + more
+    return M, slope
+
+
+@inner
 def element_at_start(line, ends, state, cell, report):
     """The element between the start and the first cell."""
     plane = line.plane
@@ -129,7 +140,8 @@ def element_at_start(line, ends, state, cell, report):
         d, tau = cell.chord.d, cell.tau
         k, k0 = stiffness_about_normal(plane, state.a1, 0, d, line.kb, line.k0, 0)
         rate = cell.turn - row_along_normal(plane, ends.spin, 0) if line.bits & STIFFNESS_DAMPING else 0.0
-        M, slope = elastic(line, 0, k, angle_between(end_chord(plane, ends.frame, 0), d) - k0)
+        bend = angle_between(end_chord(plane, ends.frame, 0), d) - k0
+        M, slope = moment_in_plane(line, state.a1, 0, d, 0, k, bend)
         M += k * tau * rate
         A = (slope * cell.g[0] + k * tau * cell.g1[0], slope * cell.g[1] + k * tau * cell.g1[1])
         report[STIFFNESS_DAMPING_POWER] += k * tau * rate * rate
@@ -150,7 +162,7 @@ def element_after(line, ends, state, i, cell, following, report):
         if i + 1 == n:
             after, late = end_chord(plane, ends.frame, 1), cell.tau
             rate = row_along_normal(plane, ends.spin, 1) - cell.turn
-        M, slope = elastic(line, i + 1, k, angle_between(d, after) - k0)
+        M, slope = moment_in_plane(line, state.a1, i, d, i + 1, k, angle_between(d, after) - k0)
         if line.bits & STIFFNESS_DAMPING:
             M += k * late * rate
             report[STIFFNESS_DAMPING_POWER] += k * late * rate * rate

@@ -6,6 +6,7 @@ import math
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, frame, get9, scale, sub
 from hybrid.kernels.laws.bending_law import bending_at, damped_bending_at, energy_share
+from hybrid.kernels.laws.bending_slip import stored_by_slip
 from hybrid.kernels.laws.cell import chord, turning
 from hybrid.kernels.laws.element import strain_of_element
 from hybrid.kernels.laws.tension_torque import couples, rest_strain, stretch_energy
@@ -87,6 +88,7 @@ def observe(line, ends, e, v, a1, w, T, turn, M, strain, energy):
         x = sub(k, k0)
         share = energy_share(line, i, math.sqrt(x[0] * x[0] + x[1] * x[1]))
         energy[1] += 0.5 * share * (kb[0] * x[0] * x[0] + kb[1] * x[1] * x[1])
+        energy[1] += stored_by_slip(line, i, x[0], x[1])
         energy[2] += 0.5 * kb[2] * x[2] * x[2]
         if coupled:
             torque = kb[2] * x[2]

@@ -9,18 +9,18 @@ from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.march.zone_torque import FIRST, LAST
 from hybrid.kernels.state.books import CONTACT, FRICTION, HYSTERESIS, OBSTACLE, RATES, STORED, WORKS
-from hybrid.kernels.state.forces import SELF_CONTACT, TOUCHES
+from hybrid.kernels.state.forces import BENDING_SLIP, SELF_CONTACT, TOUCHES
 from hybrid.kernels.state.report import (
     ADDED_MASS_POWER,
     CONTACT_WORK,
     DRAG_POWER,
     FORCE_A,
     FRICTION_WORK,
+    LOST_WORK,
     MASS_DAMPING_POWER,
     MOMENT_A,
     NET_A,
     OBSTACLE_WORK,
-    ROPE_WORK,
     SEABED_ENERGY,
     SELF_FRICTION_WORK,
     STIFFNESS_DAMPING_POWER,
@@ -68,6 +68,12 @@ def find_powers(line, ends, velocity, state, report, power):
 
 
 @inner
+def loses(line):
+    """Whether stretch or bend of a line may lose work that a step reports: ropes that remember, layers that slip."""
+    return line.law_at.shape[0] > 0 or (line.bits & BENDING_SLIP) != 0
+
+
+@inner
 def book_work(line, dt, report, books):
     """Work, J, of a step of dt: by the mean of its powers; that of the seabed comes by way, not by power."""
     power, work, clock = books.power, books.work, books.clock
@@ -82,8 +88,8 @@ def book_work(line, dt, report, books):
         clock[STORED] = report[SEABED_ENERGY]
     if line.moved.shape[0] > 0:
         work[0, OBSTACLE] += report[OBSTACLE_WORK]
-    if line.law_at.shape[0] > 0:
-        work[0, HYSTERESIS] += report[ROPE_WORK]
+    if loses(line):
+        work[0, HYSTERESIS] += report[LOST_WORK]
     if line.bits & SELF_CONTACT:
         work[0, FRICTION] += report[SELF_FRICTION_WORK]
 

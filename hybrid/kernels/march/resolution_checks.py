@@ -7,6 +7,7 @@ import math
 from hybrid.kernels.algebra.plane import angle_between, chord2, end_chord, row_in_plane, stiffness_about_normal
 from hybrid.kernels.algebra.rotations import frame, get3, get9
 from hybrid.kernels.laws.bending_law import RIGID, moment_share, parts_without_spring
+from hybrid.kernels.laws.bending_slip import slip_about_normal, slip_answer, slips
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import strain_of_element
 from hybrid.kernels.laws.tension_torque import rest_strain
@@ -30,6 +31,10 @@ def strain_of(line, T, i, k, strains):
             b = line.k0[i, 1] + part * (k[1] - line.k0[i, 1])
             strains[i, 0] = math.sqrt(a * a + b * b) / (0.5 * line.h[min(i, line.h.shape[0] - 1)])
     strains[i, 1] = moment_share(line, i, bend) * math.sqrt(x * x + y * y)
+    if slips(line, i):
+        share = moment_share(line, i, bend)
+        mx, my, _, _, _, _ = slip_answer(line, i, k[0] - line.k0[i, 0], k[1] - line.k0[i, 1])
+        strains[i, 1] = math.sqrt((share * x + mx) ** 2 + (share * y + my) ** 2)
     strains[i, 2] = line.kb[i, 2] * (k[2] - rest_strain(line, T, i)[2])
 
 
@@ -52,6 +57,9 @@ def sharpest_in_plane(line, ends, e, T, a1, strains):
             k, k0 = stiffness_about_normal(plane, a1, max(i - 1, 0), before if i > 0 else d, line.kb, line.k0, i)
             share = moment_share(line, i, abs(angle - k0))
             strains[i, 0], strains[i, 1] = x / line.hn[i], share * abs(k * (angle - k0))
+            if slips(line, i):
+                m, _, _ = slip_about_normal(line, a1, max(i - 1, 0), before if i > 0 else d, i, angle - k0)
+                strains[i, 1] = abs(share * k * (angle - k0) + m)
             if i == 0 or i == n:
                 part = parts_without_spring(line, i, abs(angle - k0))[0]
                 if part < RIGID:

@@ -27,6 +27,7 @@ from hybrid.kernels.state.state import (
     no_ends,
     no_torsion,
     remembers,
+    slip_size,
 )
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, OK, STEP, Limits, Task
@@ -71,6 +72,8 @@ def check_turns(line: Line, state: State) -> None:
         )
     if (state.sheave.shape[0] > 0) != bool((line.moved == FREE).any()):
         raise ValueError("a state with angles of sheaves that its line does not have, or without those that it has")
+    if state.layers.size != slip_size(line) * line.s.size:
+        raise ValueError("a state with layers that slip, which its line does not have, or without those that it has")
     if state.wake.shape[0] != line.wake_law.shape[0]:
         raise ValueError(
             f"a state with {state.wake.shape[0]} phases of lift on a line that has {line.wake_law.shape[0]}"

@@ -39,6 +39,7 @@ from hybrid.kernels.junctions.junctions import (
     place_ends,
 )
 from hybrid.kernels.junctions.system_job import DT, PART, TIME, read_system, task_of
+from hybrid.kernels.laws.bending_slip import BEHIND_REST, BEHIND_STEP
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import stored_in_contact
 from hybrid.kernels.machine.compile import inner, kernel
@@ -84,6 +85,7 @@ from hybrid.kernels.step.newton import (
     WHOLE,
     Task,
     ask_contact,
+    end_slip,
     follow_law,
     has_converged,
     most_turn,
@@ -202,6 +204,14 @@ def follow_laws(tables, s):
     for l in range(tables.shape[0]):
         job = read(tables[l])
         follow_law(job.line, job.old, job.new, job.work, s.dt, s.cv, s.ca)
+
+
+@inner
+def end_slips(tables, part):
+    """How far layers of all lines have slipped."""
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        end_slip(job.line, job.ends, job.old, job.new, job.work, part)
 
 
 @inner
@@ -501,6 +511,7 @@ def solve_system(table):
     if task.what == STEP or task.what == EQUILIBRIUM:
         ask_bodies(system, CARRY)
         follow_laws(tables, s)
+        end_slips(tables, BEHIND_STEP if task.what == STEP else BEHIND_REST)
     if task.what == STEP:
         bad, line_of_bad, cell = end_system_step(system, task, s, outcome == OK)
         if bad != OK:

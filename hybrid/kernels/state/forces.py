@@ -34,6 +34,8 @@ TOUCHES = SEABED | OBSTACLES
 BENDING_LAW = 131072
 # Lift of vortices that follow the motion (hybrid.kernels.laws.vortices).
 VORTICES = 262144
+# No force: layers of a section that slip on each other as it bends (hybrid.kernels.laws.bending_slip).
+BENDING_SLIP = 1048576
 
 FORCES = {
     "drag": (DRAG, "velocity, direction; environment.fluid and sections[].drag, or drag_area of modules"),

@@ -30,7 +30,8 @@ The assembly of every iteration clears and writes the first `ASSEMBLED` numbers,
     USED_RHO                  spectral radius at infinity of the step                          -
     NET_A, NET_B              resultant on the node at the start and at the end, 3 numbers     N
     OBSTACLE_WORK             work of obstacles as they move, in the step                      J
-    ROPE_WORK                 work of what ropes that remember a tension lose, in the step     J
+    LOST_WORK                 work of what ropes that remember a tension, and layers that slip,
+                              lose in the step                                                 J
 """
 
 from __future__ import annotations
@@ -52,5 +53,5 @@ STRETCH_ENERGY = 38
 USED_RHO = 39
 NET_A, NET_B = 40, 43
 OBSTACLE_WORK = 46
-ROPE_WORK = 47
+LOST_WORK = 47
 REPORT_SIZE = 48

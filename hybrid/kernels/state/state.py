@@ -42,6 +42,9 @@ WORKING = 5  # the column that says which cells remember their highest mean tens
 NO_TABLE: Floats = np.zeros((0, 3))
 # Of a line whose moments are multiples of curvature (kernels.laws.bending_law has the columns).
 NO_BEND_LAW: Floats = np.zeros((0, 7))
+# Of a line without layers that slip (kernels.laws.bending_slip has the columns).
+NO_SLIP: Floats = np.zeros((0, 3))
+NO_LAYERS: Floats = np.zeros((0, 0))
 # Of a line without vortices (kernels.laws.vortices has the columns).
 NO_WAKE_LAW: Floats = np.zeros((0, 8))
 NO_WAKE: Floats = np.zeros((0, 4))
@@ -53,6 +56,7 @@ NO_OBSTACLES: Floats = np.zeros((0, OBSTACLE))
 NO_CARRIED: Floats = np.zeros((0, CARRIED))
 NO_OBSTACLES_SEEN: Floats = np.zeros((0, 0, SEEN))
 NO_GRIP: Floats = np.zeros((0, 0))
+NO_LAYERS_SEEN: Floats = np.zeros((0, 0, 0))
 NO_SHEAVES: Floats = np.zeros((0, 4))
 NO_ROOM: Floats = np.zeros((0, 0, 0))
 NO_MOVED: NDArray[np.int8] = np.zeros(0, np.int8)
@@ -121,6 +125,11 @@ class Line(NamedTuple):
     bend_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: curvature (1/m), moment (N m), energy per length
     # (N+1, 8) of nodes with vortices (kernels.laws.vortices); empty: there are none
     wake_law: Annotated[Floats, node(columns=8, optional=True)] = NO_WAKE_LAW
+    # (N+1, 3 L) of elements with up to L layers that slip (kernels.laws.bending_slip), and how far they have, written before
+    # every march; empty: there are none
+    slip_law: Annotated[Floats, node(columns=3, optional=True)] = NO_SLIP
+    slip_now: Annotated[Floats, node(columns=3, optional=True)] = NO_SLIP
+    slip_at: NDArray[np.int64] = NO_ADDRESS  # (1,) address of kernels.laws.bending_slip.follow_slip; empty: none
     moved: NDArray[np.int8] = (
         NO_MOVED  # (M,) of all obstacles: 1 where one moves, 2 where one turns freely; empty: none does
     )
@@ -244,13 +253,14 @@ class State(NamedTuple):
     grip: Floats = NO_GRIP
     sheave: Floats = NO_SHEAVES  # (M, 4) of all obstacles where one turns freely (kernels.laws.sheaves); else empty
     peak: Floats = NO_PEAK  # (N,) N, highest mean tension of lines with a section that remembers it; else empty
+    layers: Floats = NO_LAYERS  # (N+1, 2 L) 1/m, how far layers have slipped, of lines with a `slip_law`; else empty
 
     def copy(self) -> State:
         return State(*(x.copy() for x in self))
 
 
 # What only some lines have of a state: of others it is empty, and earlier programs did not keep all of it.
-OPTIONAL_STATE = ("turn", "slow", "wake", "grip", "sheave", "peak")
+OPTIONAL_STATE = ("turn", "slow", "wake", "grip", "sheave", "peak", "layers")
 
 
 class Batch(NamedTuple):
@@ -281,6 +291,7 @@ class Batch(NamedTuple):
     turn: Floats = NO_TURNS  # (nb, K, 3) as `State.turn`
     touch: Floats = NOT_VARYING  # (nb, N+1) N/m, of contact of the line with itself; empty: there is none
     obstacles: Floats = NO_OBSTACLES_SEEN  # (nb, M, SEEN) where they are, and what acts on them; empty: none moves
+    layers: Floats = NO_LAYERS_SEEN  # (nb, N+1, 2 L) as `State.layers`
 
     def line(self, k: int, line: Line) -> Line:
         """The line at output k, from the one of all outputs."""
@@ -305,6 +316,7 @@ def batch_of_one(
         ends.moment[None].copy(), report[None].copy(), work[None].copy(), sea.now[None].copy(), turn=now.turn,
         **{} if touch is None else {"touch": touch[None].copy()},
         **{} if not state.grip.size else {"obstacles": obstacles_now(sea, state)[None]},
+        **{} if not state.layers.size else {"layers": now.layers},
     )  # fmt: skip
 
 
@@ -327,6 +339,7 @@ def state_in(batch: Batch, k: int, line: Line) -> State:
     state = state_for(line)
     state.turn[:] = batch.turn[k] if batch.turn.size else 0.0
     state.slow[:] = batch.T[k] if state.slow.size else 0.0
+    state.layers[:] = batch.layers[k] if batch.layers.size else 0.0
     for name in ("r", "v", "vd", "e", "T", "a1", "w"):
         getattr(state, name)[:] = getattr(batch, name)[k]
     return state
@@ -382,12 +395,12 @@ def no_torsion() -> Torsion:
 
 def blank_state(
     n_cells: int, zones: int = 0, slow: bool = False, wake: bool = False, obstacles: int = 0,
-    sheaves: bool = False, peak: bool = False,
+    sheaves: bool = False, peak: bool = False, layers: int = 0,
 ) -> State:  # fmt: skip
     """A state of zeros with room for `n_cells` cells; zones: those that a torque passes through; slow: mean tensions;
 
     wake: phases of vortices; obstacles: of which one moves; sheaves: one of them turns freely; peak: highest mean
-    tensions.
+    tensions; layers: that slip.
     """
     node, cell = (n_cells + 1, 3), (n_cells, 3)
     z = np.zeros
@@ -411,6 +424,7 @@ def blank_state(
         z((n_cells + 1 if obstacles else 0, 6 * obstacles)),
         z((obstacles if sheaves else 0, 4)),
         z(n_cells if peak else 0),
+        z((n_cells + 1 if layers else 0, 2 * layers)),
     )
 
 
@@ -418,8 +432,14 @@ def state_for(line: Line) -> State:
     """A state of zeros of a line."""
     free, peak = bool((line.moved == FREE).any()), remembers(line)
     return blank_state(
-        line.h.size, len(line.torsion), line.law.size > 0, line.wake_law.size > 0, line.moved.size, free, peak
+        line.h.size, len(line.torsion), line.law.size > 0, line.wake_law.size > 0, line.moved.size, free, peak,
+        slip_size(line) // 2,
     )  # fmt: skip
+
+
+def slip_size(line: Line) -> int:
+    """Numbers of a node in `State.layers` of a line."""
+    return 2 * line.slip_law.size // (3 * line.s.size)
 
 
 def remembers(line: Line) -> bool:

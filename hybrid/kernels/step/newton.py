@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from hybrid.kernels.algebra.block_elimination import substitute
 from hybrid.kernels.algebra.block_elimination_plane import substitute_planar
+from hybrid.kernels.laws.bending_slip import BEHIND_REST, BEHIND_STEP, IN_MOTION, LOADED_FIRST
 from hybrid.kernels.laws.sheaves import roll_on, turn_with
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.machine.references import caller, caller_of_six
@@ -86,6 +87,7 @@ LARGEST_TURN = 0.7
 
 call_torque = caller_of_six(0)
 call_law = caller_of_six(0)
+call_slip = caller_of_six(0)
 # ca, 1/s2, of a solve for accelerations is larger (solve.stepper.HEAVY): mean tensions stay as they are.
 AT_REST = 1e30
 
@@ -105,6 +107,21 @@ def follow_law(line, old, new, work, dt, cv, ca):
         if not dt > 0.0 and not (cv == 0.0 and ca < AT_REST):
             dt = -1.0
         call_law(line.law_at[0], line, old, new, work, dt, ca)
+
+
+@inner
+def begin_slip(line, ends, old, new, work, dt, cv, ca):
+    """Before a march: how far layers have slipped that slip on each other (kernels.laws.bending_slip), if there are any."""
+    if line.slip_at.shape[0] != 0:
+        part = IN_MOTION if dt > 0.0 or cv != 0.0 or ca >= AT_REST else LOADED_FIRST
+        call_slip(line.slip_at[0], line, ends, old, new, work, part)
+
+
+@inner
+def end_slip(line, ends, old, new, work, part):
+    """How far they have slipped after a step (BEHIND_STEP), in an equilibrium (BEHIND_REST)."""
+    if line.slip_at.shape[0] != 0:
+        call_slip(line.slip_at[0], line, ends, old, new, work, part)
 
 
 @inner
@@ -213,6 +230,7 @@ def solve(
         bad, good = -1, True
         pass_torque(space, line, ends, new, work, BEFORE_MARCH, cv)
         follow_law(line, old, new, work, task.dt, cv, ca)
+        begin_slip(line, ends, old, new, work, task.dt, cv, ca)
         if reel != 0:
             call_reel(reel, reel_table)
         if space is not None:
@@ -272,6 +290,8 @@ def solve(
         find_rates(space, line, sea, old, new, work.u, s)
     if task.what != ASSEMBLY:
         follow_law(line, old, new, work, task.dt, cv, ca)
+    if task.what == STEP or task.what == EQUILIBRIUM:
+        end_slip(line, ends, old, new, work, BEHIND_STEP if task.what == STEP else BEHIND_REST)
     pass_torque(space, line, ends, new, work, AFTER_STEP, cv)
     if task.what == STEP:
         if outcome == OK:

@@ -319,6 +319,10 @@ def sample_state(line, sea, old, new, books, where, row):
     if line.moved.shape[0] > 0:
         sample_obstacles(sea, old, new, t, x, row, at)
         at += SEEN * line.moved.shape[0]
+    for i in range(new.layers.shape[0]):
+        for j in range(new.layers.shape[1]):
+            row[at + j] = x * new.layers[i, j] + (1.0 - x) * old.layers[i, j]
+        at += new.layers.shape[1]
     sample_model_error(books.model_error, x, row, at)
 
 

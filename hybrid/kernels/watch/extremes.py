@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.algebra.rotations import add, cross, dot, frame, get3, get9, scale, sub
+from hybrid.kernels.algebra.rotations import add, cross, dot, frame, get3, get9, log_rotation, scale, sub
 from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.laws.bending_law import (
     RIGID,
@@ -23,7 +23,9 @@ from hybrid.kernels.laws.bending_law import (
     has_bend_law,
     parts_without_spring,
 )
+from hybrid.kernels.laws.bending_slip import frames_at, slips
 from hybrid.kernels.laws.cell import chord, turning
+from hybrid.kernels.laws.element import relative_rotation
 from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST, at_hinge, depth_of, fade, left_of, stiffness_share
 from hybrid.kernels.laws.obstacle_grip import pressure_of_obstacles
 from hybrid.kernels.laws.seabed import pressure
@@ -339,6 +341,14 @@ def put_layers_back(line, ends, state, books):
 
 
 @inner
+def cell_bend(line, ends, state, j):
+    """Curvature of the element at node j, 1/m."""
+    Ra, Rb = frames_at(line, ends, state, j)
+    k = log_rotation(relative_rotation(Ra, Rb))
+    return math.sqrt(k[0] * k[0] + k[1] * k[1]) / line.hn[j]
+
+
+@inner
 def at_rod_end(line, ends, state, i, side, passed):
     """Curvature, moment and torque at node i, where the rod on its side (-1, 1) ends without element."""
     n, cell = line.h.shape[0], i - 1 if side < 0 else i
@@ -353,7 +363,9 @@ def at_rod_end(line, ends, state, i, side, passed):
     if line.element[j]:
         curvature = math.sqrt(line.k0[j, 0] ** 2 + line.k0[j, 1] ** 2) / line.hn[j]
         stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
-        if has_bend_law(line, j):
+        if slips(line, j):  # what a moment bends depends on the way
+            curvature = cell_bend(line, ends, state, j)
+        elif has_bend_law(line, j):
             curvature += curvature_under(line, j, -side, moment)
         elif stiffness > 0.0:
             curvature += moment / stiffness
@@ -390,6 +402,8 @@ def note_rod_end(line, ends, state, books, i, passed, t):
 @inner
 def beside_seam(line, books, i, j):
     """Curvature at the element of node i, where sections meet, on the side of its neighbour j."""
+    if slips(line, i):
+        return books.strains[i, 0]
     if has_bend_law(line, i):
         return curvature_under(line, i, j - i, books.strains[i, 1])
     own = min(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]

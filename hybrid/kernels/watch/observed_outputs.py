@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import cross, dot, get3
+from hybrid.kernels.laws.bending_slip import EACH, FROM, KEPT
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.machine.binding import Series
 from hybrid.kernels.machine.compile import kernel
@@ -93,6 +94,14 @@ def observe_outputs(tables):
                 before = d
 
 
+def slipped(line: Line, batch: Batch) -> Floats:
+    """`slip_now` (nb, N+1, 3 L) of outputs: their layers bear what they have."""
+    out = np.full((batch.t.size, *line.slip_now.shape), np.inf)
+    for k in range(KEPT):
+        out[:, :, FROM + k :: EACH] = batch.layers[:, :, k::KEPT]
+    return out
+
+
 def observed(
     line: Line, batch: Batch, varied: Mapping[str, Floats] = MappingProxyType({})
 ) -> tuple[Floats, Floats, Floats, Floats]:
@@ -112,6 +121,8 @@ def observed(
         state["turn"] = batch.turn
     held = Ends(batch.held, batch.position, batch.frame, batch.spin, batch.force, batch.moment)
     of_line = {"line.h": batch.h, "line.kb": batch.kb} if batch.h.size else {}
+    if line.slip_law.size:
+        varied = {**varied, "slip_now": slipped(line, batch)}
     of_line |= {f"line.{name}": x for name, x in varied.items()}
     there = batch.line(0, line)._replace(**{name: x[0] for name, x in varied.items()})
     first = Output(

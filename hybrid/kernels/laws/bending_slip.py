@@ -1,0 +1,181 @@
+"""Layers of a section that slip on each other: moment over curvature with hysteresis, parallel Jenkins elements.
+
+    symbol   meaning                                                                          unit   frame
+    x        bend of an element from what has no stress, two components                       rad    Ra
+    hn       length that the element stands for                                               m
+    K        stiffness that a layer adds while it sticks (Line.slip_law)                      N m2
+    p        curvature to which it has slipped: there it has no moment (State.layers)         1/m    Ra
+    m        its moment, K (x/hn - p), of no more than `most` in size                         N m    Ra
+    most     its slip moment, m0 + mT max(T, 0), T of the start of the step                   N m
+
+A step maps x to m by radial return: m = most t/|t| where t = K (x/hn - p) is more than `most`, which has the exact
+derivative K/hn most/|t| (1 - t t^T/|t|^2); then p moves by (t - m)/K.  At rest p = 0: the curve of a first loading.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.plane import row_along_normal, to_space
+from hybrid.kernels.algebra.rotations import (
+    d_double_cross,
+    dot,
+    frame,
+    get3,
+    get9,
+    hat,
+    inverse_left_jacobian,
+    jacobian_functions,
+    log_rotation,
+    madd,
+    mat_mat,
+    mat_matT,
+    mat_vec,
+    mscale,
+    msub,
+    vec_mat,
+)
+from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.element import relative_rotation
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.state.forces import BENDING_SLIP
+from hybrid.kernels.state.report import LOST_WORK
+
+# Columns of Line.slip_law, EACH of a layer: K, N m2; m0, N m; mT, m.  K = 0: there is none (as behind the last).
+STIFFNESS, MOMENT, PER_TENSION, EACH = range(4)
+# Columns of Line.slip_now, EACH of a layer: p at the start of the step, 1/m; `most`, N m.  State.layers has KEPT of them.
+FROM, MOST, KEPT = 0, 2, 2
+# What `follow_slip` is asked for: before a march, in motion or at rest; behind a step, an equilibrium.
+IN_MOTION, LOADED_FIRST, BEHIND_STEP, BEHIND_REST = range(4)
+
+
+@inner
+def slips(line, i):
+    """Whether the element at node i has layers that slip."""
+    return (line.bits & BENDING_SLIP) != 0 and line.slip_law[i, STIFFNESS] > 0.0
+
+
+@inner
+def trial(line, i, j, x, y):
+    """Of layer j (its first column) of the element at node i under the bend x, y: moment as if it stuck, its size, and
+
+    the part of it that is left.
+    """
+    K, one = line.slip_law[i, j + STIFFNESS], 1.0 / line.hn[i]
+    a, b = K * (x * one - line.slip_now[i, j + FROM]), K * (y * one - line.slip_now[i, j + FROM + 1])
+    size, most = math.sqrt(a * a + b * b), line.slip_now[i, j + MOST]
+    return a, b, size, most / size if size > most else 1.0
+
+
+@kernel
+def slip_answer(line, i, x, y):
+    """Moment of the layers of the element at node i under the bend (x, y), its derivatives (11, 12, 22), N m/rad, and
+
+    the energy that they store, J.
+    """
+    mx, my, c11, c12, c22, stored = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(0, line.slip_law.shape[1], EACH):
+        K = line.slip_law[i, j + STIFFNESS]
+        if not K > 0.0:
+            break
+        a, b, size, part = trial(line, i, j, x, y)
+        mx, my = mx + part * a, my + part * b
+        c = K / line.hn[i] * part
+        c11, c22 = c11 + c, c22 + c
+        if part < 1.0:
+            c /= size * size
+            c11, c12, c22 = c11 - c * a * a, c12 - c * a * b, c22 - c * b * b
+        stored += 0.5 * line.hn[i] * (part * size) ** 2 / K
+    return mx, my, c11, c12, c22, stored
+
+
+@kernel
+def slip_moment(line, i, Ra, Rb, k0):
+    """What layers add to M and C of `element.bending`, of the element at node i; nothing of one without."""
+    if not line.slip_law[i, STIFFNESS] > 0.0:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    k = log_rotation(relative_rotation(Ra, Rb))
+    mx, my, c11, c12, c22, _ = slip_answer(line, i, k[0] - k0[0], k[1] - k0[1])
+    n = (mx, my, 0.0)
+    g, g1 = jacobian_functions(dot(k, k))
+    P = inverse_left_jacobian(k, g)
+    D = msub(d_double_cross(k, n, g, g1), mscale(0.5, hat(n)))
+    PT = (P[0], P[3], P[6], P[1], P[4], P[7], P[2], P[5], P[8])
+    C = mat_mat(madd(D, mat_mat(PT, (c11, c12, 0.0, c12, c22, 0.0, 0.0, 0.0, 0.0))), P)
+    return mat_vec(Ra, vec_mat(n, P)), mat_matT(mat_mat(Ra, C), Ra)
+
+
+@kernel
+def slip_about_normal(line, a1, c, d, i, bend):
+    """Of layers of the element at node i of a line in a plane, whose sections lie as in cell c with chord d: moment about
+
+    the normal under a bend (rad) about it, its slope, and the stiffness about the other axis.
+    """
+    if not line.slip_law[i, STIFFNESS] > 0.0:
+        return 0.0, 0.0, 0.0
+    m = to_space(line.plane, (-d[1], d[0]))
+    x, y = row_along_normal(line.plane, a1, c), a1[c, 0] * m[0] + a1[c, 1] * m[1] + a1[c, 2] * m[2]
+    mx, my, c11, c12, c22, _ = slip_answer(line, i, bend * x, bend * y)
+    slope = c11 * x * x + 2.0 * c12 * x * y + c22 * y * y
+    return mx * x + my * y, slope, c11 + c22 - slope
+
+
+@inner
+def stored_by_slip(line, i, x, y):
+    """Energy, J, that the layers of the element at node i store under the bend x, y (rad)."""
+    return slip_answer(line, i, x, y)[5] if slips(line, i) else 0.0
+
+
+@inner
+def frames_at(line, ends, state, i):
+    """Frames before and after node i."""
+    n = state.T.shape[0]
+    Ra, Rb = get9(ends.frame, 0), get9(ends.frame, 1)
+    if i > 0:
+        d, _, _ = chord(get3(state.e, i - 1))
+        Ra = frame(get3(state.a1, i - 1), d)
+    if i < n:
+        d, _, _ = chord(get3(state.e, i))
+        Rb = frame(get3(state.a1, i), d)
+    return Ra, Rb
+
+
+@inner
+def pull_at(state, i):
+    """Tension at node i, N, on average of the cells beside it, and not below 0."""
+    n = state.T.shape[0]
+    return max(0.5 * (state.T[max(i - 1, 0)] + state.T[min(i, n - 1)]), 0.0)
+
+
+@kernel
+def follow_slip(line, ends, old, new, work, part):
+    """IN_MOTION, LOADED_FIRST: how far layers have slipped before, and what they bear, for the march.
+
+    BEHIND_STEP, BEHIND_REST: how far they have slipped now, into new.layers, and the work that this has lost.
+    """
+    law, now, lost = line.slip_law, line.slip_now, 0.0
+    after = part >= BEHIND_STEP
+    for i in range(law.shape[0]):
+        x, y = 0.0, 0.0
+        if after and law[i, STIFFNESS] > 0.0 and line.element[i]:
+            Ra, Rb = frames_at(line, ends, new, i)
+            k = log_rotation(relative_rotation(Ra, Rb))
+            x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
+        for j in range(0, law.shape[1], EACH):
+            K, at = law[i, j + STIFFNESS], j // EACH * KEPT
+            if not K > 0.0:
+                break
+            if not after:
+                rest = part == LOADED_FIRST
+                for m in range(KEPT):
+                    now[i, j + FROM + m] = 0.0 if rest else old.layers[i, at + m]
+                T = pull_at(new, i) if rest else pull_at(old, i)
+                now[i, j + MOST] = law[i, j + MOMENT] + law[i, j + PER_TENSION] * T
+                continue
+            a, b, _, left = trial(line, i, j, x, y)
+            p, q = (1.0 - left) * a / K, (1.0 - left) * b / K
+            new.layers[i, at], new.layers[i, at + 1] = now[i, j + FROM] + p, now[i, j + FROM + 1] + q
+            lost += line.hn[i] * left * (a * p + b * q)
+    if part == BEHIND_STEP:
+        work.report[LOST_WORK] = (work.report[LOST_WORK] if line.law_at.shape[0] > 0 else 0.0) - lost
+    return 0

@@ -1,0 +1,34 @@
+"""Layers that slip on each other as a line bends: of the elements of a line on its cells."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.laws.bending_slip import EACH, follow_slip
+from hybrid.kernels.state.state import Line, blank_line, no_ends, no_work, state_for
+from hybrid.model.material import Material
+
+
+def with_slip(line: Line, material: Material, of: NDArray[np.int64]) -> Line:
+    """The line, whose cells are of pieces `of` (N,) of a material with layers, with these.
+
+    An element between layers of two kinds has one curvature, and of each as much as its half of the length.
+    """
+    layers = material.layers
+    number = [layers.index(x) for x in layers]
+    kind = np.array(number)[of]
+    rows = []
+    for i, has_element in enumerate(line.element):
+        sides = [c for c in (i - 1, i) if 0 <= c < line.h.size] if has_element else []
+        length = sum(0.5 * line.h[c] for c in sides)
+        parts = {kind[c]: sum(0.5 * line.h[k] for k in sides if kind[k] == kind[c]) / length for c in sides}
+        rows.append([x * part for k, part in parts.items() for layer in layers[k] for x in layer])
+    law = np.zeros((line.s.size, max(EACH, *map(len, rows))))
+    for i, row in enumerate(rows):
+        law[i, : len(row)] = row
+    found = line._replace(slip_law=law, slip_now=np.zeros_like(law))
+    blank = blank_line(1)._replace(slip_law=law[:2].copy(), slip_now=law[:2].copy())
+    state = state_for(blank)
+    address = follow_slip.address(blank, no_ends(), state, state, no_work(), 0)
+    return found._replace(slip_at=np.array([address], np.int64))
