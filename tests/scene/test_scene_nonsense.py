@@ -71,7 +71,8 @@ STIFFENERS = """\
 cable:
   sections:
     - {length: 6.0, mass: 1.0, bending_stiffness: 2.0}
-    - {length: 4.0, mass: 1.0, moment_curvature: [[0, 0], [0.1, 0.5], [0.5, 1.0]]}
+    - {length: 4.0, mass: 1.0, moment_curvature: [[0, 0], [0.1, 0.5], [0.5, 1.0]], first_loading: true}
+    - {length: 2.0, mass: 1.0, bending_stiffness: 2.0, bending_slip: [{stiffness: 3.0, moment: 0.4, per_tension: 0.01}]}
   attachments:
     - {kind: bend_stiffener, range: [0.0, 2.0], diameters: [0.4, 0.2], bore: 0.15, modulus: 7.0e+7, density: 1150.0}
     - {kind: bend_stiffener, range: [7.0, 10.0], added_stiffness: [[0.0, 10.0], [3.0, 50.0]]}
@@ -244,6 +245,7 @@ def _harmless(path: tuple[str | int, ...], nonsense: Any) -> bool:
         "swivel": (True,),
         "criteria": (True,),
         "always_move": (True,),
+        "first_loading": (True,),
         "errors": (True,),
         "self": (True,),
         "from_outside": (True,),
@@ -301,6 +303,7 @@ SIGNED |= {
     "tension_torque",
     "criteria",
     "always_move",
+    "first_loading",
     "errors",
     "self",
     "from_outside",
