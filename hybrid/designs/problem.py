@@ -145,9 +145,9 @@ class Problem(NamedTuple):
         return MOVING if self.moves else AT_REST
 
     def refresh(self, point: Point) -> bool:
-        """Take slopes of motions anew in cases that a limit is near in, or what is minimised speaks of; False: they are
+        """Take slopes of motions anew, in cases with a limit that is near and in those of what is minimised.
 
-        differences of runs already.
+        False: they are differences of runs already.
         """
         spoken = self.objective.rows if self.objective is not None else []
         near = [c.case for c in self.constraints if (point.values[c.row] - c.bound) * c.side >= -NEAR * c.scale]

@@ -382,9 +382,9 @@ def mesh_is_free(scene: Scene) -> bool:
 
 
 def wants_survey(scene: Scene) -> bool:
-    """Whether a coarse run comes first that shows where cells should be short; where they follow the curvature, base
+    """Whether a coarse run comes first that shows where cells should be short.
 
-    cells of which a scene gives the number to a layer.
+    Where cells follow the curvature it is for their base, and comes if the scene gives a number of cells to a layer.
     """
     wanted = requested_accuracy(scene) is not None and not follows_curvature(scene)
     return mesh_is_free(scene) and (wanted or scene.resolution is not None)

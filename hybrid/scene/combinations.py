@@ -279,12 +279,15 @@ def _springs_beside_slip(tables: Tables) -> Iterator[Place]:
     for name, of in (("start", 0), ("end", -1)) if cable is not None else ():
         if not cable.sections[of].slip_layers:  # type: ignore[union-attr]
             continue
-        for key, table in (("ends", ends.named() if ends is not None else {}), ("connections", vars_of(tables))):
+        for key, table in (
+            ("ends", ends.named() if ends is not None else {}),
+            ("connections", _connections_of(tables)),
+        ):
             if getattr(table.get(name), "bend_stiffness", None) is not None:
                 yield key, name, "bend_stiffness"
 
 
-def vars_of(tables: Tables) -> dict[str, Any]:
+def _connections_of(tables: Tables) -> dict[str, Any]:
     """How the ends of a line of several are connected."""
     held = tables.get("connections")
     return {name: getattr(held, name) for name in ("start", "end")} if held is not None else {}

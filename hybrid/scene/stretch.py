@@ -172,9 +172,9 @@ class SlipLayer(Table):
 
 
 def layers_of(rows: Curve) -> tuple[tuple[float, float, float], ...]:
-    """Stiffness, slip moment and 0 of the layers whose first loading is a table of moment (N m) over curvature (1/m),
+    """Layers whose first loading is a table of moment (N m) over curvature (1/m): stiffness, slip moment and 0 of each.
 
-    less what its last piece has from straight on (Masing).
+    What the last piece of the table has from straight on is no part of them (Masing).
     """
     return tuple((a - b, (a - b) * x, 0.0) for (a, b), (x, _) in zip(pairwise(slopes(rows)), rows[1:], strict=False))
 

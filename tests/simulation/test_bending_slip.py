@@ -93,9 +93,9 @@ def test_cycles_follow_masings_rule(section: Any, table: Any, most: float, dimen
 
 
 def test_two_axes_are_those_of_rates_and_of_returns_integrated_otherwise() -> None:
-    """A small moment that goes round: curvature (2) against rates, with order 1 in the step, and against small steps of
+    """A small moment that goes round: curvature (2) against rates, with order 1 in the step.
 
-    its own that return in closed form.
+    It is held against small steps of its own, too, that return in closed form.
     """
     most, slip, over, turns = 12.0, 0.01 * SLIP, 10.0, 1.5
 

@@ -20,9 +20,6 @@ from hybrid.kernels.algebra.plane import row_along_normal, to_space
 from hybrid.kernels.algebra.rotations import (
     d_double_cross,
     dot,
-    frame,
-    get3,
-    get9,
     hat,
     inverse_left_jacobian,
     jacobian_functions,
@@ -35,8 +32,7 @@ from hybrid.kernels.algebra.rotations import (
     msub,
     vec_mat,
 )
-from hybrid.kernels.laws.cell import chord
-from hybrid.kernels.laws.element import relative_rotation
+from hybrid.kernels.laws.element import frames_at, relative_rotation
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import BENDING_SLIP
 from hybrid.kernels.state.report import LOST_WORK
@@ -57,10 +53,8 @@ def slips(line, i):
 
 @inner
 def trial(line, i, j, x, y):
-    """Of layer j (its first column) of the element at node i under the bend x, y: moment as if it stuck, its size, and
-
-    the part of it that is left.
-    """
+    """Moment of layer j (its first column) at node i under the bend x, y, as if it stuck: two components, its size, and
+    the part that is left."""
     K, one = line.slip_law[i, j + STIFFNESS], 1.0 / line.hn[i]
     a, b = K * (x * one - line.slip_now[i, j + FROM]), K * (y * one - line.slip_now[i, j + FROM + 1])
     size, most = math.sqrt(a * a + b * b), line.slip_now[i, j + MOST]
@@ -69,9 +63,9 @@ def trial(line, i, j, x, y):
 
 @kernel
 def slip_answer(line, i, x, y):
-    """Moment of the layers of the element at node i under the bend (x, y), its derivatives (11, 12, 22), N m/rad, and
+    """Of the layers of the element at node i under the bend x, y (rad).
 
-    the energy that they store, J.
+    Moment, N m, in two components; its derivatives 11, 12, 22, N m/rad; the energy that they store, J.
     """
     mx, my, c11, c12, c22, stored = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(0, line.slip_law.shape[1], EACH):
@@ -107,9 +101,9 @@ def slip_moment(line, i, Ra, Rb, k0):
 
 @kernel
 def slip_about_normal(line, a1, c, d, i, bend):
-    """Of layers of the element at node i of a line in a plane, whose sections lie as in cell c with chord d: moment about
+    """Of layers of the element at node i of a line in a plane, whose sections lie as in cell c with chord d.
 
-    the normal under a bend (rad) about it, its slope, and the stiffness about the other axis.
+    Moment, N m, about the normal under a bend (rad) about it, its slope, and the stiffness about the other axis, N m/rad.
     """
     if not line.slip_law[i, STIFFNESS] > 0.0:
         return 0.0, 0.0, 0.0
@@ -124,20 +118,6 @@ def slip_about_normal(line, a1, c, d, i, bend):
 def stored_by_slip(line, i, x, y):
     """Energy, J, that the layers of the element at node i store under the bend x, y (rad)."""
     return slip_answer(line, i, x, y)[5] if slips(line, i) else 0.0
-
-
-@inner
-def frames_at(line, ends, state, i):
-    """Frames before and after node i."""
-    n = state.T.shape[0]
-    Ra, Rb = get9(ends.frame, 0), get9(ends.frame, 1)
-    if i > 0:
-        d, _, _ = chord(get3(state.e, i - 1))
-        Ra = frame(get3(state.a1, i - 1), d)
-    if i < n:
-        d, _, _ = chord(get3(state.e, i))
-        Rb = frame(get3(state.a1, i), d)
-    return Ra, Rb
 
 
 @inner

@@ -26,6 +26,9 @@ from hybrid.kernels.algebra.rotations import (
     cross,
     d_double_cross,
     dot,
+    frame,
+    get3,
+    get9,
     hat,
     inverse_left_jacobian,
     jacobian_functions,
@@ -43,6 +46,7 @@ from hybrid.kernels.algebra.rotations import (
     sub,
     vec_mat,
 )
+from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.machine.compile import inner
 
 # Stiffness of an angular spring of none, as a part of that of half a cell: nothing, but a number.
@@ -60,6 +64,20 @@ def put_spring(spring, line, node):
     for k in range(2):
         line.kb[node, k] = 1.0 / (1.0 / line.kb[node, k] + 1.0 / spring)
     line.hn[node] *= rigid / (0.5 * (line.kb[node, 0] + line.kb[node, 1]))
+
+
+@inner
+def frames_at(line, ends, state, i):
+    """Frames before and after node i: of the cells there, or of an end."""
+    n = line.h.shape[0]
+    Ra, Rb = get9(ends.frame, 0), get9(ends.frame, 1)
+    if i > 0:
+        d, _, _ = chord(get3(state.e, i - 1))
+        Ra = frame(get3(state.a1, i - 1), d)
+    if i < n:
+        d, _, _ = chord(get3(state.e, i))
+        Rb = frame(get3(state.a1, i), d)
+    return Ra, Rb
 
 
 @inner

@@ -294,9 +294,9 @@ def depth_before(rows, carried, k, r, i):
 
 @inner
 def stored_along(line, sea, r, c, before):
-    """Energy per length (J/m) that the bed and obstacles have stored against cell c; before: whether r, and what moves,
+    """Energy per length (J/m) that the bed and obstacles have stored against cell c.
 
-    are those before the step.
+    before: whether r, and what moves, are those before the step.
     """
     energy, moves = 0.0, line.moved.shape[0] > 0
     if line.bits & SEABED:

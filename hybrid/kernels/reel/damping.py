@@ -23,9 +23,7 @@ from hybrid.kernels.algebra.rotations import (
     add,
     cross,
     dot,
-    frame,
     get3,
-    get9,
     inverse_left_jacobian,
     jacobian_functions,
     log_rotation,
@@ -35,7 +33,7 @@ from hybrid.kernels.algebra.rotations import (
     vec_mat,
 )
 from hybrid.kernels.laws.cell import chord, turning
-from hybrid.kernels.laws.element import relative_rotation
+from hybrid.kernels.laws.element import frames_at, relative_rotation
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.mesh.fill_line import FIRST, PER_LENGTH
 from hybrid.kernels.reel.paid_length import cell, growing, lack_rate, node
@@ -104,20 +102,6 @@ def flow_of_cell(line, state, reel, k, t):
 
 
 # --- bend -----------------------------------------------------------------------------------------
-
-
-@inner
-def frames_at(line, ends, state, i):
-    """Frames before and after node i of the line."""
-    n = line.h.shape[0]
-    a, b = get9(ends.frame, 0), get9(ends.frame, 1)
-    if i > 0:
-        d, _, _ = chord(get3(state.e, i - 1))
-        a = frame(get3(state.a1, i - 1), d)
-    if i < n:
-        d, _, _ = chord(get3(state.e, i))
-        b = frame(get3(state.a1, i), d)
-    return a, b
 
 
 @inner

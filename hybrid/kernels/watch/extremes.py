@@ -23,9 +23,9 @@ from hybrid.kernels.laws.bending_law import (
     has_bend_law,
     parts_without_spring,
 )
-from hybrid.kernels.laws.bending_slip import frames_at, slips
+from hybrid.kernels.laws.bending_slip import slips
 from hybrid.kernels.laws.cell import chord, turning
-from hybrid.kernels.laws.element import relative_rotation
+from hybrid.kernels.laws.element import frames_at, relative_rotation
 from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST, at_hinge, depth_of, fade, left_of, stiffness_share
 from hybrid.kernels.laws.obstacle_grip import pressure_of_obstacles
 from hybrid.kernels.laws.seabed import pressure
