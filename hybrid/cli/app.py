@@ -114,7 +114,9 @@ def hybrid_(
     context: typer.Context, version: Annotated[bool, flag("--version", help="Print the version.")] = False
 ) -> None:
     if version:
-        print(f"hybrid {hybrid.__version__}")
+        from hybrid.kernels.machine.cache import code_in_use
+
+        print(f"hybrid {hybrid.__version__}\nmachine code: {code_in_use()}")
         raise typer.Exit
     if context.invoked_subcommand is None:
         print(context.get_help())

@@ -117,11 +117,14 @@ def test_python_runs_the_package_as_the_command(
     monkeypatch.setattr(sys, "argv", ["hybrid", "--version"])
     with pytest.raises(SystemExit) as left:
         runpy.run_module("hybrid", run_name="__main__")
-    assert not left.value.code and capsys.readouterr().out == f"hybrid {hybrid.__version__}\n"
+    assert not left.value.code and capsys.readouterr().out.startswith(f"hybrid {hybrid.__version__}\n")
 
 
 def test_version_and_help() -> None:
-    assert call("--version")[0] == f"hybrid {hybrid.__version__}\n"
+    named, code = call("--version")[0].splitlines()
+    assert named == f"hybrid {hybrid.__version__}" and code.startswith(
+        "machine code: compiled once for this processor; "
+    )
     assert call()[0] == call("-h")[0]
     for line in ("Compute the motion of a cable", "Exit codes: 0 done"):
         assert line in call("--help")[0]

@@ -111,18 +111,49 @@ def test_a_copy_elsewhere_compiles_nothing_and_an_edit_in_another_file_anew(
 
 
 @pytest.mark.slow
-def test_code_that_comes_with_the_package_is_all_that_a_first_run_needs(copy: Path, tmp_path: Path) -> None:
-    """A copy of the package with machine code for x86-64-v3, as a release has it, and an empty cache: the suspension
-    compiles nothing, and its numbers are those of code made for this processor."""
+def test_the_first_scene_from_a_wheel_compiles_nothing(tmp_path: Path) -> None:
+    """A wheel with machine code, in an environment of its own, with an empty cache and a compiler that raises an error:
+
+    the suspension has the numbers of code made for this processor.
+    """
     if not {f"+{x}" for x in LEVELS[0].features} <= set(processor().features.split(",")):
         pytest.skip("this processor has no AVX2")
-    ship = [sys.executable, str(Path(__file__).parents[1] / "ship_kernels.py"), "--few"]
-    subprocess.run(ship, env=os.environ | {"PYTHONPATH": str(copy)}, check=True, stdout=subprocess.DEVNULL)
-    scene = Path(__file__).parents[2] / "examples" / "02_suspension.yaml"
-    script = "import sys, hybrid; hybrid.run(hybrid.load_scene(sys.argv[1]), sys.argv[2]).close(); print(0)"
-    answer(copy, script, str(scene), str(tmp_path / "shipped.h5"))
-    assert not compiled(copy)
-    shutil.rmtree(copy / "hybrid" / "kernels" / "compiled")
+    source, root = tmp_path / "source", Path(__file__).parents[2]
+    unwanted = shutil.ignore_patterns("__pycache__", "compiled")
+    for name in ("hybrid", "examples", "release"):
+        shutil.copytree(root / name, source / name, ignore=unwanted)
+    for name in ("pyproject.toml", "hatch_build.py", "README.md", "LICENSE"):
+        shutil.copy(root / name, source)
+    kept = os.environ.get("HYBRID_CACHE_DIR", str(tmp_path / "kept"))  # compiled once for all runs of this test
+    build = [sys.executable, str(source / "release" / "build_wheel.py"), "--few", "--cache", kept]
+    subprocess.run([*build, "--output", str(tmp_path)], check=True, stdout=subprocess.DEVNULL)
+    (wheel,) = tmp_path.glob("*.whl")
+    assert wheel.name.split("-")[2] == f"cp{sys.version_info[0]}{sys.version_info[1]}"
+
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(tmp_path / "venv")], check=True)
+    python = tmp_path / "venv" / ("Scripts" if os.name == "nt" else "bin") / "python"
+    where = [str(python), "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"]
+    site = Path(subprocess.run(where, check=True, capture_output=True, text=True).stdout.strip())
+    (site / "dependencies.pth").write_text(f"{Path(np.__file__).parents[1]}\n")  # instead of downloads
+    install = [sys.executable, "-m", "pip", "--python", str(python), "install", "-q", "--no-deps", str(wheel)]
+    subprocess.run(install, check=True)
+    scene = root / "examples" / "02_suspension.yaml"
+    script = (
+        "import sys, hybrid; from hybrid.kernels.machine.kept_code import KeptCode\n"
+        "assert hybrid.__file__.startswith(sys.prefix), hybrid.__file__\n"
+        "def fail(*_): raise AssertionError('a kernel is compiled')\n"
+        "KeptCode._compiled = fail; sys.modules['numba'] = None\n"
+        "hybrid.run(hybrid.load_scene(sys.argv[1]), sys.argv[2], progress=False).close()"
+    )
+    environment = os.environ | {"HYBRID_CACHE_DIR": str(tmp_path / "empty"), "PYTHONPATH": ""}
+    command = [str(python), "-W", "error", "-c", script, str(scene), str(tmp_path / "shipped.h5")]
+    subprocess.run(command, env=environment, check=True, cwd=tmp_path)
+    told = subprocess.run(
+        [str(python), "-m", "hybrid", "--version"], env=environment, check=True, capture_output=True, text=True
+    ).stdout
+    assert "machine code: of the package, for x86-64-v3" in told
+    assert not list((tmp_path / "empty").rglob("*.kernel"))
+
     result = hybrid.run(hybrid.load_scene(scene), tmp_path / "own.h5", progress=False)
     with hybrid.open(tmp_path / "shipped.h5") as shipped:
         if "+avx512f" in processor().features:  # native code may sum in another order there

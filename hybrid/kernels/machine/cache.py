@@ -34,6 +34,7 @@ KERNELS = ("kernels/**/*.py", "adapt/zone_rules.py")
 KEEPERS = ("argument_types.py", "cache.py", "code_file.py", "kept_code.py", "linked_code.py")
 KEPT_CACHES = 4  # older compilations are deleted; four let a few versions or branches live side by side
 SHIPPED = Path(__file__).parents[1] / "compiled"
+NEEDS = "needs.txt"  # in it: the numba and llvmlite whose code it is, as requirements
 
 
 class CacheWarning(UserWarning):
@@ -56,7 +57,10 @@ class Processor(NamedTuple):
 
 
 V2 = ("cx16", "popcnt", "sahf", "sse3", "sse4.1", "sse4.2", "ssse3")
-LEVELS = (Level("x86-64-v3", (*V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "xsave")),)
+LEVELS = (
+    Level("x86-64-v3", (*V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "xsave")),
+    Level("generic", ("neon",)),  # of 64-bit ARM
+)
 
 
 # What numba reads of the processor, and processors on which it uses no AVX.
@@ -95,8 +99,13 @@ def processor() -> Processor:
     if is_set() or name in _WITHOUT_AVX or "+avx," not in features:
         from numba.core.registry import cpu_target
 
-        return Processor(*cpu_target.target_context.codegen().magic_tuple())
-    return Processor(llvm.get_process_triple(), name, features)
+        return processor_from(*cpu_target.target_context.codegen().magic_tuple())
+    return processor_from(llvm.get_process_triple(), name, features)
+
+
+def processor_from(triple: str, name: str, features: str) -> Processor:
+    """As LLVM and numba name it; without the version of macOS, which ends the triple there."""
+    return Processor(triple.rstrip("0123456789."), name, features)
 
 
 def is_set() -> bool:
@@ -112,12 +121,39 @@ def shipped_for() -> Processor | None:
     """
     if is_set():
         return None
-    host = processor()
-    has = set(host.features.split(","))
+    has = set(processor().features.split(","))
     for level in LEVELS:
         if all(f"+{x}" in has for x in level.features) and folder_of(level.name).is_dir():
-            return Processor(host.triple, level.name, features_of(level))
+            return processor_of(level)
     return None
+
+
+def processor_of(level: Level) -> Processor:
+    """The processors of a level, of this system."""
+    return Processor(processor().triple, level.name, features_of(level))
+
+
+def code_in_use() -> str:
+    """In words: the machine code in the package and for which processors, or why there is none to use."""
+    place = shipped_place()
+    if place and (count := len(list(place.folder.glob(f"*-{place.mark}-*{SUFFIX}")))):
+        return f"of the package, for {place.processor.name} ({count} kernels); others are compiled once"
+    return f"compiled once for this processor{unused_code()}; kept in {cache_folder()}"
+
+
+def unused_code() -> str:
+    """Why the code in the package is not used; empty where there is none."""
+    if not (SHIPPED / NEEDS).exists():
+        return ""
+    needed = (SHIPPED / NEEDS).read_text(encoding="utf-8").split()
+    there = [f"{x}=={version(x)}" for x in ("numba", "llvmlite")]
+    if there != needed:
+        return f" (code in the package is for {' '.join(needed)}, installed are {' '.join(there)})"
+    if is_set():
+        return f" (code in the package is not used: {', '.join(_SETTINGS)} or .numba_config.yaml name a processor)"
+    if shipped_place() is None:
+        return " (code in the package is for another processor, system or Python)"
+    return " (code in the package is of other sources)"
 
 
 def features_of(level: Level) -> str:

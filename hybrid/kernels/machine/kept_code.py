@@ -105,7 +105,7 @@ class KeptCode:
         why = None
         if made.is_bound:
             why = "refers to objects of Python, to large global arrays or to LAPACK, which machine code on disk cannot"
-        elif made.processor != _own_place().processor:
+        elif kept.processor_from(*made.processor) != _own_place().processor:
             why = f"is for the processor {made.processor[1]} by settings of numba that were changed in this process"
         if why:
             kept.warn_once(f"{self._function.__qualname__} is compiled at every run: it {why}")
