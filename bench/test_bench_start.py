@@ -119,12 +119,15 @@ def test_first_run_with_shipped_code(tmp_path):
     if not {f"+{x}" for x in LEVELS[0].features} <= set(processor().features.split(",")):
         pytest.skip("this processor has no AVX2")
     ignored = shutil.ignore_patterns("__pycache__", "compiled")
-    shutil.copytree(Path(hybrid.__file__).parent, tmp_path / "hybrid", ignore=ignored)
-    script = Path(__file__).parents[1] / "tests" / "ship_kernels.py"
-    subprocess.run(
-        [sys.executable, str(script), "--few"], env=os.environ | {"PYTHONPATH": str(tmp_path)}, check=True,
-        stdout=subprocess.DEVNULL,
-    )  # fmt: skip
+    source = tmp_path / "source"
+    for name in ("hybrid", "examples", "release"):
+        shutil.copytree(EXAMPLES.parent / name, source / name, ignore=ignored)
+    for name in ("pyproject.toml", "hatch_build.py", "README.md", "LICENSE"):
+        shutil.copy(EXAMPLES.parent / name, source)
+    command = [sys.executable, str(source / "release" / "build_wheel.py"), "--few", "--output", str(tmp_path)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    (wheel,) = tmp_path.glob("*.whl")
+    shutil.unpack_archive(wheel, tmp_path, "zip")
     arguments = "run", str(SCENE), "-o", "run.h5"
     cost(tmp_path, tmp_path / "before", *arguments, package=tmp_path)  # bytecode
     each = [cost(tmp_path, tmp_path / f"empty {k}", *arguments, package=tmp_path)[0] for k in range(5)]

@@ -1,8 +1,8 @@
 """Build a wheel with machine code of the kernels for this platform, Python and numba: `python release/build_wheel.py`.
 
-For each level of processors (kernels.machine.cache) that this one can execute: what tests/compile_kernels.py lists, and what
-the examples call.  From nothing this takes ten minutes of processor time; compiled code is kept in --cache, so that a second
-wheel of the same kernels takes seconds.  `pip wheel --no-deps .` builds a wheel without machine code, for any platform.
+For each level of processors (kernels.machine.cache) that this one can execute: what tests/compile_kernels.py lists, and
+what the examples call.  From nothing this takes ten minutes of processor time; compiled code is kept in --cache, from
+which a second wheel of the same kernels is made in two minutes.  `pip wheel --no-deps .` builds one without machine code.
 """
 
 from __future__ import annotations
