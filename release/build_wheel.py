@@ -2,7 +2,7 @@
 
 For each level of processors (kernels.machine.cache) that this one can execute: what tests/compile_kernels.py lists, and
 what the examples call.  From nothing this takes ten minutes of processor time; compiled code is kept in --cache, from
-which a second wheel of the same kernels is made in two minutes.  `pip wheel --no-deps .` builds one without machine code.
+which a second wheel of the same kernels is made in two minutes.  `pip wheel --no-deps .` builds one without.
 """
 
 from __future__ import annotations
