@@ -149,9 +149,8 @@ def test_the_first_scene_from_a_wheel_compiles_nothing(tmp_path: Path) -> None:
     environment = os.environ | {"HYBRID_CACHE_DIR": str(tmp_path / "empty"), "PYTHONPATH": ""}
     command = [str(python), "-W", "error", "-c", script, str(scene), str(tmp_path / "shipped.h5")]
     subprocess.run(command, env=environment, check=True, cwd=tmp_path)
-    told = subprocess.run(
-        [str(python), "-m", "hybrid", "--version"], env=environment, check=True, capture_output=True, text=True
-    ).stdout
+    ask = [str(python), "-m", "hybrid", "--version"]
+    told = subprocess.run(ask, env=environment, check=True, capture_output=True, text=True, cwd=tmp_path).stdout
     assert "machine code: of the package, for x86-64-v3" in told
     assert not list((tmp_path / "empty").rglob("*.kernel"))
 
