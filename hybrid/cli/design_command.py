@@ -100,7 +100,9 @@ def _identified(found: Identified) -> Any:
     from rich.table import Table
 
     left = f"{found.scatter:.3g}" + (" of the stated deviation" if found.stated else "")
-    head = f"{found.title or 'found'}: {found.count} numbers, {found.equilibria} equilibria; left over {left} (r.m.s.)"
+    head = f"{found.title or 'found'}: {found.count} numbers, {found.equilibria} equilibria"
+    head += f", {found.runs} runs" if found.runs else ""
+    head += f"; left over {left} (r.m.s.)"
     table = Table(title=head, title_justify="left", box=None, padding=(0, 2), min_width=min(len(head), 80))
     for name in ("", "found", "deviation", "95 % from", "to", "by cells", "start"):
         table.add_column(name, justify="right" if name else "left")

@@ -6,20 +6,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybrid.designs.equilibria import FINER, AnyScene, Equilibria, Point, scene_with
 from hybrid.designs.found_scene import text_of_found
 from hybrid.designs.identify import Apart, Estimate, fit
-from hybrid.designs.measured import Measurements, measurements
+from hybrid.designs.measured import Measurements, measurements, quantity_of
 from hybrid.designs.motions import IN_MOTION
 from hybrid.designs.nearest import Space
 from hybrid.designs.optimum import AT_BOUND, SETTLED, Optimum, Price, is_active, optimum, reached
 from hybrid.designs.problem import Constraint, Problem, as_asked, begun, problem_of, refused_result, scenes_of, space_of
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
+from hybrid.outputs.probes import PROBES
 from hybrid.scene.design import DESIGN, Design
 from hybrid.scene.read import SceneLike
 from hybrid.scene.system import System
@@ -100,13 +101,26 @@ class Found:
         return text_of_found(self.scene, self.file, self.keys, self.numbers, folder)
 
 
+class MeasuredHistory(NamedTuple):
+    """What was measured of a result over time t (m,), s, and what it is with numbers of the start and found (m,)."""
+
+    case: str
+    result: str
+    unit: str
+    t: Floats
+    measured: Floats
+    before: Floats
+    after: Floats
+
+
 @dataclass(frozen=True)
 class Identified(Found):
     """Numbers that were found from what was measured.
 
     estimates: with standard deviations and 95 % intervals; correlations (n, n), NaN where not known; apart: what cannot
     be told apart; count: numbers that were measured; scatter: root mean square of what is left, in stated deviations
-    (stated) or in the unit of what was measured; measured: places (m, 3), m, by case and line.
+    (stated) or in the unit of what was measured; measured: places (m, 3), m, by case and line; histories: what was
+    measured over time.
     """
 
     estimates: tuple[Estimate, ...] = ()
@@ -116,6 +130,7 @@ class Identified(Found):
     scatter: float = 0.0
     stated: bool = True
     measured: Mapping[str, Mapping[str, Floats]] = field(default_factory=dict)
+    histories: tuple[MeasuredHistory, ...] = ()
 
 
 def design(
@@ -224,6 +239,7 @@ def _identified(task: TaskFile[Design], asked: AnyScene, file: str) -> Identifie
         kept=(), bounds=tuple(edges), minimised=None, minimised_at_start=None, notes=tuple(notes),
         estimates=found.estimates, correlations=found.correlations, apart=found.apart, count=found.count,
         scatter=found.scatter, stated=measured.deviations is not None, measured=_places(measured, found.point),
+        histories=_histories(measured, equilibria.at(space.start), found.point),
         **_common(task, asked, equilibria, space, found.point, file),
     )  # fmt: skip
 
@@ -247,6 +263,17 @@ def _places(measured: Measurements, point: Point) -> dict[str, dict[str, Floats]
         seen = np.isfinite(places).any(axis=1)
         out.setdefault(case, {})[name] = np.where(np.isfinite(places), places, found)[seen]
     return out
+
+
+def _histories(measured: Measurements, first: Point, point: Point) -> tuple[MeasuredHistory, ...]:
+    """What was measured over time beside runs with the numbers at the start and found."""
+    return tuple(
+        MeasuredHistory(
+            x.case, x.result, PROBES[quantity_of(x.result)].unit, x.t, measured.values[x.rows],
+            first.values[measured.rows[x.rows]], point.values[measured.rows[x.rows]],
+        )
+        for x in measured.histories
+    )  # fmt: skip
 
 
 def _bed(scene: AnyScene) -> float | None:

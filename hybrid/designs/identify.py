@@ -1,4 +1,4 @@
-"""Numbers of a scene from what was measured of its equilibrium, how well they are known, and what is not."""
+"""Numbers of a scene from what was measured of its equilibrium or motion, how well they are known, and what is not."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2, t
+from scipy.stats import chi2, norm, t
 
 from hybrid.designs.equilibria import FINER, Equilibria, Point
-from hybrid.designs.measured import Measurements
+from hybrid.designs.measured import History, Measurements
 from hybrid.designs.nearest import Rows, Space, nearest
 from hybrid.errors import ComputationError
 from hybrid.kernels.state.state import Floats
@@ -24,6 +24,8 @@ PART, ALIKE = 0.05, 0.03
 # below which unknowns stay; part of the sum of squares that is worth a step.
 SINGULAR, LEAST, GAIN = 1e-6, 1e-4, 1e-7
 CONFIDENCE, DOUBT = 0.95, 0.005
+# Readings one after another from which on it is judged whether they are independent.
+FEWEST = 8
 
 
 class Estimate(NamedTuple):
@@ -77,7 +79,11 @@ def fit(measured: Measurements, equilibria: Equilibria, space: Space) -> Fit:
         point = equilibria.at(x)
         return Rows(point, (point.values[rows] - values) / scale, lambda: point.slopes[rows] / scale[:, None])
 
-    best = nearest(off, space, 1.0 / UNKNOWN if known else LEAST, GAIN)
+    def refresh(point: Point) -> bool:
+        return point.refresh({*equilibria.motions.rows})
+
+    best = nearest(off, space, 1.0 / UNKNOWN if known else LEAST, GAIN, refresh)
+    refresh(best.point)
     sizes = space.sizes(best.point.x)
     u, s, v = np.linalg.svd(best.slopes() * sizes, full_matrices=False)
     freedom = values.size - int(np.sum(s > SINGULAR * s.max(initial=0.0)))
@@ -90,7 +96,7 @@ def fit(measured: Measurements, equilibria: Equilibria, space: Space) -> Fit:
     apart = tuple(_apart(space.names, best.point.x, v[k], v, s, seen, unit) for k in np.flatnonzero(~seen))
     scatter = math.sqrt(2.0 * best.cost / values.size) * (1.0 if known else float(scale[0]))
     notes += [f"the search stopped before it was done: {best.stopped}"] if best.stopped else []
-    notes += _doubts(best, freedom, known)
+    notes += _doubts(best, freedom, known) + _after_each_other(best.values, measured.histories)
     return Fit(best.point, estimates, correlations, apart, values.size, scatter, tuple(notes))
 
 
@@ -149,6 +155,31 @@ def _doubts(best: Rows, freedom: int, known: bool) -> list[str]:
             "the deviation is larger; intervals are too narrow"
         ]
     return []
+
+
+def _likeness(left: Floats, histories: Sequence[History]) -> tuple[float, int]:
+    """Correlation of what is left in histories with that at the time before, and of how many pairs it is."""
+    pairs, square, count = 0.0, 0.0, 0
+    for each in histories:
+        x = left[each.rows]
+        pairs, square, count = pairs + float(x[1:] @ x[:-1]), square + float(x @ x), count + x.size - 1
+    return (pairs / square if square > 0.0 else 0.0), count
+
+
+def _after_each_other(left: Floats, histories: Sequence[History]) -> list[str]:
+    """Doubts about readings that are no readings by themselves: intervals count each as one.
+
+    Of independent ones the correlation is normal, with a deviation of 1 / sqrt(count).
+    """
+    likeness, count = _likeness(left, histories)
+    if count < FEWEST or likeness * math.sqrt(count) <= norm.isf(DOUBT):
+        return []
+    times = math.sqrt((1.0 + likeness) / max(1.0 - likeness, 1e-3))
+    return [
+        f"what is left at a time is like that at the time before (correlation {likeness:.2g}): the scene moves "
+        f"otherwise than was measured, or readings are closer than their noise changes; intervals are about "
+        f"{times:.2g} times too narrow"
+    ]
 
 
 def _apart(

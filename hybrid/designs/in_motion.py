@@ -7,6 +7,7 @@ step was divided, or zones are others, are no neighbours of the base run, and no
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
@@ -24,7 +25,7 @@ from hybrid.scene.combinations import refuse_use
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 
-NAME = re.compile(r"^(max|min|mean|std|last) (?:([^/@]+)/)?([a-z_]\w*)(?:\.([xyz]))?(?:@(.+))?$")
+NAME = re.compile(r"^(max|min|mean|std|last|t=\S+) (?:([^/@]+)/)?([a-z_]\w*)(?:\.([xyz]))?(?:@(.+))?$")
 OF_SECTION = re.compile(r"^sections\[(\d+)\]$")
 # Parts of a number by which runs differ: differences of second order by both, from which one of fourth order follows.
 PARTS = (1e-3, 2e-3)
@@ -41,7 +42,7 @@ OF_ENDS = 1e-6
 class Wanted(NamedTuple):
     """A result over the time of a run, in parts; line: "" of one cable; at: m, infinity: the end, None: all places, or
 
-    those of a section.
+    those of a section; time: s, at which it is wanted (over: "t"), between outputs by the straight line.
     """
 
     over: str
@@ -50,6 +51,7 @@ class Wanted(NamedTuple):
     axis: str
     at: float | None
     section: int | None = None
+    time: float = math.nan
 
 
 class Slopes(NamedTuple):
@@ -63,7 +65,8 @@ class Slopes(NamedTuple):
 def in_motion(asked: Scene | System, of: Sequence[str], by: Sequence[str]) -> Slopes:
     """Derivatives of results of a run; four runs for each number.
 
-    of: `max tension@end`, `std position.z@100`, `max hose/curvature`: max, min, mean, std or last over the outputs.
+    of: `max tension@end`, `std position.z@100`, `max hose/curvature`: max, min, mean, std or last over the outputs, or
+    `t=12.5 tension@end`, at a time.
     SceneError: no such key or result, or steps that follow the motion; ComputationError: a run fails, or steps or zones
     of runs with other numbers are not those of the base run.
     """
@@ -103,9 +106,12 @@ def parse_history(asked: Scene | System, text: str) -> Wanted:
     several = isinstance(asked, System)
     example = "max east/tension@end" if several else "max tension@end"
     if found is None or bool(found[2]) != several:
-        expected = "max, min, mean, std or last, and NAME@S, of several lines LINE/NAME@S"
+        expected = "max, min, mean, std, last or t=TIME, and NAME@S, of several lines LINE/NAME@S"
         raise SceneError([Complaint("of", text, expected, example)])
     over, line, name, axis, at = found.groups()
+    time = math.nan
+    if over.startswith("t="):
+        over, time = "t", _time_of(asked, text, over.removeprefix("t="))
     section = OF_SECTION.match(at or "")
     at = None if section is not None else at
     if isinstance(asked, System) and line not in asked.lines:
@@ -124,7 +130,20 @@ def parse_history(asked: Scene | System, text: str) -> Wanted:
     if s is None and name in PROBES and "s" in PROBES[name].dims and over not in ("max", "min"):
         raise SceneError([Complaint("of", text, "a place", f"{text}@end")])
     of_section = None if section is None else int(section[1])
-    return Wanted(over, line or "", name, axis or "", np.inf if s == length else s, of_section)
+    return Wanted(over, line or "", name, axis or "", np.inf if s == length else s, of_section, time)
+
+
+def _time_of(asked: Scene | System, text: str, number: str) -> float:
+    """The time of a result, s; SceneError: it is none, or beyond the run."""
+    duration = asked.require_time().duration
+    try:
+        time = float(number)
+    except ValueError:
+        time = math.nan
+    if not 0.0 <= time <= duration:
+        expected = f"a time between 0 and {duration:g} s"
+        raise SceneError([Complaint("of", text, expected, f"t={0.5 * duration:g} tension@end")])
+    return time
 
 
 class Motion:
@@ -141,17 +160,25 @@ class Motion:
         self.places = places
         more = [x.at for x in wanted if x.at is not None and np.isfinite(x.at)] if smooth else None
         self._cables = {k: x.cable for k, x in scene.lines.items()} if isinstance(scene, System) else {"": scene.cable}
-        with replay(scene, places, finer, more) as result:
+        each_step = any(x.over == "t" for x in wanted)
+        with replay(scene, places, finer, more, each_step) as result:
             lines: dict[str, Any] = dict(result.lines) or {"": result}
             self.steps = {name: np.array(x["steps/t"]) for name, x in lines.items()}
             self.zones = {name: list(_zones(x)) for name, x in lines.items()}
             self.where: list[Any] = [None] * len(wanted) if base is None else list(base.where)
             self.values = np.zeros(len(wanted))
             self.shapes: list[tuple[int, ...]] = []
+            histories: dict[Wanted, Floats] = {}  # of many times there is one
             for k, x in enumerate(wanted):
-                history = self._history(lines[x.line], x)
+                place = x._replace(over="", time=0.0)
+                if place not in histories:
+                    histories[place] = self._history(lines[x.line], x)
+                history = histories[place]
                 self.shapes.append(history.shape)
                 if base is not None and history.shape != base.shapes[k]:  # it is no neighbour: see check
+                    continue
+                if x.over == "t":
+                    self.values[k] = np.interp(x.time, lines[x.line].t, history[:, 0])
                     continue
                 self.values[k], self.where[k] = _over(history, x.over, self.where[k])
                 if smooth and x.over in ("max", "min"):

@@ -34,14 +34,19 @@ def places_in(scene: Scene | System) -> Places:
     return {name: places_of(x, scenes[name]) for name, x in zip(model.names, model.models, strict=True)}
 
 
-def replay(scene: Scene | System, places: Places, finer: bool = False, more: Sequence[float] | None = None) -> Result:
+def replay(
+    scene: Scene | System, places: Places, finer: bool = False, more: Sequence[float] | None = None,
+    each_step: bool = False,
+) -> Result:  # fmt: skip
     """A run into memory, on nodes at places; finer: on nodes as the scene has them, cells and steps half as long.
 
-    more: of one cable: outputs are at its nodes and these arc lengths, m; None: where the scene asks for them.
+    more: of one cable: outputs are at its nodes and these arc lengths, m; None: where the scene asks for them;
+    each_step: there are outputs at every step, in place of when the scene asks for them.
 
     SceneError, ComputationError: as of `hybrid.run`.
     """
-    scene = scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None})})
+    often = {"every": scene.require_time().step} if each_step else {}
+    scene = scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None, **often})})
     if _has_layers(scene) and not finer:
         return run(scene)
     target = MemoryTarget()

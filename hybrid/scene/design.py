@@ -133,12 +133,16 @@ class Limit(OfEquilibrium):
 
 
 class Measured(Table):
-    """What was measured of the equilibrium."""
+    """What was measured of the equilibrium, or of the motion."""
 
     file: Text = Field(
         description="CSV file, relative to the design file: a column s (m), columns of quantities such as tension, or "
-        "x, y, z of the position; in a scene of several lines a column line, with several cases a column case"
+        "x, y, z of the position; of a motion a column t (s); in a scene of several lines a column line, with several "
+        "cases a column case"
     )  # fmt: skip
+    at: Where | None = Field(
+        default=None, description="in place of a column s: arc length, start or end, where all of it was measured [m]"
+    )
     deviation: Positive | None = Field(
         default=None, description="standard deviation of what was measured, in its unit; absent: by how much it "
         "scatters about what is found",

@@ -1,4 +1,4 @@
-"""Pictures of a design: the lines of every case before and after."""
+"""Pictures of a design: the lines of every case before and after, and histories that were measured."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Shapes = Mapping[str, Mapping[str, Any]]
 
 
 class DrawnDesign(Protocol):
-    """What is drawn of a design; places that were `measured` as well, by case and line, where there are."""
+    """What is drawn of a design; places that were `measured`, by case and line, and `histories`, where there are."""
 
     @property
     def title(self) -> str: ...
@@ -52,6 +52,8 @@ def _page(found: DrawnDesign) -> Page:
     ]
     view, across = _view(np.concatenate(every))
     panels = {str(k): _panel(found, case, str(k), view, across) for k, case in enumerate(found.after)}
+    for history in getattr(found, "histories", ()):
+        panels[str(len(panels))] = _history(history, str(len(panels)))
     columns = min(COLUMNS, len(panels))
     rows = math.ceil(len(panels) / columns)
     keys = [*panels, *["."] * (rows * columns - len(panels))]
@@ -60,7 +62,15 @@ def _page(found: DrawnDesign) -> Page:
     more = f", and {len(changes) - NUMBERS} more" if len(changes) > NUMBERS else ""
     facts = ", ".join(changes[:NUMBERS]) + more
     size = max(WIDE * columns, 5.6), HIGH * rows + 0.8
-    return Page(found.title or "(no title)", facts, 2, panels, mosaic, legend=("0",), size=size)
+    return Page(
+        found.title or "(no title)",
+        facts,
+        2,
+        panels,
+        mosaic,
+        legend=("0" if not getattr(found, "histories", ()) else [*panels][-1],),
+        size=size,
+    )
 
 
 def _panel(found: DrawnDesign, case: str, key: str, view: Any, across: str) -> Panel:
@@ -78,6 +88,16 @@ def _panel(found: DrawnDesign, case: str, key: str, view: Any, across: str) -> P
         at = np.asarray(r) @ view.T
         items.append(Marks(at[:, 0], at[:, 1], "o", label="measured", face=""))
     return Panel(key, case, Axis(across, "m"), Axis("z" if across else "", "m"), items, aspect=1.0)
+
+
+def _history(history: Any, key: str) -> Panel:
+    """What was measured over time beside what the scene has of it, before and after."""
+    items: list[Item] = [
+        Line(history.t, history.before, colour=GREY, width=0.9, dash="dash", label="before"),
+        Line(history.t, history.after, colour=colour_of("catenary"), width=1.4, label="after"),
+        Marks(history.t, history.measured, "o", label="measured", face=""),
+    ]
+    return Panel(key, history.case, Axis("t", "s"), Axis(history.result, history.unit), items)
 
 
 def _view(places: Any) -> tuple[Any, str]:

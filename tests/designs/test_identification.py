@@ -141,3 +141,99 @@ def test_nothing_else_is_asked_beside_what_was_measured(folder):
     Path("design.yaml").write_text(DESIGN + "minimise: EI\n")
     with pytest.raises(hybrid.SceneError, match=r"design\.yaml:5:11: minimise[^$]*found from what was measured"):
         hybrid.design("design.yaml")
+
+
+DRAG = "cable.sections[0].drag.normal"
+TOWED = Path(__file__).parents[2] / "examples" / "designs" / "towed.yaml"
+
+
+def towed(tmp_path, noise):
+    """A record of the towed umbilical with EI 6 N m2 and drag 1.3, with noise (m, 2) in parts of 0.14 N, 0.0185 rad."""
+    run = hybrid.run(hybrid.load_scene(TOWED, [f"{EI}=6", f"{DRAG}=1.3", "output.every=0.2"]))
+    table = np.stack([run.t, run["reaction_start"][:, 0], run["theta"][:, -1]], axis=1)[1:]
+    table[:, 1:] += noise * [0.14, 0.0185]
+    rows = "".join(f"{t:.1f},{a:.12g},{b:.12g}\n" for t, a, b in table)
+    (tmp_path / "record.csv").write_text("t,reaction_start.x,theta\n" + rows)
+    stated = {"reaction_start.x": 0.14, "theta": 0.0185}
+    return hybrid.design(
+        hybrid.load_scene(TOWED),
+        unknowns={"EI": {"key": EI, "low": 1, "high": 100}, "drag": {"key": DRAG, "low": 0.3, "high": 3}},
+        measured={"file": str(tmp_path / "record.csv"), "at": "end", "deviations": stated},
+    )
+
+
+def test_stiffness_and_drag_from_a_history(tmp_path):
+    """Without noise both come back; deviations are those of differences of runs by hand, J^T J over deviations."""
+    found = towed(tmp_path, np.zeros((40, 2)))
+    assert found.numbers == pytest.approx({"EI": 6.0, "drag": 1.3}, rel=1e-4)
+    columns = []
+    for key, x in ((EI, 6.0), (DRAG, 1.3)):
+        both = []
+        for part in (1.01, 0.99):
+            others = [f"{EI}=6", f"{DRAG}=1.3", f"{key}={part * x}", "output.every=0.2"]
+            run = hybrid.run(hybrid.load_scene(TOWED, others))
+            both.append(np.concatenate([run["reaction_start"][1:, 0] / 0.14, run["theta"][1:, -1] / 0.0185]))
+        columns.append((both[0] - both[1]) / (0.02 * x))
+    J = np.stack(columns, axis=1)
+    expected = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+    assert [x.deviation for x in found.estimates] == pytest.approx(expected, rel=0.01)
+    assert [x.result for x in found.histories] == ["reaction_start.x", "theta@end"]
+    assert found.histories[0].t[0] == 0.2 and found.histories[0].unit == "N" and found.moving == 1
+    np.testing.assert_allclose(found.histories[1].after, found.histories[1].measured, rtol=1e-4)
+
+
+def test_noise_that_goes_on_from_reading_to_reading_is_said(tmp_path):
+    """Of x_i = 0.8 x_(i-1) + e; noise of readings by themselves is not said to be so."""
+    white = np.random.default_rng(3).standard_normal((40, 2))
+    slow = white.copy()
+    for i in range(1, 40):
+        slow[i] = 0.8 * slow[i - 1] + 0.6 * white[i]
+    assert not towed(tmp_path, white).notes
+    notes = towed(tmp_path, slow).notes
+    assert any("like that at the time before (correlation 0." in x for x in notes), notes
+
+
+def test_friction_of_the_bed_from_the_pull_of_a_dragged_line(tmp_path):
+    """A line that lies straight and is dragged slides as a whole: its pull is the friction times its weight."""
+    friction = "environment.seabed.friction"
+    section = {"length": 20, "mass": 5, "diameter": 0.03, "axial_stiffness": 1e5}
+    scene = hybrid.validate_scene(
+        {
+            "environment": {"seabed": {"z": 0, "stiffness": 1e5, "damping": 1e3, "friction": 0.5}},
+            "cable": {"sections": [section]},
+            "ends": {
+                "start": "free",
+                "end": {"kind": "pinned", "position": [20, 0, 0], "motion": {"velocity": [0.5, 0, 0], "ramp": 1}},
+            },
+            "initial": {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]},
+            "model": "catenary", "mesh": {"cells": 20}, "time": {"duration": 6, "step": 0.02},
+        }
+    )  # fmt: skip
+    pull = 0.4 * 5 * 20 * 9.81
+    (tmp_path / "pull.csv").write_text("t,tension\n" + "".join(f"{t},{pull + d}\n" for t, d in ((4, 3), (5, -3))))
+    found = hybrid.design(
+        scene, unknowns={"mu": {"key": friction, "low": 0.1, "high": 1}},
+        measured={"file": str(tmp_path / "pull.csv"), "at": "end", "deviation": 4.0},
+    )  # fmt: skip
+    (mu,) = found.estimates
+    assert mu.value == pytest.approx(0.4, rel=0.01)
+    assert mu.deviation == pytest.approx(4.0 / np.sqrt(2.0) / (5 * 20 * 9.81), rel=0.01)
+
+
+HISTORIES = {
+    "no time": (lambda: str(Path("rod.yaml")), "t,z\n1,-0.08\n", "end", "shape.csv:2: t", "a scene with time"),
+    "beyond the run": (lambda: str(TOWED), "t,z\n9,-0.08\n", "end", "shape.csv:2: t", "a time between 0 and 8 s"),
+    "two places": (lambda: str(TOWED), "t,s,z\n1,1,-0.08\n", "end", "at", "nothing, because"),
+    "beyond the end": (lambda: str(TOWED), "t,z\n1,-0.08\n", 4.5, "measured.at", "between 0 and 4 m"),
+}
+
+
+@pytest.mark.parametrize("name", HISTORIES)
+def test_bad_histories_are_refused(folder, name):
+    scene, text, at, place, expected = HISTORIES[name]
+    Path("shape.csv").write_text(text)
+    with pytest.raises(hybrid.SceneError) as raised:
+        hybrid.design(
+            scene(), unknowns={"EI": {"key": EI}}, measured={"file": "shape.csv", "at": at, "deviation": 0.001}
+        )
+    assert place in str(raised.value) and expected in str(raised.value), raised.value
