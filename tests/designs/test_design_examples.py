@@ -11,7 +11,7 @@ import hybrid
 from hybrid.designs.design import Found, Identified
 
 DESIGNS = Path(__file__).parents[2] / "examples" / "designs"
-NAMES = ("lazy_wave", "pretension", "stiffness")
+NAMES = ("lazy_wave", "pretension", "stiffness", "towing")
 IN_SEAS = "lazy_wave_in_seas"  # takes minutes: bench/test_bench_design.py
 
 
@@ -61,3 +61,11 @@ def test_a_sagging_umbilical_shows_the_ratio_of_stiffness_and_mass() -> None:
     (apart,) = found.apart
     assert apart.text.startswith("stiffness and mass: only their ratio is known, stiffness / mass = ")
     assert found.numbers["stiffness"] / found.numbers["mass"] == pytest.approx(10.0, abs=0.045)  # three deviations
+
+
+def test_a_towing_record_shows_stiffness_and_drag() -> None:
+    """The record was made with 6 N m2 and 1.3, and noise of 2 % of the largest force and change of angle."""
+    found = designed("towing")
+    assert isinstance(found, Identified) and not found.apart and not found.notes
+    for estimate, truth in zip(found.estimates, (6.0, 1.3), strict=True):
+        assert estimate.low <= truth <= estimate.high and estimate.deviation < 0.03 * truth

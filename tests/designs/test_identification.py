@@ -195,11 +195,11 @@ def test_noise_that_goes_on_from_reading_to_reading_is_said(tmp_path):
 
 def test_friction_of_the_bed_from_the_pull_of_a_dragged_line(tmp_path):
     """A line that lies straight and is dragged slides as a whole: its pull is the friction times its weight."""
-    friction = "environment.seabed.friction"
+    friction = "environment.seabed.friction.axial"
     section = {"length": 20, "mass": 5, "diameter": 0.03, "axial_stiffness": 1e5}
     scene = hybrid.validate_scene(
         {
-            "environment": {"seabed": {"z": 0, "stiffness": 1e5, "damping": 1e3, "friction": 0.5}},
+            "environment": {"seabed": {"z": 0, "stiffness": 1e5, "damping": 1e3, "friction": {"axial": 0.5, "lateral": 0.5}}},
             "cable": {"sections": [section]},
             "ends": {
                 "start": "free",
