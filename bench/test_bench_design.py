@@ -2,26 +2,32 @@
 
 pytest bench/test_bench_design.py -m bench -s
 
-RECORDS=100 makes so many random records in place of 400, which take a minute.  The lazy wave in ten seas takes ten.
+RECORDS=60 makes so many random records in place of 400 of a shape, which take a minute, and of 100 of a towing run,
+which take two.  The lazy wave in ten seas takes ten.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import norm, t
+from scipy.stats import binomtest, norm, t
 
 import hybrid
 from hybrid.designs.design import Found
+from hybrid.kernels.state.state import Floats
 from hybrid.scene.design import DESIGN
 
 pytestmark = pytest.mark.bench
-RECORDS = int(os.environ.get("RECORDS", "400"))
+RECORDS, TOWING_RECORDS = (int(os.environ.get("RECORDS", many)) for many in ("400", "100"))
 DESIGNS = Path(__file__).parents[1] / "examples" / "designs"
+# Of the towing record: keys and true numbers, EI (N m2) and drag; noise, 2 % of the largest force (N) and
+# change of angle (rad).
+TOWED = {"cable.sections[0].bending_stiffness": 6.0, "cable.sections[0].drag.normal": 1.3}
+TOWED_NOISE = np.array([0.14, 0.0185])
 # Of the lazy wave: diameter of the buoyancy, lengths of lower, buoyant and upper section.
 STARTS = ((0.45, 130, 50, 90), (0.5, 110, 60, 80), (0.6, 120, 30, 100), (0.42, 140, 70, 85), (0.7, 120, 25, 110))
 # The same of the lazy wave in ten seas: diameters of both buoyant sections, lengths of the four.
@@ -106,3 +112,44 @@ def test_stated_intervals_hold_the_truth(tmp_path: Path) -> None:
             "least squares by hand"
         )
         assert abs(held - by_hand) <= 1.0
+
+
+def towed(numbers: Mapping[str, float]) -> Floats:
+    """Times (s), forces on the clamp in x (N) and angles of the lower end (rad) of a towing run: (40, 3)."""
+    changes = [f"{k}={x}" for k, x in numbers.items()]
+    run = hybrid.run(hybrid.load_scene(DESIGNS / "towed.yaml", [*changes, "output.every=0.2"]))
+    return np.stack([run.t, run["reaction_start"][:, 0], run["theta"][:, -1]], axis=1)[1:]
+
+
+def test_stated_intervals_of_a_towing_record_hold_the_truth(tmp_path: Path) -> None:
+    """EI and drag from records of force and angle; the record of seed 0 is that of the example.
+
+    Beside them stands what linear least squares by hand, with differences of runs, has of the same records.
+    """
+    record, task = tmp_path / "towing_record.csv", tmp_path / "towing.yaml"
+    for name in (task.name, "towed.yaml"):
+        (tmp_path / name).write_text((DESIGNS / name).read_text())
+    example = [x for x in (DESIGNS / record.name).read_text().splitlines(True) if not x.startswith("#")]
+    truth, values = towed(TOWED), np.array([*TOWED.values()])
+    each = [towed(TOWED | {k: 1.01 * x}) - towed(TOWED | {k: 0.99 * x}) for k, x in TOWED.items()]
+    J = np.stack([x[:, 1:] / TOWED_NOISE for x in each], axis=-1).reshape(-1, values.size) / (0.02 * values)
+    reach = norm.ppf(0.975) * np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+    within, by_hand, noted = np.zeros(values.size, int), np.zeros(values.size, int), 0
+    for seed in range(TOWING_RECORDS):
+        e = np.random.default_rng(seed).standard_normal((truth.shape[0], 2))
+        rows = [f"{a:.1f},{b:.3f},{c:.4f}\n" for a, b, c in truth + np.pad(e * TOWED_NOISE, ((0, 0), (1, 0)))]
+        record.write_text("".join(["t,reaction_start.x,theta\n", *rows]))
+        assert seed or record.read_text() == "".join(example)
+        found = hybrid.design(task)
+        within += [x.low <= y <= x.high for x, y in zip(found.estimates, values, strict=True)]
+        by_hand += np.abs(np.linalg.lstsq(J, e.ravel(), rcond=None)[0]) <= reach
+        noted += bool(found.notes)
+    print(f"a note in {noted} of {TOWING_RECORDS} towing records")
+    for name, held, linear in zip(("EI", "drag"), within, by_hand, strict=True):
+        low, high = binomtest(held, TOWING_RECORDS).proportion_ci()
+        print(
+            f"{name} within its 95 % in {held} of {TOWING_RECORDS} towing records ({100 * held / TOWING_RECORDS:.1f} %, "
+            f"95 % from {100 * low:.1f} to {100 * high:.1f}); {linear} by linear least squares by hand"
+        )
+        assert binomtest(held, TOWING_RECORDS, 0.95).pvalue > 0.001
+        assert abs(held - linear) <= max(1, 0.03 * TOWING_RECORDS)

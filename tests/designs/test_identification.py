@@ -182,6 +182,17 @@ def test_stiffness_and_drag_from_a_history(tmp_path):
     np.testing.assert_allclose(found.histories[1].after, found.histories[1].measured, rtol=1e-4)
 
 
+def test_a_row_without_a_time_is_of_the_equilibrium(tmp_path):
+    """A single row shows EI alone, in which drag has no part."""
+    rest = hybrid.static(hybrid.load_scene(TOWED, [f"{EI}=6"]))["theta"][-1, -1]
+    (tmp_path / "record.csv").write_text(f"t,theta\n,{rest:.12g}\n")
+    found = hybrid.design(
+        hybrid.load_scene(TOWED), unknowns={"EI": {"key": EI, "low": 1, "high": 100}},
+        measured={"file": str(tmp_path / "record.csv"), "at": "end", "deviation": 0.0185},
+    )  # fmt: skip
+    assert found.numbers == pytest.approx({"EI": 6.0}, rel=1e-5) and found.runs == 0 and not found.histories
+
+
 def test_noise_that_goes_on_from_reading_to_reading_is_said(tmp_path):
     """Of x_i = 0.8 x_(i-1) + e; noise of readings by themselves is not said to be so."""
     white = np.random.default_rng(3).standard_normal((40, 2))

@@ -92,7 +92,9 @@ def test_a_study_of_the_step(found):
 def test_what_is_refused():
     scene = heaved()
     key = "cable.sections[0].mass"
-    for of, words in (("tension@start", "max, min, mean, std or last"), ("max tensoin@0", "one of position"),
+    for of, words in (("tension@start", "max, min, mean, std, last or t=TIME"), ("max tensoin@0", "one of position"),
+                      ("t=99 tension@end", "a time between 0 and"), ("t=one tension@end", "a time between 0 and"),
+                      ("t=1 tension", "a place"),
                       ("std tension", "a place"), ("max tension.x@0", "no components"),
                       ("max reaction_end.z@end", "one value"), ("max tension@99", "between 0 and 40 m")):  # fmt: skip
         with pytest.raises(hybrid.SceneError, match=words):
