@@ -2,14 +2,14 @@
 
 pytest bench/test_bench_design.py -m bench -s
 
-RECORDS=60 makes so many random records in place of 400 of a shape, which take a minute, and of 100 of a towing run,
-which take two.  The lazy wave in ten seas takes ten.
+RECORDS=60 makes so many random records in place of 400 of a shape, which take a minute, and of 100 of a towing run or
+of the pull of a dragged line, which take two each.  The lazy wave in ten seas takes ten.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,12 +22,33 @@ from hybrid.kernels.state.state import Floats
 from hybrid.scene.design import DESIGN
 
 pytestmark = pytest.mark.bench
-RECORDS, TOWING_RECORDS = (int(os.environ.get("RECORDS", many)) for many in ("400", "100"))
+RECORDS, HISTORIES = (int(os.environ.get("RECORDS", many)) for many in ("400", "100"))
 DESIGNS = Path(__file__).parents[1] / "examples" / "designs"
 # Of the towing record: keys and true numbers, EI (N m2) and drag; noise, 2 % of the largest force (N) and
 # change of angle (rad).
 TOWED = {"cable.sections[0].bending_stiffness": 6.0, "cable.sections[0].drag.normal": 1.3}
 TOWED_NOISE = np.array([0.14, 0.0185])
+# Of the dragged line: keys and true numbers, friction and drag along it; noise, 2 % of the largest pull (N); net weight
+# (N/m).  It stretches for a second before all of it slides; drag grows with the square of the speed.
+DRAGGED = {"environment.seabed.friction.axial": 0.4, "cable.sections[0].drag.tangential": 0.03}
+DRAGGED_NOISE = np.array([3.5])
+DRAGGED_WEIGHT = 9.81 * (1.5 - 1000 * np.pi * 0.03**2 / 4)
+DRAGGED_SCENE = f"""\
+environment:
+  fluid: {{density: 1000, surface: 10}}
+  seabed: {{z: {DRAGGED_WEIGHT / 1e5}, stiffness: 1.0e+5, damping: 1000, friction: {{axial: 0.6, lateral: 0.5}}}}
+cable:
+  sections:
+    - {{length: 20, mass: 1.5, diameter: 0.03, axial_stiffness: 2.0e+4, damping: {{stiffness: 0.05}},
+       drag: {{normal: 1, tangential: 0.05}}}}
+ends:
+  start: free
+  end: {{kind: pinned, position: [20, 0, 0], motion: {{velocity: [2, 0, 0], ramp: 4}}}}
+initial: {{kind: straight, origin: [0, 0, 0], direction: [1, 0, 0]}}
+model: catenary
+mesh: {{cells: 20}}
+time: {{duration: 5, step: 0.02}}
+"""
 # Of the lazy wave: diameter of the buoyancy, lengths of lower, buoyant and upper section.
 STARTS = ((0.45, 130, 50, 90), (0.5, 110, 60, 80), (0.6, 120, 30, 100), (0.42, 140, 70, 85), (0.7, 120, 25, 110))
 # The same of the lazy wave in ten seas: diameters of both buoyant sections, lengths of the four.
@@ -121,35 +142,81 @@ def towed(numbers: Mapping[str, float]) -> Floats:
     return np.stack([run.t, run["reaction_start"][:, 0], run["theta"][:, -1]], axis=1)[1:]
 
 
-def test_stated_intervals_of_a_towing_record_hold_the_truth(tmp_path: Path) -> None:
-    """EI and drag from records of force and angle; the record of seed 0 is that of the example.
+def count_intervals(
+    what: str,
+    numbers: Mapping[str, float],
+    noise: Floats,
+    simulate: Callable[[Mapping[str, float]], Floats],
+    identify: Callable[[Floats, int], Found],
+) -> None:
+    """Prints and asserts how often the 95 % of numbers, by key, hold the truth, of HISTORIES random records.
 
-    Beside them stands what linear least squares by hand, with differences of runs, has of the same records.
+    `simulate` has times (s) and readings of a run, (n, 1 + m), of deviation `noise` (m); `identify` is of a record and
+    its seed.  Beside it stands what linear least squares by hand, with differences of runs, has of the same records.
     """
+    truth, values = simulate(numbers), np.array([*numbers.values()])
+    each = [simulate({**numbers, k: 1.01 * x}) - simulate({**numbers, k: 0.99 * x}) for k, x in numbers.items()]
+    J = np.stack([x[:, 1:] / noise for x in each], axis=-1).reshape(-1, values.size) / (0.02 * values)
+    reach = norm.ppf(0.975) * np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+    within, by_hand, noted = np.zeros(values.size, int), np.zeros(values.size, int), 0
+    for seed in range(HISTORIES):
+        e = np.random.default_rng(seed).standard_normal((truth.shape[0], noise.size))
+        found = identify(truth + np.pad(e * noise, ((0, 0), (1, 0))), seed)
+        within += [x.low <= y <= x.high for x, y in zip(found.estimates, values, strict=True)]
+        by_hand += np.abs(np.linalg.lstsq(J, e.ravel(), rcond=None)[0]) <= reach
+        noted += bool(found.notes)
+    print(f"a note in {noted} of {HISTORIES} records of {what}")
+    for estimate, held, linear, part in zip(found.estimates, within, by_hand, reach / values, strict=True):
+        low, high = binomtest(held, HISTORIES).proportion_ci()
+        print(
+            f"{estimate.name} within its 95 % (+-{100 * part:.1f} %) in {held} of {HISTORIES} records of {what} "
+            f"({100 * held / HISTORIES:.1f} %, 95 % from {100 * low:.1f} to {100 * high:.1f}); {linear} by linear least "
+            "squares by hand"
+        )
+        assert binomtest(held, HISTORIES, 0.95).pvalue > 0.001
+        assert abs(held - linear) <= max(1, 0.03 * HISTORIES)
+
+
+def test_stated_intervals_of_a_towing_record_hold_the_truth(tmp_path: Path) -> None:
+    """EI and drag from records of force and angle; the record of seed 0 is that of the example."""
     record, task = tmp_path / "towing_record.csv", tmp_path / "towing.yaml"
     for name in (task.name, "towed.yaml"):
         (tmp_path / name).write_text((DESIGNS / name).read_text())
     example = [x for x in (DESIGNS / record.name).read_text().splitlines(True) if not x.startswith("#")]
-    truth, values = towed(TOWED), np.array([*TOWED.values()])
-    each = [towed(TOWED | {k: 1.01 * x}) - towed(TOWED | {k: 0.99 * x}) for k, x in TOWED.items()]
-    J = np.stack([x[:, 1:] / TOWED_NOISE for x in each], axis=-1).reshape(-1, values.size) / (0.02 * values)
-    reach = norm.ppf(0.975) * np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
-    within, by_hand, noted = np.zeros(values.size, int), np.zeros(values.size, int), 0
-    for seed in range(TOWING_RECORDS):
-        e = np.random.default_rng(seed).standard_normal((truth.shape[0], 2))
-        rows = [f"{a:.1f},{b:.3f},{c:.4f}\n" for a, b, c in truth + np.pad(e * TOWED_NOISE, ((0, 0), (1, 0)))]
+
+    def identify(table: Floats, seed: int) -> Found:
+        rows = [f"{a:.1f},{b:.3f},{c:.4f}\n" for a, b, c in table]
         record.write_text("".join(["t,reaction_start.x,theta\n", *rows]))
         assert seed or record.read_text() == "".join(example)
-        found = hybrid.design(task)
-        within += [x.low <= y <= x.high for x, y in zip(found.estimates, values, strict=True)]
-        by_hand += np.abs(np.linalg.lstsq(J, e.ravel(), rcond=None)[0]) <= reach
-        noted += bool(found.notes)
-    print(f"a note in {noted} of {TOWING_RECORDS} towing records")
-    for name, held, linear in zip(("EI", "drag"), within, by_hand, strict=True):
-        low, high = binomtest(held, TOWING_RECORDS).proportion_ci()
-        print(
-            f"{name} within its 95 % in {held} of {TOWING_RECORDS} towing records ({100 * held / TOWING_RECORDS:.1f} %, "
-            f"95 % from {100 * low:.1f} to {100 * high:.1f}); {linear} by linear least squares by hand"
+        return hybrid.design(task)
+
+    count_intervals("a towing run", TOWED, TOWED_NOISE, towed, identify)
+
+
+def test_stated_intervals_of_friction_hold_the_truth(tmp_path: Path) -> None:
+    """Friction and drag along a line from records of its pull on a bed, from rest to a speed of 2 m/s.
+
+    At that speed the pull is friction of its weight and drag on pi x diameter, a closed form.
+    """
+    scene, record = tmp_path / "dragged.yaml", tmp_path / "pull.csv"
+    scene.write_text(DRAGGED_SCENE)
+
+    def simulate(numbers: Mapping[str, float]) -> Floats:
+        run = hybrid.run(hybrid.load_scene(scene, [*(f"{k}={x}" for k, x in numbers.items()), "output.every=0.1"]))
+        return np.stack([run.t, run["tension"][:, -1]], axis=1)[1:]
+
+    def identify(table: Floats, seed: int) -> Found:
+        record.write_text("".join(["t,tension\n", *(f"{a:.1f},{b:.3f}\n" for a, b in table)]))
+        return hybrid.design(
+            hybrid.load_scene(scene),
+            unknowns={
+                "friction": {"key": friction, "low": 0.05, "high": 2},
+                "drag": {"key": drag, "low": 0.003, "high": 0.3},
+            },
+            measured={"file": str(record), "at": "end", "deviation": float(*DRAGGED_NOISE)},
         )
-        assert binomtest(held, TOWING_RECORDS, 0.95).pvalue > 0.001
-        assert abs(held - linear) <= max(1, 0.03 * TOWING_RECORDS)
+
+    friction, drag = DRAGGED
+    steady = 20 * (DRAGGED[friction] * DRAGGED_WEIGHT + 500 * np.pi * 0.03 * DRAGGED[drag] * 2**2)
+    assert simulate(DRAGGED)[-1, 1] == pytest.approx(steady, rel=1e-3)
+    count_intervals("the pull of a dragged line", DRAGGED, DRAGGED_NOISE, simulate, identify)
