@@ -27,7 +27,8 @@ from hybrid.kernels.state.state import Floats
 from hybrid.model.ends import EndLoad, end_load
 from hybrid.model.members import Members, pieces_of
 from hybrid.model.sea import Surroundings
-from hybrid.scene.bodies import FixedBody, FreeBody, turned
+from hybrid.scene.base import turned
+from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.end_loads import GivenLoad
 from hybrid.scene.motion import EndMotion, MotionTerms
 

@@ -20,7 +20,9 @@ from hybrid.kernels.state.obstacle_rows import (
     RAMP,
     RATE,
     RIDES,
+    SIDE,
     STILL_AXIS,
+    STILL_SIDE,
     SWEEP,
     TURNED,
 )
@@ -51,6 +53,7 @@ def courses_of(scene: Scene, rows: Floats, waves: Floats, ramp: float, elevation
     position, frame = np.array([x.at for x in scene.obstacles.values()], float), np.tile(still.ravel(), (count, 1))
     carried, paths = np.zeros((count, CARRIED)), np.zeros((count, PATH))
     carried[:, STILL_AXIS : STILL_AXIS + 3], carried[:, TURNED : TURNED + 9] = rows[:, AXIS : AXIS + 3], frame
+    carried[:, STILL_SIDE : STILL_SIDE + 3] = rows[:, SIDE : SIDE + 3]
     motions: dict[int, Motion | DrivenEnd] = {}
     driven = {}
     carried[:, MEETS_FROM], carried[:, MEETS_TO] = -np.inf, np.inf  # what comes off a reel at the start has s < 0

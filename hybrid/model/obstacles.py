@@ -9,10 +9,13 @@ import numpy as np
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES
 from hybrid.kernels.state.obstacle_rows import (
     AXIS,
+    BOX,
     DAMPING,
     FIXED,
     FLAT,
     FREE,
+    GROOVE,
+    HALF_HEIGHT,
     HALF_LENGTH,
     KIND,
     MOVES,
@@ -21,17 +24,30 @@ from hybrid.kernels.state.obstacle_rows import (
     ONSET_OF,
     PLACE,
     RADIUS,
+    RIM,
+    RING,
     ROUND,
+    SHEAVE,
+    SIDE,
     SLIP,
     STIFFNESS,
     STRAND,
+    TORUS,
 )
 from hybrid.kernels.state.state import NO_OBSTACLES, Floats
 from hybrid.model.payout import longest_out, whole_scene, winch_side
 from hybrid.model.scales import tension_scale
 from hybrid.model.sections import merged_sections
 from hybrid.scene.base import unit
-from hybrid.scene.obstacles import CylinderObstacle, Obstacle, PlaneObstacle
+from hybrid.scene.obstacles import (
+    BoxObstacle,
+    CylinderObstacle,
+    Obstacle,
+    PlaneObstacle,
+    SheaveObstacle,
+    SphereObstacle,
+    TorusObstacle,
+)
 from hybrid.scene.schema import Scene
 
 # How deep a line lies in an obstacle under what the scene asks for, where it follows its radius and where it touches it
@@ -103,14 +119,9 @@ def obstacle_rows(scene: Scene, pull: float | None = None) -> Floats:
     pull = pull_on_obstacles(scene) if pull is None else pull
     for row, x in zip(rows, scene.obstacles.values(), strict=True):
         row[PLACE : PLACE + 3], row[STRAND] = x.at, strand
-        row[KIND], row[RADIUS], over = ROUND, strand, scene.length
-        if isinstance(x, PlaneObstacle):
-            row[KIND], row[AXIS : AXIS + 3] = FLAT, unit(x.normal)
-        else:
-            row[RADIUS] = over = x.radius + strand
-            row[AXIS : AXIS + 3] = unit(x.axis) if isinstance(x, CylinderObstacle) else (0.0, 0.0, 1.0)
-        if isinstance(x, CylinderObstacle):
-            row[HALF_LENGTH] = math.inf if x.length is None else 0.5 * x.length
+        row[RADIUS] = bend_radius(x) + strand
+        over = scene.length if isinstance(x, PlaneObstacle) else row[RADIUS]
+        _put_shape(row, x, strand)
         # a string under a tension T that half of T presses on a point of a bed of stiffness k: T/2 = 2 sqrt(k T) depth
         at_point = pull / (4.0 * 2.0 * DEPTH_AT_POINT * least) ** 2
         stiffness = max((weight + pull / over) / (2.0 * DEPTH * least), at_point)
@@ -119,7 +130,39 @@ def obstacle_rows(scene: Scene, pull: float | None = None) -> Floats:
     return rows
 
 
+def bend_radius(x: Obstacle) -> float:
+    """Radius, m, to which an obstacle bends a line that lies on it, without that of the line; of a plane 0."""
+    if isinstance(x, PlaneObstacle):
+        return 0.0
+    return x.rounding if isinstance(x, BoxObstacle) else x.radius
+
+
+def _put_shape(row: Floats, x: Obstacle, strand: float) -> None:
+    """What the surface of an obstacle is into its row, but for its radius; strand: m, radius of the line."""
+    if isinstance(x, PlaneObstacle):
+        row[KIND], row[AXIS : AXIS + 3] = FLAT, unit(x.normal)
+        return
+    if isinstance(x, SphereObstacle):
+        row[KIND], row[AXIS : AXIS + 3] = ROUND, (0.0, 0.0, 1.0)
+        return
+    if isinstance(x, BoxObstacle):
+        row[KIND], row[HALF_LENGTH : HALF_HEIGHT + 1] = BOX, x.halves
+        row[AXIS : AXIS + 3], row[SIDE : SIDE + 3], _ = x.axes
+        return
+    row[AXIS : AXIS + 3] = axis = unit(x.axis)
+    if isinstance(x, CylinderObstacle):
+        row[KIND], row[HALF_LENGTH] = ROUND, math.inf if x.length is None else 0.5 * x.length
+        return
+    side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    row[SIDE : SIDE + 3] = side / np.linalg.norm(side)
+    if isinstance(x, TorusObstacle):
+        row[KIND], row[RING] = TORUS, x.ring
+    elif isinstance(x, SheaveObstacle):
+        row[KIND], row[RING], row[GROOVE], row[RIM] = SHEAVE, x.radius + x.groove, x.groove - strand, x.rim + strand
+
+
 def least_cells(scene: Scene) -> float:
     """Cells that a line has at least whose cells follow the radii of obstacles."""
-    radii = [x.radius + strand_radius(scene) for x in scene.obstacles.values() if not isinstance(x, PlaneObstacle)]
+    round_ = [x for x in scene.obstacles.values() if not isinstance(x, PlaneObstacle)]
+    radii = [bend_radius(x) + strand_radius(scene) for x in round_]
     return min(CELLS_PER_RADIUS * scene.length / min(radii), MOST_CELLS) if radii else 0.0

@@ -294,6 +294,15 @@ def unit(a: tuple[float, float, float]) -> tuple[float, float, float]:
     return (a[0] / length, a[1] / length, a[2] / length)
 
 
+def turned(angles: tuple[float, float, float], vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    """A vector turned by roll, pitch and yaw [deg], in this order, about the inertial axes."""
+    (cx, cy, cz), (sx, sy, sz) = ([f(math.radians(a)) for a in angles] for f in (math.cos, math.sin))
+    x, y, z = vector
+    y, z = cx * y - sx * z, sx * y + cx * z
+    x, z = cy * x + sy * z, -sy * x + cy * z
+    return cz * x - sz * y, sz * x + cz * y, z
+
+
 # --- unions: the branch meant is chosen by what was written, so errors speak of that branch only --
 
 

@@ -30,6 +30,7 @@ from hybrid.scene.base import (
     by_kind,
     numbers,
     refuse,
+    turned,
     unwrap,
 )
 from hybrid.scene.body_shapes import BodyShape, Carried, carried_shape
@@ -66,15 +67,6 @@ SixBySix = Annotated[
     Words("six numbers (surge, sway, heave, roll, pitch, yaw), or six rows of six"),
 ]
 Matrix = Sequence[Sequence[float]]
-
-
-def turned(angles: Triple, vector: Triple) -> Triple:
-    """A vector turned by roll, pitch and yaw [deg], in this order, about the inertial axes."""
-    (cx, cy, cz), (sx, sy, sz) = ([f(math.radians(a)) for a in angles] for f in (math.cos, math.sin))
-    x, y, z = vector
-    y, z = cx * y - sx * z, sx * y + cx * z
-    x, z = cy * x + sy * z, -sy * x + cy * z
-    return cz * x - sz * y, sz * x + cz * y, z
 
 
 def no_pivot(matrix: Matrix, least: float) -> bool:

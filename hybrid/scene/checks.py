@@ -39,7 +39,7 @@ from hybrid.scene.base import Finding, Place
 from hybrid.scene.body_shapes import Carried
 from hybrid.scene.cable import Cable, Contact, Environment, Section
 from hybrid.scene.ends import Clamped, Ends, Free, Pinned
-from hybrid.scene.obstacles import Obstacles
+from hybrid.scene.obstacles import Obstacles, SheaveObstacle
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.quantities import of_one_line
 from hybrid.scene.start_checks import SAME_LENGTH
@@ -197,6 +197,10 @@ def _touches_itself(cable: Cable, contact: Contact) -> Iterator[Finding]:
             yield Finding(("cable", "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
 
 
+# Of the radius of a line: how wide the section of a groove is at least in which it lies.
+LEAST_GROOVE = 1.05
+
+
 def _touches_obstacles(cable: Cable, obstacles: Obstacles, ends: Ends) -> Iterator[Finding]:
     """A line that touches obstacles has a radius, and its ends are outside of them."""
     if not obstacles:
@@ -205,6 +209,11 @@ def _touches_obstacles(cable: Cable, obstacles: Obstacles, ends: Ends) -> Iterat
         if section.diameter is None:
             expected = "a number > 0, in m, with which the cable touches obstacles"
             yield Finding(("cable", "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
+    widest = 0.5 * max(section.diameter or 0.0 for section in cable.sections)
+    for name, x in obstacles.items():
+        if isinstance(x, SheaveObstacle) and x.groove < LEAST_GROOVE * widest:
+            expected = f"at least {LEAST_GROOVE * widest:.4g} m, {LEAST_GROOVE:g} times the radius of the cable"
+            yield Finding(("obstacles", name, "groove"), expected, "a wider groove", f"{x.groove:g}")
     for key, places in (("position", ends.held()), ("initial_guess", ends.initial_guesses())):
         for end, place in places.items():
             for name, x in obstacles.items():

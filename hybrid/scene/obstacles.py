@@ -1,13 +1,15 @@
-"""Obstacles that a line touches, fixed or moving: planes, spheres and cylinders, by name."""
+"""Obstacles that a line touches, fixed or moving, by name: planes, spheres, cylinders, boxes, tori and sheaves."""
 
 from __future__ import annotations
 
 import math
+from operator import mul
 from typing import Annotated, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.base import (
+    Before,
     Direction,
     Finding,
     Kinds,
@@ -16,8 +18,11 @@ from hybrid.scene.base import (
     Positive,
     Table,
     Vector,
+    Words,
     by_kind,
+    numbers,
     refuse,
+    turned,
     unit,
 )
 from hybrid.scene.motion_tables import Motion
@@ -33,14 +38,14 @@ _MOTION = "how it moves, and turns about the place `at`, where it is at t = 0; a
 
 
 class Spin(Table):
-    """Turning of a cylinder about its own axis, which carries along what rubs on it."""
+    """Turning of a cylinder, torus or sheave about its own axis, which carries along what rubs on it."""
 
     rate: Number = Field(description="angular velocity about `axis`, right-handed [rad/s]")
     ramp: Positive = Field(description="time over which it grows from zero, smoothly [s]")
 
 
 class Bearing(Table):
-    """A bearing about which a cylinder turns freely, as a sheave does under a line that rubs on it."""
+    """A bearing about which a cylinder, torus or sheave turns freely under a line that rubs on it."""
 
     inertia: Positive = Field(description="moment of inertia about its axis [kg m^2]")
     damping: NonNegative = Field(default=0.0, description="moment of the bearing over the rate of its turn [N m s/rad]")
@@ -94,16 +99,9 @@ class SphereObstacle(_Obstacle):
         return math.dist(x, self.at) - self.radius
 
 
-class CylinderObstacle(_Obstacle):
-    """A roller, pile or pipe."""
+class _Turning(_Obstacle):
+    """What those have that turn about an axis of their own."""
 
-    kind: Literal["cylinder"] = Field(default="cylinder", description="a round cylinder: a pipe, pile or roller")
-    at: Vector = Field(description="the middle of its axis, or any point of an endless one, inertial frame [m]")
-    axis: Direction = Field(description="direction of its axis; any length [-]")
-    radius: Positive = Field(description="radius [m]")
-    length: Positive | None = Field(
-        default=None, description="its length, without the half spheres in which it ends; absent: endless [m]"
-    )
     spin: Spin | None = Field(
         default=None, description="how it turns about its axis, as a driven roller; absent: not at all"
     )
@@ -118,6 +116,18 @@ class CylinderObstacle(_Obstacle):
             refuse([Finding(("bearing",), "nothing, because the spin is given", "leave out the one or the other")])
         return self
 
+
+class CylinderObstacle(_Turning):
+    """A roller, pile or pipe."""
+
+    kind: Literal["cylinder"] = Field(default="cylinder", description="a round cylinder: a pipe, pile or roller")
+    at: Vector = Field(description="the middle of its axis, or any point of an endless one, inertial frame [m]")
+    axis: Direction = Field(description="direction of its axis; any length [-]")
+    radius: Positive = Field(description="radius [m]")
+    length: Positive | None = Field(
+        default=None, description="its length, without the half spheres in which it ends; absent: endless [m]"
+    )
+
     def distance(self, x: tuple[float, float, float]) -> float:
         """Distance [m] of a place to the surface; negative within the solid."""
         half, a = math.inf if self.length is None else 0.5 * self.length, unit(self.axis)
@@ -126,11 +136,115 @@ class CylinderObstacle(_Obstacle):
         return math.hypot(*(p - along * q for p, q in zip(w, a, strict=True))) - self.radius
 
 
+class BoxObstacle(_Obstacle):
+    """A box with rounded edges: a deck, beam, chute or container."""
+
+    kind: Literal["box"] = Field(default="box", description="a box with rounded edges")
+    at: Vector = Field(description="its middle, inertial frame [m]")
+    size: Annotated[tuple[Positive, Positive, Positive], Before(numbers(3)), Words("three numbers > 0")] = Field(
+        description="its outer length, width and height, along axes of its own [m]"
+    )
+    rounding: Positive = Field(description="radius of its edges, at most half of the smallest of `size` [m]")
+    rotation: Vector = Field(
+        default=(0.0, 0.0, 0.0),
+        description="how it is turned at t = 0: roll, pitch, yaw, about x, then y, then z of the inertial frame [deg]",
+    )
+
+    @model_validator(mode="after")
+    def _is_round_within_its_size(self) -> Self:
+        if 2.0 * self.rounding > min(self.size):
+            expected = f"at most half of the smallest of `size`, {0.5 * min(self.size):g} m"
+            refuse([Finding(("rounding",), expected, "a smaller radius, or a larger size", f"{self.rounding:g}")])
+        return self
+
+    @property
+    def halves(self) -> tuple[float, float, float]:
+        """Half lengths [m] of its flat faces."""
+        x, y, z = (0.5 * a - self.rounding for a in self.size)
+        return x, y, z
+
+    @property
+    def axes(self) -> tuple[tuple[float, float, float], ...]:
+        """Its axes (3, 3), inertial [-], at t = 0."""
+        return tuple(turned(self.rotation, x) for x in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+
+    def distance(self, x: tuple[float, float, float]) -> float:
+        """Distance [m] of a place to the surface; negative within the solid."""
+        w = [p - q for p, q in zip(x, self.at, strict=True)]
+        past = [abs(sum(map(mul, w, a))) - half for a, half in zip(self.axes, self.halves, strict=True)]
+        return math.hypot(*(max(p, 0.0) for p in past)) + min(max(past), 0.0) - self.rounding
+
+
+class TorusObstacle(_Turning):
+    """A ring of round section: a shackle, fairlead or eye, through which a line may pass."""
+
+    kind: Literal["torus"] = Field(default="torus", description="a ring of round section")
+    at: Vector = Field(description="its middle, inertial frame [m]")
+    axis: Direction = Field(description="direction of its axis; any length [-]")
+    ring: Positive = Field(description="radius of the middle of the ring [m]")
+    radius: Positive = Field(description="radius of its section, smaller than that of the ring [m]")
+
+    @model_validator(mode="after")
+    def _has_a_hole(self) -> Self:
+        if self.radius >= self.ring:
+            expected = f"less than the radius of the ring, {self.ring:g} m"
+            refuse([Finding(("radius",), expected, "a larger `ring`, or a sphere", f"{self.radius:g}")])
+        return self
+
+    def distance(self, x: tuple[float, float, float]) -> float:
+        """Distance [m] of a place to the surface; negative within the solid."""
+        away, along = _about(x, self.at, self.axis)
+        return math.hypot(away - self.ring, along) - self.radius
+
+
+class SheaveObstacle(_Turning):
+    """A disc with a groove of round section around it, in which a line lies, between rims of round section."""
+
+    kind: Literal["sheave"] = Field(default="sheave", description="a disc with a groove around it")
+    at: Vector = Field(description="its middle, inertial frame [m]")
+    axis: Direction = Field(description="direction of its axis; any length [-]")
+    radius: Positive = Field(description="radius of the disc at the bottom of the groove [m]")
+    groove: Positive = Field(
+        description="radius of the section of the groove, half as wide as it is; larger than that of the line [m]"
+    )
+    rim: Positive = Field(description="radius of the section of its rims, each twice that thick [m]")
+
+    def distance(self, x: tuple[float, float, float]) -> float:
+        """Distance [m] of a place to the surface; negative within the solid."""
+        away, along = _about(x, self.at, self.axis)
+        out, along = away - self.radius - self.groove, abs(along)
+        if out > 0.0:
+            return math.hypot(out, along - self.groove - self.rim) - self.rim
+        return max(self.groove - math.hypot(out, along), along - self.groove - 2.0 * self.rim)
+
+
+def _about(
+    x: tuple[float, float, float], at: tuple[float, float, float], axis: tuple[float, float, float]
+) -> tuple[float, float]:
+    """How far [m] a place is away from an axis through `at`, and along it."""
+    w, a = [p - q for p, q in zip(x, at, strict=True)], unit(axis)
+    along = sum(map(mul, w, a))
+    return math.hypot(*(p - along * q for p, q in zip(w, a, strict=True))), along
+
+
 Obstacle = Annotated[
     Annotated[PlaneObstacle, Tag("<plane>")]
     | Annotated[SphereObstacle, Tag("<sphere>")]
-    | Annotated[CylinderObstacle, Tag("<cylinder>")],
+    | Annotated[CylinderObstacle, Tag("<cylinder>")]
+    | Annotated[BoxObstacle, Tag("<box>")]
+    | Annotated[TorusObstacle, Tag("<torus>")]
+    | Annotated[SheaveObstacle, Tag("<sheave>")],
     Discriminator(by_kind),
-    Kinds(("plane", "sphere", "cylinder"), usual=("cylinder",), implied=(("axis", "cylinder"), ("normal", "plane"))),
+    Kinds(
+        ("plane", "sphere", "cylinder", "box", "torus", "sheave"),
+        usual=("cylinder",),
+        implied=(
+            ("normal", "plane"),
+            ("rounding", "box"),
+            ("ring", "torus"),
+            ("groove", "sheave"),
+            ("axis", "cylinder"),
+        ),
+    ),
 ]
 Obstacles = dict[Name, Obstacle]

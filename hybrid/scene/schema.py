@@ -40,7 +40,15 @@ from hybrid.scene.checks import contradictions
 from hybrid.scene.end_loads import Load
 from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned
 from hybrid.scene.motion_tables import Harmonic, Motion, Travel
-from hybrid.scene.obstacles import CylinderObstacle, Obstacles, PlaneObstacle, SphereObstacle
+from hybrid.scene.obstacles import (
+    BoxObstacle,
+    CylinderObstacle,
+    Obstacles,
+    PlaneObstacle,
+    SheaveObstacle,
+    SphereObstacle,
+    TorusObstacle,
+)
 from hybrid.scene.sea import (
     Current,
     CurrentPoint,
@@ -68,6 +76,7 @@ __all__ = [
     "BendRestrictor",
     "BendStiffener",
     "Body",
+    "BoxObstacle",
     "Cable",
     "CatenaryModel",
     "CatenaryZone",
@@ -113,6 +122,7 @@ __all__ = [
     "Scene",
     "Seabed",
     "Section",
+    "SheaveObstacle",
     "SphereObstacle",
     "Spread",
     "Spreading",
@@ -123,6 +133,7 @@ __all__ = [
     "Table",
     "Time",
     "TorsethaugenWaves",
+    "TorusObstacle",
     "Travel",
     "UniformCurrent",
     "Vector",
@@ -144,7 +155,9 @@ class Scene(Table):
     cable: Cable = Field(description="what the cable is made of")
     contact: Contact = Field(default=Contact(), description="what the cable touches beside the seabed")
     obstacles: Obstacles = Field(
-        default={}, description="obstacles by name, fixed or moving, that the cable touches: planes, spheres, cylinders"
+        default={},
+        description="obstacles by name, fixed or moving, that the cable touches: planes, spheres, cylinders, boxes, "
+        "tori, sheaves",
     )
     ends: Ends = Field(description="how the ends are held, moved and loaded")
     initial: Initial = Field(description="where the cable is at t = 0")

@@ -29,8 +29,8 @@ from hybrid.scene.analysis import (
     Time,
 )
 from hybrid.scene.attachments import Attachment
-from hybrid.scene.base import Finding, NonNegative, Pair, Positive, Table, Text, Truth, Whole, refuse
-from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, turned, without_turns
+from hybrid.scene.base import Finding, NonNegative, Pair, Positive, Table, Text, Truth, Whole, refuse, turned
+from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, without_turns
 from hybrid.scene.cable import Cable, Contact, Environment, Section
 from hybrid.scene.combinations import instead
 from hybrid.scene.connections import ClampedConnection, Connections
@@ -228,7 +228,8 @@ class System(Table):
     )
     obstacles: Obstacles = Field(
         default={},
-        description="obstacles by name, fixed or moving, that every line touches: planes, spheres, cylinders",
+        description="obstacles by name, fixed or moving, that every line touches: planes, spheres, cylinders, boxes, "
+        "tori, sheaves",
     )
     time: Time | None = Field(default=None, description="how long to compute; absent: statics only")
     accuracy: AskedAccuracy | None = Field(

@@ -14,13 +14,13 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, distances, put_obstacles
+from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, distances, half_thickness, put_obstacles
 from hybrid.kernels.march.resolution_checks import lowest
 from hybrid.kernels.run.entry import sharpest
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, PLANAR, SEABED, SELF_FRICTION
-from hybrid.kernels.state.obstacle_rows import KIND, RADIUS, RIDES, ROUND
+from hybrid.kernels.state.obstacle_rows import FLAT, KIND, RADIUS, RIDES
 from hybrid.kernels.state.report import BEND, TWIST_NODE
 from hybrid.kernels.state.state import Batch, Ends, Floats, State, ends_in, state_in
 from hybrid.kernels.step.accept import LARGEST_TWIST
@@ -484,7 +484,7 @@ class Diagnostics:
             if self._round:
                 continue
             coarse = (within > -TOUCHING) & (CELLS_PER_RADIUS * longest > 1.01 * rows[:, RADIUS, None])
-            coarse &= (rows[:, KIND] == ROUND)[:, None]
+            coarse &= (rows[:, KIND] != FLAT)[:, None]
             if coarse.any():
                 which, node = (int(i) for i in np.argwhere(coarse)[0])
                 name, radius = sea.names[which], rows[which, RADIUS]
@@ -501,13 +501,14 @@ class Diagnostics:
         """Cells longer than an obstacle is thick, and so near to it that it may pass between their nodes untouched."""
         h, gap = self._model.line.h, distances(rows, r)
         gap = np.maximum(np.minimum(gap[:, :-1], gap[:, 1:]), 0.0)  # of the nearer node of each cell
-        missed = (rows[:, KIND] == ROUND)[:, None] & (h > 2.0 * rows[:, RADIUS, None]) & (gap < 0.5 * h)
+        wide = 2.0 * half_thickness(rows)
+        missed = (h > wide[:, None]) & (gap < 0.5 * h)
         if met is not None:
             missed &= met > 0.0
         if not missed.any():
             return
         which, cell = (int(i) for i in np.argwhere(missed)[0])
-        name, thick = self._model.sea.names[which], 2.0 * rows[which, RADIUS]
+        name, thick = self._model.sea.names[which], wide[which]
         text = (
             f"at s = {self._model.line.s[cell]:g} m the line is {gap[which, cell]:.2g} m from obstacle {name}, which "
             f"may pass between two nodes without touching one: cells are {h[cell]:.2g} m long, and cells of "

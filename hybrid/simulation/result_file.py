@@ -10,7 +10,23 @@ import numpy as np
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.machine.cache import cache_folder
 from hybrid.kernels.state.forces import OBSTACLES, SEABED, SURFACE
-from hybrid.kernels.state.obstacle_rows import AXIS, HALF_LENGTH, KIND, PLACE, RADIUS, STILL_AXIS, STRAND
+from hybrid.kernels.state.obstacle_rows import (
+    AXIS,
+    GROOVE,
+    HALF_HEIGHT,
+    HALF_LENGTH,
+    HALF_WIDTH,
+    KIND,
+    PLACE,
+    RADIUS,
+    RIM,
+    RING,
+    ROUND,
+    SIDE,
+    STILL_AXIS,
+    STILL_SIDE,
+    STRAND,
+)
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
@@ -259,13 +275,21 @@ def _obstacle_shapes(model: Model) -> list[tuple[Field, np.ndarray]]:
     sea, found = model.sea.values, []
     for k, name in enumerate(model.sea.names):
         row = sea.obstacles[k]
-        place, axis = row[PLACE : PLACE + 3], row[AXIS : AXIS + 3]
+        place, axis, side = row[PLACE : PLACE + 3], row[AXIS : AXIS + 3], row[SIDE : SIDE + 3]
         if sea.carried.size:
             place, axis = sea.courses.position[k], sea.carried[k, STILL_AXIS : STILL_AXIS + 3]
+            side = sea.carried[k, STILL_SIDE : STILL_SIDE + 3]
         half = row[HALF_LENGTH] if np.isfinite(row[HALF_LENGTH]) else -1.0
         what = "kind (0 plane, 1 round), place, axis or normal, radius, half its length (0: a ball, -1: endless)"
-        text = f"obstacle {name} at t = 0: {what}"
         shape = np.array([row[KIND], *place, *axis, row[RADIUS] - row[STRAND], half])
+        if row[KIND] > ROUND:
+            what = (
+                "kind (2 box, 3 torus, 4 sheave), place, axis, radius (edges, section, bottom of the groove), half "
+                "lengths of flat faces of a box, its second axis, radius of the ring, of the groove and of its rims"
+            )
+            more = row[HALF_WIDTH], row[HALF_HEIGHT], *side, row[RING]
+            shape = np.array([*shape, *more, row[GROOVE] + row[STRAND], max(row[RIM] - row[STRAND], 0.0)])
+        text = f"obstacle {name} at t = 0: {what}"
         found.append((Field(f"obstacles/{name}/shape", "", text, shape.shape, ("shape",), "inertial"), shape))
     return found
 

@@ -11,7 +11,7 @@ from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, distances
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held
 from hybrid.kernels.state.forces import BODIES, FRICTION, OBSTACLES, SEABED
-from hybrid.kernels.state.obstacle_rows import AXIS, HALF_LENGTH, KIND, PLACE, RADIUS, ROUND
+from hybrid.kernels.state.obstacle_rows import AXIS, FLAT, HALF_LENGTH, KIND, PLACE, RADIUS, ROUND, SHEAVE, TORUS
 from hybrid.kernels.state.state import Floats, Line, Sea, State
 
 # A line that lies this part of its length, and this many onsets of contact, under the bed has gone through it.
@@ -97,14 +97,15 @@ def behind_obstacles(line: Line, sea: Sea, state: State) -> Iterator[tuple[int, 
     met = cells_met(sea.carried, line.s) if sea.carried.size else None
     touched = depths_in_obstacles(rows, state.r, line.s, met) > -TOUCHING
     for which, (row, nodes) in enumerate(zip(rows, touched, strict=True)):
-        if row[KIND] != ROUND or not nodes.any():
+        if row[KIND] in (FLAT, TORUS) or not nodes.any():  # through a torus a line passes on any side
             continue
         axis, place, r = row[AXIS : AXIS + 3], row[PLACE : PLACE + 3], state.r[nodes]
-        along = np.clip((r - place) @ axis, -row[HALF_LENGTH], row[HALF_LENGTH])
+        half = row[HALF_LENGTH] if row[KIND] == ROUND else 0.0
+        along = np.clip((r - place) @ axis, -half, half)
         middle = place + along.mean() * axis
         part = np.clip((middle - state.r[0]) @ way / (way @ way), 0.0, 1.0) if way.any() else 0.0
         span, side = state.r[0] + part * way - middle, (r - middle).mean(axis=0)
-        if row[HALF_LENGTH] > 0.0:  # of a cylinder what counts is across its axis
+        if half > 0.0 or row[KIND] == SHEAVE:  # of a cylinder or sheave what counts is across its axis
             span, side = span - (span @ axis) * axis, side - (side @ axis) * axis
         if span @ side < -BEHIND * row[RADIUS] ** 2:
             yield which, int(np.flatnonzero(nodes)[0])
@@ -117,7 +118,7 @@ def obstacles_left(line: Line, sea: Sea, start: State, state: State) -> Iterator
     touched = depths_in_obstacles(rows, state.r, line.s, met).max(axis=1) > -TOUCHING
     gaps = distances(rows, start.r)
     for which, gap in enumerate(gaps):
-        if rows[which, KIND] == ROUND and not touched[which] and gap.min() < BEHIND * rows[which, RADIUS]:
+        if rows[which, KIND] != FLAT and not touched[which] and gap.min() < BEHIND * rows[which, RADIUS]:
             yield which, int(np.argmin(gap))
 
 

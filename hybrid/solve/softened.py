@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from hybrid.kernels.laws.obstacles import half_thickness
 from hybrid.kernels.state.forces import OBSTACLES, SEABED
-from hybrid.kernels.state.obstacle_rows import KIND, ONSET_OF, RADIUS, ROUND, STIFFNESS
+from hybrid.kernels.state.obstacle_rows import ONSET_OF, STIFFNESS
 from hybrid.kernels.state.state import Line, Sea
 
-# How deep a continuation lets a line lie first in the bed, of its length, and in a round obstacle, of its radius.
+# How deep a continuation lets a line lie first in the bed, of its length, and in an obstacle, of half of how thick
+# it is; in a plane as in the bed.
 SOFT_BED, SOFT = 0.05, 0.5
 
 
@@ -21,7 +25,8 @@ def softened(sea: Sea, part: float) -> Sea:
 def softest(line: Line, sea: Sea, length: float) -> float:
     """The part of the stiffness of bed and obstacles at which a line of this length (m) lies as deep as it may."""
     soft = sea.onset / (SOFT_BED * length) if line.bits & SEABED else 1.0
-    for row in sea.obstacles if line.bits & OBSTACLES else ():
-        deep = SOFT * row[RADIUS] if row[KIND] == ROUND else SOFT_BED * length
-        soft = min(soft, float(row[ONSET_OF]) / deep)
+    if line.bits & OBSTACLES:
+        thick = half_thickness(sea.obstacles)
+        deep = np.where(np.isfinite(thick), SOFT * thick, SOFT_BED * length)
+        soft = min(soft, float((sea.obstacles[:, ONSET_OF] / deep).min(initial=1.0)))
     return min(1.0, soft)

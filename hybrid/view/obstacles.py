@@ -13,18 +13,20 @@ from hybrid.view.style import STONE, STONE_EDGE, short
 
 # Points around a round obstacle and along its half spheres; beyond the picture, in sizes of that, endless ones go on.
 AROUND, OVER, BEYOND = 32, 7, 0.2
-PLANE, ROUND = 0.0, 1.0
+PLANE, ROUND, BOX, TORUS, SHEAVE = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 class Body(NamedTuple):
     """An obstacle where it is at an output."""
 
     name: str
-    kind: float  # PLANE or ROUND
+    kind: float  # PLANE, ROUND, BOX, TORUS or SHEAVE
     place: np.ndarray  # (3,) m
     axis: np.ndarray  # (3,) of a cylinder, or the normal of a plane
     radius: float  # m
     half: float  # m, half its length; 0: a ball, infinite: endless
+    more: tuple[float, ...] = ()  # of a box half its width and height; radii (m) of ring, groove and rims
+    side: np.ndarray = np.zeros(3)  # (3,) second axis of a box
 
 
 def obstacles_at(result: Result, output: int, moving: bool | None = None) -> list[Body]:
@@ -32,15 +34,16 @@ def obstacles_at(result: Result, output: int, moving: bool | None = None) -> lis
     found = []
     for name in names_of(result):
         kind, *more = result[f"obstacles/{name}/shape"].tolist()
-        place, axis, (radius, half) = np.array(more[:3]), np.array(more[3:6]), more[6:]
-        half = half if half >= 0.0 else np.inf
+        place, axis, (radius, half) = np.array(more[:3]), np.array(more[3:6]), more[6:8]
+        half, side = half if half >= 0.0 else np.inf, np.array(more[10:13])
         moves = moves_ever(result, name)
         if moving is not None and moves != moving:
             continue
         if f"obstacles/{name}/position" in result:
             place = result[f"obstacles/{name}/position"][output]
-            axis = _rotation(np.radians(result[f"obstacles/{name}/rotation"][output])) @ axis
-        found.append(Body(name, kind, place, axis, radius, half))
+            turn = _rotation(np.radians(result[f"obstacles/{name}/rotation"][output]))
+            axis, side = turn @ axis, turn @ side if side.size else side
+        found.append(Body(name, kind, place, axis, radius, half, (*more[8:10], *more[13:]), side))
     return found
 
 
@@ -76,17 +79,57 @@ def across(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _surface(body: Body, low: float, high: float) -> np.ndarray:
-    """Rings (n, AROUND, 3) of a round obstacle from end to end; low, high: m along its axis, of an endless one."""
-    p, q = across(body.axis)
+    """Rings (n, AROUND, 3) of an obstacle from end to end; low, high: m along its axis, of an endless one.
+
+    Of a torus the last is the first.
+    """
     turn = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+    if body.kind == BOX:
+        return _box(body)
+    p, q = across(body.axis)
     round_ = np.cos(turn)[:, None] * p + np.sin(turn)[:, None] * q
-    if np.isfinite(body.half):
+    if body.kind == TORUS:
+        along, out = _arc(body.more[2], 0.0, body.radius, np.linspace(0.0, 2.0 * np.pi, AROUND + 1))
+    elif body.kind == SHEAVE:
+        along, out = _profile(body)
+    elif np.isfinite(body.half):
         rise = np.linspace(0.0, 0.5 * np.pi, OVER)
         cap, out = body.half + body.radius * np.sin(rise), body.radius * np.cos(rise)
         along, out = np.concatenate([-cap[::-1], cap]), np.concatenate([out[::-1], out])
     else:
         along, out = np.array([low, high]), np.full(2, body.radius)
     return np.asarray(body.place + along[:, None, None] * body.axis + out[:, None, None] * round_)
+
+
+def _arc(away: float, along: float, radius: float, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a circle about (along, away), m: along an axis and away from it; angle: rad, from outwards on."""
+    return along + radius * np.sin(angle), away + radius * np.cos(angle)
+
+
+def _profile(body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """The section of a sheave from one side of its axis to the other: along that and away from it, m."""
+    groove, rim = body.more[3:]
+    ring, middle = body.radius + groove, groove + rim
+    half = np.linspace(-0.5 * np.pi, 0.5 * np.pi, AROUND // 2)
+    low, high = _arc(ring, -middle, rim, half), _arc(ring, middle, rim, half)
+    bottom = _arc(ring, 0.0, groove, np.linspace(1.5 * np.pi, 0.5 * np.pi, AROUND // 2))
+    ends = ([-middle - rim], [0.0]), ([middle + rim], [0.0])
+    along, out = (np.concatenate([x[k] for x in (ends[0], low, bottom, high, ends[1])]) for k in (0, 1))
+    return along, out
+
+
+def _box(body: Body) -> np.ndarray:
+    """Rings (n, AROUND, 3) of a box with rounded edges, from one face along its axis to the other."""
+    axes = np.array([body.axis, body.side, np.cross(body.axis, body.side)])
+    turn = (np.arange(AROUND) + 0.5) * 2.0 * np.pi / AROUND  # no direction lies in a face: it has a corner
+    rise = np.linspace(0.5 * np.pi, 0.0, OVER)
+    rise = np.concatenate([-rise, rise[::-1]])
+    n = np.stack([np.outer(np.sin(rise), np.ones(AROUND)), np.outer(np.cos(rise), np.cos(turn)),
+                  np.outer(np.cos(rise), np.sin(turn))], axis=-1)  # fmt: skip
+    sides = np.concatenate([-np.ones(OVER), np.ones(OVER)])[:, None]
+    signs = np.stack(np.broadcast_arrays(sides, np.sign(np.cos(turn)), np.sign(np.sin(turn))), axis=-1)
+    local = body.radius * n + signs * np.array([body.half, *body.more[:2]])
+    return np.asarray(body.place + local @ axes)
 
 
 def outlines(result: Result, view: View, output: int, moving: bool | None = None) -> list[Item]:
@@ -99,14 +142,24 @@ def outlines(result: Result, view: View, output: int, moving: bool | None = None
             corners = _half_plane(body, view, box, size)
         else:
             at = float((result.position[output].mean(axis=0) - body.place) @ body.axis)
-            x, y = view.project(_surface(body, at - 3.0 * size, at + 3.0 * size).reshape(-1, 3))
+            rings = _surface(body, at - 3.0 * size, at + 3.0 * size)
+            x, y = view.project(rings.reshape(-1, 3))
+            if body.kind == TORUS:  # what is seen through its hole stays
+                items.append(Area(_quads(np.stack([x, y], axis=-1).reshape(len(rings), AROUND, 2)), STONE, "obstacle"))
+                continue
             corners = hull(np.column_stack([x, y]))
         if corners is not None:
             items.append(Area(corners[None], STONE, "obstacle"))
-            edge = corners if body.kind == ROUND else corners[:2]
-            closed = np.vstack([edge, edge[:1]]) if body.kind == ROUND else edge
+            edge = corners if body.kind != PLANE else corners[:2]
+            closed = np.vstack([edge, edge[:1]]) if body.kind != PLANE else edge
             items.append(Line(closed[:, 0], closed[:, 1], colour=STONE_EDGE, width=0.8))
     return items
+
+
+def _quads(rings: np.ndarray) -> np.ndarray:
+    """Corners (m, 4, 2) of the faces between neighbouring points of rings (n, AROUND, 2)."""
+    after = np.roll(rings, -1, axis=1)
+    return np.stack([rings[:-1], after[:-1], after[1:], rings[1:]], axis=2).reshape(-1, 4, 2)
 
 
 def _half_plane(body: Body, view: View, box: np.ndarray, size: float) -> np.ndarray | None:
@@ -165,17 +218,20 @@ def surfaces(result: Result, box: np.ndarray, moving: bool | None = None, output
     found = obstacles_at(result, output, moving)
     size = float(np.ptp(box, axis=0).max()) or 1.0
     for body in found:
-        if body.kind == ROUND:
+        if body.kind > ROUND:
+            x = _surface(body, 0.0, 0.0).reshape(-1, 3)
+            low, high = x.min(axis=0), x.max(axis=0)
+        elif body.kind == ROUND:
             p = np.clip(body.place, *box) if not np.isfinite(body.half) else body.place
             reach = body.radius + (body.half if np.isfinite(body.half) else 0.0)
-            if body.kind == ROUND and np.isfinite(body.half):
+            if np.isfinite(body.half):
                 low, high = p - reach, p + reach
             else:
                 wide = body.radius * np.sqrt(1.0 - body.axis**2)
                 low, high = body.place - wide, body.place + wide
                 low, high = (np.where(np.abs(body.axis) > 0.9, p, x) for x in (low, high))
-            if np.all(high > box[0] - size) and np.all(low < box[1] + size):
-                box[0], box[1] = np.minimum(box[0], low), np.maximum(box[1], high)
+        if body.kind != PLANE and np.all(high > box[0] - size) and np.all(low < box[1] + size):
+            box[0], box[1] = np.minimum(box[0], low), np.maximum(box[1], high)
     when = f" at t = {short(float(result.times[output]), 4)} s"
     return [_triangles(body, box, when if moves_ever(result, body.name) else "") for body in found]
 

@@ -35,13 +35,17 @@ from hybrid.kernels.state.state import NO_CARRIED, NO_GRIP, NO_MOVES, NO_ROOM, E
 
 N = 7
 CV, CA = 3.0, 7.0
-# A plane, a sphere, an endless cylinder and one with round ends that the line of `random_case` runs through: kind, place,
-# axis, radius, half length, strand, friction, stiffness, damping, onset, elastic travel.
+# A plane, a sphere, an endless cylinder, one with round ends, a box, a torus and a sheave that the line of `random_case` runs
+# through, each with the numbers of kernels.state.obstacle_rows.
+X, UP, NO = [1.0, 0.0, 0.0], [0.6, 0.0, 0.8], [0.0] * 5
 OBSTACLES_THERE = np.array([
-    [0, 0.0, 0.0, -3.0, 0.6, 0.0, 0.8, 0.1, 0.0, 0.1, 0.2, 2.0, 0.3, 40.0, 0.3],
-    [1, 2.0, 1.0, 0.5, 0.0, 0.0, 1.0, 2.0, 0.0, 0.1, 0.5, 3.0, 0.4, 50.0, 0.4],
-    [1, 4.0, -1.0, 1.0, 0.0, 0.8, 0.6, 1.5, np.inf, 0.1, 0.4, 4.0, 0.2, 50.0, 3.0],
-    [1, 5.0, 2.0, -1.5, 0.6, 0.0, 0.8, 1.5, 1.0, 0.1, 0.0, 2.0, 0.5, 60.0, 0.2],
+    [0, 0.0, 0.0, -3.0, *UP, *X, 0.1, 0.0, *NO, 0.1, 0.2, 2.0, 0.3, 40.0, 0.3],
+    [1, 2.0, 1.0, 0.5, 0.0, 0.0, 1.0, *X, 2.0, 0.0, *NO, 0.1, 0.5, 3.0, 0.4, 50.0, 0.4],
+    [1, 4.0, -1.0, 1.0, 0.0, 0.8, 0.6, *X, 1.5, np.inf, *NO, 0.1, 0.4, 4.0, 0.2, 50.0, 3.0],
+    [1, 5.0, 2.0, -1.5, *UP, *X, 1.5, 1.0, *NO, 0.1, 0.0, 2.0, 0.5, 60.0, 0.2],
+    [2, 5.0, 0.0, 0.0, *UP, 0.0, 1.0, 0.0, 0.6, 0.5, 0.4, 0.3, 0.0, 0.0, 0.0, 0.1, 0.4, 2.0, 0.4, 50.0, 0.3],
+    [3, 3.0, 0.0, 0.0, *UP, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.5, 0.0, 0.0, 0.1, 0.3, 3.0, 0.3, 50.0, 0.4],
+    [4, 1.0, -2.0, 0.0, *UP, 0.0, 1.0, 0.0, 1.5, 0.0, 0.0, 0.0, 2.0, 0.8, 0.5, 0.1, 0.2, 2.0, 0.2, 50.0, 0.3],
 ])  # fmt: skip
 ZONES = {
     "rod": [1] * (N + 1),

@@ -40,8 +40,10 @@ from hybrid.kernels.state.obstacle_rows import (
     ENDED,
     OFFSET,
     RADIUS,
+    SIDE,
     SPEED,
     STILL_AXIS,
+    STILL_SIDE,
     SWEEP,
     TURNED,
     TURNING,
@@ -127,6 +129,7 @@ def carry_shape(sea, k, old, new, work):
     put_matrix(sea.carried, k, TURNED, R)
     put_vector(sea.obstacles, k, CENTRE, add(c, mat_vec(R, row3(sea.carried, k, OFFSET))))
     put_vector(sea.obstacles, k, AXIS, mat_vec(R, row3(sea.carried, k, STILL_AXIS)))
+    put_vector(sea.obstacles, k, SIDE, mat_vec(R, row3(sea.carried, k, STILL_SIDE)))
 
 
 @inner

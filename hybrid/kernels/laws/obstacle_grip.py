@@ -15,7 +15,8 @@ from hybrid.kernels.laws.obstacle_motion import (
     way_along,
     way_with,
 )
-from hybrid.kernels.laws.obstacles import Z3, beside, gradient_of_normal, grip, half_cell, meets
+from hybrid.kernels.laws.obstacles import grip, half_cell, meets
+from hybrid.kernels.laws.surfaces import Z3, gradient_of_normal, surface
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import FRICTION
 from hybrid.kernels.state.obstacle_rows import (
@@ -42,8 +43,8 @@ from hybrid.kernels.state.report import CONTACT_WORK, FRICTION_WORK, OBSTACLE_WO
 
 @inner
 def pressed(line, sea, k, i, x, state):
-    """Force N of obstacle k on node i at x along its normal n, with how that bends: N, n, 1/rho, axis."""
-    d, n, hollow, a = beside(sea.obstacles, k, x)
+    """Force N of obstacle k on node i at x along its normal n, with how that bends: N, n, curvature."""
+    d, n, curved = surface(sea.obstacles, k, x)
     v, moves = state.v, line.moved.shape[0] > 0
     vi = get3(v, i)
     if moves:
@@ -54,7 +55,7 @@ def pressed(line, sea, k, i, x, state):
         N += half_cell(line, sea, k, i - 1, x, p, pd, before, get3(v, i - 1), 0.0)[0]
     if i < line.h.shape[0] and meets(line, sea, moves, k, i):
         N += half_cell(line, sea, k, i, x, p, pd, get3(state.e, i), get3(v, i + 1), 0.0)[0]
-    return N, n, hollow, a
+    return N, n, curved
 
 
 @kernel
@@ -62,7 +63,7 @@ def pressure_of_obstacles(line, sea, state, i):
     """Force per length (N/m) of all obstacles across node i, over its half cells."""
     x, F, length = get3(state.r, i), Z3, 0.0
     for k in range(sea.obstacles.shape[0]):
-        N, n, _, _ = pressed(line, sea, k, i, x, state)
+        N, n, _ = pressed(line, sea, k, i, x, state)
         if N != 0.0:
             F = add(F, scale(N, n))
     if i > 0:
@@ -82,11 +83,11 @@ def grip_obstacles(line, sea, u, state, was, now):
     for i in range(u.shape[0]):
         x = get3(state.r, i)
         for k in range(rows.shape[0]):
-            N, n, hollow, a = pressed(line, sea, k, i, x, state)
+            N, n, curved = pressed(line, sea, k, i, x, state)
             f, q = scale(N, n), Z3
             if line.bits & FRICTION and rows[k, MU] > 0.0 and N > 0.0:
                 t = way_along(sea.carried, k, row3(was, i, EACH * k), x, get3(u, i))
-                rub, _, _, q = grip(t, n, gradient_of_normal(hollow, n, a), N, rows[k, MU], rows[k, SLIP])
+                rub, _, _, q = grip(t, n, gradient_of_normal(curved, n), N, rows[k, MU], rows[k, SLIP])
                 f = add(f, rub)
             for j in range(3):
                 now[i, EACH * k + TRAVEL + j], now[i, EACH * k + FORCE + j] = q[j], f[j]
@@ -102,8 +103,8 @@ def mean_force(old, new, i, at):
 @inner
 def normals_of_step(sea, k, x, u):
     """Normals of obstacle k where a node was before the step, and where it is, at x after the displacement u."""
-    _, before, _, _ = beside(sea.obstacles, k, swept(sea.carried, k, sub(x, u)))
-    _, after, _, _ = beside(sea.obstacles, k, x)
+    _, before, _ = surface(sea.obstacles, k, swept(sea.carried, k, sub(x, u)))
+    _, after, _ = surface(sea.obstacles, k, x)
     return mat_vec(transposed(row9(sea.carried, k, SWEEP)), before), after
 
 

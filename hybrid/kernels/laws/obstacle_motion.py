@@ -35,8 +35,10 @@ from hybrid.kernels.state.obstacle_rows import (
     ROLLED,
     ROLLED_BEFORE,
     ROLLING,
+    SIDE,
     SPEED,
     STILL_AXIS,
+    STILL_SIDE,
     SWEEP,
     TURNED,
     TURNING,
@@ -129,6 +131,7 @@ def carry_obstacles(begin, end, sea):
         put_matrix(sea.carried, k, TURNED, R)
         put_vector(sea.obstacles, k, PLACE, c)
         put_vector(sea.obstacles, k, AXIS, mat_vec(bare, row3(sea.carried, k, STILL_AXIS)))
+        put_vector(sea.obstacles, k, SIDE, mat_vec(bare, row3(sea.carried, k, STILL_SIDE)))
 
 
 @inner

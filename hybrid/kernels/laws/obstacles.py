@@ -1,15 +1,13 @@
-"""Obstacles that a line touches, fixed or moving (kernels.laws.obstacle_motion): planes, spheres, cylinders.
+"""Obstacles that a line touches, fixed or moving (kernels.laws.obstacle_motion).
 
-A cylinder of finite length ends in half spheres, so that a sphere is one of no length: the distance of a point to it
-is that to a stretch of its axis, less the radius.  A cell presses on the obstacle as on the bed (kernels.laws.seabed):
-the penetration is linear between its nodes, and the force per length has a potential.
+What d, n and K of each kind are is in kernels.laws.surfaces.  A cell presses on the obstacle as on the bed
+(kernels.laws.seabed): the penetration is linear between its nodes, and the force per length has a potential.
 
     symbol   meaning                                                              shape  unit   frame
     d        distance of the centreline to the surface moved out by the radius
              of the strand                                                        -      m
     n        its gradient, the outward normal                                     3      -      inertial
-    K        gradient of n, (1 - nn^T - aa^T)/rho beside a cylinder of axis a,
-             (1 - nn^T)/rho about its ends and a sphere, 0 of a plane             9      1/m    inertial
+    K        gradient of n                                                        9      1/m    inertial
     p        penetration, o/2 - d with o the onset of contact                     -      m
     N        force on a node along n                                              -      N
     q        elastic travel of friction: the way of the node along the surface    3      m      inertial
@@ -29,12 +27,16 @@ from hybrid.kernels.algebra.rotations import add, cross, dot, get3, madd, mat_ve
 from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.laws.obstacle_motion import row3, surface_velocity, swept, way_along
 from hybrid.kernels.laws.seabed import contact, depth_of, stored, with_cell
+from hybrid.kernels.laws.surfaces import E9, Z3, Z9, bent, gradient_of_normal, surface
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SEABED
 from hybrid.kernels.state.obstacle_rows import (
     AXIS,
+    BOX,
     DAMPING,
     FLAT,
+    GROOVE,
+    HALF_HEIGHT,
     HALF_LENGTH,
     KIND,
     MEETS_FROM,
@@ -46,63 +48,20 @@ from hybrid.kernels.state.obstacle_rows import (
     PIECE_END,
     PLACE,
     RADIUS,
-    ROUND,
+    RIM,
     SEEN_FORCE,
     SEEN_TURN,
+    SHEAVE,
+    SIDE,
     SLIP,
     STIFFNESS,
     STILL_AXIS,
+    STILL_SIDE,
     STRAND,
     THINNER,
     TURNING,
 )
 from hybrid.kernels.state.state import Floats
-
-Z3 = (0.0, 0.0, 0.0)
-Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-E9 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-
-
-@inner
-def beside(rows, k, x):
-    """d and n of obstacle k at a point, 1/rho and the axis without curvature there (0: there is none)."""
-    a = (rows[k, AXIS], rows[k, AXIS + 1], rows[k, AXIS + 2])
-    w = (x[0] - rows[k, PLACE], x[1] - rows[k, PLACE + 1], x[2] - rows[k, PLACE + 2])
-    t = dot(w, a)
-    if rows[k, KIND] == FLAT:
-        return t - rows[k, RADIUS], a, 0.0, a
-    half = rows[k, HALF_LENGTH]
-    along = min(max(t, -half), half)
-    y = sub(w, scale(along, a))
-    rho = math.sqrt(dot(y, y))
-    if not rho > 1e-12 * rows[k, RADIUS]:  # on the axis any direction leads out
-        y = (1.0 - a[0] * a[0], -a[0] * a[1], -a[0] * a[2])
-        if not dot(y, y) > 0.1:
-            y = (-a[1] * a[0], 1.0 - a[1] * a[1], -a[1] * a[2])
-        rho = math.sqrt(dot(y, y))
-        return -rows[k, RADIUS], scale(1.0 / rho, y), 0.0, a
-    if along != t or half == 0.0:
-        a = Z3
-    return rho - rows[k, RADIUS], scale(1.0 / rho, y), 1.0 / rho, a
-
-
-@inner
-def bent(hollow, n, a, y):
-    """K y of a surface."""
-    s, t = dot(n, y), dot(a, y)
-    return (
-        hollow * (y[0] - s * n[0] - t * a[0]),
-        hollow * (y[1] - s * n[1] - t * a[1]),
-        hollow * (y[2] - s * n[2] - t * a[2]),
-    )
-
-
-@inner
-def gradient_of_normal(hollow, n, a):
-    """K of a surface."""
-    if hollow == 0.0:
-        return Z9
-    return mscale(hollow, madd(E9, mscale(-1.0, madd(outer(n, n), outer(a, a)))))
 
 
 @inner
@@ -141,7 +100,7 @@ def half_cell(line, sea, k, c, x, p, pd, e, v, cv):
     p, pd: penetration of the node at x, of a line as thick as the strand, and its rate.
     """
     rows, moves = sea.obstacles, line.moved.shape[0] > 0
-    d, m, hollow, a = beside(rows, k, add(x, e))
+    d, m, curved = surface(rows, k, add(x, e))
     o = rows[k, ONSET_OF]
     po = 0.5 * o - d
     if rows.shape[1] > OBSTACLE:
@@ -156,7 +115,7 @@ def half_cell(line, sea, k, c, x, p, pd, e, v, cv):
     if moves:
         slope = add(slope, scale(g1, cross(m, row3(sea.carried, k, TURNING))))
     if g1 != 0.0:
-        slope = sub(slope, scale(g1, bent(hollow, m, a, v)))
+        slope = sub(slope, scale(g1, bent(curved, m, v)))
     return f, f0, g0, slope
 
 
@@ -170,11 +129,11 @@ def meets(line, sea, moves, k, c):
 
 @inner
 def normal_force(line, sea, moves, k, i, x, v, e, cv):
-    """What obstacle k presses on node i at x with: N, whether it touches, n, 1/rho, a, and how N changes with x, and with
+    """What obstacle k presses on node i at x with: N, whether it touches, n, curvature, and how N changes with x, and with
 
     the places of the neighbours before and after.
     """
-    d, n, hollow, a = beside(sea.obstacles, k, x)
+    d, n, curved = surface(sea.obstacles, k, x)
     vi = get3(v, i)
     if moves:
         vi = sub(vi, surface_velocity(sea.carried, k, x))
@@ -183,25 +142,25 @@ def normal_force(line, sea, moves, k, i, x, v, e, cv):
     L, R, dN = Z3, Z3, Z3
     if i > 0 and meets(line, sea, moves, k, i - 1):
         f, f0, g0, L = half_cell(line, sea, k, i - 1, x, p, pd, scale(-1.0, get3(e, i - 1)), get3(v, i - 1), cv)
-        N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(hollow, n, a, vi)))
+        N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(curved, n, vi)))
         turned += g0
     if i < line.h.shape[0] and meets(line, sea, moves, k, i):
         f, f0, g0, R = half_cell(line, sea, k, i, x, p, pd, get3(e, i), get3(v, i + 1), cv)
-        N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(hollow, n, a, vi)))
+        N, DN, dN = N + f, DN + f0 + cv * g0, add(dN, scale(-g0, bent(curved, n, vi)))
         turned += g0
     dN = add(dN, scale(-DN, n))
     if moves:
         dN = add(dN, scale(turned, cross(n, row3(sea.carried, k, TURNING))))
-    return N, N != 0.0 or DN != 0.0, n, hollow, a, dN, L, R
+    return N, N != 0.0 or DN != 0.0, n, curved, dN, L, R
 
 
 @kernel
 def force_of_obstacle(line, sea, k, i, x, u, v, e, cv):
     """As `obstacle_forces`, of obstacle k alone, which moves: whether it touches, F, D, GL, GR."""
-    N, touches, n, hollow, a, dN, L, R = normal_force(line, sea, True, k, i, x, v, e, cv)
+    N, touches, n, curved, dN, L, R = normal_force(line, sea, True, k, i, x, v, e, cv)
     F, D, slope = Z3, Z9, n
     if touches:
-        K = gradient_of_normal(hollow, n, a)
+        K = gradient_of_normal(curved, n)
         F, D = scale(N, n), mscale(N, K)
         if line.bits & FRICTION and sea.obstacles[k, MU] > 0.0 and N > 0.0:
             t = way_along(sea.carried, k, row3(sea.grip, i, 6 * k), x, get3(u, i))
@@ -223,11 +182,11 @@ def obstacle_forces(line, sea, i, x, u, v, e, cv):
     kept = get3(sea.slid, i) if lies else t
     touches, rubs, moves = False, False, line.moved.shape[0] > 0
     for k in range(rows.shape[0]):
-        N, presses, n, hollow, a, dN, L, R = normal_force(line, sea, moves, k, i, x, v, e, cv)
+        N, presses, n, curved, dN, L, R = normal_force(line, sea, moves, k, i, x, v, e, cv)
         if not presses:
             continue
         touches = True
-        K = gradient_of_normal(hollow, n, a)
+        K = gradient_of_normal(curved, n)
         slope = n
         F, D = add(F, scale(N, n)), madd(D, mscale(N, K))
         if line.bits & FRICTION and rows[k, MU] > 0.0 and N > 0.0:
@@ -255,7 +214,7 @@ def obstacle_forces(line, sea, i, x, u, v, e, cv):
 @inner
 def depth_in(rows, k, r, i):
     """p of node i in obstacle k."""
-    d, _, _, _ = beside(rows, k, (r[i, 0], r[i, 1], r[i, 2]))
+    d, _, _ = surface(rows, k, (r[i, 0], r[i, 1], r[i, 2]))
     return 0.5 * rows[k, ONSET_OF] - d
 
 
@@ -288,7 +247,7 @@ def stored_in_contact(line, sea, r):
 @inner
 def depth_before(rows, carried, k, r, i):
     """p of node i in obstacle k, which moves, both where they were before the step."""
-    d, _, _, _ = beside(rows, k, swept(carried, k, (r[i, 0], r[i, 1], r[i, 2])))
+    d, _, _ = surface(rows, k, swept(carried, k, (r[i, 0], r[i, 1], r[i, 2])))
     return 0.5 * rows[k, ONSET_OF] - d
 
 
@@ -331,11 +290,15 @@ def normal_at(line, sea, x, of_bed):
         if not line.bits & SEABED:
             deep = -math.inf
         for k in range(sea.obstacles.shape[0]):
-            d, m, _, _ = beside(sea.obstacles, k, x)
+            d, m, _ = surface(sea.obstacles, k, x)
             p = 0.5 * sea.obstacles[k, ONSET_OF] - d
             if p > deep:
                 n, deep = m, p
     return n
+
+
+# Of the radius of a strand: how near to being too deep a way counts as too deep.
+REACHED = 1e-3
 
 
 @kernel
@@ -352,43 +315,38 @@ def passes(line, sea, r, u):
             if moves:  # as seen from the obstacle
                 x = swept(sea.carried, k, get3(r, i))
                 y = sub(add(get3(r, i), get3(u, i)), x)
-            before, _, _, _ = beside(rows, k, x)
-            after, _, _, _ = beside(rows, k, add(x, y))
-            least = after
-            if rows[k, KIND] == ROUND:
-                a = (rows[k, AXIS], rows[k, AXIS + 1], rows[k, AXIS + 2])
-                w = sub(x, (rows[k, PLACE], rows[k, PLACE + 1], rows[k, PLACE + 2]))
-                z, b = y, w
-                if rows[k, HALF_LENGTH] > 0.0:  # where the way is nearest to the line of the axis
-                    z, b = sub(y, scale(dot(y, a), a)), sub(w, scale(dot(w, a), a))
-                square = dot(z, z)
-                if square > 0.0:
-                    part = min(max(-dot(z, b) / square, 0.0), 1.0)
-                    between, _, _, _ = beside(rows, k, add(x, scale(part, y)))
-                    least = min(least, between)
             thin = 0.0
             if rows.shape[1] > OBSTACLE:  # of the thinner side
                 thin = thinner(line, rows, k, max(i - 1, 0))
                 thin = max(thin, thinner(line, rows, k, min(i, line.h.shape[0] - 1)))
-            if least < min(before, -thin) - (rows[k, STRAND] - thin):
-                return i
+            before, _, _ = surface(rows, k, x)
+            size, solid = math.sqrt(dot(y, y)), rows[k, STRAND] - thin
+            most = min(before, -thin) - solid
+            way = before - most
+            while way < size:  # d changes by no more than the way: nothing is missed between
+                d, _, _ = surface(rows, k, add(x, scale(way / size, y)))
+                if d - most < REACHED * solid:
+                    return i
+                way += d - most
     return -1
 
 
 # --- for Python ---------------------------------------------------------------------------------------
 
 
-def distances(rows: Floats, x: Floats) -> Floats:
+@kernel
+def find_distances(rows, x, out):
     """Distances (M, n) m of points x (n, 3) m to the surfaces of obstacles, moved out by the strand's radius."""
+    for k in range(rows.shape[0]):
+        for i in range(x.shape[0]):
+            out[k, i], _, _ = surface(rows, k, get3(x, i))
+
+
+def distances(rows: Floats, x: Floats) -> Floats:
+    """The same as an array."""
     out = np.empty((len(rows), len(x)))
-    for k, row in enumerate(rows):
-        a, w = row[AXIS : AXIS + 3], x - row[PLACE : PLACE + 3]
-        t = w @ a
-        if row[KIND] == FLAT:
-            out[k] = t - row[RADIUS]
-        else:
-            y = w - np.clip(t, -row[HALF_LENGTH], row[HALF_LENGTH])[:, None] * a
-            out[k] = np.linalg.norm(y, axis=1) - row[RADIUS]
+    if len(rows):
+        find_distances(np.ascontiguousarray(rows), np.ascontiguousarray(x), out)
     return out
 
 
@@ -396,11 +354,21 @@ def put_obstacles(rows: Floats, carried: Floats, seen: Floats) -> None:
     """Rows (M, OBSTACLE) where obstacles were that move; carried: as of `Sea`; seen: (M, SEEN) of them then."""
     rows[:, PLACE : PLACE + 3] = seen[:, :SEEN_TURN]
     turn = seen[:, SEEN_TURN:SEEN_FORCE].reshape(-1, 3, 3)
-    rows[:, AXIS : AXIS + 3] = np.einsum("kij,kj->ki", turn, carried[:, STILL_AXIS : STILL_AXIS + 3])
+    for at, still in ((AXIS, STILL_AXIS), (SIDE, STILL_SIDE)):
+        rows[:, at : at + 3] = np.einsum("kij,kj->ki", turn, carried[:, still : still + 3])
 
 
 # Parts of a chord at which its distance is looked at; of the radius of an obstacle, how deep a chord may cut it.
 PARTS, CUTS = 8, 0.125
+
+
+def half_thickness(rows: Floats) -> Floats:
+    """Half of how thick (M,) m obstacles are with the radius of the strand where they are thinnest; planes: infinite."""
+    of_box = rows[:, HALF_LENGTH : HALF_HEIGHT + 1].min(axis=1)
+    found = rows[:, RADIUS] + np.where(rows[:, KIND] == BOX, of_box, 0.0)
+    of_sheave = rows[:, GROOVE] + 2.0 * rows[:, RIM]
+    found = np.where(rows[:, KIND] == SHEAVE, np.minimum(found, of_sheave), found)
+    return np.where(rows[:, KIND] == FLAT, np.inf, found)
 
 
 def cells_met(carried: Floats, s: Floats) -> Floats:

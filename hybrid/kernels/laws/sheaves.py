@@ -94,7 +94,7 @@ def moments(line, sea, r, u, state, k, b, q, cv):
             b[i, j] = q[i, j] = 0.0
     for i in range(last + 1 if line.bits & FRICTION else 0):
         x = add(get3(r, i), get3(u, i))
-        N, _, n, _, _, dN, before, after = normal_force(line, sea, True, k, i, x, state.v, state.e, cv)
+        N, _, n, _, dN, before, after = normal_force(line, sea, True, k, i, x, state.v, state.e, cv)
         if N > 0.0:
             t = way_along(sea.carried, k, row3(sea.grip, i, EACH * k), x, get3(u, i))
             tau = cross(axis, sub(x, row3(sea.carried, k, ENDED)))

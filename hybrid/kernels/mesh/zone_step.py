@@ -16,7 +16,7 @@ from hybrid.kernels.algebra.rotations import dot, get3
 from hybrid.kernels.laws.axial_law import has_law, stretch_work
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.end_motion import end_turn
-from hybrid.kernels.laws.obstacles import beside
+from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.laws.tension_torque import twist_of_line
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import caller, reader
@@ -281,7 +281,7 @@ def weigh_obstacles(line, sea, state, zones, horizon):
     for i in range(state.r.shape[0]):
         x, v = get3(state.r, i), get3(state.v, i)
         for k in range(rows.shape[0]):
-            gap, n, _, _ = beside(rows, k, x)
+            gap, n, _ = surface(rows, k, x)
             gap, wide = max(gap + min(horizon * dot(n, v), 0.0), 0.0), 2.0 * rows[k, STRAND]
             raise_ratio(zones.ratios, CONTACT, of[max(i - 1, 0)], of[min(i, last)], 2.0 * wide / (gap + wide))
 

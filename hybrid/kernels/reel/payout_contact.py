@@ -13,7 +13,8 @@ import math
 from hybrid.kernels.algebra.rotations import add, dot, get3, mat_vec, scale, sub
 from hybrid.kernels.laws.obstacle_grip import mean_force
 from hybrid.kernels.laws.obstacle_motion import put_vector, row3, row9, transposed
-from hybrid.kernels.laws.obstacles import beside, normal_at, stored_along
+from hybrid.kernels.laws.obstacles import normal_at, stored_along
+from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.machine.compile import inner
 from hybrid.kernels.reel.paid_length import cell, changes_length, growing, node
 from hybrid.kernels.reel.reel import LENGTH, LENGTH_BEFORE, SIDE
@@ -96,7 +97,7 @@ def friction_of_flow(line, sea, old, new, reel):
         rubbed, moves = (0.0, 0.0, 0.0), line.moved.shape[0] > 0
         for m in range(line.moved.shape[0]):
             g = mean_force(old, new, i, EACH * m)
-            _, n, _, _ = beside(sea.obstacles, m, x)
+            _, n, _ = surface(sea.obstacles, m, x)
             rubbed, f = add(rubbed, sub(g, scale(dot(g, n), n))), sub(f, g)
         n = normal_at(line, sea, x, moves)  # where obstacles move what is left is the bed's
         rubbed = add(rubbed, sub(f, scale(dot(f, n), n)))

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-# Of Sea.obstacles: kind; place (m); unit axis of a cylinder, unit normal of a plane; radius of the surface moved out by the strand's (m; of a
-# plane how far it is moved out); half the length of the cylinder (m; infinite: endless; 0: a sphere); radius of the strand
-# (m); friction; stiffness (N/m per m), damping (N s/m per m), onset (m), elastic travel (m).
-KIND, PLACE, AXIS, RADIUS, HALF_LENGTH, STRAND, MU, STIFFNESS, DAMPING, ONSET_OF, SLIP = (
+# Of Sea.obstacles: kind; place (m); unit axis of a cylinder, torus, sheave and the first of a box, unit normal of a plane;
+# unit vector across it, the second axis of a box; radius of the surface moved out by the strand's (m; of a plane how far it
+# is moved out; of a box that of its edges, of a torus that of its section, of a sheave that at the bottom of its groove);
+# half the length of a cylinder (m; infinite: endless; 0: a sphere) or of the flat part of a box, half the width and height
+# of that; radius of the ring about which sections of a torus or groove lie; radius of a groove less that of the strand, and
+# of its rims more that (m);
+KIND, PLACE, AXIS, SIDE, RADIUS, HALF_LENGTH, HALF_WIDTH, HALF_HEIGHT, RING, GROOVE, RIM = (
     0,
     1,
     4,
     7,
-    8,
-    9,
     10,
     11,
     12,
     13,
     14,
+    15,
+    16,
 )
-FLAT, ROUND = 0.0, 1.0
-OBSTACLE = 15
+# radius of the strand (m); friction; stiffness (N/m per m), damping (N s/m per m), onset (m), elastic travel (m).
+STRAND, MU, STIFFNESS, DAMPING, ONSET_OF, SLIP = 17, 18, 19, 20, 21, 22
+FLAT, ROUND, BOX, TORUS, SHEAVE = 0.0, 1.0, 2.0, 3.0, 4.0
+OBSTACLE = 23
 # Behind them, of a line of several diameters, two numbers for each of its sections: the arc length at which it ends, and by
 # how much its radius is smaller than that of the strand, which is the largest (m).
 PIECE_END, THINNER, OF_PIECE = 0, 1, 2
@@ -32,9 +37,10 @@ BEGAN, ENDED, SWEEP, SPEED, TURNING, TURNED, STILL_AXIS, RATE, RAMP = 0, 3, 6, 1
 INERTIA, BEARING, ROLLED_BEFORE, ROLLED, ROLLING = 35, 36, 37, 38, 39
 LEFT_OVER, ALONE, YIELDING = 46, 47, 48
 # Of a line that is fixed to the body which carries an obstacle: from which arc length and up to which (m) it meets that; of
-# what a body carries its place and whether one does (1.0), in axes of the body, as the axis at t = 0 is.
+# what a body carries its place and whether one does (1.0), in axes of the body, as the axis at t = 0 and what is across are.
 MEETS_FROM, MEETS_TO, OFFSET, RIDES = 40, 41, 42, 45
-CARRIED = 49
+STILL_SIDE = 49
+CARRIED = 52
 # Of Line.moved; of a row of State.sheave: angle (rad), rate, algorithmic and true acceleration.
 FIXED, MOVES, FREE = 0, 1, 2
 ANGLE, SPIN, ALGORITHMIC, TRUE = 0, 1, 2, 3

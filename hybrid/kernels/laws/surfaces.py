@@ -1,0 +1,177 @@
+"""Surfaces of obstacles, all kinds by one function: distance, outward normal and curvature at a point.
+
+    symbol   meaning                                                              shape  unit   frame
+    d        distance of a point to the surface moved out by the radius of the
+             strand; its slope is 1 everywhere                                    -      m
+    n        its gradient, the outward normal                                     3      -      inertial
+    K        gradient of n, h (1 - nn^T - aa^T) + g aa^T: curvatures h across
+             and g along a unit vector a of the surface                           9      1/m    inertial
+
+    kind      solid                                                        h             g
+    plane     half space                                                   0             0
+    round     what is within the radius of a stretch of its axis: a        1/rho         0 beside a cylinder, else 1/rho (a = 0)
+              cylinder that ends in half spheres, a sphere
+    box       what is within the radius of a box: faces, rounded edges     0 on faces, as a cylinder on edges, as a
+              and corners                                                  sphere on corners
+    torus     what is within the radius of a ring                          1/rho         n_s/s
+    sheave    a disc with a groove of circular section, whose rims are     -1/rho in the n_s/s
+              tori                                                         groove
+
+rho is the distance to the axis, edge or ring; s that to the axis of a torus or sheave, n_s the part of n away from it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.rotations import add, cross, dot, madd, mscale, outer, scale, sub
+from hybrid.kernels.machine.compile import called, inner
+from hybrid.kernels.state.obstacle_rows import (
+    AXIS,
+    BOX,
+    FLAT,
+    GROOVE,
+    HALF_HEIGHT,
+    HALF_LENGTH,
+    HALF_WIDTH,
+    KIND,
+    PLACE,
+    RADIUS,
+    RIM,
+    RING,
+    ROUND,
+    SIDE,
+    TORUS,
+)
+
+Z3 = (0.0, 0.0, 0.0)
+Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+E9 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+@inner
+def surface(rows, k, x):
+    """d and n of obstacle k at a point, and its curvature (h, a, g) there."""
+    if rows[k, KIND] > ROUND:
+        return shaped_surface(rows, k, x)
+    a = (rows[k, AXIS], rows[k, AXIS + 1], rows[k, AXIS + 2])
+    w = (x[0] - rows[k, PLACE], x[1] - rows[k, PLACE + 1], x[2] - rows[k, PLACE + 2])
+    t = dot(w, a)
+    if rows[k, KIND] == FLAT:
+        return t - rows[k, RADIUS], a, (0.0, a, 0.0)
+    half = rows[k, HALF_LENGTH]
+    along = min(max(t, -half), half)
+    y = sub(w, scale(along, a))
+    rho = math.sqrt(dot(y, y))
+    if not rho > 1e-12 * rows[k, RADIUS]:  # on the axis any direction leads out
+        y = (1.0 - a[0] * a[0], -a[0] * a[1], -a[0] * a[2])
+        if not dot(y, y) > 0.1:
+            y = (-a[1] * a[0], 1.0 - a[1] * a[1], -a[1] * a[2])
+        rho = math.sqrt(dot(y, y))
+        return -rows[k, RADIUS], scale(1.0 / rho, y), (0.0, a, 0.0)
+    if along != t or half == 0.0:
+        a = Z3
+    return rho - rows[k, RADIUS], scale(1.0 / rho, y), (1.0 / rho, a, 0.0)
+
+
+@called
+def shaped_surface(rows, k, x):
+    """The same of a box, torus or sheave, found in axes of its own: along AXIS, along SIDE, and across both."""
+    u = (rows[k, AXIS], rows[k, AXIS + 1], rows[k, AXIS + 2])
+    v = (rows[k, SIDE], rows[k, SIDE + 1], rows[k, SIDE + 2])
+    w = cross(u, v)
+    y = (x[0] - rows[k, PLACE], x[1] - rows[k, PLACE + 1], x[2] - rows[k, PLACE + 2])
+    y = (dot(y, u), dot(y, v), dot(y, w))
+    if rows[k, KIND] == BOX:
+        halves = (rows[k, HALF_LENGTH], rows[k, HALF_WIDTH], rows[k, HALF_HEIGHT])
+        d, n, (h, a, g) = box_surface(halves, rows[k, RADIUS], y)
+    else:
+        s = math.sqrt(y[1] * y[1] + y[2] * y[2])
+        out = (y[1] / s, y[2] / s) if s > 0.0 else (1.0, 0.0)
+        if rows[k, KIND] == TORUS:
+            d, na, ns, h = ring_section(rows[k, RADIUS], s - rows[k, RING], y[0])
+        else:
+            d, na, ns, h = sheave_section(rows[k, RING], rows[k, GROOVE], rows[k, RIM], s, y[0])
+        n, a = (na, ns * out[0], ns * out[1]), (0.0, -out[1], out[0])
+        g = ns / s if s > 0.0 else 0.0
+    n = add(scale(n[0], u), add(scale(n[1], v), scale(n[2], w)))
+    a = add(scale(a[0], u), add(scale(a[1], v), scale(a[2], w)))
+    return d, n, (h, a, g)
+
+
+@inner
+def beyond(p, half):
+    """How far a coordinate is beyond a half length on either side; 0: it is within."""
+    return p - min(max(p, -half), half)
+
+
+@inner
+def box_surface(halves, radius, y):
+    """d, n and curvature of what is within a radius of a box of half lengths (3,), in its axes."""
+    z = (beyond(y[0], halves[0]), beyond(y[1], halves[1]), beyond(y[2], halves[2]))
+    rho = math.sqrt(dot(z, z))
+    if not rho > 1e-12 * radius:  # within the box: the nearest face leads out
+        deep = (halves[0] - abs(y[0]), halves[1] - abs(y[1]), halves[2] - abs(y[2]))
+        least = min(deep[0], deep[1], deep[2])
+        if deep[0] == least:
+            n = (math.copysign(1.0, y[0]), 0.0, 0.0)
+        elif deep[1] == least:
+            n = (0.0, math.copysign(1.0, y[1]), 0.0)
+        else:
+            n = (0.0, 0.0, math.copysign(1.0, y[2]))
+        return -least - radius, n, (0.0, Z3, 0.0)
+    n = scale(1.0 / rho, z)
+    free = (1.0 if z[0] == 0.0 else 0.0, 1.0 if z[1] == 0.0 else 0.0, 1.0 if z[2] == 0.0 else 0.0)
+    count = free[0] + free[1] + free[2]
+    if count == 2.0:
+        return rho - radius, n, (0.0, Z3, 0.0)
+    return rho - radius, n, (1.0 / rho, free, 0.0)  # of a corner `free` is zero, of an edge its direction
+
+
+@inner
+def ring_section(radius, p, q):
+    """d of a circle about the origin at q along the axis and p away from it, parts of n along both (q, p), and h."""
+    rho = math.sqrt(p * p + q * q)
+    if not rho > 1e-12 * radius:
+        return -radius, 0.0, 1.0, 0.0
+    return rho - radius, q / rho, p / rho, 1.0 / rho
+
+
+@inner
+def sheave_section(ring, groove, rim, s, q):
+    """The same of a sheave: groove of circular section about (ring, 0), rims of circular section on both sides of it.
+
+    Its sides are plane.  groove, rim: radii less and more that of the strand, m.
+    """
+    side = math.copysign(groove + rim, q)  # where the middle of a rim is
+    if s > ring:
+        return ring_section(rim, s - ring, q - side)
+    rho = math.sqrt((s - ring) * (s - ring) + q * q)
+    beside = abs(q) - groove - 2.0 * rim
+    if beside > groove - rho:
+        return beside, math.copysign(1.0, q), 0.0, 0.0
+    if not rho > 1e-12 * groove:
+        return groove, 0.0, 1.0, 0.0
+    return groove - rho, -q / rho, (ring - s) / rho, -1.0 / rho
+
+
+@inner
+def bent(curved, n, y):
+    """K y of a surface."""
+    hollow, a, g = curved
+    s, t = dot(n, y), dot(a, y)
+    return (
+        hollow * (y[0] - s * n[0] - t * a[0]) + g * t * a[0],
+        hollow * (y[1] - s * n[1] - t * a[1]) + g * t * a[1],
+        hollow * (y[2] - s * n[2] - t * a[2]) + g * t * a[2],
+    )
+
+
+@inner
+def gradient_of_normal(curved, n):
+    """K of a surface."""
+    hollow, a, g = curved
+    if hollow == 0.0 and g == 0.0:
+        return Z9
+    across = mscale(hollow, madd(E9, mscale(-1.0, madd(outer(n, n), outer(a, a)))))
+    return madd(across, mscale(g, outer(a, a)))
