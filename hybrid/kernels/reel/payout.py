@@ -21,7 +21,7 @@ import math
 from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.laws.cell import Chord, chord
 from hybrid.kernels.laws.node_forces import Z3, inertia_and_water
-from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.machine.compile import called, inner, kernel
 from hybrid.kernels.march.assembly import JOINED
 from hybrid.kernels.reel.damping import (
     correct_damping_power,
@@ -115,7 +115,7 @@ def velocity_at(line, state, reel, i, rate, g):
     return sub(v, scale(rate, slope))
 
 
-@inner
+@called
 def of_material(line, sea, ends, state, reel, i):
     """What the force on node i, N, is more because it does not move as the material does, and r' there."""
     n, numbers, g = line.h.shape[0], reel.numbers, growing(line, reel)

@@ -12,7 +12,7 @@ from hybrid.kernels.algebra.rotations import add, dot, frame, get3, get9, scale,
 from hybrid.kernels.laws.bending_law import bending_at
 from hybrid.kernels.laws.cell import Chord, chord, moment_force, rotary_force, turning
 from hybrid.kernels.laws.node_forces import Z9, node_loads
-from hybrid.kernels.machine.compile import inner
+from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.reel.paid_length import growing, node
 from hybrid.kernels.state.forces import ROTARY
 from hybrid.kernels.watch.extremes import moment_at
@@ -21,7 +21,7 @@ from hybrid.kernels.watch.extremes import moment_at
 AROUND = 3
 
 
-@inner
+@called
 def moment_of(line, ends, state, j):
     """Moment at node j: of its element, or what acts on an end."""
     n = line.h.shape[0]
@@ -38,7 +38,7 @@ def moment_of(line, ends, state, j):
     return M
 
 
-@inner
+@called
 def force_in(line, ends, state, c):
     """Force in cell c."""
     d, _, il = chord(get3(state.e, c))
