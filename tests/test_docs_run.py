@@ -180,6 +180,9 @@ def quoted(start: str) -> Iterator[tuple[Path, str]]:
 def parse(words: list[str]) -> None:
     """Parse a command without running it; what is only missing may be missing."""
     group: Any = typer.main.get_command(app)
+    if words[0].startswith("-"):  # an option of the program, not a command
+        assert words[0] in {name for option in group.params for name in option.opts}, f"there is no option {words[0]}"
+        return
     outer = group.make_context("hybrid", words, resilient_parsing=True)
     assert words[0] in group.commands, f"there is no command {words[0]}"
     inner = group.commands[words[0]]
@@ -206,7 +209,7 @@ def test_quoted_commands_of_ours_parse() -> None:
 
 
 def test_a_command_that_does_not_exist_is_noticed() -> None:
-    for wrong in (["walk"], ["run", "--fast", "x.yaml"], ["trade", "x.yaml", "--repeat", "often"]):
+    for wrong in (["walk"], ["--walk"], ["run", "--fast", "x.yaml"], ["trade", "x.yaml", "--repeat", "often"]):
         with pytest.raises(AssertionError):
             parse(wrong)
 

@@ -143,6 +143,9 @@ obstacles:
   roller: {at: [2.0, 0.0, -5.0], axis: [0.0, 1.0, 0.0], radius: 0.5, damping: 10.0,
            spin: {rate: 2.0, ramp: 1.0}, motion: {travel: {by: [0.0, 0.0, 1.0], over: 2.0}}}
   sheave: {at: [5.0, 0.0, -5.0], axis: [0.0, 1.0, 0.0], radius: 0.5, bearing: {inertia: 2.0, damping: 0.5}}
+  deck: {kind: box, at: [8.0, 0.0, -5.0], size: [1.0, 2.0, 1.0], rounding: 0.1, rotation: [0.0, 10.0, 0.0]}
+  eye: {kind: torus, at: [6.0, 0.0, -15.0], axis: [1.0, 0.0, 0.0], ring: 0.5, radius: 0.1}
+  wheel: {kind: sheave, at: [3.0, 0.0, -15.0], axis: [0.0, 1.0, 0.0], radius: 0.5, groove: 0.05, rim: 0.04}
 contact: {self: false}
 initial: {kind: equilibrium}
 model: {kind: catenary}
@@ -353,7 +356,7 @@ def _negative(name: str, path: tuple[str | int, ...]) -> None:
         or {"tension_strain", "moment_curvature", "curve"} & {*keys}
         or keys == ["initial", "friction"]
         or keys[:2] == ["initial", "points"]
-        or (keys[0] == "obstacles" and keys[-1] in ("at", "axis", "normal"))
+        or (keys[0] == "obstacles" and keys[-1] in ("at", "axis", "normal", "rotation"))
         or ballast
     ):
         found = complaints(_put(TEXTS[name], dict(_places(TEXTS[name]))[path], "-7.25"))

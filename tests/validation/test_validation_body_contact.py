@@ -15,7 +15,7 @@ from hybrid.kernels.junctions.bodies import FRAME, PLACE, STATE, V, W
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.march.energies import observe
 from hybrid.kernels.state.books import SHORTEST, blank_books
-from hybrid.kernels.state.obstacle_rows import EACH, FORCE
+from hybrid.kernels.state.obstacle_rows import EACH, FORCE, STIFFNESS
 from hybrid.model.bodies import body_model
 from hybrid.model.build import build
 from hybrid.model.system import build_system
@@ -81,7 +81,7 @@ def test_what_rests_stays_and_an_obstacle_there_holds_the_lines_the_same(rest: A
     tables = on_two_lines()
     del tables["bodies"], tables["time"]
     at = rest["bodies/ball/position"][-1].tolist()
-    stiffness = float(_rows(on_two_lines())[0, 11])
+    stiffness = float(_rows(on_two_lines())[0, STIFFNESS])
     tables["obstacles"] = {"ball": {"kind": "sphere", "at": at, "radius": RADIUS, "stiffness": stiffness}}
     held = hybrid.static(tables)
     for side in ("left", "right"):

@@ -17,6 +17,7 @@ import hybrid
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.bodies import PLACE, V, W
 from hybrid.kernels.state.books import SHORTEST, blank_books
+from hybrid.kernels.state.obstacle_rows import STIFFNESS
 from hybrid.model.system import build_system
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.read import as_scene_or_system
@@ -190,7 +191,7 @@ def test_a_ball_rests_on_lines_that_lie_on_others() -> None:
         assert line["self_contact"][-1].max() > 20.0
     for name in ("fore", "aft"):
         assert not rest.lines[name]["obstacles/ball/force"].any()
-    stiffness = float(build_of(tables).models[0].sea.values.obstacles[0, 11])
+    stiffness = float(build_of(tables).models[0].sea.values.obstacles[0, STIFFNESS])
     at = rest["bodies/ball/position"][-1].tolist()
     del tables["bodies"]
     tables["obstacles"] = {"ball": {"kind": "sphere", "at": at, "radius": 0.6, "stiffness": stiffness}}

@@ -10,6 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import SceneError
+from hybrid.kernels.state.obstacle_rows import STIFFNESS
 from hybrid.model.system import build_system
 from hybrid.scene.read import as_scene_or_system
 from hybrid.scene.system import System
@@ -146,7 +147,8 @@ def test_a_body_makes_obstacles_stiff_enough() -> None:
     tables["bodies"] = {"block": {"mass": 100 * WEIGHT / 9.81, "inertia": [1, 1, 1],
                                   "initial_guess": [CENTRELINE, 0, -1.0]}}  # fmt: skip
     light, heavy = (
-        build_system(system_of(x)).models[0].sea.values.obstacles[0, 11] for x in (weight_over_a_drum(0.0), tables)
+        build_system(system_of(x)).models[0].sea.values.obstacles[0, STIFFNESS]
+        for x in (weight_over_a_drum(0.0), tables)
     )
     assert heavy == pytest.approx(100 * light, rel=0.02)
 

@@ -10,7 +10,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.kernels.state.obstacle_rows import PIECE_END, STIFFNESS, STRAND, THINNER
+from hybrid.kernels.state.obstacle_rows import OBSTACLE, PIECE_END, STIFFNESS, STRAND, THINNER
 from hybrid.model.build import build
 from hybrid.model.obstacles import obstacle_rows
 from hybrid.simulation.payout_nodes import NodeChanges
@@ -242,7 +242,7 @@ def test_obstacles_are_as_hard_as_what_will_be_out_asks_for() -> None:
     (found,) = obstacle_rows(hybrid.validate_scene(tables_with(paid, {"time.duration": 1.0})))
     assert found[STRAND] == row[STRAND] == 0.025
     assert found[STIFFNESS] == pytest.approx(row[STIFFNESS], rel=0.2) and found[STIFFNESS] > 2.0 * now[STIFFNESS]
-    pieces = found[15:].reshape(-1, 2)
+    pieces = found[OBSTACLE:].reshape(-1, 2)
     np.testing.assert_allclose(pieces[:3, PIECE_END], [12.0, 52.0, 72.0])
     np.testing.assert_allclose(pieces[:3, THINNER], [0.0, 0.0, 0.005])
 
