@@ -656,7 +656,9 @@ REFUSALS: tuple[Refusal, ...] = (
         VORTICES, PLANE, "physics", "vortices shake a line across its plane ({key})", "nothing", IN_SPACE,
     ),
     Refusal(
-        VORTICES, RESPONSE, "not worked out", "lift that locks in to a motion is no part of a response by frequency",
+        VORTICES, RESPONSE, "physics",
+        "a response by frequency is linear about rest, and wakes oscillate by themselves, with a size and a frequency "
+        "that their locking in to the motion decides",
         fix="leave it out; hybrid run computes it in time",
     ),
     # --- several lines ---
