@@ -15,7 +15,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
 from hybrid.scene.base import Finding
-from hybrid.scene.design import Design, Measured
+from hybrid.scene.design import Design
 from hybrid.scene.schema import Scene
 from hybrid.scene.task_file import TaskFile
 from hybrid.studies.csv_table import Table, read_table
@@ -70,7 +70,7 @@ def measurements(task: TaskFile[Design], scene: AnyScene) -> Measurements:
                 continue
             at = ""
             if has_place(result):
-                s = _arc_length(asked, cells, cable_of(scene, name).length, line)
+                s = _arc_length(task, cells, cable_of(scene, name).length, line)
                 at = "@end" if s == cable_of(scene, name).length else f"@{s!r}"  # it stays the end of another length
             of = f"{'' if isinstance(scene, Scene) else f'{name}/'}{result}{at}"
             key = (case, of if time is None else f"t={time!r} {of}{IN_MOTION}")
@@ -113,12 +113,15 @@ def has_place(result: str) -> bool:
     return "s" in PROBES[quantity_of(result)].dims
 
 
-def _arc_length(asked: Measured, cells: dict[str, str], length: float, line: int) -> float:
+def _arc_length(task: TaskFile[Design], cells: dict[str, str], length: float, line: int) -> float:
     """Where a row was measured, m."""
+    asked = task.asked.measured
+    assert asked is not None
     if asked.at is not None:
         s = {"start": 0.0, "end": length}[asked.at] if isinstance(asked.at, str) else asked.at
         if not 0.0 <= s <= length:
-            raise SceneError([Complaint("measured.at", f"{s:g}", f"an arc length between 0 and {length:g} m")])
+            expected = f"an arc length between 0 and {length:g} m"
+            raise task.refusal([Finding(("measured", "at"), expected, given=f"{s:g}")])
         return s
     found = _number(asked.file, "s", cells["s"], line)
     if found is None or not 0.0 <= found <= length:

@@ -52,7 +52,8 @@ def _page(found: DrawnDesign) -> Page:
     ]
     view, across = _view(np.concatenate(every))
     panels = {str(k): _panel(found, case, str(k), view, across) for k, case in enumerate(found.after)}
-    for history in getattr(found, "histories", ()):
+    histories = getattr(found, "histories", ())
+    for history in histories:
         panels[str(len(panels))] = _history(history, str(len(panels)))
     columns = min(COLUMNS, len(panels))
     rows = math.ceil(len(panels) / columns)
@@ -62,15 +63,8 @@ def _page(found: DrawnDesign) -> Page:
     more = f", and {len(changes) - NUMBERS} more" if len(changes) > NUMBERS else ""
     facts = ", ".join(changes[:NUMBERS]) + more
     size = max(WIDE * columns, 5.6), HIGH * rows + 0.8
-    return Page(
-        found.title or "(no title)",
-        facts,
-        2,
-        panels,
-        mosaic,
-        legend=("0" if not getattr(found, "histories", ()) else [*panels][-1],),
-        size=size,
-    )
+    named = [*panels][-1] if histories else "0"
+    return Page(found.title or "(no title)", facts, 2, panels, mosaic, legend=(named,), size=size)
 
 
 def _panel(found: DrawnDesign, case: str, key: str, view: Any, across: str) -> Panel:
