@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from hybrid.accuracy.run_forecast import plan
     from hybrid.adapt.user_criterion import NodeState
     from hybrid.couple.fmu_export import export_fmu
+    from hybrid.designs.component import openmdao_component
     from hybrid.designs.design import design
     from hybrid.designs.seek import seek
     from hybrid.designs.sensitivity import sensitivity
@@ -72,6 +73,7 @@ _HOME = {
     "modes": ("hybrid.modal.api", "modes"),
     "offsets": ("hybrid.simulation.system_stiffness", "offsets"),
     "open": ("hybrid.store.reader", "open_result"),
+    "openmdao_component": ("hybrid.designs.component", "openmdao_component"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
     "plan": ("hybrid.accuracy.run_forecast", "plan"),
     "listed_outputs": ("hybrid.simulation.listed_outputs", "listed_outputs"),
@@ -126,6 +128,7 @@ __all__ = [
     "offsets",
     "open",
     "open_study",
+    "openmdao_component",
     "parse_scene",
     "plan",
     "plot",

@@ -81,6 +81,7 @@ ONLY = {
     "typer": ("cli",),
     "rich": ("cli",),
     "pythonfmu3": ("couple",),
+    "openmdao": ("designs",),
     "zarr": ("store",),
     "xarray": ("store", "scene"),
     "distributed": ("studies",),

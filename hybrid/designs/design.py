@@ -148,7 +148,7 @@ def design(
     SceneError: the design or its scene is refused; ComputationError: there is no equilibrium where the search begins,
     or limits and targets cannot be kept together: it says which are in the way.
     """
-    task, scene = _task(source, unknowns, more)
+    task, scene = task_of(source, unknowns, more)
     asked = as_asked(scene, task)
     file = task.asked.scene if scene is None else ""
     if task.asked.measured is not None:
@@ -161,11 +161,13 @@ def design(
     return _solved(task, asked, problem, file)
 
 
-def _task(source: Any, unknowns: Mapping[str, Any] | None, more: Mapping[str, Any]) -> tuple[TaskFile[Design], Any]:
+def task_of(source: Any, unknowns: Mapping[str, Any] | None, more: Mapping[str, Any]) -> tuple[TaskFile[Design], Any]:
     """The design, and the scene that it is of; None: that of the file that it names."""
     if unknowns is None:
         if more:
             raise TypeError(f"{', '.join(more)}: without unknowns the source is a design file, which says it")
+        if isinstance(source, Design):
+            source = source.model_dump(exclude_none=True)
         if isinstance(source, Mapping):
             return DESIGN.of_data(source), None
         return DESIGN.read(source), None

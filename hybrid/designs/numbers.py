@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state.state import Floats
-from hybrid.scene.base import Invalid, Table
+from hybrid.scene.base import Invalid, Table, unit_of
 from hybrid.scene.read import parse_either, scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
@@ -33,6 +33,17 @@ def number_of(scene: Scene | System, key: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise SceneError([Complaint("by", key, f"a number, which {key} is not in this scene", "another key")])
     return float(value)
+
+
+def unit_of_key(scene: Scene | System, key: str) -> str:
+    """The unit that the reference of scenes has for a key; "": none."""
+    value, unit = cast(Any, scene), ""
+    for part in PART.findall(key):
+        if isinstance(value, Table):
+            unit, value = unit_of(type(value).model_fields.get(part)), getattr(value, part)
+        else:
+            value = value[part] if isinstance(value, Mapping) else value[int(part)]
+    return unit
 
 
 class OfScene:

@@ -65,12 +65,12 @@ class Objective:
 
     def __init__(self, text: str, unknowns: Sequence[str], results: Mapping[str, int], task: TaskFile[Design]) -> None:
         """results: rows of those that it may speak of, by name."""
-        self.text, self._unknowns, self._results, self._task = text, list(unknowns), dict(results), task
+        self.text, self._unknowns, self.results, self._task = text, list(unknowns), dict(results), task
 
     @property
     def rows(self) -> list[int]:
         """Those of the results that it speaks of."""
-        return [*self._results.values()]
+        return [*self.results.values()]
 
     def value(self, point: Point) -> float:
         """SceneError: it is no number there."""
@@ -89,14 +89,14 @@ class Objective:
         """(n,) derivatives by unknowns."""
         by_name = self.parts(point)
         out = np.array([by_name[x] for x in self._unknowns])
-        for name, row in self._results.items():
+        for name, row in self.results.items():
             if by_name[name] != 0.0:
                 out += by_name[name] * point.slopes[row]
         return out
 
     def _names(self, point: Point) -> dict[str, float]:
         own = dict(zip(self._unknowns, point.x.tolist(), strict=True))
-        return own | {name: float(point.values[row]) for name, row in self._results.items()}
+        return own | {name: float(point.values[row]) for name, row in self.results.items()}
 
     def _values(self, rows: Sequence[dict[str, float]]) -> list[float]:
         try:
