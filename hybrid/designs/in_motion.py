@@ -1,8 +1,9 @@
 """What results of a motion answer to numbers of the scene: differences of runs with the steps and cells of a base run.
 
 Where steps follow the motion, a number that changes them changes results by more than by itself: a small difference of
-two runs is then wrong by factors.  Steps that are given are those of every run, and so are its cells; runs in which a
-step was divided, or zones are others, are no neighbours of the base run, and no derivative is made of them.
+two runs is then wrong by factors.  Steps and cells of the base run are therefore those of every run, whether a scene
+gives them or its accuracy has chosen them; runs in which a step was divided, or zones are others, are no neighbours of
+the base run, and no derivative is made of them.
 """
 
 from __future__ import annotations
@@ -14,14 +15,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.designs.cable_at_rest import Places
 from hybrid.designs.line_at_rest import AXES, refuse_parts
 from hybrid.designs.numbers import changed_scene, number_of
-from hybrid.designs.replay import places_in, replay
+from hybrid.designs.replay import Course, course_of, replay
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
-from hybrid.scene.combinations import refuse_use
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 
@@ -67,20 +66,19 @@ def in_motion(asked: Scene | System, of: Sequence[str], by: Sequence[str]) -> Sl
 
     of: `max tension@end`, `std position.z@100`, `max hose/curvature`: max, min, mean, std or last over the outputs, or
     `t=12.5 tension@end`, at a time.
-    SceneError: no such key or result, or steps that follow the motion; ComputationError: a run fails, or steps or zones
-    of runs with other numbers are not those of the base run.
+    SceneError: no such key or result; ComputationError: a run fails, or steps or zones of runs with other numbers are
+    not those of the base run.
     """
-    refuse_use(asked, "derivatives in motion", given="hybrid sensitivity --motion")
     wanted = [parse_history(asked, x) for x in of]
     numbers = [number_of(asked, key) for key in by]
-    base = Motion(asked, wanted, places_in(asked))
+    base = Motion(asked, wanted, course_of(asked))
     slopes, errors = (np.zeros((len(by), len(of))) for _ in range(2))
     for i, (key, number) in enumerate(zip(by, numbers, strict=True)):
         found = []
         for part in PARTS:
             d = part * size_of(asked, key, number)
             more, less = (
-                Motion(changed_scene(asked, key, number + x), wanted, base.places, base) for x in (d, -d)
+                Motion(changed_scene(asked, key, number + x), wanted, base.course, base) for x in (d, -d)
             )  # fmt: skip
             for each in (more, less):
                 each.check(base, key)
@@ -150,18 +148,18 @@ class Motion:
     """A run, and results of it; beside a base run extremes are where and when those of that are."""
 
     def __init__(
-        self, scene: Scene | System, wanted: Sequence[Wanted], places: Places, base: Motion | None = None,
+        self, scene: Scene | System, wanted: Sequence[Wanted], course: Course, base: Motion | None = None,
         finer: bool = False, smooth: bool = False,
     ) -> None:  # fmt: skip
-        """places: of nodes; finer: as of `replay`; smooth: extremes are those of parabolas in time and along the line,
+        """course, finer: as of `replay`; smooth: extremes are those of parabolas in time and along the line,
 
         at whose nodes there are outputs.
         """
-        self.places = places
+        self.course = course
         more = [x.at for x in wanted if x.at is not None and np.isfinite(x.at)] if smooth else None
         self._cables = {k: x.cable for k, x in scene.lines.items()} if isinstance(scene, System) else {"": scene.cable}
         each_step = any(x.over == "t" for x in wanted)
-        with replay(scene, places, finer, more, each_step) as result:
+        with replay(scene, course, finer, more, each_step) as result:
             lines: dict[str, Any] = dict(result.lines) or {"": result}
             self.steps = {name: np.array(x["steps/t"]) for name, x in lines.items()}
             self.zones = {name: list(_zones(x)) for name, x in lines.items()}

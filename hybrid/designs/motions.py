@@ -12,13 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.designs.cable_at_rest import Places
 from hybrid.designs.in_motion import Motion, parse_history, size_of
 from hybrid.designs.numbers import number_of
-from hybrid.designs.replay import places_in
+from hybrid.designs.replay import Course, course_of
 from hybrid.errors import ComputationError
 from hybrid.kernels.state.state import Floats
-from hybrid.scene.combinations import refuse_use
 
 # Behind the name of a result of a motion; part of a number by which runs differ: off by as much, round-off is 1e-8.
 IN_MOTION, PART = " in motion", 1e-4
@@ -46,20 +44,18 @@ class Motions:
     ) -> None:  # fmt: skip
         """wanted: case and result of every row; scene_of: of a case with values of unknowns.
 
-        SceneError: a result that no run has, steps that follow the motion.
+        SceneError: a result that no run has.
         """
         self._scenes, self._keys, self._scene_of = scenes, keys, scene_of
         moving = [k for k, (_, result) in enumerate(wanted) if result.endswith(IN_MOTION)]
         self.rows = {case: np.array([k for k in moving if wanted[k][0] == case], int) for case in scenes}
         self.rows = {case: rows for case, rows in self.rows.items() if rows.size}
-        for case in self.rows:
-            refuse_use(scenes[case], "derivatives in motion", given="over")
         self._of = {
             case: [parse_history(scenes[case], wanted[k][1].removesuffix(IN_MOTION)) for k in rows]
             for case, rows in self.rows.items()
         }
         self._size, self.count = len(wanted), 0
-        self._places: dict[str, Places] = {}
+        self._courses: dict[str, Course] = {}
         self._last: OfMotion | None = None  # whose slopes were asked for last
 
     def at(self, x: Floats, finer: bool = False) -> OfMotion:
@@ -68,9 +64,9 @@ class Motions:
         for case in self.rows:
             self.count += FINER_RUN if finer else 1
             scene = self._scene_of(case, x)
-            if case not in self._places:
-                self._places[case] = places_in(scene)
-            runs[case] = Motion(scene, self._of[case], self._places[case], finer=finer, smooth=True)
+            if case not in self._courses:
+                self._courses[case] = course_of(scene)
+            runs[case] = Motion(scene, self._of[case], self._courses[case], finer=finer, smooth=True)
         return OfMotion(x.copy(), runs)
 
     def values(self, point: OfMotion, values: Floats) -> None:
@@ -117,7 +113,7 @@ class Motions:
             beside = point.x + step * (np.arange(point.x.size) == i)
             self.count += 1
             try:
-                run = Motion(self._scene_of(case, beside), self._of[case], base.places, base, smooth=True)
+                run = Motion(self._scene_of(case, beside), self._of[case], base.course, base, smooth=True)
                 run.check(base, key)
             except ComputationError as error:
                 failed = error

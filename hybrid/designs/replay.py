@@ -2,75 +2,127 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from hybrid.accuracy.api import run
-from hybrid.designs.cable_at_rest import NO_PLACES, Places
 from hybrid.model.build import build, places_of
 from hybrid.model.output_points import NEAR
-from hybrid.model.resolution import Resolution, first_resolution
+from hybrid.model.resolution import Resolution, accuracy_of, first_resolution
 from hybrid.model.system import SystemResolution, build_system
-from hybrid.scene.read import scene_text
+from hybrid.scene.read import parse_either, scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ProgressReporter
+from hybrid.simulation.restore import resolution_from
+from hybrid.simulation.system_checkpoint import kept_resolution
 from hybrid.simulation.system_run import run_system
 from hybrid.store.array_recorder import MemoryTarget
-from hybrid.store.reader import Result, written_result
+from hybrid.store.checkpoint import read_checkpoint
+from hybrid.store.hdf5_file import opened
+from hybrid.store.reader import Result, open_result, written_result
 
 
-def places_in(scene: Scene | System) -> Places:
-    """Places of the nodes of every line of a run; none where a pre-run lays cells."""
-    if _has_layers(scene):
-        return NO_PLACES
-    if isinstance(scene, Scene):
-        return {"": places_of(build(scene, first_resolution(scene), spare=False), scene)}
-    model = build_system(scene, SystemResolution.first(scene))
-    scenes = {name: scene.scene_of(name, scene.carried(name), scene.guesses) for name in model.names}
-    return {name: places_of(x, scenes[name]) for name, x in zip(model.names, model.models, strict=True)}
+class Course(NamedTuple):
+    """How a run is replayed: how finely each line is computed, by name, "" of one cable, with places of its nodes.
+
+    scene: as it was computed: the model of one cable is that which the run has chosen.
+    """
+
+    scene: Scene | System
+    lines: Mapping[str, Resolution]
+
+    def applied(self, scene: Scene | System) -> Scene | System:
+        """A scene with other numbers, as it is computed in a replay: its errors are not estimated."""
+        if not isinstance(self.scene, Scene):  # whose runs estimate none by themselves
+            return scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None})})
+        output = scene.output.model_copy(update={"errors": False})
+        return scene.model_copy(update={"output": output, "model": self.scene.model})
+
+
+def course_of(scene: Scene | System) -> Course:
+    """Of a run of a scene: it is made where what it does tells how finely, for steps, accuracy and cells of a layer."""
+    if not _is_open(scene):
+        if isinstance(scene, Scene):
+            return _with_nodes(scene, {"": first_resolution(scene)})
+        return _with_nodes(scene, SystemResolution.first(scene).lines)
+    with tempfile.TemporaryDirectory(prefix="hybrid-replay-") as room:
+        path = Path(room) / "run.h5"
+        run(scene, path).close()
+        with open_result(path) as result:
+            computed = parse_either(result.scene_text)[0]
+            part = next(iter(result.lines.values())) if result.lines else result
+            ends = tuple(np.array(part["steps/t"], float).tolist())
+        if isinstance(computed, Scene):
+            with opened(path) as file:
+                found = {"": resolution_from(read_checkpoint(file).resolution, computed)}
+        else:
+            found = dict(kept_resolution(computed, path).lines)
+    if any(x.local is not None for x in found.values()):
+        longest = float(np.diff([0.0, *ends]).max())
+        found = {k: replace(x, local=None, later=0.0, step=longest, ends=ends) for k, x in found.items()}
+    return _with_nodes(computed, {k: replace(x, follow=False) for k, x in found.items()})
 
 
 def replay(
-    scene: Scene | System, places: Places, finer: bool = False, more: Sequence[float] | None = None,
+    scene: Scene | System, course: Course, finer: bool = False, more: Sequence[float] | None = None,
     each_step: bool = False,
 ) -> Result:  # fmt: skip
-    """A run into memory, on nodes at places; finer: on nodes as the scene has them, cells and steps half as long.
+    """A run into memory, in the steps and on the nodes of a course; finer: on nodes as the scene has them, cells and
+
+    steps half as long.
 
     more: of one cable: outputs are at its nodes and these arc lengths, m; None: where the scene asks for them;
-    each_step: there are outputs at every step, in place of when the scene asks for them.
+    each_step: there are outputs at every step, or about as often where steps are not equal, in place of when the scene
+    asks for them.
 
     SceneError, ComputationError: as of `hybrid.run`.
     """
-    often = {"every": scene.require_time().step} if each_step else {}
-    scene = scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None, **often})})
-    if _has_layers(scene) and not finer:
-        return run(scene)
+    scene = course.applied(scene)
+    lines = {k: _halved(x) for k, x in course.lines.items()} if finer else course.lines
+    first = next(iter(course.lines.values()))
+    if each_step:
+        every = float(np.median(np.diff([0.0, *first.ends]))) if first.ends else first.step
+        scene = scene.model_copy(update={"output": scene.output.model_copy(update={"every": every})})
     target = MemoryTarget()
     if isinstance(scene, Scene):
-        first = first_resolution(scene)
-        resolution = _halved(first) if finer else replace(first, places=places.get("", ()))
         if more is not None:
-            points = np.unique([*build(scene, resolution, spare=False).line.s, *more])
+            points = np.unique([*build(scene, lines[""], spare=False).line.s, *more])
             points = points[np.append(True, np.diff(points) > NEAR * scene.length)]
             scene = scene.model_copy(update={"output": scene.output.model_copy(update={"points": tuple(points)})})
-        Case(scene, None).record(resolution, target)
+        Case(scene, None).record(lines[""], target)
         return written_result(target)
-    lines = SystemResolution.first(scene).lines
-    asked = {k: _halved(x) if finer else replace(x, places=places.get(k, ())) for k, x in lines.items()}
     reporter = ProgressReporter(None, scene.require_time().duration)
-    run_system(scene, target, scene_text(scene), reporter, lambda: False, resolution=SystemResolution(asked))
+    run_system(scene, target, scene_text(scene), reporter, lambda: False, resolution=SystemResolution(lines))
     return written_result(target)
 
 
+def _with_nodes(scene: Scene | System, lines: Mapping[str, Resolution]) -> Course:
+    """With the places of the nodes of every line."""
+    if isinstance(scene, Scene):
+        places = {"": places_of(build(scene, lines[""], spare=False), scene)}
+    else:
+        model = build_system(scene, SystemResolution(lines))
+        scenes = {name: scene.scene_of(name, scene.carried(name), scene.guesses) for name in model.names}
+        places = {name: places_of(x, scenes[name]) for name, x in zip(model.names, model.models, strict=True)}
+    return Course(scene, {k: replace(x, places=places[k]) for k, x in lines.items()})
+
+
 def _halved(resolution: Resolution) -> Resolution:
-    return replace(resolution.halved(), step=0.5 * resolution.step)
+    ends = np.array([0.0, *resolution.ends])
+    both = np.column_stack([0.5 * (ends[:-1] + ends[1:]), ends[1:]]).ravel()
+    return replace(resolution.halved(), step=0.5 * resolution.step, places=(), ends=tuple(both.tolist()))
 
 
-def _has_layers(scene: Scene | System) -> bool:
-    """Whether a scene says how many cells a layer has, which a pre-run shows."""
+def _is_open(scene: Scene | System) -> bool:
+    """Whether it leaves steps or cells to the program, which a run shows."""
     lines = [scene] if isinstance(scene, Scene) else [*scene.lines.values()]
-    return any(x.resolution is not None for x in lines)
+    alone = [scene] if isinstance(scene, Scene) else [scene.scene_of(name) for name in scene.lines]
+    layers = any(x.resolution is not None for x in lines)
+    return layers or scene.require_time().controlled or any(accuracy_of(x) is not None for x in alone)

@@ -198,7 +198,8 @@ class Resolution:
     rods: stretches (from, to, m; the lack over what is allowed) of which a pre-run has shown that catenaries will lack
     what is asked along the line: zones that move begin with rods there.
     parts: of every cell of a mesh that the scene gives.  places: of nodes among the places where nodes have to be, the
-    k-th of these at k: cells go along with their sections; empty: as the scene or the program places them.
+    k-th of these at k: cells go along with their sections; empty: as the scene or the program places them.  ends: s,
+    when the steps end, those of another run; empty: they are as `step` and `local` say.
     """
 
     fineness: float
@@ -214,6 +215,7 @@ class Resolution:
     rods: tuple[tuple[float, float, float], ...] = ()
     parts: int = 1
     places: tuple[float, ...] = ()
+    ends: tuple[float, ...] = ()
 
     def halved(self) -> Resolution:
         """With cells half as long, also those of a mesh that the scene gives."""
@@ -229,7 +231,7 @@ class Resolution:
         every = round(steps) if steps > 1.0 else 1
         step, later = self.step * steps, self.later * steps
         fineness = self.fineness / cells
-        return replace(self, fineness=fineness, step=step, local=local, every=every, later=later, places=())
+        return replace(self, fineness=fineness, step=step, local=local, every=every, later=later, places=(), ends=())
 
     @property
     def turn(self) -> float:

@@ -28,7 +28,7 @@ Tables = Mapping[str, Any]
 Kind = Literal["physics", "not worked out", "several lines"]
 # Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
 USE, SYSTEM, LINE = "use", "system", "line"
-Use = Literal["", "about rest", "response", "derivatives", "derivatives in motion"]
+Use = Literal["", "about rest", "response", "derivatives"]
 LEAVE_OUT = "leave it out"
 ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
@@ -496,9 +496,6 @@ ABOUT_REST = Feature("natural modes, response to a sea, derivatives at rest", "h
                      _used("about rest", "derivatives"))  # fmt: skip
 RESPONSE = Feature("response to a sea", "hybrid response", _used("response"))
 DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("derivatives"))
-IN_MOTION = Feature("derivatives in motion", "hybrid sensitivity --motion", _used("derivatives in motion"))
-FOLLOWED = Feature("steps that follow the motion", "no time.step, time.tolerance",
-                   _asks("time", "step", lambda x: x.controlled))  # fmt: skip
 HELD_BESIDE = Feature("offsets of a body from its equilibrium", "--offsets", lambda tables: ())
 OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change in time",
                         "motion.file, motion.travel, force.history", _changing_loads)  # fmt: skip
@@ -621,15 +618,6 @@ REFUSALS: tuple[Refusal, ...] = (
         BY_RAO, FINITE_WAVES, "physics",
         "an RAO is of linear waves, and the harmonics of one wave of finite height ({key}) travel with it",
         fix="waves: {{kind: regular}}, or the motion from a file",
-    ),
-    Refusal(
-        IN_MOTION, FOLLOWED, "not worked out",
-        "steps follow the motion ({key}), and runs with other numbers have other steps, which changes results by more",
-        "a step, in s", "give `step: ...` (s) in time, and no tolerance",
-    ),
-    Refusal(
-        IN_MOTION, ACCURACY, "not worked out", "an accuracy ({key}) chooses other cells for other numbers",
-        "cells that stay", "leave {key} out, and give mesh.cells",
     ),
     Refusal(
         DERIVATIVES, SETTLED_FRICTION, "physics", "friction has settled ({key}), and how depends on the way there",

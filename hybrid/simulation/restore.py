@@ -91,7 +91,7 @@ def refused(source: Path) -> Iterator[None]:
 def resolution_tree(resolution: Resolution) -> Tree:
     """A resolution for a checkpoint."""
     tree = {x.name: getattr(resolution, x.name) for x in fields(resolution)}
-    rows = {x: np.array(getattr(resolution, x), float).ravel() for x in ("rods", "places")}
+    rows = {x: np.array(getattr(resolution, x), float).ravel() for x in ("rods", "places", "ends")}
     return tree | {"grading": resolution.grading and vars(resolution.grading)} | rows
 
 
@@ -100,7 +100,13 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
     first = first_resolution(scene)
     if "later" not in tree:  # of a checkpoint of before, whose steps were short from one end to the other
         tree = tree | {"later": first.later * tree["step"] / first.step if first.step else 0.0, "still": first.still}
-    later = {"bends": inf, "rods": np.zeros(0), "parts": 1, "places": np.zeros(0)}  # all cells of before had one part
+    later = {
+        "bends": inf,
+        "rods": np.zeros(0),
+        "parts": 1,
+        "places": np.zeros(0),
+        "ends": np.zeros(0),
+    }  # all cells of before had one part
     saved = matched(later | tree, resolution_tree(first) | {"grading": None}, "resolution")
     for name in ("fineness", "step", "local", "zones", "later", "still"):
         asked, is_ = getattr(first, name), saved[name]
@@ -127,6 +133,7 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
     rows = {
         "rods": tuple((float(a), float(b), float(x)) for a, b, x in rods),
         "places": tuple(saved["places"].tolist()),
+        "ends": tuple(saved["ends"].tolist()),
     }
     return Resolution(**saved | {"grading": grading} | rows)
 

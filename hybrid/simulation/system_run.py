@@ -563,7 +563,8 @@ class SystemRun:
         self._breaks = sorted({x for each in (*given, self.failures.times) for x in each if x < end})
         outputs = [x for x in self.times if x < end] if self.system.output.exact else []
         last = self.times[-1] if until is None else until
-        return apart([*outputs, last, *self._breaks], self.t, self.resolution.one.step)
+        steps = [x for x in self.resolution.one.ends if x < end]
+        return apart([*outputs, *steps, last, *self._breaks], self.t, self.resolution.one.step)
 
     def go_to(self, stop: float, look: Callable[[], None] = lambda: None) -> None:
         """Steps to `stop` (s), with what is due there; look: called there, and about ten times a second."""
@@ -714,7 +715,7 @@ class SystemRun:
                 model.ends.set_loads(self.t)
             self.restart_steps()
             self.leg = (stop, 0)
-        if self.system.output.exact:
+        if self.system.output.exact or self.resolution.one.ends:
             self.leg = (stop, 0)
         if self.loop.due:
             self._attach()

@@ -93,7 +93,8 @@ class TimeLoop:
         self._report, self._interrupted = report, interrupted
         self._observed = run.model  # by the observer
         self._cpu = clock.process_time()  # at the start of the run
-        self.patient = False  # whether steps and outputs wait in the buffers of the run until these are full
+        # whether steps and outputs wait in the buffers of the run until these are full
+        self.patient = bool(run.resolution.ends)
         self._aside: list[tuple[Model, Output]] = []  # outputs that wait, each of a line of its own
         self._nodes_aside = 0  # of all of these
         self._ratios: list[np.ndarray] = []  # (criteria, points) of outputs that wait, where criteria are written
@@ -148,6 +149,8 @@ class TimeLoop:
 
     def close(self) -> None:
         """The run is complete: a last checkpoint, what is to be said of all of it, and the file is closed."""
+        if self.patient:
+            self.write_down(everything=True)
         self._checkpoint(last=True)
         self.finish()
         self.recorder.close("complete", f"{self.run.steps} steps")
@@ -177,6 +180,7 @@ class TimeLoop:
         stops = [t for t in (*breaks, *run.model.ends.release_times) if t < end]
         if run.controlled:
             stops += [t for t in (*ramp_ends(run.scene), *self._vibration.begins) if t < end]
+        stops += [t for t in run.resolution.ends if t < end]
         if exact:
             stops += [float(t) for t in run.run.books.outputs if t < end]
         for stop in apart([*stops, end], run.t, run.resolution.step):
@@ -186,7 +190,7 @@ class TimeLoop:
                 self._vibration.judge(run.run.clock)
             self.go_to(stop)
             self._vibration.begin(run.run.clock)
-            if exact:
+            if exact or run.resolution.ends:
                 run.begin_leg()
             if breaks and any(abs(t - stop) <= SAME_STOP * run.resolution.step for t in breaks):
                 run.restart()

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 import hybrid
 from hybrid.designs.motions import PART, Motions
-from tests.designs.test_in_motion import G, W, heaved, on_the_bed
+from tests.designs.test_in_motion import G, W, as_lines, heaved, on_the_bed
 
 MASS, AMPLITUDE = "cable.sections[0].mass", "ends.start.motion.heave.amplitude"
 TOP = {"quantity": "tension", "at": "start", "over": "max"}
@@ -85,12 +85,7 @@ def test_slopes_of_a_motion_are_those_of_central_differences():
 
 def test_written_as_a_system_it_is_the_same():
     """A line that hangs from a point that is heaved, with a body below: of several lines."""
-    scene = heaved()
-    section, motion = scene["cable"]["sections"][0], scene["ends"]["start"]["motion"]
-    points = {"top": {"kind": "fixed", "position": [0, 0, 0], "motion": motion},
-              "end": {"kind": "free", "initial_guess": [0, 0, -40], "mass": 60.0}}  # fmt: skip
-    line = {"start": "top", "end": "end", "sections": [section], "model": "catenary", "mesh": {"cells": 8}}
-    system = {"points": points, "lines": {"a": line}, "time": scene["time"], "output": scene["output"]}
+    system = as_lines(heaved())
     found = hybrid.design(
         system, unknowns={"m": {"key": "lines.a.sections[0].mass", "low": 1, "high": 20}},
         targets={"top": TOP | {"line": "a", "value": 3500.0}},
@@ -112,11 +107,22 @@ def test_what_is_refused(limits, words):
         hybrid.design(heaved(), unknowns={"m": {"key": MASS, "low": 1, "high": 20}}, minimise="-m", limits=limits)
 
 
-def test_scenes_without_steps_of_their_own_are_refused():
+@pytest.mark.parametrize("more", [{"tolerance": 1e-3}, {}])
+def test_steps_that_follow_the_motion_are_those_of_the_first_run(more):
+    """Also where an accuracy chooses them; the free run has steps half as long."""
+    accuracy = {} if more else {"accuracy": "1%"}
+    found = hybrid.design(
+        heaved(time={"duration": 36.0} | more) | accuracy, unknowns={"m": {"key": MASS, "low": 1, "high": 20}},
+        targets={"top": TOP | {"value": 3500.0}},
+    )  # fmt: skip
+    assert found.numbers["m"] == pytest.approx(brentq(lambda m: by_hand(m) - 3500.0, 1.0, 20.0), rel=3e-3)
+    assert found.kept[0].finer == pytest.approx(by_hand(found.numbers["m"]), rel=2e-3)
+    assert found.runs <= 10
+
+
+def test_scenes_without_time_are_refused():
     limits = {"top": TOP | {"largest": 3500.0}}
     asked = {"unknowns": {"m": {"key": MASS, "low": 1, "high": 20}}, "minimise": "-m", "limits": limits}
-    with pytest.raises(hybrid.SceneError, match="steps follow the motion"):
-        hybrid.design(heaved(time={"duration": 24.0, "tolerance": 1e-3}), **asked)
     still = heaved()
     del still["time"], still["ends"]["start"]["motion"]
     with pytest.raises(hybrid.SceneError, match=r"limits\.top\.over[^$]*a scene with time"):

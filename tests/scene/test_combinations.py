@@ -91,8 +91,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.OTHER_MOTIONS, c.RESPONSE): (
         {"ends.end": {"kind": "free", "force": {"value": [1, 0, 0], "until": 2}}}, "response"
     ),
-    (c.IN_MOTION, c.FOLLOWED): ({"time": {"duration": 3.0, "tolerance": 1e-3}}, "derivatives in motion"),
-    (c.IN_MOTION, c.ACCURACY): ({"accuracy": "3%"}, "derivatives in motion"),
     (c.DERIVATIVES, c.SETTLED_FRICTION): ({"initial": {"kind": "equilibrium", "friction": "settled"}}, "derivatives"),
     (c.PAYOUT_AT_START, c.PAYOUT_AT_END): (PAID | {"ends.start.payout": {"rate": 0.1, "ramp": 1.0}}, ""),
     (c.TENSION_HELD, c.SEVERAL_LINES): (
