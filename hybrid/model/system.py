@@ -238,26 +238,26 @@ def _leave_own_bodies(system: System, models: Sequence[Model]) -> NDArray[np.int
 
     beyond its way out of that, straight towards its other end.
     """
-    if not system.shaped:
-        return np.zeros(0, np.int64)
     surfaces, numbers = list(system.surfaces), list(system.free_bodies)
     for model, line in zip(models, system.lines.values(), strict=True):
         carried, length = model.sea.values.carried, model.length
         places = system.first_place(line.start), system.first_place(line.end)
         for end, name in enumerate((line.start, line.end)):
             point = system.points[name]
-            if not isinstance(point, Fairlead) or point.body not in system.shaped:
+            shape = getattr(system.bodies[point.body], "shape", None) if isinstance(point, Fairlead) else None
+            if not isinstance(point, Fairlead) or shape is None:
                 continue
-            body, k = system.free_bodies[point.body], surfaces.index(point.body)
+            k = surfaces.index(point.body)
             axes = carried[k, TURNED : TURNED + 9].reshape(3, 3)
             towards = tuple((axes.T @ np.subtract(places[1 - end], places[end])).tolist())
             row = model.sea.values.obstacles[k]
-            assert body.shape is not None
-            out = max(way_out(body.shape, point.place, towards, float(row[STRAND] + row[ONSET_OF])), LEAST_WAY * length)
+            out = max(way_out(shape, point.place, towards, float(row[STRAND] + row[ONSET_OF])), LEAST_WAY * length)
             if end:
                 carried[k, MEETS_TO] = length - out
             else:
                 carried[k, MEETS_FROM] = out
+    if not system.shaped:
+        return np.zeros(0, np.int64)
     return np.array([numbers.index(x) if x in system.shaped else -1 for x in surfaces], np.int64)
 
 

@@ -132,6 +132,10 @@ class FixedBody(Table):
         """Where a point of the body is at rest, inertial [m]."""
         return _placed(self.position, self.rotation, place)
 
+    def surface(self, name: str) -> dict[str, Carried]:
+        """As of a free body: lines pass through one that a scene holds."""
+        return {}
+
     @property
     def shift(self) -> Motion | None:
         """The motion of the body without its rotations, as far as tables give it."""
@@ -147,6 +151,16 @@ class FixedBody(Table):
             expected = "nothing, because lines end at points of kind fairlead"
             refuse([Finding(("motion", "vessel", "fairlead"), expected, "leave it out")])
         return self
+
+
+class HeldBody(FixedBody):
+    """A body with a shape that is held beside its equilibrium, which is what no scene asks for."""
+
+    shape: BodyShape = Field(exclude=True, description="surface that lines touch")
+
+    def surface(self, name: str) -> dict[str, Carried]:
+        """Its shape as an obstacle by the name of the body."""
+        return {name: carried_shape(name, self.shape, self.position, self.rotation, turned)}
 
 
 class FreeBody(Table):

@@ -496,7 +496,6 @@ ABOUT_REST = Feature("natural modes, response to a sea, derivatives at rest", "h
                      _used("about rest", "derivatives"))  # fmt: skip
 RESPONSE = Feature("response to a sea", "hybrid response", _used("response"))
 DERIVATIVES = Feature("derivatives at rest", "hybrid sensitivity", _used("derivatives"))
-HELD_BESIDE = Feature("offsets of a body from its equilibrium", "--offsets", lambda tables: ())
 OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change in time",
                         "motion.file, motion.travel, force.history", _changing_loads)  # fmt: skip
 FINITE_WAVES = Feature("waves of finite height", "waves.kind: stream_function", _finite_waves)
@@ -510,10 +509,6 @@ ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
 RESPONSE_TO_MOTION = Refusal(
     OTHER_MOTIONS, RESPONSE, "physics", "a response by frequency is of what is constant or a sum of harmonics",
     "harmonics, and loads that stay", "hybrid run computes it in time",
-)  # fmt: skip
-OFFSETS_OF_SHAPE = Refusal(
-    HELD_BESIDE, SHAPES, "not worked out", "a body that is held has no shape, and this one has ({key})",
-    "another body, or a point", "--stiffness has what it takes to shift it a little",
 )  # fmt: skip
 PAID = "line is paid out ({key})"
 TOUCHES = "there are obstacles or lines that touch each other ({key})"
@@ -583,7 +578,6 @@ REFUSALS: tuple[Refusal, ...] = (
         PLANE, OBSTACLES, "not worked out", "contact with obstacles ({key}) is computed in space", "3 or nothing",
         "leave it out",
     ),
-    OFFSETS_OF_SHAPE,
     Refusal(
         PAYOUT, MEETS_LINES, "not worked out",
         "what touches ({key}) moves, and nodes that enter and leave do not know it",

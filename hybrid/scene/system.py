@@ -272,7 +272,7 @@ class System(Table):
     @property
     def surfaces(self) -> Obstacles:
         """The obstacles, and behind them the shapes of bodies, by name."""
-        shapes = {key: x for name, body in self.free_bodies.items() for key, x in body.surface(name).items()}
+        shapes = {key: x for name, body in self.bodies.items() for key, x in body.surface(name).items()}
         return {**self.obstacles, **shapes} if shapes else self.obstacles
 
     @property

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.junctions.bodies import ARM, FORCE, FRAME, MASS, PLACE, STATE, STIFFNESS, V
+from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.march.assembly import JOINED
-from hybrid.kernels.state.obstacle_rows import STRAND
+from hybrid.kernels.state.obstacle_rows import EACH, STRAND
+from hybrid.kernels.state.obstacle_rows import FORCE as FORCE_OF
+from hybrid.kernels.state.obstacle_rows import STIFFNESS as STIFFNESS_OF
 from hybrid.kernels.state.report import FORCE_A, MOMENT_A
 from hybrid.kernels.state.state import Floats
 from hybrid.model.bodies import angles_of, frame_of
 from hybrid.model.clamps import seat_of, seated
 from hybrid.model.system import SystemModel, build_system
-from hybrid.scene.bodies import FixedBody, FreeBody
-from hybrid.scene.combinations import OFFSETS_OF_SHAPE
+from hybrid.scene.analysis import Equilibrium
+from hybrid.scene.bodies import FixedBody, FreeBody, HeldBody
+from hybrid.scene.body_shapes import BodyShape
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene_text
 from hybrid.scene.suggestions import nearest
@@ -227,8 +232,6 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
     """
     system = _system(scene)
     kind, name = target_of(system, at)
-    if kind == "body" and name in system.shaped:
-        raise OFFSETS_OF_SHAPE.error("offsets", at)
     try:
         known = bool(len(distances)) and bool(np.isfinite([*distances, heading]).all())
     except (TypeError, ValueError):
@@ -239,6 +242,9 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
         raise SceneError([Complaint("offsets", given, "distances (m) and a heading (deg)", fix)])
     model = build_system(system)
     found = _equilibrium(system, model)
+    shape = getattr(system.bodies[name], "shape", None) if kind == "body" else None
+    if shape is not None:  # which lines may not pass on the way to where they touch it
+        system = system.model_copy(update={"lines": _from_where_they_lie(system, found)})
     place = _place(system, model, found, name) if kind == "point" else None
     rigid = kind == "point" and name in system.rigid
     if rigid:
@@ -258,8 +264,9 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
     which = _points_of(system, kind, name)
     for distance in distances:
         try:
-            moved = _held(system, kind, name, place + distance * along, rotation)
+            moved = _held(system, kind, name, (place + distance * along, rotation), shape)
             there = build_system(moved)
+            _make_as_hard(moved, there, system, model)
             here = _equilibrium(moved, there)
         except SceneError as error:
             given = f"an offset of {distance:g} m"
@@ -267,7 +274,7 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
         except ComputationError as error:
             detail = f"at an offset of {distance:g} m; {error.detail}"
             raise ComputationError(error.outcome, error.t, error.s, detail) from None
-        force, moment = np.zeros(3), np.zeros(3)
+        force, moment = _contact_on(here, moved, name, place + distance * along)
         for l, ends in enumerate(_ends(moved)):
             for k, point in enumerate(ends):
                 if point in which:
@@ -359,15 +366,52 @@ def _clamped_as_they_lie(
     return lines
 
 
-def _held(system: System, kind: str, name: str, place: Floats, rotation: Floats) -> System:
-    """The system with a point or body held somewhere."""
-    at, turned = tuple(place.tolist()), tuple(rotation.tolist())
-    changed: dict[str, object] = {"points": {**system.points, name: FixedPoint(position=at)}}
+def _from_where_they_lie(system: System, found: SystemEquilibrium) -> dict[str, JoinedLine]:
+    """The lines, whose equilibria are searched for from that."""
+    shapes = (tuple(map(tuple, x.r.tolist())) for x in found.state.lines)
+    return {
+        name: line.model_copy(update={"initial": Equilibrium(points=points)})
+        for (name, line), points in zip(system.lines.items(), shapes, strict=True)
+    }
+
+
+def _held(system: System, kind: str, name: str, pose: tuple[Floats, Floats], shape: BodyShape | None) -> System:
+    """The system with a point or body held somewhere; pose: place, m, and rotation, deg; shape: of the body."""
+    at, turned = (tuple(x.tolist()) for x in pose)
+    changed: dict[str, dict[str, Any]] = {"points": {**system.points, name: FixedPoint(position=at)}}
     if kind == "body":
         changed = {"bodies": {**system.bodies, name: FixedBody(position=at, rotation=turned)}}
+        if not _points_of(system, kind, name):  # which no scene holds
+            del changed["bodies"][name]
     moved, _ = parse_either(scene_text(system.model_copy(update=changed)))  # so that lines too short are refused
     assert isinstance(moved, System)
-    return moved
+    if shape is None:
+        return moved
+    held = HeldBody(position=at, rotation=turned, shape=shape)
+    return moved.model_copy(update={"bodies": {**moved.bodies, name: held}})
+
+
+def _make_as_hard(moved: System, there: SystemModel, system: System, model: SystemModel) -> None:
+    """Let obstacles be as hard as they were with a body or point that presses lines on them, and is held now."""
+    before = list(system.surfaces)
+    same = [before.index(x) for x in moved.surfaces]
+    for new, old in zip(there.models, model.models, strict=True):
+        new.sea.values.obstacles[:, STIFFNESS_OF] = old.sea.values.obstacles[same, STIFFNESS_OF]
+
+
+def _contact_on(found: SystemEquilibrium, system: System, body: str, origin: Floats) -> tuple[Floats, Floats]:
+    """Force (3,) N of lines that touch a body, and moment (3,) N m about its origin."""
+    force, moment, surfaces = np.zeros(3), np.zeros(3), list(system.surfaces)
+    if body not in surfaces or body in system.obstacles:
+        return force, moment
+    at = EACH * surfaces.index(body) + FORCE_OF
+    for x, state in zip(found.solver.lines, found.state.lines, strict=True):
+        grip = np.zeros_like(state.grip)
+        grip_obstacles(x.line, x.sea, np.zeros_like(state.r), state, state.grip, grip)
+        pressed = -grip[:, at : at + 3]
+        force += pressed.sum(axis=0)
+        moment += np.cross(state.r - origin, pressed).sum(axis=0)
+    return force, moment
 
 
 def _let_go(

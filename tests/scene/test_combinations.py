@@ -118,7 +118,6 @@ OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.ABOUT_REST, c.MOVED_BY_LINES), TWO_LINES, "derivatives"),
     ((c.PAYOUT, c.MEETS_LINES), SHAPED | PAID_LINE, ""),
 )
-OF_ARRAYS = [c.OFFSETS_OF_SHAPE]
 
 
 def _scene(changes: dict[str, Any], several: bool) -> Scene | System:
@@ -136,7 +135,7 @@ def _id(x: object) -> str:
 def test_every_refusal_has_an_example() -> None:
     pairs = [(x.feature, x.beside) for x in REFUSALS]
     assert len(set(pairs)) == len(pairs)
-    assert set(pairs) == {*EXAMPLES, *((x.feature, x.beside) for x in (*BY_SCHEMA, *OF_ARRAYS))}
+    assert set(pairs) == {*EXAMPLES, *((x.feature, x.beside) for x in BY_SCHEMA)}
 
 
 @pytest.mark.parametrize(("pair", "changes", "use"), [*((k, *x) for k, x in EXAMPLES.items()), *OTHERS], ids=_id)

@@ -133,6 +133,36 @@ def test_stiffness_and_offsets_of_points_beside_a_body_that_lines_touch() -> Non
     np.testing.assert_allclose((shifted[0] - shifted[1]) / 2e-4, held[:, 0], rtol=5e-5)
 
 
+@pytest.mark.parametrize("heading", [0.0, 90.0])
+@pytest.mark.parametrize("tables", [on_two_lines(), tied_down()], ids=["alone", "tied"])
+def test_a_body_that_is_held_bears_what_lines_that_touch_it_do(tables: Tables, heading: float) -> None:
+    """Where it rests its weight, with no moment; beside that the stiffness, of equilibria under forces on a free body;
+
+    and a free body under the opposite of the force far away rests there, where the lines' contact is of second order.
+    """
+    K, k = hybrid.stiffness(tables, "body:ball").matrix, int(heading == 90.0)
+    held = hybrid.offsets(tables, "body:ball", [0.0, -1e-4, 1e-4, 0.05], heading=heading)
+    assert held.moment is not None
+    np.testing.assert_allclose(held.force[0], [0, 0, MASS * 9.81], atol=1e-6)
+    np.testing.assert_allclose(held.moment[0], 0.0, atol=1e-8)
+    for found, there in ((K[:3, k], held.force), (K[3:, k], held.moment)):
+        np.testing.assert_allclose((there[1] - there[2]) / 2e-4, found, rtol=1e-3, atol=1e-4 * np.abs(K[:, k]).max())
+    assert held.restoring == pytest.approx(-held.force[:, k], abs=1e-9)
+    if k == 0:  # along the lines it would roll away
+        return
+    rest = hybrid.static(tables)["bodies/ball/position"][-1]
+    there = rest + 0.05 * np.eye(3)[k]
+    under = -held.force[3] - [0, 0, -MASS * 9.81]
+    body = tables["bodies"]["ball"] | {"force": under.tolist(), "moment": (-held.moment[3]).tolist()}
+    body |= {"initial_guess": there.tolist()}
+    moved = hybrid.static(tables | {"bodies": {"ball": body}})
+    np.testing.assert_allclose(moved["bodies/ball/position"][-1], there, atol=2e-7)
+    assert {x: float(held.tension[x][3]) for x in held.tension} == pytest.approx(
+        {x: float(line["max_tension"].max()) if "max_tension" in line.names else float(line.tension.max())
+         for x, line in moved.lines.items()}, rel=2e-3
+    )  # fmt: skip
+
+
 # --- in motion --------------------------------------------------------------------------------------
 
 
@@ -401,10 +431,8 @@ def test_newtons_method_converges_quadratically() -> None:
 # --- what is refused --------------------------------------------------------------------------------
 
 
-def test_a_shape_has_the_name_of_no_obstacle_and_no_body_that_is_held_has_one() -> None:
+def test_a_shape_has_the_name_of_no_obstacle() -> None:
     tables = on_two_lines()
-    with pytest.raises(SceneError, match="a body that is held has no shape"):
-        hybrid.offsets(tables, "body:ball", [0.1])
     tables["obstacles"] = {"ball": {"kind": "sphere", "at": [0, 0, 9], "radius": 1}}
     with pytest.raises(SceneError, match="no obstacle has"):
         hybrid.static(tables)
