@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hybrid.designs.design import design
     from hybrid.designs.seek import seek
     from hybrid.designs.sensitivity import sensitivity
+    from hybrid.designs.shares import shares
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.exports.api import export
     from hybrid.interop.moordyn import export_moordyn, import_moordyn
@@ -92,6 +93,7 @@ _HOME = {
     "scene_text": ("hybrid.scene.read", "scene_text"),
     "seek": ("hybrid.designs.seek", "seek"),
     "sensitivity": ("hybrid.designs.sensitivity", "sensitivity"),
+    "shares": ("hybrid.designs.shares", "shares"),
     "static": ("hybrid.accuracy.api", "static"),
     "stiffness": ("hybrid.simulation.system_stiffness", "stiffness"),
     "study": ("hybrid.studies.study", "study"),
@@ -145,6 +147,7 @@ __all__ = [
     "scene_text",
     "seek",
     "sensitivity",
+    "shares",
     "static",
     "stiffness",
     "study",

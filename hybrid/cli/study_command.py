@@ -38,6 +38,9 @@ def study(
     sensitivity: Annotated[
         str | None, typer.Option(metavar="RESULT", help="What each variable of STUDY.zarr does to a result.")
     ] = None,
+    derivatives: Annotated[
+        bool, flag("--derivatives", help="With --sensitivity: shares of the spread by derivatives at the mean.")
+    ] = False,
     overwrite: Annotated[bool, flag("--overwrite", help="Begin anew where there is a study.")] = False,
     quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
@@ -46,6 +49,8 @@ def study(
         raise UsageError(
             f"{source} is a folder; a study file is expected, or --case N, --sensitivity RESULT for what it holds"
         )
+    if derivatives and sensitivity is None:
+        raise UsageError("--derivatives goes with --sensitivity RESULT")
     with session(as_json, quiet) as console:
         if netcdf is not None:
             from hybrid.store.selection import check_target
@@ -62,6 +67,8 @@ def study(
             for row in rows:
                 console.json("influence", **row._asdict())
             console.show(lambda: _influences(rows))
+            if derivatives:
+                _show_shares(console, hybrid.shares(source, sensitivity))
             console.json("done", file=str(source))
             return
         console.source = ""
@@ -152,6 +159,24 @@ def _influences(rows: list[Any]) -> Any:
         figures = (f"{x:.3g}" if x == x else "" for x in (row.first, row.total, row.interval))
         table.add_row(row.variable, *figures)
     return table
+
+
+def _show_shares(console: Console, found: Any) -> None:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("", no_wrap=True)
+    for title in ("derivative", "share", "first order from", "to"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for row in found.rows:
+        parts = (f"{x:.3f}" if x == x else "" for x in (row.share, row.low, row.high))
+        table.add_row(row.variable, f"{row.derivative:.4g}", *parts)
+    console.json("shares", **found._asdict() | {"rows": [x._asdict() for x in found.rows]})
+    console.show(lambda: table)
+    if found.why:
+        console.note(f"note: no shares by derivatives: {found.why}")
+    else:
+        console.note(f"note: of {found.of} at the mean; R² {found.r2:.4f} over {found.cases} cases")
 
 
 def _kind(reason: str) -> str:

@@ -69,7 +69,7 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
     if motion:
         values, found, errors = in_motion(asked, of, by)
     else:
-        _refuse_edges(of)
+        refuse_edges(of)
         fine = at_rest(asked, of)
         values, found = fine.values, fine.by(by)
         errors = OF_DIFFERENCE * np.abs(found - at_rest(asked, of, 2.0).by(by))
@@ -84,7 +84,7 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
     return out
 
 
-def _refuse_edges(of: Sequence[str]) -> None:
+def refuse_edges(of: Sequence[str]) -> None:
     """Where contact begins and ends moves from node to node: the line of cells has no derivative that means it."""
     for text in of:
         name = text.split("@")[0].split("/")[-1].split(" ")[-1].split(".")[0]

@@ -5,7 +5,8 @@ a batch with a status is there.  One that was cut off is computed again, and its
 
 Layout::
 
-    attributes   format, identity (hash of the study), batch (cases in a chunk), title, study (JSON), created, versions
+    attributes   format, identity (hash of the study), batch (cases in a chunk), title, study (JSON), created, versions,
+                 shares (JSON, by result: what `hybrid.shares` has found)
     case (n)     number of the case
     <variable> (n)                   what was varied, and what was derived from it
     status (n)   0: not done, 1: done, 2: failed
@@ -131,6 +132,10 @@ class StudyFile:
     @property
     def attributes(self) -> dict[str, Any]:
         return dict(self._group.attrs)
+
+    def keep(self, name: str, entries: Mapping[str, Any]) -> None:
+        """Write entries of an attribute that is a table in JSON, such as `shares` by result; others of it stay."""
+        self._group.attrs[name] = json.dumps({**json.loads(self.attributes.get(name, "{}")), **entries})
 
     @property
     def status(self) -> np.ndarray:

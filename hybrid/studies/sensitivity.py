@@ -41,6 +41,20 @@ class Influence(NamedTuple):
     interval: float
 
 
+class StudyResult(NamedTuple):
+    """A result of a study: all of its data, values (n,), which cases have one, how they were sampled (None: not)."""
+
+    data: Any
+    values: np.ndarray
+    done: np.ndarray
+    sample: dict[str, Any] | None
+
+    @property
+    def method(self) -> str:
+        """Of its sample; "": it has none."""
+        return str(self.sample["method"]) if self.sample else ""
+
+
 def design(method: str, names: list[str], count: int, seed: int) -> np.ndarray:
     """Points (n, m) between 0 and 1 of a design for m variables; count: its base size."""
     optional_package("SALib", "a design for sensitivity", "studies")
@@ -59,14 +73,10 @@ def sensitivity(study: str | Path, result: str) -> list[Influence]:
     indices of Sobol, by `morris` elementary effects, any other rank correlations.  ResultError for a result that is not
     there or known of too few cases, or a design of which cases have failed.
     """
-    found = open_study(study)
-    if result not in found or found[result].dims != ("case",) or found[result].dtype.kind != "f":
-        numbers = [str(n) for n in found.data_vars if found[n].dims == ("case",) and found[n].dtype.kind == "f"]
-        raise ResultError(f"{study} has no result '{result}'\n    expected: one of {', '.join(numbers)}")
-    sample = json.loads(found.attrs.get("sample", "null"))
-    method = sample["method"] if sample else ""
-    values, done = found[result].values, (found["status"].values == DONE) & np.isfinite(found[result].values)
-    if method in DESIGNS:
+    asked = result_of(study, result)
+    found, values, done, sample = asked
+    method = asked.method
+    if sample is not None and method in DESIGNS:
         if not done.all():
             raise ResultError(
                 f"{int((~done).sum())} of {done.size} cases have no '{result}', and a design of {method} needs all\n"
@@ -76,9 +86,20 @@ def sensitivity(study: str | Path, result: str) -> list[Influence]:
         if done.size != _size(method, len(bounds), sample["count"]):
             raise ResultError(f"{study} crosses a design of {method} with lists of values: analyse one value at a time")
         return _of_design(method, bounds, found, values)
+    return _ranked(found, values, done)
+
+
+def result_of(study: str | Path, result: str) -> StudyResult:
+    """A number that was kept of each run; ResultError: it is not there, or known of too few cases."""
+    found = open_study(study)
+    if result not in found or found[result].dims != ("case",) or found[result].dtype.kind != "f":
+        numbers = [str(n) for n in found.data_vars if found[n].dims == ("case",) and found[n].dtype.kind == "f"]
+        raise ResultError(f"{study} has no result '{result}'\n    expected: one of {', '.join(numbers)}")
+    values = found[result].values
+    done = (found["status"].values == DONE) & np.isfinite(values)
     if done.sum() < LEAST:
         raise ResultError(f"{int(done.sum())} of {done.size} cases have a '{result}'\n    expected: {LEAST} at least")
-    return _ranked(found, values, done)
+    return StudyResult(found, values, done, json.loads(found.attrs.get("sample", "null")))
 
 
 def _size(method: str, variables: int, count: int) -> int:

@@ -237,6 +237,7 @@ def _created(
         "variables": json.dumps(list(columns)), "scene_file": Path(asked.scene).name,
         "files": json.dumps(cases.files), "sample": json.dumps(asked.sample.model_dump() if asked.sample else None),
         "bounds": json.dumps(cases.bounds),
+        "collect": json.dumps({name: each.model_dump(mode="json") for name, each in wanted.items()}),
     }  # fmt: skip
     return StudyFile.create(target, columns, len(rows), batch, attributes)
 

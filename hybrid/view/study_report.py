@@ -44,6 +44,7 @@ def html(study: Path) -> str:
         "subtitle": escape(_subtitle(found, counts)),
         "failures": _failures(found),
         "ranges": _ranges(found, results),
+        "shares": _shares(found),
         "example": escape(_example(found, variables)),
         "again": escape(again),
         "footer": escape(footer()),
@@ -109,6 +110,28 @@ def _ranges(found: Any, results: list[str]) -> str:
     heads = ("", "what it is", "unit", "smallest", "median", "largest", "in case")
     head = "".join(f'<th scope="col"{" class=number" if k > 2 else ""}>{text}</th>' for k, text in enumerate(heads))
     return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+
+
+def _shares(found: Any) -> str:
+    """What `hybrid.shares` has found of results: a table of each, or why it claims nothing."""
+    parts = []
+    for name, each in json.loads(found.attrs.get("shares", "{}")).items():
+        heads = ("", "derivative", "share", "first order from", "to", "Sobol: first order", "total")
+        head = "".join(f'<th scope="col"{" class=number" if k else ""}>{x}</th>' for k, x in enumerate(heads))
+        rows = ""
+        for row in each["rows"]:
+            numbers = (row[x] for x in ("derivative", "share", "low", "high", "first", "total"))
+            cells = "".join(f'<td class="number">{"" if x != x else f"{x:.4g}"}</td>' for x in numbers)
+            rows += f"<tr><td>{escape(row['variable'])}</td>{cells}</tr>"
+        about = f"R² {each['r2']:.4f} over {each['cases']} cases"
+        about = f"No shares: {escape(each['why'])}." if each["why"] else f"{escape(each['of'])} at the mean; {about}."
+        parts.append(
+            f'<h3>{escape(name)}</h3><p class="quiet">{about}</p><div class="scroll"><table><thead><tr>{head}</tr>'
+            f"</thead><tbody>{rows}</tbody></table></div>"
+        )
+    if not parts:
+        return ""
+    return f'<section id="shares"><h2>Shares of the spread, by derivatives</h2>{"".join(parts)}</section>'
 
 
 def _example(found: Any, variables: list[str]) -> str:
