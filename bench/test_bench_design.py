@@ -9,6 +9,7 @@ of the pull of a dragged line, which take two each.  The lazy wave in ten seas t
 from __future__ import annotations
 
 import os
+import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -20,6 +21,7 @@ import hybrid
 from hybrid.designs.design import Found
 from hybrid.kernels.state.state import Floats
 from hybrid.scene.design import DESIGN
+from tests.designs.test_in_motion import heaved
 
 pytestmark = pytest.mark.bench
 RECORDS, HISTORIES = (int(os.environ.get("RECORDS", many)) for many in ("400", "100"))
@@ -62,6 +64,20 @@ def test_pretension_of_a_buoy_on_three_lines() -> None:
     found = hybrid.design(DESIGNS / "pretension.yaml")
     print(f"pretension of three lines: {found.equilibria} equilibria, that of the check on twice the cells included")
     assert found.equilibria <= 6
+
+
+def test_one_short_motion() -> None:
+    """A mass for a largest pull within 2 s of heave: no equilibrium where the motion alone is asked."""
+    scene = heaved(time={"duration": 2.0, "step": 0.05})
+    top = {"quantity": "tension", "at": "start", "over": "max", "value": 3500.0}
+    unknowns = {"m": {"key": "cable.sections[0].mass", "low": 1, "high": 20}}
+    took = []
+    for _ in range(6):
+        begin = clock.process_time()
+        found = hybrid.design(scene, unknowns=unknowns, targets={"top": top})
+        took.append(clock.process_time() - begin)
+    print(f"one short motion: {min(took):.3f} s of CPU time, {found.equilibria} equilibria, {found.runs} runs")
+    assert found.equilibria == 0
 
 
 def from_start(name: str, start: Sequence[float]) -> Found:

@@ -66,9 +66,9 @@ def _tables(found: Found) -> Any:
     from rich.console import Group
     from rich.table import Table
 
-    head = f"{found.title or 'found'}: {found.equilibria} equilibria"
-    if found.moving:
-        head += f", {found.runs} runs ({found.runs / found.moving:.3g} of each case)"
+    took = [f"{found.equilibria} equilibria"] if found.equilibria else []
+    took += [f"{found.runs} runs ({found.runs / found.moving:.3g} of each case)"] if found.moving else []
+    head = f"{found.title or 'found'}: {', '.join(took)}"
     numbers = Table(title=head, title_justify="left", box=None, padding=(0, 2), min_width=min(len(head), 80))
     for name in ("", "found", "start", ""):
         numbers.add_column(name, justify="left" if not name else "right")
@@ -100,7 +100,8 @@ def _identified(found: Identified) -> Any:
     from rich.table import Table
 
     left = f"{found.scatter:.3g}" + (" of the stated deviation" if found.stated else "")
-    head = f"{found.title or 'found'}: {found.count} numbers, {found.equilibria} equilibria"
+    head = f"{found.title or 'found'}: {found.count} numbers"
+    head += f", {found.equilibria} equilibria" if found.equilibria else ""
     head += f", {found.runs} runs" if found.runs else ""
     head += f"; left over {left} (r.m.s.)"
     table = Table(title=head, title_justify="left", box=None, padding=(0, 2), min_width=min(len(head), 80))

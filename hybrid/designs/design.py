@@ -73,7 +73,8 @@ class Found:
     worth, of `moving` cases; notes: what is doubtful.
     settled: whether what is minimised is least there; False: the search ended before, and a note says why.
     scene: with the numbers, without changes of cases; scenes: of each case; before, after: places of nodes (n, 3), m,
-    by case and line; bed: height of a level seabed, m, None: none; file: the scene file, "": none.
+    by case and line, where a motion alone is asked of output points where it begins; bed: height of a level seabed, m,
+    None: none; file: the scene file, "": none.
     """
 
     title: str

@@ -24,15 +24,18 @@ APART = 1e-12
 
 
 class Point:
-    """Equilibria of all cases with the same values of unknowns: results (R,), and what they answer to unknowns."""
+    """Equilibria and runs of all cases with the same values of unknowns: results (R,), what they answer to unknowns.
+
+    rests: none of a case whose motion alone is asked.
+    """
 
     def __init__(
         self, x: Floats, rests: Mapping[str, CableAtRest | SystemAtRest], motion: OfMotion, equilibria: Equilibria
     ) -> None:
         self.x, self.rests, self._motion, self._of = x, rests, motion, equilibria
         self.values = np.zeros(len(equilibria.wanted))
-        for case, rows in equilibria.rows.items():
-            self.values[rows] = rests[case].values
+        for case, rest in rests.items():
+            self.values[equilibria.rows[case]] = rest.values
         equilibria.motions.values(motion, self.values)
         self._slopes: Floats | None = None
 
@@ -67,8 +70,12 @@ class Point:
         return rest.lines[list(rest.scene.lines).index(name)].model.line.s
 
     def shapes(self) -> dict[str, dict[str, Floats]]:
-        """Places (N+1, 3) of the nodes of every line, m, by case; "" is the name of a line that is alone."""
-        return {case: _shapes(x) for case, x in self.rests.items()}
+        """Places (N+1, 3) of the nodes of every line, m, by case; "" is the name of a line that is alone.
+
+        Of a case whose motion alone is asked those of its output points where it begins.
+        """
+        begins = {case: run.begin for case, run in self._motion.runs.items()}
+        return {case: _shapes(self.rests[case]) if case in self.rests else begins[case] for case in self._of.scenes}
 
 
 def _shapes(rest: CableAtRest | SystemAtRest) -> dict[str, Floats]:
@@ -103,6 +110,8 @@ class Equilibria:
             return kept
         rests = {}
         for case in self.scenes:
+            if case in self.motions.rows and not self.rows[case].size:
+                continue
             self.count += 1
             of = [self.wanted[k][1] for k in self.rows[case]]
             rests[case] = at_rest(self.scene(case, x), of, cells, self._places.get(case, NO_PLACES))

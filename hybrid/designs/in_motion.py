@@ -145,7 +145,10 @@ def _time_of(asked: Scene | System, text: str, number: str) -> float:
 
 
 class Motion:
-    """A run, and results of it; beside a base run extremes are where and when those of that are."""
+    """A run, and results of it; beside a base run extremes are where and when those of that are.
+
+    begin: places (n, 3), m, of output points of every line at first.
+    """
 
     def __init__(
         self, scene: Scene | System, wanted: Sequence[Wanted], course: Course, base: Motion | None = None,
@@ -163,6 +166,7 @@ class Motion:
             lines: dict[str, Any] = dict(result.lines) or {"": result}
             self.steps = {name: np.array(x["steps/t"]) for name, x in lines.items()}
             self.zones = {name: list(_zones(x)) for name, x in lines.items()}
+            self.begin = {name: np.array(x.position[0]) for name, x in lines.items()}
             self.where: list[Any] = [None] * len(wanted) if base is None else list(base.where)
             self.values = np.zeros(len(wanted))
             self.shapes: list[tuple[int, ...]] = []

@@ -31,6 +31,7 @@ def test_a_mass_for_a_largest_pull():
     assert top.finer == pytest.approx(by_hand(found.numbers["m"]), rel=1e-3)
     assert found.moving == 1 and found.runs <= 10  # four of them are the free run
     assert found.minimised is None and not found.notes
+    assert found.equilibria == 0 and found.before[""][""][0] == pytest.approx([0, 0, 0], abs=1e-9)
 
 
 def test_a_limit_over_two_seas_and_its_price():
@@ -45,6 +46,26 @@ def test_a_limit_over_two_seas_and_its_price():
     assert kept["high"].active and not kept["low"].active
     assert kept["high"].price == pytest.approx(-1.0 / (40.0 * (G + W**2)), rel=1e-2)
     assert found.moving == 2 and found.runs / 2 <= 20
+
+
+def test_what_has_no_equilibrium_is_designed_in_motion():
+    """A rod that nothing holds falls by g t^2/2."""
+    section = {
+        "length": 4.0,
+        "mass": 1.0,
+        "axial_stiffness": 1e5,
+        "bending_stiffness": 10.0,
+        "torsional_stiffness": 10.0,
+    }
+    scene = {
+        "environment": {"gravity": 9.0}, "cable": {"sections": [section]}, "ends": {"start": "free", "end": "free"},
+        "initial": {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]}, "model": "rod",
+        "mesh": {"cells": 8}, "time": {"duration": 1.0, "step": 0.05},
+    }  # fmt: skip
+    low = {"quantity": "position.z", "at": "start", "over": "last", "value": -5.0}
+    found = hybrid.design(scene, unknowns={"environment.gravity": {"low": 1, "high": 20}}, targets={"low": low})
+    assert found.numbers["environment.gravity"] == pytest.approx(10.0, rel=1e-6) and found.equilibria == 0
+    assert found.before[""][""][-1] == pytest.approx([4, 0, 0])
 
 
 def test_results_of_rest_and_motion_together():
