@@ -13,6 +13,7 @@ import hybrid
 from board import against_peers
 from board import problems as ours
 from board.answers import Answer, Problem, references
+from board.cosserat import solved_by_all
 from board.page import page
 from board.picture import draw
 
@@ -29,6 +30,7 @@ PROBLEMS: dict[str, Callable[[str], list[Answer]]] = {
     "suspension": against_peers.suspended,
     "power_cables": ours.power_cables,
     "helix": ours.helix,
+    **{f"cosserat_{x}": solved_by_all for x in ("cantilever", "catenary", "pendulum", "crossing", "capstan", "pile")},
 }
 PACKAGES = {
     "CableDyn": "cabledyn",
@@ -36,6 +38,8 @@ PACKAGES = {
     "MoorPy": "moorpy",
     "Exudyn": "exudyn",
     "PyElastica": "pyelastica",
+    "MuJoCo": "mujoco",
+    "cosseratbench": "cosseratbench",
 }
 
 

@@ -114,7 +114,7 @@ def static(scene: SceneLike | System, output: str | Path | None = None, *, overw
     """
     scene = as_scene_or_system(scene)
     if not isinstance(scene, Scene):
-        return _several_lines(scene, output, overwrite, None)
+        return _several_lines(scene, output, overwrite, moves=False)
     check_motions(scene)
     compile_beside(scene, static=True)
     case, begin = StaticCase(scene), clock.process_time()
@@ -184,20 +184,22 @@ def _several_lines(
     system: System,
     output: str | Path | None,
     overwrite: bool,
-    progress: bool | Listener | None,
+    progress: bool | Listener = False,
     criterion: UserCriterion | None = None,
+    *,
+    moves: bool = True,
 ) -> Result:
-    """The motion of several lines, or, with progress None, their equilibrium."""
+    """The motion of several lines, or their equilibrium."""
     from hybrid.accuracy.system_accuracy import SystemPasses, is_refined, system_with_layers
     from hybrid.simulation.system_run import static_system
 
-    refined = is_refined(system, moves=progress is not None)
-    target = _target(output, overwrite, refined or (progress is not None and bool(system.output.errors)))
+    refined = is_refined(system, moves=moves)
+    target = _target(output, overwrite, refined or (moves and bool(system.output.errors)))
     with locked(_path(output)):
-        if progress is None and refined:
+        if not moves and refined:
             assert not isinstance(target, MemoryTarget)
             SystemPasses(system, target, False, ProgressReporter(None, 1.0), lambda: False).compute()
-        elif progress is None:
+        elif not moves:
             resolution = system_with_layers(system, False, ProgressReporter(None, 1.0), lambda: False)
             static_system(system, target, partial(scene_text, system), resolution)
         else:

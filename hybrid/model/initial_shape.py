@@ -33,7 +33,7 @@ def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
     start, end = (end.held_position for end in scene.ends.both)
     initial, length = scene.initial, scene.length
     if isinstance(initial, Points):
-        return along_polyline(np.array(initial.points, float), s), "the polyline given"
+        return along_polyline(np.array(initial.points, float), s, np.array(initial.knots)), "the polyline given"
     if isinstance(initial, Straight):
         direction = np.array(initial.direction, float) / np.linalg.norm(initial.direction)
         origin = initial.origin or start
@@ -102,9 +102,10 @@ def _along_bed(scene: Scene, place: Sequence[float]) -> Floats:
     return np.array([-rise[1], rise[0], 0.0])
 
 
-def along_polyline(points: Floats, s: Floats) -> Floats:
-    """Nodes (N+1, 3) spread over a polyline (K, 3) in proportion to s."""
-    knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+def along_polyline(points: Floats, s: Floats, knots: Floats | None = None) -> Floats:
+    """Nodes (N+1, 3) m over a polyline (K, 3) m, in proportion to its knots (K,), by default its own lengths."""
+    if knots is None:
+        knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     return np.column_stack([np.interp(s * knots[-1] / s[-1], knots, points[:, k]) for k in range(3)])
 
 
@@ -272,8 +273,8 @@ def corners(scene: Scene) -> list[float]:
     """Arc lengths at which the initial polyline turns."""
     if not isinstance(scene.initial, Points):
         return []
-    knots = np.cumsum(np.linalg.norm(np.diff(np.array(scene.initial.points), axis=0), axis=1))
-    return [float(x) for x in knots[:-1] * scene.length / knots[-1]]
+    knots = np.array(scene.initial.knots)
+    return [float(x) for x in knots[1:-1] * scene.length / knots[-1]]
 
 
 def softness(line: Line, cable: Material) -> Floats:

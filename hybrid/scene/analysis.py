@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from itertools import pairwise
+from collections.abc import Iterator, Mapping
+from itertools import accumulate, pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
@@ -45,6 +45,19 @@ def _doubled(points: tuple[tuple[float, float, float], ...]) -> list[Finding]:
     return [Finding(("points", i), "a point other than the one before", "leave it out") for i in same]
 
 
+def _disordered(s: tuple[float, ...], count: int) -> Iterator[Finding]:
+    """Arc lengths of the corners of a polyline that are too few or many, or do not rise from 0."""
+    if len(s) != count:
+        yield Finding(
+            ("arc_lengths",), f"{count} arc lengths (m), one for each point", "give one for each", f"{len(s)}"
+        )
+    elif s[0] != 0.0:
+        yield Finding(("arc_lengths", 0), "0, the start of the cable", "write 0")
+    else:
+        bad = [i for i, (a, b) in enumerate(pairwise(s), start=1) if b <= a]
+        yield from (Finding(("arc_lengths", i), f"more than {s[i - 1]:.8g} m", "sort them") for i in bad[:1])
+
+
 # --- where the cable starts --------------------------------------------------------------------
 
 
@@ -65,17 +78,29 @@ class Straight(Table):
 
 
 class Points(Table):
-    """The cable starts along a polyline, spread evenly over it, at rest."""
+    """The cable starts along a polyline, at rest: spread evenly over it, or stretched as arc lengths say."""
 
     kind: Literal["points"] = Field(default="points", description="along a polyline")
     points: tuple[Vector, ...] = Field(
         min_length=2, description="corners of the polyline from s = 0 to s = length, inertial frame [m]"
     )
+    arc_lengths: tuple[NonNegative, ...] | None = Field(
+        default=None,
+        description="unstretched arc lengths s of the corners, from 0 to the length of the cable, so that it starts "
+        "stretched as it hangs; absent: in proportion to the polyline [m]",
+    )
 
     @model_validator(mode="after")
     def _corners_are_distinct(self) -> Points:
         refuse(_doubled(self.points))
+        if self.arc_lengths is not None:
+            refuse(_disordered(self.arc_lengths, len(self.points)))
         return self
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Arc lengths of the corners (m), or what they are in proportion to."""
+        return self.arc_lengths or (0.0, *accumulate(math.dist(a, b) for a, b in pairwise(self.points)))
 
 
 class Equilibrium(Table):

@@ -232,7 +232,10 @@ def _straight_start(cable: Cable, ends: Ends, initial: Straight) -> Iterator[Fin
 def _polyline_start(cable: Cable, ends: Ends, initial: Points | Equilibrium, allowed: float) -> Iterator[Finding]:
     points, length = initial.points or (), cable.length
     total = sum(math.dist(a, b) for a, b in pairwise(points))
-    if abs(total - length) > allowed * length:
+    s = initial.arc_lengths if isinstance(initial, Points) else None
+    if s is not None:
+        yield from _pieces_fit(points, s, length, allowed)
+    elif abs(total - length) > allowed * length:
         exact = "the length of the inextensible cable"
         why = exact if allowed == SAME_PLACE else "the length of the cable, within 20 %"
         expected = f"a polyline {length:.8g} m long, {why}"
@@ -244,6 +247,21 @@ def _polyline_start(cable: Cable, ends: Ends, initial: Points | Equilibrium, all
             expected = f"{_at(position)}, where ends.{name}.position holds the cable"
             yield Finding(("initial", "points", index), expected, "let the polyline begin and end at the held ends")
     yield from _bodies_agree(ends, points[0], points[-1], SAME_PLACE * length)
+
+
+def _pieces_fit(points: tuple[Triple, ...], s: tuple[float, ...], length: float, allowed: float) -> Iterator[Finding]:
+    """Arc lengths of the corners of a polyline that do not end with the cable, or stretch a piece too far."""
+    if abs(s[-1] - length) > SAME_PLACE * length:
+        fix = "the last arc length is the length of all sections"
+        yield Finding(("initial", "arc_lengths", len(s) - 1), f"{length:.8g} m, the length of the cable", fix)
+        return
+    for i, (a, b) in enumerate(pairwise(zip(points, s, strict=True)), start=1):
+        chord, rest = math.dist(a[0], b[0]), b[1] - a[1]
+        if abs(chord - rest) > allowed * rest + SAME_PLACE * length:
+            bound = "as long as it, of an inextensible cable" if allowed == SAME_PLACE else "as long as it within 20 %"
+            expected = f"a chord from point {i - 1} to {i} that is {bound}: {chord:.6g} m over {rest:.6g} m of cable"
+            yield Finding(("initial", "arc_lengths", i), expected, "move the point, or change the arc length")
+            return
 
 
 def _bodies_agree(ends: Ends, first: Triple, last: Triple, near: float) -> Iterator[Finding]:

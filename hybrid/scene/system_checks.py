@@ -31,7 +31,7 @@ def system_findings(system: System) -> Iterator[Iterator[Finding]]:
     """What contradicts in a system, in groups: of the first one with findings no later one makes sense."""
     yield _unknown_names(system)
     yield _refused_combinations(system)
-    yield chain(_lonely_points(system), _floating_groups(system))
+    yield chain(_lonely_points(system), () if system.starts_as_placed else floating_groups(system))
     yield _start_findings(system)
     yield connection_findings(system)
     yield _touching_findings(system)
@@ -84,8 +84,8 @@ def _lonely_points(system: System) -> Iterator[Finding]:
             yield Finding(("bodies", name), "a body with a fairlead among the points", fix, "no fairlead")
 
 
-def _floating_groups(system: System) -> Iterator[Finding]:
-    """Free points and bodies from which no way along lines leads to what is fixed."""
+def floating_groups(system: System) -> Iterator[Finding]:
+    """Free points and bodies from which no way along lines leads to what is fixed: none of them has an equilibrium."""
     ways = [{x.start, x.end} for x in system.lines.values()]
     ways += [{p, f"body {x.body}"} for p, x in system.points.items() if isinstance(x, Fairlead)]
     held = {name for name, point in system.points.items() if isinstance(point, FixedPoint)}

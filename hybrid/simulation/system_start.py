@@ -7,17 +7,19 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from hybrid.errors import ComputationError, Outcome
+from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.junctions.bodies import NUMBERS
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.laws.members import PIECE, PUSH, WATER, WET
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES
 from hybrid.kernels.state.state import Floats
 from hybrid.model.system import SystemModel, balanced_places, starts_between
+from hybrid.scene.base import dotted
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
+from hybrid.scene.system_checks import floating_groups
 from hybrid.simulation.blended import blended_text, rotate_ends_in
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.equilibrium import count_turns, settling
@@ -46,6 +48,8 @@ def equilibrium_of_system(system: System, model: SystemModel, t: float, friction
 
     friction: whether it settles on the bed, of lines that ask for that.
     """
+    if floating := [Complaint(dotted(x.at), str(x.given), x.expected, x.fix) for x in floating_groups(system)]:
+        raise SceneError(floating)
     try:
         numbers = model.body_numbers(t)
         found = solve_with_contact(model, joined_lines(model, t), numbers, lambda: _starts(system, model))

@@ -387,7 +387,7 @@ def test_the_texts_of_this_file_have_every_key() -> None:
     known = {key for table in (schema, *schema["$defs"].values()) for key in table["properties"]}
     written = {part for text in TEXTS.values() for path, _ in _places(text) for part in path}
     elsewhere = {"file", "exact", "max_tension", "min_tension", "vessel", "rao", "heading", "fairlead", "drift"}
-    elsewhere |= {"line", "other", "all", "shortest_period", "longest_period", "max_contact_force"}
+    elsewhere |= {"line", "other", "all", "shortest_period", "longest_period", "max_contact_force", "arc_lengths"}
     assert known - written == elsewhere  # where these are tested
 
 

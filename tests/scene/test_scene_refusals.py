@@ -148,6 +148,11 @@ CASES = {
     "polyline too long": (EVERYTHING_ELSE, POINTS, "§[[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, 0.0, -6.0]]", "initial.points", "11 m"),
     "polyline elsewhere": (EVERYTHING_ELSE, POINTS, "[§[1.0, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, 0.0, -6.0]]", "initial.points[0]", "held ends"),
     "polyline that stops": (EVERYTHING_ELSE, POINTS, "[[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], §[10.0, 0.0, 0.0]]", "initial.points[2]", "leave it out"),
+    "too few arc lengths": (EVERYTHING_ELSE, POINTS, f"{POINTS}, arc_lengths: §[0, 5]", "initial.arc_lengths", "3 arc lengths"),
+    "arc lengths from 1 on": (EVERYTHING_ELSE, POINTS, f"{POINTS}, arc_lengths: [§1, 5, 10]", "initial.arc_lengths[0]", "write 0"),
+    "arc lengths that fall": (EVERYTHING_ELSE, POINTS, f"{POINTS}, arc_lengths: [0, 5, §5]", "initial.arc_lengths[2]", "sort"),
+    "arc lengths beyond it": (EVERYTHING_ELSE, POINTS, f"{POINTS}, arc_lengths: [0, 5, §11]", "initial.arc_lengths[2]", "length of the cable"),
+    "a piece stretched far": (EVERYTHING_ELSE, POINTS, f"{POINTS}, arc_lengths: [0, §3, 10]", "initial.arc_lengths[1]", "within 20 %"),
     "polyline of a point": (EVERYTHING_ELSE, POINTS, "§[[0.0, 0.0, 0.0]]", "initial.points", "at least 2"),
     # --- what engineers write
     "EI": (SUSPENSION, BENDING, f"{BENDING}\n      §EI: 1", "cable.sections[0].EI", "did you mean bending_stiffness (N"),

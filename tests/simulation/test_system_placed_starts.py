@@ -123,3 +123,57 @@ def test_such_a_start_is_where_the_search_of_a_rest_begins() -> None:
     found = -result["points/weight/position"][-1, 2]
     assert found == pytest.approx(brentq(missing, down, 2.0 * down, xtol=1e-12), rel=1e-6)
     assert found > down + 1e-2
+
+
+HANG = {"length": 2.0, "mass": 0.5, "diameter": 0.02, "axial_stiffness": 2e3}
+PULL = 20.0
+
+
+def hanging(model: str, cells: int, **initial: Any) -> dict[str, Any]:
+    """A soft line that hangs from a pin, pulled down: u = (F s + w (L s - s^2/2))/EA, in corners that are not even."""
+    w = HANG["mass"] * GRAVITY
+    s = 2.0 * np.linspace(0.0, 1.0, 9) ** 1.3
+    depth = s + (PULL * s + w * (2.0 * s - 0.5 * s**2)) / HANG["axial_stiffness"]
+    corners = np.column_stack([0.0 * s, 0.0 * s, -depth])
+    return {
+        "environment": {"gravity": GRAVITY}, "mesh": {"cells": cells}, "model": model, "time": {"duration": 0.5, "step": 0.005},
+        "cable": {"sections": [HANG | {"bending_stiffness": 0.1}]}, "output": {"every": 0.01},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": [0, 0, -PULL]}},
+        "initial": {"kind": "points", "points": corners.tolist(), **initial}, "dimension": 3,
+    } | ({"s": s.tolist()} if not initial else {})  # fmt: skip
+
+
+@pytest.mark.parametrize("model", ["rod", "catenary"])
+def test_a_line_that_starts_stretched_as_it_hangs_stays_there(model: str) -> None:
+    """Spread evenly over the same polyline it bounces along its length by a third of what it is stretched."""
+    scene = hanging(model, 40)
+    s = scene.pop("s")
+    stretch = HANG["mass"] * GRAVITY * 2.0 / HANG["axial_stiffness"]  # u at the end, m
+
+    def moves(initial: dict[str, Any]) -> float:
+        x = hybrid.run(hanging(model, 40, **initial))["position"][:, :, 2]
+        return float(np.abs(x - x[0]).max())
+
+    assert moves({"arc_lengths": s}) < 0.02 * stretch
+    del scene["initial"]["points"][1:-1]
+    x = hybrid.run(scene)["position"][:, :, 2]
+    assert np.abs(x - x[0]).max() > 0.1 * stretch
+
+
+def test_lines_that_nothing_holds_fall_and_have_no_equilibrium() -> None:
+    """Two lines that meet at a free point: their middle falls by g t^2/2; at rest they are refused."""
+    line = {"sections": [SECTION | {"length": 2.0}], "mesh": {"cells": 4}, "model": "rod"}
+    scene = {
+        "environment": {"gravity": GRAVITY}, "time": {"duration": 0.5, "step": 0.01},
+        "points": {x: {"kind": "free", "initial_guess": [k, 0, 0]} for x, k in (("a", 0), ("b", 2), ("c", 4))},
+        "lines": {
+            "left": {"start": "a", "end": "b", "initial": {"kind": "straight", "direction": [1, 0, 0]}} | line,
+            "right": {"start": "b", "end": "c", "initial": {"kind": "straight", "direction": [1, 0, 0]}} | line,
+        },
+    }  # fmt: skip
+    result = hybrid.run(scene, progress=None)
+    for name in scene["lines"]:
+        fallen = result.lines[name]["position"][:, :, 2]
+        assert np.abs(fallen + 0.5 * GRAVITY * result.times[:, None] ** 2).max() < 1e-9
+    with pytest.raises(SceneError, match="nothing holds it"):
+        hybrid.static(scene)
