@@ -152,7 +152,7 @@ CASES = {
     "arc lengths from 1 on": (EVERYTHING_ELSE, POINTS, f"{POINTS}, arc_lengths: [§1, 5, 10]", "initial.arc_lengths[0]", "write 0"),
     "arc lengths that fall": (EVERYTHING_ELSE, POINTS, f"{POINTS}, arc_lengths: [0, 5, §5]", "initial.arc_lengths[2]", "sort"),
     "arc lengths beyond it": (EVERYTHING_ELSE, POINTS, f"{POINTS}, arc_lengths: [0, 5, §11]", "initial.arc_lengths[2]", "length of the cable"),
-    "a piece stretched far": (EVERYTHING_ELSE, POINTS, f"{POINTS}, arc_lengths: [0, §3, 10]", "initial.arc_lengths[1]", "within 20 %"),
+    "a piece stretched far": (EVERYTHING_ELSE, POINTS, f"{POINTS}, arc_lengths: [0, §3, 10]", "initial.arc_lengths[1]", "5 m over 3 m"),
     "polyline of a point": (EVERYTHING_ELSE, POINTS, "§[[0.0, 0.0, 0.0]]", "initial.points", "at least 2"),
     # --- what engineers write
     "EI": (SUSPENSION, BENDING, f"{BENDING}\n      §EI: 1", "cable.sections[0].EI", "did you mean bending_stiffness (N"),
