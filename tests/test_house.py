@@ -82,6 +82,7 @@ ONLY = {
     "rich": ("cli",),
     "pythonfmu3": ("couple",),
     "openmdao": ("designs",),
+    "cosseratbench": ("couple",),
     "zarr": ("store",),
     "xarray": ("store", "scene"),
     "distributed": ("studies",),

@@ -1,1 +1,1 @@
-"""A cable behind the interfaces of other programs: co-simulation units (FMI 3.0)."""
+"""A cable behind the interfaces of other programs: co-simulation units (FMI 3.0), MoorDyn, cosseratbench."""

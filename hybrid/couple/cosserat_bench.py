@@ -18,7 +18,8 @@ from cosseratbench.scenario import Cylinder, End, EndCondition, Motion, Rod, Sce
 from cosseratbench.solver import Capability, Diverged
 from cosseratbench.trajectory import Trajectory
 
-import hybrid
+from hybrid.accuracy.api import run
+from hybrid.errors import HybridError
 
 STEPS = 1000  # to the slowest period of a scenario
 CORNER = 0.04  # s, over which a motion that jumps to a velocity reaches it
@@ -63,8 +64,8 @@ class HybridSolver:
             scene["time"] = {"duration": scenario.duration, "step": self._step(scenario)}
             scene["output"] = {"every": scenario.duration / (n_frames - 1), "points": n_elements + 1, "exact": True}
             try:
-                result = hybrid.run(scene)
-            except hybrid.HybridError as error:
+                result = run(scene)
+            except HybridError as error:
                 raise Diverged(str(error)) from error
         lines = [result.lines[f"rod{i}"] for i in range(len(scenario.rods))]
         positions = tuple(np.asarray(line["position"]) for line in lines)

@@ -12,7 +12,7 @@ pytest.importorskip("cosseratbench", reason="cosseratbench is not installed: its
 from cosseratbench import registry
 from cosseratbench.experiment import COMPLETED, UNSUPPORTED, Result, run
 
-from hybrid.interop.cosserat_bench import HybridSolver
+from hybrid.couple.cosserat_bench import HybridSolver
 
 
 def solved(name: str, **values: float) -> Result:
