@@ -241,7 +241,8 @@ def test_no_motion_no_reader_of_motion_files() -> None:
     text = "cable: {sections: [{length: 1.0, mass: 1.0}]}\\ninitial: equilibrium\\nmodel: catenary\\n"
     text += "ends: {start: {kind: pinned, position: [0, 0, 0]}, end: free}"
     code = f"import sys, hybrid; hybrid.parse_scene('{text}'); assert 'scipy' not in sys.modules"
-    subprocess.run([sys.executable, "-c", code], check=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_results_kept_in_memory_write_no_file(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -257,7 +258,8 @@ def test_words_need_no_compiler_and_no_plots(command: str) -> None:
         "import sys\nfrom hybrid.cli.commands import main\ntry:\n    main(sys.argv[1:])\nexcept SystemExit as leave:\n"
     )
     code += "    assert not leave.code\nassert not {'numba', 'matplotlib', 'h5py', 'scipy'} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code, command], check=True, capture_output=True)
+    done = subprocess.run([sys.executable, "-c", code, command], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 TORSION = {"torsional_stiffness": 1.0e-2}

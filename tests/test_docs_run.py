@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -177,9 +178,15 @@ def quoted(start: str) -> Iterator[tuple[Path, str]]:
         yield from ((page, text) for text in re.findall(r"`([^`\n]+)`", prose) if text.split()[0] == start)
 
 
+@cache
+def program() -> Any:
+    """The commands of `hybrid`, made once: that takes as long as a hundred of them to parse."""
+    return typer.main.get_command(app)
+
+
 def parse(words: list[str]) -> None:
     """Parse a command without running it; what is only missing may be missing."""
-    group: Any = typer.main.get_command(app)
+    group = program()
     if words[0].startswith("-"):  # an option of the program, not a command
         assert words[0] in {name for option in group.params for name in option.opts}, f"there is no option {words[0]}"
         return

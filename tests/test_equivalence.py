@@ -75,7 +75,7 @@ AXES = {
 }
 
 
-def compare(a, b, tolerance, rotate=SAME, flip=False):
+def assert_alike(a, b, tolerance, rotate=SAME, flip=False):
     """Two results are the same, b being a turned by `rotate` (and read from the other end with `flip`)."""
     size = np.abs(a.tension).max()
     along = slice(None, None, -1) if flip else slice(None)
@@ -89,9 +89,9 @@ def compare(a, b, tolerance, rotate=SAME, flip=False):
 @pytest.mark.parametrize("model", MODELS)
 def test_a_turned_scene_gives_the_turned_answer(model, turn):
     rotate = AXES[turn]
-    compare(hybrid.static(scene(model)), hybrid.static(scene(model, rotate)), STATIC, rotate)
+    assert_alike(hybrid.static(scene(model)), hybrid.static(scene(model, rotate)), STATIC, rotate)
     if turn in ("x to z", "anyhow"):
-        compare(hybrid.run(released(model)), hybrid.run(released(model, rotate)), MOVING, rotate)
+        assert_alike(hybrid.run(released(model)), hybrid.run(released(model, rotate)), MOVING, rotate)
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -104,7 +104,7 @@ def test_a_mirrored_scene_gives_the_mirrored_answer(model):
     mirrored[0]["intrinsic_curvature"] = [-k1, k2, -k3]
     for solve, make, tolerance in ((hybrid.static, scene, STATIC), (hybrid.run, released, MOVING)):
         a, b = solve(make(model)), solve(make(model, mirror, mirrored))
-        compare(a, b, tolerance, mirror)
+        assert_alike(a, b, tolerance, mirror)
         if model == "rod":
             assert np.abs(a.torque + b.torque).max() < 100 * tolerance * np.abs(a.torque).max()
 
@@ -142,8 +142,8 @@ def hanging(model, swapped=False, motion=True):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_swapped_ends(model):
-    compare(hybrid.static(hanging(model)), hybrid.static(hanging(model, swapped=True)), STATIC, flip=True)
-    compare(hybrid.run(hanging(model)), hybrid.run(hanging(model, swapped=True)), MOVING, flip=True)
+    assert_alike(hybrid.static(hanging(model)), hybrid.static(hanging(model, swapped=True)), STATIC, flip=True)
+    assert_alike(hybrid.run(hanging(model)), hybrid.run(hanging(model, swapped=True)), MOVING, flip=True)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +166,7 @@ def test_a_zone_split_in_two_of_the_same_kind(whole, split):
     straight = {"kind": "straight", "direction": [0.2, 0.1, -1.0]}
     a = hybrid.run(scene("hybrid", model={"kind": "zones", "zones": whole}, initial=straight))
     b = hybrid.run(scene("hybrid", model={"kind": "zones", "zones": split}, initial=straight))
-    compare(a, b, MOVING)
+    assert_alike(a, b, MOVING)
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -176,7 +176,7 @@ def test_a_section_split_in_two_alike(model):
         dict(SECTIONS[0], length=0.5),
         *[dict(SECTIONS[1], length=x) for x in (0.33, 0.87)],
     ]
-    compare(hybrid.run(released(model)), hybrid.run(released(model, sections=halves)), MOVING)
+    assert_alike(hybrid.run(released(model)), hybrid.run(released(model, sections=halves)), MOVING)
 
 
 def test_far_from_the_origin():

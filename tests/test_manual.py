@@ -9,6 +9,7 @@ import subprocess
 import sys
 import unicodedata
 import xml.etree.ElementTree as xml
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -46,13 +47,15 @@ def test_results_that_lie_among_the_examples_are_no_part_of_the_site(tmp_path: P
 # --- every message has an entry --------------------------------------------------------------------
 
 
+@cache
 def kinds_in_code() -> set[str]:
     """Kinds of events that the sources name where they write one: `event(..., kind, text)`, `note`, `event=`."""
     found = set()
     for file in (ROOT / "hybrid").rglob("*.py"):
         if file.relative_to(ROOT / "hybrid").parts[0] in ("scene", "interop"):
             continue  # have no events; their notes are of another kind
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        text = file.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)) if re.search(r"event\(|note\(|event=|_notes", text) else ():
             if isinstance(node, ast.Call):
                 name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
                 place = {"event": 3, "note": 2}.get(name)

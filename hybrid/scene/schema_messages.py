@@ -12,7 +12,7 @@ from pydantic import Tag
 from pydantic.fields import FieldInfo
 
 from hybrid.scene.base import Finding, Kinds, Place, Table, Words, dotted, unit_of
-from hybrid.scene.schema_walk import Spot, arms, every_key, follow, is_tag, item, meaning, tables
+from hybrid.scene.schema_walk import Spot, all_keys, arms, follow, is_tag, item, meaning, tables
 from hybrid.scene.suggestions import decimal_comma, nearest, speaks_of
 
 # A larger number would not help, as an example of how to write it.
@@ -132,7 +132,7 @@ def _unknown_key(root: type[Table], path: Place, spot: Spot) -> Finding:
 
 def _elsewhere(root: type[Table], key: str) -> str:
     """Where in the schema a key belongs that is not of its table; empty if nobody knows."""
-    every = dict(every_key(root))
+    every = all_keys(root)
     called = [path for path in every if path.rpartition(".")[2] == key]
     described = [path for path, text in every.items() if len(key) > 1 and speaks_of(text, key)]
     found = sorted(called or described, key=lambda path: path.count("."))

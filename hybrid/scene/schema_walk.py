@@ -11,7 +11,7 @@ import re
 import types
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import reduce
+from functools import cache, reduce
 from operator import or_
 from typing import Annotated, Any, Union, get_args, get_origin
 
@@ -135,10 +135,15 @@ def meaning(of: FieldInfo | None) -> str:
     return re.split(r"[;:(\[]", text)[0].strip(" ,")
 
 
-def every_key(root: type[Table], path: Place = ()) -> Iterator[tuple[str, str]]:
-    """The path of every key of the schema, lists without their brackets, and its description."""
+@cache
+def all_keys(root: type[Table]) -> dict[str, str]:
+    """The description of every key of the schema, by its path without brackets of lists."""
+    return dict(_every_key(root, ()))
+
+
+def _every_key(root: type[Table], path: Place) -> Iterator[tuple[str, str]]:
     for name, own in root.model_fields.items():
         yield dotted((*path, name)), own.description or ""
         for annotation, _ in arms(own.annotation):
             for table in tables(item(annotation, 0) or annotation):
-                yield from every_key(table, (*path, name))
+                yield from _every_key(table, (*path, name))

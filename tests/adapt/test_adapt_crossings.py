@@ -318,7 +318,7 @@ def fixed(what: Scene, model: str, nodes: Floats) -> hybrid.Result:
     return hybrid.run(Scene.model_validate(text | {"model": {"kind": model}, "mesh": {"nodes": nodes.tolist()}}))
 
 
-def same(one: hybrid.Result, other: hybrid.Result) -> None:
+def assert_same(one: hybrid.Result, other: hybrid.Result) -> None:
     """Newton stops at 1e-9 of a turn or of the tension; what is left of that after hundreds of steps is damped."""
     assert np.abs(one.position - other.position).max() < 1e-7 * LENGTH
     assert np.abs(one.tension - other.tension).max() < 1e-6 * np.abs(other.tension).max()
@@ -339,7 +339,7 @@ def far_from_all() -> Scene:
 def test_nothing_asks_is_a_catenary(how):
     scene: Callable[..., Scene] = bending if how == "always catenary" else far_from_all
     what = scene(model={"force_catenary": [[0, LENGTH]]}) if how == "always catenary" else scene()
-    same(hybrid.run(what), fixed(what, "catenary", BASE))
+    assert_same(hybrid.run(what), fixed(what, "catenary", BASE))
 
 
 @pytest.mark.parametrize("how", ["always rod", "intolerant"])
@@ -347,13 +347,13 @@ def test_everything_asks_is_a_rod(how):
     what = sagging(model={"force_rod": [[0, LENGTH]]} if how == "always rod" else {"tolerance": 1e-9})
     result = hybrid.run(what)
     assert all(rods(result, k) == [(0.0, LENGTH)] for k in range(len(result.times)))
-    same(result, fixed(what, "rod", BASE))
+    assert_same(result, fixed(what, "rod", BASE))
 
 
 def test_rods_that_come_and_go_have_no_rotary_inertia_of_a_diameter():
     """What a diameter implies is left out, from the beginning: all rod has none either."""
     what = sagging(model={"force_rod": [[0, LENGTH]]}, diameter=0.2)
-    same(hybrid.run(what), fixed(sagging(rotary_inertia=0, diameter=0.2), "rod", BASE))
+    assert_same(hybrid.run(what), fixed(sagging(rotary_inertia=0, diameter=0.2), "rod", BASE))
     plan = {x.what: x for x in hybrid.plan(what).contents}
     assert not plan["rotary inertia"].on and "come and go" in plan["rotary inertia"].why
 

@@ -93,7 +93,7 @@ def pinned(x: float, z: float = 0.0) -> dict[str, Any]:
     return {"kind": "pinned", "position": [x, 0, z]}
 
 
-def within(measured: float, predicted: float) -> None:
+def assert_within(measured: float, predicted: float) -> None:
     assert LOW < measured / predicted < HIGH, (measured, predicted, measured / predicted)
 
 
@@ -106,8 +106,8 @@ def test_sag_of_a_tether(span: float) -> None:
     EI, middle = 2e3, LENGTH / 2
     found = measured(EI, pinned(span))
     lack = lack_of_bend(EI, W, found.at("tension", middle), found.at("curvature", middle), 0.0)
-    within(found.largest("position"), lack.position)
-    within(found.largest("bending_moment", 20, 80), lack.moment)
+    assert_within(found.largest("position"), lack.position)
+    assert_within(found.largest("bending_moment", 20, 80), lack.moment)
 
 
 @pytest.mark.parametrize("span", [60.0, 70.0])
@@ -118,8 +118,8 @@ def test_bend_of_a_deep_sag(span: float) -> None:
     s, k = found.catenary.s, found.catenary.curvature[-1]
     bends = float(np.abs(np.gradient(np.gradient(k, s), s))[(s > 40) & (s < 60)].max())
     lack = lack_of_bend(EI, W, found.at("tension", middle), found.at("curvature", middle), bends)
-    within(found.largest("tension", 40, 60), lack.tension)
-    within(found.largest("curvature", 40, 60), lack.curvature)
+    assert_within(found.largest("tension", 40, 60), lack.tension)
+    assert_within(found.largest("curvature", 40, 60), lack.curvature)
 
 
 @pytest.mark.parametrize("angle", [0.05, 0.3])
@@ -134,11 +134,11 @@ def test_layer_at_a_clamp(angle: float) -> None:
     T = found.at("tension", 0.0)
     lack = lack_at_clamp(EI, W, T, angle)
     lam = np.sqrt(EI / T)
-    within(found.largest("position", 0.0, 6 * lam), lack.position)
-    within(found.largest("curvature", 0.0, lam), lack.curvature)
-    within(found.largest("bending_moment", 0.0, lam), lack.moment)
+    assert_within(found.largest("position", 0.0, 6 * lam), lack.position)
+    assert_within(found.largest("curvature", 0.0, lam), lack.curvature)
+    assert_within(found.largest("bending_moment", 0.0, lam), lack.moment)
     if angle > 0.1:  # else it is what the change of the sag does to all of the line
-        within(found.largest("tension", 0.0, 0.5 * lam), lack.tension)
+        assert_within(found.largest("tension", 0.0, 0.5 * lam), lack.tension)
 
 
 @pytest.mark.parametrize("mass", [20.0, 200.0])
@@ -148,11 +148,11 @@ def test_kink_at_a_point_load(mass: float) -> None:
     T = found.at("tension", 49.9)
     angle = mass * GRAVITY / T
     lack, lam = lack_at_kink(EI, W, T, angle), np.sqrt(EI / T)
-    within(found.largest("position", 45, 55), lack.position + lack_of_bend(EI, W, T, W / T, 0.0).position)
-    within(found.largest("curvature", 50 - lam, 50 + lam), lack.curvature)
-    within(found.largest("bending_moment", 50 - lam, 50 + lam), lack.moment)
+    assert_within(found.largest("position", 45, 55), lack.position + lack_of_bend(EI, W, T, W / T, 0.0).position)
+    assert_within(found.largest("curvature", 50 - lam, 50 + lam), lack.curvature)
+    assert_within(found.largest("bending_moment", 50 - lam, 50 + lam), lack.moment)
     if mass > 100.0:
-        within(found.largest("tension", 49.5, 49.99), lack.tension)
+        assert_within(found.largest("tension", 49.5, 49.99), lack.tension)
 
 
 @pytest.mark.parametrize(("EI", "k"), [(2e3, 2e6), (2e4, 2e6), (2e3, 2e4), (2e4, 5e3)])
@@ -163,8 +163,8 @@ def test_edge_of_contact(EI: float, k: float) -> None:
     s = float(found.catenary.touchdown[-1][1])
     T = found.at("tension", s)
     lack, lam = lack_at_edge(EI, W, T, k), np.sqrt(EI / T)
-    within(found.largest("position", s - 6 * lam, s + 6 * lam), lack.position)
-    within(found.largest("curvature", s - 4 * lam, s + 4 * lam), lack.curvature)
+    assert_within(found.largest("position", s - 6 * lam, s + 6 * lam), lack.position)
+    assert_within(found.largest("curvature", s - 4 * lam, s + 4 * lam), lack.curvature)
 
 
 def test_a_moment_given_at_an_end() -> None:
@@ -172,9 +172,9 @@ def test_a_moment_given_at_an_end() -> None:
     found = measured(EI, {"kind": "free", "force": [4e4, 0, LENGTH * W / 2], "moment": [0, M, 0]})
     T = found.at("tension", LENGTH)
     lack, lam = lack_of_moment(EI, T, M), np.sqrt(EI / T)
-    within(found.largest("position", LENGTH - 6 * lam, LENGTH), lack.position)
-    within(found.largest("curvature", LENGTH - lam, LENGTH), lack.curvature)
-    within(found.largest("bending_moment", LENGTH - lam, LENGTH), lack.moment)
+    assert_within(found.largest("position", LENGTH - 6 * lam, LENGTH), lack.position)
+    assert_within(found.largest("curvature", LENGTH - lam, LENGTH), lack.curvature)
+    assert_within(found.largest("bending_moment", LENGTH - lam, LENGTH), lack.moment)
 
 
 # --- e_h ------------------------------------------------------------------------------------------
@@ -190,10 +190,10 @@ def test_interpolation_along_cells(cells: int) -> None:
     k = fine.curvature[-1]
     bends = float(np.abs(np.gradient(np.gradient(k, s), s))[inner].max())
     lack = error_of_length(EI, W, float(k.max()), bends, h)
-    within(float(np.abs(coarse.curvature[-1] - k)[inner].max()), lack.curvature)
+    assert_within(float(np.abs(coarse.curvature[-1] - k)[inner].max()), lack.curvature)
     nodes = coarse.mesh[0].s if coarse.mesh else np.linspace(0, LENGTH, cells + 1)
     x = np.stack([np.interp(s, nodes, np.interp(nodes, s, fine.position[-1][:, j])) for j in range(3)], axis=1)
-    within(float(np.linalg.norm(x - fine.position[-1], axis=1).max()), lack.position)
+    assert_within(float(np.linalg.norm(x - fine.position[-1], axis=1).max()), lack.position)
 
 
 def test_the_longest_cell_reaches_its_share() -> None:

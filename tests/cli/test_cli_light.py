@@ -69,8 +69,9 @@ def test_what_is_compiled_is_called_without_numba(
     """
     monkeypatch.chdir(tmp_path)
     Path("hanging.yaml").write_text(json.dumps(HANGING))
-    call(command, "hanging.yaml")  # what has to be compiled is
     _, modules = call(command, "hanging.yaml")
+    if "numba" in modules:  # what had to be compiled is
+        _, modules = call(command, "hanging.yaml")
     assert "hybrid.kernels.machine.linked_code" in modules
     assert not modules & {"numba", "scipy", "scipy.special", "numpy.f2py", "matplotlib"}
     assert not modules & {"hybrid.scene.system", "hybrid.simulation.payout", "hybrid.kernels.reel.payout"}

@@ -67,15 +67,12 @@ def couple(step: float, duration: float, agreed: bool, newton: bool = False) -> 
 
 @pytest.mark.parametrize(("agreed", "order"), [(True, 2.0), (False, 1.0)])
 def test_steps_that_are_repeated_are_of_order_two_and_staggered_ones_of_order_one(agreed: bool, order: float) -> None:
-    coarse, middle, fine, finest = (couple(step, 12.0, agreed).height for step in (0.1, 0.05, 0.025, 0.0125))
-    ratios = np.log2(
-        [abs(coarse - middle).max() / abs(middle - fine).max(), abs(middle - fine).max() / abs(fine - finest).max()]
-    )
-    assert ratios[1] == pytest.approx(order, abs=0.25)
+    coarse, middle, fine = (couple(step, 6.0, agreed).height for step in (0.05, 0.025, 0.0125))
+    assert np.log2(abs(coarse - middle).max() / abs(middle - fine).max()) == pytest.approx(order, abs=0.25)
 
 
 def test_the_energy_of_body_and_cable_is_balanced() -> None:
-    assert abs(couple(0.05, 60.0, agreed=True).imbalance) < 1e-4
+    assert abs(couple(0.05, 30.0, agreed=True).imbalance) < 1e-4
 
 
 def test_newton_with_the_interface_stiffness_takes_fewer_tries_to_the_same_motion() -> None:

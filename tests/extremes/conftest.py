@@ -25,8 +25,8 @@ def warm() -> None:
 
 
 @pytest.fixture
-def honest(request: pytest.FixtureRequest) -> Callable[[Case], None]:
-    """`honest(case)`: it ends as it must, and as docs/evidence/extremes.md says."""
+def assert_honest(request: pytest.FixtureRequest) -> Callable[[Case], None]:
+    """`assert_honest(case)`: it ends as it must, and as docs/evidence/extremes.md says."""
     writes = request.config.getoption("--write-extremes")
 
     def look(case: Case) -> None:

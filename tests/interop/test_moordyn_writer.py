@@ -52,7 +52,7 @@ def back(scene: Any, folder: Path) -> Any:
     return made.scene
 
 
-def same(ours: Any, theirs: Any) -> None:
+def assert_same(ours: Any, theirs: Any) -> None:
     """Two cables are made of the same, to the digits of a deck."""
     for a, b in zip(ours.sections, theirs.sections, strict=True):
         for key in ("length", "mass", "diameter", "axial_stiffness", "bending_stiffness"):
@@ -67,7 +67,7 @@ def test_several_lines_come_back(name: str, tmp_path: Path) -> None:
     (made,) = import_moordyn(FOLDER / f"{name}.txt").scenes.values()
     again = back(made.scene, tmp_path)
     for ours, theirs in zip(made.scene.lines.values(), again.lines.values(), strict=True):
-        same(ours.cable, theirs.cable)
+        assert_same(ours.cable, theirs.cable)
         for a, b in ((ours.start, theirs.start), (ours.end, theirs.end)):
             assert again.points[b].position == pytest.approx(made.scene.points[a].position)
     assert again.environment == made.scene.environment
@@ -79,7 +79,7 @@ def test_a_riser_with_joints_comes_back(tmp_path: Path) -> None:
     ours, theirs = ([x.cable for x in s.lines.values()] for s in (scene, again))
     assert sorted(len(x.sections) for x in ours) == sorted(len(x.sections) for x in theirs) == [1, 1, 3]
     riser, copy = (max(x, key=lambda cable: len(cable.sections)) for x in (ours, theirs))
-    same(riser, copy)
+    assert_same(riser, copy)
     body, point = scene.points["body1"], next(p for p in again.points.values() if p.kind == "free")
     assert (point.mass, point.volume, point.drag_area) == (body.mass, body.volume, body.drag_area)
     assert point.added_mass == pytest.approx(body.added_mass)
@@ -105,7 +105,7 @@ def test_bodies_come_back(tmp_path: Path) -> None:
 def test_a_cable_with_a_clump_comes_back(tmp_path: Path) -> None:
     (made,) = import_moordyn(FOLDER / "rope_and_chain.txt").scenes.values()
     scene, again = made.scene, back(made.scene, tmp_path)
-    same(scene.cable, again.cable)
+    assert_same(scene.cable, again.cable)
     (clump,), (copy,) = scene.cable.attachments, again.cable.attachments
     assert (clump.at, clump.mass, clump.volume, clump.drag_area) == (copy.at, copy.mass, copy.volume, copy.drag_area)
     assert again.mesh.nodes == pytest.approx(scene.mesh.nodes)

@@ -40,7 +40,7 @@ G = 9.81
 ROUND_OFF, QUADRATURE, DIFFERENCE = 1e-12, 1e-10, 1e-8
 
 
-def within(value, bound):
+def assert_within(value, bound):
     """Show a figure with the test that measured it (`pytest -s`), and hold it to its bound."""
     test = os.environ["PYTEST_CURRENT_TEST"].split("::")[-1].removesuffix(" (call)")
     print(f"\n{test}: {value:.1e} of at most {bound:.1e}", end="")
@@ -66,15 +66,15 @@ def test_current_is_the_table(height):
     def table(z):
         return 0.7 * np.array([np.interp(z, HEIGHTS, SPEEDS[:, k]) for k in range(3)])
 
-    within(np.abs(U - table(height)).max(), ROUND_OFF)
-    within(np.abs(U1 - slope(table, height, 1e-3)).max(), 1e-10)
+    assert_within(np.abs(U - table(height)).max(), ROUND_OFF)
+    assert_within(np.abs(U1 - slope(table, height, 1e-3)).max(), 1e-10)
 
 
 @pytest.mark.parametrize("z", HEIGHTS)
 def test_current_is_continuous_at_its_heights(z):
     below, at, above = (np.array(current_at(HEIGHTS, SPEEDS, 1.0, z + d)[0]) for d in (-1e-9, 0.0, 1e-9))
-    within(np.abs(below - at).max(), 1e-8)
-    within(np.abs(above - at).max(), 1e-8)
+    assert_within(np.abs(below - at).max(), 1e-8)
+    assert_within(np.abs(above - at).max(), 1e-8)
 
 
 def test_uniform_current():
@@ -110,8 +110,8 @@ def test_power_law_table():
     error = np.abs(found - exact).max(axis=1) / size
     high = error[part >= 1e-2].max()
     print(f"power law: {high:.1e} of the speed at the top above 1 % of the height, {error.max():.1e} anywhere")
-    within(high, 1e-5)
-    within(error.max(), 2.5e-4)
+    assert_within(high, 1e-5)
+    assert_within(error.max(), 2.5e-4)
     for beyond, speed_there in ((top + 20.0, size), (bottom - 20.0, 0.0)):
         assert np.linalg.norm(current_at(z, table, 1.0, beyond)[0]) == pytest.approx(speed_there, abs=ROUND_OFF)
 
@@ -254,8 +254,8 @@ def test_stretching_leaves_a_part_k_a_of_the_acceleration():
         left.append(worst / (waves[0, 0] * waves[0, 1] ** 2))
     ratio = np.array(left[1:]) / np.array(left[:-1])
     print(f"left out: {left[-1]:.3f} of the acceleration at k A = {waves[0, 0] * waves[0, 5]:.3f}; doubles: {ratio}")
-    within(left[-1], waves[0, 0] * waves[0, 5])
-    within(np.abs(ratio - 2.0).max(), 0.1)
+    assert_within(left[-1], waves[0, 0] * waves[0, 5])
+    assert_within(np.abs(ratio - 2.0).max(), 0.1)
 
 
 @pytest.mark.parametrize("depth", [math.inf, 15.0])
@@ -279,7 +279,7 @@ def test_at_the_moving_surface_is_what_linear_theory_has_at_still_water(depth):
 def test_no_flow_through_the_bed():
     waves = components(JonswapWaves(significant_height=3.0, peak_period=9.0, components=40), 25.0, G)
     flow = stirred(sea_of(waves, 25.0), 12.3, [(x, 0.0, -25.0) for x in np.linspace(0, 100, 11)])
-    within(np.abs(flow[:, [2, 5]]).max(), ROUND_OFF)
+    assert_within(np.abs(flow[:, [2, 5]]).max(), ROUND_OFF)
     assert np.abs(flow[:, 0]).max() > 0.1
 
 
@@ -290,8 +290,8 @@ def test_water_keeps_its_volume_and_does_not_turn(depth):
     around = sea_of(waves, depth)
     point, size = np.array([3.0, -4.0, -5.0]), waves[0, 0] * waves[0, 1] * waves[0, 5]
     J = np.array([slope(lambda q, e=e: stirred(around, 2.0, point + q * e)[0, :3], 0.0, 1e-1) for e in np.eye(3)]).T
-    within(abs(np.trace(J)), 1e-5 * size)
-    within(np.abs(J - J.T).max(), 1e-5 * size)
+    assert_within(abs(np.trace(J)), 1e-5 * size)
+    assert_within(np.abs(J - J.T).max(), 1e-5 * size)
     assert np.abs(J).max() > 0.3 * size
 
 
@@ -314,8 +314,8 @@ def test_waves_add_up():
     around = [sea_of(slight[i : i + 1], 40.0) for i in range(7)]
     whole = stirred(sea_of(slight, 40.0), 5.0, (10.0, 0.0, -3.0))[0]
     parts = sum(stirred(x, 5.0, (10.0, 0.0, -3.0))[0] for x in around)
-    within(abs(whole[6] - parts[6]), 1e-18)
-    within(np.abs(whole - parts)[:6].max(), 1e-6 * np.abs(whole[:6]).max())
+    assert_within(abs(whole[6] - parts[6]), 1e-18)
+    assert_within(np.abs(whole - parts)[:6].max(), 1e-6 * np.abs(whole[:6]).max())
 
 
 @pytest.mark.parametrize("ramp", [None, 20.0])
@@ -337,7 +337,7 @@ def test_growth_of_the_sea():
     grown, growing = sea_of(waves, math.inf), sea_of(waves, math.inf, 20.0)
     assert not stirred(growing, 0.0, (0, 0, -1)).any()
     assert growing.elevation(0, 0, 10.0)[0] == pytest.approx(0.5 * grown.elevation(0, 0, 10.0)[0], rel=1e-12)
-    within(np.abs(stirred(growing, 20.0, (0, 0, -1)) - stirred(grown, 20.0, (0, 0, -1))).max(), ROUND_OFF)
+    assert_within(np.abs(stirred(growing, 20.0, (0, 0, -1)) - stirred(grown, 20.0, (0, 0, -1))).max(), ROUND_OFF)
 
 
 def test_depth_over_the_seabed_is_that_of_the_waves():
@@ -385,8 +385,8 @@ def test_jonswap_moments(gamma, n):
         "Tz": math.sqrt(m2 / (energy @ w**2)) - 1,
     }
     print(f"gamma {gamma}, {n} waves:", ", ".join(f"{k} {100 * x:+.2f} %" for k, x in error.items()))
-    within(abs(error["Te"]), 2e-3)
-    within(abs(error["T1"]), 1e-2)
+    assert_within(abs(error["Te"]), 2e-3)
+    assert_within(abs(error["T1"]), 1e-2)
     assert 0.0 < error["Tz"] <= 2.5e-2
 
 
@@ -450,10 +450,10 @@ def test_elevation_statistics():
         "kurtosis": float(np.mean(z**4)),
     }
     print(", ".join(f"{k} {x:.3f}" for k, x in figures.items()))
-    within(abs(eta.mean()), 0.01 * height)
+    assert_within(abs(eta.mean()), 0.01 * height)
     assert figures["std/(Hs/4)"] == pytest.approx(1.0, abs=0.05)
     assert figures["Tz counted/Tz"] == pytest.approx(1.0, abs=0.05)
-    within(abs(figures["skewness"]), 0.15)
+    assert_within(abs(figures["skewness"]), 0.15)
     assert figures["kurtosis"] == pytest.approx(3.0, abs=0.45)
 
 
@@ -484,7 +484,7 @@ def test_wetted_stretch_is_the_mean_of_the_wetness(xa, xb):
     breaks = sorted(q for q in ((0 - xa) / (xb - xa), (1 - xa) / (xb - xa)) if 0 < q < 1)
     edges = [0.0, *breaks, 1.0]
     mean = sum(quad(lambda q: wetted(xa + q * (xb - xa))[0], a, b, epsabs=1e-14)[0] for a, b in pairwise(edges))
-    within(abs(W - mean), QUADRATURE)
+    assert_within(abs(W - mean), QUADRATURE)
     step = min(1e-3, 0.3 * abs(xb - xa))
     assert wa == pytest.approx(
         slope(lambda x: wetted_stretch(x, xb)[0], xa, step), abs=1e-6 if step < 1e-3 else DIFFERENCE * 10
@@ -500,7 +500,7 @@ def test_wetted_stretch_of_a_level_one(x):
     """Level and nearly level stretches: no jump where the quotient gives way to the middle (SAME_WETNESS^2/24 g'')."""
     just = [wetted_stretch(x, x + f * SAME_WETNESS) for f in (0.999, 1.001)]
     assert just[0][0] == pytest.approx(just[1][0], abs=1e-6 * SAME_WETNESS + 2e-9 + 1.6 * 0.002 * SAME_WETNESS)
-    within(np.abs(np.subtract(just[0], just[1])[1:]).max(), 1e-3)
+    assert_within(np.abs(np.subtract(just[0], just[1])[1:]).max(), 1e-3)
     assert wetted_stretch(x, x)[0] == wetted(x)[0]
 
 
@@ -555,7 +555,7 @@ def test_contact_is_the_integral_of_the_pressure(case):
         abs(far - integral(lambda x: x * q(x))),
         abs(near + far - integral(q)),
     )
-    within(error, QUADRATURE * size)
+    assert_within(error, QUADRATURE * size)
 
 
 @pytest.mark.parametrize("case", CONTACTS[:40])
@@ -583,8 +583,8 @@ def test_contact_is_smooth_while_touchdown_travels(still):
     p = np.linspace(-0.5, 0.7, 24001)
     F = np.array([contact(x, still, 0.0, 0.0, 1.0, 1e4, 0.0, 0.1)[:3] if max(x, still) > 0 else (0, 0, 0) for x in p])
     # a jump would not shrink with the step of 5e-5: the force may change by k dp, its slopes by k dp/o, times h
-    within(np.abs(np.diff(F[:, 0])).max(), 1e4 * 5e-5)
-    within(np.abs(np.diff(F[:, 1:], axis=0)).max(), 4 * 1e4 * 5e-5 / 0.1)
+    assert_within(np.abs(np.diff(F[:, 0])).max(), 1e4 * 5e-5)
+    assert_within(np.abs(np.diff(F[:, 1:], axis=0)).max(), 4 * 1e4 * 5e-5 / 0.1)
 
 
 @pytest.mark.parametrize("case", CONTACTS[:40])
@@ -654,11 +654,11 @@ def test_friction_law(q):
     cone = math.hypot(f @ AXIS / MU_A, f @ SIDE / MU_L) / N
     size = np.linalg.norm(q)
     assert cone == pytest.approx(min(size / SL, 1.0), rel=1e-12)
-    within(abs(f @ NORMAL), ROUND_OFF * N)
+    assert_within(abs(f @ NORMAL), ROUND_OFF * N)
     assert f @ q < 0.0
     assert np.linalg.norm(left) == pytest.approx(min(size, SL), rel=1e-12)
-    within(np.abs(rub(left)[0] - f).max(), ROUND_OFF * N)  # what is left explains the force
-    within(np.abs(f - N * g).max(), ROUND_OFF * N)
+    assert_within(np.abs(rub(left)[0] - f).max(), ROUND_OFF * N)  # what is left explains the force
+    assert_within(np.abs(f - N * g).max(), ROUND_OFF * N)
 
 
 @pytest.mark.parametrize("q", TRAVELS)
@@ -668,7 +668,7 @@ def test_friction_derivatives(q):
         if abs(np.linalg.norm(q) - SL) < 3e-6:
             continue
         assert np.abs(column - slope(lambda x, e=e: rub(q + x * e)[0], 0.0, 1e-6)).max() <= 1e-6 * N / SL
-    within(np.abs(g - slope(lambda x: rub(q, x)[0], N, 1e-2)).max(), DIFFERENCE)
+    assert_within(np.abs(g - slope(lambda x: rub(q, x)[0], N, 1e-2)).max(), DIFFERENCE)
 
 
 def test_friction_along_and_across():

@@ -182,7 +182,7 @@ def test_a_point_of_several_lines_that_heaves_into_the_bed_is_refused() -> None:
 def test_an_end_on_the_bed_may_heave_up_and_slide() -> None:
     up = {"surge": {"amplitude": 2.0, "period": 8.0}, "travel": {"by": [0, 0, 5.0], "over": 9.0}, "ramp": 16.0}
     start = {"kind": "pinned", "position": [0, 0, -100.0], "motion": up}
-    scene(ends={"start": start, "end": {"kind": "pinned", "position": [205.0, 0, 0]}})
+    assert scene(ends={"start": start, "end": {"kind": "pinned", "position": [205.0, 0, 0]}}).ends.start.motion
 
 
 def test_the_seabed_end_of_a_mooring_whose_ends_are_exchanged_is_refused() -> None:

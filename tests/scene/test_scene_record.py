@@ -79,7 +79,7 @@ SAMPLES, FORMS = [12, 13, 24, 100, 500], [None, "%.3f", "%.4f", "%.4g", "%.6g"]
 def test_smooth_signals_pass(name: str, uneven: float) -> None:
     rng = np.random.default_rng(1)
     for samples in SAMPLES:
-        for phase in rng.uniform(0.0, 6.0, 3):
+        for phase in rng.uniform(0.0, 6.0, 3 if samples < 500 else 1):
             t = _times(samples, uneven, rng)
             for form in FORMS:
                 assert _jump(t, SMOOTH[name](t, phase), form) is None, (samples, phase, form)

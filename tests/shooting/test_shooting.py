@@ -1,6 +1,7 @@
 """The arbiter, held to closed forms, to published numbers and to its own symmetries.
 
 Tolerances are of three kinds (house.md): round-off, discretisation (an order and a bound), published.
+Its motions against closed forms are slow; in every run test_against_arbiter.py holds them against those of the package.
 """
 
 from __future__ import annotations
@@ -137,7 +138,7 @@ def random_problem(line: Line, y: list[fields_.Fields], rng: np.random.Generator
 @pytest.mark.parametrize("moving", [False, True], ids=["statics", "dynamics"])
 @pytest.mark.parametrize("name", LINES)
 def test_hand_written_derivatives(name: str, moving: bool) -> None:
-    """Every block of Newton's matrix against differences of order six; 1e-10: round-off over the step 1e-3."""
+    """Newton's matrix along some directions of all unknowns against differences of order six; 1e-10: round-off over the step 1e-3."""
     rng = np.random.default_rng(7)
     start, end, zones = LINES[name]
     cells = 2 * len(zones)
@@ -153,44 +154,27 @@ def test_hand_written_derivatives(name: str, moving: bool) -> None:
         ]
     linear = problem.linear(y, problem.scales(y))
 
-    def residuals(i: int, node: int, column: int, step: float) -> np.ndarray[Any, Any]:
-        d = np.zeros((len(y[i].x), line.pieces[i].unknowns))
-        d[node, column] = step
-        there = problem.linear([*y[:i], fields_.moved(y[i], d, problem.clock(i)), *y[i + 1 :]], linear.scales)
+    def residuals(d: list[np.ndarray[Any, Any]], step: float) -> np.ndarray[Any, Any]:
+        moved = [fields_.moved(f, step * x, problem.clock(i)) for i, (f, x) in enumerate(zip(y, d, strict=True))]
+        there = problem.linear(moved, linear.scales)
         parts = [there.start[0], *(c[0].ravel() for c in there.cells), *(m[0] for m in there.meetings), there.end[0]]
         return np.concatenate(parts)
 
-    def written(i: int, node: int, column: int) -> np.ndarray[Any, Any]:
-        last = len(y) - 1
-        parts = [linear.start[1][:, column] if (i, node) == (0, 0) else np.zeros(len(linear.start[0]))]
-        for k, (r, left, right) in enumerate(linear.cells):
-            block = np.zeros_like(r)
-            if k == i and node < len(r):
-                block[node] += left[node][:, column]
-            if k == i and node > 0:
-                block[node - 1] += right[node - 1][:, column]
-            parts.append(block.ravel())
-        for k, (r, left, right) in enumerate(linear.meetings):
-            here = np.zeros(len(r))
-            if (k, node) == (i, len(y[i].x) - 1):
-                here += left[:, column]
-            if (k + 1, node) == (i, 0):
-                here += right[:, column]
-            parts.append(here)
-        at_end = (i, node) == (last, len(y[last].x) - 1)
-        parts.append(linear.end[1][:, column] if at_end else np.zeros(len(linear.end[0])))
-        return np.concatenate(parts)
+    def written(d: list[np.ndarray[Any, Any]]) -> np.ndarray[Any, Any]:
+        parts = [linear.start[1] @ d[0][0]]
+        for k, (_, left, right) in enumerate(linear.cells):
+            parts += [left[n] @ d[k][n] + right[n] @ d[k][n + 1] for n in range(len(left))]
+        for k, (_, left, right) in enumerate(linear.meetings):
+            parts.append(left @ d[k][-1] + right @ d[k + 1][0])
+        return np.concatenate([*parts, linear.end[1] @ d[-1][-1]])
 
     h = 1.0e-3
-    worst = 0.0
-    for i, piece in enumerate(line.pieces):
-        for node in range(len(piece.s)):
-            for column in range(piece.unknowns):
-                f = {k: residuals(i, node, column, k * h) for k in (-3, -2, -1, 1, 2, 3)}
-                slope = (45 * (f[1] - f[-1]) - 9 * (f[2] - f[-2]) + (f[3] - f[-3])) / (60 * h)
-                exact = written(i, node, column)
-                worst = max(worst, np.abs(slope - exact).max() / (1.0 + np.abs(exact).max()))
-    assert worst < 1.0e-10
+    for _ in range(6):
+        d = [0.3 * rng.standard_normal((len(f.x), p.unknowns)) for f, p in zip(y, line.pieces, strict=True)]
+        f = {k: residuals(d, k * h) for k in (-3, -2, -1, 1, 2, 3)}
+        slope = (45 * (f[1] - f[-1]) - 9 * (f[2] - f[-2]) + (f[3] - f[-3])) / (60 * h)
+        exact = written(d)
+        assert np.abs(slope - exact).max() < 1.0e-10 * (1.0 + np.abs(exact).max())
 
 
 # --- statics: published and exact ------------------------------------------------------------------
@@ -528,6 +512,7 @@ def test_chain_with_too_small_steps_is_said() -> None:
     assert caught.value.t is not None
 
 
+@pytest.mark.slow
 def test_vibrating_cantilever() -> None:
     """First bending frequency 1.8751^2 sqrt(EI/m)/L^2: second order."""
     b, s = 1.87510407, np.linspace(0.0, 1.0, 101)
@@ -545,6 +530,7 @@ def test_vibrating_cantilever() -> None:
     assert errors[1] < 3e-3
 
 
+@pytest.mark.slow
 def test_torsional_vibration() -> None:
     """A torsion pendulum: a wire with a heavy, stiff bob, twisted by a torque that is let go; second order.
 
@@ -596,6 +582,7 @@ def test_equilibrium_stays() -> None:
         assert np.abs(state.force - states[0].force).max() < 1e-7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["rod", HYBRID], ids=["rod", "hybrid"])
 def test_suspension_relaxes(model: str | list[dict[str, Any]]) -> None:
     """What Goyal & Perkins did: let the straight line sink with losses.  It must end in the equilibrium of statics."""
@@ -643,6 +630,7 @@ def test_sinking(direction: tuple[float, float, float], kind: str) -> None:
     assert errors[1] < 2e-3
 
 
+@pytest.mark.slow
 def test_marching_from_either_end_in_motion() -> None:
     """The swinging hybrid written from its other end: both orders of joint, the same motion."""
     inert = [{**x, "rotary_inertia": 1e-3} for x in BOTH]
@@ -658,6 +646,7 @@ def test_marching_from_either_end_in_motion() -> None:
     assert np.abs(there.moment + back.moment[::-1]).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_energy_ledger() -> None:
     """A shaken rod, in space, with torsion, stretch and rotary inertia: work of the clamp = change of energy.
 

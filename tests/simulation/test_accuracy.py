@@ -409,7 +409,7 @@ def test_what_does_not_converge_is_written_and_printed_as_not_known(capsys, monk
 @pytest.mark.parametrize("settings", [["model=rod"], []])
 def test_errors_do_not_depend_on_the_blocks_they_are_computed_in(settings, tmp_path, monkeypatch):
     """Of a result in a file, which is read block by block, and of one in memory; the order is a sum over blocks."""
-    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["output.errors=true", "time.duration=9.4", *settings])
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["output.errors=true", "time.duration=4.7", *settings])
     whole = hybrid.run(scene)
     for most in (1, 2000):
         monkeypatch.setattr(error_estimate, "MOST", most)

@@ -243,13 +243,13 @@ def test_a_cell_that_enters_or_leaves_does_not_kick(
     model: str, EA: float | None, EI: float | None, rate: float
 ) -> None:
     """The force at the winch, within five steps, against a run in which that one cell does not: 0.1 % of the mean."""
-    check_kicks(sagging(model, EA, EI, rate, duration=12.0), 1e-3)
+    assert_no_kicks(sagging(model, EA, EI, rate, duration=12.0), 1e-3)
 
 
 @pytest.mark.parametrize(("EA", "EI", "cells"), [(2e6, 2e4, 40), (None, 2e4, 40), (None, 500.0, 80)])
 @pytest.mark.parametrize("rate", [0.8, -0.8])
 def test_behind_a_clamp_it_does_not_kick_either(EA: float | None, EI: float, cells: int, rate: float) -> None:
-    check_kicks(clamped(sagging("rod", EA, EI, rate, duration=12.0, mesh={"cells": cells})), 6e-4)
+    assert_no_kicks(clamped(sagging("rod", EA, EI, rate, duration=12.0, mesh={"cells": cells})), 6e-4)
 
 
 @pytest.mark.parametrize("EA", [None, 2e6])
@@ -268,7 +268,7 @@ def test_in_space_behind_a_clamp_that_turns_it_does_not_kick() -> None:
     scene = clamped(sagging("rod", 2e6, 2e4, duration=12.0), [1.0, 0.2, 0.5])
     scene["cable"]["sections"][0]["torsional_stiffness"] = 1.5e4
     scene["ends"]["end"]["motion"] = {"roll": {"amplitude": 10.0, "period": 7.0}, "ramp": 7.0}
-    check_kicks(scene, 1e-3)
+    assert_no_kicks(scene, 1e-3)
 
 
 def clamped(scene: dict[str, Any], tangent: list[float] | None = None) -> dict[str, Any]:
@@ -285,7 +285,7 @@ def kicks(scene: dict[str, Any]) -> list[float]:
     return [float(np.abs(other - found[: at + 6])[at:].max() / found.mean()) for other, at in others]
 
 
-def check_kicks(scene: dict[str, Any], most: float) -> None:
+def assert_no_kicks(scene: dict[str, Any], most: float) -> None:
     """The largest of `kicks` is below `most`."""
     assert max(kicks(scene)) < most
 

@@ -51,7 +51,7 @@ def as_system(scene: dict[str, Any]) -> dict[str, Any]:
     return found | {"points": points, "lines": {"one": line}}
 
 
-def is_same(one: hybrid.Result, other: hybrid.Result, most: float) -> None:
+def assert_same(one: hybrid.Result, other: hybrid.Result, most: float) -> None:
     """Two results of a line."""
     assert np.abs(np.diff(one["payout/length"])).sum() > 1.0
     for name in ("position", "tension", "reaction_end", "payout/length", "payout/power", "work/end", "work/zones"):
@@ -75,13 +75,13 @@ def is_same(one: hybrid.Result, other: hybrid.Result, most: float) -> None:
     ids=["catenary", "clamp", "rod, taken in", "tables", "damped"],
 )
 def test_a_system_of_one_line_is_the_cable(scene: dict[str, Any]) -> None:
-    is_same(hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"], 1e-9)
+    assert_same(hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"], 1e-9)
 
 
 def test_so_it_is_with_a_winch_that_holds_a_tension() -> None:
     scene = cable(EA=2e6)
     scene["ends"]["end"]["payout"] = WINCH
-    is_same(hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"], 1e-9)
+    assert_same(hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"], 1e-9)
 
 
 def lowered(clamp: bool = False, **more: Any) -> dict[str, Any]:
@@ -101,7 +101,7 @@ def lowered(clamp: bool = False, **more: Any) -> dict[str, Any]:
 def test_a_free_point_is_lowered_as_the_body_of_a_cable(more: dict[str, Any]) -> None:
     """To Newton's tolerance: its unknown is one of the junctions, and not the last node of the line."""
     scene = lowered(**more)
-    is_same(hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"], 1e-6)
+    assert_same(hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"], 1e-6)
 
 
 def test_what_breaks_off_the_far_end_does_as_an_end_that_is_let_go() -> None:
@@ -123,13 +123,13 @@ def test_loads_change_as_of_one_cable(tmp_path: Path) -> None:
         hybrid.run(each, output=path)
         changed = hybrid.resume(path, until=9.0, settings=["environment.fluid.current=[0, -0.6, 0]"])
         found.append(changed.lines["one"] if changed.lines else changed)
-    is_same(*found, 1e-9)
+    assert_same(*found, 1e-9)
 
 
 def test_it_touches_itself_as_one_cable() -> None:
     """Contact goes on over nodes that enter."""
     scene = cable(model="rod", EA=2e5, EI=20.0) | {"contact": {"self": True}}
-    is_same(hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"], 1e-7)
+    assert_same(hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"], 1e-7)
 
 
 # --- several ----------------------------------------------------------------------------------------

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import random
+import signal
 import subprocess
 import sys
-import time
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bits import FEW_STEPS, Stopping, differences, machine_code
+from bits import FEW_STEPS, Stopping, differences
 
 import hybrid
 import hybrid.simulation.system_run
@@ -188,33 +187,34 @@ def test_a_running_result_shows_all_lines(tmp_path: Path, stopping: Stopping, mo
     assert status == "running" and 40 <= outputs < 101 and of_lines == 3 * [outputs]
 
 
+KILLED = """
+import os, signal, sys, threading
+import hybrid
+from hybrid.simulation import progress, system_run
+
+def kill(progress):
+    if progress.step >= int(step):
+        threading.Timer(float(later), os.kill, (os.getpid(), signal.SIGKILL)).start()
+
+scene, path, step, later = sys.argv[1:]
+system_run.WORK, progress.REPORT_EVERY = 3000, -1.0
+hybrid.run(scene, path, progress=kill)
+"""
+
+
 @pytest.mark.slow
-def test_kills_lose_no_more_than_the_work_since_a_checkpoint(tmp_path: Path) -> None:
-    code = (
-        "import sys, hybrid, hybrid.simulation.system_run as r; r.WORK = 3000; "
-        "hybrid.run(sys.argv[1], sys.argv[2]) if len(sys.argv) > 2 else hybrid.resume(sys.argv[1])"
-    )
-    scene, whole, path = tmp_path / "float.yaml", tmp_path / "whole.h5", tmp_path / "run.h5"
+def test_kills_lose_no_more_than_the_work_since_a_checkpoint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some ms after a step that is drawn, so that it is not always between two steps."""
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 3000)
+    scene, whole = tmp_path / "float.yaml", tmp_path / "whole.h5"
     scene.write_text(hybrid.scene_text(hybrid.System.model_validate(mooring(time=LONG))))
-    compiled: set[Path] | None = None
-    while compiled != (compiled := machine_code()):  # timed again if kernels had to be compiled
-        begin = time.monotonic()
-        subprocess.run([sys.executable, "-c", code, str(scene), str(whole)], check=True)
-        wall = time.monotonic() - begin
-    draw, killed = random.Random(7), 0
-    while killed < 2:
-        begin = time.monotonic()
-        process = subprocess.Popen([sys.executable, "-c", code, str(scene), str(path)])
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(draw.uniform(0.5, 0.95) * wall)
-            wall = time.monotonic() - begin  # it has ended: the machine has less to do than when it was timed
-        process.kill()
-        process.wait()
-        if path.exists():
-            with hybrid.open(path) as part:
-                good = part.status == "running" and len(part.times)
-            if good:
-                subprocess.run([sys.executable, "-c", code, str(path)], check=True)
-                assert differences(whole, path) == []
-                killed += 1
-            path.unlink()
+    hybrid.run(scene, whole).close()
+    draw, steps = random.Random(7), LONG["duration"] / LONG["step"]
+    for share in (0.3, 0.8):
+        path = tmp_path / f"{share}.h5"
+        asked = [str(scene), str(path), str(round(share * steps)), str(draw.uniform(0.0, 0.02))]
+        assert subprocess.run([sys.executable, "-c", KILLED, *asked]).returncode == -signal.SIGKILL
+        with hybrid.open(path) as part:
+            assert part.status == "running" and len(part.times)
+        hybrid.resume(path).close()
+        assert differences(whole, path) == []

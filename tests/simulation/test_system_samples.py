@@ -61,7 +61,7 @@ def fields(result: hybrid.Result) -> dict[str, np.ndarray]:
     }  # fmt: skip
 
 
-def same(one: hybrid.Result, other: hybrid.Result) -> None:
+def assert_same(one: hybrid.Result, other: hybrid.Result) -> None:
     """Bit for bit."""
     mine, its = fields(one), fields(other)
     assert mine.keys() == its.keys() and len(mine) > 60
@@ -101,7 +101,7 @@ def test_outputs_and_buffers_do_not_shape_the_motion(monkeypatch: pytest.MonkeyP
     many = hybrid.run(moored(0.03, 0.02, 1.2))
     few = hybrid.run(moored(0.03, 0.08, 1.2))
     monkeypatch.setattr(hybrid.simulation.system_run, "WAITING", 1)
-    same(many, hybrid.run(moored(0.03, 0.02, 1.2)))
+    assert_same(many, hybrid.run(moored(0.03, 0.02, 1.2)))
     assert np.array_equal(many.lines["up"]["steps/dt"], few.lines["up"]["steps/dt"])
     mine = fields(many)
     for name, x in fields(few).items():
@@ -138,7 +138,7 @@ def test_a_run_that_stops_between_outputs_goes_on_bit_for_bit(
             pass
     assert k == 3 or automatic
     with hybrid.open(whole) as one, hybrid.open(path) as other:
-        same(one, other)
+        assert_same(one, other)
 
 
 def test_what_is_stepped_from_outside_and_taken_back_has_the_same_outputs() -> None:
@@ -151,7 +151,7 @@ def test_what_is_stepped_from_outside_and_taken_back_has_the_same_outputs() -> N
             simulation.restore(saved)
             simulation.advance(t)
         result = simulation.result()
-    same(hybrid.run(scene), result)
+    assert_same(hybrid.run(scene), result)
 
 
 def test_a_load_that_jumps_on_an_output_counts_in_it() -> None:
