@@ -81,6 +81,7 @@ class Outcome(IntEnum):
     FOLDED = 14
     COLLAPSED = 15
     NOT_REACHED = 16
+    LEFT_PLANE = 17
 
     @property
     def cause(self) -> str:
@@ -207,6 +208,7 @@ _CAUSE = {
     "and stands on it",
     Outcome.COLLAPSED: "steps have become so short that the run would not end",
     Outcome.NOT_REACHED: "what is asked of the scene is not reached from where the search began",
+    Outcome.LEFT_PLANE: "it leaves the plane in which it lies at first, and dimension is 2",
     Outcome.OVERSTRETCHED: "the cable is stretched, or compressed, beyond what a section bears",
 }
 
@@ -222,6 +224,7 @@ _REMEDY = {
     Outcome.BURIED: "another start (initial.points); check stiffness and place of the bed and of obstacles",
     Outcome.TURNS_LOST: "add cells, hold the cable tauter, or turn the end in time (ends.*.motion), with damping",
     Outcome.WINCH_AT_END: "another winch.tension, a longer payout.longest, more cells, or a shorter time.duration",
+    Outcome.LEFT_PLANE: "write `dimension: 3`, or leave dimension out",
     Outcome.NOT_REACHED: "wider limits or bounds, more unknowns, or another start",
     Outcome.COLLAPSED: "what cuts the steps has to go: see what the message names, and where",
     Outcome.OVERSTRETCHED: "check axial_stiffness (N), mass (kg/m), lengths (m), loads (N); max_strain is the limit",

@@ -77,6 +77,7 @@ class Model:
     layout: Layout | None = None  # of a line whose zones move
     on_base: LineOnBase | None = None  # and what makes its lines
     plane: Floats | None = None  # (3, 3) rows p, q, normal: what the scene lies in, if it does
+    kept_in: Floats | None = None  # (3,) normal of the plane that it must not leave, though it is computed in space
     follows_error: bool = False  # whether the error of leaving bending out is followed
     payout: PayoutPlan | None = None  # of a line that is paid out or taken in
 
@@ -205,7 +206,10 @@ def build(
     ]
     follows = resolution.follow and followed(scene, zones).on
     plane, flat = in_plane(scene, start, others, ends.values)
-    if plane is not None and scene.dimension == 2:
+    kept: Floats | None = None
+    if plane is not None and scene.obstacles:  # which are computed in space
+        kept, plane = plane[2], None
+    elif plane is not None and scene.dimension == 2:
         line = planar(line, plane)
     return Model(
         line=line, zones=zones, ends=ends, sea=sea, start=start, start_shape=shape_name, other_starts=tuple(others),
@@ -215,7 +219,7 @@ def build(
         inextensible=not line.ck.any(),
         attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
         on_base=LineOnBase(cable, layout.base) if layout is not None else None,
-        plane=plane, follows_error=follows,
+        plane=plane, kept_in=kept, follows_error=follows,
         payout=paid or payout_plan(scene, line, zones, to_compare=to_compare),
     )  # fmt: skip
 

@@ -29,7 +29,7 @@ def in_plane(scene: Scene, start: State, others: list[tuple[str, State]], ends: 
         return None, Entry(WHAT, False, "dimension: 3")
     if scene.contact.self:
         return None, Entry(WHAT, False, "contact.self: contact of the line with itself is computed in space")
-    if scene.obstacles:
+    if scene.obstacles and scene.dimension != 2:
         return None, Entry(WHAT, False, "obstacles: contact with obstacles is computed in space")
     asked = scene.dimension == 2
     tolerance = TYPED if asked else EXACT
@@ -46,6 +46,9 @@ def in_plane(scene: Scene, start: State, others: list[tuple[str, State]], ends: 
         return None, Entry(WHAT, False, f"the first shape leaves {found.text()}")
     if asked:
         others[:] = [(name, x) for name, x in others if _lies_in(plane, x, ends, tolerance)]
+        if scene.obstacles:
+            why = f"obstacles: contact is computed in space, where nothing may leave {found.text()}"
+            return plane, Entry(WHAT, False, why)
         return plane, Entry(WHAT, True, f"dimension: 2; {found.text()}")
     why = f"all of the scene lies in {found.text()}; dimension: 3 switches it off"
     return plane, Entry(WHAT, True, why)

@@ -38,6 +38,7 @@ from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.body_shapes import way_out
 from hybrid.scene.connections import Connections
+from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.points import Fairlead
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
@@ -203,6 +204,8 @@ def build_system(
         models = _with_contact(system, models, touching)
     if _takes_current(system, models):
         models = [replace(x, contents=tuple(e for e in x.contents if e.what != IDLE)) for x in models]
+    if system.dimension == 2:
+        models = _kept_in_plane(system, models)
     known = maker.known
     for name, body in system.bodies.items():
         if isinstance(body, FixedBody) and name not in known:
@@ -215,6 +218,14 @@ def build_system(
         maker.seats, known, maker.scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
         tuple(_turns_of(x.connections) for x in system.lines.values()), touching, rides=rides,
     )  # fmt: skip
+
+
+def _kept_in_plane(system: System, models: Sequence[Model]) -> list[Model]:
+    """The models, whose lines must not leave the plane in which all of them are."""
+    scenes = [system.scene_of(name, system.carried(name)) for name in system.lines]
+    tables = [(x.environment, x.ends, x.initial) for x in scenes]
+    plane, _ = plane_of(scenes[0].environment, scenes[0].cable, scenes[0].ends, scenes[0].initial, TYPED, tables)
+    return [replace(x, kept_in=np.array(plane.normal)) for x in models]
 
 
 def _turns_of(held: Connections) -> tuple[float, float]:

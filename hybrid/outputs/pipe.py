@@ -10,10 +10,14 @@ from hybrid.kernels.state.state import Floats
 from hybrid.kernels.watch import pipes as wall_of
 from hybrid.model.payout import whole_scene
 from hybrid.outputs.probes import Probe
+from hybrid.outputs.strains import bends_without_natural
 
 if TYPE_CHECKING:
     from hybrid.outputs.observation import Observation
     from hybrid.scene.schema import Scene
+
+
+CURVED_NOWHERE: Floats = np.zeros(1)
 
 
 class Walls(NamedTuple):
@@ -25,6 +29,7 @@ class Walls(NamedTuple):
     pressure: Floats  # Pa, inside, at pressure_z
     pressure_z: Floats  # m
     content: Floats  # kg/m3
+    natural: Floats = CURVED_NOWHERE  # 1/m, curvature without load, of which there is no stress
 
 
 class Pipes:
@@ -43,11 +48,12 @@ class Pipes:
         for x in sections:
             p = x.pipe
             if p is None:
-                rows.append((x.diameter or 0.0, 0.0, np.nan, 0.0, 0.0, 0.0))
+                rows.append((x.diameter or 0.0, 0.0, np.nan, 0.0, 0.0, 0.0, 0.0))
                 continue
             outer = p.outer_diameter or x.diameter or np.nan
             z = self._surface if p.pressure_z is None else p.pressure_z
-            rows.append((outer, outer - 2.0 * p.wall, p.modulus, p.pressure, z, p.content_density))
+            natural = float(np.hypot(*(x.intrinsic_curvature or (0.0, 0.0))[:2]))
+            rows.append((outer, outer - 2.0 * p.wall, p.modulus, p.pressure, z, p.content_density, natural))
         self._walls = Walls(*np.array(rows, float).T)
         self.whole = tuple(begin + np.cumsum([x.length for x in sections]))  # m, where they end
         limits = [x.pipe.max_stress if x.pipe is not None else None for x in sections]
@@ -82,6 +88,7 @@ class Pipes:
             wall_of.MODULUS: np.nan_to_num(walls.modulus), wall_of.INSIDE: walls.pressure,
             wall_of.INSIDE_Z: walls.pressure_z, wall_of.CONTENT: walls.content * self._gravity,
             wall_of.WATER: self._density * self._gravity, wall_of.SURFACE: self._surface,
+            wall_of.NATURAL: walls.natural,
         }  # fmt: skip
         for column, values in columns.items():
             found[:, column] = values
@@ -112,6 +119,10 @@ class Pipes:
         walls, outside, inside = self._pressures(v)
         force = self.wall_tension(v)
         curvature, torque = v.curvature_twist[:, 0], v.torque
+        if np.any(walls.natural > 0.0):
+            bent, unknown = bends_without_natural(v)
+            bent = np.where(unknown, curvature + walls.natural, bent)
+            curvature = np.where(walls.natural > 0.0, bent, curvature)
         return largest_stress(walls, outside, inside, force, curvature, torque)
 
 

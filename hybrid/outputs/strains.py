@@ -96,11 +96,7 @@ def _directions(line: Line, x: Floats) -> Floats:
 def _end_rods(view: Observation, out: Floats, spans: Integers) -> None:
     """At the ends of rods: where no element sits, or stiffness jumps, the strain of the moment; twist of the cell."""
     line, at = view.line, ends_of(spans)
-    bare = line.element[at.node] == 0  # a joint or an end without element: strain of the moment that is given
-    # the moment is one, the stiffness is not
-    jumps = ~bare & np.isin(at.node, view.changes) & (line.element[2 * at.cell + 1 - at.node] == 1)
-    if line.slip_law.size:  # an element between layers of two kinds has one curvature
-        jumps &= line.slip_law[at.node, 0] == 0.0
+    bare, jumps = _by_moment(view, at)
     if (given := np.flatnonzero(bare | jumps)).size:
         out[at.row[given]] = _strain_of_moment(view, at.node[given], at.cell[given])
     # an angular spring at a clamp bends, but does not twist
@@ -114,6 +110,51 @@ def _end_rods(view: Observation, out: Floats, spans: Integers) -> None:
         beside = np.where(at.cell == at.node, at.cell + 1, at.cell - 1)
         some = np.flatnonzero(np.tile(spans[:, 1] - spans[:, 0] > 1, 2))
         out[at.row[some], 1] -= _twist_to_node(view, at.cell[some], beside[some])
+
+
+def _by_moment(view: Observation, at: SpanEnds) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Ends of rods (n,) without an element, whose strain is that of the moment that is given there; and those where the
+
+    stiffness changes: the moment is one.
+    """
+    line = view.line
+    bare = line.element[at.node] == 0
+    jumps = ~bare & np.isin(at.node, view.changes) & (line.element[2 * at.cell + 1 - at.node] == 1)
+    if line.slip_law.size:  # an element between layers of two kinds has one curvature
+        jumps &= line.slip_law[at.node, 0] == 0.0
+    return bare, jumps
+
+
+def bends_without_natural(view: Observation) -> tuple[Floats, NDArray[np.bool_]]:
+    """Curvature (ns, outputs) 1/m from what has no stress, at output points; and where it is not known: in catenaries,
+
+    which do not know which way their sections are curved, and where a joint takes of the curvature of a rod.
+    """
+    nodes, spans = view.grid.side_nodes, np.array(view.grid.spans).reshape(-1, 3)
+    rods = np.array([zone.kind == "rod" for zone in view.grid.parts])
+    of_rod = np.repeat(rods, spans[:, 1] - spans[:, 0] + 1)
+    bend = np.zeros((nodes.size, 2, view.columns))
+    mine = nodes[of_rod]
+    bend[of_rod] = (view.element_strains[mine, :2] - view.of_line("k0", mine)[:, :2]) / view.of_line("hn", mine)[
+        :, None
+    ]
+    if rods.any():
+        at = ends_of(spans[rods])
+        bare, jumps = _by_moment(view, at)
+        given = np.flatnonzero(bare | jumps)
+        if given.size:
+            bend[at.row[given]] = _bend_of_moment(view, at.node[given], at.cell[given])[:, :2]
+        for k in np.flatnonzero(~bare & ~jumps & np.isin(at.node, view.end_nodes)):
+            i, cell, row = int(at.node[k]), int(at.cell[k]), at.row[k]
+            turn = bend[row] * view.of_line("hn", i)
+            bend[row] = turn * part_without_spring(view, i, cell, np.hypot(*turn)) / (0.5 * view.cell_lengths[cell])
+    plain = np.zeros((nodes.size, 2, view.columns))
+    plain[of_rod, 0] = np.hypot(*np.moveaxis(view.element_strains[mine, :2], 1, 0)) / view.of_line("hn", mine)
+    if rods.any():
+        _end_rods(view, plain, spans[rods])
+    touched = ~of_rod[:, None] | (view.curvature_on_sides != np.abs(plain[:, 0]))
+    unknown = np.asarray(view.grid.sides @ touched.astype(float)) > 0.0
+    return np.hypot(*np.moveaxis(np.asarray(view.grid.sides @ bend), 1, 0)), unknown
 
 
 def _end_catenaries(view: Observation, out: Floats, spans: Integers) -> None:
@@ -241,25 +282,31 @@ def _bend_by_table(line: Line, inner: Integers, side: Integers, moment: Floats, 
     return out
 
 
-def _strain_of_moment(view: Observation, node: Integers, cell: Integers) -> Floats:
-    """Curvature and twist (n, 2, outputs) at rods' ends that carry given moments (at a joint that of its zone)."""
+def _bend_of_moment(view: Observation, node: Integers, cell: Integers) -> Floats:
+    """Curvatures and twist (n, 3, outputs) 1/m from what has no stress, likewise."""
     line = view.line
     torque = np.zeros((node.size, view.columns))
     if view.batch.turn.size:
         for z, (first, last) in enumerate(line.torsion[:, :2]):
             torque[(node == first) | (node == last)] = view.batch.turn[:, z, TORQUE]
     inner = np.where(cell == node, cell + 1, cell)
-    hn = view.of_line("hn", inner)[:, None]
-    B = view.stiffness(inner) * hn
-    k0 = view.of_line("k0", inner) / hn
+    B = view.stiffness(inner) * view.of_line("hn", inner)[:, None]
     a1, d, M = view.directors(cell), view.d[cell], view.node_moment[node]
     body = np.stack([dot(a1, M), dot(cross(d, a1), M), dot(d, M) + torque], axis=1)
-    if line.tension_twist.size:
-        k0 = k0 + np.zeros_like(body)
-        k0[:, 2] -= (2.0 * line.tension_twist[cell] / line.h[cell])[:, None] * view.T[cell]
-    k = k0 + np.divide(body, B, out=np.zeros_like(body), where=np.broadcast_to(B > 0, body.shape))
+    k = np.divide(body, B, out=np.zeros_like(body), where=np.broadcast_to(B > 0, body.shape))
     if line.bend_law.size:
-        k[:, :2] = k0[:, :2] + _bend_by_table(line, inner, np.sign(node - inner), body[:, :2], (k - k0)[:, :2])
+        k[:, :2] = _bend_by_table(line, inner, np.sign(node - inner), body[:, :2], k[:, :2])
+    return np.asarray(k)
+
+
+def _strain_of_moment(view: Observation, node: Integers, cell: Integers) -> Floats:
+    """Curvature and twist (n, 2, outputs) at rods' ends that carry given moments (at a joint that of its zone)."""
+    line = view.line
+    inner = np.where(cell == node, cell + 1, cell)
+    hn = view.of_line("hn", inner)[:, None]
+    k = view.of_line("k0", inner) / hn + _bend_of_moment(view, node, cell)
+    if line.tension_twist.size:
+        k[:, 2] -= (2.0 * line.tension_twist[cell] / line.h[cell])[:, None] * view.T[cell]
     if (
         line.slip_law.size and (slips := np.flatnonzero(line.slip_law[inner, 0])).size
     ):  # depends on the way: as beside it

@@ -124,23 +124,6 @@ def _value(scene: Table, at: Place) -> str:
     return "nothing" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def instead(table: str) -> dict[str, str]:
-    """What to do in place of keys that a table of several lines does not have, as one cable has them."""
-    absent = [x.feature.places for x in REFUSALS if isinstance(x.feature.places, Absent)]
-    return {key: x.fix for x in absent for key in x.keys.get(table, ())}
-
-
-@dataclass(frozen=True)
-class Absent:
-    """Where a feature is asked for by keys that tables of several lines do not have: the schema refuses them."""
-
-    keys: Mapping[str, tuple[str, ...]]  # by name of the table
-    fix: str
-
-    def __call__(self, tables: Tables) -> Iterator[Place]:
-        return iter(())
-
-
 # --- where features are asked for ---------------------------------------------------------------
 
 
@@ -453,8 +436,6 @@ DIRECTED = Feature(
     _either(TWO_STIFFNESSES, CURLED),
 )  # fmt: skip
 SWIVEL_BESIDE = Feature("swivels beside such sections", "attachments: kind: swivel", _swivels_beside(_directed))
-PIPE_CURLED = Feature("stress of a pipe", "pipe",
-                      _in_sections("pipe", of=lambda x: x.pipe is not None and _curls(x)))  # fmt: skip
 TURNS = Feature("turns at an end", "ends.end.turns", _turns)
 TORSION = Feature("turns at an end, torque of tension", "ends.end.turns, tension_torque",
                   _either(TURNS, TORQUE_OF_TENSION))  # fmt: skip
@@ -500,11 +481,6 @@ OTHER_MOTIONS = Feature("motions that are no sum of harmonics, loads that change
                         "motion.file, motion.travel, force.history", _changing_loads)  # fmt: skip
 FINITE_WAVES = Feature("waves of finite height", "waves.kind: stream_function", _finite_waves)
 BY_RAO = Feature("a vessel that moves by an RAO", "motion.vessel.rao", _by_rao)
-
-# Of one cable alone, by keys that several lines do not have.
-ONE_PLANE = Feature("a plane", "dimension: 2", Absent(
-    {"System": ("dimension",)}, "leave it out: several lines are computed in space"
-))  # fmt: skip
 
 RESPONSE_TO_MOTION = Refusal(
     OTHER_MOTIONS, RESPONSE, "physics", "a response by frequency is of what is constant or a sum of harmonics",
@@ -562,10 +538,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "put a short straight section with one bending_stiffness around it",
     ),
     Refusal(
-        CURLED, PIPE_CURLED, "not worked out", "the stress of a pipe is that of its curvature from straight (pipe)",
-        fix="leave it out, or leave pipe out",
-    ),
-    Refusal(
         STRETCH_LAW, TORQUE_OF_TENSION, "not worked out", "tension makes a torque in this line (tension_torque)",
         "axial_stiffness alone", "give axial_stiffness alone",
     ),
@@ -574,10 +546,6 @@ REFUSALS: tuple[Refusal, ...] = (
         fix="leave it out and give mesh.cells or mesh.nodes, or write curvature_error for cells that follow",
     ),
     # --- obstacles, and other lines ---
-    Refusal(
-        PLANE, OBSTACLES, "not worked out", "contact with obstacles ({key}) is computed in space", "3 or nothing",
-        "leave it out",
-    ),
     Refusal(
         PAYOUT, MEETS_LINES, "not worked out",
         "what touches ({key}) moves, and nodes that enter and leave do not know it",
@@ -646,10 +614,5 @@ REFUSALS: tuple[Refusal, ...] = (
     # --- several lines ---
     Refusal(
         FOLLOWING_CELLS, SEVERAL_LINES, "several lines", "cells of several lines have lengths that stay", fix=ALONE
-    ),
-    *(
-        Refusal(x, SEVERAL_LINES, "several lines", "tables of several lines have no such key", fix=x.places.fix)
-        for x in (ONE_PLANE,)
-        if isinstance(x.places, Absent)
     ),
 )  # fmt: skip

@@ -8,7 +8,7 @@ the first that does not lie in it; what does not fit is a finding.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -23,6 +23,8 @@ from hybrid.scene.sea import CurrentPoint, CurrentProfile, PowerLawCurrent, Unif
 # What a scene that insists on a plane may leave it by, as a part of a vector's or the cable's length: the last of the
 # digits that people write.  A scene that does not insist is in a plane to round-off or not at all.
 TYPED, EXACT = 1e-6, 1e-9
+# Of the length: how far a line may be from its plane that is computed in space, where obstacles or several lines are.
+OUT = 1e-5
 # A witness that is this close (a sine) to those before it does not define the plane.
 SAYS_NOTHING = 1e-3
 UP: Triple = (0.0, 0.0, 1.0)
@@ -58,18 +60,23 @@ class Plane:
         return f"the plane with normal [{n[0]:.4g}, {n[1]:.4g}, {n[2]:.4g}]"
 
 
+Witnessed = tuple[Environment, Ends, Initial]  # tables of a line that may say in which plane it is
+
+
 def plane_of(
-    environment: Environment, cable: Cable, ends: Ends, initial: Initial, tolerance: float = EXACT
-) -> tuple[Plane, list[Finding]]:
+    environment: Environment, cable: Cable, ends: Ends, initial: Initial, tolerance: float = EXACT,
+    beside: Sequence[Witnessed] = (),
+) -> tuple[Plane, list[Finding]]:  # fmt: skip
     """The plane that a scene is in, or would be in but for what the findings say.
 
-    tolerance: by what part of its length a vector may leave the plane.
+    tolerance: by what part of its length a vector may leave the plane; beside: of lines with which it shares a plane.
     """
     witnesses = list(_witnesses(environment, ends, initial))
-    places = [w.vector for w in witnesses if w.kind == "place"]
+    all_ = [w for tables in beside for w in _witnesses(*tables)] or witnesses
+    places = [w.vector for w in all_ if w.kind == "place"]
     origin = places[0] if places else (0.0, 0.0, 0.0)
     vertical = environment.gravity != 0.0 or (environment.fluid is not None and environment.fluid.surface is not None)
-    plane = _choose(witnesses, origin, vertical)
+    plane = _choose(all_, origin, vertical)
     return plane, [
         *_leaves(witnesses, plane, origin, cable.length, tolerance),
         *_sections(cable, ends, plane),

@@ -9,7 +9,6 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape
 from hybrid.scene.base import After, Finding, Kinds, NonNegative, Positive, Table, Text, Vector, by_kind, refuse
-from hybrid.scene.combinations import instead
 from hybrid.scene.end_loads import GivenLoad, Loading
 from hybrid.scene.ends import Body, Free
 from hybrid.scene.motion_tables import Motion
@@ -52,7 +51,7 @@ class Failure(Table):
 class FixedPoint(Table):
     """A point that is held or moved: an anchor, a fairlead of a vessel whose motion is known."""
 
-    instead: ClassVar[Mapping[str, str]] = instead("FixedPoint") | WINCH
+    instead: ClassVar[Mapping[str, str]] = WINCH
 
     kind: Literal["fixed"] = Field(default="fixed", description="held where it is, or moved as `motion` says")
     position: Vector = Field(description="position, inertial frame [m]")
@@ -63,7 +62,7 @@ class FixedPoint(Table):
 class FreePoint(Table):
     """A point that lines alone hold: a knot, a buoy, a clump.  It has no moment of inertia."""
 
-    instead: ClassVar[Mapping[str, str]] = instead("FreePoint") | WINCH
+    instead: ClassVar[Mapping[str, str]] = WINCH
 
     kind: Literal["free"] = Field(default="free", description="moves with the lines that meet there")
     initial_guess: Vector = Field(
@@ -110,7 +109,7 @@ class FreePoint(Table):
 class Fairlead(Table):
     """A point of a body: a fairlead, a padeye, a hang-off.  It moves with the body."""
 
-    instead: ClassVar[Mapping[str, str]] = instead("Fairlead") | WINCH
+    instead: ClassVar[Mapping[str, str]] = WINCH
 
     kind: Literal["fairlead"] = Field(default="fairlead", description="a point of a body, and moves with it")
     body: Name = Field(description="name of the body")

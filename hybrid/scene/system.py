@@ -32,7 +32,6 @@ from hybrid.scene.attachments import Attachment
 from hybrid.scene.base import Finding, NonNegative, Pair, Positive, Table, Text, Truth, Whole, refuse, turned
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, without_turns
 from hybrid.scene.cable import Cable, Contact, Environment, Section
-from hybrid.scene.combinations import instead
 from hybrid.scene.connections import ClampedConnection, Connections
 from hybrid.scene.end_loads import GivenLoad
 from hybrid.scene.ends import Clamped, End, Ends, Pinned, Triple
@@ -91,7 +90,7 @@ class LineFailure(Failure):
 class JoinedLine(Table):
     """A line from one point to another, with s = 0 at `start`."""
 
-    instead: ClassVar[Mapping[str, str]] = instead("JoinedLine") | WINCH
+    instead: ClassVar[Mapping[str, str]] = WINCH
 
     start: Name = Field(description="name of the point at s = 0")
     end: Name = Field(description="name of the point at s = length")
@@ -170,8 +169,6 @@ def _between(initial: Initial, ends: Mapping[str, End]) -> Initial:
 class SystemOutput(Table):
     """What is kept."""
 
-    instead: ClassVar[Mapping[str, str]] = instead("SystemOutput")
-
     every: Positive | None = Field(
         default=None, description="time between two outputs; absent: a hundredth of the duration, or one a step [s]"
     )
@@ -206,7 +203,7 @@ class SystemOutput(Table):
 class System(Table):
     """Several lines, the points where they meet, what acts on them, and what is asked."""
 
-    instead: ClassVar[Mapping[str, str]] = instead("System") | {
+    instead: ClassVar[Mapping[str, str]] = {
         "ends": "a scene of several lines has points, at which its lines end",
         "model": "each line has its own: lines.NAME.model",
         "mesh": "each line has its own: lines.NAME.mesh",
@@ -238,6 +235,11 @@ class System(Table):
         "they are given; parts are of how far each line moves, and of its own tensions",
     )
     output: SystemOutput = Field(default=SystemOutput(), description="what is kept")
+    dimension: Literal[2, 3] | None = Field(
+        default=None,
+        description="2: all lines lie in one plane, refused if they do not, and stopped where something leaves it; "
+        "several lines are computed in space whatever is said here [-]",
+    )
 
     @property
     def adaptive(self) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from hybrid.scene.combinations import refused, tables_of
 from hybrid.scene.connections import connection_findings
 from hybrid.scene.ends import Clamped, Ends, Free
 from hybrid.scene.motion_checks import motion_findings
+from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.points import Fairlead, FixedPoint, FreePoint
 from hybrid.scene.quantities import of_several_lines
 from hybrid.scene.schema import Scene
@@ -38,6 +39,7 @@ def system_findings(system: System) -> Iterator[Iterator[Finding]]:
     yield chain.from_iterable(_body_findings(system, name) for name in system.bodies)
     yield chain.from_iterable(_moment_findings(system, name) for name in system.points)
     yield chain.from_iterable(_line_findings(system, name) for name in system.lines)
+    yield _in_a_plane(system)
     yield travel_findings(system)
     yield elevation_has_waves(system.output, system.environment)
     yield of_several_lines(system.output.quantities, system.lines, system.environment.seabed is not None)
@@ -178,6 +180,18 @@ def _line_findings(system: System, name: str) -> Iterator[Finding]:
         if wrong:
             break
     yield from (_of_system(system, name, found) for found in wrong)
+
+
+def _in_a_plane(system: System) -> Iterator[Finding]:
+    """What leaves the plane of all lines."""
+    scenes = {name: system.scene_of(name, system.carried(name)) for name in system.lines if system.dimension == 2}
+    tables = [(x.environment, x.ends, x.initial) for x in scenes.values()]
+    found = {
+        _of_system(system, name, each): None
+        for name, x in scenes.items()
+        for each in plane_of(x.environment, x.cable, x.ends, x.initial, TYPED, tables)[1]
+    }
+    yield from found
 
 
 def _of_system(system: System, name: str, found: Finding) -> Finding:

@@ -29,6 +29,7 @@ from hybrid.model.first_state import HUNG
 from hybrid.model.obstacles import CELLS_PER_RADIUS
 from hybrid.outputs.joined_lines import JoinedObservation, Output
 from hybrid.outputs.observation import Observation
+from hybrid.scene.plane import OUT
 from hybrid.simulation.doubtful_outputs import Bounds, doubtful, kinks_at
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.hockling_watch import LOOP, note_hockling, note_loops
@@ -386,8 +387,18 @@ class Diagnostics:
         over = (length > self._longest * h) | (length < (2.0 - self._longest) * h)
         return (Outcome.OVERSTRETCHED, most_stretched(self._model, state)) if over.any() else None
 
+    def left_plane(self, r: Floats) -> Stop:
+        """Nodes (..., N+1, 3) m of a line that is to stay in a plane, and is computed in space, that are out of it."""
+        model = self._model
+        if model.kept_in is None:
+            return None
+        out = np.abs((r - model.start.r[0]) @ model.kept_in).reshape(-1, r.shape[-2]).max(axis=0)
+        return (Outcome.LEFT_PLANE, int(np.argmax(out))) if out.max() > OUT * model.length else None
+
     def outputs(self, seen: Observation, values: Mapping[str, Floats]) -> Stop:
         """Look at outputs as computed; values: their fields (nb, ...)."""
+        if (stop := self.left_plane(seen.batch.r)) is not None:
+            return stop
         self.mesh(seen)
         self.loops(seen.batch.t, values, seen.grid.s)
         self.rest(seen.batch, values)
@@ -397,6 +408,9 @@ class Diagnostics:
         self, seen: JoinedObservation, values: Mapping[str, Floats], lines: Sequence[tuple[Model, Output]]
     ) -> Stop:
         """Look at outputs as computed of which each has a line of its own; lines: each with a model of its cable."""
+        for _, output in lines if self._model.kept_in is not None else ():
+            if (stop := self.left_plane(output.batch.r)) is not None:
+                return stop
         for k in np.flatnonzero(doubtful(seen, values, self._bounds)).tolist():
             self.follow(_with_line(*lines[k]))
             one = seen.one(k)

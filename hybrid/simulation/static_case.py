@@ -73,7 +73,7 @@ class StaticCase:
                 manager = switching.manager
                 diagnostics.torque(0.0, manager.torque * manager.compliance, manager.torque)
             stretched = diagnostics.stretch(found.state)
-            stop = stretched or diagnostics.still(ends, found.state)
+            stop = stretched or diagnostics.left_plane(found.state.r) or diagnostics.still(ends, found.state)
             values, at_edges, doubt = _values(model, found, observer) if stop is None else ({}, {}, np.array(NO_DOUBT))
             if stop is None:
                 diagnostics.loops(

@@ -391,7 +391,9 @@ class LineResult:
 
     def judge(self, t: float | None, sharp: Sequence[float], state: State) -> None:
         """Look at a state for what its mesh does not resolve (an event) and for strain beyond what a section bears."""
-        self._stop_if(self.diagnostics.stretch(state) or self.diagnostics.shape(t or 0.0, sharp, state), t, state)
+        watch = self.diagnostics
+        stop = watch.stretch(state) or watch.left_plane(state.r) or watch.shape(t or 0.0, sharp, state)
+        self._stop_if(stop, t, state)
 
     def waiting(self) -> tuple[list[Batch], list[Floats], float | None]:
         """Outputs and steps that wait, and the energy that the balance counts from (J), to come back to."""

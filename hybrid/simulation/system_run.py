@@ -16,6 +16,7 @@ import numpy as np
 from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
+from hybrid.kernels.junctions.bodies import FRAME, PLACE, V
 from hybrid.kernels.machine.cache import cache_folder
 from hybrid.kernels.run.system_sampling import SAMPLE_AXES, SAMPLE_PLACE
 from hybrid.kernels.state import books as b
@@ -26,6 +27,7 @@ from hybrid.model.ends import table_of_loads
 from hybrid.model.plan import output_times
 from hybrid.model.plan import parts as equal_parts
 from hybrid.model.system import SystemResolution, build_system
+from hybrid.scene.plane import OUT
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
 from hybrid.simulation.collapse import COLLAPSE, CONTACT, GIVE_UP, collapse_text
@@ -368,8 +370,21 @@ class SystemRun:
             values |= self.quantities.values(by_name, {line.name: line for line in self.lines})
             self.recorder.save_batch(seen.t, values, [("lines", 0.0, 0.0)])
         self._look_for_dry_bodies(seen)
+        self._keep_in_plane()
         for line, x in zip(self.lines, states, strict=True):
             line.output(x)
+
+    def _keep_in_plane(self) -> None:
+        """LineFailed where a body has left the plane of the lines, by its place or its turn, and is to stay in it."""
+        normal, first = self.model.models[0].kept_in, self.model.models[0].start.r[0]
+        for k, (row, begun) in enumerate(zip(self.state.bodies, self.model.body_places, strict=True)):
+            if normal is None:
+                return
+            out = abs(float((row[PLACE:FRAME] - first) @ normal)) / self.model.models[0].length
+            R, R0 = (x[FRAME:V].reshape(3, 3) for x in (row, begun))
+            if max(out, float(np.abs(R @ R0.T @ normal - normal).max())) > OUT:
+                names = [*(body.name for body in self.model.bodies), *self.model.rigid]
+                raise LineFailed(-1, Outcome.LEFT_PLANE, self.t, None, f"{names[k]} leaves it")
 
     def _look_for_dry_bodies(self, seen: Sampled) -> None:
         """An event where a body that counts as submerged has risen out of the water."""

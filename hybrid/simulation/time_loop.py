@@ -119,7 +119,7 @@ class TimeLoop:
         except StepFailed as failed:
             self.fail(failed.tried, failed.dt)
         self.diagnostics.follow(run.model)
-        self._stop_if(self.diagnostics.stretch(run.state))
+        self._stop_if(self.diagnostics.stretch(run.state) or self.diagnostics.left_plane(run.state.r))
         self._stop_if(self.diagnostics.still(run.model.ends.values, run.state))
         self._vibration.begin(run.run.clock)
         self.diagnostics.scheme(run.rho)

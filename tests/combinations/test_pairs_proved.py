@@ -318,3 +318,64 @@ def test_turns_of_one_of_two_lines_are_shared_by_both(body: bool, at: str, model
         for name in ("left", "right"):
             torque = found.lines[name]["torque"][0]
             assert torque == pytest.approx(sign * 15.0 * np.pi * turns / SPAN, rel=1e-6)
+
+
+# --- stress of a pipe that is curved without load ---------------------------------------------------
+
+PIPE = {S + "pipe": {"wall": 0.003, "modulus": 2e8}, S + "intrinsic_curvature": [0.0, 0.02, 0.0]}
+
+
+def test_a_pipe_that_lies_as_it_was_made_has_no_stress_and_bent_straight_that_of_its_curvature() -> None:
+    """sigma = E d/2 |kappa - kappa_0|; outputs and extremes over all steps."""
+    kappa, length, d, E = 0.02, 12.0, 0.03, 2e8
+    at, along = np.sin(kappa * length) / kappa, (1.0 - np.cos(kappa * length)) / kappa
+    bare = {"environment.gravity": 0.0, "model": "rod", "mesh.cells": 48, "time": {"duration": 0.1, "step": 0.02}}
+    start = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": [0, 1, 0]}
+    for sign in (1.0, -1.0):
+        free = ran(
+            **{START: start, END: {"kind": "free"}} | bare | PIPE | {S + "intrinsic_curvature": [0, sign * kappa, 0]}
+        )
+        assert free["von_mises"].max() < 1e-6 * E
+        assert free["curvature"][0, 1:-1] == pytest.approx(kappa, rel=1e-6)
+        assert np.linalg.norm(free.position[0, -1]) == pytest.approx(np.hypot(at, along), rel=1e-3)
+        straight = ran(
+            **{START: start, END: start | {"position": [length, 0, 0]}} | bare | PIPE
+            | {S + "intrinsic_curvature": [0, sign * kappa, 0]}
+        )  # fmt: skip
+        assert straight["von_mises"] == pytest.approx(0.5 * E * d * kappa, rel=1e-6)
+        assert straight.envelope["von_mises_max"].max() == pytest.approx(0.5 * E * d * kappa, rel=1e-6)
+
+
+def off_its_moment(natural: list[float], cells: int, model: str = "rod") -> tuple[float, float]:
+    """How far the stress of a curved pipe is from that of its moment, tension and torque: at the clamp, and elsewhere.
+
+    A catenary has the most that both curvatures can make.
+    """
+    d, wall, E, EI = 0.03, 0.003, 2e8, 20.0
+    curved = PIPE | {S + "intrinsic_curvature": natural}
+    found = ran(**{START: CLAMP, "model": model, "mesh.cells": cells} | curved)
+    bore = d - 2.0 * wall
+    area, polar = 0.25 * np.pi * (d**2 - bore**2), np.pi / 32.0 * (d**4 - bore**4)
+    bend = found["bending_moment"] / EI if model == "rod" else found["curvature"] + np.hypot(*natural[:2])
+    axial = found["tension"] / area + 0.5 * E * d * bend
+    torque = found["torque"] if model == "rod" else 0.0
+    off = np.abs(found["von_mises"] / np.sqrt(axial**2 + 3.0 * (0.5 * torque * d / polar) ** 2) - 1.0)
+    largest, seen = found.envelope["von_mises_max"].max(), found["von_mises"].max()
+    assert seen * (1.0 - 1e-6) <= largest < 1.2 * seen
+    return float(off[:, 0].max()), float(off[:, 1:].max())
+
+
+def test_stress_of_a_curved_pipe_is_that_of_its_moment() -> None:
+    """To second order in the cells, as moments are projected on tangents between cells.
+
+    At a clamp to first order where there is torque: its half cell bends about axes that are turned by half its bend
+    against those of the clamp, and so is the torque that it bears.  Without torque it is exact there.
+    """
+    at_clamp, along = np.array([off_its_moment([0.03, 0.05, 0.01], cells) for cells in (24, 48, 96)]).T
+    assert along[1] < 2e-5 and np.log2(along[:-1] / along[1:]) == pytest.approx(2.0, abs=0.05)
+    assert at_clamp[1] < 5e-4 and np.log2(at_clamp[:-1] / at_clamp[1:]) == pytest.approx(1.0, abs=0.1)
+    assert max(off_its_moment([0.05, 0.0, 0.0], 48)) < 1e-9
+
+
+def test_stress_of_a_curved_pipe_that_is_a_catenary_is_the_most_that_it_can_be() -> None:
+    assert max(off_its_moment([0.03, 0.05, 0.01], 48, "catenary")) < 1e-6

@@ -12,7 +12,7 @@ import yaml
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.scene import combinations as c
-from hybrid.scene.combinations import REFUSALS, Absent, Refusal, Use, refuse_use
+from hybrid.scene.combinations import REFUSALS, Use, refuse_use
 from hybrid.scene.read import parse_either
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
@@ -79,10 +79,8 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.PLANE, c.SELF_CONTACT): ({"dimension": 2, "contact": {"self": True}}, ""),
     (c.SWIVEL, c.TURNS): (SWIVEL | {END + "turns": 2}, ""),
     (c.SWIVEL_BESIDE, c.DIRECTED): (SWIVEL | TWO, ""),
-    (c.CURLED, c.PIPE_CURLED): (CURVED | {SECTION + "pipe": {"wall": 0.002, "modulus": 2e11}}, ""),
     (c.STRETCH_LAW, c.TORQUE_OF_TENSION): (ROPE | TORQUE, ""),
     (c.SHORTEST_CELLS, c.STAYING_CELLS): ({"model": {"kind": "adaptive", "rod_cell": 0.1}}, ""),
-    (c.PLANE, c.OBSTACLES): (BALL | {"dimension": 2}, ""),
     (c.MOVING_ZONES, c.GOES_ITS_WAY): ({"obstacles.ball": BALL["obstacles"]["ball"] | {"from_outside": True}} | MOVING, ""),
     (c.PAYOUT, c.MEETS_LINES): (TWO_LINES | PAID_LINE, ""),
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
@@ -107,7 +105,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.BY_RAO, c.FINITE_WAVES): (HIGH_WAVES | {END + "motion": {"vessel": RAO}}, ""),
     (c.FOLLOWING_CELLS, c.SEVERAL_LINES): ({ONE + "model": FOLLOWING["model"]}, ""),
 }  # fmt: skip
-BY_SCHEMA = [x for x in REFUSALS if isinstance(x.feature.places, Absent)]
 # Other examples of pairs whose one reason is that of several features.
 OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.TORSION, c.PLANE), {END + "turns": 2, "dimension": 2}, ""),
@@ -135,7 +132,7 @@ def _id(x: object) -> str:
 def test_every_refusal_has_an_example() -> None:
     pairs = [(x.feature, x.beside) for x in REFUSALS]
     assert len(set(pairs)) == len(pairs)
-    assert set(pairs) == {*EXAMPLES, *((x.feature, x.beside) for x in BY_SCHEMA)}
+    assert set(pairs) == set(EXAMPLES)
 
 
 @pytest.mark.parametrize(("pair", "changes", "use"), [*((k, *x) for k, x in EXAMPLES.items()), *OTHERS], ids=_id)
@@ -153,26 +150,10 @@ def test_it_is_refused_with_its_reason_and_remedy(
         assert x.fix and (x.line or use) and (x.value or not use), told.value
 
 
-@pytest.mark.parametrize("refusal", BY_SCHEMA, ids=lambda x: x.feature.name)
-def test_keys_that_several_lines_do_not_have_say_what_to_do(refusal: Refusal) -> None:
-    assert isinstance(refusal.feature.places, Absent)
-    at = {"System": "", "SystemOutput": "output.", "FixedPoint": "points.b.", "JoinedLine": ONE,
-          "FreePoint": "points.free.", "Fairlead": "points.on."}  # fmt: skip
-    more: dict[str, Any] = {
-        "output": {}, "points.free": {"kind": "free", "initial_guess": [4, 0, -1]},
-        "points.on": {"kind": "fairlead", "body": "x", "place": [0, 0, 0]}, **CLAMPED,
-    }  # fmt: skip
-    for table, keys in refusal.feature.places.keys.items():
-        for key in keys:
-            with pytest.raises(SceneError) as told:
-                _scene(more | {at[table] + key: {}}, True)
-            assert refusal.fix in [x.fix for x in told.value.complaints if x.where.endswith(key)], told.value
-
-
 def test_nothing_else_refuses_a_combination() -> None:
     """Reasons of the table stand in no other file of the package."""
     root = Path(hybrid.__file__).parent
-    reasons = [x.why.partition("{key}")[0].strip(" (,") for x in REFUSALS if x not in BY_SCHEMA]
+    reasons = [x.why.partition("{key}")[0].strip(" (,") for x in REFUSALS]
     words = {x for x in reasons if len(x) > 20}
     for path in root.rglob("*.py"):
         if path.name not in ("combinations.py", "plane.py"):  # this one: what does not lie in a plane

@@ -58,7 +58,7 @@ def test_a_system_is_read_changed_and_written() -> None:
         ("  east: {position", "  idle: {position: [0, 0, 0]}\n  east: {position", 5, "points.idle", "leave it out"),
         ("  fluid: {density: 1025, surface: 30}", "  gravity: 9.81", 6, "points.buoy.volume", "fluid"),
         ("time:", "accuracy: 1 kg\ntime:", 10, "accuracy", "1%, 3 cm or 50 N"),
-        ("time:", "dimension: 2\ntime:", 10, "dimension", "computed in space"),
+        ("time:", "dimension: 4\ntime:", 10, "dimension", "one of: 2, 3"),
         ("mass: 10, diameter: 0.05, axial", "mass: 10, diameter: 0.05, drag: 3, axial", 8, "lines.west.sections[0].drag",
          "normal: 3"),
     ],

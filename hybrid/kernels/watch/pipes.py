@@ -5,6 +5,7 @@ Tension, curvature and torque are those of kernels.watch.extremes, pressures tho
     symbol   meaning                                                     shape   unit
     F        tension in the wall                                         -       N
     po, pi   pressure outside and inside, over that of the air           -       Pa
+    k0       curvature without load of the section, of which there is no stress  -       1/m
     m, w     mean and half difference of Lame's stresses: radial stress  -       Pa, N
              m - w/d^2, hoop stress m + w/d^2 at the diameter d
 """
@@ -13,6 +14,10 @@ from __future__ import annotations
 
 import math
 
+from hybrid.kernels.algebra.rotations import log_rotation
+from hybrid.kernels.laws.bending_law import curvature_under, has_bend_law, parts_without_spring
+from hybrid.kernels.laws.bending_slip import slips
+from hybrid.kernels.laws.element import frames_at, relative_rotation
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.zone_torque import FIRST, LAST
 from hybrid.kernels.march.zone_torque import TORQUE as PASSED
@@ -29,9 +34,10 @@ from hybrid.kernels.watch.extremes import (
 )
 
 # Columns of `walls`: where the section ends, m; outer and inner diameter, m, Young's modulus, Pa, 0: no pipe; pressure
-# inside, Pa, at the height PRESSURE_Z, m; specific weight of the content and of the water, N/m3; surface of the water, m.
-SECTION_END, OUTER, INNER, MODULUS, INSIDE, INSIDE_Z, CONTENT, WATER, SURFACE = range(9)
-WALL = 9
+# inside, Pa, at the height PRESSURE_Z, m; specific weight of the content and of the water, N/m3; surface of the water, m;
+# curvature without load, 1/m.
+SECTION_END, OUTER, INNER, MODULUS, INSIDE, INSIDE_Z, CONTENT, WATER, SURFACE, NATURAL = range(10)
+WALL = 10
 
 
 @inner
@@ -62,6 +68,55 @@ def bend_and_torque(line, ends, state, books, i, side, passed):
         curvature, _, torque = at_rod_end(line, ends, state, i, side, passed)
         return abs(books.strains[i, BENT]) if 0 < i < n else curvature, torque
     return beside_kink(line, state, books, i, side), passed
+
+
+@inner
+def bend_of_element(line, ends, state, i):
+    """Curvature, 1/m, of the element at node i from what has no stress."""
+    n = line.h.shape[0]
+    Ra, Rb = frames_at(line, ends, state, i)
+    k = log_rotation(relative_rotation(Ra, Rb))
+    x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
+    bend = math.sqrt(x * x + y * y)
+    if i == 0 or i == n:
+        return parts_without_spring(line, i, bend)[0] * bend / (0.5 * line.h[min(i, n - 1)])
+    return bend / line.hn[i]
+
+
+@inner
+def bend_at_seam(line, ends, state, books, i, side):
+    """The same of the element at node i, where sections meet, on its side: the moment is one."""
+    j = i + side
+    if has_bend_law(line, i):
+        return curvature_under(line, i, side, books.strains[i, 1])
+    if slips(line, i) or not (line.element[j] and line.kb[j, 0] > 0.0 and line.kb[j, 1] > 0.0):
+        return bend_of_element(line, ends, state, i)
+    Ra, Rb = frames_at(line, ends, state, i)
+    k = log_rotation(relative_rotation(Ra, Rb))
+    x = line.kb[i, 0] * (k[0] - line.k0[i, 0]) / line.kb[j, 0]
+    y = line.kb[i, 1] * (k[1] - line.k0[i, 1]) / line.kb[j, 1]
+    return math.sqrt(x * x + y * y) / line.hn[j]
+
+
+@inner
+def bend_and_torque_curved(line, ends, state, books, i, side, passed, natural):
+    """As `bend_and_torque`, where a section is curved without load: from what has no stress.
+
+    A catenary does not know which way its sections are curved: the most that both curvatures can make.
+    """
+    curvature, torque = bend_and_torque(line, ends, state, books, i, side, passed)
+    if line.element[i] and abs(books.strains[i, BENT]) == books.strains[i, 0]:  # no joint takes of it
+        if books.marks[i] & SEAM:
+            return bend_at_seam(line, ends, state, books, i, side), torque
+        return bend_of_element(line, ends, state, i), torque
+    n = line.h.shape[0]
+    if i == 0 or i == n:
+        j = 1 if i == 0 else n - 1
+        if line.spin[min(i, n - 1)] and line.element[j]:  # by the moment that is given there
+            if slips(line, j):
+                return bend_of_element(line, ends, state, j), torque
+            return curvature - math.sqrt(line.k0[j, 0] ** 2 + line.k0[j, 1] ** 2) / line.hn[j], torque
+    return curvature + natural, torque
 
 
 @inner
@@ -118,7 +173,10 @@ def note_pipes(line, ends, state, books, t):
             F = tension_at(line, ends, state, books, i, side) + inside * bore - outside * full
             stress = 0.0
             if wall[MODULUS] > 0.0:
-                curvature, torque = bend_and_torque(line, ends, state, books, i, side, passed)
+                if wall[NATURAL] > 0.0:
+                    curvature, torque = bend_and_torque_curved(line, ends, state, books, i, side, passed, wall[NATURAL])
+                else:
+                    curvature, torque = bend_and_torque(line, ends, state, books, i, side, passed)
                 stress = largest_stress(wall, outside, inside, F, curvature, torque)
             widen(books.extremes, WALL_TENSION, column, F, t)
             widen(books.extremes, VON_MISES, column, stress, t)

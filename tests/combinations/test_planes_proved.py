@@ -1,0 +1,152 @@
+"""`dimension: 2` where space is computed: beside obstacles, and of several lines, of which nothing may leave the plane."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import ComputationError, Outcome, SceneError
+from tests.combinations.pairs import Tables, as_system, seen_by
+
+LENGTH = 12.0
+SECTION: Tables = {
+    "length": LENGTH, "mass": 4.0, "diameter": 0.05, "axial_stiffness": 1e5, "bending_stiffness": 30.0,
+    "torsional_stiffness": 20.0, "damping": {"mass": 0.4}, "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
+}  # fmt: skip
+STEPS: Tables = {"time": {"duration": 1.0, "step": 0.02}, "output": {"every": 0.1, "points": 25, "exact": True}}
+
+
+def hung(model: str = "rod", **more: Any) -> Tables:
+    """A line in the plane of x and z whose upper end is moved in it."""
+    motion = {"surge": {"amplitude": 0.4, "period": 1.5}, "heave": {"amplitude": 0.5, "period": 1.2}, "ramp": 0.5}
+    fluid = {"density": 1025, "surface": 6.0, "current": [0.3, 0, 0]}
+    return {
+        "environment": {"fluid": fluid}, "cable": {"sections": [SECTION]},
+        "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -1]},
+                 "end": {"kind": "pinned", "position": [8, 0, 3], "motion": motion}},
+        "initial": "equilibrium", "model": model, "contact": {"self": False}, "mesh": {"cells": 36}, "dimension": 2,
+    } | deepcopy(STEPS) | more  # fmt: skip
+
+
+def system(tables: Tables) -> Tables:
+    found = as_system(tables | {"initial": {"kind": "equilibrium"}})
+    assert found is not None
+    return found
+
+
+def over(kind: str = "cylinder", **obstacle: Any) -> Tables:
+    """The same over something across the plane, or centred in it."""
+    shapes: Tables = {
+        "cylinder": {"axis": [0, 1, 0], "radius": 0.6}, "sphere": {"radius": 0.6},
+        "box": {"size": [1.2, 3.0, 1.2], "rounding": 0.3, "rotation": [0, 20, 0]},
+    }  # fmt: skip
+    pipe = {"kind": kind, "at": [4.0, 0, -2.6], "friction": 0.3} | shapes[kind]
+    found = hung(obstacles={"pipe": pipe | obstacle})
+    if kind == "sphere":  # on which a line stays that is taut, and turned aside by less than the radius
+        found["obstacles"]["pipe"] |= {"at": [4.0, 0, 0.9]} | obstacle
+        found["ends"]["start"] = {"kind": "pinned", "position": [0, 0, 0]}
+        found["cable"] = {"sections": [SECTION | {"length": 8.45}]}
+        for way in ("surge", "heave"):
+            found["ends"]["end"]["motion"][way]["amplitude"] *= 0.1
+    return found
+
+
+@pytest.mark.parametrize("model", ["rod", "catenary"])
+def test_a_line_of_several_in_a_plane_is_what_the_plane_computes(model: str) -> None:
+    """Against the equations of the plane, to 1e-8 m; across it there is nothing at all."""
+    tables = hung(model)
+    if model == "catenary":  # which has to stay taut
+        tables["ends"]["start"] = {"kind": "pinned", "position": [0, 0, 0]}
+        tables["ends"]["end"]["motion"] = {"surge": {"amplitude": 0.2, "period": 4.0}, "ramp": 0.5}
+    one, two = hybrid.run(tables), hybrid.run(system(tables)).lines["one"]
+    assert np.abs(one.position - two.position).max() < 1e-8 * LENGTH
+    assert np.abs(one.tension - two.tension).max() < 1e-6 * np.abs(one.tension).max()
+    assert not two.position[..., 1].any() and not two.velocity[..., 1].any()
+    assert np.ptp(two.position[:, 12], axis=0)[[0, 2]].min() > 0.03
+
+
+@pytest.mark.parametrize("kind", ["cylinder", "box", "sphere"])
+@pytest.mark.parametrize("several", [False, True])
+def test_beside_obstacles_in_a_plane_nothing_leaves_it(kind: str, several: bool) -> None:
+    """It is the motion in space, whose parts across the plane are zero; in another plane they are round-off."""
+    tables = over(kind)
+    free = {key: x for key, x in tables.items() if key != "dimension"}
+    said, whole = (system(x) if several else x for x in (tables, free))
+    found, space = hybrid.run(said), hybrid.run(whole)
+    line, other = (x.lines["one"] if several else x for x in (found, space))
+    assert not line.position[..., 1].any()
+    assert np.abs(line.position - other.position).max() == 0.0
+    away = np.linalg.norm((line.position - tables["obstacles"]["pipe"]["at"])[..., [0, 2]], axis=-1).min(axis=1)
+    assert (away < (0.95 if kind == "box" else 0.7)).any() and away.min() > 0.6
+    c, s = np.cos(0.7), np.sin(0.7)
+    M = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    if kind != "box":  # whose rotation is about axes of the inertial frame
+        motion = tables["ends"]["end"]["motion"]  # of which surge is in the plane that is turned
+        ways = {
+            key: motion["surge"] | {"amplitude": motion["surge"]["amplitude"] * x}
+            for key, x in (("surge", c), ("sway", s))
+        }
+        again = seen_by(M, over(kind))
+        again["ends"]["end"]["motion"] = motion | ways
+        again["environment"]["fluid"]["current"] = [0.3 * c, 0.3 * s, 0.0]
+        turned = hybrid.run(system(again) if several else again)
+        there = (turned.lines["one"] if several else turned).position @ M
+        assert np.abs(there[..., 1]).max() < 1e-9 * LENGTH
+        assert np.abs(there - line.position).max() < 1e-6 * LENGTH
+
+
+def with_body(**buoy: Any) -> Tables:
+    """Two lines with a buoy between them, which turns in the plane."""
+    line = {"sections": [SECTION | {"length": 6.0}], "model": "rod", "mesh": {"cells": 12}}
+    body = {"mass": 40.0, "inertia": [3.0, 5.0, 4.0], "initial_guess": [4, 0, -2], "centre": [0.1, 0, -0.2]}
+    motion = {"surge": {"amplitude": 0.4, "period": 1.5}, "ramp": 0.5}
+    return {
+        "points": {"a": {"position": [0, 0, 0]}, "b": {"position": [9, 0, 1], "motion": motion},
+                   "l": {"body": "buoy", "place": [-0.3, 0, 0.1]}, "r": {"body": "buoy", "place": [0.3, 0, 0.2]}},
+        "bodies": {"buoy": body | buoy}, "dimension": 2, "environment": {"fluid": {"density": 1025}},
+        "lines": {"left": {"start": "a", "end": "l"} | line, "right": {"start": "r", "end": "b"} | line},
+    } | deepcopy(STEPS)  # fmt: skip
+
+
+def test_a_body_between_lines_turns_in_their_plane() -> None:
+    found = hybrid.run(with_body())
+    rotation, place = found.bodies["buoy/rotation"], found.bodies["buoy/position"]
+    assert np.ptp(rotation[:, 1]) > 1.0 and not rotation[:, [0, 2]].any() and not place[:, 1].any()
+    assert all(not x.position[..., 1].any() for x in found.lines.values())
+
+
+OUT: list[tuple[Tables, str, float | None]] = [
+    (over(axis=[0.4, 1, 0]), "", 0.0),
+    (over("sphere", at=[4.0, 0.2, 0.9]), "", None),
+    (system(over(axis=[0.4, 1, 0])), "line one", 0.0),
+    (with_body(centre=[0.1, 0.1, -0.2]), "buoy leaves it", 0.0),
+    (with_body(moment={"value": [3, 0, 0], "ramp": 0.5}), "buoy leaves it", 0.0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("tables", "words", "since"), OUT)
+def test_what_leaves_the_plane_stops(tables: Tables, words: str, since: float | None) -> None:
+    """At rest too; with what to write."""
+    for compute in (hybrid.run, hybrid.static) if since is not None else (hybrid.static,):
+        with pytest.raises(ComputationError, match="dimension: 3") as told:
+            compute(tables)
+        assert told.value.outcome == Outcome.LEFT_PLANE and words in str(told.value)
+
+
+REFUSED: list[tuple[Tables, str]] = [
+    (system(hung()) | {"environment": {"fluid": {"density": 1025, "current": [0.3, 0.1, 0]}}}, r"environment\.fluid"),
+    (with_body() | {"points": with_body()["points"] | {"b": {"position": [9, 0.5, 1]}}}, r"points\.b\.position"),
+    (system(hung(cable={"sections": [SECTION | {"tension_torque": 1e-3}]})), "there is no torsion"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("tables", "words"), REFUSED)
+def test_what_does_not_lie_in_the_plane_is_refused_where_it_stands(tables: Tables, words: str) -> None:
+    with pytest.raises(SceneError, match=words):
+        hybrid.run(tables)
+    three = tables | {"dimension": 3}
+    assert hybrid.static({key: x for key, x in three.items() if key not in ("time", "output")}) is not None
