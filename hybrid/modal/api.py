@@ -167,7 +167,7 @@ def _touched(rest: Rest) -> Iterator[str]:
     for x, model, state in zip(rest.solver.lines, rest.models, rest.states.lines, strict=True):
         rows = x.sea.obstacles
         if x.line.bits & OBSTACLES:
-            near = (distances(rows, state.r) + thinner_nodes(rows, x.line.s)).min(axis=1)
+            near = (distances(x.sea, state.r) + thinner_nodes(rows, x.line.s)).min(axis=1)
             yield from (
                 name for name, d, row in zip(model.sea.names, near, rows, strict=True) if d < 0.5 * row[ONSET_OF]
             )

@@ -78,11 +78,14 @@ def _on_obstacles(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     """What of the line lifts off an obstacle or comes down on it."""
     if not x.line.bits & OBSTACLES:
         return
-    rows, r = x.sea.obstacles, found.mean_position
+    r = found.mean_position
     step = NEAR * float(x.line.s[-1])
-    sides = [(distances(rows, r + d) - distances(rows, r - d)) / (2.0 * step) for d in step * np.eye(3)]
+    sides = [(distances(x.sea, r + d) - distances(x.sea, r - d)) / (2.0 * step) for d in step * np.eye(3)]
     for name, gap, n in zip(
-        x.obstacles, distances(rows, r) + thinner_nodes(rows, x.line.s), np.stack(sides, axis=-1), strict=True
+        x.obstacles,
+        distances(x.sea, r) + thinner_nodes(x.sea.obstacles, x.line.s),
+        np.stack(sides, axis=-1),
+        strict=True,
     ):
         yield from _crossing(x, gap, np.einsum("fni,ni->fn", found.position, n), f"obstacle {name}")
 

@@ -194,10 +194,10 @@ def beside_obstacles(r: Floats, s: Floats, sea: Sea) -> Floats:
     span is in an obstacle as well stays where it is.
     """
     way = r[0] + (s / s[-1])[:, None] * (r[-1] - r[0]) - r
-    inside = np.flatnonzero(distances(sea.obstacles, r).min(axis=0) < 0.0)
+    inside = np.flatnonzero(distances(sea, r).min(axis=0) < 0.0)
     part = np.linspace(0.0, 1.0, 1 + WAYS_OUT)[:, None, None]
     tried = r[inside] + part * way[inside]
-    free = (distances(sea.obstacles, tried.reshape(-1, 3)).min(axis=0) >= 0.0).reshape(tried.shape[:2])
+    free = (distances(sea, tried.reshape(-1, 3)).min(axis=0) >= 0.0).reshape(tried.shape[:2])
     first = np.where(free.any(axis=0), free.argmax(axis=0), 0)
     found = r.copy()
     found[inside] = tried[first, np.arange(inside.size)]

@@ -18,6 +18,7 @@ from hybrid.kernels.state.obstacle_rows import (
     HALF_HEIGHT,
     HALF_LENGTH,
     KIND,
+    MESH,
     MOVES,
     MU,
     OBSTACLE,
@@ -26,6 +27,7 @@ from hybrid.kernels.state.obstacle_rows import (
     RADIUS,
     RIM,
     RING,
+    ROOT,
     ROUND,
     SHEAVE,
     SIDE,
@@ -35,6 +37,7 @@ from hybrid.kernels.state.obstacle_rows import (
     TORUS,
 )
 from hybrid.kernels.state.state import NO_OBSTACLES, Floats
+from hybrid.model.facets import facet_tables, facets_of
 from hybrid.model.payout import longest_out, whole_scene, winch_side
 from hybrid.model.scales import tension_scale
 from hybrid.model.sections import merged_sections
@@ -42,6 +45,7 @@ from hybrid.scene.base import unit
 from hybrid.scene.obstacles import (
     BoxObstacle,
     CylinderObstacle,
+    MeshObstacle,
     Obstacle,
     PlaneObstacle,
     SheaveObstacle,
@@ -117,11 +121,13 @@ def obstacle_rows(scene: Scene, pull: float | None = None) -> Floats:
     least = 0.5 * min(x.diameter or 0.0 for x in sections)  # by which how hard an obstacle is goes
     weight = max(x.mass for x in sections) * (scene.environment.gravity or 1.0)
     pull = pull_on_obstacles(scene) if pull is None else pull
-    for row, x in zip(rows, scene.obstacles.values(), strict=True):
+    first = facet_tables(scene.obstacles)[2]
+    for row, (name, x) in zip(rows, scene.obstacles.items(), strict=True):
         row[PLACE : PLACE + 3], row[STRAND] = x.at, strand
-        row[RADIUS] = bend_radius(x) + strand
-        over = scene.length if isinstance(x, PlaneObstacle) else row[RADIUS]
+        row[RADIUS] = strand if isinstance(x, MeshObstacle) else bend_radius(x) + strand
+        over = scene.length if isinstance(x, PlaneObstacle) else bend_radius(x) + strand
         _put_shape(row, x, strand)
+        row[ROOT] = first.get(name, 0)
         # a string under a tension T that half of T presses on a point of a bed of stiffness k: T/2 = 2 sqrt(k T) depth
         at_point = pull / (4.0 * 2.0 * DEPTH_AT_POINT * least) ** 2
         stiffness = max((weight + pull / over) / (2.0 * DEPTH * least), at_point)
@@ -134,6 +140,8 @@ def bend_radius(x: Obstacle) -> float:
     """Radius, m, to which an obstacle bends a line that lies on it, without that of the line; of a plane 0."""
     if isinstance(x, PlaneObstacle):
         return 0.0
+    if isinstance(x, MeshObstacle):
+        return facets_of(x).rounding
     return x.rounding if isinstance(x, BoxObstacle) else x.radius
 
 
@@ -144,6 +152,11 @@ def _put_shape(row: Floats, x: Obstacle, strand: float) -> None:
         return
     if isinstance(x, SphereObstacle):
         row[KIND], row[AXIS : AXIS + 3] = ROUND, (0.0, 0.0, 1.0)
+        return
+    if isinstance(x, MeshObstacle):
+        row[KIND], row[HALF_LENGTH : HALF_HEIGHT + 1] = MESH, facets_of(x).half_thickness
+        row[RING] = facets_of(x).rounding
+        row[AXIS : AXIS + 3], row[SIDE : SIDE + 3], _ = x.axes
         return
     if isinstance(x, BoxObstacle):
         row[KIND], row[HALF_LENGTH : HALF_HEIGHT + 1] = BOX, x.halves

@@ -13,6 +13,7 @@ from hybrid.kernels.state.obstacle_rows import ANGLE, EACH, INERTIA, ROLLED
 from hybrid.kernels.state.state import Floats, Sea, State, no_sea, with_waves
 from hybrid.model.driven_end import DrivenEnd
 from hybrid.model.ends import rise
+from hybrid.model.facets import facet_tables
 from hybrid.model.obstacle_motion import courses_of
 from hybrid.model.obstacles import obstacle_rows
 from hybrid.model.scales import pressing
@@ -112,7 +113,8 @@ def surroundings(scene: Scene, cells: int) -> Surroundings:
             friction = np.array([bed.friction.axial, bed.friction.lateral]) if bed.friction else np.zeros(2)
             sea = sea._replace(friction=friction, slip_length=slip_length(scene, bed))
     if scene.obstacles:
-        sea = sea._replace(obstacles=obstacle_rows(scene))
+        boxes, facets, _ = facet_tables(scene.obstacles)
+        sea = sea._replace(obstacles=obstacle_rows(scene), boxes=boxes, facets=facets)
         if not (bed is not None and rubs(bed)):
             sea = sea._replace(
                 friction=np.zeros(2), slip_length=1.0

@@ -189,19 +189,19 @@ def _history_header(name: str, header: list[str]) -> list[str]:
     raise RecordRefused("columns t,x,y,z, in any order", "name the columns in the first line of the file", given)
 
 
-def check_file(path: str | Path) -> None:
+def check_file(path: str | Path, what: str = "a CSV file") -> None:
     """RecordRefused if there is no regular file of bounded size; nothing is opened, so that a pipe cannot wait."""
     try:
         status = os.stat(path)
     except FileNotFoundError:
         fix = "check the name; it is relative to the folder of the scene file"
-        raise RecordRefused("a CSV file", fix, f"{path}, which does not exist") from None
+        raise RecordRefused(what, fix, f"{path}, which does not exist") from None
     except (OSError, ValueError):
-        raise RecordRefused("a CSV text file", "check the path", f"{path}, which cannot be read") from None
+        raise RecordRefused(what, "check the path", f"{path}, which cannot be read") from None
     if not stat.S_ISREG(status.st_mode):
         kind = next((name for test, name in _KINDS if test(status.st_mode)), "no regular file")
         fix = "name a file; what comes through a pipe or a device has to be written to one first"
-        raise RecordRefused("a CSV file", fix, f"{path}, which is {kind}")
+        raise RecordRefused(what, fix, f"{path}, which is {kind}")
     if status.st_size > LARGEST_FILE:
         fix = "sample less finely, as 20 rows a period are enough; or cut it to time.duration"
         given = f"{path}, {status.st_size / 1e6:.0f} MB"

@@ -1,8 +1,9 @@
-"""Obstacles that a line touches, fixed or moving, by name: planes, spheres, cylinders, boxes, tori and sheaves."""
+"""Obstacles that a line touches, fixed or moving, by name: planes, spheres, cylinders, boxes, tori, sheaves, meshes."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from operator import mul
 from typing import Annotated, Literal, Self
 
@@ -17,6 +18,7 @@ from hybrid.scene.base import (
     Number,
     Positive,
     Table,
+    Text,
     Vector,
     Words,
     by_kind,
@@ -136,7 +138,21 @@ class CylinderObstacle(_Turning):
         return math.hypot(*(p - along * q for p, q in zip(w, a, strict=True))) - self.radius
 
 
-class BoxObstacle(_Obstacle):
+class _Rotated(_Obstacle):
+    """What those have that are turned by angles."""
+
+    rotation: Vector = Field(
+        default=(0.0, 0.0, 0.0),
+        description="how it is turned at t = 0: roll, pitch, yaw, about x, then y, then z of the inertial frame [deg]",
+    )
+
+    @property
+    def axes(self) -> tuple[tuple[float, float, float], ...]:
+        """Its axes (3, 3), inertial [-], at t = 0."""
+        return tuple(turned(self.rotation, x) for x in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+
+
+class BoxObstacle(_Rotated):
     """A box with rounded edges: a deck, beam, chute or container."""
 
     kind: Literal["box"] = Field(default="box", description="a box with rounded edges")
@@ -145,10 +161,6 @@ class BoxObstacle(_Obstacle):
         description="its outer length, width and height, along axes of its own [m]"
     )
     rounding: Positive = Field(description="radius of its edges, at most half of the smallest of `size` [m]")
-    rotation: Vector = Field(
-        default=(0.0, 0.0, 0.0),
-        description="how it is turned at t = 0: roll, pitch, yaw, about x, then y, then z of the inertial frame [deg]",
-    )
 
     @model_validator(mode="after")
     def _is_round_within_its_size(self) -> Self:
@@ -162,11 +174,6 @@ class BoxObstacle(_Obstacle):
         """Half lengths [m] of its flat faces."""
         x, y, z = (0.5 * a - self.rounding for a in self.size)
         return x, y, z
-
-    @property
-    def axes(self) -> tuple[tuple[float, float, float], ...]:
-        """Its axes (3, 3), inertial [-], at t = 0."""
-        return tuple(turned(self.rotation, x) for x in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
     def distance(self, x: tuple[float, float, float]) -> float:
         """Distance [m] of a place to the surface; negative within the solid."""
@@ -218,6 +225,47 @@ class SheaveObstacle(_Turning):
         return max(self.groove - math.hypot(out, along), along - self.groove - 2.0 * self.rim)
 
 
+class MeshObstacle(_Rotated):
+    """A closed surface of triangles: a hull, structure or fairlead as it is drawn, with sharp edges."""
+
+    kind: Literal["mesh"] = Field(default="mesh", description="a closed surface of triangles")
+    file: Text = Field(
+        min_length=1,
+        description="STL file, text or binary, or OBJ file, relative to the scene file; every edge is shared by two "
+        "triangles, whose corners go counter-clockwise seen from outside",
+    )
+    at: Vector = Field(description="where the origin of the file is, inertial frame [m]")
+    scale: Positive = Field(default=1.0, description="length of a unit of the file: 0.001 for one in millimetres [m]")
+
+    @model_validator(mode="after")
+    def _readable(self) -> Self:
+        from hybrid.scene.mesh_file import read_mesh
+        from hybrid.scene.motion_file import RecordRefused
+
+        try:
+            read_mesh(self.file)
+        except RecordRefused as refused:
+            refuse([refused.finding])
+        return self
+
+    def distance(self, x: tuple[float, float, float]) -> float:
+        """Distance [m] of a place to the surface; negative within the solid."""
+        from hybrid.scene.mesh_file import distance_to, read_mesh
+
+        w = [(p - q) / self.scale for p, q in zip(x, self.at, strict=True)]
+        u, v, z = (sum(map(mul, w, a)) for a in self.axes)
+        return self.scale * distance_to(read_mesh(self.file), (u, v, z))
+
+
+def files_of(obstacles: Mapping[str, _Obstacle]) -> list[str]:
+    """Paths of the files that obstacles and their motions are read from."""
+    found = [x.file for x in obstacles.values() if isinstance(x, MeshObstacle)]
+    for motion in (x.motion for x in obstacles.values() if x.motion is not None):
+        vessel = motion.vessel
+        found += [x for x in (motion.file, vessel.rao if vessel is not None else None) if x is not None]
+    return found
+
+
 def _about(
     x: tuple[float, float, float], at: tuple[float, float, float], axis: tuple[float, float, float]
 ) -> tuple[float, float]:
@@ -233,10 +281,11 @@ Obstacle = Annotated[
     | Annotated[CylinderObstacle, Tag("<cylinder>")]
     | Annotated[BoxObstacle, Tag("<box>")]
     | Annotated[TorusObstacle, Tag("<torus>")]
-    | Annotated[SheaveObstacle, Tag("<sheave>")],
+    | Annotated[SheaveObstacle, Tag("<sheave>")]
+    | Annotated[MeshObstacle, Tag("<mesh>")],
     Discriminator(by_kind),
     Kinds(
-        ("plane", "sphere", "cylinder", "box", "torus", "sheave"),
+        ("plane", "sphere", "cylinder", "box", "torus", "sheave", "mesh"),
         usual=("cylinder",),
         implied=(
             ("normal", "plane"),
@@ -244,6 +293,7 @@ Obstacle = Annotated[
             ("ring", "torus"),
             ("groove", "sheave"),
             ("axis", "cylinder"),
+            ("file", "mesh"),
         ),
     ),
 ]

@@ -258,11 +258,15 @@ def _system() -> type[System]:
 
 
 def _resolve_motion_files(data: Any, folder: Path) -> None:
-    """Make the paths of files of motions and loads absolute, so that the scene can be used from anywhere."""
+    """Make the paths of files that motions, loads and obstacles name absolute: a scene is used from anywhere."""
     points, bodies = (data.get(x) if isinstance(data, dict) else None for x in ("points", "bodies"))
     files = [*product(("ends",), ("start", "end"), ("motion", "force", "moment", "thrust", "payout"))]
     files += product(("points",), points if isinstance(points, dict) else (), ("motion", "force"))
     files += product(("bodies",), bodies if isinstance(bodies, dict) else (), ("motion", "force", "moment"))
+    obstacles = _at(data, ("obstacles",))
+    for name in obstacles if isinstance(obstacles, dict) else ():
+        _make_absolute(obstacles[name], folder)
+        _make_absolute(_at(obstacles[name], ("motion",)), folder)
     files += [("environment", "seabed", "depths"), ("environment", "fluid", "waves")]
     for path in files:
         _make_absolute(_at(data, path), folder)

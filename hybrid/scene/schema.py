@@ -43,6 +43,7 @@ from hybrid.scene.motion_tables import Harmonic, Motion, Travel
 from hybrid.scene.obstacles import (
     BoxObstacle,
     CylinderObstacle,
+    MeshObstacle,
     Obstacles,
     PlaneObstacle,
     SheaveObstacle,
@@ -104,6 +105,7 @@ __all__ = [
     "JonswapWaves",
     "Load",
     "Mesh",
+    "MeshObstacle",
     "Model",
     "Modules",
     "Motion",
@@ -157,7 +159,7 @@ class Scene(Table):
     obstacles: Obstacles = Field(
         default={},
         description="obstacles by name, fixed or moving, that the cable touches: planes, spheres, cylinders, boxes, "
-        "tori, sheaves",
+        "tori, sheaves, meshes of triangles",
     )
     ends: Ends = Field(description="how the ends are held, moved and loaded")
     initial: Initial = Field(description="where the cable is at t = 0")

@@ -226,7 +226,7 @@ class System(Table):
     obstacles: Obstacles = Field(
         default={},
         description="obstacles by name, fixed or moving, that every line touches: planes, spheres, cylinders, boxes, "
-        "tori, sheaves",
+        "tori, sheaves, meshes of triangles",
     )
     time: Time | None = Field(default=None, description="how long to compute; absent: statics only")
     accuracy: AskedAccuracy | None = Field(

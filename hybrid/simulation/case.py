@@ -37,6 +37,7 @@ from hybrid.model.sections import section_changes
 from hybrid.model.self_reach import self_reach, without_contact
 from hybrid.outputs.probes import Observer
 from hybrid.outputs.quantities import quantities_of
+from hybrid.scene.obstacles import files_of
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
@@ -288,11 +289,11 @@ class Case:
 
     @property
     def _files(self) -> dict[str, str]:
-        """Digests of the files of motions and loads, by path: a run that is resumed needs the same."""
+        """Digests of the files that the scene reads, by path: a run that is resumed needs the same."""
         paths = {
             path
             for x in (self.scene, *(x.scene for x in self.changes))
-            for path in (*x.ends.files(), *x.environment.files(), *x.cable.files())
+            for path in (*x.ends.files(), *x.environment.files(), *x.cable.files(), *files_of(x.obstacles))
         }
         return {path: digest_of(Path(path)) for path in sorted(paths)}
 

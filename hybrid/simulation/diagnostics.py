@@ -14,15 +14,22 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, distances, half_thickness, put_obstacles
+from hybrid.kernels.laws.obstacles import (
+    bend_radii,
+    cells_met,
+    depths_in_obstacles,
+    distances,
+    half_thickness,
+    put_obstacles,
+)
 from hybrid.kernels.march.resolution_checks import lowest
 from hybrid.kernels.run.entry import sharpest
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
 from hybrid.kernels.state.forces import FRICTION, OBSTACLES, PLANAR, SEABED, SELF_FRICTION
-from hybrid.kernels.state.obstacle_rows import FLAT, KIND, RADIUS, RIDES
+from hybrid.kernels.state.obstacle_rows import FLAT, KIND, RIDES
 from hybrid.kernels.state.report import BEND, TWIST_NODE
-from hybrid.kernels.state.state import Batch, Ends, Floats, State, ends_in, state_in
+from hybrid.kernels.state.state import Batch, Ends, Floats, Sea, State, ends_in, state_in
 from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.model.build import Model
 from hybrid.model.first_state import HUNG
@@ -478,12 +485,13 @@ class Diagnostics:
         """
         line, sea = self._model.line, self._model.sea
         rows = sea.values.obstacles.copy()
+        around = sea.values._replace(obstacles=rows)
         longest = np.maximum(np.append(line.h, 0.0), np.append(0.0, line.h))
         met = cells_met(sea.values.carried, line.s) if sea.values.carried.size else None
         for k, (t, r) in enumerate(zip(batch.t.tolist(), batch.r, strict=True)):
             if batch.obstacles.size:
                 put_obstacles(rows, sea.values.carried, batch.obstacles[k])
-            within = depths_in_obstacles(rows, r, line.s, met)
+            within = depths_in_obstacles(around, r, line.s, met)
             which, node = (int(i) for i in np.unravel_index(np.argmax(within), within.shape))
             if within[which, node] > self._within:
                 rides = bool(sea.values.carried.size) and sea.values.carried[which, RIDES] != 0.0
@@ -497,11 +505,11 @@ class Diagnostics:
                 self._within = 3.0 * float(within[which, node])
             if self._round:
                 continue
-            coarse = (within > -TOUCHING) & (CELLS_PER_RADIUS * longest > 1.01 * rows[:, RADIUS, None])
+            coarse = (within > -TOUCHING) & (CELLS_PER_RADIUS * longest > 1.01 * bend_radii(rows)[:, None])
             coarse &= (rows[:, KIND] != FLAT)[:, None]
             if coarse.any():
                 which, node = (int(i) for i in np.argwhere(coarse)[0])
-                name, radius = sea.names[which], rows[which, RADIUS]
+                name, radius = sea.names[which], bend_radii(rows)[which]
                 text = (
                     f"cells of {longest[node]:.2g} m lie on obstacle {name} at s = {line.s[node]:g} m, whose radius is "
                     f"{radius:.2g} m: cells of {radius / CELLS_PER_RADIUS:.2g} m would follow it"
@@ -509,13 +517,13 @@ class Diagnostics:
                 self.note(t, node, "unresolved bend", text)
                 self._round = True
             elif not self._between:
-                self._pass_between(t, r, rows, met)
+                self._pass_between(t, r, around, met)
 
-    def _pass_between(self, t: float, r: Floats, rows: Floats, met: Floats | None) -> None:
+    def _pass_between(self, t: float, r: Floats, sea: Sea, met: Floats | None) -> None:
         """Cells longer than an obstacle is thick, and so near to it that it may pass between their nodes untouched."""
-        h, gap = self._model.line.h, distances(rows, r)
+        h, gap = self._model.line.h, distances(sea, r)
         gap = np.maximum(np.minimum(gap[:, :-1], gap[:, 1:]), 0.0)  # of the nearer node of each cell
-        wide = 2.0 * half_thickness(rows)
+        wide = 2.0 * half_thickness(sea.obstacles)
         missed = (h > wide[:, None]) & (gap < 0.5 * h)
         if met is not None:
             missed &= met > 0.0

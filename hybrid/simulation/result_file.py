@@ -9,6 +9,7 @@ import numpy as np
 
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.machine.cache import cache_folder
+from hybrid.kernels.state.facet_rows import BEHIND, LEAF, NORMAL
 from hybrid.kernels.state.forces import OBSTACLES, SEABED, SURFACE
 from hybrid.kernels.state.obstacle_rows import (
     AXIS,
@@ -17,10 +18,12 @@ from hybrid.kernels.state.obstacle_rows import (
     HALF_LENGTH,
     HALF_WIDTH,
     KIND,
+    MESH,
     PLACE,
     RADIUS,
     RIM,
     RING,
+    ROOT,
     ROUND,
     SIDE,
     STILL_AXIS,
@@ -284,14 +287,33 @@ def _obstacle_shapes(model: Model) -> list[tuple[Field, np.ndarray]]:
         shape = np.array([row[KIND], *place, *axis, row[RADIUS] - row[STRAND], half])
         if row[KIND] > ROUND:
             what = (
-                "kind (2 box, 3 torus, 4 sheave), place, axis, radius (edges, section, bottom of the groove), half "
-                "lengths of flat faces of a box, its second axis, radius of the ring, of the groove and of its rims"
+                "kind (2 box, 3 torus, 4 sheave, 5 mesh), place, axis, radius (edges, section, bottom of the groove), "
+                "half lengths of flat faces of a box, second axis, radius of the ring, of the groove and of its rims"
             )
             more = row[HALF_WIDTH], row[HALF_HEIGHT], *side, row[RING]
             shape = np.array([*shape, *more, row[GROOVE] + row[STRAND], max(row[RIM] - row[STRAND], 0.0)])
-        text = f"obstacle {name} at t = 0: {what}"
-        found.append((Field(f"obstacles/{name}/shape", "", text, shape.shape, ("shape",), "inertial"), shape))
+        text, of = f"obstacle {name} at t = 0: {what}", "shape" if row[KIND] <= ROUND else "solid"
+        found.append((Field(f"obstacles/{name}/shape", "", text, shape.shape, (of,), "inertial"), shape))
+        if row[KIND] == MESH:
+            found += _triangles(name, sea, int(row[ROOT]))
     return found
+
+
+def _triangles(name: str, sea: Sea, root: int) -> list[tuple[Field, np.ndarray]]:
+    """The surface of triangles of an obstacle, in axes of its own, so that it is drawn without its file."""
+    leaves = sea.boxes[root : int(sea.boxes[root, BEHIND]), LEAF]
+    corners = sea.facets[np.sort(leaves[leaves >= 0.0]).astype(np.int64), :NORMAL].reshape(-1, 3)
+    points, of = np.unique(corners, axis=0, return_inverse=True)
+    triangles, at = of.reshape(-1, 3).astype(np.int64), f"obstacles/{name}"
+    what = f"corners of triangles of obstacle {name}, from its place"
+    which = f"numbers of the corners of each triangle of obstacle {name}, counter-clockwise from outside"
+    return [
+        (Field(f"{at}/points", "m", what, points.shape, (f"{name}_corners", "xyz"), "body"), points),
+        (
+            Field(f"{at}/triangles", "", which, triangles.shape, (f"{name}_triangles", "three"), dtype="int64"),
+            triangles,
+        ),
+    ]
 
 
 def _surroundings(model: Model) -> list[tuple[Field, np.ndarray]]:

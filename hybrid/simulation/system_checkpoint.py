@@ -14,6 +14,7 @@ from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import OPTIONAL_STATE
 from hybrid.model.system import SystemResolution
 from hybrid.scene.bodies import FixedBody, FreeBody
+from hybrid.scene.obstacles import files_of as obstacle_files
 from hybrid.scene.system import System
 from hybrid.simulation.restore import program, refused, resolution_from, resolution_tree
 from hybrid.simulation.system_contact import let_touch
@@ -205,11 +206,12 @@ def kept_changes(source: Path, most: int) -> int:
 
 
 def files_of(system: System) -> dict[str, str]:
-    """Digests of the files that motions and loads are read from, by path."""
+    """Digests of the files that a scene of several lines reads, by path."""
     guesses = system.guesses
     scenes = [system.scene_of(name, system.carried(name), guesses) for name in system.lines]
     found = {path for scene in scenes for path in scene.ends.files()}
     found |= {path for scene in scenes for path in scene.cable.files()} | set(system.environment.files())
+    found |= set(obstacle_files(system.obstacles))
     for body in system.bodies.values():
         if isinstance(body, FixedBody) and body.motion is not None:
             vessel = body.motion.vessel

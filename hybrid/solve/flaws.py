@@ -11,7 +11,7 @@ from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, distances
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held
 from hybrid.kernels.state.forces import BODIES, FRICTION, OBSTACLES, SEABED
-from hybrid.kernels.state.obstacle_rows import AXIS, FLAT, HALF_LENGTH, KIND, PLACE, RADIUS, ROUND, SHEAVE, TORUS
+from hybrid.kernels.state.obstacle_rows import AXIS, FLAT, HALF_LENGTH, KIND, MESH, PLACE, RADIUS, ROUND, SHEAVE, TORUS
 from hybrid.kernels.state.state import Floats, Line, Sea, State
 
 # A line that lies this part of its length, and this many onsets of contact, under the bed has gone through it.
@@ -51,7 +51,7 @@ def flaw_of_line(line: Line, sea: Sea, state: State, length: float, floor: float
             return Outcome.BURIED, int(np.argmax(deep))
     if line.bits & OBSTACLES:
         met = cells_met(sea.carried, line.s) if sea.carried.size else None
-        within = depths_in_obstacles(sea.obstacles, state.r, line.s, met).max(axis=0)
+        within = depths_in_obstacles(sea, state.r, line.s, met).max(axis=0)
         if within.max() > 1.0:
             return Outcome.BURIED, int(np.argmax(within))
     turns = np.where(_pressed(line, state), folds(line, state), 0.0)
@@ -95,9 +95,9 @@ def behind_obstacles(line: Line, sea: Sea, state: State) -> Iterator[tuple[int, 
     """
     rows, way = sea.obstacles, state.r[-1] - state.r[0]
     met = cells_met(sea.carried, line.s) if sea.carried.size else None
-    touched = depths_in_obstacles(rows, state.r, line.s, met) > -TOUCHING
+    touched = depths_in_obstacles(sea, state.r, line.s, met) > -TOUCHING
     for which, (row, nodes) in enumerate(zip(rows, touched, strict=True)):
-        if row[KIND] in (FLAT, TORUS) or not nodes.any():  # through a torus a line passes on any side
+        if row[KIND] in (FLAT, TORUS, MESH) or not nodes.any():  # through a ring a line passes on any side
             continue
         axis, place, r = row[AXIS : AXIS + 3], row[PLACE : PLACE + 3], state.r[nodes]
         half = row[HALF_LENGTH] if row[KIND] == ROUND else 0.0
@@ -115,8 +115,8 @@ def obstacles_left(line: Line, sea: Sea, start: State, state: State) -> Iterator
     """Obstacles that a line touches at its start and not in a state, and the node that is nearest there."""
     rows = sea.obstacles
     met = cells_met(sea.carried, line.s) if sea.carried.size else None
-    touched = depths_in_obstacles(rows, state.r, line.s, met).max(axis=1) > -TOUCHING
-    gaps = distances(rows, start.r)
+    touched = depths_in_obstacles(sea, state.r, line.s, met).max(axis=1) > -TOUCHING
+    gaps = distances(sea, start.r)
     for which, gap in enumerate(gaps):
         if rows[which, KIND] != FLAT and not touched[which] and gap.min() < BEHIND * rows[which, RADIUS]:
             yield which, int(np.argmin(gap))

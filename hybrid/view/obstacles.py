@@ -8,25 +8,29 @@ import numpy as np
 
 from hybrid.store.reader import Result
 from hybrid.view.figure import Area, Item, Line
+from hybrid.view.mesh_edges import closed_way, sharp_edges, turned_to_eye
 from hybrid.view.projections import View, extent_in
 from hybrid.view.style import STONE, STONE_EDGE, short
 
 # Points around a round obstacle and along its half spheres; beyond the picture, in sizes of that, endless ones go on.
 AROUND, OVER, BEYOND = 32, 7, 0.2
-PLANE, ROUND, BOX, TORUS, SHEAVE = 0.0, 1.0, 2.0, 3.0, 4.0
+PLANE, ROUND, BOX, TORUS, SHEAVE, MESH = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
+MANY = 5000  # triangles of a mesh that is drawn as its hull in a plane
 
 
 class Body(NamedTuple):
     """An obstacle where it is at an output."""
 
     name: str
-    kind: float  # PLANE, ROUND, BOX, TORUS or SHEAVE
+    kind: float  # PLANE, ROUND, BOX, TORUS, SHEAVE or MESH
     place: np.ndarray  # (3,) m
     axis: np.ndarray  # (3,) of a cylinder, or the normal of a plane
     radius: float  # m
     half: float  # m, half its length; 0: a ball, infinite: endless
     more: tuple[float, ...] = ()  # of a box half its width and height; radii (m) of ring, groove and rims
-    side: np.ndarray = np.zeros(3)  # (3,) second axis of a box
+    side: np.ndarray = np.zeros(3)  # (3,) second axis of a box or mesh
+    points: np.ndarray = np.zeros((0, 3))  # (n, 3) m, corners of a mesh, where it is
+    triangles: np.ndarray = np.zeros((0, 3), np.int64)  # (m, 3) of them, counter-clockwise from outside
 
 
 def obstacles_at(result: Result, output: int, moving: bool | None = None) -> list[Body]:
@@ -43,7 +47,11 @@ def obstacles_at(result: Result, output: int, moving: bool | None = None) -> lis
             place = result[f"obstacles/{name}/position"][output]
             turn = _rotation(np.radians(result[f"obstacles/{name}/rotation"][output]))
             axis, side = turn @ axis, turn @ side if side.size else side
-        found.append(Body(name, kind, place, axis, radius, half, (*more[8:10], *more[13:]), side))
+        mesh: tuple[np.ndarray, ...] = ()
+        if kind == MESH:
+            axes = np.array([axis, side, np.cross(axis, side)])
+            mesh = (place + result[f"obstacles/{name}/points"] @ axes, result[f"obstacles/{name}/triangles"])
+        found.append(Body(name, kind, place, axis, radius, half, (*more[8:10], *more[13:]), side, *mesh))
     return found
 
 
@@ -140,6 +148,15 @@ def outlines(result: Result, view: View, output: int, moving: bool | None = None
     for body in obstacles_at(result, output, moving):
         if body.kind == PLANE:
             corners = _half_plane(body, view, box, size)
+        elif body.kind == MESH and len(body.triangles) <= MANY:
+            x = np.column_stack(view.project(body.points))
+            front, around = turned_to_eye(x, body.triangles)
+            items.append(Area(x[body.triangles[front]], STONE, "obstacle"))
+            gaps = np.array([[*x[[a, b]], [np.nan, np.nan]] for a, b in around]).reshape(-1, 2)
+            items.append(Line(gaps[:, 0], gaps[:, 1], colour=STONE_EDGE, width=0.8))
+            continue
+        elif body.kind == MESH:
+            corners = hull(np.column_stack(view.project(body.points)))
         else:
             at = float((result.position[output].mean(axis=0) - body.place) @ body.axis)
             rings = _surface(body, at - 3.0 * size, at + 3.0 * size)
@@ -206,6 +223,9 @@ def rings(result: Result, output: int) -> list[np.ndarray]:
             p, q = across(body.axis)
             found.append(body.place + size * np.array([-p - q, p - q, p + q, q - p, -p - q]))
             continue
+        if body.kind == MESH:
+            found += [body.points[list(pair)] for pair in sharp_edges(body.points, body.triangles)]
+            continue
         at = float((result.position[output].mean(axis=0) - body.place) @ body.axis)
         x = _surface(body, at - size, at + size)
         found += [*(np.vstack([ring, ring[:1]]) for ring in (x[0], x[len(x) // 2 - 1], x[len(x) // 2], x[-1]))]
@@ -219,7 +239,7 @@ def surfaces(result: Result, box: np.ndarray, moving: bool | None = None, output
     size = float(np.ptp(box, axis=0).max()) or 1.0
     for body in found:
         if body.kind > ROUND:
-            x = _surface(body, 0.0, 0.0).reshape(-1, 3)
+            x = body.points if body.kind == MESH else _surface(body, 0.0, 0.0).reshape(-1, 3)
             low, high = x.min(axis=0), x.max(axis=0)
         elif body.kind == ROUND:
             p = np.clip(body.place, *box) if not np.isfinite(body.half) else body.place
@@ -246,6 +266,14 @@ def _triangles(body: Body, box: np.ndarray, when: str) -> dict[str, Any]:
         x = np.array([body.place + s * p + t * q for s, t in
                       ((a.min(), b.min()), (a.max(), b.min()), (a.max(), b.max()), (a.min(), b.max()))])  # fmt: skip
         return look | {axis: x[:, k].tolist() for k, axis in enumerate("xyz")}
+    if body.kind == MESH:
+        x, mesh = body.points, {name: body.triangles[:, k].tolist() for k, name in enumerate("ijk")}
+        return (
+            look
+            | {axis: x[:, k].tolist() for k, axis in enumerate("xyz")}
+            | mesh
+            | {"rim": closed_way(body.points, body.triangles)}
+        )
     along = (corners - body.place) @ body.axis
     rings = _surface(body, float(along.min()), float(along.max()))
     x, n = rings.reshape(-1, 3), len(rings)
@@ -254,8 +282,5 @@ def _triangles(body: Body, box: np.ndarray, when: str) -> dict[str, Any]:
     sides = {"i": [*i, *right], "j": [*right, *(right + AROUND)], "k": [*(i + AROUND), *(i + AROUND)]}
     middle = (n // 2) * AROUND
     rim = [k for at in (0, middle, (n - 1) * AROUND) for k in (*range(at, at + AROUND), at)]
-    return (
-        look
-        | {axis: x[:, k].tolist() for k, axis in enumerate("xyz")}
-        | {name: [int(v) for v in value] for name, value in (sides | {"rim": rim}).items()}
-    )
+    numbers = {name: [int(v) for v in value] for name, value in (sides | {"rim": rim}).items()}
+    return look | {axis: x[:, k].tolist() for k, axis in enumerate("xyz")} | numbers

@@ -32,21 +32,26 @@ from hybrid.kernels.state.forces import (
 )
 from hybrid.kernels.state.obstacle_rows import BEGAN, CARRIED, EACH, ENDED, PLACE, SPEED, SWEEP, TURNING
 from hybrid.kernels.state.state import NO_CARRIED, NO_GRIP, NO_MOVES, NO_ROOM, Ends, Line, Sea, blank_state
+from hybrid.model.facets import surface_of
+from hybrid.scene.mesh_file import Mesh
 
 N = 7
 CV, CA = 3.0, 7.0
-# A plane, a sphere, an endless cylinder, one with round ends, a box, a torus and a sheave that the line of `random_case` runs
-# through, each with the numbers of kernels.state.obstacle_rows.
-X, UP, NO = [1.0, 0.0, 0.0], [0.6, 0.0, 0.8], [0.0] * 5
+# A plane, a sphere, an endless cylinder, one with round ends, a box, a torus, a sheave and a mesh that the line of
+# `random_case` runs through, each with the numbers of kernels.state.obstacle_rows.
+X, UP, NO = [1.0, 0.0, 0.0], [0.6, 0.0, 0.8], [0.0] * 6
 OBSTACLES_THERE = np.array([
     [0, 0.0, 0.0, -3.0, *UP, *X, 0.1, 0.0, *NO, 0.1, 0.2, 2.0, 0.3, 40.0, 0.3],
     [1, 2.0, 1.0, 0.5, 0.0, 0.0, 1.0, *X, 2.0, 0.0, *NO, 0.1, 0.5, 3.0, 0.4, 50.0, 0.4],
     [1, 4.0, -1.0, 1.0, 0.0, 0.8, 0.6, *X, 1.5, np.inf, *NO, 0.1, 0.4, 4.0, 0.2, 50.0, 3.0],
     [1, 5.0, 2.0, -1.5, *UP, *X, 1.5, 1.0, *NO, 0.1, 0.0, 2.0, 0.5, 60.0, 0.2],
-    [2, 5.0, 0.0, 0.0, *UP, 0.0, 1.0, 0.0, 0.6, 0.5, 0.4, 0.3, 0.0, 0.0, 0.0, 0.1, 0.4, 2.0, 0.4, 50.0, 0.3],
-    [3, 3.0, 0.0, 0.0, *UP, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.5, 0.0, 0.0, 0.1, 0.3, 3.0, 0.3, 50.0, 0.4],
-    [4, 1.0, -2.0, 0.0, *UP, 0.0, 1.0, 0.0, 1.5, 0.0, 0.0, 0.0, 2.0, 0.8, 0.5, 0.1, 0.2, 2.0, 0.2, 50.0, 0.3],
+    [2, 5.0, 0.0, 0.0, *UP, 0.0, 1.0, 0.0, 0.6, 0.5, 0.4, 0.3, *NO[:4], 0.1, 0.4, 2.0, 0.4, 50.0, 0.3],
+    [3, 3.0, 0.0, 0.0, *UP, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.5, 0.0, 0.0, 0.0, 0.1, 0.3, 3.0, 0.3, 50.0, 0.4],
+    [4, 1.0, -2.0, 0.0, *UP, 0.0, 1.0, 0.0, 1.5, 0.0, 0.0, 0.0, 2.0, 0.8, 0.5, 0.0, 0.1, 0.2, 2.0, 0.2, 50.0, 0.3],
+    [5, 4.5, 0.5, -0.5, *UP, 0.0, 1.0, 0.0, 0.5, 0.0, *NO, 0.1, 0.3, 2.0, 0.3, 50.0, 0.3],
 ])  # fmt: skip
+HULL = surface_of(Mesh(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1.2, 0], [0, 0, 0.8]]),
+                       np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])))  # fmt: skip
 ZONES = {
     "rod": [1] * (N + 1),
     "catenary": [0] * (N + 1),
@@ -119,7 +124,7 @@ def random_sea(g):
             bed_x=np.zeros(0), bed_y=np.zeros(0), bed_heights=np.zeros((0, 4)), stiffness=3.0, damping=0.5, onset=50.0, obstacles=OBSTACLES_THERE,
         friction=np.array([0.3, 0.6]), slip_length=0.4, flow=0.1 * g.normal(size=(N + 1, 7)), lanes=np.zeros((10, 16)),
         axis=axis / np.linalg.norm(axis, axis=1)[:, None], slip=slip, slid=np.zeros((N + 1, 3)), bed=np.zeros((N + 1, 3)),
-        courses=NO_MOVES, carried=NO_CARRIED, grip=NO_GRIP, rolling=NO_ROOM,
+        courses=NO_MOVES, carried=NO_CARRIED, grip=NO_GRIP, rolling=NO_ROOM, boxes=HULL.boxes, facets=HULL.facets,
     )  # fmt: skip
 
 

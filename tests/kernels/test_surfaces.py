@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -12,9 +13,10 @@ import hybrid
 from hybrid.errors import SceneError
 from hybrid.kernels.laws import surfaces
 from hybrid.kernels.laws.obstacles import half_thickness
-from hybrid.model.obstacles import obstacle_rows
+from hybrid.model.build import build
 
 STRAND = 0.01
+DATA = Path(__file__).parents[1] / "data"
 OBSTACLES: dict[str, Any] = {
     "wall": {"kind": "plane", "at": [0.1, 0, 0], "normal": [1, 2, 3]},
     "ball": {"kind": "sphere", "at": [0.2, -0.1, 0.3], "radius": 0.4},
@@ -22,12 +24,21 @@ OBSTACLES: dict[str, Any] = {
     "deck": {"kind": "box", "at": [0.1, 0.2, -0.1], "size": [1.2, 0.8, 0.5], "rounding": 0.1, "rotation": [20, -35, 50]},
     "ring": {"kind": "torus", "at": [0.1, 0, 0.2], "axis": [1, 1, -1], "ring": 0.6, "radius": 0.15},
     "sheave": {"kind": "sheave", "at": [0, 0.1, 0.1], "axis": [2, -1, 1], "radius": 0.5, "groove": 0.1, "rim": 0.04},
+    "angle": {"kind": "mesh", "file": str(DATA / "angle.obj"), "scale": 0.1, "at": [-0.3, -0.4, 0], "rotation": [20, 15, -30]},
 }  # fmt: skip
 
 
+class Around(NamedTuple):
+    """What `surface` reads of a Sea."""
+
+    obstacles: np.ndarray
+    boxes: np.ndarray
+    facets: np.ndarray
+
+
 @numba.njit
-def at(rows: Any, k: int, x: Any) -> Any:
-    d, n, curved = surfaces.surface(rows, k, x)
+def at(sea: Any, k: int, x: Any) -> Any:
+    d, n, curved = surfaces.surface(sea, k, x)
     return d, n, surfaces.gradient_of_normal(curved, n), surfaces.bent(curved, n, (0.3, -0.5, 0.7))
 
 
@@ -42,8 +53,13 @@ def scene(**tables: Any) -> hybrid.Scene:
 
 
 @pytest.fixture(scope="module")
-def rows() -> np.ndarray:
-    return obstacle_rows(scene())
+def sea() -> Around:
+    return around(scene())
+
+
+def around(scene: hybrid.Scene) -> Around:
+    values = build(scene).sea.values
+    return Around(values.obstacles, values.boxes, values.facets)
 
 
 def places(count: int) -> np.ndarray:
@@ -51,20 +67,20 @@ def places(count: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", OBSTACLES)
-def test_kernels_and_scene_have_the_same_distances(name: str, rows: np.ndarray) -> None:
+def test_kernels_and_scene_have_the_same_distances(name: str, sea: Around) -> None:
     """The scene has closed forms of its own."""
     k, obstacle = list(OBSTACLES).index(name), scene().obstacles[name]
     for x in places(300):
-        assert at(rows, k, tuple(x))[0] == pytest.approx(obstacle.distance(tuple(x)) - STRAND, abs=1e-12)
+        assert at(sea, k, tuple(x))[0] == pytest.approx(obstacle.distance(tuple(x)) - STRAND, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", OBSTACLES)
-def test_normals_and_curvature_are_derivatives(name: str, rows: np.ndarray) -> None:
+def test_normals_and_curvature_are_derivatives(name: str, sea: Around) -> None:
     """n of d, K of n, by central differences; where they are not, at an edge of a face of it, only rarely."""
     k, step, off = list(OBSTACLES).index(name), 1e-5, 0
     for x in places(300):
-        _, n, K, bent = at(rows, k, tuple(x))
-        sides = [[at(rows, k, tuple(x + e)) for e in (step * axis, -step * axis)] for axis in np.eye(3)]
+        _, n, K, bent = at(sea, k, tuple(x))
+        sides = [[at(sea, k, tuple(x + e)) for e in (step * axis, -step * axis)] for axis in np.eye(3)]
         slope = np.array([(a[0] - b[0]) / (2 * step) for a, b in sides])
         turn = np.array([(np.array(a[1]) - b[1]) / (2 * step) for a, b in sides]).T
         assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-12)
@@ -77,33 +93,32 @@ def test_normals_and_curvature_are_derivatives(name: str, rows: np.ndarray) -> N
 
 
 @pytest.mark.parametrize("name", OBSTACLES)
-def test_a_distance_is_that_to_the_nearest_place_and_changes_by_no_more_than_the_way(
-    name: str, rows: np.ndarray
-) -> None:
+def test_a_distance_is_that_to_the_nearest_place_and_changes_by_no_more_than_the_way(name: str, sea: Around) -> None:
     """From outside the way back along n ends on the surface; nothing between two places is missed by their distances."""
     k, x = list(OBSTACLES).index(name), places(400)
-    d = np.array([at(rows, k, tuple(p))[0] for p in x])
+    d = np.array([at(sea, k, tuple(p))[0] for p in x])
     for p, far in zip(x, d, strict=True):
         if far > 0.0:
-            _, n, _, _ = at(rows, k, tuple(p))
-            assert abs(at(rows, k, tuple(p - far * np.array(n)))[0]) < 1e-12
+            _, n, _, _ = at(sea, k, tuple(p))
+            assert abs(at(sea, k, tuple(p - far * np.array(n)))[0]) < 1e-12
     assert (np.abs(np.diff(d)) <= np.linalg.norm(np.diff(x, axis=0), axis=1) + 1e-12).all()
 
 
-def test_a_turned_box_has_turned_normals(rows: np.ndarray) -> None:
+def test_a_turned_box_has_turned_normals(sea: Around) -> None:
     """A box between its edges is its face: 0.4 m above the middle of a face of a half width of 0.25 m less 0.01."""
     deck = scene().obstacles["deck"]
     up = np.array(deck.axes[2])
-    d, n, K, _ = at(rows, list(OBSTACLES).index("deck"), tuple(np.array(deck.at) + 0.4 * up))
+    d, n, K, _ = at(sea, list(OBSTACLES).index("deck"), tuple(np.array(deck.at) + 0.4 * up))
     assert d == pytest.approx(0.4 - 0.25 - STRAND, abs=1e-12)
     np.testing.assert_allclose(n, up, atol=1e-12)
     np.testing.assert_array_equal(K, 0.0)
 
 
-def test_how_thick_obstacles_are(rows: np.ndarray) -> None:
-    half = np.array([np.inf, 0.4, 0.2, 0.25, 0.15, 0.18]) + STRAND
+def test_how_thick_obstacles_are(sea: Around) -> None:
+    half = np.array([np.inf, 0.4, 0.2, 0.25, 0.15, 0.18, 0.0]) + STRAND
     half[5] += STRAND - 0.01
-    np.testing.assert_allclose(half_thickness(rows), half, rtol=1e-12)
+    half[6] += 0.6 * 0.56 / (2 * 0.56 + 3.6 * 0.6)  # volume over surface
+    np.testing.assert_allclose(half_thickness(sea.obstacles), half, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -58,10 +58,10 @@ def test_tension_grows_by_the_exponential_of_the_angle(kind: str) -> None:
 def test_a_smooth_surface_presses_by_tension_over_radius(kind: str) -> None:
     """T/R by the law of contact from the penetration, on the inside of a ring and in a groove."""
     tables = over(kind, 10.0, friction=0.0)
-    result, rows = ran(tables), build(hybrid.validate_scene(tables)).sea.values.obstacles
+    result, sea = ran(tables), build(hybrid.validate_scene(tables)).sea.values
     x = result.position[-1]
-    *_, stiffness, _, onset, _ = rows[0]
-    depth = 0.5 * onset - distances(rows, x)[0][x[:, 2] > 0.2 * CENTRELINE]
+    *_, stiffness, _, onset, _ = sea.obstacles[0]
+    depth = 0.5 * onset - distances(sea, x)[0][x[:, 2] > 0.2 * CENTRELINE]
     pressure = stiffness * np.where(depth < onset, 0.5 * depth**2 / onset, depth - 0.5 * onset)
     np.testing.assert_allclose(pressure, 10.0 / CENTRELINE, rtol=0.02)
     np.testing.assert_allclose(result.tension[-1], 10.0, rtol=2e-3)
@@ -87,7 +87,7 @@ def laid() -> Any:
 
 def test_an_equilibrium_over_a_beam_is_found_from_the_scene_alone(laid: Any) -> None:
     """It lies on the beam that its catenary would pass through, and nowhere deeper than it may."""
-    away = distances(build(hybrid.validate_scene(over_box())).sea.values.obstacles, laid.position[0])[0]
+    away = distances(build(hybrid.validate_scene(over_box())).sea.values, laid.position[0])[0]
     assert -0.05 * 0.05 < away.min() < 0.0
     assert {e.kind for e in laid.events} == {"static friction neglected"}
 
@@ -115,8 +115,8 @@ def test_no_step_carries_a_line_through(kind: str) -> None:
         "kind": "straight", "direction": [1, 0, 0], "origin": [-1.0, 0.0, 0.5], "velocity": [0, 0, -20]}}  # fmt: skip
     tables["cable"]["sections"][0]["max_strain"] = 0.2
     result = ran(tables)
-    rows = build(hybrid.validate_scene(tables)).sea.values.obstacles
-    away = np.array([distances(rows, x)[0].min() for x in result.position])
+    sea = build(hybrid.validate_scene(tables)).sea.values
+    away = np.array([distances(sea, x)[0].min() for x in result.position])
     assert -0.01 < away.min() < 1e-3
     assert result.position[:, 50, 2].min() > 0.05
     assert result.steps.repeats.max() > 0
@@ -137,11 +137,11 @@ def test_drawings_of_boxes_rings_and_sheaves() -> None:
     tables["time"] = {"duration": 0.02, "step": 0.01}
     scene = hybrid.validate_scene(tables)
     result = hybrid.run(scene)
-    rows = build(scene).sea.values.obstacles
+    sea = build(scene).sea.values
     drawn = surfaces(result, np.array([[-4.0, -4.0, -4.0], [4.0, 4.0, 4.0]]))
     for each in drawn:
         x = np.column_stack([each[a] for a in "xyz"])
-        np.testing.assert_allclose(distances(rows, x)[list(DRUMS).index(each["name"])] + 0.01, 0.0, atol=1e-9)
+        np.testing.assert_allclose(distances(sea, x)[list(DRUMS).index(each["name"])] + 0.01, 0.0, atol=1e-9)
         assert max(*each["i"], *each["j"], *each["k"]) == len(x) - 1
     box, _, ring = (x for x in outlines(result, view_named("xz"), 0) if isinstance(x, Area))
     np.testing.assert_allclose(np.ptp(box.outlines[0], axis=0), 2 * DRUM, rtol=0.02)

@@ -1,4 +1,4 @@
-"""Boxes, rings and sheaves beside what else a scene may have: motions, several lines, resume, zones, payout, accuracy."""
+"""Boxes, rings, sheaves and meshes beside what else a scene may have: motions, several lines, resume, zones, payout, accuracy."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from tests.validation.obstacle_scenes import CENTRELINE, DRUM, Tables, over_pipe
 from tests.validation.test_validation_moving_obstacles import as_system, pushed, stepped
 from tests.validation.test_validation_obstacles_accuracy import ASKED, DRAGGED, LOW, parts
 
+DATA = Path(__file__).parents[1] / "data"
 SHAPES: dict[str, Tables] = {
     "box": {"kind": "box", "size": [0.3, 0.24, 0.6], "rounding": 0.06, "rotation": [10, 20, 30]},
     "torus": {"kind": "torus", "axis": [0.3, 0.1, 1], "ring": 0.12, "radius": 0.06},
     "sheave": {"kind": "sheave", "axis": [0.3, 0.1, 1], "radius": 0.12, "groove": 0.04, "rim": 0.03},
+    "mesh": {"kind": "mesh", "file": str(DATA / "angle.obj"), "scale": 0.03, "rotation": [10, 20, 30]},
 }
 STRAND = 0.01  # m, radius of the rope that is pushed
 

@@ -44,7 +44,7 @@ from hybrid.kernels.state.report import CONTACT_WORK, FRICTION_WORK, OBSTACLE_WO
 @inner
 def pressed(line, sea, k, i, x, state):
     """Force N of obstacle k on node i at x along its normal n, with how that bends: N, n, curvature."""
-    d, n, curved = surface(sea.obstacles, k, x)
+    d, n, curved = surface(sea, k, x)
     v, moves = state.v, line.moved.shape[0] > 0
     vi = get3(v, i)
     if moves:
@@ -103,8 +103,8 @@ def mean_force(old, new, i, at):
 @inner
 def normals_of_step(sea, k, x, u):
     """Normals of obstacle k where a node was before the step, and where it is, at x after the displacement u."""
-    _, before, _ = surface(sea.obstacles, k, swept(sea.carried, k, sub(x, u)))
-    _, after, _ = surface(sea.obstacles, k, x)
+    _, before, _ = surface(sea, k, swept(sea.carried, k, sub(x, u)))
+    _, after, _ = surface(sea, k, x)
     return mat_vec(transposed(row9(sea.carried, k, SWEEP)), before), after
 
 

@@ -41,6 +41,7 @@ from hybrid.kernels.state.obstacle_rows import (
     KIND,
     MEETS_FROM,
     MEETS_TO,
+    MESH,
     MU,
     OBSTACLE,
     OF_PIECE,
@@ -49,6 +50,7 @@ from hybrid.kernels.state.obstacle_rows import (
     PLACE,
     RADIUS,
     RIM,
+    RING,
     SEEN_FORCE,
     SEEN_TURN,
     SHEAVE,
@@ -61,7 +63,7 @@ from hybrid.kernels.state.obstacle_rows import (
     THINNER,
     TURNING,
 )
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.state import Floats, Sea
 
 
 @inner
@@ -100,7 +102,7 @@ def half_cell(line, sea, k, c, x, p, pd, e, v, cv):
     p, pd: penetration of the node at x, of a line as thick as the strand, and its rate.
     """
     rows, moves = sea.obstacles, line.moved.shape[0] > 0
-    d, m, curved = surface(rows, k, add(x, e))
+    d, m, curved = surface(sea, k, add(x, e))
     o = rows[k, ONSET_OF]
     po = 0.5 * o - d
     if rows.shape[1] > OBSTACLE:
@@ -133,7 +135,7 @@ def normal_force(line, sea, moves, k, i, x, v, e, cv):
 
     the places of the neighbours before and after.
     """
-    d, n, curved = surface(sea.obstacles, k, x)
+    d, n, curved = surface(sea, k, x)
     vi = get3(v, i)
     if moves:
         vi = sub(vi, surface_velocity(sea.carried, k, x))
@@ -212,10 +214,10 @@ def obstacle_forces(line, sea, i, x, u, v, e, cv):
 
 
 @inner
-def depth_in(rows, k, r, i):
+def depth_in(sea, k, r, i):
     """p of node i in obstacle k."""
-    d, _, _ = surface(rows, k, (r[i, 0], r[i, 1], r[i, 2]))
-    return 0.5 * rows[k, ONSET_OF] - d
+    d, _, _ = surface(sea, k, (r[i, 0], r[i, 1], r[i, 2]))
+    return 0.5 * sea.obstacles[k, ONSET_OF] - d
 
 
 @kernel
@@ -224,9 +226,9 @@ def stored_on_obstacles(line, sea, r):
     rows, energy, moves = sea.obstacles, 0.0, line.moved.shape[0] > 0
     for k in range(rows.shape[0]):
         stiffness, o = rows[k, STIFFNESS], rows[k, ONSET_OF]
-        p1 = depth_in(rows, k, r, 0)
+        p1 = depth_in(sea, k, r, 0)
         for i in range(line.h.shape[0]):
-            p0, p1 = p1, depth_in(rows, k, r, i + 1)
+            p0, p1 = p1, depth_in(sea, k, r, i + 1)
             thin = thinner(line, rows, k, i) if rows.shape[1] > OBSTACLE else 0.0
             if (p0 > thin or p1 > thin) and meets(line, sea, moves, k, i):
                 energy = with_cell(energy, p0 - thin, p1 - thin, line.h[i], stiffness, o)
@@ -245,10 +247,10 @@ def stored_in_contact(line, sea, r):
 
 
 @inner
-def depth_before(rows, carried, k, r, i):
+def depth_before(sea, k, r, i):
     """p of node i in obstacle k, which moves, both where they were before the step."""
-    d, _, _ = surface(rows, k, swept(carried, k, (r[i, 0], r[i, 1], r[i, 2])))
-    return 0.5 * rows[k, ONSET_OF] - d
+    d, _, _ = surface(sea, k, swept(sea.carried, k, (r[i, 0], r[i, 1], r[i, 2])))
+    return 0.5 * sea.obstacles[k, ONSET_OF] - d
 
 
 @inner
@@ -267,9 +269,9 @@ def stored_along(line, sea, r, c, before):
         for k in range(rows.shape[0]):
             thin = thinner(line, rows, k, c) if rows.shape[1] > OBSTACLE else 0.0
             if moves and before:
-                p0, p1 = depth_before(rows, sea.carried, k, r, c), depth_before(rows, sea.carried, k, r, c + 1)
+                p0, p1 = depth_before(sea, k, r, c), depth_before(sea, k, r, c + 1)
             else:
-                p0, p1 = depth_in(rows, k, r, c), depth_in(rows, k, r, c + 1)
+                p0, p1 = depth_in(sea, k, r, c), depth_in(sea, k, r, c + 1)
             p0, p1 = p0 - thin, p1 - thin
             if (p0 > 0.0 or p1 > 0.0) and meets(line, sea, moves, k, c):
                 energy = with_cell(energy, p0, p1, 1.0, rows[k, STIFFNESS], rows[k, ONSET_OF])
@@ -290,7 +292,7 @@ def normal_at(line, sea, x, of_bed):
         if not line.bits & SEABED:
             deep = -math.inf
         for k in range(sea.obstacles.shape[0]):
-            d, m, _ = surface(sea.obstacles, k, x)
+            d, m, _ = surface(sea, k, x)
             p = 0.5 * sea.obstacles[k, ONSET_OF] - d
             if p > deep:
                 n, deep = m, p
@@ -319,12 +321,12 @@ def passes(line, sea, r, u):
             if rows.shape[1] > OBSTACLE:  # of the thinner side
                 thin = thinner(line, rows, k, max(i - 1, 0))
                 thin = max(thin, thinner(line, rows, k, min(i, line.h.shape[0] - 1)))
-            before, _, _ = surface(rows, k, x)
+            before, _, _ = surface(sea, k, x)
             size, solid = math.sqrt(dot(y, y)), rows[k, STRAND] - thin
             most = min(before, -thin) - solid
             way = before - most
             while way < size:  # d changes by no more than the way: nothing is missed between
-                d, _, _ = surface(rows, k, add(x, scale(way / size, y)))
+                d, _, _ = surface(sea, k, add(x, scale(way / size, y)))
                 if d - most < REACHED * solid:
                     return i
                 way += d - most
@@ -335,18 +337,18 @@ def passes(line, sea, r, u):
 
 
 @kernel
-def find_distances(rows, x, out):
+def find_distances(sea, x, out):
     """Distances (M, n) m of points x (n, 3) m to the surfaces of obstacles, moved out by the strand's radius."""
-    for k in range(rows.shape[0]):
+    for k in range(sea.obstacles.shape[0]):
         for i in range(x.shape[0]):
-            out[k, i], _, _ = surface(rows, k, get3(x, i))
+            out[k, i], _, _ = surface(sea, k, get3(x, i))
 
 
-def distances(rows: Floats, x: Floats) -> Floats:
+def distances(sea: Sea, x: Floats) -> Floats:
     """The same as an array."""
-    out = np.empty((len(rows), len(x)))
-    if len(rows):
-        find_distances(np.ascontiguousarray(rows), np.ascontiguousarray(x), out)
+    out = np.empty((len(sea.obstacles), len(x)))
+    if len(out):
+        find_distances(sea, np.ascontiguousarray(x), out)
     return out
 
 
@@ -365,10 +367,15 @@ PARTS, CUTS = 8, 0.125
 def half_thickness(rows: Floats) -> Floats:
     """Half of how thick (M,) m obstacles are with the radius of the strand where they are thinnest; planes: infinite."""
     of_box = rows[:, HALF_LENGTH : HALF_HEIGHT + 1].min(axis=1)
-    found = rows[:, RADIUS] + np.where(rows[:, KIND] == BOX, of_box, 0.0)
+    found = rows[:, RADIUS] + np.where(np.isin(rows[:, KIND], (BOX, MESH)), of_box, 0.0)
     of_sheave = rows[:, GROOVE] + 2.0 * rows[:, RIM]
     found = np.where(rows[:, KIND] == SHEAVE, np.minimum(found, of_sheave), found)
     return np.where(rows[:, KIND] == FLAT, np.inf, found)
+
+
+def bend_radii(rows: Floats) -> Floats:
+    """Radii (M,) m to which obstacles bend the centreline of a line that lies on them; of planes 0 with the strand's."""
+    return np.asarray(rows[:, RADIUS] + np.where(rows[:, KIND] == MESH, rows[:, RING], 0.0))
 
 
 def cells_met(carried: Floats, s: Floats) -> Floats:
@@ -391,20 +398,21 @@ def thinner_nodes(rows: Floats, s: Floats) -> Floats:
     return np.minimum(np.append(thin[:1], thin), np.append(thin, thin[-1:]))
 
 
-def depths_in_obstacles(rows: Floats, r: Floats, s: Floats, met: Floats | None = None) -> Floats:
+def depths_in_obstacles(sea: Sea, r: Floats, s: Floats, met: Floats | None = None) -> Floats:
     """How deep (M, N+1) the nodes r (N+1, 3) m and the cells after them lie in obstacles, over what they may.
 
     s: (N+1,) m, of the nodes; met: (M, N) as of `cells_met`; None: all do.  Nodes: by the radius of the line; cells,
     whose ends may lie on an obstacle that they cut, by an eighth of its radius more.  Beyond 1 a line is in what is
     solid, or has passed through it.
     """
+    rows = sea.obstacles
     thin = thinner_cells(rows, s)
     of_node = np.maximum(np.append(thin[:1], thin), np.append(thin, thin[-1:]))
     strand = rows[:, STRAND, None]
-    found = (-distances(rows, r) - of_node) / (strand - of_node)
+    found = (-distances(sea, r) - of_node) / (strand - of_node)
     x = np.linspace(0.0, 1.0, PARTS + 1)[1:-1, None, None]
     points = ((1.0 - x) * r[:-1] + x * r[1:]).reshape(-1, 3)
-    within = -distances(rows, points).reshape(len(rows), PARTS - 1, len(r) - 1).max(axis=1) - thin
+    within = -distances(sea, points).reshape(len(rows), PARTS - 1, len(r) - 1).max(axis=1) - thin
     cut = np.where(within > 0.0, within / (strand - thin + CUTS * rows[:, RADIUS, None]), -np.inf)
     if met is not None:
         cut = np.where(met > 0.0, cut, -np.inf)

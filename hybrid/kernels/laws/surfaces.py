@@ -16,6 +16,7 @@
     torus     what is within the radius of a ring                          1/rho         n_s/s
     sheave    a disc with a groove of circular section, whose rims are     -1/rho in the n_s/s
               tori                                                         groove
+    mesh      what is within the radius of a closed surface of triangles   as of a box (kernels.laws.facets)
 
 rho is the distance to the axis, edge or ring; s that to the axis of a torus or sheave, n_s the part of n away from it.
 """
@@ -25,6 +26,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, madd, mscale, outer, scale, sub
+from hybrid.kernels.laws.facets import mesh_surface
 from hybrid.kernels.machine.compile import called, inner
 from hybrid.kernels.state.obstacle_rows import (
     AXIS,
@@ -35,10 +37,12 @@ from hybrid.kernels.state.obstacle_rows import (
     HALF_LENGTH,
     HALF_WIDTH,
     KIND,
+    MESH,
     PLACE,
     RADIUS,
     RIM,
     RING,
+    ROOT,
     ROUND,
     SIDE,
     TORUS,
@@ -50,10 +54,11 @@ E9 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @inner
-def surface(rows, k, x):
+def surface(sea, k, x):
     """d and n of obstacle k at a point, and its curvature (h, a, g) there."""
+    rows = sea.obstacles
     if rows[k, KIND] > ROUND:
-        return shaped_surface(rows, k, x)
+        return shaped_surface(sea, k, x)
     a = (rows[k, AXIS], rows[k, AXIS + 1], rows[k, AXIS + 2])
     w = (x[0] - rows[k, PLACE], x[1] - rows[k, PLACE + 1], x[2] - rows[k, PLACE + 2])
     t = dot(w, a)
@@ -75,8 +80,9 @@ def surface(rows, k, x):
 
 
 @called
-def shaped_surface(rows, k, x):
-    """The same of a box, torus or sheave, found in axes of its own: along AXIS, along SIDE, and across both."""
+def shaped_surface(sea, k, x):
+    """The same of what has axes of its own: along AXIS, along SIDE, and across both."""
+    rows = sea.obstacles
     u = (rows[k, AXIS], rows[k, AXIS + 1], rows[k, AXIS + 2])
     v = (rows[k, SIDE], rows[k, SIDE + 1], rows[k, SIDE + 2])
     w = cross(u, v)
@@ -85,6 +91,8 @@ def shaped_surface(rows, k, x):
     if rows[k, KIND] == BOX:
         halves = (rows[k, HALF_LENGTH], rows[k, HALF_WIDTH], rows[k, HALF_HEIGHT])
         d, n, (h, a, g) = box_surface(halves, rows[k, RADIUS], y)
+    elif rows[k, KIND] == MESH:
+        d, n, (h, a, g) = mesh_surface(sea, int(rows[k, ROOT]), rows[k, RADIUS], y)
     else:
         s = math.sqrt(y[1] * y[1] + y[2] * y[2])
         out = (y[1] / s, y[2] / s) if s > 0.0 else (1.0, 0.0)

@@ -281,7 +281,7 @@ def weigh_obstacles(line, sea, state, zones, horizon):
     for i in range(state.r.shape[0]):
         x, v = get3(state.r, i), get3(state.v, i)
         for k in range(rows.shape[0]):
-            gap, n, _ = surface(rows, k, x)
+            gap, n, _ = surface(sea, k, x)
             gap, wide = max(gap + min(horizon * dot(n, v), 0.0), 0.0), 2.0 * rows[k, STRAND]
             raise_ratio(zones.ratios, CONTACT, of[max(i - 1, 0)], of[min(i, last)], 2.0 * wide / (gap + wide))
 

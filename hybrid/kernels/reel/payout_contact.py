@@ -97,7 +97,7 @@ def friction_of_flow(line, sea, old, new, reel):
         rubbed, moves = (0.0, 0.0, 0.0), line.moved.shape[0] > 0
         for m in range(line.moved.shape[0]):
             g = mean_force(old, new, i, EACH * m)
-            _, n, _ = surface(sea.obstacles, m, x)
+            _, n, _ = surface(sea, m, x)
             rubbed, f = add(rubbed, sub(g, scale(dot(g, n), n))), sub(f, g)
         n = normal_at(line, sea, x, moves)  # where obstacles move what is left is the bed's
         rubbed = add(rubbed, sub(f, scale(dot(f, n), n)))

@@ -6,9 +6,10 @@ from __future__ import annotations
 # unit vector across it, the second axis of a box; radius of the surface moved out by the strand's (m; of a plane how far it
 # is moved out; of a box that of its edges, of a torus that of its section, of a sheave that at the bottom of its groove);
 # half the length of a cylinder (m; infinite: endless; 0: a sphere) or of the flat part of a box, half the width and height
-# of that; radius of the ring about which sections of a torus or groove lie; radius of a groove less that of the strand, and
-# of its rims more that (m);
-KIND, PLACE, AXIS, SIDE, RADIUS, HALF_LENGTH, HALF_WIDTH, HALF_HEIGHT, RING, GROOVE, RIM = (
+# of that (of a mesh all three half of how thick it is on average); radius of the ring about which sections of a torus or
+# groove lie, of a mesh the smallest of what is round on it (0: it has sharp edges); radius of a groove less that of the
+# strand, and of its rims more that (m); of a mesh the first row in Sea.boxes;
+KIND, PLACE, AXIS, SIDE, RADIUS, HALF_LENGTH, HALF_WIDTH, HALF_HEIGHT, RING, GROOVE, RIM, ROOT = (
     0,
     1,
     4,
@@ -20,11 +21,12 @@ KIND, PLACE, AXIS, SIDE, RADIUS, HALF_LENGTH, HALF_WIDTH, HALF_HEIGHT, RING, GRO
     14,
     15,
     16,
+    17,
 )
 # radius of the strand (m); friction; stiffness (N/m per m), damping (N s/m per m), onset (m), elastic travel (m).
-STRAND, MU, STIFFNESS, DAMPING, ONSET_OF, SLIP = 17, 18, 19, 20, 21, 22
-FLAT, ROUND, BOX, TORUS, SHEAVE = 0.0, 1.0, 2.0, 3.0, 4.0
-OBSTACLE = 23
+STRAND, MU, STIFFNESS, DAMPING, ONSET_OF, SLIP = 18, 19, 20, 21, 22, 23
+FLAT, ROUND, BOX, TORUS, SHEAVE, MESH = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
+OBSTACLE = 24
 # Behind them, of a line of several diameters, two numbers for each of its sections: the arc length at which it ends, and by
 # how much its radius is smaller than that of the strand, which is the largest (m).
 PIECE_END, THINNER, OF_PIECE = 0, 1, 2

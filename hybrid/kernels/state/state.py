@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.machine.references import by_reference
+from hybrid.kernels.state.facet_rows import NO_BOXES, NO_FACETS
 from hybrid.kernels.state.fields import HALF, MEAN, POINT, ROD, SHARED, blank, cell, fields_of, node
 from hybrid.kernels.state.obstacle_rows import (
     CARRIED,
@@ -227,6 +228,8 @@ class Sea(NamedTuple):
     carried: Floats  # (M, CARRIED) how far they have (kernels.laws.obstacle_motion); empty: none does
     grip: Floats  # (N+1, 6 M) as `State.grip`, at the start of the step; empty: no obstacle moves
     rolling: Floats  # (3 K, N+1, 5) room for answers to K sheaves that turn freely (kernels.laws.sheaves)
+    boxes: Floats = NO_BOXES  # (B, BOX_ROW) boxes over facets (kernels.state.facet_rows); empty: no obstacle has any
+    facets: Floats = NO_FACETS  # (F, FACET) of surfaces of triangles, in axes of their obstacles
 
 
 class State(NamedTuple):
