@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import time as clock
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -64,32 +65,67 @@ def test_watching_that_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert min(on) < 1.1 * min(off)
 
 
-def test_random_throws() -> None:
-    """Two to four lines, one above the other across each other, fly together at 2 to 20 m/s in steps of 0.3 to 10 diameters.
+MESH = Path(__file__).parents[1] / "tests" / "data" / "angle.obj"
+
+
+def underneath(random: np.random.Generator) -> dict[str, Any]:
+    """One to three obstacles under lines that come down: balls, pipes, boxes, rings and bars of triangles, turned anyhow."""
+    found: dict[str, Any] = {}
+    for k in range(int(random.integers(1, 4))):
+        size, turn = float(random.uniform(0.03, 0.15)), random.uniform(-180, 180, 3).tolist()
+        axis, kind = random.normal(size=3).tolist(), str(random.choice(["sphere", "cylinder", "box", "torus", "mesh"]))
+        shape: dict[str, Any] = {
+            "sphere": {"radius": size},
+            "cylinder": {"radius": 0.5 * size, "axis": axis, "length": 1.7 * size},
+            "box": {"size": [size, size, 1.5 * size], "rounding": 0.1 * size, "rotation": turn},
+            "torus": {"ring": 0.8 * size, "radius": 0.3 * size, "axis": axis},
+            "mesh": {"file": str(MESH), "scale": 0.1 * size, "rotation": turn},
+        }[kind]
+        low = -1.5 * size - 2.0 * WIDTH  # nothing of it is above the lowest line
+        at = [*(0.2 * random.normal(size=2)).tolist(), low]
+        found[f"o{k}"] = shape | {"kind": kind, "at": at, "friction": float(random.uniform(0.0, 0.6))}
+    return found
+
+
+@pytest.mark.parametrize("among", ["each other", "obstacles"])
+def test_random_throws(among: str) -> None:
+    """Two to four lines, one above the other across each other, fly together at 2 to 20 m/s in steps of 0.3 to 10 diameters,
+
+    or two to five down on obstacles.
 
     Prints how many gain energy, come nearer than 0.9 and 0.5 diameters (of polygons), or fail.
     """
-    gains, near, through, failed, met = 0, 0, 0, 0, 0
+    gains, near, through, failed, met, deep, deepest = 0, 0, 0, 0, 0, 0, -np.inf
+    below = among == "obstacles"
     for seed in range(THROWS):
         random = np.random.default_rng(seed)
-        count, speed = int(random.integers(2, 5)), float(np.exp(random.uniform(np.log(2.0), np.log(20.0))))
+        count, speed = (
+            int(random.integers(2, 6 if below else 5)),
+            float(np.exp(random.uniform(np.log(2.0), np.log(20.0)))),
+        )
         step, friction = float(np.exp(random.uniform(np.log(0.3), np.log(10.0)))), random.uniform(0.0, 0.6)
         shapes, speeds = [], []
         for k in range(count):
             angle = np.pi * k / count + random.uniform(-0.2, 0.2)
             middle = np.append(0.1 * random.normal(size=2), 3.0 * WIDTH * k)
             shapes.append(straight(1.0, middle, np.array([np.cos(angle), np.sin(angle), 0.0]), 40))
-            speeds.append(np.tile(np.append(0.2 * speed * random.normal(size=2), -speed * k), (41, 1)))
+            down = speed * (1.0 + 0.3 * k if below else k)
+            speeds.append(np.tile(np.append(0.2 * speed * random.normal(size=2), -down), (41, 1)))
+        obstacles = underneath(random) if below else None
+        duration = 20.0 * WIDTH / speed * max(1.0, step)
         try:
-            found = throw(shapes, speeds, step * WIDTH / speed, 20.0 * WIDTH / speed * max(1.0, step), friction)
-        except AssertionError:
+            found = throw(shapes, speeds, step * WIDTH / speed, duration, friction, obstacles=obstacles)
+        except AssertionError as error:
             failed += 1
+            print(f"throw {seed}: {error}")
             continue
         met += bool(found.shared.met())
         gains += max(found.energies) > 1.001 * found.energies[0]
+        deep, deepest = deep + (found.deepest > 1.0), max(deepest, found.deepest)
         near, through = near + (found.least < 0.9 * WIDTH), through + (found.least < 0.5 * WIDTH)
     print(
-        f"\n{THROWS} throws: {met} touch, {failed} fail, {gains} gain energy, {near} nearer than 0.9 D, {through} than 0.5 D"
+        f"\n{THROWS} throws: {met} touch, {failed} fail, {gains} gain energy, {near} nearer than 0.9 D, {through} than 0.5 D; "
+        f"in obstacles {deep} too deep, at most {deepest:.2g}"
     )
-    assert failed == through == 0
+    assert failed == through == deep == 0
     assert gains <= 0.01 * THROWS

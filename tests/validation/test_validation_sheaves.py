@@ -205,7 +205,7 @@ def test_lines_thrown_at_two_sheaves_and_each_other_keep_angular_momentum(fricti
     upper = straight(1.0, np.array([0.13, 0.05, 2.0 * WIDTH]), np.array([1.0, 0.3, 0.0]), 40)
     found = throw(
         [lower, upper], [np.zeros_like(lower) - [1.0, 0.0, 2.0], np.zeros_like(upper) - [1.0, 0.0, 6.0]],
-        2.5e-5, 0.025, friction, sheaves=sheaves,
+        2.5e-5, 0.025, friction, obstacles=sheaves,
     )  # fmt: skip
     spins = found.states.lines[0].sheave[:, SPIN]
     assert found.shared.met() and (np.abs(spins) > 0.05).all()

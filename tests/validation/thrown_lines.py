@@ -11,9 +11,10 @@ import hybrid
 from hybrid.errors import Outcome
 from hybrid.kernels.contact.self_contact_pairs import ENERGY
 from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, PLACE, STATE, V, W
-from hybrid.kernels.laws.obstacles import stored_energy
+from hybrid.kernels.laws.obstacles import depths_in_obstacles, stored_energy
 from hybrid.kernels.march.energies import observe
 from hybrid.kernels.state.books import SHORTEST, blank_books
+from hybrid.kernels.state.forces import OBSTACLES
 from hybrid.kernels.state.obstacle_rows import INERTIA, SPIN
 from hybrid.model.bodies import body_model
 from hybrid.model.build import build
@@ -47,6 +48,7 @@ class Throw(NamedTuple):
     states: SystemState
     shared: SharedContact
     model: list[Any]
+    deepest: float  # in obstacles, nodes and chords, over what they may (kernels.laws.obstacles.depths_in_obstacles)
 
 
 def straight(length: float, at: Floats, along: Floats, cells: int) -> Floats:
@@ -58,14 +60,14 @@ def straight(length: float, at: Floats, along: Floats, cells: int) -> Floats:
 def throw(
     shapes: list[Floats], speeds: list[Floats], step: float, duration: float, friction: float = 0.0,
     width: float = WIDTH, kind: str = "rod", turn: Floats | None = None, body: FreeBody | None = None,
-    sheaves: dict[str, Any] | None = None,
+    obstacles: dict[str, Any] | None = None,
 ) -> Throw:  # fmt: skip
     """Lines with nodes (N+1, 3) m and velocities (N+1, 3) m/s fly; steps (s) that fail are halved.
 
-    turn: (3, 3), of everything; body: a free one with a shape, which spins; sheaves: obstacles that turn freely.
+    turn: (3, 3), of everything; body: a free one with a shape, which spins; obstacles: at rest, or that turn freely.
     """
     models, lines, states = [], [], []
-    around = {"obstacles": sheaves if body is None else body.surface("ball")} if body or sheaves else {}
+    around = {"obstacles": obstacles if body is None else body.surface("ball")} if body or obstacles else {}
     rides = np.zeros(0 if body is None else 1, np.int64)
     own = () if body is None else (body_model("ball", body, 0.0, 0.0),)
     numbers = np.array([x.numbers for x in own]).reshape(len(own), NUMBERS)
@@ -104,7 +106,7 @@ def throw(
     solver.keep_books(books)
     old = SystemState(states, rows)
     solver.consistent_accelerations(old, [np.zeros((2, 3))] * count)
-    new, t, before, rho, part, tries = old.copy(), 0.0, 0.0, 0.9, step, 0
+    new, t, before, rho, part, tries, deepest = old.copy(), 0.0, 0.0, 0.9, step, 0, -np.inf
     masses = [x.line.mass[:, None] for x in models]
     first, energies, least = of(models, masses, old, numbers), [energy(models, old, shared, lines, numbers)], np.inf
     while t < duration * (1.0 - 1e-9):
@@ -117,6 +119,8 @@ def throw(
             assert part > 1e-6 * step, taken
             continue
         least = min(least, nearest(old, new))
+        for x, state in zip(lines if obstacles else [], new.lines, strict=False):
+            deepest = max(deepest, float(depths_in_obstacles(x.sea, state.r, x.line.s).max()))
         old, new, before, rho, t = new, old, end - t, taken.rho, end
         energies.append(energy(models, old, shared, lines, numbers))
         part = min(2.0 * part, step)
@@ -126,7 +130,7 @@ def throw(
         for x, m in zip(old.lines, masses, strict=True)
     )
     momentum, turning = np.stack([first[0], last[0]]), np.stack([first[1], last[1]])
-    return Throw(least, energies, momentum, turning, size, tries, old, shared, models)
+    return Throw(least, energies, momentum, turning, size, tries, old, shared, models, deepest)
 
 
 def energy(
@@ -138,7 +142,7 @@ def energy(
         parts, room = np.zeros(5), np.zeros((x.T.size + 1, 3))
         observe(model.line, model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, room, room.copy(), parts)
         total += float(parts[:4].sum())
-        if model.line.moved.size:
+        if model.line.bits & OBSTACLES:
             total += float(stored_energy(model.line, joined.sea, x.r))
     if states.lines[0].sheave.size:
         total += 0.5 * float(lines[0].sea.carried[:, INERTIA] @ states.lines[0].sheave[:, SPIN] ** 2)
