@@ -386,7 +386,18 @@ def test_the_texts_of_this_file_have_every_key() -> None:
     schema = Scene.model_json_schema()
     known = {key for table in (schema, *schema["$defs"].values()) for key in table["properties"]}
     written = {part for text in TEXTS.values() for path, _ in _places(text) for part in path}
-    elsewhere = {"file", "exact", "max_tension", "min_tension", "vessel", "rao", "heading", "fairlead", "drift"}
+    elsewhere = {
+        "file",
+        "scale",
+        "exact",
+        "max_tension",
+        "min_tension",
+        "vessel",
+        "rao",
+        "heading",
+        "fairlead",
+        "drift",
+    }
     elsewhere |= {"line", "other", "all", "shortest_period", "longest_period", "max_contact_force", "arc_lengths"}
     assert known - written == elsewhere  # where these are tested
 

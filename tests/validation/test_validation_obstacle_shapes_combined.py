@@ -18,7 +18,7 @@ SHAPES: dict[str, Tables] = {
     "box": {"kind": "box", "size": [0.3, 0.24, 0.6], "rounding": 0.06, "rotation": [10, 20, 30]},
     "torus": {"kind": "torus", "axis": [0.3, 0.1, 1], "ring": 0.12, "radius": 0.06},
     "sheave": {"kind": "sheave", "axis": [0.3, 0.1, 1], "radius": 0.12, "groove": 0.04, "rim": 0.03},
-    "mesh": {"kind": "mesh", "file": str(DATA / "angle.obj"), "scale": 0.03, "rotation": [10, 20, 30]},
+    "mesh": {"kind": "mesh", "file": str(DATA / "block.obj"), "scale": 0.1, "rotation": [10, 20, 30]},
 }
 STRAND = 0.01  # m, radius of the rope that is pushed
 
@@ -51,8 +51,9 @@ def test_a_line_lies_on_what_has_moved_and_turned(aside: Any) -> None:
         local = (x - place) @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) + still
         gaps.append(min(solid.distance(tuple(p)) for p in local) - STRAND)
     assert min(gaps) > -STRAND
+    deep = 0.4 if kind == "mesh" else 0.2  # a sharp edge is pressed on at a point
     pressed = np.linalg.norm(result["obstacles/bar/force"], axis=1) > 0.5
-    assert pressed.any() and np.abs(np.array(gaps)[pressed]).max() < 0.2 * STRAND
+    assert pressed.any() and np.abs(np.array(gaps)[pressed]).max() < deep * STRAND
     assert result.position[:, 15:45, 1].max() > 0.05
 
 
