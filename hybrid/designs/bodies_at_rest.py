@@ -20,6 +20,7 @@ from hybrid.kernels.junctions.bodies import FRAME, OWN, PIECES, SOFTEST, V
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.state.state import Floats
 from hybrid.modal.loaded_members import stiffness_by_water
+from hybrid.model.bodies import loads_of
 from hybrid.model.system import SystemModel, bodies_of
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
@@ -95,10 +96,11 @@ class BodiesAtRest:
 
 
 def with_bodies(model: SystemModel, system: System) -> SystemModel:
-    """The model with the bodies of a changed scene in whose lines none turns with a body: these stay as they are."""
+    """The model with the bodies of a changed scene, and moments on its points; its lines stay as they are."""
     free = system.free_bodies
     held = [[system.points[x] for x in (line.start, line.end)] for line in system.lines.values()]
     places = [
         [x.place if isinstance(x, Fairlead) and x.body in free else (0.0, 0.0, 0.0) for x in pair] for pair in held
     ]
-    return replace(model, bodies=bodies_of(system), fairleads=np.array(places))
+    moments = tuple(loads_of(system.moments_on(x)) for x in system.rigid)
+    return replace(model, bodies=bodies_of(system), fairleads=np.array(places), moments=moments)

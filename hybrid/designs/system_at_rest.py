@@ -25,6 +25,7 @@ from hybrid.kernels.state.state import Floats
 from hybrid.modal.matrices import linear_network
 from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby, same_nodes
+from hybrid.model.nearby_clamped import nearby_clamped, seats_know_no_shape
 from hybrid.model.system import SystemModel, SystemResolution, build_system
 from hybrid.scene.bodies import FreeBody, RigidBody
 from hybrid.scene.combinations import refuse_use
@@ -210,11 +211,14 @@ class SystemAtRest(OfScene):
         return False
 
     def _changed(self, system: System, key: str) -> _Changed:
-        """A changed scene.  Lines that turn with bodies are built anew: how a clamp is seated hangs on all of it."""
+        """A changed scene.  How a clamped line is seated may hang on first shapes of all: then all are built anew."""
         anew = [self._hangs_on(system, name) for name in self._names]
-        seated = [new and bool(self._bodies.turns(l)) for l, new in enumerate(anew)]
+        by_shape = any(
+            new and self._bodies.turns(l) and not seats_know_no_shape(system, name)
+            for l, (new, name) in enumerate(zip(anew, self._names, strict=True))
+        )
         built = None
-        if any(seated):
+        if by_shape:
             built = build_system(system, self._resolution)
         elif self._bodies.count and any(getattr(system, x) is not getattr(self.scene, x) for x in OF_BODIES):
             built = with_bodies(self._model, system)
@@ -224,11 +228,16 @@ class SystemAtRest(OfScene):
                 out.append(line.here)
                 continue
             scene, frames = self._scene_of(system, name), NO_FRAMES
-            if built is not None and seated[l]:
+            if not self._bodies.turns(l):
+                model = nearby(line.model, self._scenes[name], scene, self._resolution.lines[name], LEFT_OUT)
+            elif by_shape and built is not None:
                 model = _on_same_cells(built.models[l], line.model)
                 frames = self._bodies.frames(l, built.seats[l])
             else:
-                model = nearby(line.model, self._scenes[name], scene, self._resolution.lines[name], LEFT_OUT)
+                bodies = (self._model if built is None else built).bodies
+                found = nearby_clamped(line.model, self._scenes[name], system, name, bodies, self._resolution, LEFT_OUT)
+                model, seats = (None, None) if found is None else found
+                frames = self._bodies.frames(l, seats) if seats is not None else NO_FRAMES
             if model is None:
                 raise _other_cells(key)
             out.append(line.beside(scene, model, frames))

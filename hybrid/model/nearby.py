@@ -10,7 +10,7 @@ import numpy as np
 from hybrid.kernels.state.forces import PLANAR, ROTARY
 from hybrid.kernels.state.state import Floats, Sea
 from hybrid.model.build import Model, build, place_cells
-from hybrid.model.initial_shape import end_conditions
+from hybrid.model.initial_shape import end_conditions, frames
 from hybrid.model.layout import Layout
 from hybrid.model.line import NO_INERTIA, WITH_SECTIONS, line_on
 from hybrid.model.line_on_base import LineOnBase
@@ -28,14 +28,17 @@ SHIFT = 2e-4
 WRITTEN = ("flow", "axis", "slip", "slid", "bed", "grip", "rolling", "now", "lanes")
 
 
-def nearby(model: Model, of: Scene, scene: Scene, resolution: Resolution, without: int) -> Model | None:
+def nearby(
+    model: Model, of: Scene, scene: Scene, resolution: Resolution, without: int, clamped: bool = False
+) -> Model | None:  # fmt: skip
     """The model of `scene`, in the cells and zones that `model` has of the scene `of`; None: its cells are others.
 
-    without: bits of forces that its line leaves out (kernels.state.forces).
+    without: bits of forces that its line leaves out (kernels.state.forces); clamped: frames of ends hang on directions
+    of the scene alone, and are those of it.
     Its start, its other starts and its contents are those of `model`.  Tables of `scene` that are the same objects as
     those of `of` count as unchanged.
     """
-    if model.payout is not None or _turned_by_shape(model):
+    if model.payout is not None or (_turned_by_shape(model) and not clamped):
         return _built(model, scene, resolution)
     cable = material(scene)
     placed = _cells(model, cable, of, scene, resolution)
@@ -57,8 +60,12 @@ def nearby(model: Model, of: Scene, scene: Scene, resolution: Resolution, withou
     if scene.ends is not of.ends:
         chords = model.start.e[[0, -1]]
         chords = chords / np.linalg.norm(chords, axis=1)[:, None]
-        frames = ends.values.frame.reshape(2, 3, 3)
-        ends = end_conditions(scene, (frames[0][:, 0], frames[1][:, 0]), chords, sea)
+        if clamped:
+            directors = frames(scene, model.start.e, line, cable)[0]
+            ends = end_conditions(scene, (directors[0], directors[-1]), chords, sea)
+        else:
+            held = ends.values.frame.reshape(2, 3, 3)
+            ends = end_conditions(scene, (held[0][:, 0], held[1][:, 0]), chords, sea)
     return replace(
         model, line=line, zones=zones, ends=ends, sea=sea, length=float(line.s[-1]), cable=cable, layout=layout,
         on_base=on_base, attached=tuple(cable.at.tolist()), inextensible=not line.ck.any(),

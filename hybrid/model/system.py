@@ -180,18 +180,12 @@ def build_system(
     resolution: how finely, None: as the scene asks for; like: a model of the same lines, whose meshes are taken.
     Raises SceneError where a line cannot be meshed.
     """
-    rigid = system.rigid
     made = bodies_of(system)
-    points = np.zeros((len(rigid), STATE))
-    points[:, PLACE:FRAME] = np.array([system.first_place(x) for x in rigid]).reshape(-1, 3)
-    points[:, FRAME:V] = np.eye(3).ravel()
-    bodies = np.vstack([np.array([body.start for body in made]).reshape(-1, STATE), points])
-    free = tuple(x for x in system.free if x not in rigid)
-    places = np.array([system.first_place(x) for x in free], float).reshape(-1, 3)
+    free, places, bodies = first_places(system, made)
     resolution = resolution or SystemResolution.first(system)
     joined = _joined(system, places, bodies)
     joint, fairleads = joined.joint, joined.fairleads
-    maker = _Lines(system, joined, bodies, resolution)
+    maker = FirstLines(system, joined, bodies, resolution)
     if like is not None:
         maker.meshes = {name: model.mesh for name, model in zip(like.names, like.models, strict=True)}
     maker.turn_points()
@@ -226,6 +220,26 @@ def _kept_in_plane(system: System, models: Sequence[Model]) -> list[Model]:
     tables = [(x.environment, x.ends, x.initial) for x in scenes]
     plane, _ = plane_of(scenes[0].environment, scenes[0].cable, scenes[0].ends, scenes[0].initial, TYPED, tables)
     return [replace(x, kept_in=np.array(plane.normal)) for x in models]
+
+
+def first_places(system: System, made: Sequence[BodyModel]) -> tuple[tuple[str, ...], Floats, Floats]:
+    """Names of the free points at which lines turn freely, their places (P, 3) m, and (B, STATE) of bodies and of the
+
+    points behind them, not turned yet, where the scene has them first.  made: the free bodies.
+    """
+    rigid = system.rigid
+    points = np.zeros((len(rigid), STATE))
+    points[:, PLACE:FRAME] = np.array([system.first_place(x) for x in rigid]).reshape(-1, 3)
+    points[:, FRAME:V] = np.eye(3).ravel()
+    bodies = np.vstack([np.array([body.start for body in made]).reshape(-1, STATE), points])
+    free = tuple(x for x in system.free if x not in rigid)
+    return free, np.array([system.first_place(x) for x in free], float).reshape(-1, 3), bodies
+
+
+def first_lines(system: System, made: Sequence[BodyModel], resolution: SystemResolution) -> FirstLines:
+    """What makes lines between first places of points and bodies, with free points that are not turned yet."""
+    _, places, bodies = first_places(system, made)
+    return FirstLines(system, _joined(system, places, bodies), bodies, resolution)
 
 
 def _turns_of(held: Connections) -> tuple[float, float]:
@@ -345,12 +359,12 @@ def starts_between(system: System, places: Floats, bodies: Floats, model: System
     places: (P, 3) m of the free points; bodies: (B, STATE), which are returned too, with the axes of points that lines
     are clamped to.
     """
-    maker = _Lines(system, _joined(system, places, bodies), bodies, model.resolution, model)
+    maker = FirstLines(system, _joined(system, places, bodies), bodies, model.resolution, model)
     maker.turn_points()
     return [maker.start(name, each) for name, each in zip(model.names, model.models, strict=True)], maker.bodies
 
 
-class _Lines:
+class FirstLines:
     """Makes the models of lines, with their clamps."""
 
     def __init__(
@@ -378,11 +392,11 @@ class _Lines:
             known = {p: [at for at in system.clamped_at(p) if self._leads_from_known(at, left)] for p in left}
             point = next((p for p in left if known[p]), left[0])
             here = [*known[point], *(at for at in system.clamped_at(point) if at not in known[point])]
-            models = {name: self._shape(name, self._directions(name, left)) for name, _ in here}
+            models = {name: self._shape(name, self.directions(name, left)) for name, _ in here}
             far = None
             if known[point]:
                 name, end = known[point][0]
-                far = self._directions(name, left)["start" if end == "end" else "end"]
+                far = self.directions(name, left)["start" if end == "end" else "end"]
             axes = axes_of_point({end: self._at_rigid[end] for end in here}, models, far)
             self.bodies[self._rows[point], FRAME:V] = axes.ravel()
             left.remove(point)
@@ -396,28 +410,28 @@ class _Lines:
             return False
         return held.normal is not None or point in self._system.rigid
 
-    def _axes(self, point: str) -> Floats | None:
+    def axes(self, point: str) -> Floats | None:
         """Axes (3, 3) of what carries a point; None: nothing that is free does."""
         row = self._rows.get(point)
         return None if row is None else self.bodies[row, FRAME:V].reshape(3, 3)
 
     def _shape(self, name: str, directions: Mapping[str, Any] | None) -> Model:
-        scene, mesh = self._scene(name, (), directions), self.meshes.get(name)
+        scene, mesh = self.scene(name, (), directions), self.meshes.get(name)
         with said_of_line(name):
             return build(scene, self._resolution[name], mesh, spare=bool(scene.obstacles))
 
-    def _scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> Scene:
+    def scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> Scene:
         """The scene of a line between the places of its points; of one that is carried, with the point."""
         if name not in self.scenes:
             self.scenes[name] = self._system.scene_of(name)
         return self._system.scene_of(name, carried, self._at, directions, self.scenes[name])
 
-    def _directions(self, name: str, left: Sequence[str] = ()) -> dict[str, Any]:
+    def directions(self, name: str, left: Sequence[str] = ()) -> dict[str, Any]:
         """Inertial directions in which the line is clamped, by end; left: points whose axes are not known yet."""
         found: dict[str, Any] = {}
         line = self._system.lines[name]
         for k, (end, point) in enumerate((("start", line.start), ("end", line.end))):
-            axes = self._axes(point)
+            axes = self.axes(point)
             if point in left:
                 found[end] = None
             elif axes is not None and self._given is not None and self._given[self._names.index(name), k, TURNS]:
@@ -433,25 +447,25 @@ class _Lines:
 
     def start(self, name: str, model: Model) -> State:
         """The first shape of a line, whose model has been made, between the places of now."""
-        scene, line, sea = self._scene(name, (), self._directions(name)), model.line, model.sea
+        scene, line, sea = self.scene(name, (), self.directions(name)), model.line, model.sea
         shape = hung(scene, line, sea.values)
         return first_state(scene, line, model.cable, sea, model.tension_scale, shape)[0]
 
     def model(self, name: str) -> Model:
         """The model of a line: its loads with the points that it carries, its first shape between held places."""
         system, l = self._system, self._names.index(name)
-        directions = self._directions(name)
+        directions = self.directions(name)
         clamps = [system.clamp(name, end) for end in ("start", "end")]
         model = self._shape(name, directions)
         carried = system.carried(name)
         if carried:
-            other = build(self._scene(name, carried, directions), self._resolution[name], model.mesh, like=model)
+            other = build(self.scene(name, carried, directions), self._resolution[name], model.mesh, like=model)
             held = [k for k, end in enumerate(("start", "end")) if clamps[k] is not None]
             other = with_clamps(other, model, held)
             other.ends.values.frame[held] = model.ends.values.frame[held]
             model = replace(other, start=model.start, start_shape=model.start_shape)
         for k, point in enumerate((system.lines[name].start, system.lines[name].end)):
-            found, body, axes = system.points[point], system.body_of(point), self._axes(point)
+            found, body, axes = system.points[point], system.body_of(point), self.axes(point)
             if clamps[k] is not None and axes is not None and self._given is None:
                 kind = WITH_POINT if point in system.rigid else WITH_BODY
                 self.seats[l, k] = seat_of(model.ends.values.frame[k], axes, kind)

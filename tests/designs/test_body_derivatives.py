@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.designs import system_at_rest
 from hybrid.designs.cable_at_rest import CableAtRest
 from hybrid.designs.line_at_rest import parse_result
 from hybrid.designs.numbers import changed_scene, with_number
 from hybrid.designs.sensitivity import at_rest
+from hybrid.model.nearby_clamped import seats_know_no_shape
+from hybrid.model.system import build_system
 from hybrid.scene.read import as_scene_or_system
 from tests.designs.test_system_derivatives import ANCHORS, BUOY, CHAIN, HOSE, SEA, moored
 
@@ -73,14 +76,24 @@ def two_bodies():
     return tables
 
 
-def clamped_to_a_point():
-    """Two lines that a free point with mass and volume turns with."""
+def without_normals():
+    """The same hose, of which neither end says where its material axis is, to a ship that lies askew first."""
+    tables = two_bodies()
+    tables["lines"]["hose"]["connections"] = {"start": CLAMPED, "end": {"kind": "clamped", "tangent": [1, 0, 0.6]}}
+    tables["bodies"]["ship"]["initial_rotation"] = [5, 3, 10]
+    return tables
+
+
+def clamped_to_a_point(**end):
+    """Two lines that a free point with mass and volume turns with; end: a clamp of the first at its other end."""
     tables = moored(BUOY, True)
     clamp, rod = {"connections": {"start": {"kind": "clamped"}}}, {"model": "rod", "mesh": {"cells": 20}}
     tables["points"]["weight"] = {"kind": "free", "initial_guess": [0, 0, -20], "mass": 100.0}
     tables["lines"]["hose"] |= clamp | rod | {"sections": [ROD]}
     tail = {"start": "top", "end": "weight", "sections": [ROD | {"length": 20.0}]}
     tables["lines"]["tail"] = clamp | rod | tail
+    if end:
+        tables["lines"]["hose"]["connections"] = clamp["connections"] | {"end": {"kind": "clamped"} | end}
     return tables
 
 
@@ -110,6 +123,15 @@ SCENES = {
     "a point": (clamped_to_a_point(), [*OF_HOSE, "tail/tension@start"], [
         "points.top.volume", "points.weight.mass", "lines.hose.sections[0].length", "points.vessel.position[2]",
     ]),
+    "without normals": (without_normals(), OF_HOSE, [
+        "lines.hose.connections.end.tangent[2]", "lines.hose.sections[0].torsional_stiffness",
+    ]),
+    "twist that hangs on first shapes": (clamped_to_a_point(tangent=[1, 0, 1]), OF_HOSE, [
+        "points.weight.mass", "lines.hose.sections[0].length",
+    ]),
+    "twist that is given": (clamped_to_a_point(tangent=[1, 0, 1], normal=[0, 1, 0.2], turns=0.1), OF_HOSE, [
+        "points.weight.mass", "lines.hose.sections[0].length", "lines.hose.connections.end.turns",
+    ]),
     "members": (spar(), OF, [
         "bodies.hull.members[0].diameter", "bodies.hull.force[2]", "points.at_east.place[2]", "environment.fluid.surface",
     ]),
@@ -129,6 +151,42 @@ def test_differences_of_equilibria(what):
         floor = 1e-3 * np.abs(rest.values) / abs(number)
         off = np.abs(ours - (more - less) / (2.0 * d)) / np.maximum(np.abs(ours), floor)
         assert off.max() < 3e-6, (key, off)
+
+
+@pytest.mark.parametrize("what", ["a clamp", "two bodies", "a point", "without normals", "twist that is given"])
+def test_arrays_of_clamped_lines_are_those_of_lines_that_are_built_anew(what, monkeypatch):
+    """No line is built for a number where directions say how it is seated; all are where first shapes do."""
+    tables, of, keys = SCENES[what]
+    made, built = as_scene_or_system(tables), []
+    rest = at_rest(made, of)
+    monkeypatch.setattr(system_at_rest, "build_system", lambda *x: built.append(1) or build_system(*x))
+    ours = rest.by(keys)
+    assert not built
+    monkeypatch.setattr(system_at_rest, "seats_know_no_shape", lambda *_: False)
+    anew = rest.by(keys)
+    assert built
+    np.testing.assert_allclose(ours, anew, rtol=1e-7, atol=1e-9 * np.abs(anew).max())
+
+
+def test_what_hangs_on_first_shapes():
+    def known(tables, name="hose"):
+        return seats_know_no_shape(as_scene_or_system(tables), name)
+
+    assert known(two_bodies()) and known(without_normals()) and known(clamped_to_a_point())
+    assert not known(clamped_to_a_point(tangent=[1, 0, 1])) and known(
+        clamped_to_a_point(tangent=[1, 0, 1], normal=[0, 1, 0])
+    )
+    assert not known(clamped_to_a_point(tangent=[1, 0, 1], normal=[0, 1, 0], swivel=True, bend_stiffness=10.0))
+    back = without_normals()  # opposite tangents know no short way from one to the other
+    back["bodies"]["ship"]["initial_rotation"] = [0, 0, 0]
+    back["lines"]["hose"]["connections"]["end"] = {"kind": "clamped", "tangent": [-1, 0, -1]}
+    assert not known(back)
+    end_alone = held_by_three(HULL, mesh={"cells": 30})
+    hose = end_alone["lines"]["hose"]
+    hose |= {"start": "vessel", "end": "out", "connections": {"end": {"kind": "clamped", "tangent": [-1, 0, -1]}}}
+    assert not known(end_alone)
+    hose["connections"] = {"end": {"kind": "clamped", "tangent": [-1, 0, -1], "normal": [0, 1, 0]}}
+    assert known(end_alone)
 
 
 def with_torque():
