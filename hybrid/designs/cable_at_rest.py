@@ -98,14 +98,14 @@ class CableAtRest(OfScene):
             if model is None:
                 detail = f"{key}: a change of it changes the number of cells; give `mesh: {{cells: ..}}`"
                 raise ComputationError(Outcome.NOT_CONVERGED, None, None, detail)
-            if scene is more and not _same_places(model, self.model) and not is_allowed(more):
+            if scene is more and not same_places(model, self.model) and not is_allowed(more):
                 fix = "a number that others do not have to match, as lengths of zones have to"
                 raise SceneError([Complaint("by", key, "a number that may change by itself", fix)])
             found.append(self.line.beside(scene, model))
         return found[0], found[1]
 
 
-def _same_places(a: Model, b: Model) -> bool:
+def same_places(a: Model, b: Model) -> bool:
     """Whether nodes, sections and attachments of two models are at the same arc lengths."""
     pairs = (a.line.s, b.line.s), (a.cable.bounds, b.cable.bounds), (a.cable.at, b.cable.at)
     return all(np.array_equal(x, y) for x, y in pairs)

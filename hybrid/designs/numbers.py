@@ -83,6 +83,15 @@ def is_allowed(scene: Scene | System) -> bool:
     return True
 
 
+def is_allowed_line(system: System, name: str) -> bool:
+    """The same of one line of several that was made by `with_number`."""
+    try:
+        system.checked_scene(name)
+    except Invalid:
+        return False
+    return True
+
+
 def _put(value: Any, parts: list[str], number: float) -> Any:
     if not parts:
         return number

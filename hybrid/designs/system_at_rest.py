@@ -16,9 +16,9 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from hybrid.designs.bodies_at_rest import BodiesAtRest, with_bodies
-from hybrid.designs.cable_at_rest import NO_PLACES, Places
+from hybrid.designs.cable_at_rest import NO_PLACES, Places, same_places
 from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, Wanted, moment_on_body, parse_result
-from hybrid.designs.numbers import OfScene, is_allowed, with_number
+from hybrid.designs.numbers import OfScene, is_allowed_line, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
@@ -188,11 +188,16 @@ class SystemAtRest(OfScene):
 
     def _beside(self, key: str, number: float, step: float) -> tuple[_Changed, _Changed]:
         """The scene with a number that is more by a step, and less."""
-        more, less = (with_number(self.scene, key, number + d) for d in (step, -step))
-        if more.lines is not self.scene.lines and not is_allowed(more):
-            fix = "a number that others do not have to match, as lengths of zones have to"
-            raise SceneError([Complaint("by", key, "a number that may change by itself", fix)])
-        return self._changed(more, key), self._changed(less, key)
+        found = list[_Changed]()
+        for scene in (with_number(self.scene, key, number + d) for d in (step, -step)):
+            changed = self._changed(scene, key)
+            both = zip(self._names, changed.lines, self.lines, strict=True)
+            others = [name for name, x, line in both if not same_places(x.model, line.model)]
+            if not found and not all(is_allowed_line(scene, name) for name in others):
+                fix = "a number that others do not have to match, as lengths of zones have to"
+                raise SceneError([Complaint("by", key, "a number that may change by itself", fix)])
+            found.append(changed)
+        return found[0], found[1]
 
     def _hangs_on(self, system: System, name: str) -> bool:
         """Whether a line hangs on what a changed scene has changed."""
@@ -213,6 +218,9 @@ class SystemAtRest(OfScene):
     def _changed(self, system: System, key: str) -> _Changed:
         """A changed scene.  How a clamped line is seated may hang on first shapes of all: then all are built anew."""
         anew = [self._hangs_on(system, name) for name in self._names]
+        for new, name in zip(anew, self._names, strict=True):
+            if new:
+                system.know_scene(name, self.scene.scene_of(name))
         by_shape = any(
             new and self._bodies.turns(l) and not seats_know_no_shape(system, name)
             for l, (new, name) in enumerate(zip(anew, self._names, strict=True))

@@ -450,21 +450,32 @@ class System(Table):
                     bend_stiffness=clamp.bend_stiffness, motion=motion, payout=payout,
                 )  # fmt: skip
         initial = line.initial if self.starts_as_placed else _between(line.initial, ends)
+        tables: dict[str, Any] = {"ends": Ends(**ends), "initial": initial}
         if places is not None:
-            return (scene or self.scene_of(name)).model_copy(update={"ends": Ends(**ends), "initial": initial})
-        tables: dict[str, Any] = {
-            "title": f"{self.title}, line {name}" if self.title else f"line {name}", "environment": self.environment,
-            "cable": line.cable, "ends": Ends(**ends), "initial": initial, "model": line.chosen_model,
-            "mesh": line.mesh, "resolution": line.resolution, "contact": line.contact, "obstacles": self.surfaces,
+            return (scene or self.scene_of(name)).model_copy(update=tables)
+        tables |= {
+            "environment": self.environment, "cable": line.cable, "model": line.chosen_model, "mesh": line.mesh,
+            "resolution": line.resolution, "contact": line.contact, "obstacles": self.surfaces,
             "accuracy": self._accuracy_of(line),
         }  # fmt: skip
         if self.time is not None:
             tables["time"] = self.time
+        if scene is not None:
+            return scene.model_copy(update=tables)
+        tables["title"] = f"{self.title}, line {name}" if self.title else f"line {name}"
         given = {key: getattr(self.output, key) for key in ("points", "every", "errors")}
         given["history"] = self.output.history.get(name)
         given["criteria"] = self.output.criteria and (name in self.adaptive or not self.adaptive)  # none: each says so
         tables["output"] = {key: value for key, value in given.items() if value is not None}
         return Scene.model_validate(tables)
+
+    def checked_scene(self, name: str) -> Scene:
+        """The scene of a line as `scene_of`, checked anew; ValidationError of pydantic: what is wrong with it."""
+        return self._scene_of(name, ())
+
+    def know_scene(self, name: str, scene: Scene) -> None:
+        """Make the scene of a line from that of a system that differs in numbers alone, without checking it again."""
+        self._known_scenes[name, ()] = self._scene_of(name, (), scene=scene)
 
     def _accuracy_of(self, line: JoinedLine) -> Accuracy | None:
         """What is asked of a line: of one that names no model no curvature, because nobody has asked for a rod."""

@@ -168,6 +168,20 @@ def test_arrays_of_clamped_lines_are_those_of_lines_that_are_built_anew(what, mo
     np.testing.assert_allclose(ours, anew, rtol=1e-7, atol=1e-9 * np.abs(anew).max())
 
 
+@pytest.mark.parametrize("clamped", [False, True])
+def test_numbers_that_others_have_to_match_are_refused(clamped):
+    """Lengths of a section and of zones, of a line that turns freely at a point, or is clamped to a body."""
+    tables = held_by_three(HULL, mesh={"cells": 30}) if clamped else moored(BUOY, True)
+    hose = tables["lines"]["hose"]
+    del hose["mesh"]
+    hose["model"] = {"kind": "zones", "zones": [{"rod": 40.0, "cells": 15}, {"catenary": 60.0, "cells": 15}]}
+    rest = at_rest(as_scene_or_system(tables), ["hose/tension@start"])
+    for key in ("lines.hose.sections[0].length", "lines.hose.model.zones[0].rod"):
+        with pytest.raises(hybrid.SceneError, match="a number that may change by itself"):
+            rest.by([key])
+    assert rest.by(["lines.hose.sections[0].mass"])[0, 0] != 0.0
+
+
 def test_what_hangs_on_first_shapes():
     def known(tables, name="hose"):
         return seats_know_no_shape(as_scene_or_system(tables), name)
