@@ -29,7 +29,7 @@ from hybrid.kernels.state.obstacle_rows import (
 from hybrid.kernels.state.state import NO_CARRIED, NO_MOVES, Floats, Moves
 from hybrid.model.driven_end import PATH, DrivenEnd
 from hybrid.model.ends import Motion, table_of_motions
-from hybrid.scene.body_shapes import Carried, CarriedCylinder
+from hybrid.scene.body_shapes import Carried, CarriedBox, CarriedCylinder
 from hybrid.scene.motion import Elevation, EndMotion
 from hybrid.scene.schema import Scene
 
@@ -59,10 +59,12 @@ def courses_of(scene: Scene, rows: Floats, waves: Floats, ramp: float, elevation
     carried[:, MEETS_FROM], carried[:, MEETS_TO] = -np.inf, np.inf  # what comes off a reel at the start has s < 0
     for k, (name, x) in enumerate(scene.obstacles.items()):
         if isinstance(x, Carried):
-            position[k], frame[k] = x.origin, np.array(x.axes).T.ravel()
+            position[k], frame[k] = x.origin, np.array(x.body_axes).T.ravel()
             carried[k, OFFSET : OFFSET + 3], carried[k, RIDES] = x.place, 1.0
             carried[k, BEGAN:SWEEP], carried[k, TURNED : TURNED + 9] = [*x.origin, *x.origin], frame[k]
             carried[k, STILL_AXIS : STILL_AXIS + 3] = x.own_axis if isinstance(x, CarriedCylinder) else (0.0, 0.0, 1.0)
+            if isinstance(x, CarriedBox):
+                carried[k, STILL_AXIS : STILL_AXIS + 3], carried[k, STILL_SIDE : STILL_SIDE + 3], _ = x.own_axes
             carried[k, SWEEP : SWEEP + 9] = still.ravel()
         elif x.from_outside:
             motions[k] = driven[name] = DrivenEnd(paths[k], position[k], frame[k], True, True)

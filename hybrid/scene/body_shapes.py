@@ -4,13 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hybrid.scene.base import Direction, Finding, NonNegative, Positive, Table, Vector, refuse, unit
+from hybrid.scene.base import (
+    Before,
+    Direction,
+    Finding,
+    NonNegative,
+    Positive,
+    Table,
+    Vector,
+    Words,
+    numbers,
+    refuse,
+    unit,
+)
 from hybrid.scene.ends import Triple
-from hybrid.scene.obstacles import CylinderObstacle, SphereObstacle
+from hybrid.scene.obstacles import BoxObstacle, CylinderObstacle, SphereObstacle, rounded_within
 
 _FRICTION = "coefficient of friction (Coulomb) of lines on it, in every direction [-]"
 _STIFFNESS = (
@@ -27,7 +39,7 @@ class CarriedSphere(SphereObstacle):
 
     body: str = Field(exclude=True, description="name of the body")
     origin: Triple = Field(exclude=True, description="origin of the body [m]")
-    axes: tuple[Triple, Triple, Triple] = Field(exclude=True, description="axes of the body, inertial [-]")
+    body_axes: tuple[Triple, Triple, Triple] = Field(exclude=True, description="axes of the body, inertial [-]")
     place: Triple = Field(exclude=True, description="middle of the shape, in axes of the body [m]")
 
     @property
@@ -41,7 +53,7 @@ class CarriedCylinder(CylinderObstacle):
 
     body: str = Field(exclude=True, description="name of the body")
     origin: Triple = Field(exclude=True, description="origin of the body [m]")
-    axes: tuple[Triple, Triple, Triple] = Field(exclude=True, description="axes of the body, inertial [-]")
+    body_axes: tuple[Triple, Triple, Triple] = Field(exclude=True, description="axes of the body, inertial [-]")
     place: Triple = Field(exclude=True, description="middle of the shape, in axes of the body [m]")
     own_axis: Triple = Field(exclude=True, description="axis, in axes of the body [-]")
 
@@ -51,20 +63,68 @@ class CarriedCylinder(CylinderObstacle):
         return True
 
 
-Carried = CarriedSphere | CarriedCylinder
+class CarriedBox(BoxObstacle):
+    """A box that a body carries, where the body is first looked for; its rotation is against the axes of the body."""
+
+    body: str = Field(exclude=True, description="name of the body")
+    origin: Triple = Field(exclude=True, description="origin of the body [m]")
+    body_axes: tuple[Triple, Triple, Triple] = Field(exclude=True, description="axes of the body, inertial [-]")
+    place: Triple = Field(exclude=True, description="middle of the shape, in axes of the body [m]")
+
+    @property
+    def moves(self) -> bool:
+        """Always, with its body."""
+        return True
+
+    @property
+    def own_axes(self) -> tuple[Triple, ...]:
+        """Its axes (3, 3), in those of the body [-]."""
+        return super().axes
+
+    @property
+    def axes(self) -> tuple[Triple, ...]:
+        """Its axes (3, 3), inertial [-], where the body is first looked for."""
+        x, y, z = zip(*self.body_axes, strict=True)
+        return tuple((_dot(a, x), _dot(a, y), _dot(a, z)) for a in self.own_axes)
+
+
+def _dot(a: Triple, b: Triple) -> float:
+    return sum(p * q for p, q in zip(a, b, strict=True))
+
+
+Carried = CarriedSphere | CarriedCylinder | CarriedBox
+# What each kind has, of what not all of them have.
+_KEYS = {
+    "sphere": ("radius",),
+    "cylinder": ("radius", "axis", "length"),
+    "box": ("size", "rounding"),
+}
+_EXAMPLES = {"radius": "radius: 0.5", "axis": "axis: [0, 0, 1]", "length": "length: 2", "size": "size: [2, 1, 1]",
+             "rounding": "rounding: 0.1"}  # fmt: skip
 
 
 class BodyShape(Table):
-    """The surface of a body: a ball, or a round cylinder with half spheres at its ends."""
+    """The surface of a body: a ball, a round cylinder with half spheres at its ends, or a box with rounded edges."""
 
-    kind: Literal["sphere", "cylinder"] = Field(description="a ball, or a round cylinder")
+    kind: Literal["sphere", "cylinder", "box"] = Field(description="a ball, a round cylinder, or a box")
     place: Vector = Field(default=(0.0, 0.0, 0.0), description=_PLACE)
-    radius: Positive = Field(description="radius [m]")
+    radius: Positive | None = Field(default=None, description="of a ball or cylinder: its radius [m]")
     axis: Direction | None = Field(
         default=None, description="of a cylinder: direction of its axis, in axes of the body; any length [-]"
     )
     length: Positive | None = Field(
         default=None, description="of a cylinder: its length, without the half spheres in which it ends [m]"
+    )
+    size: Annotated[tuple[Positive, Positive, Positive], Before(numbers(3)), Words("three numbers > 0")] | None = Field(
+        default=None, description="of a box: its outer length, width and height, along axes of its own [m]"
+    )
+    rounding: Positive | None = Field(
+        default=None, description="of a box: radius of its edges, at most half of the smallest of `size` [m]"
+    )
+    rotation: Vector | None = Field(
+        default=None,
+        description="of a box: how it is turned against the body, roll, pitch, yaw, about x, then y, then z of that; "
+        "absent: not at all [deg]",
     )
     friction: NonNegative = Field(default=0.0, description=_FRICTION)
     stiffness: Positive | None = Field(default=None, description=_STIFFNESS)
@@ -73,16 +133,25 @@ class BodyShape(Table):
     @model_validator(mode="after")
     def _has_what_its_kind_has(self) -> Self:
         found = []
-        for key in ("axis", "length"):
-            given = getattr(self, key) is not None
-            if given and self.kind == "sphere":
-                found.append(Finding((key,), "nothing, because the kind is sphere", "leave it out, or kind: cylinder"))
-            elif not given and self.kind == "cylinder":
-                example = "axis: [0, 0, 1]" if key == "axis" else "length: 2"
-                found.append(Finding((key,), f"the {key} of the cylinder", example, "nothing"))
-        if found:
-            refuse(found)
+        for key in (*_EXAMPLES, "rotation"):
+            given, has = getattr(self, key) is not None, key in _KEYS[self.kind]
+            if given and not has and (key, self.kind) != ("rotation", "box"):
+                other = next((kind for kind, keys in _KEYS.items() if key in keys), "box")
+                expected = f"nothing, because the kind is {self.kind}"
+                found.append(Finding((key,), expected, f"leave it out, or kind: {other}"))
+            elif has and not given:
+                found.append(Finding((key,), f"the {key} of the {self.kind}", _EXAMPLES[key], "nothing"))
+        refuse(found)
+        if self.size is not None and self.rounding is not None:
+            refuse(rounded_within(self.size, self.rounding))
         return self
+
+    @property
+    def across(self) -> float:
+        """No straight line is longer within it [m]."""
+        if self.size is not None:
+            return math.hypot(*self.size)
+        return (self.length or 0.0) + 2.0 * (self.radius or 0.0)
 
 
 def carried_shape(
@@ -95,10 +164,14 @@ def carried_shape(
     """
     x, y, z = turned(rotation, shape.place)
     given: dict[str, Any] = {
-        "at": (origin[0] + x, origin[1] + y, origin[2] + z), "radius": shape.radius, "friction": shape.friction,
+        "at": (origin[0] + x, origin[1] + y, origin[2] + z), "friction": shape.friction,
         "stiffness": shape.stiffness, "damping": shape.damping, "body": name, "origin": origin, "place": shape.place,
-        "axes": tuple(turned(rotation, x) for x in AXES),
+        "body_axes": tuple(turned(rotation, x) for x in AXES),
     }  # fmt: skip
+    if shape.size is not None and shape.rounding is not None:
+        own = shape.rotation or (0.0, 0.0, 0.0)
+        return CarriedBox(**given, size=shape.size, rounding=shape.rounding, rotation=own)
+    given |= {"radius": shape.radius}
     if shape.axis is None:
         return CarriedSphere(**given)
     axis = unit(shape.axis)
@@ -115,7 +188,7 @@ def way_out(shape: BodyShape, start: Triple, towards: tuple[float, ...], margin:
     if not size > 0.0:
         return 0.0
     direction = tuple(x / size for x in towards)
-    length = (shape.length or 0.0) + 2.0 * (shape.radius + margin)
+    length = shape.across + 2.0 * margin
 
     def apart(way: float) -> float:
         x, y, z = (a + way * d for a, d in zip(start, direction, strict=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from operator import mul
 from typing import Annotated, Literal, Self
 
@@ -164,9 +164,7 @@ class BoxObstacle(_Rotated):
 
     @model_validator(mode="after")
     def _is_round_within_its_size(self) -> Self:
-        if 2.0 * self.rounding > min(self.size):
-            expected = f"at most half of the smallest of `size`, {0.5 * min(self.size):g} m"
-            refuse([Finding(("rounding",), expected, "a smaller radius, or a larger size", f"{self.rounding:g}")])
+        refuse(rounded_within(self.size, self.rounding))
         return self
 
     @property
@@ -180,6 +178,13 @@ class BoxObstacle(_Rotated):
         w = [p - q for p, q in zip(x, self.at, strict=True)]
         past = [abs(sum(map(mul, w, a))) - half for a, half in zip(self.axes, self.halves, strict=True)]
         return math.hypot(*(max(p, 0.0) for p in past)) + min(max(past), 0.0) - self.rounding
+
+
+def rounded_within(size: tuple[float, float, float], rounding: float) -> Iterator[Finding]:
+    """What is wrong with the radius [m] of the edges of a box of a size [m]."""
+    if 2.0 * rounding > min(size):
+        expected = f"at most half of the smallest of `size`, {0.5 * min(size):g} m"
+        yield Finding(("rounding",), expected, "a smaller radius, or a larger size", f"{rounding:g}")
 
 
 class TorusObstacle(_Turning):

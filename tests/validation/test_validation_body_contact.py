@@ -242,9 +242,9 @@ def test_a_run_that_goes_on_has_the_same_bits(tmp_path: Path, fallen: Any) -> No
     assert np.array_equal(result["bodies/ball/position"], fallen["bodies/ball/position"])
 
 
-@pytest.mark.parametrize("kind", ["sphere", "cylinder"])
+@pytest.mark.parametrize("kind", ["sphere", "cylinder", "box"])
 def test_a_very_heavy_body_is_an_obstacle(kind: str) -> None:
-    """Of a cylinder across the lines, too, whose axis its body turns there."""
+    """Of a cylinder across the lines, too, whose axis its body turns there, and of a box that is turned in its body."""
     tables = pushed(stiffness=1e5)
     tables["environment"] = {"gravity": 0}
     heavy = {"initial_guess": [4.2, 0.02, 0.62], "mass": 1e12, "inertia": [1e12, 1e12, 1e12],
@@ -256,6 +256,13 @@ def test_a_very_heavy_body_is_an_obstacle(kind: str) -> None:
         axis = [np.cos(np.radians(80)), np.sin(np.radians(80)), 0]
         obstacle |= {"kind": "cylinder", "axis": axis, "length": 3.0,
                      "at": [4.2, -0.48 + 0.5 * np.sin(np.radians(80)), 0.62]}  # fmt: skip
+    if (
+        kind == "box"
+    ):  # turned by 10 deg about its length, by 50 deg with its body and by 30 deg more about the vertical
+        size = {"kind": "box", "size": [3.0, 1.2, 1.2], "rounding": 0.4, "friction": 0.4, "stiffness": 1e5}
+        heavy["shape"] = size | {"rotation": [10, 0, 30], "place": [0.5, 0, 0]}
+        heavy |= {"initial_rotation": [0, 0, 50], "initial_guess": [4.2 - 0.5 * np.cos(np.radians(50)), -0.38, 0.65]}
+        obstacle = size | {"rotation": [10, 0, 80], "at": [4.2, -0.38 + 0.5 * np.sin(np.radians(50)), 0.65]}
     tables["bodies"] = {"ball": heavy}
     for side in ("left", "right"):
         for end in (0, 10):
@@ -270,7 +277,56 @@ def test_a_very_heavy_body_is_an_obstacle(kind: str) -> None:
     for side in ("left", "right"):
         a, b = by_body.lines[side], by_obstacle.lines[side]
         np.testing.assert_allclose(a.position, b.position, atol=1e-6)
-        np.testing.assert_allclose(a.tension, b.tension, rtol=1e-6, atol=1e-3)
+        left = 3e-3 if kind == "box" else 1e-3  # N: Newton's method leaves more where curvature jumps at edges
+        np.testing.assert_allclose(a.tension, b.tension, rtol=1e-6, atol=left)
+
+
+def test_a_box_that_falls_on_lines(tmp_path: Path) -> None:
+    """Work of lines on it and of it on them, the scene turned, and a run that goes on, as of a ball."""
+    box = {"kind": "box", "size": [0.9, 1.3, 0.8], "rounding": 0.15, "rotation": [10, 20, 5], "friction": 0.4}
+
+    def tables(heading: float, duration: float = 0.5) -> Tables:
+        angle = np.radians(heading)
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        found = pushed()
+        for point in found["points"].values():
+            point["position"] = (turn @ point["position"]).tolist()
+        ball = found["bodies"]["ball"]
+        ball |= {"shape": box, "initial_guess": (turn @ [4.2, 0.02, 0.9]).tolist()}
+        ball |= {"moment": (turn @ ball["moment"]).tolist(), "initial_rotation": [20, 10, 30 + heading]}
+        for line in found["lines"].values():
+            line["initial"]["direction"] = turn[:, 0].tolist()
+        return found | {"time": {"duration": duration, "step": 0.005}}
+
+    result, other = hybrid.run(tables(0.0)), hybrid.run(tables(40.0))
+    done, by_lines = result["bodies/ball/work/lines"], sum(x["work/obstacles"] for x in result.lines.values())
+    assert np.abs(done).max() > 1.0
+    np.testing.assert_allclose(done, -by_lines, atol=0.02 * np.abs(done).max())
+    assert np.abs(result["bodies/ball/rotation"] - result["bodies/ball/rotation"][0]).max() > 1.0
+    assert not any(x.kind in ("deep in an obstacle", "gains energy") for x in result.events)
+    c, s = np.cos(np.radians(40.0)), np.sin(np.radians(40.0))
+    back = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    np.testing.assert_allclose(other["bodies/ball/position"], result["bodies/ball/position"] @ back, atol=1e-9)
+    hybrid.run(tables(0.0, 0.25), tmp_path / "a.h5")
+    on = hybrid.resume(tmp_path / "a.h5", until=0.5)
+    assert np.array_equal(on["bodies/ball/position"], result["bodies/ball/position"])
+
+
+@pytest.mark.parametrize(
+    ("shape", "where", "says"),
+    [
+        ({"kind": "box", "radius": 0.5, "size": [1, 1, 1], "rounding": 0.1}, "radius", "nothing, because the kind is box"),
+        ({"kind": "box", "size": [1, 1, 1]}, "rounding", "the rounding of the box"),
+        ({"kind": "box", "size": [1, 1, 1], "rounding": 0.6}, "rounding", "at most half of the smallest"),
+        ({"kind": "sphere"}, "radius", "the radius of the sphere"),
+        ({"kind": "sphere", "radius": 0.5, "rotation": [0, 0, 9]}, "rotation", "nothing, because the kind is sphere"),
+        ({"kind": "sphere", "radius": 0.5, "axis": [0, 0, 1]}, "axis", "nothing, because the kind is sphere"),
+    ],
+)  # fmt: skip
+def test_shapes_have_what_their_kind_has(shape: Tables, where: str, says: str) -> None:
+    with pytest.raises(SceneError, match=says) as refused:
+        hybrid.static(on_two_lines(shape=shape))
+    assert [x.where for x in refused.value.complaints] == [f"bodies.ball.shape.{where}"]
 
 
 def test_lines_that_end_at_another_body_run_either_way_and_as_catenaries() -> None:
