@@ -329,12 +329,6 @@ def _clamped_to_free(tables: Tables) -> Iterator[Place]:
             yield at
 
 
-def _obstacles(tables: Tables) -> Iterator[Place]:
-    if tables.get("obstacles"):
-        yield ("obstacles",)
-    yield from _shapes(tables)
-
-
 def _shapes(tables: Tables) -> Iterator[Place]:
     """Shapes of bodies that lines touch."""
     return (("bodies", name, "shape") for name in (tables[SYSTEM].shaped if SYSTEM in tables else ()))
@@ -447,12 +441,9 @@ PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payo
 TENSION_HELD = Feature("a winch that holds a tension, of a line to what is free", "payout.winch", _tension_held)
 ZONES_OF_SEVERAL = Feature("zones of several lines that move", "lines.NAME.model", _zones_of_several)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
-OBSTACLES = Feature("obstacles", "obstacles", _obstacles)
 SHAPES = Feature("bodies that lines touch", "bodies.NAME.shape", _shapes)
 SHEAVES = Feature("sheaves that turn freely", "obstacles.NAME.bearing", _free_sheaves)
 LINES_TOUCH = Feature("contact of lines with each other", "contact", _lines_touch)
-PUSHED = Feature("obstacles, contact of lines with each other", "obstacles, contact",
-                 _either(OBSTACLES, LINES_TOUCH))  # fmt: skip
 GOES_ITS_WAY = Feature(
     "contact of lines with each other, with bodies, with obstacles that move",
     "contact, bodies.NAME.shape, obstacles.NAME.motion",
@@ -487,7 +478,6 @@ RESPONSE_TO_MOTION = Refusal(
     "harmonics, and loads that stay", "hybrid run computes it in time",
 )  # fmt: skip
 PAID = "line is paid out ({key})"
-TOUCHES = "there are obstacles or lines that touch each other ({key})"
 REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         TWO_STIFFNESSES, MOVING_ZONES, "physics",
@@ -562,7 +552,8 @@ REFUSALS: tuple[Refusal, ...] = (
         "give `step: ...` (s) in time, leave accuracy and output.errors out; halve step and cells to see their error",
     ),
     Refusal(
-        SETTLED_FRICTION, PUSHED, "not worked out", f"{TOUCHES}, and their friction is neglected in every equilibrium",
+        SETTLED_FRICTION, GOES_ITS_WAY, "not worked out",
+        "what touches ({key}) is a line, a body or an obstacle that moves, whose friction is neglected in equilibria",
         "neglected",
     ),
     Refusal(

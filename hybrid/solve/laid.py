@@ -1,4 +1,4 @@
-"""A line that lies on the seabed without tension, before it is pulled to its equilibrium with friction."""
+"""A line that lies somewhere without tension, before it is pulled to its equilibrium with friction."""
 
 from __future__ import annotations
 
@@ -8,18 +8,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles
+from hybrid.kernels.state.forces import SEABED
 from hybrid.kernels.state.state import Ends, Line, Sea, State
+from hybrid.solve.flaws import TOUCHING
 
 
-def laid_on_bed(line: Line, sea: Sea, ends: Ends, state: State) -> State:
-    """A copy of an equilibrium whose stretches on the bed have their unstretched length, without friction yet.
+def laid_without_tension(line: Line, sea: Sea, ends: Ends, state: State) -> State:
+    """A copy of an equilibrium whose stretches on the bed and on obstacles have their unstretched length, without
 
-    A stretch keeps its path, and its place at a held end that lies on the bed; one without such an end keeps the place
-    of its middle.  The displacement of a node from here is the travel that friction opposes (docs/theory.md, T17b).
+    friction yet.  A stretch keeps its path, and its place at a held end that lies there, too; one without such an end
+    keeps the place of its middle.  The displacement of a node from here is the travel that friction opposes
+    (docs/theory.md, T17b).
     """
     laid, cells = state.copy(), line.h.size
     laid.slip[:] = 0.0
-    touches = planes_under(sea, state.r)[1] > 0.5 * sea.onset
+    met = cells_met(sea.carried, line.s) if sea.carried.size else None
+    depths = depths_in_obstacles(sea, state.r, line.s, met)
+    touches = np.asarray((depths > -TOUCHING).any(axis=0))
+    if line.bits & SEABED:
+        touches |= planes_under(sea, state.r)[1] > 0.5 * sea.onset
     touches[0] |= bool(ends.held[0]) and bool(touches[1])
     touches[cells] |= bool(ends.held[1]) and bool(touches[cells - 1])
     shortening = (line.h / np.linalg.norm(state.e, axis=1) - 1.0)[:, None] * state.e
@@ -41,7 +49,7 @@ def laid_on_bed(line: Line, sea: Sea, ends: Ends, state: State) -> State:
 
 
 def _stretches(touches: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """First and last node of every run of nodes on the bed, of at least two nodes."""
+    """First and last node of every run of nodes that touch, of at least two nodes."""
     turns = np.flatnonzero(np.diff(np.concatenate([[False], touches, [False]]).astype(np.int8)))
     for first, after in turns.reshape(-1, 2):
         if after - first > 1:

@@ -25,7 +25,7 @@ from hybrid.kernels.state.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
 from hybrid.kernels.step.step import friction_axes
 from hybrid.solve.flaws import flaw_of_line, fold_text, lowest_tension
-from hybrid.solve.laid import laid_on_bed
+from hybrid.solve.laid import laid_without_tension
 from hybrid.solve.settling import Settling, gyration
 from hybrid.solve.softened import softened, softest
 from hybrid.solve.stability import Stability, is_judged
@@ -251,12 +251,12 @@ def _settled(solver: _Solver, ends: Ends, start: State, shape: str) -> tuple[str
 def _pulled(
     smooth: _Solver, rough: _Solver, roads: Iterator[tuple[str, Outcome, int, State]], ends: Ends
 ) -> Iterator[tuple[str, Outcome, int, State]]:
-    """Laid on the bed without tension along the equilibrium without friction, then pulled tight against friction."""
+    """Laid where it touches, without tension, along the equilibrium without friction, then pulled tight against it."""
     for how, outcome, where, state in roads:
         if outcome != Outcome.OK:
             yield f"without friction, {how}", outcome, where, state
             continue
-        rest = laid_on_bed(smooth.line, smooth.sea, ends, state)
+        rest = laid_without_tension(smooth.line, smooth.sea, ends, state)
         rough.total += smooth.total
         yield "pulled tight against friction from where it lay without tension", *rough.newton(rough.line, ends, rest)
         return

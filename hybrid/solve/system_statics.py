@@ -16,7 +16,7 @@ from hybrid.solve.contact_statics import DAMPING as SLOWED
 from hybrid.solve.contact_statics import stop
 from hybrid.solve.flaws import fold_text, lowest_tension, slack_text
 from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
-from hybrid.solve.laid import laid_on_bed
+from hybrid.solve.laid import laid_without_tension
 from hybrid.solve.settling import CALM, GROWN, RELAXING_STEPS, along, damped, growth_time, gyration, nudged
 from hybrid.solve.softened import softened, softest
 from hybrid.solve.stability import Stability
@@ -110,7 +110,7 @@ def settled_with_friction(
     lines: Sequence[JoinedLine], points: int, bodies: Floats, ways: Mapping[int, str], found: SystemEquilibrium,
     first: SystemState,
 ) -> SystemEquilibrium:  # fmt: skip
-    """The equilibrium with friction on the bed of the lines named in `ways`, by number, as of one cable.
+    """The equilibrium with friction of the lines named in `ways`, by number, as of one cable.
 
     ways: "pull": laid along the equilibrium without friction (`found`) without tension, then pulled tight, all such
     lines together; "start", and where that fails: at rest after a damped motion from the first shapes.  LineFailed.
@@ -136,11 +136,11 @@ def settled_with_friction(
 
 
 def _laid(solver: SystemSolver, ways: Iterable[int], states: SystemState) -> SystemState:
-    """The states with these lines laid on the bed without tension, their ends where they are."""
+    """The states with these lines laid where they touch without tension, their ends where they are."""
     out = states.copy()
     for k in ways:
         x = solver.lines[k]
-        out.lines[k] = laid_on_bed(x.line, x.sea, x.ends, out.lines[k])  # type: ignore[index]
+        out.lines[k] = laid_without_tension(x.line, x.sea, x.ends, out.lines[k])  # type: ignore[index]
     return out
 
 

@@ -379,3 +379,55 @@ def test_stress_of_a_curved_pipe_is_that_of_its_moment() -> None:
 
 def test_stress_of_a_curved_pipe_that_is_a_catenary_is_the_most_that_it_can_be() -> None:
     assert max(off_its_moment([0.03, 0.05, 0.01], 48, "catenary")) < 1e-6
+
+
+# --- friction that has settled on obstacles -------------------------------------------------------
+
+MU, PIPE_RADIUS, STRAND = 0.4, 1.0, 0.01
+
+
+def over_a_pipe(friction: str = "settled", cells: int = 240) -> Tables:
+    """A light rope, 1.5 % stretched, over a pipe below the middle between pins."""
+    section = {"length": 4.2, "mass": 0.02, "diameter": 2 * STRAND, "axial_stiffness": 2e4, "bending_stiffness": 1e-3}
+    at: Tables = {"kind": "cylinder", "at": [0, 0, -0.3], "axis": [0, 1, 0], "radius": PIPE_RADIUS, "friction": MU}
+    return {
+        "cable": {"sections": [section]}, "obstacles": {"pipe": at}, "model": "rod", "mesh": {"cells": cells},
+        "ends": {k: {"kind": "pinned", "position": [x, 0, 0]} for k, x in (("start", -2), ("end", 2))},
+        "initial": {"kind": "equilibrium", "friction": friction}, "contact": {"self": False},
+        "output": {"points": 421, "exact": True},
+    }  # fmt: skip
+
+
+def slope_on_the_pipe(line: hybrid.Result) -> float:
+    """How fast the logarithm of tension rises by the angle on the pipe, away from its top, on both sides.
+
+    Within half of the contact: towards its edges the pressure fades over sqrt(T/k) = 0.07 m.
+    """
+    r, T = line.position[0], line.tension[0]
+    angle = np.arctan2(r[:, 0], r[:, 2] + 0.3)
+    on = np.abs(np.hypot(r[:, 0], r[:, 2] + 0.3) - PIPE_RADIUS - STRAND) < STRAND
+    found = []
+    for side in (1.0, -1.0):
+        a = side * angle
+        here = on & (a > 0.04) & (a < 0.18)
+        found.append(np.polyfit(a[here], np.log(T[here]), 1)[0])
+    assert found[0] == pytest.approx(found[1], rel=0.03)
+    return float(np.mean(found))
+
+
+def test_friction_that_has_settled_on_a_pipe_is_that_of_the_capstan() -> None:
+    """T = T_top e^(mu phi) on both sides of the top, which stays where it lay; without it T is even; of several, too.
+
+    It stays so when time begins.
+    """
+    tables = over_a_pipe()
+    found, plain = hybrid.static(tables), hybrid.static(over_a_pipe("neglected"))
+    system = as_system(tables)
+    assert system is not None
+    several = hybrid.static(system).lines["one"]
+    assert slope_on_the_pipe(found) == pytest.approx(MU, rel=0.01)
+    assert abs(slope_on_the_pipe(plain)) < 0.005
+    assert np.abs(several.tension - found.tension).max() < 1e-6 * found.tension.max()
+    moved = hybrid.run(tables | {"time": {"duration": 0.2, "step": 0.01}})
+    assert np.abs(moved.position - found.position[0]).max() < 1e-6
+    assert np.abs(moved.tension - found.tension[0]).max() < 1e-3 * found.tension.max()

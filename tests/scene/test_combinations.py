@@ -84,7 +84,7 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.MOVING_ZONES, c.GOES_ITS_WAY): ({"obstacles.ball": BALL["obstacles"]["ball"] | {"from_outside": True}} | MOVING, ""),
     (c.PAYOUT, c.MEETS_LINES): (TWO_LINES | PAID_LINE, ""),
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
-    (c.SETTLED_FRICTION, c.PUSHED): (BALL | {"initial": {"kind": "equilibrium", "friction": "settled"}}, ""),
+    (c.SETTLED_FRICTION, c.GOES_ITS_WAY): (TWO_LINES | {ONE + "initial": {"friction": "settled"}}, ""),
     (c.ABOUT_REST, c.MOVED_BY_LINES): (TWO_LINES, "about rest"),
     (c.OTHER_MOTIONS, c.RESPONSE): (
         {"ends.end": {"kind": "free", "force": {"value": [1, 0, 0], "until": 2}}}, "response"

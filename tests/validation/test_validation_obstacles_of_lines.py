@@ -160,7 +160,6 @@ def test_a_body_makes_obstacles_stiff_enough() -> None:
     ("change", "where", "says"),
     [
         ({"points.top.position": [0, 0, DRUM]}, "points.top.position", "obstacles.drum"),
-        ({"lines.rope.initial.friction": "settled"}, "lines.rope.initial.friction", "obstacles"),
     ],
 )  # fmt: skip
 def test_what_does_not_go_with_obstacles_is_refused(change: Tables, where: str, says: str) -> None:
