@@ -65,6 +65,8 @@ def test_watching_that_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert min(on) < 1.1 * min(off)
 
 
+# N/m per m, of obstacles: weightless lines without tension ask for none.
+HARD = 1e7
 MESH = Path(__file__).parents[1] / "tests" / "data" / "angle.obj"
 
 
@@ -83,7 +85,12 @@ def underneath(random: np.random.Generator) -> dict[str, Any]:
         }[kind]
         low = -1.5 * size - 2.0 * WIDTH  # nothing of it is above the lowest line
         at = [*(0.2 * random.normal(size=2)).tolist(), low]
-        found[f"o{k}"] = shape | {"kind": kind, "at": at, "friction": float(random.uniform(0.0, 0.6))}
+        found[f"o{k}"] = shape | {
+            "kind": kind,
+            "at": at,
+            "friction": float(random.uniform(0.0, 0.6)),
+            "stiffness": HARD,
+        }
     return found
 
 
