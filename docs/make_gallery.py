@@ -23,6 +23,11 @@ SHOWN = {
     "s_tether": "A tether, heavy above and buoyant below, hangs in an S while its buoy heaves: rod in the bends.",
     "laying_loop": "A twisted cable is laid too slack: it throws a loop, which is pulled open again.",
     "plectoneme": "A twisted rod whose ends approach winds around itself: it touches itself and does not pass through.",
+    "trefoil": "A trefoil knot is pulled tight: its loop closes, and friction in the braid carries the pull.",
+    "tethers_tangle": "Two vehicles circle each other twice and back: their tethers wind up, and come apart.",
+    "umbilical_clash": "A current drives an umbilical against a mooring line.",
+    "rope_over_sheave": "A rope slips over a sheave that does not turn, as the lighter weight is let go.",
+    "cable_over_pipeline": "A cable that is thrown over a pipeline sinks, comes down across it, and lies there.",
     "06_whip": "A rod that is clamped at one end is let go from the horizontal; its tip whips.",
 }
 HEAD = """\
