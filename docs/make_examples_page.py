@@ -70,7 +70,8 @@ def escaped(text: str) -> str:
 
 def section(path: Path) -> str:
     first, entries = header(path)
-    command = f"hybrid run examples/{path.name} --plot"
+    place = path.relative_to(ROOT).as_posix()
+    command = f"hybrid run {place} --plot"
     if path.suffix == ".py":
         command = f"python examples/{path.name} {path.stem}.png"
     elif (ROOT / "docs" / "pictures" / f"{path.stem}_zones.png").exists():
@@ -81,7 +82,7 @@ def section(path: Path) -> str:
     out += "| | |\n|---|---|\n"
     for name in ("Shows", "Look at", "Physics", "Run time", "Source"):
         out += f"| **{name}** | {escaped(entries[name]).replace(chr(10), ' ')} |\n"
-    out += f"| **File** | [{path.name}](../examples/{path.name}) |\n\n"
+    out += f"| **File** | [{path.name}](../{place}) |\n\n"
     zones = ROOT / "docs" / "pictures" / f"{path.stem}_zones.png"
     if zones.exists():
         out += f"![Zones over time: {title(path)}](pictures/{zones.name})\n\n"
@@ -93,7 +94,8 @@ def page() -> str:
     numbered = sorted((ROOT / "examples").glob("[0-9]*.*"))
     sea = [ROOT / "examples" / f"{name}.yaml" for name in SEA]
     others = sorted(set((ROOT / "examples").glob("*.yaml")) - {*numbered, *sea})
-    sections = [section(path) for path in (*numbered, *sea, *others)]
+    contact = sorted((ROOT / "examples" / "contact").glob("*.yaml"))
+    sections = [section(path) for path in (*numbered, *sea, *others, *contact)]
     return (HEAD + "".join(sections)).rstrip() + "\n"
 
 

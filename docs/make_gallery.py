@@ -59,23 +59,28 @@ def film(name: str, result: hybrid.Result) -> Path:
     return made.path
 
 
+def example(name: str) -> Path:
+    """The scene of this name."""
+    return next((ROOT / "examples").rglob(f"{name}.yaml"))
+
+
 def page() -> str:
     """The page, with the films that are there."""
     text = HEAD
     for name, words in SHOWN.items():
-        title = (ROOT / "examples" / f"{name}.yaml").read_text(encoding="utf-8")
+        title = example(name).read_text(encoding="utf-8")
         title = next(line.removeprefix("title: ") for line in title.splitlines() if line.startswith("title: "))
         text += f"## {title}\n\n{words}\n\n"
         # the poster is what phones show before a film is played
         text += f'<video controls loop muted playsinline preload="metadata" poster="pictures/{name}.png" '
         text += f'src="films/{name}.mp4"></video>\n\n'
-        text += f"[{name}.yaml](../examples/{name}.yaml)\n\n"
+        text += f"[{name}.yaml](../{example(name).relative_to(ROOT).as_posix()})\n\n"
     return text.rstrip("\n") + "\n"
 
 
 def main(names: list[str]) -> None:
     for name in [] if "--page" in names else names or SHOWN:
-        film(name, hybrid.run(hybrid.load_scene(ROOT / "examples" / f"{name}.yaml")))
+        film(name, hybrid.run(example(name)))
     PAGE.write_text(page(), encoding="utf-8")
 
 

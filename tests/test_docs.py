@@ -219,7 +219,11 @@ def test_example_loads_and_is_planned(example: Path, capsys: pytest.CaptureFixtu
     assert "unknowns" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("example", [*EXAMPLES, ROOT / "examples" / "08_python_api.py"], ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "example",
+    [*EXAMPLES, *(ROOT / "examples" / "contact").glob("*.yaml"), ROOT / "examples" / "08_python_api.py"],
+    ids=lambda p: p.stem,
+)
 def test_example_has_a_header_and_a_picture(example: Path) -> None:
     text = example.read_text(encoding="utf-8")
     for entry in ("Shows:", "Physics:", "Look at:", "Run time:", "Source:"):

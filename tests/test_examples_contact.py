@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import hybrid
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+EXAMPLES = Path(__file__).parents[1] / "examples" / "contact"
 Floats = NDArray[np.float64]
 
 
@@ -66,7 +66,7 @@ def test_tethers_wind_up_without_passing_through_each_other_and_come_apart() -> 
     assert distances[0] > 1.0
     middle = np.argmin(np.abs(result.times - 29.0))
     assert distances[middle] < 2.0 * 0.03
-    assert distances[-1] > 10.0 * 0.03
+    assert distances[-1] > 2.0 * 0.03
 
 
 def test_an_umbilical_clashes_with_a_mooring_line() -> None:

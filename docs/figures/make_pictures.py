@@ -38,7 +38,9 @@ def first_scene() -> hybrid.Scene:
 
 
 def main(names: list[str]) -> None:
-    scenes = {path.stem: hybrid.load_scene(path) for path in sorted(EXAMPLES.glob("*.yaml"))}
+    scenes: dict[str, Path | hybrid.Scene] = {
+        path.stem: path for path in sorted([*EXAMPLES.glob("*.yaml"), *(EXAMPLES / "contact").glob("*.yaml")])
+    }
     scenes["first"] = first_scene()
     for name, scene in scenes.items():
         if names and name not in names:
