@@ -13,7 +13,6 @@ import hybrid
 from board import against_peers
 from board import problems as ours
 from board.answers import Answer, Problem, references
-from board.cosserat import solved_by_all
 from board.page import page
 from board.picture import draw
 
@@ -30,7 +29,6 @@ PROBLEMS: dict[str, Callable[[str], list[Answer]]] = {
     "suspension": against_peers.suspended,
     "power_cables": ours.power_cables,
     "helix": ours.helix,
-    **{f"cosserat_{x}": solved_by_all for x in ("cantilever", "catenary", "pendulum", "crossing", "capstan", "pile")},
 }
 PACKAGES = {
     "CableDyn": "cabledyn",
@@ -38,8 +36,6 @@ PACKAGES = {
     "MoorPy": "moorpy",
     "Exudyn": "exudyn",
     "PyElastica": "pyelastica",
-    "MuJoCo": "mujoco",
-    "cosseratbench": "cosseratbench",
 }
 
 

@@ -197,7 +197,6 @@ def test_the_program_places_cells_that_follow_a_radius() -> None:
 @pytest.mark.parametrize(
     ("change", "where", "says"),
     [
-        ({"dimension": 2}, "dimension", "computed in space"),
         ({"ends": {"start": {"kind": "pinned", "position": [0, 0, 0.05]}, "end": "free"}}, "ends.start.position", "obstacles.pipe"),
         ({"obstacles": {"pipe": {"kind": "cylinder", "at": [0, 0, 0], "radius": 1}}}, "obstacles.pipe.axis", ""),
     ],
