@@ -32,7 +32,7 @@ MARKED = {"index.md": 1, "studies.md": 1, "trade.md": 1}
 # extend.md is tests/test_extend.py, export.md tests/exports/test_export_page.py; of the README .ci/run runs the first two blocks, and test_docs.py the others, commands.md and tutorial.md.
 ELSEWHERE = {"extend.md", "export.md", "README.md", "tutorial.md", "commands.md"}
 # Files that run examples as they stand and check their figures: examples.md does not run those again.
-FIGURES = ("test_examples.py", "simulation/test_stepping.py", "couple/test_fmu.py")
+FIGURES = ("test_examples.py", "test_examples_contact.py", "simulation/test_stepping.py", "couple/test_fmu.py")
 
 
 class Block(NamedTuple):
@@ -60,9 +60,9 @@ def runs(page: Path) -> bool:
 def checked(block: Block) -> bool:
     """Whether a test checks the figures of the example that a block runs."""
     tests = "".join((ROOT / "tests" / file).read_text(encoding="utf-8") for file in FIGURES)
-    examples = re.findall(r"examples/(\w+)\.(yaml|py)", block.text)
-    assert examples and all((ROOT / "examples" / f"{name}.{ending}").is_file() for name, ending in examples)
-    return all(re.search(rf'"{name}(\.{ending})?"', tests) for name, ending in examples)
+    examples = [Path(x) for x in re.findall(r"examples/[\w/]+\.(?:yaml|py)", block.text)]
+    assert examples and all((ROOT / x).is_file() for x in examples)
+    return all(re.search(rf'"{x.stem}({x.suffix})?"', tests) for x in examples)
 
 
 def shape(line: str) -> str:
