@@ -19,7 +19,7 @@ from cosseratbench.solver import Capability, Diverged
 from cosseratbench.trajectory import Trajectory
 
 from hybrid.accuracy.api import run
-from hybrid.errors import HybridError
+from hybrid.errors import ComputationError, SceneError
 
 STEPS = 1000  # to the slowest period of a scenario
 CORNER = 0.04  # s, over which a motion that jumps to a velocity reaches it
@@ -57,7 +57,7 @@ class HybridSolver:
         """Compute a scenario with n_elements cells to a rod.
 
         Returns n_frames outputs: positions in m, inertial frame, and the material direction of each cell.
-        Raises NotImplementedError for an end that slides, Diverged where a run stops.
+        Raises NotImplementedError for what a scene does not state (an end that slides), Diverged where a run stops.
         """
         with TemporaryDirectory() as folder:
             scene = _scene(scenario, n_elements, Path(folder))
@@ -65,8 +65,10 @@ class HybridSolver:
             scene["output"] = {"every": scenario.duration / (n_frames - 1), "points": n_elements + 1, "exact": True}
             try:
                 result = run(scene)
-            except HybridError as error:
-                raise Diverged(str(error)) from error
+            except SceneError as error:  # asked for what no scene states
+                raise NotImplementedError(str(error)) from error
+            except ComputationError as error:
+                raise Diverged(str(error), error.t) from error
         lines = [result.lines[f"rod{i}"] for i in range(len(scenario.rods))]
         positions = tuple(np.asarray(line["position"]) for line in lines)
         directors = tuple(
@@ -90,6 +92,8 @@ def _scene(scenario: Scenario, cells: int, folder: Path) -> dict[str, Any]:
     points: dict[str, Any] = {}
     lines: dict[str, Any] = {}
     friction = max(rod.friction for rod in scenario.rods)
+    if any(rod.friction != friction for rod in scenario.rods):
+        raise NotImplementedError("rods of different friction")
     for i, rod in enumerate(scenario.rods):
         ends = {end.value: f"rod{i}_{end.value}" for end in (End.START, End.END)}
         nodes = rod.nodes(cells)

@@ -25,6 +25,7 @@ from hybrid.scene.sea import Seabed
 
 SHORTEST_SPAN = 1e-3  # of the length: a line between nearer ends has no straight span to start from
 DRAG_ROUNDS = 4  # of the first shape: drag follows the shape, half of it first
+GIVEN = "the polyline given"  # name of a first shape that the scene gives
 WAYS_OUT = 100  # places to which a node that is in an obstacle may be moved
 
 
@@ -33,7 +34,7 @@ def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
     start, end = (end.held_position for end in scene.ends.both)
     initial, length = scene.initial, scene.length
     if isinstance(initial, Points):
-        return along_polyline(np.array(initial.points, float), s, np.array(initial.knots)), "the polyline given"
+        return along_polyline(np.array(initial.points, float), s, np.array(initial.knots)), GIVEN
     if isinstance(initial, Straight):
         direction = np.array(initial.direction, float) / np.linalg.norm(initial.direction)
         origin = initial.origin or start
@@ -41,7 +42,7 @@ def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
         return first + s[:, None] * direction, "the straight line given"
     assert isinstance(initial, Equilibrium)
     if initial.points is not None:
-        return along_polyline(np.array(initial.points, float), s), "the polyline given"
+        return along_polyline(np.array(initial.points, float), s), GIVEN
     down = net_weight(scene) >= 0.0  # a line lighter than water hangs upwards
     start, end = (end.first_position for end in scene.ends.both)
     if start and end and initial.guess == "span":

@@ -34,8 +34,8 @@ AXES = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 _PLACE = "its middle, from the origin of the body in axes of the body [m]"
 
 
-class CarriedSphere(SphereObstacle):
-    """A ball that a body carries, where the body is first looked for."""
+class _OnBody(Table):
+    """What a shape knows of the body that carries it, where the body is first looked for."""
 
     body: str = Field(exclude=True, description="name of the body")
     origin: Triple = Field(exclude=True, description="origin of the body [m]")
@@ -48,33 +48,18 @@ class CarriedSphere(SphereObstacle):
         return True
 
 
-class CarriedCylinder(CylinderObstacle):
-    """A cylinder that a body carries, where the body is first looked for."""
+class CarriedSphere(_OnBody, SphereObstacle):
+    """A ball that a body carries."""
 
-    body: str = Field(exclude=True, description="name of the body")
-    origin: Triple = Field(exclude=True, description="origin of the body [m]")
-    body_axes: tuple[Triple, Triple, Triple] = Field(exclude=True, description="axes of the body, inertial [-]")
-    place: Triple = Field(exclude=True, description="middle of the shape, in axes of the body [m]")
+
+class CarriedCylinder(_OnBody, CylinderObstacle):
+    """A cylinder that a body carries."""
+
     own_axis: Triple = Field(exclude=True, description="axis, in axes of the body [-]")
 
-    @property
-    def moves(self) -> bool:
-        """Always, with its body."""
-        return True
 
-
-class CarriedBox(BoxObstacle):
-    """A box that a body carries, where the body is first looked for; its rotation is against the axes of the body."""
-
-    body: str = Field(exclude=True, description="name of the body")
-    origin: Triple = Field(exclude=True, description="origin of the body [m]")
-    body_axes: tuple[Triple, Triple, Triple] = Field(exclude=True, description="axes of the body, inertial [-]")
-    place: Triple = Field(exclude=True, description="middle of the shape, in axes of the body [m]")
-
-    @property
-    def moves(self) -> bool:
-        """Always, with its body."""
-        return True
+class CarriedBox(_OnBody, BoxObstacle):
+    """A box that a body carries; its rotation is against the axes of the body."""
 
     @property
     def own_axes(self) -> tuple[Triple, ...]:

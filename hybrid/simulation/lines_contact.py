@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid.kernels.state.state import Floats
 from hybrid.model.lines_contact import Touching
 from hybrid.model.system import SystemModel
+from hybrid.simulation.contact_equilibrium import JUMP, jumps
 from hybrid.simulation.self_watch import diameters, least_bending
 from hybrid.solve.joined import SystemState
 from hybrid.solve.shared_contact import SharedContact, TouchingLine
 
 if TYPE_CHECKING:
     from hybrid.simulation.system_run import SystemRun
-
-# Parts of a way between two shapes, and by how much the Gauss integral of two lines jumps where one passes through the
-# other: by 1, and by far less in a part of a way on which none does.
-PARTS, JUMP = 48, 0.5
 
 
 def shared_of(model: SystemModel, rubs: bool = False) -> SharedContact | None:
@@ -33,18 +28,6 @@ def shared_of(model: SystemModel, rubs: bool = False) -> SharedContact | None:
     return SharedContact(model.touching, strands, rubs)
 
 
-def gauss_integral(a: Floats, b: Floats) -> float:
-    """Gauss integral of two polylines (n, 3) m and (m, 3) m: half the sum of their signed crossings over all views."""
-    p, q = a[:-1, None], a[1:, None]
-    r, s = b[None, :-1], b[None, 1:]
-    pr, ps, qr, qs = (y - x for x, y in ((p, r), (p, s), (q, r), (q, s)))
-    normals = [np.cross(x, y) for x, y in ((pr, ps), (ps, qs), (qs, qr), (qr, pr))]
-    n = [x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-300) for x in normals]
-    angles = [np.arcsin(np.clip(np.einsum("ijk,ijk->ij", n[i], n[(i + 1) % 4]), -1.0, 1.0)) for i in range(4)]
-    side = np.sign(np.einsum("ijk,ijk->ij", np.cross(s - r, q - p), pr))
-    return float((side * sum(angles)).sum() / (4.0 * math.pi))
-
-
 def crossed(touching: Touching, first: SystemState, last: SystemState) -> tuple[int, int] | None:
     """Numbers of two lines of which one passes through the other on the straight way between two shapes; None: none."""
     for j, a in enumerate(touching.lines):
@@ -55,10 +38,7 @@ def crossed(touching: Touching, first: SystemState, last: SystemState) -> tuple[
             lows, highs = ([f(w, axis=(0, 1)) for w in ways] for f in (np.min, np.max))
             if (np.maximum(*lows) > np.minimum(*highs)).any():
                 continue
-            found = np.array([
-                gauss_integral(*((1.0 - x) * w[0] + x * w[1] for w in ways)) for x in np.linspace(0.0, 1.0, PARTS + 1)
-            ])  # fmt: skip
-            if (np.abs(np.diff(found)) > JUMP).any():
+            if jumps(*ways) > JUMP:
                 return a, b
     return None
 

@@ -14,7 +14,7 @@ from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.first_state import HUNG
 from hybrid.model.system import SystemModel
-from hybrid.simulation.contact_equilibrium import KEPT, contact_of
+from hybrid.simulation.contact_equilibrium import KEPT, contact_of, passes_itself
 from hybrid.simulation.lines_contact import crossed, shared_of
 from hybrid.solve.contact_statics import contact_energy
 from hybrid.solve.flaws import behind_obstacles
@@ -53,6 +53,8 @@ def solve_with_contact(
     lost = _has_lost(lines, hung, found)
     if model.touching is not None:
         lost = lost or crossed(model.touching, hung, found.state) is not None
+    each = zip(_touch(lines), model.models, found.state.lines, strict=True)
+    lost = lost or any(touches and passes_itself(x, state) for touches, x, state in each)
     if not (lost or _largest_energy(model, lines, bodies, found.state)):
         return found
     last: list[Start] = [] if lost else [("the equilibrium without contact", found.state)]

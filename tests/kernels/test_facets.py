@@ -140,10 +140,10 @@ WRONG: dict[str, tuple[Any, str]] = {
 @pytest.mark.parametrize("what", WRONG)
 def test_surfaces_that_cannot_be_are_refused(what: str, tmp_path: Path) -> None:
     corners, says = WRONG[what]
-    refused(text_stl(tmp_path / "x.stl", np.asarray(corners)), says)
+    assert_refused(text_stl(tmp_path / "x.stl", np.asarray(corners)), says)
 
 
-def refused(file: str, says: str) -> None:
+def assert_refused(file: str, says: str) -> None:
     with pytest.raises(SceneError) as error:
         obstacles(mesh={"kind": "mesh", "file": file, "at": [0, 0, 0]})
     (found,) = (x for x in error.value.complaints if x.where == "obstacles.mesh.file")
@@ -176,12 +176,12 @@ FILES: dict[str, tuple[str, bytes, str]] = {
 def test_files_that_cannot_be_read_are_refused(what: str, tmp_path: Path) -> None:
     name, data, says = FILES[what]
     (tmp_path / name).write_bytes(data)
-    refused(str(tmp_path / name), says)
+    assert_refused(str(tmp_path / name), says)
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    refused(str(tmp_path / "none.stl"), "an STL or OBJ file.*does not exist")
-    refused(str(tmp_path), "an STL or OBJ file.*a folder")
+    assert_refused(str(tmp_path / "none.stl"), "an STL or OBJ file.*does not exist")
+    assert_refused(str(tmp_path), "an STL or OBJ file.*a folder")
 
 
 def test_an_end_within_the_surface_is_refused() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.simulation.contact_equilibrium import gauss_integral
 
 WIDTH, LENGTH = 0.02, 8.0
 LEGS = {"zones": [{"catenary": 3.0}, {"rod": 2.0}, {"catenary": 3.0}]}
@@ -120,3 +121,32 @@ def test_strands_that_are_too_close_along_the_line_for_contact() -> None:
     result = hybrid.static(hybrid.validate_scene(tables))
     assert result["energy/self_contact"][0] == 0.0 and apart(result) < 1.0
     assert "line touches itself" in {e.kind for e in result.events}
+
+
+def knotted(**more: Any) -> dict[str, Any]:
+    """A cord in a trefoil between two pins, apart from itself; its bends are short against the loops under its weight."""
+    t = np.linspace(-2.05, 2.05, 60)
+    p = np.column_stack([t**3 - 3 * t, 4 * t**2 - t**4, (t**5 - 10 * t) / 6]) * 0.05
+    tails = [(a - b) / np.linalg.norm(a - b) for a, b in ((p[0], p[1]), (p[-1], p[-2]))]
+    points = np.vstack([p[0] + 0.4 * tails[0], p, p[-1] + 0.4 * tails[1]])
+    section = {
+        "length": float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()), "mass": 0.1, "diameter": 0.012,
+        "axial_stiffness": 2e4, "bending_stiffness": 1e-4,
+    }  # fmt: skip
+    return {
+        "environment": {"gravity": 5.0}, "model": "rod", "mesh": {"cells": 280}, "cable": {"sections": [section]},
+        "ends": {"start": {"kind": "pinned", "position": points[0].tolist()},
+                 "end": {"kind": "pinned", "position": points[-1].tolist()}},
+        "contact": {"self": True}, "initial": {"kind": "equilibrium", "points": points.tolist()},
+    } | more  # fmt: skip
+
+
+def test_a_knot_that_is_given_is_a_knot_at_rest() -> None:
+    """Without contact the line is a catenary, which it reaches by passing through itself: a writhe of 0 for -3."""
+    scene = knotted()
+    given, free = np.array(scene["initial"]["points"]), hybrid.static(knotted(contact={"self": False})).position[0]
+    assert gauss_integral(given, given) == pytest.approx(-3.15, abs=0.01)
+    assert abs(gauss_integral(free, free)) < 0.01
+    tight = hybrid.static(scene)
+    assert gauss_integral(tight.position[0], tight.position[0]) == pytest.approx(-3.15, abs=0.1)
+    assert apart(tight) * WIDTH > 0.94 * 0.012 and "line touches itself" in {e.kind for e in tight.events}
