@@ -77,3 +77,17 @@ def keys_of(tables: dict[str, Any]) -> list[str]:
     if "attachments" in tables["cable"]:
         keys += ["cable.attachments[0].buoyancy", "cable.attachments[0].mass"]
     return [*keys, "ends.end.position[0]", "ends.end.position[2]", "ends.start.position[1]"]
+
+
+def scene_in_motion(seed: int) -> tuple[str, dict[str, Any]]:
+    """The same whose end is heaved and surged for a period of its swing, with fixed steps."""
+    kind, tables = scene_at_rest(seed)
+    rng = np.random.default_rng(10_000 + seed)
+    L = sum(x["length"] for x in tables["cable"]["sections"])
+    period = float(2.0 * np.pi * np.sqrt(L / 9.81) * rng.uniform(0.7, 1.5))
+    axes = {"heave": float(rng.uniform(0.002, 0.01)) * L, "surge": float(rng.uniform(0.002, 0.01)) * L}
+    motion = {name: {"amplitude": x, "period": period, "phase": 40.0} for name, x in axes.items()}
+    tables["ends"]["end"] |= {"motion": {**motion, "ramp": 0.5 * period}}
+    tables["time"] = {"duration": period, "step": period / 80.0, "rho_inf": 0.6}
+    tables["output"] = {"every": period / 40.0, "points": 21}
+    return kind, tables

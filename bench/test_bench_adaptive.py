@@ -1,7 +1,8 @@
 """Zones that move, measured: error against what was asked, switches, cost, and CPU time at equal accuracy.
 
     pytest bench -m bench -s -k adaptive                 # all, about 15 minutes
-    HYBRID_BENCH_SEEDS=60 pytest bench -m bench -s -k "adaptive and random"    # or one: random (200 seeds if none are
+    HYBRID_BENCH_SEEDS=60 HYBRID_BENCH_ROUNDS=1 pytest bench -m bench -s -o faulthandler_timeout=0 -k "adaptive and random"
+                                                               # or one: random (200 seeds, 3 rounds if none are
                                                                # given), suspension, switches, flicker,
                                                                # speed, slack, limits
 
@@ -80,6 +81,7 @@ def changes(result: hybrid.Result) -> list[Any]:
 
 
 SEEDS = int(os.environ.get("HYBRID_BENCH_SEEDS", "200"))
+RANDOM_ROUNDS = int(os.environ.get("HYBRID_BENCH_ROUNDS", "3"))
 
 
 def in_plane(text: Text) -> Text:
@@ -106,7 +108,7 @@ def test_adaptive_random(plane: bool) -> None:
         L, tolerance = length(text), text["model"]["tolerance"]
         found: dict[str, hybrid.Result] = {}
         spent = {"zones that move": np.inf, "rods": np.inf}
-        for _ in range(3):
+        for _ in range(RANDOM_ROUNDS):
             for name, model in (("zones that move", {}), ("rods", {"kind": "rod"})):
                 try:
                     found[name] = run(text, **model)
@@ -121,6 +123,7 @@ def test_adaptive_random(plane: bool) -> None:
         ratio = apart(a, r) / L / tolerance
         ratios.append(ratio)
         ratio_cpu.append(spent["zones that move"] / spent["rods"])
+        print(f"{seed:4d} {kind:10s} {ratio:8.2f} of the tolerance, {ratio_cpu[-1]:5.2f} of the time", flush=True)
         if ratio > 2.0:
             said = run(text | {"output": text["output"] | {"errors": True}}).attributes["error_total_position"]
             shorter = copy.deepcopy(text)

@@ -56,7 +56,7 @@ ROUNDS = 5
 
 
 def test_what_a_mooring_of_three_lines_costs() -> None:
-    """Whole runs of hybrid with a file, against the loops alone of the others: each row beside those as exact or better."""
+    """Whole runs of hybrid with a file, against whole runs of the others: each row beside those as exact or better."""
     pytest.importorskip("cabledyn")
     pytest.importorskip("moordyn")
     programs = {"hybrid": hybrids, "CableDyn": cabledyns, "MoorDyn": moordyns}

@@ -1,6 +1,6 @@
 """What the choice of a model costs: scenes that name none, at 1 %, against rods and zones that move at the same accuracy.
 
-    HYBRID_BENCH_SEEDS=100 pytest bench/test_bench_choice.py -m bench -n 0 -s      (30 seeds if none are given)
+    HYBRID_BENCH_SEEDS=100 pytest bench/test_bench_choice.py -m bench -n 0 -s -o faulthandler_timeout=0     (30 seeds if none are given)
 
 Processor times are of whole runs, all passes counted, from the scene to its result in memory; every run is made twice,
 and the second counts.

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.linear.eigen import lowest_modes
+from hybrid.linear.matrices import linear_network
 from hybrid.modal.api import equilibrium_of
-from hybrid.modal.eigen import lowest_modes
-from hybrid.modal.matrices import linear_network
 
 pytestmark = pytest.mark.bench
 ROUNDS = 5

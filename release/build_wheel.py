@@ -59,7 +59,8 @@ def compile_for(level: cache.Level, few: bool, kept: Path) -> None:
         if any([half.wait() for half in halves]):
             raise SystemExit("tests/compile_kernels.py failed")
     with TemporaryDirectory() as work:
-        for scene in [SUSPENSION] if few else sorted(SUSPENSION.parent.glob("*.yaml")):
+        contact = SUSPENSION.parent / "contact"
+        for scene in [SUSPENSION] if few else sorted([*SUSPENSION.parent.glob("*.yaml"), *contact.glob("*.yaml")]):
             command = [sys.executable, "-m", "hybrid", "run", str(scene), "-q", "-o", f"{work}/run.h5"]
             subprocess.run(command, env=environment, check=True)
     place = cache.Place(cache.folder_of(level.name), cache.processor_of(level), ours=False)

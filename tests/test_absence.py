@@ -14,6 +14,7 @@ import hybrid
 from hybrid.kernels.state.forces import (
     ADDED_MASS,
     BODIES,
+    BREAKOUT,
     DRAG,
     FLOW,
     FORCES,
@@ -24,10 +25,12 @@ from hybrid.kernels.state.forces import (
     ROTARY,
     SEABED,
     SELF_CONTACT,
+    SOIL,
     STIFFNESS_DAMPING,
     SURFACE,
     WAVES,
 )
+from hybrid.kernels.state.state import state_for
 from hybrid.model.build import Model, build
 
 BARE = {"length": 2.0, "mass": 0.1}
@@ -113,6 +116,16 @@ SCENES = {
     ),
     "seabed": (scene(BENDS, "rod", **bed()), SEABED),
     "friction": (scene(BENDS, "rod", **bed(friction=0.3)), SEABED | FRICTION),
+    "soil": (
+        scene(
+            BENDS | {"diameter": 0.01}, "rod", environment={"seabed": {"z": -1.5, "soil": {"shear_strength": 500.0}}}
+        ),
+        SEABED | SOIL | ROTARY | MAY_TOUCH,
+    ),
+    "friction that breaks out": (
+        scene(BENDS, "rod", **bed(friction={"axial": 0.3, "lateral": 0.3, "residual": [0.2, 0.2], "breakout": 0.1})),
+        SEABED | FRICTION | BREAKOUT,
+    ),
     "friction of zero": (scene(BENDS, "rod", **bed(friction=0)), SEABED),
     "clump": (scene(BARE, **WET, **on_it(kind="clump", at=1.0, mass=0.2)), 0),
     "clump with drag": (scene(BARE, **WET, **on_it(kind="clump", at=1.0, mass=0.2, drag_area=0.01)), BODIES),
@@ -145,6 +158,9 @@ def test_only_what_is_asked_for_has_a_bit_and_numbers(asked: hybrid.Scene, bits:
         value = getattr(model.sea.values, name)
         assert np.isnan(value).any() != bool(bits & bit), name
     assert bool(model.sea.values.waves.size) == bool(bits & WAVES)
+    assert bool(line.bed_width.size) == bool(bits & SOIL)
+    for memory in (model.sea.values.soil, state_for(line).soil):
+        assert bool(memory.size) == bool(bits & (SOIL | BREAKOUT))
     for name, bit in PARAMETERS.items():
         value = getattr(line, name)
         assert (np.isfinite(value) if bits & bit else np.isnan(value)).all(), name

@@ -57,6 +57,18 @@ def test_a_rope_slips_over_a_sheave_as_the_capstan_equation_says() -> None:
     assert np.abs(held.position[late, -1, 2] - held.position[late, -1, 2].mean()).max() < 0.02
 
 
+def test_a_rope_is_drawn_over_a_fairlead_of_triangles() -> None:
+    result = ran("rope_over_fairlead")
+    late = int(np.argmin(np.abs(result.times - 1.5)))
+    before, behind = result.tension[late, -1], result.tension[late, 0]
+    assert before == pytest.approx(490.0, rel=1e-3)
+    assert behind / before == pytest.approx(np.exp(0.15 * np.pi), rel=0.01)
+    assert {x.kind for x in result.events} == {"unresolved bend"}
+    out = np.hypot(result.position[late, :, 0], result.position[late, :, 2])
+    assert out.min() > 0.4 * np.cos(np.pi / 36) + 0.9 * 0.01  # on the faces of the barrel
+    assert len(result["obstacles/fairlead/triangles"]) == 432
+
+
 def test_tethers_wind_up_without_passing_through_each_other_and_come_apart() -> None:
     result = ran("tethers_tangle")
     assert [e.kind for e in result.events].count("lines touch") == 1

@@ -76,24 +76,26 @@ def test_what_needs_no_change_holds_as_it_is(tmp_path: Path) -> None:
     prove(blocks("python")[:UNCHANGED], ROOT, tmp_path)
 
 
-@pytest.mark.slow  # a minute: the kernels of the copy are compiled
-def test_every_proof_of_a_change_holds(copy: Path) -> None:
-    cache = {"HYBRID_CACHE_DIR": str(copy / "cache"), "NUMBA_OPT": "1"}  # compiled once, run for a moment
-    prove(blocks("python")[UNCHANGED:], copy, copy, **cache)
-    walk = [
-        "-m",
-        "pytest",
-        "-q",
-        "-n",
-        "0",
-        "-p",
-        "no:cacheprovider",
-        str(ROOT / "tests/model/test_fields_of_a_line.py"),
-    ]
-    done = subprocess.run(
-        [sys.executable, "-P", *walk], cwd=copy, env=os.environ | {"PYTHONPATH": str(copy)} | cache, capture_output=True,
-        text=True,
-    )  # fmt: skip
+@pytest.fixture
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Where kernels of the copy are kept, for all tests and processes, and how they are compiled: once, to run for a moment."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    return {"HYBRID_CACHE_DIR": str(shared / "kernels_of_the_copy"), "NUMBA_OPT": "1"}
+
+
+@pytest.mark.slow  # minutes: the kernels of the copy are compiled
+def test_every_proof_of_a_change_holds(copy: Path, compiled: dict[str, str]) -> None:
+    prove(blocks("python")[UNCHANGED:], copy, copy, **compiled)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", ["payout", "not payout"])
+def test_a_force_that_was_added_is_carried(part: str, copy: Path, compiled: dict[str, str]) -> None:
+    walk = ["-q", "-n", "0", "-p", "no:cacheprovider", "-k", part, str(ROOT / "tests/model/test_fields_of_a_line.py")]
+    here = os.environ | {"PYTHONPATH": str(copy)} | compiled
+    command = [sys.executable, "-P", "-m", "pytest", *walk]
+    done = subprocess.run(command, cwd=copy, env=here, capture_output=True, text=True)
     assert done.returncode == 0, f"a field that is not carried: {done.stdout}"
 
 

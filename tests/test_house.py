@@ -28,15 +28,16 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "adapt": ("errors", "kernels", "model"),
     "outputs": ("errors", "kernels", "model", "solve", "store"),
     "simulation": COMPUTING,
-    "accuracy": (*COMPUTING, "simulation"),
+    "linear": (*COMPUTING, "simulation"),
+    "accuracy": (*COMPUTING, "simulation", "linear"),
     "view": ("errors", "statistics", "store"),
     "exports": ("errors", "store"),
     "interop": ("errors", "scene"),
-    "modal": (*COMPUTING, "simulation", "accuracy"),
+    "modal": (*COMPUTING, "simulation", "linear", "accuracy"),
     "studies": (*COMPUTING, "simulation", "accuracy", "view"),
-    "designs": (*COMPUTING, "simulation", "accuracy", "modal", "studies"),
+    "designs": (*COMPUTING, "simulation", "linear", "accuracy", "modal", "studies"),
     "couple": (*COMPUTING, "simulation", "accuracy", "interop"),
-    "live": (*COMPUTING, "simulation", "accuracy", "view"),
+    "live": (*COMPUTING, "simulation", "accuracy", "modal", "view"),
     "cli": (
         *COMPUTING,
         "simulation",
@@ -47,6 +48,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "studies",
         "couple",
         "live",
+        "linear",
         "modal",
         "designs",
         "__init__",
@@ -68,7 +70,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
 
 # Packages from outside that only these rooms may import.
 ONLY = {
-    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "simulation", "accuracy", "modal", "designs", "view", "exports", "studies"),
+    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "simulation", "linear", "accuracy", "modal", "designs", "view", "exports", "studies"),
     "numba": ("kernels",),
     "h5py": ("store", "exports"),
     "matplotlib": ("view",),

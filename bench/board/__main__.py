@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import json
 import shlex
 import sys
 from collections.abc import Callable
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -15,20 +17,24 @@ from board import problems as ours
 from board.answers import Answer, Problem, references
 from board.page import page
 from board.picture import draw
+from board.ropes import cosseratbench
 
 DOCS = Path(__file__).parents[2] / "docs"
+KEPT = DOCS.parent / "build" / "board"
 PROBLEMS: dict[str, Callable[[str], list[Answer]]] = {
     "lazy_wave_80": lambda name: ours.lazy_wave(name) + against_peers.cabledyn_on(name),
     "span_80": lambda name: ours.span(name) + against_peers.cabledyn_on(name),
     "lazy_wave_800": lambda name: ours.lazy_wave(name) + against_peers.cabledyn_on(name),
     "touchdown_bending": ours.touchdown_bending,
-    "chain_current": ours.chain_current,
-    "chain_heave": ours.chain_heave,
+    "chain_current": lambda name: ours.chain_current(name) + against_peers.cabledyn_in_current(name),
+    "chain_heave": lambda name: ours.chain_heave(name) + against_peers.heaved_chains(name),
     "touchdown": against_peers.touchdown,
     "mooring": against_peers.mooring,
+    "moorings_at_rest": against_peers.moorings_at_rest,
     "suspension": against_peers.suspended,
     "power_cables": ours.power_cables,
     "helix": ours.helix,
+    "cosseratbench": cosseratbench,
 }
 PACKAGES = {
     "CableDyn": "cabledyn",
@@ -36,6 +42,8 @@ PACKAGES = {
     "MoorPy": "moorpy",
     "Exudyn": "exudyn",
     "PyElastica": "pyelastica",
+    "MuJoCo": "mujoco",
+    "cosseratbench": "cosseratbench",
 }
 
 
@@ -60,13 +68,29 @@ def programs() -> tuple[str, str]:
     return ", ".join(there), ", ".join(missing) or "none"
 
 
-def board(names: list[str], folder: Path, command: str) -> str:
-    """Compute problems, write board.md and pictures/board.png to the folder; the page."""
-    found = []
+def board(names: list[str], folder: Path, command: str, again: bool) -> str:
+    """Compute problems, write board.md and pictures/board.png to the folder; the page.
+
+    What a problem gave is kept in KEPT; unless again, it is taken from there where all versions are the same.
+    """
+    found, versions = [], programs()
+    KEPT.mkdir(parents=True, exist_ok=True)
     for name in names:
+        file = KEPT / f"{name}.json"
+        kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() and not again else {}
+        if kept.get("versions") == list(versions):
+            given = kept["problem"]
+            found.append(Problem(**given | {"answers": [Answer(**x) for x in given["answers"]]}))
+            continue
         print(f"{name} ...", file=sys.stderr, flush=True)
+        if again and name == "cosseratbench":
+            for pair in KEPT.glob("*-*-*.json"):
+                pair.unlink()
         found.append(solved(name))
-    text = page(found, command, *programs())
+        file.write_text(
+            json.dumps({"versions": versions, "problem": asdict(found[-1])}, default=float), encoding="utf-8"
+        )
+    text = page(found, command, *versions)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "board.md").write_text(text, encoding="utf-8")
     draw(found, folder / "pictures" / "board.png")
@@ -78,10 +102,12 @@ def main() -> None:
     ask = argparse.ArgumentParser(prog="python -m board", description=sys.modules["board"].__doc__)
     ask.add_argument("--problems", nargs="+", choices=list(PROBLEMS), default=list(PROBLEMS), metavar="NAME")
     ask.add_argument("-o", "--output", type=Path, help="folder; else docs, and build/board for a part of the problems")
+    ask.add_argument("--kept", action="store_true", help="take what an earlier call of the same versions computed")
     given = ask.parse_args()
     whole = given.problems == list(PROBLEMS)
-    folder = given.output or (DOCS if whole else DOCS.parent / "build" / "board")
-    print(board(given.problems, folder, shlex.join(["python", "-m", "board", *sys.argv[1:]])))
+    folder = given.output or (DOCS if whole else KEPT)
+    command = shlex.join(["python", "-m", "board", *(x for x in sys.argv[1:] if x != "--kept")])
+    print(board(given.problems, folder, command, not given.kept))
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ Each program is run by its own module of `peers`, in the settings that its bench
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -18,7 +19,9 @@ from peers import (
     cabledyn_cable,
     exudyn_suspension,
     hybrid_suspension,
+    moordyn_cable,
     pyelastica_suspension,
+    random_moorings,
     spread_mooring,
     suspension,
 )
@@ -27,7 +30,7 @@ from peers.measure import BEST, PEERS, elsewhere
 
 import hybrid
 from board.answers import ROUNDS, Answer, references, timed
-from board.problems import row_of
+from board.problems import CURRENTS, SEGMENT, first_harmonic, row_of
 
 AGREED = "two programs"  # of the touchdown
 # Program, elements, EI, settings of the touchdown (test_bench_touchdown.py).
@@ -45,6 +48,8 @@ MOORING = (
     ("CableDyn", spread_mooring.cabledyns, 0.05),
     ("MoorDyn", spread_mooring.moordyns, 4e-3),
 )
+# Program, module, segments over those of the references, step (s) of the chains in heave.
+HEAVED = (("CableDyn", cabledyn_cable, 2, 0.05), ("MoorDyn", moordyn_cable, 1, 1e-3))
 OURS_MOORING = ((0.1, False), (0.05, False), (0.05, True))  # step, whether errors are estimated
 
 
@@ -77,6 +82,61 @@ def cabledyn_on(name: str) -> list[Answer]:
     bend, pull = found.curvature[:, inner], found.top[late] / 1e3
     values = [bend[0].max(), bend[late].max(), pull[:-1].mean(), pull.min(), pull.max()]
     return [Answer("CableDyn", named(name, values), {}, cpu, words)]
+
+
+def cabledyn_in_current(name: str) -> list[Answer]:
+    """On the mesh of the reference and on four times as many elements."""
+    row, found = row_of(name), list[Answer]()
+    ((kind, length, count),) = row["sections"]
+    for times in (1, 4) if cabledyn_cable.available() else ():
+        cut = row | {"sections": [[kind, length, times * count]]}
+        runs = [rounds_of(lambda cut=cut, x=x: cabledyn_cable.run(cut | {"current": x})) for x in CURRENTS]
+        values = [x / 1e3 for run, _ in runs for x in (run.top[0], run.anchor[0])]
+        spent = sum(cpu for _, cpu in runs)
+        found.append(Answer("CableDyn", named(name, values), {}, spent, f"{times * count} elements"))
+    return found
+
+
+def heaved_chains(name: str) -> list[Answer]:
+    """Six runs of CableDyn and of MoorDyn on segments of the references and on half of them."""
+    problem, found = references()["problems"][name], list[Answer]()
+    heave = problem["heave"]
+    for program, module, times, step in HEAVED:
+        if not module.available():
+            continue
+        values, spent = [], 0.0
+        for number, _ in enumerate(problem["rows"]):
+            row = row_of(name, number)
+            ((kind, length, count),) = row["sections"]
+            _, mass, stiffness, *_ = row["types"][kind]
+            row |= {"sections": [[kind, length, times * count]], "damping": SEGMENT * math.sqrt(mass * stiffness)}
+            for amplitude in heave["amplitudes"]:
+                t, force, cpu = module.heaved(row, heave | {"amplitude": amplitude}, step)
+                values.append(first_harmonic(t, force / 1e3, heave["period"], heave["window"]))
+                spent += cpu
+        words = f"segments of {SEGMENT / times:g} m, steps of {step:g} s"
+        found.append(Answer(program, named(name, values), {}, spent, words))
+    return found
+
+
+def moorings_at_rest(name: str) -> list[Answer]:
+    """Ten systems of hybrid on two meshes and of MoorPy, whose catenaries are the reference; CPU time of all ten."""
+    if not spread_mooring.installed("moorpy"):
+        return []
+    systems = [random_moorings.random_system(seed) for seed in range(random_moorings.COUNT)]
+    theirs, found = random_moorings.by_moorpy(systems), list[Answer]()
+    for cells in (20, random_moorings.CELLS):
+        scenes = [random_moorings.scene_of(x, cells) for x in systems]
+        results, cpu = timed(lambda scenes=scenes: [hybrid.static(x) for x in scenes])
+        off = []
+        for result, other in zip(results, theirs, strict=True):
+            right = np.array(other["tensions"])
+            off.append(np.abs(random_moorings.tensions_of(result) - right).max(axis=0)[::-1] / right.max())
+        found.append(Answer("hybrid", named(name, np.max(off, axis=0)), {}, cpu, f"{cells} cells to a line"))
+    return [
+        *found,
+        Answer("MoorPy", named(name, (0.0, 0.0)), {}, sum(x["cpu"] for x in theirs), "catenaries, the reference"),
+    ]
 
 
 def touchdown(name: str) -> list[Answer]:
@@ -114,7 +174,7 @@ def peers_touchdown(name: str, run: Any, agreed: dict[str, float]) -> Answer:
 
 
 def mooring(name: str) -> list[Answer]:
-    """Pull on the first fairlead; ours with file and error figure, the peers' time loops."""
+    """Pull on the first fairlead; whole runs, ours with file and error figure."""
     figures, found = spread_mooring.figures, list[Answer]()
     for step, errors in OURS_MOORING:
         pull, cpu = timed(lambda step=step, errors=errors: spread_mooring.hybrids(3, step, errors=errors)[0])

@@ -19,7 +19,8 @@ ROUNDS = 3
 class Answer:
     """Of one program to one problem: values by quantity in its unit, its own error figures, CPU time (s).
 
-    words: what is said in place of values, of a program that has none, or beside them.
+    words: what is said in place of values, of a program that has none, or beside them.  walls: wall times (s) by quantity,
+    where each has a run of its own.  note: a sentence below the table.  finer: a run of ours that others are held against.
     """
 
     program: str
@@ -27,6 +28,9 @@ class Answer:
     figures: dict[str, float] = field(default_factory=dict)
     cpu: float | None = None
     words: str = ""
+    walls: dict[str, float] = field(default_factory=dict)
+    note: str = ""
+    finer: bool = False
 
 
 @dataclass(frozen=True)

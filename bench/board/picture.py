@@ -17,6 +17,7 @@ from board.answers import Answer, Problem
 LOOKS = {
     "hybrid": ("o", "#c2410c"), "CableDyn": ("s", "#1d4ed8"), "MoorDyn": ("^", "#047857"),
     "Exudyn": ("D", "#7c3aed"), "PyElastica": ("v", "#525252"),
+    "MoorPy": ("P", "#0e7490"),
 }  # fmt: skip
 LEAST = 1e-5  # smaller errors are drawn there
 INK, FAINT = "#262626", "#d4d4d4"

@@ -1,4 +1,7 @@
-"""Power cables at rest and in heave in CableDyn, from the rows of power_cables.json: bed, sections with bending, no current."""
+"""Cables at rest and in heave in CableDyn, from the rows of power_cables.json: bed, sections with bending, uniform current.
+
+A row may have `damping`, EA times the time of its strain rate (N s).
+"""
 
 from __future__ import annotations
 
@@ -41,6 +44,7 @@ LineID LineType Length NumSegs
 0 cBot
 0.4 rhoInf
 {dt} dtM
+{current} current
 {duration} TMax
 --- OUTPUTS ---
 {outputs}
@@ -49,7 +53,7 @@ LineID LineType Length NumSegs
 
 
 class Found(NamedTuple):
-    """Times (nt,) s, tension at the start and at the end (nt,) N, curvature at the nodes (nt, n) 1/m, CPU time (s)."""
+    """Times (nt,) s, force at the start and at the end (nt,) N, curvature at the nodes (nt, n) 1/m, CPU time (s)."""
 
     t: NDArray[np.float64]
     top: NDArray[np.float64]
@@ -67,7 +71,7 @@ def deck(row: dict[str, Any], dt: float, duration: float) -> tuple[str, list[str
     """The input file, and its channels of curvature."""
     bed = row["bed"] or {"depth": NO_BED, "stiffness": 1.0}
     types = [
-        f"{name} {d} {mass} {EA} 0 {EI} {drag} {along} {added} 0"
+        f"{name} {d} {mass} {EA} {row.get('damping', 0)} {EI} {drag} {along} {added} 0"
         for name, (d, mass, EA, EI, drag, along, added) in row["types"].items()
     ]
     sections = [f"1 {kind} {length} {count}" for kind, length, count in row["sections"]]
@@ -75,6 +79,7 @@ def deck(row: dict[str, Any], dt: float, duration: float) -> tuple[str, list[str
     return DECK.format(
         types="\n".join(types), sections="\n".join(sections), start=" ".join(map(str, row["start"])),
         end=" ".join(map(str, row["end"])), depth=bed["depth"], bed=bed["stiffness"], dt=dt, duration=duration,
+        current="uniform " + " ".join(map(str, row["current"])) if "current" in row else "none",
         outputs="\n".join(f'"{x}"' for x in ("FairTen1", "AnchTen1", *bends)),
     ), bends  # fmt: skip
 
@@ -108,6 +113,14 @@ def run(row: dict[str, Any], heave: dict[str, float] | None = None, dt: float = 
         cpu = time.process_time() - begin
     values = np.array(found, dtype=float)
     return Found(np.array(times), values[:, 0], values[:, 1], np.abs(values[:, 2:]), cpu)
+
+
+def heaved(
+    row: dict[str, Any], heave: dict[str, float], step: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Times (nt,) s, force (nt,) N at the start, which heaves, CPU time (s)."""
+    found = run(row, heave, step)
+    return found.t, found.top, found.cpu
 
 
 def moved(t: float, heave: dict[str, float]) -> tuple[float, float, float]:

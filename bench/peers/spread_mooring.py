@@ -90,7 +90,7 @@ def heaved(t: float) -> float:
 
 
 def cabledyns(count: int, step: float = STEP) -> tuple[Vector, float]:
-    """Tension (nt,) N at the fairlead of the first line, every EVERY s; CPU time (s) of the loop."""
+    """Tension (nt,) N at the fairlead of the first line, every EVERY s; CPU time (s) from the deck to the end."""
     points, lines = [], []
     for k in range(count):
         points += [
@@ -99,6 +99,7 @@ def cabledyns(count: int, step: float = STEP) -> tuple[Vector, float]:
         ]
         lines.append((2 * k + 2, 2 * k + 1, LENGTH))
     rows = f"{DEPTH} WtrDpth", f"{BED} kBot", f"{BED_DAMPING} cBot", f"{step} dtM", f"{DURATION} TMax"
+    begin = time.process_time()
     with model_of(deck(R4_185, points, lines, SEGMENTS, *rows)) as model:
         position, velocity, acceleration = model.get_coupled_motion()
         velocity[:], acceleration[:] = 0.0, 0.0
@@ -107,7 +108,6 @@ def cabledyns(count: int, step: float = STEP) -> tuple[Vector, float]:
         up = [k for k in range(2, rest.size, 3) if abs(rest.ravel()[k] - FAIRLEADS[1]) < 1e-9]
         assert len(up) == count
         pull = [float(model.channel("FairTen1"))]
-        begin = time.process_time()
         for k in range(1, round(DURATION / step) + 1):
             t = k * step
             before, now, after = heaved(t - d), heaved(t), heaved(t + d)
@@ -181,7 +181,7 @@ COUPLING = 0.02  # s, between two positions of fairleads that MoorDyn is given
 
 
 def moordyns(count: int, step: float) -> tuple[Vector, float]:
-    """The same of MoorDyn: the force of its line on the first fairlead, CPU time (s) of the loop."""
+    """The same of MoorDyn: the force of its line on the first fairlead, CPU time (s) from the deck to the end."""
     import moordyn
 
     points = [
@@ -197,12 +197,12 @@ def moordyns(count: int, step: float) -> tuple[Vector, float]:
     with tempfile.TemporaryDirectory() as folder, silence():
         path = Path(folder) / "deck.txt"
         path.write_text(text)
+        begin = time.process_time()
         system = moordyn.Create(str(path))
         rest, velocity = np.array([around(count, FAIRLEADS, k) for k in range(count)]), np.zeros((count, 3))
         assert moordyn.Init(system, rest.ravel().tolist(), velocity.ravel().tolist()) == 0
         point = moordyn.GetPoint(system, 2)
         pull = [float(np.linalg.norm(moordyn.GetPointForce(point)))]
-        begin = time.process_time()
         for k in range(round(DURATION / COUPLING)):
             now, then = heaved(COUPLING * k), heaved(COUPLING * (k + 1))
             position = rest.copy()

@@ -15,14 +15,14 @@ PICTURE = ROOT / "docs" / "pictures" / "rooms.svg"
 # Floors from the top; in each room's entry its column and what it does.
 FLOORS = (
     {"cli": (2.3, "commands, console, tables")},
-    {"designs": (1.1, "derivatives, goal seek, design")},
+    {"designs": (1.1, "derivatives, goal seek, design"), "live": (3.2, "page for the browser")},
     {
         "studies": (0.05, "many runs, other programs"),
         "couple": (1.1, "FMU"),
         "modal": (2.15, "modes, response to a sea"),
-        "live": (3.2, "page for the browser"),
     },
     {"accuracy": (0.5, "passes, errors, choice of model")},
+    {"linear": (1.1, "matrices about an equilibrium")},
     {
         "simulation": (0.5, "one run, stepping, diagnostics"),
         "interop": (2.3, "MoorDyn decks"),

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybrid.accuracy.error_control import ErrorController
 from hybrid.accuracy.errors_by_cause import Errors, summary
-from hybrid.accuracy.free_vibrations import uncertain_by_vibrations
 from hybrid.accuracy.refinement import END_FORCE, asked_quantities, asked_text, not_asked_text, sizes_of
 from hybrid.errors import ZONE_EVENTS
 from hybrid.model.plan import output_times
@@ -23,6 +24,9 @@ from hybrid.store.format import Field
 from hybrid.store.late_file import LateFile
 from hybrid.store.named_arrays import Tree
 from hybrid.store.records import not_converged_attribute
+
+if TYPE_CHECKING:
+    from hybrid.accuracy.free_vibrations import LostBy
 
 UNITS = {
     "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m",
@@ -54,7 +58,9 @@ def write_errors(
                 yield f"errors/{cause}/{name}", begin, at_all_points(values, result.places) if along else values
 
     def known_then(happened: Happened) -> tuple[Mapping[str, str | float | int], list[tuple[str, str]]]:
-        found, notes = known(scene, control, result, errors, happened)
+        from hybrid.accuracy.free_vibrations import of_cable
+
+        found, notes = known(scene, control, result, errors, happened, partial(of_cable, scene, result))
         return attributes | found, notes
 
     amend(target, fields, blocks(), known_then, before)
@@ -78,9 +84,13 @@ def effort(scene: Scene, control: ErrorController, result: RunSample, cpu: float
 
 
 def known(
-    scene: Scene, control: ErrorController, result: RunSample, errors: Errors | None, happened: Happened
-) -> tuple[dict[str, float | str], list[tuple[str, str]]]:
-    """The largest errors, as attributes, and events of a result; happened: its events until now."""
+    scene: Scene, control: ErrorController, result: RunSample, errors: Errors | None, happened: Happened,
+    vibrations: Callable[[], LostBy],
+) -> tuple[dict[str, float | str], list[tuple[str, str]]]:  # fmt: skip
+    """The largest errors, as attributes, and events of a result; happened: its events until now; vibrations: finds what
+
+    steps lose of free ones, by quantity.
+    """
     undersampled: list[tuple[str, str]] = []
     if errors is not None and control.moves:
         largest = {name: errors.largest("total", name) for name in errors.fields.get("total", {})}
@@ -90,8 +100,10 @@ def known(
             error = max(largest.get(name, 0.0) for name in END_FORCES.values())
             undersampled += damped_jolts(scene, result, error, control.allowed_force)
         if not control.irregular:
+            from hybrid.accuracy.free_vibrations import uncertain_by_vibrations
+
             bounds = None if control.asked is None else sizes_of(control.asked, result)
-            undersampled += uncertain_by_vibrations(scene, result, largest, bounds)
+            undersampled += uncertain_by_vibrations(vibrations(), result, largest, bounds)
     found: dict[str, float | str] = {**summary(errors)} if errors is not None else {}
     found |= not_converged_attribute([control.diverging])
     if errors is not None and control.asked is not None:

@@ -1,50 +1,63 @@
-"""Free vibrations that ramps and moves of ends leave in a line that hardly anything damps, and what steps make of them.
+"""Free vibrations that ramps and moves of ends leave in lines that hardly anything damps, and what steps make of them.
 
 A forced motion forgets, a free vibration does not: its phase is late by a part of a radian in every radian, and steps
 take a part of its energy.  Runs with longer steps have lost what the result has lost, and their differences do not show
-it.  Here the line is linear about its first output: nodes with its masses, joined by its tension and its stiffness.
+it.  Here lines are linear about their equilibrium (hybrid.linear): its modes, and what ends excite of them.
 docs/errors.md
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from itertools import pairwise
-from math import isfinite, pi
+from math import pi
 from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
 
-from hybrid.model.output_points import output_points
-from hybrid.scene.analysis import CatenaryModel, Equilibrium
-from hybrid.scene.attachments import Clump
-from hybrid.scene.cable import Section
-from hybrid.scene.ends import Body
-from hybrid.scene.motion import EndMotion
+from hybrid.errors import ComputationError, SceneError
+from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
+from hybrid.kernels.junctions.bodies import DAMPING, FRAME, V
+from hybrid.kernels.state.forces import BODIES, DRAG
+from hybrid.kernels.state.state import Floats
+from hybrid.linear.eigen import BELOW, lowest_modes
+from hybrid.linear.excitation import frequencies_of
+from hybrid.linear.loaded_line import LoadedLine
+from hybrid.linear.matrices import ANCHOR, LinearNetwork, linear_network, rows_at_rest, sparse_rows
+from hybrid.linear.rest import CABLE, Rest, line_at_rest, system_at_rest
+from hybrid.model.system import SystemResolution
+from hybrid.scene.analysis import Equilibrium
+from hybrid.scene.combinations import refuse_use
 from hybrid.scene.motion_tables import Motion
 from hybrid.scene.schema import Scene
+from hybrid.scene.system import System
 from hybrid.simulation.run_sample import END_FORCES, RunSample
-
-Floats = np.ndarray
+from hybrid.simulation.static_case import StaticCase
 
 RAW = {shown: raw for raw, shown in END_FORCES.items()}
-UNITS = {"position": "m", "curvature": "1/m", "bending_moment": "N m"} | dict.fromkeys(RAW, "N")
+UNITS = {
+    "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m", **dict.fromkeys(RAW, "N"),
+}  # fmt: skip
 
-# Elements of the line, and its lowest modes that are looked at.
-ELEMENTS, MODES = 40, 12
+# Lowest modes that are looked at, to a line; of several lines at most so many in all.
+MODES, MOST_MODES = 12, 48
 # A motion is integrated by Gauss's rule of so many points, in at least as many pieces as it has periods of a vibration
 # and as few as these; modes with more periods than MOST_PERIODS are left out: a ramp that is so long leaves nothing.
 GAUSS, FEWEST_PIECES, MOST_PERIODS = 8, 8, 200
-# A section that does not stretch is so many times as stiff as its tension and bending; fewer output points than these
-# do not show the shape; a fluid of more than this density, kg/m^3, damps what lasts in air.
-STIFF, FEWEST_POINTS, GAS = 1.0e4, 6, 5.0
+# w^2 below this part of the largest found is that of a motion that nothing holds.
+HELD = 1e-8
+# Times at which amplitudes are followed as they die; rate of that, of the velocity of a harmonic and its drag.
+DYING, HARMONIC = 60, 4.0 / (3.0 * pi)
 # Frequencies of a motion and of a vibration count as different by at least so many rad in the duration.
 CLOSE = 1.0
 # An error by steps that this makes is worth a word where it exceeds what is asked, and the error figure so many times;
 # where nothing is asked, this part of the largest value.
 TIMES_THE_FIGURE, PART = 1.5, 0.01
-# Times that are looked at, at most; of longer runs some of theirs, from so many at a time.
-ROWS, BLOCK = 20_000, 2000
+# Times that are looked at, at most; of longer runs some of theirs, from so many at a time; and places, beside those at
+# which a mode is largest.
+ROWS, BLOCK, PLACES = 20_000, 2000, 40
 
 
 class Lost(NamedTuple):
@@ -56,32 +69,24 @@ class Lost(NamedTuple):
     step: float  # s, that leaves an error of a tenth of this
 
 
-class Line(NamedTuple):
-    """A line as linear: freedoms are the positions of its nodes, and the directions in which clamps hold its ends."""
-
-    stiffness: Floats  # (n, n)
-    mass: Floats  # (n,)
-    bends: Floats  # (nodes, 3, n) changes of curvature
-    rigidity: Floats  # (nodes,) N m^2
-    held: Floats  # (n,) whether a freedom is prescribed
-    damping: tuple[float, float, float]  # Rayleigh's 1/s and s; 1/2 density x diameter x Cd, kg/m^2
+LostBy = Mapping[str, Lost]  # by quantity
 
 
 def uncertain_by_vibrations(
-    scene: Scene, result: RunSample, errors: Mapping[str, float], allowed: Mapping[str, float] | None
+    found: LostBy, result: RunSample, errors: Mapping[str, float], allowed: Mapping[str, float] | None
 ) -> list[tuple[str, str]]:
     """The event that says so where steps lose more of free vibrations than error figures show.
 
-    errors: figures, by quantity; allowed: errors that are asked, None: nothing is.
+    found: what they lose; errors: figures, by quantity; allowed: errors that are asked, None: nothing is.
     """
     worst, of = 1.0, ""
-    found = lost_vibrations(scene, result)
     for name, lost in found.items():
         values = result.values.get(RAW.get(name, name))
         if name not in errors or values is None or (allowed is not None and name not in allowed):
             continue
         if allowed is None:
-            sizes = np.asarray(values) if name in ("curvature", "bending_moment") else np.linalg.norm(values, axis=-1)
+            sizes = np.asarray(values)
+            sizes = np.linalg.norm(sizes, axis=-1) if name == "position" or name in RAW else sizes
             least = PART * float(np.abs(sizes).max())
         else:
             least = allowed[name]
@@ -102,243 +107,283 @@ def uncertain_by_vibrations(
     return [("error uncertain", text)]
 
 
-def lost_vibrations(scene: Scene, result: RunSample) -> dict[str, Lost]:
-    """By quantity, what steps of the result make of free vibrations; empty where none is left, or it is not known."""
-    motions = [end.prescribed_motion for end in scene.ends.both]
-    begins = [_quiet_from(x) for x in motions if x is not None]
-    if not begins or any(x is None for x in begins) or not _is_simple(scene) or len(result.forces) < 2:
+def of_cable(scene: Scene, result: RunSample) -> LostBy:
+    """By quantity, what steps of the result of one cable make of free vibrations; empty where none is left, or it is
+
+    not known.
+    """
+    if result.touches:
         return {}
-    line = linear_line(scene, result)
-    if line is None:
-        return {}
-    duration = float(result.forces[-1, 0])
-    quiet = min(max(x for x in begins if x is not None), duration)
-    w, modes, rest = _modes(line)
-    fits = w * quiet <= 2.0 * pi * MOST_PERIODS
-    w, modes = w[fits], modes[:, fits]
-    if not w.size or not (w > 0.0).all():
-        return {}
-    drive = modes.T @ (line.mass[~line.held, None] * rest)  # (modes, prescribed)
-    size = _amplitudes(scene, motions, w, drive, quiet, duration)
-    t = np.concatenate([[0.0], result.forces[:, 0]])
-    t = t[np.concatenate([[True], np.diff(t) > 0.0])]
-    factors = Factors(_radius(scene))
-    of_mass, of_stiffness, of_drag = line.damping
-    fall = 0.5 * (of_mass + of_stiffness * w * w)
-    lengths = np.linalg.norm(_nodes(modes, line), axis=-1)
-    cubes = (lengths**3).sum(axis=0) * scene.length / (len(lengths) - 1)
-    drift, t = factors.drift(w, t)
-    dies = np.exp(-np.outer(t, fall)) / (1.0 + np.outer(t, 4.0 / (3.0 * pi) * of_drag * w * cubes * size))
-    wrong = np.abs(1.0 - np.exp(drift)) * dies * size
-    wrong = wrong[t >= min(quiet, 0.5 * duration)]
-    found = {}
-    for name, shapes in _outputs(line, modes).items():
-        each = np.abs(shapes) if shapes.ndim == 2 else np.linalg.norm(shapes, axis=1)  # (places, modes)
-        errors = np.sqrt((wrong**2) @ (each**2).T)  # (times, places)
-        error, whole = float(errors.max()), float(np.sqrt(((size * each) ** 2).sum(axis=1)).max())
-        at = np.unravel_index(int(errors.argmax()), errors.shape)
-        k = int((wrong[at[0]] * each[at[1]]).argmax())
-        found[name] = Lost(error, whole, 2.0 * pi / w[k], factors.step(w[k], duration))
-    return found
+    found = lost_vibrations(scene, lambda: line_at_rest(StaticCase(scene), result.resolution), result.forces[:, 0])
+    return found.get(CABLE, {})
 
 
-def _is_simple(scene: Scene) -> bool:
-    """Whether a line is one of which `linear_line` knows all: from an equilibrium, in a gas or none, no ground."""
-    fluid, ends = scene.environment.fluid, scene.ends.both
-    still = fluid is None or (fluid.density <= GAS and fluid.waves is None)
-    plain = all(isinstance(x, Clump) for x in scene.cable.attachments)
-    steady = not any(x.loads or x.release is not None or getattr(x, "payout", None) for x in ends)
-    at_rest = isinstance(scene.initial, Equilibrium)
-    return still and plain and steady and at_rest and scene.environment.seabed is None
+def of_system(system: System, resolution: SystemResolution, times: Floats) -> Mapping[str, LostBy]:
+    """The same of several lines, by their names; times: (n,) s, ends of the steps of the result."""
+    return lost_vibrations(system, lambda: system_at_rest(system, resolution), times)
+
+
+def lost_vibrations(asked: Scene | System, rest: Callable[[], Rest], times: Floats) -> Mapping[str, LostBy]:
+    """By line and quantity, what steps that end at `times` (n,) s make of free vibrations about an equilibrium."""
+    motions = list(_motions(asked))
+    begins = [_quiet_from(x) for x in motions]
+    quiet = max((x for x in begins if x is not None), default=0.0)
+    fluid = asked.environment.fluid
+    still = fluid is None or fluid.waves is None
+    starts = isinstance(asked.initial, Equilibrium) if isinstance(asked, Scene) else not asked.starts_as_placed
+    if not begins or None in begins or not (still and starts) or len(times) < 2:
+        return {}
+    try:
+        refuse_use(asked, "about rest")
+        found = rest()
+    except (ComputationError, SceneError):
+        return {}
+    if not _is_steady(found):
+        return {}
+    breaks = sorted({0.0, *(x for motion in motions for x in _breaks(motion) if x < quiet)})
+    return Vibrations(found).lost(breaks, min(quiet, float(times[-1])), np.asarray(times), _radius(asked))
+
+
+def _motions(asked: Scene | System) -> Iterator[Motion]:
+    """Of ends, points and bodies."""
+    if isinstance(asked, Scene):
+        found = [end.prescribed_motion for end in asked.ends.both]
+    else:
+        found = [getattr(x, "motion", None) for x in (*asked.points.values(), *asked.bodies.values())]
+    yield from (x for x in found if x is not None)
 
 
 def _quiet_from(motion: Motion) -> float | None:
-    """When an end moves as harmonics alone do, s; None: never."""
+    """When a motion is one of harmonics alone, s; None: never."""
     if motion.file is not None or motion.follow is not None or motion.vessel is not None:
         return None
+    return max(_breaks(motion))
+
+
+def _breaks(motion: Motion) -> tuple[float, ...]:
+    """Times, s, at which something in a motion begins or ends."""
     travel = motion.travel
-    return max(motion.ramp or 0.0, travel.begin + travel.over if travel is not None else 0.0)
+    return (0.0, motion.ramp or 0.0, *(() if travel is None else (travel.begin, travel.begin + travel.over)))
 
 
-def _radius(scene: Scene) -> float:
-    return scene.time.rho_inf if scene.time is not None else 0.5
+def _is_steady(rest: Rest) -> bool:
+    """Whether nothing but motions of ends excites a network, and all that damps it is known."""
+    for model in rest.models:
+        moves, ends = model.ends.moves(), model.ends
+        towed = moves.velocity.any() and bool(model.line.bits & (DRAG | BODIES))  # the drag of the tow is not known
+        let_go = np.isfinite([*ends.release_times, *ends.release_forces]).any()
+        if model.payout is not None or len(moves.loads) or let_go or towed:
+            return False
+    return not any(x.loads or x.members is not None for x in rest.floats)
 
 
-def linear_line(scene: Scene, result: RunSample) -> Line | None:
-    """The line about its first output; None: too few output points show it."""
-    s, n = output_points(scene).s, ELEMENTS
-    s = s[result.places] if result.places.size else s
-    place, pull = (np.asarray(result.values[x][:1])[0] for x in ("position", "tension"))
-    if not FEWEST_POINTS <= s.size == len(place):
-        return None
-    at = np.linspace(0.0, scene.length, n + 1)
-    h, middle = scene.length / n, 0.5 * (at[1:] + at[:-1])
-    x = np.column_stack([np.interp(at, s, place[:, k]) for k in range(3)])
-    tension = np.interp(middle, s, pull)
-    sections = [_section_at(scene, y) for y in middle]
-    string = isinstance(scene.model, CatenaryModel)
-    rigid = np.array([0.0 if string else (y.weakest_bending or 0.0) for y in sections])
-    usual = STIFF * max(float(np.abs(tension).max()), float(rigid.max()) / h**2)
-    axial = np.array([usual if y.stiffness is None else y.stiffness for y in sections])
-    size = 3 * (n + 3)  # nodes, and two directions
-    along = np.diff(x, axis=0)
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    stiffness = np.zeros((size, size))
-    for i, d in enumerate(along):
-        spring = axial[i] / h * np.outer(d, d) + tension[i] / h * (np.eye(3) - np.outer(d, d))
-        a, b = slice(3 * i, 3 * i + 3), slice(3 * i + 3, 3 * i + 6)
-        for p, q, factor in ((a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)):
-            stiffness[p, q] += factor * spring
-    bends, per_node = np.zeros((n + 1, 3, size)), np.zeros(n + 1)
-    per_node[1:-1] = 0.5 * (rigid[1:] + rigid[:-1])
-    per_node[[0, -1]] = rigid[[0, -1]]
-    for i in range(1, n):
-        d = along[i] + along[i - 1]
-        across = (np.eye(3) - np.outer(d, d) / (d @ d)) / h**2
-        for j in (i - 1, i, i + 1):
-            bends[i, :, 3 * j : 3 * j + 3] = (-2.0 if j == i else 1.0) * across
-        stiffness += per_node[i] * h * bends[i].T @ bends[i]
-    held = np.zeros(size, bool)
-    held[-6:] = True
-    for end, i, j, k in ((scene.ends.start, 0, 1, n + 1), (scene.ends.end, n, n - 1, n + 2)):
-        held[3 * i : 3 * i + 3] = end.held_position is not None
-        if end.held_tangent is None or not per_node[i]:
-            continue
-        across = np.eye(3) - np.outer(along[min(i, n - 1)], along[min(i, n - 1)])
-        sign = 1.0 if j > i else -1.0  # directions are those of increasing s
-        soft = 1.0 if not isfinite(end.spring) else end.spring / (end.spring + 2.0 * per_node[i] / h)
-        parts = {j: 1.0, i: -1.0, k: -sign * h}
-        for m, part in parts.items():
-            bends[i, :, 3 * m : 3 * m + 3] = soft * part * 2.0 / h**2 * across
-        stiffness += (per_node[i] * h / 2.0 / max(soft, 1e-12)) * bends[i].T @ bends[i]
-    return Line(stiffness, _masses(scene, sections, h), bends, per_node, held, _damping(scene, sections))
+def _radius(asked: Scene | System) -> float:
+    return asked.time.rho_inf if asked.time is not None else 0.5
 
 
-def _section_at(scene: Scene, s: float) -> Section:
-    until = 0.0
-    for section in scene.cable.sections:
-        until += section.length
-        if s <= until:
-            return section
-    return scene.cable.sections[-1]
+class Vibrations:
+    """Modes of a network about its equilibrium, of mass 1, and what damps and drives each.
 
-
-def _masses(scene: Scene, sections: list[Section], h: float) -> Floats:
-    """Of all freedoms, kg; directions have none."""
-    n, mass = len(sections), np.zeros(len(sections) + 3)
-    for i, section in enumerate(sections):
-        mass[i : i + 2] += 0.5 * h * section.mass
-    for item in scene.cable.attachments:
-        if isinstance(item, Clump):
-            mass[min(n, round(item.at / h))] += item.mass
-    for end, i in zip(scene.ends.both, (0, n), strict=True):
-        mass[i] += end.mass if isinstance(end, Body) else 0.0
-    return np.repeat(mass, 3)
-
-
-def _damping(scene: Scene, sections: list[Section]) -> tuple[float, float, float]:
-    """The least of Rayleigh's two coefficients and of 1/2 density x diameter x Cd in all sections."""
-    rayleigh = [x.damping for x in sections]
-    of_mass = min(x.mass if x is not None else 0.0 for x in rayleigh)
-    of_stiffness = min(x.stiffness if x is not None else 0.0 for x in rayleigh)
-    fluid = scene.environment.fluid
-    density = fluid.density if fluid is not None else 0.0
-    drag = min(0.5 * density * (x.diameter or 0.0) * (x.drag.normal if x.drag is not None else 0.0) for x in sections)
-    return of_mass, of_stiffness, drag
-
-
-def _modes(line: Line) -> tuple[Floats, Floats, Floats]:
-    """Of the lowest free vibrations: rad/s (m,) and shapes (free, m) of mass 1; and how what is prescribed moves the
-
-    free nodes at rest (free, held).  rad/s 0: some of it can move at no cost.
+    w: (m,) 1/s; fall: (m,) 1/s, by damping that is linear; drags: quadratic ones; drive: (lines, 2, 6, m) 1, by shifts
+    and turns of ends, q'' + w^2 q = -drive u''.
     """
-    free, root = ~line.held, np.sqrt(line.mass[~line.held])
-    inner, coupling = line.stiffness[np.ix_(free, free)], line.stiffness[np.ix_(line.held, free)]
-    squares, vectors = np.linalg.eigh(inner / np.outer(root, root))
-    if not squares[0] > 1e-12 * squares[-1]:
-        return np.zeros(1), np.zeros((root.size, 1)), np.zeros(coupling.T.shape)
-    shapes = vectors / root[:, None]
-    rest = -(shapes / squares) @ (shapes.T @ coupling.T)
-    return np.sqrt(squares[:MODES]), shapes[:, :MODES], rest
 
+    def __init__(self, rest: Rest) -> None:
+        self.rest = rest
+        network = linear_network(rest.solver, rest.states, rest.names, sticks=True)
+        omegas = frequencies_of(rest.models)
+        self.lines = [
+            LoadedLine(x, linear, model, omegas)
+            for x, linear, model in zip(rest.solver.lines, network.lines, rest.models, strict=True)
+        ]
+        self.omegas = omegas
+        free = 2 + len(self.lines) + 3 * network.bodies  # that may have no period
+        eigen = lowest_modes(network, min(MODES * len(self.lines), MOST_MODES) + free)
+        self.stable = bool(eigen.squares.min() > -HELD * np.abs(eigen.squares).max())
+        kept = eigen.squares > HELD * eigen.squares.max()
+        self.w, vectors = np.sqrt(eigen.squares[kept]), eigen.vectors[:, kept]
+        whole = np.asarray(network.place @ vectors)
+        self.parts = [whole[a:b] for a, b in pairwise(network.at)]  # (5 (N+1), m) of each line
+        self.fall = 0.5 * np.einsum("qm,qm->m", vectors, self._damping(network) @ vectors)
+        forced = list(self._forced(network))
+        self.drags = [drag for each in zip(self.lines, self.parts, forced, strict=True) for drag in _drags(*each)]
+        ends = [model.ends.moves().prescribed for model in rest.models]
+        self.drive = np.array([self._driven(*each) for each in zip(self.lines, ends, self.parts, strict=True)])
 
-def _nodes(modes: Floats, line: Line) -> Floats:
-    """Shapes (nodes, m, 3) of modes."""
-    whole = np.zeros((line.held.size, modes.shape[1]))
-    whole[~line.held] = modes
-    return np.moveaxis(whole[:-6].reshape(-1, 3, modes.shape[1]), 1, 2)
+    def _damping(self, network: LinearNetwork) -> sparse.csr_array:
+        """(q, q) of sections, the bed, a current, and bodies."""
+        blocks = []
+        for x in self.lines:
+            still, moving = np.zeros((2, x.line.s.size, SIZE * WIDTH))
+            rows_at_rest(x.line, x.x, x.x.ends, x.linear.state, (0.0, ANCHOR), still)
+            rows_at_rest(x.line, x.x, x.x.ends, x.linear.state, (1.0, ANCHOR), moving)
+            blocks.append(sparse_rows(moving - still))
+        found = network.place.T @ sparse.block_diag(blocks, format="csr") @ network.place
+        frames = [np.kron(np.eye(2), state[FRAME:V].reshape(3, 3)) for state in self.rest.states.bodies]
+        own = [
+            R @ row[DAMPING:][:36].reshape(6, 6) @ R.T for R, row in zip(frames, self.rest.solver.bodies, strict=True)
+        ]
+        first = network.size - 6 * network.bodies
+        return sparse.csr_array(found + sparse.block_diag([sparse.csr_array((first, first)), *own], format="csr"))
 
+    def _forced(self, network: LinearNetwork) -> Iterator[Floats]:
+        """Velocities (F, N+1, 3) m/s of each line, as it follows the harmonics of ends at rest, complex amplitudes."""
+        every = np.arange(self.omegas.size)
+        loads = [x.loads(every, 0.0 * x.linear.mass) for x in self.lines] if every.size else []
+        whole = np.zeros((int(network.at[-1]), every.size), complex)
+        if loads:
+            right = network.place.T @ np.concatenate(loads)
+            shift = BELOW * network.slow  # what nothing holds stays
+            factors = splu(sparse.csc_array(network.stiffness + shift * network.mass))
+            whole = network.place @ (factors.solve(right.real) + 1j * factors.solve(right.imag))
+        for x, a, b in zip(self.lines, network.at[:-1], network.at[1:], strict=True):
+            moved = np.moveaxis(whole[a:b].reshape((b - a) // SIZE, SIZE, every.size)[:, 1:4], 2, 0)
+            for excited, each in zip(x.excited, moved, strict=True):
+                each[[0, -1]] += excited.shifts
+            yield self.omegas[:, None, None] * moved
 
-def _outputs(line: Line, modes: Floats) -> dict[str, Floats]:
-    """What a unit of each mode is in outputs, (places, 3, m)."""
-    whole = np.zeros((line.held.size, modes.shape[1]))
-    whole[~line.held] = modes
-    bent = np.einsum("kij,jm->kim", line.bends, whole)
-    found = {"position": whole[:-6].reshape(-1, 3, modes.shape[1])}
-    if line.rigidity.any():
-        found |= {"curvature": bent, "bending_moment": line.rigidity[:, None, None] * bent}
-    pulls = line.stiffness @ whole
-    for name, first in (("end_force_start", 0), ("end_force_end", line.held.size - 9)):
-        if line.held[first]:
-            found[name] = pulls[None, first : first + 3]
-    return found
+    def _driven(self, x: LoadedLine, moved: np.ndarray, part: Floats) -> Floats:
+        """(2, 6, m) by unit shifts (inertial) and turns of the ends of a line; moved: (2, 2) which are given."""
+        out = np.zeros((2, 6, self.w.size))
+        for k in (0, 1):
+            if moved[k, 0]:
+                out[k, :3] = -self._pull(x, k, part) / self.w**2
+            if moved[k, 1] and x.line.element[-k]:
+                out[k, 3:] = -(x.turned[k] @ part) / self.w**2
+        return out
 
+    def lost(self, breaks: list[float], quiet: float, times: Floats, radius: float) -> Mapping[str, LostBy]:
+        """By line and quantity; breaks: s, at which something in a motion begins or ends before it is quiet; times: s,
 
-def _amplitudes(
-    scene: Scene, motions: list[Motion | None], w: Floats, drive: Floats, quiet: float, duration: float
-) -> Floats:
-    """Of the free vibrations that are there once ends move as harmonics alone, (m,), by modes of mass 1.
+        ends of steps; radius: of the time scheme.
+        """
+        duration = float(times[-1])
+        fits = self.w * quiet <= 2.0 * pi * MOST_PERIODS
+        if not (self.stable and fits.any()):
+            return {}
+        size = np.where(fits, self._amplitudes(breaks, quiet, duration, fits), 0.0)
+        t = np.concatenate([[0.0], times])
+        t = t[np.concatenate([[True], np.diff(t) > 0.0])]
+        factors = Factors(radius)
+        drift, t = factors.drift(self.w, t)
+        made = int(np.searchsorted(t, 0.5 * quiet))  # on average
+        wrong = np.abs(1.0 - np.exp(drift - drift[made])) * self._dying(size, np.maximum(t - t[made], 0.0))
+        wrong = wrong[t >= min(quiet, 0.5 * duration)]
+        found: dict[str, dict[str, Lost]] = {}
+        for x, part in zip(self.lines, self.parts, strict=True):
+            of_line = found.setdefault(x.name, {})
+            for name, shapes in self._outputs(x, part):
+                each = np.abs(shapes) if shapes.ndim == 2 else np.linalg.norm(shapes, axis=1)  # (places, m)
+                each = each[_places(each)]
+                errors = np.sqrt((wrong**2) @ (each**2).T)  # (times, places)
+                error, whole = float(errors.max()), float(np.sqrt(((size * each) ** 2).sum(axis=1)).max())
+                row, place = np.unravel_index(int(errors.argmax()), errors.shape)
+                k = int((wrong[row] * each[place]).argmax())
+                of_line[name] = Lost(error, whole, 2.0 * pi / self.w[k], factors.step(self.w[k], duration))
+        return found
 
-    q'' + w^2 q = -drive u'': integral of u'' exp(-i w t) until then, less what harmonics go on to add.
-    """
-    held = [which for which, end in enumerate(scene.ends.both) if end.held_position is not None]
-    column = {which: 3 * k for k, which in enumerate(held)}  # of `drive`: ends that are held, then two directions
-    t, weights = _gauss(motions, quiet, float(w.max()))
-    total = np.zeros(w.size, complex)
-    for which, (motion, end) in enumerate(zip(motions, scene.ends.both, strict=True)):
-        if motion is None:
-            continue
-        moved = EndMotion(motion, end.held_position, np.eye(3))
-        tangent = np.array(end.held_tangent or (0.0, 0.0, 0.0), float)
-        tangent /= max(float(np.linalg.norm(tangent)), 1e-300)
-        turning = drive[:, 3 * len(held) + 3 * which :][:, :3]
-        moving = drive[:, column[which] : column[which] + 3] if which in column else np.zeros((w.size, 3))
-        rates = np.array([np.concatenate([v, np.cross(spin, tangent)]) for _, v, _, spin in map(moved.at, t.tolist())])
-        both = np.hstack([moving, turning])
+    def _dying(self, size: Floats, t: Floats) -> Floats:
+        """Amplitudes (t, m) of vibrations of a size (m,) at t = 0, at times (s) that increase."""
+        last = max(float(t[-1]), 1e-300)
+        at = np.concatenate([[0.0], np.geomspace(1e-4 * last, last, DYING)])
+        now, found = size, [size]
+        for dt in np.diff(at):
+            rate = np.zeros(self.w.size)
+            for drag, square, forced in self.drags:
+                rate += (drag * np.sqrt(square @ (self.w * now) ** 2 + forced)) @ square
+            now = now * np.exp(-self.fall * dt) / (1.0 + HARMONIC * rate * dt)  # of one vibration alone: exact
+            found.append(now)
+        return np.stack([np.interp(t, at, x) for x in np.transpose(found)], axis=1)
+
+    def _outputs(self, x: LoadedLine, part: Floats) -> Iterator[tuple[str, Floats]]:
+        """What a unit of each mode is in outputs of a line, (places, m) or (places, 3, m)."""
+        count, line = self.w.size, x.line
+        moved = np.moveaxis(part.reshape(-1, SIZE, count), 2, 0)
+        found = x.response_to(moved, np.zeros((count, 2, 3)), self.w)
+        yield "position", np.moveaxis(found.position, 0, 2)
+        yield "tension", found.tension.T
+        if line.element.any():
+            bent = np.stack([found.curvature, found.curvature_across], axis=1) * (line.element != 0)
+            yield "curvature", np.moveaxis(bent, 0, 2).transpose(1, 0, 2)
+            rigidity = np.where(line.element != 0, line.kb[:, :2].max(axis=1) * line.hn, 0.0)
+            yield "bending_moment", np.moveaxis(bent * rigidity, 0, 2).transpose(1, 0, 2)
+        for k, name in enumerate(("end_force_start", "end_force_end")):
+            yield name, self._pull(x, k, part)[None]
+
+    def _pull(self, x: LoadedLine, k: int, part: Floats) -> Floats:
+        """(3, m) N, of each mode on end k of a line: where an end is held, columns alone have it."""
+        first = k * SIZE * (x.line.s.size - 1) + 1
+        K, M = x.linear.stiffness[:, first : first + 3], x.linear.mass[:, first : first + 3]
+        return np.asarray(K.T @ part - (M.T @ part) * self.w**2)
+
+    def _amplitudes(self, breaks: list[float], quiet: float, duration: float, fits: Floats) -> Floats:
+        """Of the free vibrations that are there once ends move as harmonics alone, (m,), by modes of mass 1.
+
+        q'' + w^2 q = -drive u'': integral of u'' exp(-i w t) until then, less what harmonics go on to add.
+        """
+        w = self.w
+        t, weights = _gauss(breaks, quiet, float(w[fits].max()))
         waves = np.exp(-1j * np.outer(t, w))
-        inside = rates @ both.T * waves  # (t, m)
-        total += inside[-1] + 1j * w * (weights @ inside[:-1])
-        if quiet >= duration:
-            continue
-        for axis, amplitude, o, phase in moved.terms().harmonics:
-            unit = np.zeros(6)
-            along = amplitude * np.eye(6)[int(axis)]
-            unit[:3], unit[3:] = along[:3], np.cross(along[3:], tangent)
-            near = np.where(o < w, -1.0, 1.0) * np.maximum(np.abs(o - w), CLOSE / duration)
-            up = np.exp(1j * (near * quiet + phase)) / (1j * near)
-            down = np.exp(-1j * ((o + w) * quiet + phase)) / (-1j * (o + w))
-            total -= (both @ unit) * (-o * o) / 2j * (up - down)
-    return np.asarray(np.abs(total) / w)
+        total = np.zeros(w.size, complex)
+        for x, model, drive in zip(self.lines, self.rest.models, self.drive, strict=True):
+            if not drive.any():
+                continue
+            rates = np.zeros((t.size, 2, 6))
+            for each, now in zip(rates, t.tolist(), strict=True):
+                each[:, 3:], each[:, :3] = model.ends.at(now).spin, model.ends.velocity
+            model.ends.at(np.inf)
+            inside = np.einsum("tkc,kcm->tm", rates, drive) * waves
+            total += inside[-1] + 1j * w * (weights @ inside[:-1])
+            if quiet >= duration:
+                continue
+            for o, excited in zip(self.omegas, x.excited, strict=True):
+                unit = np.einsum("kc,kcm->m", np.hstack([excited.shifts, excited.turns]), drive)
+                total -= _harmonic_until(quiet, o, w, unit, duration)
+        return np.asarray(np.abs(total) / w)
 
 
-def _gauss(motions: list[Motion | None], quiet: float, w: float) -> tuple[Floats, Floats]:
+def _harmonic_until(quiet: float, o: float, w: Floats, unit: Floats, duration: float) -> Floats:
+    """Integral until `quiet` (s) of  u'' exp(-i w t)  for  u = Re(unit exp(-i o t))  that has grown slowly, (m,)."""
+    near = np.where(o < w, -1.0, 1.0) * np.maximum(np.abs(o - w), CLOSE / duration)
+    up = unit.conj() * np.exp(1j * near * quiet) / (1j * near)
+    down = unit * np.exp(-1j * (o + w) * quiet) / (-1j * (o + w))
+    return np.asarray(-o * o / 2.0 * (up + down))
+
+
+def _drags(x: LoadedLine, part: Floats, forced: Floats) -> Iterator[tuple[Floats, Floats, Floats]]:
+    """Of drag across and along half cells, and of bodies: N s^2/m^2 (n,), squares of modes (n, m), m^2, and of forced
+
+    velocities (n,), m^2/s^2; forced: (F, N+1, 3) m/s.
+    """
+    shift, d = part.reshape(-1, SIZE, part.shape[1])[:, 1:4], x.d[:, None]
+    modes, moves = np.moveaxis(shift, 2, 1)[x.node], np.moveaxis(forced, 0, 1)[x.node]  # (half cells, .., 3)
+    squares = [(np.abs(u) ** 2).sum(axis=2) for u in (modes, moves)]
+    along = [np.abs((u * d).sum(axis=2)) ** 2 for u in (modes, moves)]
+    for drag, (square, velocity) in (
+        (x.cn, [every - one for every, one in zip(squares, along, strict=True)]),
+        (x.ct, along),
+        (x.point_drag, [(np.abs(u) ** 2).sum(axis=2) for u in (np.moveaxis(shift, 2, 1), np.moveaxis(forced, 0, 1))]),
+    ):
+        if drag.any():
+            yield drag, np.maximum(square, 0.0), np.maximum(velocity.sum(axis=1), 0.0)
+
+
+def _places(each: Floats) -> Floats:
+    """Rows of shapes (places, m) that are looked at."""
+    even = np.linspace(0, len(each) - 1, min(PLACES, len(each))).round().astype(int)
+    return np.unique(np.concatenate([even, each.argmax(axis=0)]))
+
+
+def _gauss(breaks: list[float], quiet: float, w: float) -> tuple[Floats, Floats]:
     """Times until `quiet`, s, and their weights in an integral over motions and vibrations of up to w; and `quiet`."""
-    found = {0.0, quiet}
-    for motion in motions:
-        if motion is not None:
-            travel = motion.travel
-            found |= {motion.ramp or 0.0} | (
-                {travel.begin, travel.begin + travel.over} if travel is not None else set()
-            )
-    breaks = sorted(x for x in found if x <= quiet)
     x, each = np.polynomial.legendre.leggauss(GAUSS)
-    times, weights = [], []
-    for a, b in pairwise(breaks):
+    times, weights = [np.zeros(0)], [np.zeros(0)]
+    for a, b in pairwise([x for x in breaks if x < quiet] + [quiet]):
         ends = np.linspace(a, b, max(FEWEST_PIECES, int(w * (b - a) / pi)) + 1)
         half = 0.5 * (ends[1] - ends[0])
         times.append((ends[:-1, None] + half * (1.0 + x)).ravel())
         weights.append(np.tile(half * each, ends.size - 1))
-    return np.concatenate([*times, [quiet]]), np.concatenate([*weights, []])
+    return np.concatenate([*times, [quiet]]), np.concatenate(weights)
 
 
 class Factors:

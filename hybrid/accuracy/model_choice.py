@@ -17,7 +17,7 @@ from hybrid.model.model_costs import (
     no_catenary,
     ratios,
     reasons,
-    rod_share,
+    rods_of_zones,
     structural,
     with_model,
 )
@@ -44,8 +44,8 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
     rods, catenaries = (gradings[kind].count(0.0, model.length, resolution.fineness) for kind in ("rod", "catenary"))
     near = "it comes near itself, and contact of catenaries alone is not asked for" if case.came_near_itself else ""
     why_not = structural(scene, model.cable) or near or no_catenary(found, demand.s)
-    share = rod_share(model, demand, found, gradings["rod"])
-    each = costs(scene, model, rods, catenaries, share, why_not)
+    of_zones = rods_of_zones(model, demand, found, gradings["rod"])
+    each = costs(scene, model, rods, catenaries, of_zones, why_not)
     kind = cheapest(each).kind
     if kind != "rod":
         case.scene = with_model(scene, kind)

@@ -19,6 +19,7 @@ from hybrid.accuracy.finer_result import FinerResult
 from hybrid.accuracy.model_choice import chosen_and_surveyed, rods_instead
 from hybrid.accuracy.refinement import WORTH_WRITING, Free, times_the_cost
 from hybrid.errors import ComputationError
+from hybrid.model.build import zone_plans
 from hybrid.model.model_costs import NAMED, ModelChoice
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import (
@@ -105,8 +106,7 @@ class Passes:
         else:
             choice, resolution = self._surveyed(resolution) if remaining is None else (NAMED, resolution)
             control = self._controls(compute, choice)
-            moves = isinstance(case.scene.model, AdaptiveModel) and not follows_curvature(case.scene)
-            first = replace(resolution, follow=moves)
+            first = replace(resolution, follow=_has_joints(case.scene))
 
             def go_on() -> tuple[RunSample, Errors | None]:
                 return control.start(first)
@@ -213,6 +213,16 @@ def free_in(scene: Scene) -> Free:
     # where cells follow the curvature its share decides kinds, and the tolerance cells as well: both stay
     follows = follows_curvature(scene)
     return Free(mesh_is_free(scene), steps, zones_are_free(scene) and not follows, follows)
+
+
+def _has_joints(scene: Scene) -> bool:
+    """Whether rods and catenaries may meet on the cells of a result, which then follows itself what that leaves out.
+
+    What a joint does beside it is of the cells there: a coarser run, whose outputs are fewer too, does not show it.
+    """
+    if isinstance(scene.model, AdaptiveModel):
+        return not follows_curvature(scene)
+    return len({zone.kind for zone in zone_plans(scene)}) > 1
 
 
 def emptied(target: Target, error: ComputationError) -> None:

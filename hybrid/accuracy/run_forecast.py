@@ -17,8 +17,9 @@ from hybrid.accuracy.budget import CELL, COMPARISONS, FINER, LEAST, MOST_TIMES, 
 from hybrid.accuracy.model_choice import chosen_and_surveyed
 from hybrid.errors import ComputationError
 from hybrid.kernels.machine.cache import is_warm
+from hybrid.kernels.state.state import State
 from hybrid.model import plan as tables
-from hybrid.model.build import build
+from hybrid.model.build import Model, build
 from hybrid.model.contents import with_accuracy
 from hybrid.model.model_costs import NAMED
 from hybrid.model.plan import Plan, SystemPlan, count_steps, output_interval
@@ -34,8 +35,8 @@ from hybrid.store.comparison_recorder import ComparisonRecorder
 if TYPE_CHECKING:  # its tables take long to make
     from hybrid.scene.system import System
 
-# s of processor time that the pre-run, and the first steps of the result, may take.
-PRE_RUN, FIRST_STEPS = 0.2, 0.1
+# s of processor time that the pre-run and the first steps of the result may take, and a pre-run that chooses the model.
+PRE_RUN, FIRST_STEPS, CHOICE = 0.2, 0.1, 1.0
 # Of a run whose number of steps is known: so many show what one costs.
 ENOUGH_STEPS = 400
 # Cells of a line whose equilibrium, which comes before its first steps, takes no longer than these.
@@ -55,9 +56,10 @@ def plan(scene: System, *, measure: bool = True) -> SystemPlan: ...
 def plan(scene: SceneLike | System, *, measure: bool = True) -> Plan | SystemPlan:
     """What would be computed for a scene (a Scene, the path of a scene file, or a dict), and how long it would take.
 
-    measure: the mesh pre-run and the first steps are computed (at most about 0.3 s of processor time), so that cells,
-    steps and processor time are those of this scene on this machine; False: nothing is computed, and they are
-    estimated from tables, as where kernels are not compiled yet.  Of several lines it is a SystemPlan.
+    measure: the mesh pre-run and the first steps are computed (at most about 0.3 s of processor time, 1.1 s where they
+    choose the model), so that cells, steps and processor time are those of this scene on this machine, and the model is
+    that of a run; False: nothing is computed, and they are estimated from tables, as where kernels are not compiled
+    yet.  Of several lines it is a SystemPlan.
     """
     scene = as_scene_or_system(scene)
     if not isinstance(scene, Scene):
@@ -73,6 +75,7 @@ class _Probe(Case):
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene, None)
         self.loop: TimeLoop | None = None  # the last
+        self.at_rest: tuple[Model, State] | None = None  # where it begins, if that is an equilibrium
         self._end = np.inf
         self._most_steps = np.inf
         self.interrupted = self._is_used_up
@@ -95,6 +98,7 @@ class _Probe(Case):
         self.allow(np.inf)  # the budget of the pre-run may be used up, and the equilibrium has none
         model, equilibrium, switching = self._start(resolution)
         loop = self._loop(self.scene, model, resolution, switching, None)
+        self.at_rest = None if equilibrium is None else (model, equilibrium.state.copy())
         begun = clock.process_time()
         known = resolution.local is None and model.payout is None
         self.allow(FIRST_STEPS, ENOUGH_STEPS if known else np.inf)
@@ -114,7 +118,7 @@ def _measured(scene: Scene, found: Plan) -> Plan:
         return found
     case, first, choice, cut = _Probe(scene), first_resolution(scene), NAMED, False
     resolution, begin = first, clock.process_time()
-    case.allow(PRE_RUN)
+    case.allow(CHOICE if found.choice else PRE_RUN)
     try:
         try:
             choice, resolution = chosen_and_surveyed(case, first)
@@ -136,10 +140,15 @@ def _measured(scene: Scene, found: Plan) -> Plan:
         seconds, most = seconds + (TOUCHING - 1.0) * motion, most + (MOST_TOUCHING - 1.0) * motion
     model = build(case.scene, resolution)
     payout = model.payout.forecast(duration) if model.payout is not None else None
+    torque = found.critical_torque
+    if case.at_rest is not None:
+        here, state = case.at_rest
+        torque = tables.critical_torque(scene, here, state.T)
     return replace(
-        found, **tables.mesh_of(model), payout=payout, contents=with_accuracy(found.contents, scene, case.reach),
+        found, **tables.mesh_of(model), payout=payout, critical_torque=torque,
+        contents=with_accuracy(found.contents, scene, case.reach),
         seconds=survey + seconds, most_seconds=survey + most, measured=True, steps=round(steps),
-        step=min(resolution.step, duration / steps), chosen=choice.kind,
+        step=min(resolution.step, duration / steps), chosen=choice.kind, why=choice.why,
     )  # fmt: skip
 
 
@@ -200,6 +209,7 @@ def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
     try:
         run = SystemRun(system, None, "", moves=True)
         run.begin_motion()
+        first = [x.T.copy() for x in run.state.lines]
         begun = clock.process_time()
 
         def look() -> None:
@@ -217,6 +227,11 @@ def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
         steps = run.steps * time.duration / max(run.t, 1e-9 * time.duration)
     motion = steps * spent / max(run.steps, 1)
     scenes = {name: system.scene_of(name) for name in system.lines}
+    if not system.starts_as_placed:
+        at_rest = zip(run.model.names, run.model.models, first, strict=True)
+        torques = {name: tables.critical_torque(scenes[name], x, T) for name, x, T in at_rest}
+        lines = {name: replace(x, critical_torque=torques[name]) for name, x in found.lines.items()}
+        found = replace(found, lines=lines)
     outputs = time.duration / output_interval(system)
     each = [_of_passes(scene, 0.0, 0.0, outputs, found.lines[name]) for name, scene in scenes.items()]
     expected, most = max(_of_passes(scene, setup, motion, 0.0, found.lines[name]) for name, scene in scenes.items())

@@ -13,9 +13,9 @@ import json
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -68,6 +68,9 @@ from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
 from hybrid.store.records import ERROR_ESTIMATE, not_converged_attribute
+
+if TYPE_CHECKING:
+    from hybrid.accuracy.free_vibrations import LostBy
 
 Samples = dict[str, RunSample]  # of the lines, by name
 
@@ -423,6 +426,14 @@ class SystemPasses:
         attributes, notes = dict[str, dict[str, str | float | int]](), dict[str, list[tuple[str, str]]]()
         with open_result(self.target) as found:
             happened = {name: [(e.t, e.kind) for e in line.events] for name, line in found.lines.items()}
+        steps = next(iter(result.values())).forces[:, 0]
+        from hybrid.accuracy.free_vibrations import of_system
+
+        lost = cache(partial(of_system, self.system, resolution, steps))
+
+        def vibrations(name: str) -> LostBy:
+            return {} if self._touches else lost().get(name, {})
+
         for name, control in self.controls.items():
             scene, run = self.scenes[name], result[name]
             errors = control.estimate.errors if control.estimate is not None else None
@@ -431,7 +442,7 @@ class SystemPasses:
             for cause, quantity, begin, rows in errors.blocks() if errors is not None else ():
                 if (kept := values[name].get(f"errors/{cause}/{quantity}")) is not None:
                     kept[begin : begin + len(rows)] = rows
-            largest, notes[name] = known(scene, control, run, errors, happened[name])
+            largest, notes[name] = known(scene, control, run, errors, happened[name], partial(vibrations, name))
             attributes[name] = {**effort(scene, control, run, cpu), **largest}
             if control.asked is not None:
                 of = [x.errors for x in control.statistics.values()] if control.irregular else [errors]

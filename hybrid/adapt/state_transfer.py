@@ -13,7 +13,7 @@ from hybrid.kernels.state.state import NO_WAKE, Floats, Line, State, blank_state
 from hybrid.model.layout import Layout
 
 Clamp = tuple[Floats, Floats]  # first director and tangent
-states = Packed(blank_state, given=("turn", "slow", "wake", "peak"))
+states = Packed(blank_state, given=("turn", "slow", "wake", "peak", "grip", "sheave", "soil"))
 
 
 class Remapped(NamedTuple):
@@ -50,6 +50,9 @@ def transfer_to(
         slow=np.zeros(len(target.law)),
         wake=np.zeros((len(target.wake_law), NO_WAKE.shape[1])),
         peak=np.zeros(state.peak.size and target.h.size),
+        grip=np.zeros((len(state.grip) and target.h.size + 1, state.grip.shape[1])),
+        sheave=np.zeros(state.sheave.shape),
+        soil=np.zeros((len(state.soil) and target.h.size + 1, state.soil.shape[1])),
     )
     return Transfer(
         line, target, state, out, old.places, new.places, new.base_of_cell, old.first, kinks, twist,

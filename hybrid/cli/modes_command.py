@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybrid
-from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, flag, load_either, plot_option, session
+from hybrid.cli.app import Json, Quiet, SceneFile, Settings, app, flag, load_either, session
 
 if TYPE_CHECKING:
     from hybrid.modal.api import Modes
@@ -23,17 +23,23 @@ def modes(
     count: Annotated[int, typer.Option("--count", metavar="N", help="How many, the longest periods first.")] = 10,
     near: Annotated[float | None, typer.Option(metavar="S", help="Those nearest to this period (s) instead.")] = None,
     smooth: Annotated[bool, flag("--smooth", help="Without friction of the bed, which else holds the line.")] = False,
-    plot: Annotated[Path | None, plot_option("the shapes")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw the shapes: PNG, PDF, SVG; HTML, where they swing.")
+    ] = None,
     quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
     """Natural periods and shapes of a cable, or of lines with their points and bodies, about the equilibrium."""
     with session(as_json, quiet) as console:
-        from hybrid.view.save import PICTURES, check_target
+        from hybrid.view.save import PAGES, PICTURES, check_target
 
         asked = load_either(console, scene, settings)
-        picture = check_target(plot, PICTURES) if plot is not None else None
+        picture = check_target(plot, (*PICTURES, *PAGES)) if plot is not None else None
         found = hybrid.modes(asked, count, near, friction=not smooth)
-        if picture is not None:
+        if picture is not None and picture.suffix.lower() in PAGES:
+            from hybrid.view.modes_page import write_modes
+
+            write_modes(found, picture)
+        elif picture is not None:
             from hybrid.view.mode_shapes import plot_modes
 
             plot_modes(found, picture)

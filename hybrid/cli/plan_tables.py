@@ -152,8 +152,9 @@ def _model(plan: Plan) -> str:
     if plan.choice:
         each = ", ".join(f"{kind} {span(seconds)}" for kind, seconds in plan.choice)
         none = f"; no catenary: {plan.no_choice}" if plan.no_choice else ""
-        which = f"{plan.chosen}, the cheapest" if plan.chosen else "the cheapest"
-        return f"{which} by a pre-run: {each}{none}"
+        if plan.chosen:
+            return f"{plan.chosen}, chosen by a pre-run: {plan.why}"
+        return f"the cheapest by a pre-run: {each}{none}"
     if plan.base_cells is not None:
         return "adaptive: rod where a criterion asks for it, catenary elsewhere"
     if len(plan.zones) == 1:
@@ -189,7 +190,10 @@ def _hockling(plan: Plan) -> str:
     found = plan.critical_torque
     if found is None:
         return ""
-    text = f"a loop can form from {found.torque:.3g} N m on (s = {found.s:.4g} m)"
+    about = "about " if found.rough else ""
+    text = f"a loop can form from {about}{found.torque:.3g} N m on (s = {found.s:.4g} m)"
+    if found.rough:
+        text += " of the line hung without bed and bending; `hybrid static` has its tension"
     if found.of_tension:
         text += f", of which tension makes {abs(found.of_tension):.3g}"
     if found.diameter > 0.0 and found.min_bend_radius > 0.0:
@@ -270,5 +274,6 @@ def outputs_table(found: Sequence[Listed], more: Sequence[Listed]) -> Any:
         table.add_row(x.name, x.unit, "", x.description)
     table.add_row("wall_tension, von_mises", "N, Pa", "", "cable.sections[..].pipe: {wall: ...}")
     table.add_row("capacity_used", "%", "", "cable.sections[..].capacity: [[tension, 0], .., [0, curvature]]")
+    table.add_row("code_used", "%", "", "cable.sections[..].code: {kind: E301, ...} or {kind: F201, ...}")
     table.add_row("elevation", "m", "", "output.elevation: [[x, y], ...], in waves")
     return Group("", table)

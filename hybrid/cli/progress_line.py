@@ -116,7 +116,7 @@ class ProgressLine:
         time = f"{p.t:{widest}.{places}f} / {p.duration:.8g} s"
         step, rate, left = f"step {p.step:<5d}", self._speed(p), _left(p.seconds_left)
         which = [f"run {p.run} of {p.runs}: {p.name}"] if p.runs > 1 else []
-        touches = ["contact with itself"] if p.touches else []
+        touches = ["contact"] if p.touches else []
         for zones, newton, real in (
             (40, " Newton", " x real time"),
             (18, " Newton", " x real time"),

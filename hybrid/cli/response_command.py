@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -9,9 +10,10 @@ import typer
 
 import hybrid
 from hybrid.cli.app import Json, Quiet, SceneFile, Settings, UsageError, app, flag, load_either, session
+from hybrid.linear.response_results import OF_LARGEST
 
 if TYPE_CHECKING:
-    from hybrid.modal.response_results import LineResponse, Response
+    from hybrid.linear.response_results import LineResponse, Response
 
 
 MOTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -33,6 +35,8 @@ def response(
         found = hybrid.response(load_either(console, scene, settings), friction=not smooth, check=check)
         rows = _rows(found, hours)
         console.show(lambda: _table(found, rows, hours))
+        for text in _unresolved(found):
+            console.note(text)
         for name, (here, there) in found.checks.items():
             console.note(f"{name}: standard deviation {here:.4g}, in a run of {check:g} s {there:.4g}")
         for note in found.notes:
@@ -40,6 +44,18 @@ def response(
         console.json(
             "response", valid=found.valid, notes=list(found.notes), hours=hours, rows=rows, checks=dict(found.checks)
         )
+
+
+def _unresolved(found: Response) -> Iterator[str]:
+    """Along which part of each line curvature varies too little to be known."""
+    for name, line in found.lines.items():
+        part, most = 1.0 - float(line.resolved("curvature").mean()), float(line.deviation("curvature").max())
+        if part > 0.0 and most > 0.0:
+            of = f"line {name}: " if len(found.lines) > 1 else ""
+            yield (
+                f"{of}curvature is not known where its standard deviation is below a fifth of the largest, "
+                f"{OF_LARGEST * most:.3g} 1/m, {100.0 * part:.0f} % of the line: it may vary several times as much"
+            )
 
 
 def _rows(found: Response, hours: float) -> list[dict[str, Any]]:

@@ -31,6 +31,7 @@ from hybrid.errors import ResultError
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
+    from hybrid.modal.api import Modes
     from hybrid.store.reader import Result
 
 
@@ -99,6 +100,9 @@ def report(
     ],
     output: Annotated[Path | None, output_option("Page; else RUN.html, beside it.")] = None,
     line: LineName = None,
+    modes: Annotated[
+        int, typer.Option(metavar="N", min=0, max=200, help="Show so many natural modes of the scene, too.")
+    ] = 0,
     overwrite: Foreign = False,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -119,11 +123,19 @@ def report(
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
         from hybrid.view.summary import facts_of
 
-        page = hybrid.report(opened, output or result.with_suffix(".html"), overwrite=overwrite)
+        swings = _modes_of(opened, modes) if modes else None
+        page = hybrid.report(opened, output or result.with_suffix(".html"), overwrite=overwrite, modes=swings)
         size, facts = page.stat().st_size, []
         if as_json and not opened.lines:
             facts = [fact._asdict() for fact in facts_of(opened)]
         console.done(f"{size / 1e6:.1f} MB", page, status=opened.status, size=size, facts=facts)
+
+
+def _modes_of(result: Result, count: int) -> Modes:
+    """Natural modes of the scene of a result."""
+    from hybrid.scene.read import parse_either
+
+    return hybrid.modes(parse_either(result.scene_text)[0], count)
 
 
 def _comparison(

@@ -87,4 +87,10 @@ def _tables(found: list[Derivative]) -> Any:
             elastic = f"{x.elasticity:.3g}" if math.isfinite(x.elasticity) else ""
             table.add_row(x.by, f"{x.number:.5g}", f"{x.derivative:.5g}", f"{x.error:.1g}", elastic)
         tables.append(table)
-    return Group(*tables)
+    ways = dict.fromkeys(x.way for x in found)
+    return Group(*tables, *(f"by {way}" if len(ways) == 1 else f"{_keys(found, way)} by {way}" for way in ways))
+
+
+def _keys(found: list[Derivative], way: str) -> str:
+    """By which numbers derivatives were found in a way."""
+    return ", ".join(dict.fromkeys(x.by for x in found if x.way == way))

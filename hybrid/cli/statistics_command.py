@@ -58,26 +58,26 @@ def stats(
     fatigue damage and fatigue life; where each is largest, or at the places of --at."""
     if not 0.0 < hours < inf:
         raise UsageError(f"--hours: {hours:g} is no time; give a number above 0, such as 3")
-    if curve is None and (strength is not None or section is not None):
-        name = "--strength" if strength is not None else "--section"
-        raise UsageError(f"{name}: of fatigue damage, which needs a curve; add --curve NAME, such as --curve 'D sea'")
-    asked = (mooring is not None, factors is not None, pretension is not None)
-    if any(asked) and not all(asked):
-        raise UsageError("--mooring, --factors and --pretension go together; there is no usual factor")
+    _refuse_alone(curve, strength, section, (mooring, factors, pretension))
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
-        if opened.lines and (names is None or not all(name in opened for name in names)):
-            from hybrid.store.histories import usual_names
+        from hybrid.store.histories import component_of, usual_names
 
+        if opened.lines and (names is None or not all(component_of(opened, name)[0] in opened for name in names)):
             own = ",".join(usual_names(opened))
             fix = f"--line {next(iter(opened.lines))}" + (f", or --names {own}" if own else "")
             raise ResultError(f"{result} holds the lines {', '.join(opened.lines)}\n    try:      {fix}")
-        from hybrid.store.statistics_table import rows_of
+        from hybrid.store.statistics_table import rows_of, values_of
 
-        facts: dict[str, Any] = {}
-        if curve is not None:
-            s, damage = opened.damage(curve, strength=strength, section=section, times=times, at=at)
-            facts = _fatigue_facts(opened, s, damage, times, section is not None)
-            facts["places"] = [] if at is None else _fatigue_at(s, damage, facts)
+        if len(opened.times) == 1 and opened.status == "complete" and (above, below, curve, mooring) == (None,) * 4:
+            values = values_of(opened, names, at)
+            for row in values:
+                console.json("statistics", **row)
+            console.show(lambda: _values_table(values))
+            console.note("note: of an equilibrium, which has values and no statistics")
+            console.json("done", file=str(result), status=opened.status)
+            return
+
+        facts = {} if curve is None else _fatigue(opened, curve, strength, section, times, at)
         for key, value in (("--above", above), ("--below", below)):
             if value is not None and (names is None or len(names) > 1):
                 fix = f"hybrid stats RUN.h5 --names end_force_end {key} 5e4"
@@ -111,6 +111,28 @@ def stats(
             console.show(lambda: moored["text"])
         more = {"mooring": moored} if moored else {}
         console.json("done", file=str(result), status=opened.status, fatigue=facts, utilisation=used, **more)
+
+
+def _refuse_alone(curve: str | None, strength: float | None, section: Any, moored: tuple[Any, Any, Any]) -> None:
+    """UsageError: options without those that belong to them; moored: --mooring, --factors, --pretension."""
+    if curve is None and (strength is not None or section is not None):
+        name = "--strength" if strength is not None else "--section"
+        raise UsageError(f"{name}: of fatigue damage, which needs a curve; add --curve NAME, such as --curve 'D sea'")
+    given = [x is not None for x in moored]
+    if any(given) and not all(given):
+        raise UsageError("--mooring, --factors and --pretension go together; there is no usual factor")
+
+
+def _fatigue(result: Result, curve: str, strength: float | None, section: Any, times: Any, at: Any) -> dict[str, Any]:
+    """Damage and life where the damage is largest, with what errors leave of it, and at the places that are asked."""
+    from hybrid.store.fatigue_errors import life_within
+
+    s, damage = result.damage(curve, strength=strength, section=section, times=times, at=at)
+    facts = _fatigue_facts(result, s, damage, times, section is not None)
+    if facts["life"] is not None:
+        facts |= life_within(result, facts, curve, strength, section, times)
+    facts["places"] = [] if at is None else _fatigue_at(s, damage, facts)
+    return facts
 
 
 def _moored(
@@ -171,6 +193,19 @@ def _table(rows: list[dict[str, Any]], hours: float) -> Any:
     return table
 
 
+def _values_table(rows: list[dict[str, Any]]) -> Any:
+    """Values of an equilibrium."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for title in ("", "s (m)", "value"):
+        table.add_column(title, justify="right" if title else "left", no_wrap=True)
+    for row in rows:
+        texts = ("" if x is None else f"{x:.5g}" for x in (row["s"], row["value"]))
+        table.add_row(f"{row['quantity']} ({row['unit']})", *texts)
+    return table
+
+
 def _parts_of_time(rows: list[dict[str, Any]], above: float | None, below: float | None) -> list[str]:
     """For which part of the time quantities are above, or below, a value."""
     found = []
@@ -184,6 +219,7 @@ def _parts_of_time(rows: list[dict[str, Any]], above: float | None, below: float
 
 def _limit_lines(result: Result) -> list[str]:
     """Which part of the limits of sections is used, and the limits of quantities."""
+    from hybrid.store.code_checks import clauses_of
     from hybrid.store.envelope import largest_contact
     from hybrid.store.verdicts import quantity_limits
 
@@ -192,12 +228,14 @@ def _limit_lines(result: Result) -> list[str]:
         partner, most = pressed
         at = f"s = {most.s:.5g} m, t = {most.t:.5g} s"
         found.append(f"largest contact force: {most.value:.5g} N/m of {partner}, {at}")
+    found += [f"contact, {x.partner}: {x.text}, t = {x.t_force:.5g} s, of every output" for x in result.contacts()]
     for x in () if result.lines else result.utilisation().values():
         part = "" if x.used is None else f"{100.0 * x.used:.4g} % of {x.limit} used: "
         if x.limit == "min_bend_radius" and x.used is not None:
             part = f"MBR utilisation of {100.0 * x.used:.4g} %: "
         found.append(f"{part}{x.text}, s = {x.s:.5g} m, t = {x.t:.5g} s, of every step and output{x.ending}")
-    return found + [f"{x.text}{x.when}{x.ending}" for x in quantity_limits(result)]
+    found += [f"{x.text}{x.when}{x.ending}" for x in quantity_limits(result)]
+    return found + ([f"code_used is by {clauses}"] if (clauses := clauses_of(result)) else [])
 
 
 def _fatigue_facts(result: Result, s: np.ndarray, damage: np.ndarray, times: Any, bends: bool) -> dict[str, Any]:
@@ -233,6 +271,10 @@ def _fatigue_lines(curve: str, facts: dict[str, Any]) -> str:
     lines = []
     for x in facts["places"] or [facts]:
         life = "unlimited" if x["life"] is None else f"{x['life']:.3g} years"
+        if x["life"] is not None and facts.get("life_least") is not None:
+            scale = x["life"] / facts["life"]
+            most = "unlimited" if facts["life_most"] is None else f"{scale * facts['life_most']:.3g}"
+            life += f", {scale * facts['life_least']:.3g} to {most} by the errors of what varies"
         life = facts["life_not_verified"] or life
         place = f"{'' if facts['places'] else 'largest '}damage at s = {x['s']:.5g} m"
         lines.append(f"{place}: {x['damage']:.3g} in {facts['duration']:.6g} s; fatigue life {life}")

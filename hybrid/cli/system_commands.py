@@ -80,7 +80,9 @@ def ended(console: Console, result: Result, target: Path, picture: Path | None, 
     points, bodies = _last(result, "points"), _last(result, "bodies")
     console.events(result.events)
     end = float(result.times[-1]) if moves else None
-    console.show(lambda: _table(lines, points, bodies, held, end))
+    meetings = [(x.t, x.text) for x in result.events if x.kind == "lines touch"]
+    meetings += [(x.t_force, f"{x.partner}: {x.text}") for x in result.contacts()]
+    console.show(lambda: _table(lines, points, bodies, held, end, meetings))
     pictures = [picture] if picture is not None else []
     console.done(
         text, target, *pictures, status=result.status, lines=lines, points=points, bodies=bodies, quantities=held,
@@ -100,9 +102,12 @@ def _last(result: Result, group: str) -> dict[str, dict[str, Any]]:
 
 def _table(
     lines: dict[str, Any], points: dict[str, Any], bodies: dict[str, Any], held: list[dict[str, Any]],
-    end: float | None,
+    end: float | None, meetings: list[tuple[float, str]],
 ) -> Any:  # fmt: skip
-    """end: s, time of the last output, of which points and bodies are; None: of an equilibrium."""
+    """end: s, time of the last output, of which points and bodies are; None: of an equilibrium; meetings: of lines,
+
+    when (s) and where they touched first, and with what force.
+    """
     from rich.table import Table
 
     def at(x: dict[str, Any]) -> str:
@@ -142,6 +147,8 @@ def _table(
         turned = f"{_vector(facts['position'])} m, turned by {_vector(facts['rotation'], 1e-6)} deg"
         loads = f"force of the lines {_vector(facts['force'])} N, moment {_vector(facts['moment'])} N m"
         table.add_row(f"body {name}", f"{last}{turned}, {loads}")
+    for t, text in meetings:
+        table.add_row("contact", f"{'' if end is None else f't = {t:.5g} s: '}{text}")
     for x in held:
         table.add_row(x["name"], x["text"] + x["when"] + x["ending"])
     table.columns[0].style = "bold"

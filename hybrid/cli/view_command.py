@@ -5,11 +5,14 @@ from __future__ import annotations
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hybrid.cli.app import Json, app, flag, session
+
+if TYPE_CHECKING:
+    from hybrid.cli.console import Console
 
 NEEDED = ("starlette", "uvicorn", "websockets")
 
@@ -32,11 +35,24 @@ def view(
             fix = 'pip install "hybrid-cable[view]"'
             console.error("view", f"hybrid view needs {', '.join(missing)}\n    try:      {fix}")
             raise typer.Exit(1)
+        import asyncio
+
+        console.source = str(file or "")
+        with suppress(KeyboardInterrupt):  # the way to end it
+            asyncio.run(_serve(file, console, no_browser))
+
+
+async def _serve(file: Path | None, console: Console, no_browser: bool) -> None:
+    """Serve until the end.  The process that makes pictures starts first, and reads its modules beside this one."""
+    from hybrid.live.workers import Workers
+
+    workers = Workers()
+    await workers.start()
+    try:
         from hybrid.live.server import listen, make_server
         from hybrid.live.session import session_of
 
-        console.source = str(file or "")
-        viewed = session_of(file)
+        viewed = session_of(file, workers)
         at = listen()
         server, address, once = make_server(viewed, at)
         console.json("view", address=address, file=str(file) if file else None)
@@ -45,5 +61,6 @@ def view(
             import webbrowser
 
             webbrowser.open(once)
-        with suppress(KeyboardInterrupt):  # the way to end it
-            server.run(sockets=[at])
+        await server.serve(sockets=[at])
+    finally:
+        await workers.stop()

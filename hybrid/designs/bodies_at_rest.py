@@ -5,7 +5,7 @@ Of a body that lines pull at with forces f at arms a, and with moments m where t
     R = (F + sum f,  M + sum (a x f + m)),
 
 a change of the scene changes its own F and M (weight, water, loads), the arms, and the forces and moments of the same
-shapes of the lines.  What lines leave over at their ends comes through the place of the ends (modal.matrices).
+shapes of the lines.  What lines leave over at their ends comes through the place of the ends (linear.matrices).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from hybrid.designs.line_at_rest import Frames
 from hybrid.kernels.junctions.bodies import FRAME, OWN, PIECES, SOFTEST, V
 from hybrid.kernels.junctions.carried_frames import TURNS
 from hybrid.kernels.state.state import Floats
-from hybrid.modal.loaded_members import stiffness_by_water
+from hybrid.linear.loaded_members import stiffness_by_water
 from hybrid.model.bodies import loads_of
 from hybrid.model.system import SystemModel, bodies_of
 from hybrid.scene.points import Fairlead

@@ -1,7 +1,8 @@
 """The equilibrium of one cable, and what its results answer to numbers of the scene.
 
 At an equilibrium R(q; p) = 0, so that  A dq/dp = dR/dp  with the matrix A of the modes (theory.md, 20): one solve for
-each number, in place of two equilibria.  dR/dp is the change of the block rows of the same state between two lines.
+each number, in place of two equilibria, or for each result where numbers are many (designs.gradients).  dR/dp is the
+change of the block rows of the same state between two lines.
 """
 
 from __future__ import annotations
@@ -12,15 +13,16 @@ from types import MappingProxyType
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from hybrid.accuracy.api import resolution_at_rest
+from hybrid.designs.factors import Factors
+from hybrid.designs.gradients import Gradients
 from hybrid.designs.line_at_rest import LEFT_OUT, Beside, LineAtRest, Wanted
 from hybrid.designs.numbers import OfScene, is_allowed, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
-from hybrid.modal.matrices import linear_line
+from hybrid.linear.matrices import linear_line
 from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby
 from hybrid.model.resolution import Resolution
@@ -62,9 +64,9 @@ class CableAtRest(OfScene):
                 free[-k, 1:4] = False
         self._free, self._held = np.flatnonzero(free.ravel()), [k for k in (0, 1) if held[k]]
         of_free = linear.stiffness[self._free]
-        self._factors = splu(sparse.csc_array(of_free[:, self._free]))
+        self._factors = Factors(sparse.csc_array(of_free[:, self._free]))
         self._by_ends = {k: of_free[:, self._of_end(k)].toarray() for k in self._held}
-        self.values = self.line.values()
+        self.values, self.gradients = self.line.values(), Gradients(self.line)
 
     def _of_end(self, k: int) -> np.ndarray:
         """Which unknowns are the place of an end."""
@@ -79,15 +81,32 @@ class CableAtRest(OfScene):
         pairs = [self._beside(*row) for row in zip(keys, numbers.tolist(), steps.tolist(), strict=True)]
         lines = [x for pair in pairs for x in pair]
         left, reports = zip(*(self.line.left(x) for x in lines), strict=True)
-        q = np.zeros((len(keys), self.model.line.s.size, SIZE))
         right = np.stack([x - y for x, y in zip(left[::2], left[1::2], strict=True)], axis=1)[self._free]
         right /= 2.0 * steps
+        shifts = np.zeros((len(keys), self.model.line.s.size, SIZE))
         for k in self._held:
             shift = np.stack([a.ends.position[k] - b.ends.position[k] for a, b in pairs], axis=1) / (2.0 * steps)
             right -= self._by_ends[k] @ shift
-            q[:, -k, 1:4] = shift.T
-        q.reshape(len(keys), -1)[:, self._free] = self._factors.solve(right).T
-        return self.line.by_state(q) + self.line.by_scene([*zip(lines, reports, strict=True)], steps)
+            shifts[:, -k, 1:4] = shift.T
+        by_scene = self.line.by_scene([*zip(lines, reports, strict=True)], steps)
+        by_state = self.transposed if self.gradients.pay_for(len(keys)) else self.forward
+        return by_scene + by_state(right, shifts)
+
+    def forward(self, right: Floats, shifts: Floats) -> Floats:
+        """(P, W) by a solve for each number: right (free, P), shifts (P, N+1, 5) of held ends."""
+        return self.line.by_state(self.movements(right, shifts))
+
+    def movements(self, right: Floats, shifts: Floats) -> Floats:
+        """(P, N+1, 5) of the state by numbers."""
+        q = shifts.copy()
+        q.reshape(len(q), -1)[:, self._free] = self._factors.solve(right).T
+        return q
+
+    def transposed(self, right: Floats, shifts: Floats) -> Floats:
+        """(P, W) the same by a transposed solve for each result."""
+        by_unknowns = self.gradients.by_unknowns.reshape(len(self.line.wanted), -1)
+        prices = self._factors.solve(by_unknowns[:, self._free].T, transposed=True)
+        return np.asarray(right.T @ prices + shifts.reshape(len(shifts), -1) @ by_unknowns.T)
 
     def _beside(self, key: str, number: float, step: float) -> tuple[Beside, Beside]:
         """The line with a number that is more by a step, and less."""

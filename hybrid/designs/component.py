@@ -32,7 +32,7 @@ def openmdao_component(
     `minimise` here.  Inputs are the unknowns, by name; outputs are results, targets and limits by name, a limit with a
     value for each of its cases and sections, and what is minimised as `minimised`.  Units are those of the scene.
     driven: unknowns are design variables with their bounds, limits and targets constraints, what is minimised the
-    objective.  Derivatives are exact at rest, of motions forward differences.
+    objective.  Derivatives are exact at rest, of motions those of `hybrid.design`.
 
     Where there is no equilibrium it raises OpenMDAO's `AnalysisError`.  SceneError: the design or its scene is refused;
     ComputationError: there is no equilibrium where it begins; ResultError: OpenMDAO is not installed.

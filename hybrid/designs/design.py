@@ -10,12 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.designs.equilibria import FINER, AnyScene, Equilibria, Point, scene_with
+from hybrid.designs.equilibria import FINER, AnyScene, Equilibria, Point
 from hybrid.designs.found_scene import text_of_found
 from hybrid.designs.identify import Apart, Estimate, fit
 from hybrid.designs.measured import Measurements, measurements, quantity_of
 from hybrid.designs.motions import IN_MOTION
 from hybrid.designs.nearest import Space
+from hybrid.designs.numbers import scene_with
 from hybrid.designs.optimum import AT_BOUND, SETTLED, Optimum, Price, is_active, optimum, reached
 from hybrid.designs.problem import Constraint, Problem, as_asked, begun, problem_of, refused_result, scenes_of, space_of
 from hybrid.errors import ComputationError, Outcome, SceneError

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from hybrid.designs.cable_at_rest import NO_PLACES, CableAtRest, Places
-from hybrid.designs.motions import IN_MOTION, Motions, OfMotion
-from hybrid.designs.numbers import changed_scene, is_allowed, with_number
+from hybrid.designs.motions import IN_MOTION, Motions, OfMotion, Peaks
+from hybrid.designs.numbers import scene_with
 from hybrid.designs.sensitivity import at_rest
 from hybrid.designs.system_at_rest import SystemAtRest
 from hybrid.errors import ComputationError, Outcome
@@ -36,8 +36,8 @@ class Point:
         self.values = np.zeros(len(equilibria.wanted))
         for case, rest in rests.items():
             self.values[equilibria.rows[case]] = rest.values
-        equilibria.motions.values(motion, self.values)
         self._slopes: Floats | None = None
+        self._take_motions()
 
     @property
     def slopes(self) -> Floats:
@@ -50,16 +50,53 @@ class Point:
                 if rows.size:
                     by_key = self.rests[case].by(keys).T
                     np.add.at(self._slopes, (rows[:, None], owner[None, :]), by_key)
-            if self._of.motions.rows:
-                sizes = np.where(self.x == 0.0, 1.0, np.abs(self.x))
-                self._slopes += self._of.motions.slopes(self._motion, sizes)
+            for case, rows in self._of.motions.rows.items():
+                self._slopes[rows] += [x.slopes[0] for x in self._motions[case]]
         return self._slopes
+
+    @property
+    def _motions(self) -> Mapping[str, list[Peaks]]:
+        return self._of.motions.peaks(self._motion, np.where(self.x == 0.0, 1.0, np.abs(self.x)))
+
+    def peaks(self, row: int) -> Peaks | None:
+        """The peaks of an extreme over time, of other results of motions their value; None: it is of an equilibrium."""
+        if row not in self._of.motions.place:
+            return None
+        case, k = self._of.motions.place[row]
+        return self._motions[case][k]
+
+    def at_peaks(self, row: int, peaks: Peaks) -> Floats:
+        """Values (m,) of a result at places and times of the peaks of another point, but the first: its own extreme."""
+        case, k = self._of.motions.place[row]
+        values = self._of.motions.at_peaks(self._motion, case, k, peaks)
+        values[0] = self.values[row]
+        return values
+
+    def foretold(self, x: Floats) -> Floats:
+        """Results (R,) by slopes with other values of unknowns."""
+        values = self.values + self.slopes @ (x - self.x)
+        for case, rows in self._of.motions.rows.items():
+            values[rows] = [each.moved(x - self.x).values[0] for each in self._motions[case]]
+        return np.asarray(values)
+
+    def _take_motions(self) -> None:
+        self._of.motions.values(self._motion, self.values)
+        self._of.check(self)
+        self._slopes = None
+
+    def complete(self, cases: Iterable[str] | None = None) -> bool:
+        """Run cases that were foretold; None: all; False: none of them were."""
+        motions = self._of.motions
+        if not motions.run(self._motion, motions.rows if cases is None else cases):
+            return False
+        self._take_motions()
+        return True
 
     def refresh(self, cases: set[str]) -> bool:
         """Make slopes of motions in these cases those of runs beside; False: they are."""
         if not self._of.motions.refresh(self._motion, cases):
             return False
-        self._slopes = None
+        self._take_motions()
         return True
 
     def nodes(self, case: str, name: str) -> Floats:
@@ -99,14 +136,17 @@ class Equilibria:
         self._kept: dict[bytes, Point] = {}
         self._places: dict[str, Places] = {}  # cells of the first: others would make results jump
 
-    def at(self, x: Floats, cells: float = 1.0) -> Point:
-        """Equilibria with values (n,) of unknowns; cells: how many times as long as usual.
+    def at(self, x: Floats, cells: float = 1.0, moving: Iterable[str] | None = None) -> Point:
+        """Equilibria with values (n,) of unknowns; cells: how many times as long as usual; moving: cases that are run,
+
+        others are foretold (`Motions.at`); None: all.
 
         SceneError: a scene may not have these; ComputationError: there is no equilibrium, or a result is not there in
         it, such as `touchdown` of a line that does not lie on the bed.
         """
         kept = self._kept.get(x.tobytes()) if cells == 1.0 else None
         if kept is not None:
+            kept.complete(moving)
             return kept
         rests = {}
         for case in self.scenes:
@@ -116,30 +156,20 @@ class Equilibria:
             of = [self.wanted[k][1] for k in self.rows[case]]
             rests[case] = at_rest(self.scene(case, x), of, cells, self._places.get(case, NO_PLACES))
             self._places.setdefault(case, rests[case].places)
-        point = Point(x.copy(), rests, self.motions.at(x, finer=cells < 1.0), self)
-        for k in np.flatnonzero(~np.isfinite(point.values))[:1]:
-            case, result = self.wanted[k]
-            given = ", ".join(f"{group[0]} = {value:.6g}" for group, value in zip(self.keys, x, strict=True))
-            detail = f"{result}{f' ({case})' if case else ''} has no value in the equilibrium with {given}"
-            raise ComputationError(Outcome.NOT_REACHED, None, None, detail)
+        point = Point(x.copy(), rests, self.motions.at(x, cells < 1.0, moving), self)
         if cells == 1.0:
             first = [*self._kept.items()][:1]  # where a search began is asked for once more at its end
             self._kept = dict(first + [*self._kept.items()][1:][-1:]) | {x.tobytes(): point}
         return point
 
+    def check(self, point: Point) -> None:
+        """ComputationError: a result that has no value."""
+        for k in np.flatnonzero(~np.isfinite(point.values))[:1]:
+            case, result = self.wanted[k]
+            given = ", ".join(f"{group[0]} = {value:.6g}" for group, value in zip(self.keys, point.x, strict=True))
+            detail = f"{result}{f' ({case})' if case else ''} has no value in the equilibrium with {given}"
+            raise ComputationError(Outcome.NOT_REACHED, None, None, detail)
+
     def scene(self, case: str, x: Floats) -> Any:
         """The scene of a case with values of unknowns; SceneError: it may not have these."""
         return scene_with(self.scenes[case], self.keys, x * (1.0 + APART * np.arange(x.size)))
-
-
-def scene_with(scene: AnyScene, keys: Sequence[tuple[str, ...]], x: Floats) -> AnyScene:
-    """A scene with values at keys of each unknown; SceneError: it may not have these."""
-    given = [(key, float(value)) for group, value in zip(keys, x, strict=True) for key in group]
-    changed = scene
-    for key, value in given:
-        changed = with_number(changed, key, value)
-    if not is_allowed(changed):
-        for key, value in given:
-            scene = changed_scene(scene, key, value)
-        return scene
-    return changed

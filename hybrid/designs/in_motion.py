@@ -10,28 +10,38 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.designs.line_at_rest import AXES, refuse_parts
-from hybrid.designs.numbers import changed_scene, number_of
-from hybrid.designs.replay import Course, course_of, replay
+from hybrid.designs.numbers import number_of, scene_with
+from hybrid.designs.peaks import over_time, peaks
+from hybrid.designs.replay import Course, course_of, replay, with_outputs
+from hybrid.designs.tangents import Others, Seen, Unfollowed, step_of
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import Scene, Spread
 from hybrid.scene.system import System
+from hybrid.simulation.case import Begun
 
 NAME = re.compile(r"^(max|min|mean|std|last|t=\S+) (?:([^/@]+)/)?([a-z_]\w*)(?:\.([xyz]))?(?:@(.+))?$")
 OF_SECTION = re.compile(r"^sections\[(\d+)\]$")
 # Parts of a number by which runs differ: differences of second order by both, from which one of fourth order follows.
 PARTS = (1e-3, 2e-3)
+# How derivatives were found.
+TANGENTS, DIFFERENCES = "tangents along the steps", "differences of runs"
 # Coordinates differ by parts of this part of the longest line: what they are depends on where the origin is.
 PLACE, OF_LENGTH = re.compile(r"(position\[\d\]|\.z|\.surface|\.at\[\d\])$"), 0.1
 # Tables of how a scene is computed and written.
 COMPUTING = ("time", "output", "mesh", "accuracy", "model", "resolution")
+# Error of tangents that equations give to one side, in parts of a number by which another line differs from the line; a
+# result that answers by less than this, in parts by parts, has it of this.
+ONE_SIDED, WEAK = 1.5, 0.04
 # Of the length, by which zones of two runs may differ that are the same.
 SAME_ZONE = 0.005
 # Of the length, within which a place is at the end of a section.
@@ -52,40 +62,113 @@ class Wanted(NamedTuple):
     section: int | None = None
     time: float = math.nan
 
+    @property
+    def place(self) -> Wanted:
+        """Whose history it is of."""
+        return self._replace(over="", time=0.0)
+
 
 class Slopes(NamedTuple):
-    """Results (W,) of the base run; their derivatives (P, W) by numbers, and errors of these by the step."""
+    """Results (W,) of the base run; their derivatives (P, W) by numbers, errors of these, and the way to each row."""
 
     values: Floats
     derivatives: Floats
     errors: Floats
+    ways: tuple[str, ...]
 
 
 def in_motion(asked: Scene | System, of: Sequence[str], by: Sequence[str]) -> Slopes:
-    """Derivatives of results of a run; four runs for each number.
+    """Derivatives of results of a run: tangents along its steps or, where these are not known, four runs a number.
 
     of: `max tension@end`, `std position.z@100`, `max hose/curvature`: max, min, mean, std or last over the outputs, or
     `t=12.5 tension@end`, at a time.
     SceneError: no such key or result; ComputationError: a run fails, or steps or zones of runs with other numbers are
     not those of the base run.
     """
-    wanted = [parse_history(asked, x) for x in of]
-    numbers = [number_of(asked, key) for key in by]
-    base = Motion(asked, wanted, course_of(asked))
-    slopes, errors = (np.zeros((len(by), len(of))) for _ in range(2))
-    for i, (key, number) in enumerate(zip(by, numbers, strict=True)):
+    wanted, course = [parse_history(asked, x) for x in of], course_of(asked)
+    numbers = {key: number_of(asked, key) for key in by}
+    sizes = {key: size_of(asked, key, number) for key, number in numbers.items()}
+    apart: dict[str, str] = {}  # why tangents are not known
+    found: list[Slopes] = []
+    while along := {key: x for key, x in numbers.items() if key not in apart}:
+        try:
+            found.append(by_tangents(asked, wanted, course, along, sizes))
+            break
+        except Unfollowed as why:
+            which = list(along) if why.number is None else [list(along)[why.number]]
+            apart |= {key: str(why) for key in which}
+    if apart:
+        found.append(by_differences(asked, wanted, course, {key: numbers[key] for key in apart}, sizes))
+    ways = tuple(f"{DIFFERENCES}: {apart[key]}" if key in apart else TANGENTS for key in by)
+    order = [[*along, *apart].index(key) for key in by]
+    derivatives, errors = (
+        np.concatenate(x)[order] for x in ([x.derivatives for x in found], [x.errors for x in found])
+    )
+    return Slopes(found[0].values, derivatives, errors, ways)
+
+
+def by_tangents(
+    asked: Scene | System, wanted: Sequence[Wanted], course: Course, numbers: Mapping[str, float],
+    sizes: Mapping[str, float],
+) -> Slopes:  # fmt: skip
+    """Derivatives by tangents along the steps of one run; Unfollowed: they are not known of it."""
+    if not isinstance(asked, Scene):
+        raise Unfollowed("several lines")
+    steps = {key: step_of(key, sizes[key]) for key in numbers}
+
+    def other(key: str, d: float) -> Scene:
+        return scene_with(asked, [(key,)], np.array([numbers[key] + d]))
+
+    pairs = [(other(key, h), other(key, -h)) for key, h in steps.items()]
+    base, values, off = followed(asked, wanted, course, pairs, [*steps.values()])
+    h = np.array([*steps.values()])[:, None]
+    slopes = (values[:, 0] - values[:, 1]) / (2.0 * h)
+    size = np.array([[sizes[key]] for key in numbers])
+    parts = off[:, None] + ONE_SIDED * h / size
+    errors = parts * np.maximum(np.abs(slopes), WEAK * np.abs(base.values) / size)
+    return Slopes(base.values, slopes, errors, len(numbers) * (TANGENTS,))
+
+
+def followed(
+    asked: Scene, wanted: Sequence[Wanted], course: Course, pairs: Sequence[tuple[Scene, Scene]],
+    steps: Sequence[float], smooth: bool = False,
+) -> tuple[Motion, Floats, Floats]:  # fmt: skip
+    """A run, results (P, 2, W) of scenes with more and with less of each number by a step, and parts of tangents (P,)
+
+    by which these may be off.  smooth: as of `Motion`, with all peaks of each result in turn, so that W is more.
+    """
+    each_step, more = any(x.over == "t" for x in wanted), Motion.more(wanted) if smooth else None
+    scenes = [
+        (with_outputs(a, course, each_step=each_step), with_outputs(b, course, each_step=each_step)) for a, b in pairs
+    ]
+    others = Others(scenes, steps, course.lines[""], more)
+    base = Motion(asked, wanted, course, smooth=smooth, begun=others.begin)
+    seen = others.results(sorted({x.name for x in wanted}))
+    values = np.array([[base.beside(x, wanted) for x in pair] for pair in seen])
+    return base, values, others.errors
+
+
+def by_differences(
+    asked: Scene | System, wanted: Sequence[Wanted], course: Course, numbers: Mapping[str, float],
+    sizes: Mapping[str, float],
+) -> Slopes:  # fmt: skip
+    """Derivatives by differences of runs in the steps of one: four for each number."""
+    base = Motion(asked, wanted, course)
+    slopes, errors = (np.zeros((len(numbers), len(wanted))) for _ in range(2))
+    for i, (key, number) in enumerate(numbers.items()):
         found = []
         for part in PARTS:
-            d = part * size_of(asked, key, number)
+            d = part * sizes[key]
             more, less = (
-                Motion(changed_scene(asked, key, number + x), wanted, base.course, base) for x in (d, -d)
+                Motion(scene_with(asked, [(key,)], np.array([number + x])), wanted, base.course, base)
+                for x in (d, -d)
             )  # fmt: skip
             for each in (more, less):
                 each.check(base, key)
             found.append((more.values - less.values) / (2.0 * d))
         slopes[i] = (4.0 * found[0] - found[1]) / 3.0
         errors[i] = np.abs(slopes[i] - found[0])
-    return Slopes(base.values, slopes, errors)
+    return Slopes(base.values, slopes, errors, len(numbers) * (DIFFERENCES,))
 
 
 def size_of(asked: Scene | System, key: str, number: float) -> float:
@@ -152,44 +235,92 @@ class Motion:
 
     def __init__(
         self, scene: Scene | System, wanted: Sequence[Wanted], course: Course, base: Motion | None = None,
-        finer: bool = False, smooth: bool = False,
+        finer: bool = False, smooth: bool = False, begun: Begun | None = None,
     ) -> None:  # fmt: skip
-        """course, finer: as of `replay`; smooth: extremes are those of parabolas in time and along the line,
+        """course, finer, begun: as of `replay`; smooth: extremes are those of parabolas in time and along the line,
 
         at whose nodes there are outputs.
         """
-        self.course = course
-        more = [x.at for x in wanted if x.at is not None and np.isfinite(x.at)] if smooth else None
+        self.course, self.smooth = course, smooth
+        more = self.more(wanted) if smooth else None
         self._cables = {k: x.cable for k, x in scene.lines.items()} if isinstance(scene, System) else {"": scene.cable}
         each_step = any(x.over == "t" for x in wanted)
-        with replay(scene, course, finer, more, each_step) as result:
+        with replay(scene, course, finer, more, each_step, begun) as result:
             lines: dict[str, Any] = dict(result.lines) or {"": result}
             self.steps = {name: np.array(x["steps/t"]) for name, x in lines.items()}
             self.zones = {name: list(_zones(x)) for name, x in lines.items()}
             self.begin = {name: np.array(x.position[0]) for name, x in lines.items()}
-            self.where: list[Any] = [None] * len(wanted) if base is None else list(base.where)
-            self.values = np.zeros(len(wanted))
-            self.shapes: list[tuple[int, ...]] = []
-            histories: dict[Wanted, Floats] = {}  # of many times there is one
-            for k, x in enumerate(wanted):
-                place = x._replace(over="", time=0.0)
-                if place not in histories:
-                    histories[place] = self._history(lines[x.line], x)
-                history = histories[place]
-                self.shapes.append(history.shape)
-                if base is not None and history.shape != base.shapes[k]:  # it is no neighbour: see check
-                    continue
-                if x.over == "t":
-                    self.values[k] = np.interp(x.time, lines[x.line].t, history[:, 0])
-                    continue
-                self.values[k], self.where[k] = _over(history, x.over, self.where[k])
-                if smooth and x.over in ("max", "min"):
-                    self.values[k] += _beyond(history, *self.where[k])
+            self._t = {name: np.array(x.t) for name, x in lines.items()}
+            self._histories = self._read(lines, wanted)
+        self.where: list[Any] = [None] * len(wanted) if base is None else list(base.where)
+        self.values = self._values(wanted, self.where, base)
+        # of each result, when and where peaks are; one of all that are no extremes
+        self.peaks: list[list[Any]] = [[where] for where in self.where] if base is None else base.peaks
+        if smooth and base is None:
+            each = zip(wanted, self.where, strict=True)
+            self.peaks = [peaks(self._histories[x.place], x.over, where) for x, where in each]
+        if not smooth:
+            self._histories = {}
+
+    @staticmethod
+    def more(wanted: Sequence[Wanted]) -> list[float]:
+        """Places that are wanted, m."""
+        return [x.at for x in wanted if x.at is not None and np.isfinite(x.at)]
+
+    def beside(self, seen: Seen, wanted: Sequence[Wanted]) -> Floats:
+        """The same results of other outputs in these steps, of a scene with another number, of all peaks in turn:
+
+        extremes are where they are in this run.  Unfollowed: there are others.
+        """
+        other = copy(self)
+        other._cables, other._t = {"": seen.scene.cable}, {"": seen.t}
+        other._histories = other._read({"": seen}, wanted)
+        if other.shapes != self.shapes:
+            raise Unfollowed("outputs of a section are more or fewer")
+        return other.at_peaks(wanted, self.peaks)
+
+    def at_peaks(self, wanted: Sequence[Wanted], where: Sequence[Sequence[Any]]) -> Floats:
+        """Results at places and times of the peaks of each, which may be those of another run, in turn."""
+        each = [(x, place) for x, places in zip(wanted, where, strict=True) for place in places]
+        return self._values([x for x, _ in each], [place for _, place in each])
+
+    def _read(self, lines: Mapping[str, Any], wanted: Sequence[Wanted]) -> dict[Wanted, Floats]:
+        """Histories of results, of which there is one of many times; their shapes are noted."""
+        out: dict[Wanted, Floats] = {}
+        for x in wanted:
+            if x.place not in out:
+                out[x.place] = self._history(lines[x.line], x)
+        self.shapes = {place: history.shape for place, history in out.items()}
+        self._cuts = {place: self._cut(lines[place.line], place, shape[-1]) for place, shape in self.shapes.items()}
+        return out
+
+    def _cut(self, result: Any, x: Wanted, count: int) -> NDArray[np.bool_]:
+        """(count,) which of the places of a history are jumps, where a value may be two; no ends of sections."""
+        s = np.asarray(result.s)
+        cut = np.zeros(count, bool)
+        if count == s.size and self.smooth:
+            for item in self._cables[x.line].attachments:
+                for at in item.range if isinstance(item, Spread) else (item.at,):
+                    cut |= np.abs(s - at) <= OF_ENDS * s[-1]
+        return cut
+
+    def _values(self, wanted: Sequence[Wanted], where: list[Any], base: Motion | None = None) -> Floats:
+        """Results (W,); where: when and where extremes are, found here where it is not known."""
+        values = np.zeros(len(wanted))
+        for k, x in enumerate(wanted):
+            history = self._histories[x.place]
+            if base is not None and history.shape != base.shapes[x.place]:  # it is no neighbour: see check
+                continue
+            if x.over == "t":
+                values[k] = np.interp(x.time, self._t[x.line], history[:, 0])
+                continue
+            values[k], where[k] = over_time(history, x.over, where[k], self._cuts[x.place] if self.smooth else None)
+        return values
 
     def _history(self, result: Any, x: Wanted) -> Floats:
         """(outputs, places or 1) of a result."""
         try:
-            value = np.asarray(result[x.name], float)
+            value = np.asarray((result.values if isinstance(result, Seen) else result)[x.name], float)
         except (KeyError, ResultError):
             names = ", ".join(name for name in PROBES if "/" not in name)
             raise SceneError([Complaint("of", x.name, f"one of {names}", "max tension@end")]) from None
@@ -236,29 +367,3 @@ def _alike(one: Sequence[Sequence[tuple[str, float]]], other: Sequence[Sequence[
         and all(abs(x - y) <= SAME_ZONE for (_, x), (_, y) in zip(a, b, strict=True))
         for a, b in zip(one, other, strict=True)
     )
-
-
-def _over(history: Floats, over: str, where: Any) -> tuple[float, Any]:
-    """The statistic of outputs (n, places), and when and where an extreme is; where: None: not known yet."""
-    if over in ("max", "min"):
-        if where is None:
-            flat = np.nanargmax(history) if over == "max" else np.nanargmin(history)
-            where = np.unravel_index(int(flat), history.shape)
-        return float(history[where]), where
-    x = history[:, 0]
-    return float({"mean": x.mean(), "std": x.std(), "last": x[-1]}[over]), None
-
-
-def _beyond(history: Floats, i: int, k: int) -> float:
-    """By how much the extremes of parabolas through an extreme and its neighbours in time and place are beyond it.
-
-    Outputs and places count as evenly spaced there: it changes evenly where an extreme goes from one to the next.
-    """
-    out = 0.0
-    for row, j in ((history[:, k], i), (history[i], k)):
-        if 0 < j < row.size - 1:
-            before, here, after = row[j - 1 : j + 2]
-            bent = after - 2.0 * here + before
-            if abs(after - before) < 2.0 * abs(bent):  # it is between the neighbours
-                out -= (after - before) ** 2 / (8.0 * bent)
-    return float(out)

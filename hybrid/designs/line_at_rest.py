@@ -17,8 +17,9 @@ from hybrid.kernels.run.entry import assembly, workspace_of
 from hybrid.kernels.state.forces import FRICTION, PLANAR, WAVES
 from hybrid.kernels.state.report import MOMENT_A, NET_A
 from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, batch_of_one
-from hybrid.modal.matrices import ANCHOR, rotation
+from hybrid.linear.matrices import ANCHOR, rotation
 from hybrid.model.build import Model
+from hybrid.model.output_points import jump_points
 from hybrid.outputs.joined_lines import Output
 from hybrid.outputs.probes import PROBES, Observer
 from hybrid.scene.schema import Scene
@@ -32,9 +33,10 @@ AXES = "xyz"
 # How far a state is moved to differentiate its results: a part of chords, and of the largest tension.
 ALONG = 1e-5
 # Differences to both sides that are unequal by this part of them, and this part of the result, are of a jump.
-KINK, ROUGH = 0.3, 1e-6
+KINK, ROUGH = 0.3, 1e-7
 # Forces that do not act at rest, or depend on the way there; and a plane has block rows of its own.
 LEFT_OUT = PLANAR | WAVES | FRICTION
+SAME_PLACE = 1e-9  # part of the length within which a node is at a jump
 TURNED = 1e-9  # N m over N m, torque through catenary zones that is none
 
 
@@ -88,13 +90,15 @@ class Peak(NamedTuple):
     weights: Floats
 
 
-def _peak(s: Floats, values: Floats, sign: float) -> Peak:
+def _peak(s: Floats, values: Floats, sign: float, jumps: Sequence[float]) -> Peak:
     """Where values (n,) at nodes s, m, are largest (sign 1) or least (-1): at the top of the parabola through the node
 
-    that is and its neighbours.  Its place goes from node to node, and its value has no kink there.
+    that is and its neighbours.  Its place goes from node to node, and its value has no kink there.  No parabola goes
+    through jumps, m, where a value may be two.
     """
     k = int((sign * values).argmax())
-    if not 0 < k < s.size - 1:
+    near = [abs(x - at) <= SAME_PLACE * s[-1] for x in s[max(k - 1, 0) : k + 2] for at in jumps]
+    if not 0 < k < s.size - 1 or any(near):
         return Peak(np.array([k]), np.ones(1))
     i = np.array([k - 1, k, k + 1])
     left, right = (values[k] - values[k - 1]) / (s[k] - s[k - 1]), (values[k + 1] - values[k]) / (s[k + 1] - s[k])
@@ -184,7 +188,8 @@ class LineAtRest:
                 value = _component(x, np.asarray(found[x.name][0]))
                 nodes = self._along(x)
                 at_nodes = value[np.searchsorted(observer.s, self.model.line.s[nodes])]
-                self._peak_of[x] = _peak(self.model.line.s[nodes], at_nodes, 1.0 if x.extreme == "max" else -1.0)
+                sign, jumps = 1.0 if x.extreme == "max" else -1.0, jump_points(self.here.scene)
+                self._peak_of[x] = _peak(self.model.line.s[nodes], at_nodes, sign, jumps)
                 self._peak_of[x].nodes[:] = nodes[self._peak_of[x].nodes]
         self._values = self._results(found, [(observer.s, self.model.line.s)])[0]
         return self._values
@@ -201,13 +206,25 @@ class LineAtRest:
         near = 1e-9 * s[-1]
         return np.flatnonzero((s >= ends[x.section] - near) & (s <= ends[x.section + 1] + near))
 
+    def near(self) -> list[int]:
+        """Nodes by which results stand: at their places, at extremes, and at the ends of the line for all others."""
+        s, found = self.model.line.s, set[int]()
+        for x in self.wanted:
+            if x in self._peak_of:
+                found.update(self._peak_of[x].nodes.tolist())
+            elif x.at is None:
+                found.update((0, s.size - 1))
+            else:
+                found.add(int(np.searchsorted(s, min(x.at, s[-1]))))
+        return sorted(found)
+
     def by_state(self, q: Floats, turns: Floats | None = None) -> Floats:
         """(P, W) derivatives of results along movements (P, N+1, 5) of the state.
 
         turns: (P, 2, 3) rad, of the frames of ends; None: they stay.
         """
-        steps = _steps(self.state, q, turns)
-        moved = _moved(self.state, np.repeat(q, 2, axis=0), (steps[:, None] * (1.0, -1.0)).ravel())
+        steps = steps_along(self.state, q, turns)
+        moved = displaced(self.state, np.repeat(q, 2, axis=0), (steps[:, None] * (1.0, -1.0)).ravel())
         batch = _repeated(self._output(self.here, self._work.report), 2 * len(q))._replace(**cast(Any, moved))
         for end in self._free:
             batch.position[:, end] = batch.r[:, -end]
@@ -378,7 +395,7 @@ def _turned(frames: Floats, turns: Floats) -> Floats:
     return np.stack([(rotation(n) @ x.reshape(3, 3)).ravel() for x, n in zip(frames, turns, strict=True)])
 
 
-def _steps(state: State, q: Floats, turns: Floats | None = None) -> Floats:
+def steps_along(state: State, q: Floats, turns: Floats | None = None) -> Floats:
     """(P,) how many times movements q (P, N+1, 5), turns (P, 2, 3), are taken so that chords and tensions change by a
 
     part ALONG.
@@ -391,7 +408,7 @@ def _steps(state: State, q: Floats, turns: Floats | None = None) -> Floats:
     return np.asarray(ALONG / np.maximum(most, 1e-300))
 
 
-def _moved(state: State, q: Floats, steps: Floats) -> dict[str, Floats]:
+def displaced(state: State, q: Floats, steps: Floats) -> dict[str, Floats]:
     """Positions, chords, tensions and directors (P, ..) of a state that is moved by steps (P,) times q (P, N+1, 5)."""
     q = steps[:, None, None] * q
     e = state.e + np.diff(q[:, :, 1:4], axis=1)

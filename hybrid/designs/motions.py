@@ -1,37 +1,72 @@
 """Results of motions of the cases of a design, and what they answer to unknowns.
 
-Slopes are forward differences of runs in the steps, cells and zones of the one between them where a search asks for
-that, and else those of the point before, corrected by what results changed by on the way (secants, after Broyden): a
-step then takes one run of each case, in place of one more for each unknown.
+Where a search asks for slopes they are tangents along the steps of a run or, where these are not known, forward
+differences of runs in its steps, cells and zones; else those of the run before, corrected by what results changed by on
+the way (secants, after Broyden), so that a step takes a run of each case.  Of an extreme its other peaks are known as
+well, so that a search sees which of them would be the largest.  Results of a case that a search does not need are what
+the last run of it foretells.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.designs.in_motion import Motion, parse_history, size_of
+from hybrid.designs.in_motion import Motion, followed, parse_history, size_of
 from hybrid.designs.numbers import number_of
 from hybrid.designs.replay import Course, course_of
+from hybrid.designs.tangents import Unfollowed, step_of
 from hybrid.errors import ComputationError
 from hybrid.kernels.state.state import Floats
+from hybrid.scene.schema import Scene
 
 # Behind the name of a result of a motion; part of a number by which runs differ: off by as much, round-off is 1e-8.
 IN_MOTION, PART = " in motion", 1e-4
 FINER_RUN = 4  # runs' worth of one with cells and steps half as long
+TANGENT = 0.5  # and of tangents of one number (bench/test_bench_tangents.py: 0.41 to 0.61 without waves)
+
+
+class Peaks(NamedTuple):
+    """Of a result its value, of an extreme all peaks, the largest first: when and where each is, values (m,), slopes
+
+    (m, n).  least: whether it is the least that is asked for.
+    """
+
+    where: tuple[Any, ...]
+    values: Floats
+    slopes: Floats
+    least: bool
+
+    def moved(self, step: Floats) -> Peaks:
+        """As they are foretold to be after a step of unknowns."""
+        values = self.values + self.slopes @ step
+        order = np.argsort(values if self.least else -values, kind="stable")
+        return Peaks(tuple(self.where[k] for k in order), values[order], self.slopes[order], self.least)
+
+    def foretold(self, where: Any, step: Floats) -> float:
+        """The value of that which is next to a place and time, after a step."""
+        k = self.nearest_to(where)
+        return float(self.values[k] + self.slopes[k] @ step)
+
+    def nearest_to(self, where: Any) -> int:
+        """Which of them is at, or next to, another place and time."""
+        if where is None:
+            return 0
+        return min(range(len(self.where)), key=lambda k: math.dist(self.where[k], where))
 
 
 class OfMotion:
-    """Runs of all cases with the same values of unknowns.
+    """Runs with the same values of unknowns of cases, and results: of those that were run, and of others foretold.
 
-    slopes: (R, n); None: nobody has asked yet; fresh: cases whose slopes are differences.
+    peaks: by case of its rows in turn; none where nobody has asked yet; fresh: cases whose slopes are not secants.
     """
 
     def __init__(self, x: Floats, runs: Mapping[str, Motion]) -> None:
         self.x, self.runs = x, dict(runs)
-        self.slopes: Floats | None = None
+        self.peaks: dict[str, list[Peaks]] = {}
         self.fresh: set[str] = set()
 
 
@@ -54,70 +89,163 @@ class Motions:
             case: [parse_history(scenes[case], wanted[k][1].removesuffix(IN_MOTION)) for k in rows]
             for case, rows in self.rows.items()
         }
-        self._size, self.count = len(wanted), 0
+        self.place = {int(k): (case, i) for case, rows in self.rows.items() for i, k in enumerate(rows)}
+        self.count = 0.0
         self._courses: dict[str, Course] = {}
-        self._last: OfMotion | None = None  # whose slopes were asked for last
+        self._last: dict[str, tuple[Floats, list[Peaks]]] = {}  # of each case the last run whose slopes were asked for
+        self._differences: set[str] = set()  # cases whose tangents are not known
 
-    def at(self, x: Floats, finer: bool = False) -> OfMotion:
-        """Runs with values (n,) of unknowns."""
-        runs = {}
-        for case in self.rows:
+    def at(self, x: Floats, finer: bool = False, cases: Iterable[str] | None = None) -> OfMotion:
+        """Runs with values (n,) of unknowns; cases: of which; others are foretold; None: of all."""
+        point = OfMotion(x.copy(), {})
+        self.run(point, self.rows if cases is None else cases, finer)
+        return point
+
+    def run(self, point: OfMotion, cases: Iterable[str], finer: bool = False) -> bool:
+        """Run cases that were not, the first time with tangents; False: there are none."""
+        wanted = [case for case in self.rows if case in set(cases) and case not in point.runs]
+        for case in wanted:
+            if case not in self._last and not finer and self._with_tangents(point, case):
+                continue
             self.count += FINER_RUN if finer else 1
-            scene = self._scene_of(case, x)
+            scene = self._scene_of(case, point.x)
             if case not in self._courses:
                 self._courses[case] = course_of(scene)
-            runs[case] = Motion(scene, self._of[case], self._courses[case], finer=finer, smooth=True)
-        return OfMotion(x.copy(), runs)
+            point.runs[case] = Motion(scene, self._of[case], self._courses[case], finer=finer, smooth=True)
+            point.peaks.pop(case, None)
+        return bool(wanted)
 
     def values(self, point: OfMotion, values: Floats) -> None:
         """Put results into their rows."""
         for case, rows in self.rows.items():
-            values[rows] = point.runs[case].values
-
-    def slopes(self, point: OfMotion, sizes: Floats) -> Floats:
-        """(R, n): those of the point before, corrected by what has changed since; differences at the first."""
-        if point.slopes is None:
-            last = self._last
-            if last is None or last.slopes is None:
-                self.refresh(point, set(self.rows))
+            if case in point.runs:
+                values[rows] = point.runs[case].values
             else:
-                point.slopes, step = last.slopes.copy(), (point.x - last.x) / sizes
-                size = float(step @ step)
-                for case, rows in self.rows.items():
-                    if size > 0.0:
-                        off = point.runs[case].values - last.runs[case].values - last.slopes[rows] @ (point.x - last.x)
-                        point.slopes[rows] += np.outer(off, step / sizes) / size
-            self._last = point
-        assert point.slopes is not None
-        return point.slopes
+                values[rows] = [x.values[0] for x in self._foretold(point, case)]
 
-    def refresh(self, point: OfMotion, cases: set[str]) -> bool:
-        """Take differences of runs beside those of a point in these cases; False: there are, already."""
-        wanted = (cases & set(self.rows)) - point.fresh
-        if not wanted:
-            return False
-        if point.slopes is None:
-            point.slopes = np.zeros((self._size, point.x.size))
+    def at_peaks(self, point: OfMotion, case: str, k: int, peaks: Peaks) -> Floats:
+        """Values (m,) of the result k of a case at places and times of peaks of another run; of a case that was not run
+
+        those that are foretold of these.
+        """
+        if case in point.runs:
+            return point.runs[case].at_peaks([self._of[case][k]], [peaks.where])
+        x, last = self._last[case]
+        return np.array([last[k].foretold(where, point.x - x) for where in peaks.where])
+
+    def changed(self, x: Floats, size: int) -> Floats:
+        """(size,) by how much results are foretold to change from the last run of each case, in their rows."""
+        out = np.zeros(size)
+        for case, rows in self.rows.items():
+            x_last, last = self._last[case]
+            out[rows] = [peaks.moved(x - x_last).values[0] - peaks.values[0] for peaks in last]
+        return out
+
+    def peaks(self, point: OfMotion, sizes: Floats) -> Mapping[str, list[Peaks]]:
+        """Of every case: secants, but where slopes were taken anew; these at the first."""
+        new = {case for case in point.runs if case not in self._last}
+        self.refresh(point, new)
+        for case in self.rows:
+            if case not in point.runs:
+                point.peaks.setdefault(case, self._foretold(point, case))
+                continue
+            if case not in point.peaks:
+                point.peaks[case] = self._secants(point, case, sizes)
+            self._last[case] = point.x, point.peaks[case]
+        return point.peaks
+
+    def _foretold(self, point: OfMotion, case: str) -> list[Peaks]:
+        x, last = self._last[case]
+        return [peaks.moved(point.x - x) for peaks in last]
+
+    def _secants(self, point: OfMotion, case: str, sizes: Floats) -> list[Peaks]:
+        """Slopes of the last run, of that of its peaks that is next to each."""
+        run, (x, last) = point.runs[case], self._last[case]
+        change = point.x - x
+        step = change / sizes
+        size, out, values = float(step @ step), [], iter(run.at_peaks(self._of[case], run.peaks))
+        for where, before in zip(run.peaks, last, strict=True):
+            found, slopes = [], []
+            for place in where:
+                k, value = before.nearest_to(place), float(next(values))
+                slope = before.slopes[k]
+                if size > 0.0:
+                    slope = slope + (value - before.values[k] - slope @ change) / size * step / sizes
+                found.append(value)
+                slopes.append(slope)
+            out.append(Peaks(tuple(where), np.array(found), np.array(slopes), before.least))
+        return out
+
+    def refresh(self, point: OfMotion, cases: Iterable[str]) -> bool:
+        """Take tangents, or differences of runs beside those of a point, in these cases; False: there are, already."""
+        wanted = (set(cases) & set(self.rows)) - point.fresh
         for case in sorted(wanted):
-            for i in range(point.x.size):
-                point.slopes[self.rows[case], i] = self._difference(point, case, i)
-        point.fresh |= wanted
+            if not self._with_tangents(point, case):
+                self.run(point, {case})
+                columns = [self._difference(point, case, i) for i in range(point.x.size)]
+                self._take(point, case, np.stack(columns, axis=1))
+        return bool(wanted)
+
+    def _take(self, point: OfMotion, case: str, slopes: Floats) -> None:
+        """Keep slopes (W, n) of all peaks of the results of a case that was run."""
+        run, first, out = point.runs[case], 0, []
+        values = run.at_peaks(self._of[case], run.peaks)
+        for x, where in zip(self._of[case], run.peaks, strict=True):
+            rows = slice(first, first + len(where))
+            out.append(Peaks(tuple(where), values[rows], slopes[rows], x.over == "min"))
+            first += len(where)
+        point.peaks[case] = out
+        point.fresh.add(case)
+
+    def _with_tangents(self, point: OfMotion, case: str) -> bool:
+        """Run a case with tangents along its steps; False: these are not known of it."""
+        if case in self._differences:
+            return False
+        try:
+            self._take(point, case, self._tangents(point, case))
+        except Unfollowed:
+            self._differences.add(case)
+            return False
         return True
+
+    def _size(self, point: OfMotion, case: str, i: int) -> float:
+        scene, key = self._scenes[case], self._keys[i][0]
+        return size_of(scene, key, float(point.x[i]) or number_of(scene, key))
+
+    def _tangents(self, point: OfMotion, case: str) -> Floats:
+        """Slopes (W, n) of a run that is made with tangents along its steps; Unfollowed: these are not known of it."""
+        scene = self._scene_of(case, point.x)
+        if not isinstance(scene, Scene):
+            raise Unfollowed("several lines")
+        if case not in self._courses:
+            self._courses[case] = course_of(scene)
+        each = range(point.x.size)
+        steps = [min(step_of(key, self._size(point, case, i)) for key in self._keys[i]) for i in each]
+
+        def other(i: int, d: float) -> Scene:
+            found: Scene = self._scene_of(case, point.x + d * (np.arange(point.x.size) == i))
+            return found
+
+        pairs = [(other(i, h), other(i, -h)) for i, h in zip(each, steps, strict=True)]
+        run, values, _ = followed(scene, self._of[case], self._courses[case], pairs, steps, smooth=True)
+        self.count += 1 + TANGENT * point.x.size
+        point.runs[case] = run
+        return np.asarray((values[:, 0] - values[:, 1]) / (2.0 * np.array(steps)[:, None])).T
 
     def _difference(self, point: OfMotion, case: str, i: int) -> Floats:
         """Change of results of a case by one unknown; ComputationError: no run beside goes as this one does."""
-        scene, key = self._scenes[case], self._keys[i][0]
-        d = PART * size_of(scene, key, float(point.x[i]) or number_of(scene, key))
+        d, wanted = PART * self._size(point, case, i), self._of[case]
         base, failed = point.runs[case], None
         for step in (d, -d):
             beside = point.x + step * (np.arange(point.x.size) == i)
             self.count += 1
             try:
-                run = Motion(self._scene_of(case, beside), self._of[case], base.course, base, smooth=True)
-                run.check(base, key)
+                run = Motion(self._scene_of(case, beside), wanted, base.course, base, smooth=True)
+                run.check(base, self._keys[i][0])
             except ComputationError as error:
                 failed = error
                 continue
-            return np.asarray((run.values - base.values) / step)
+            change = run.at_peaks(wanted, base.peaks) - base.at_peaks(wanted, base.peaks)
+            return np.asarray(change / step)
         assert failed is not None
         raise failed

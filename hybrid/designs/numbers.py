@@ -17,8 +17,9 @@ from hybrid.scene.system import System
 
 AnyScene = TypeVar("AnyScene", bound=Scene | System)
 PART = re.compile(r"[^.\[\]]+")
-# Part of a number by which lines are differentiated; one that is 0 is changed by this, in its own unit.
-OF_NUMBER = 1e-4
+# Part of a number by which lines are differentiated; one that is 0 is changed by this, in its own unit.  Lengths are
+# changed by less: a place that is at a node would see the cell to one side of it as much as that to the other.
+OF_NUMBER, OF_LENGTH, LENGTH = 1e-4, 1e-5, re.compile(r"\blength$")
 
 
 def number_of(scene: Scene | System, key: str) -> float:
@@ -58,7 +59,8 @@ class OfScene:
     def numbers_and_steps(self, keys: Sequence[str]) -> tuple[Floats, Floats]:
         """(P,) values of keys, and by how much lines with more and with less of each differ from the scene."""
         numbers = np.array([self.number(key) for key in keys])
-        return numbers, np.where(numbers == 0.0, OF_NUMBER, OF_NUMBER * np.abs(numbers))
+        parts = np.array([OF_LENGTH if LENGTH.search(key) else OF_NUMBER for key in keys])
+        return numbers, np.where(numbers == 0.0, parts, parts * np.abs(numbers))
 
 
 def changed_scene(scene: AnyScene, key: str, value: float) -> AnyScene:
@@ -90,6 +92,19 @@ def is_allowed_line(system: System, name: str) -> bool:
     except Invalid:
         return False
     return True
+
+
+def scene_with(scene: AnyScene, keys: Sequence[tuple[str, ...]], x: Floats) -> AnyScene:
+    """A scene with values at keys of each unknown; SceneError: it may not have these."""
+    given = [(key, float(value)) for group, value in zip(keys, x, strict=True) for key in group]
+    changed = scene
+    for key, value in given:
+        changed = with_number(changed, key, value)
+    if not is_allowed(changed):
+        for key, value in given:
+            scene = changed_scene(scene, key, value)
+        return scene
+    return changed
 
 
 def _put(value: Any, parts: list[str], number: float) -> Any:

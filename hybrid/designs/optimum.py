@@ -6,6 +6,7 @@ price of the limit, what a unit of it is worth.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -192,42 +193,46 @@ class _Search:
             values, slopes = self._rows(self._here)
             step, foretold = self._step(values, slopes, width)
             if foretold <= self._problem.within.exact:
-                if self._problem.refresh(self._here):
+                if self._here.complete() or self._problem.refresh(self._here):
                     continue
                 break
-            there = self._tried(step)
-            gained = self._gained(there)
-            if there is not None and gained < ACCEPTED * foretold:  # limits are bent: once more with what they came to
-                step, _ = self._step(self._values(there) - slopes @ step, slopes, width)
-                there = self._tried(step)
-                gained = self._gained(there)
+            there, gained = self._tried(step)
+            if there is not None and gained < ACCEPTED * foretold:
+                if self._here.refresh(self._problem.missed(self._here, there)):
+                    continue  # by slopes that are no secants
+                # limits are bent: once more with what they came to
+                step, _ = self._step(self._after(there) - slopes @ step, slopes, width)
+                there, gained = self._tried(step)
+            missed = set() if there is None else self._problem.missed(self._here, there)
             if there is not None and gained >= ACCEPTED * foretold:
+                there.refresh(missed)
                 self._learn(there)
                 self._here = there
                 width = min(2.0 * width, STEP) if gained >= TRUSTED * foretold else width
-            elif there is None or not self._problem.refresh_missed(self._here, there):
+            elif there is None or not self._here.refresh(missed):
                 width = (SHRUNK if there is not None else CUT) * min(width, float(np.abs(step).max()))
                 if width < SHORTEST:
                     break
         else:
             self.exhausted = True
+        self._here.complete()
         return self._here
 
-    def _tried(self, step: Floats) -> Point | None:
-        """The point after a step; None: there is no equilibrium, no such scene, or what is minimised is no number."""
+    def _tried(self, step: Floats) -> tuple[Point | None, float]:
+        """The point after a step, and by how much it is better than where it is now; None: there is no equilibrium,
+
+        no such scene, or what is minimised is no number.
+        """
         space = self._problem.space
         try:
-            point = self._problem.equilibria.at(np.clip(self._here.x + self._sizes * step, space.low, space.high))
+            x = np.clip(self._here.x + self._sizes * step, space.low, space.high)
+            point = self._problem.equilibria.at(x, moving=self._problem.moving(self._here, x))
             self._objective.parts(point)
         except (ComputationError, SceneError) as error:
             self.stopped = " ".join(str(error).split())
-            return None
+            return None, -np.inf
         self.stopped = ""
-        return point
-
-    def _gained(self, there: Point | None) -> float:
-        """By how much a point is better than where it is now."""
-        return -np.inf if there is None else self._merit(self._here) - self._merit(there)
+        return point, self._merit(self._here) - self._merit(point)
 
     def _merit(self, point: Point) -> float:
         off = float(self._values(point).max(initial=0.0))
@@ -235,19 +240,31 @@ class _Search:
 
     def _values(self, point: Point) -> Floats:
         """Constraints as numbers (M,) that may not be above 0; targets count to both sides."""
+        return self._numbers([point.values[[c.row]] for c in self._problem.constraints])
+
+    def _numbers(self, values: Sequence[Floats]) -> Floats:
+        """The same of several values of the result of each constraint."""
         out = []
-        for c in self._problem.constraints:
-            value = c.evened(point.values[c.row])[0]
-            out += [value, -value] if c.side == 0 else [c.side * value]
+        for c, each in zip(self._problem.constraints, values, strict=True):
+            numbers = [c.evened(x)[0] for x in each.tolist()]
+            out += [*numbers, *(-x for x in numbers)] if c.side == 0 else [c.side * x for x in numbers]
         return np.array(out, float)
 
     def _rows(self, point: Point) -> tuple[Floats, Floats]:
-        """The same, and their slopes (M, n)."""
-        slopes = [np.zeros((0, self._sizes.size))]
+        """The same (M,) of all peaks of each result, and their slopes (M, n)."""
+        slopes, peaks = [np.zeros((0, self._sizes.size))], [peaks_of(c, point) for c in self._problem.constraints]
+        for c, (values, each) in zip(self._problem.constraints, peaks, strict=True):
+            slope = np.array([c.evened(x)[1] for x in values.tolist()])[:, None] * each * self._sizes
+            slopes.append(np.concatenate([slope, -slope]) if c.side == 0 else c.side * slope)
+        return self._numbers([values for values, _ in peaks]), np.concatenate(slopes)
+
+    def _after(self, there: Point) -> Floats:
+        """Constraints (M,) after a step, in the rows of where it is now."""
+        values = []
         for c in self._problem.constraints:
-            slope = c.evened(point.values[c.row])[1] * point.slopes[c.row] * self._sizes
-            slopes.append(np.stack([slope, -slope]) if c.side == 0 else c.side * slope[None])
-        return self._values(point), np.concatenate(slopes)
+            now = self._here.peaks(c.row)
+            values.append(there.values[[c.row]] if now is None else there.at_peaks(c.row, now))
+        return self._numbers(values)
 
     def _step(self, values: Floats, slopes: Floats, width: float) -> tuple[Floats, float]:
         """The best step by the model within a box, and by how much it foretells that to be better."""
@@ -291,7 +308,7 @@ class _Search:
             out = self._objective.slopes(point)
             for c, price in zip(self._problem.constraints, prices, strict=True):
                 if price:
-                    out = out + price * point.slopes[c.row]
+                    out = out + price * self._like(point, c.row, there.slopes[c.row])
             return np.asarray(out * self._sizes / self._scale)
 
         y, B = lagrangian(there) - lagrangian(self._here), self._hessian
@@ -303,6 +320,23 @@ class _Search:
             y = part * y + (1.0 - part) * B @ s
         self._hessian = B + np.outer(y, y) / float(s @ y) - np.outer(B @ s, B @ s) / bent
 
+    def _like(self, point: Point, row: int, slopes: Floats) -> Floats:
+        """Of the peaks of a result the slopes (n,) that are most like others: where another peak has become the
+
+        largest, theirs differ without any curvature.
+        """
+        peaks = point.peaks(row)
+        each = point.slopes[[row]] if peaks is None else peaks.slopes
+        return np.asarray(each[int(np.argmin(np.linalg.norm((each - slopes) * self._sizes, axis=1)))])
+
+
+def peaks_of(constraint: Constraint, point: Point) -> tuple[Floats, Floats]:
+    """Values (m,) of the result of a constraint, of an extreme over time of all its peaks, and their slopes (m, n)."""
+    row, peaks = constraint.row, point.peaks(constraint.row)
+    if peaks is None or constraint.side == 0:
+        return point.values[[row]], point.slopes[[row]]
+    return peaks.values, peaks.slopes
+
 
 def priced(problem: Problem, objective: Objective, point: Point) -> Optimum:
     """Prices of what holds the optimum: the multipliers that leave least of the slopes of what is minimised."""
@@ -312,8 +346,14 @@ def priced(problem: Problem, objective: Objective, point: Point) -> Optimum:
     gradient = objective.slopes(point) * sizes
     held = [k for k, c in enumerate(constraints) if is_active(c, point, problem.within)]
     at = np.stack([np.abs(point.x - space.low) <= AT_BOUND * own, np.abs(point.x - space.high) <= AT_BOUND * own], 1)
-    columns = [(constraints[k].side or 1) * point.slopes[constraints[k].row] * sizes for k in held]
-    least = [-np.inf if constraints[k].side == 0 else 0.0 for k in held]
+    columns, least, owners = [], list[float](), list[int]()
+    for k in held:
+        c = constraints[k]
+        values, slopes = peaks_of(c, point)
+        for slope in slopes[np.abs(values - c.bound) <= problem.within.active * c.scale]:
+            columns.append((c.side or 1) * slope * sizes)
+            least.append(-np.inf if c.side == 0 else 0.0)
+            owners.append(k)
     edges = [(i, k) for i, k in np.argwhere(at).tolist()]
     for i, k in edges:
         columns.append(np.eye(sizes.size)[i] * (1.0 if k else -1.0) * sizes[i])
@@ -328,9 +368,9 @@ def priced(problem: Problem, objective: Objective, point: Point) -> Optimum:
         multipliers = found.x / norms
         left = float(np.linalg.norm(matrix @ multipliers + gradient)) / size
     prices = [Price(False, 0.0) for _ in constraints]
-    for k, multiplier in zip(held, multipliers, strict=False):
-        prices[k] = Price(True, float(-(constraints[k].side or 1) * multiplier))
+    for k, multiplier in zip(owners, multipliers, strict=False):
+        prices[k] = Price(True, prices[k].price - float((constraints[k].side or 1) * multiplier))
     bounds = np.full((sizes.size, 2), np.nan)
-    for (i, k), multiplier in zip(edges, multipliers[len(held) :], strict=True):
+    for (i, k), multiplier in zip(edges, multipliers[len(owners) :], strict=True):
         bounds[i, k] = -multiplier if k else multiplier
     return Optimum(point, tuple(prices), bounds, left, "")

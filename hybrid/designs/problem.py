@@ -126,6 +126,8 @@ class Within(NamedTuple):
 AT_REST, MOVING = Within(1e-6, 1e-4, 1e-7), Within(1e-3, 3e-3, 1e-3)
 # Parts of a limit within which it is near.
 NEAR = 0.01
+# Parts of a limit, beside what it is foretold to change by, that a case has to keep from it for not being run.
+AWAY = 0.05
 
 
 class Problem(NamedTuple):
@@ -153,15 +155,31 @@ class Problem(NamedTuple):
         near = [c.case for c in self.constraints if (point.values[c.row] - c.bound) * c.side >= -NEAR * c.scale]
         return self.moves and point.refresh({*near, *(self.equilibria.wanted[k][0] for k in spoken)})
 
-    def refresh_missed(self, point: Point, there: Point) -> bool:
-        """The same in cases in which another point has come nearer to a limit, or beyond it, than slopes foretold."""
-        change = point.slopes @ (there.x - point.x) if self.moves else there.values
-        missed = [
+    def missed(self, point: Point, there: Point) -> set[str]:
+        """Cases in which another point has come nearer to a limit, or beyond it, than slopes foretold."""
+        if not self.moves:
+            return set()
+        foretold = point.foretold(there.x)
+        return {
             c.case for c in self.constraints
             if (there.values[c.row] - c.bound) * c.side >= -NEAR * c.scale
-            and abs(there.values[c.row] - point.values[c.row] - change[c.row]) > self.within.kept * c.scale
-        ]  # fmt: skip
-        return self.moves and point.refresh({*missed})
+            and abs(there.values[c.row] - foretold[c.row]) > self.within.kept * c.scale
+        }  # fmt: skip
+
+    def moving(self, point: Point, x: Floats) -> set[str]:
+        """Cases of which a search has to know the motion with values x of unknowns: those with a target, a limit that
+
+        may be near by what a point and the last run of the case foretell, and those of what is minimised.
+        """
+        equilibria, spoken = self.equilibria, self.objective.rows if self.objective is not None else []
+        cases = {equilibria.wanted[k][0] for k in spoken}
+        if self.moves:
+            foretold, changed = point.foretold(x), np.abs(equilibria.motions.changed(x, len(equilibria.wanted)))
+            cases |= {
+                c.case for c in self.constraints
+                if (foretold[c.row] - c.bound) * c.side >= -(AWAY * c.scale + changed[c.row])
+            }  # fmt: skip
+        return cases
 
 
 def problem_of(task: TaskFile[Design], scene: AnyScene) -> Problem:

@@ -6,11 +6,13 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybrid.accuracy.api import run
+from hybrid.designs.numbers import AnyScene
+from hybrid.kernels.state.state import Floats
 from hybrid.model.build import build, places_of
 from hybrid.model.output_points import NEAR
 from hybrid.model.resolution import Resolution, accuracy_of, first_resolution
@@ -18,7 +20,7 @@ from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.read import parse_either, scene_text
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
-from hybrid.simulation.case import Case
+from hybrid.simulation.case import Begun, Case
 from hybrid.simulation.progress import ProgressReporter
 from hybrid.simulation.restore import resolution_from
 from hybrid.simulation.system_checkpoint import kept_resolution
@@ -38,12 +40,17 @@ class Course(NamedTuple):
     scene: Scene | System
     lines: Mapping[str, Resolution]
 
-    def applied(self, scene: Scene | System) -> Scene | System:
+    def at(self, finer: bool) -> Mapping[str, Resolution]:
+        """How finely lines are computed; finer: on cells and in steps half as long."""
+        return {k: _halved(x) for k, x in self.lines.items()} if finer else self.lines
+
+    def applied(self, scene: AnyScene) -> AnyScene:
         """A scene with other numbers, as it is computed in a replay: its errors are not estimated."""
-        if not isinstance(self.scene, Scene):  # whose runs estimate none by themselves
-            return scene.model_copy(update={"output": scene.output.model_copy(update={"errors": None})})
-        output = scene.output.model_copy(update={"errors": False})
-        return scene.model_copy(update={"output": output, "model": self.scene.model})
+        changed: dict[str, Any] = {"output": scene.output.model_copy(update={"errors": None})}
+        if isinstance(self.scene, Scene):
+            changed = {"output": scene.output.model_copy(update={"errors": False}), "model": self.scene.model}
+        out: Any = scene.model_copy(update=changed)  # of several lines runs estimate none by themselves
+        return out
 
 
 def course_of(scene: Scene | System) -> Course:
@@ -72,35 +79,49 @@ def course_of(scene: Scene | System) -> Course:
 
 def replay(
     scene: Scene | System, course: Course, finer: bool = False, more: Sequence[float] | None = None,
-    each_step: bool = False,
+    each_step: bool = False, begun: Begun | None = None,
 ) -> Result:  # fmt: skip
     """A run into memory, in the steps and on the nodes of a course; finer: on nodes as the scene has them, cells and
 
     steps half as long.
 
-    more: of one cable: outputs are at its nodes and these arc lengths, m; None: where the scene asks for them;
-    each_step: there are outputs at every step, or about as often where steps are not equal, in place of when the scene
-    asks for them.
-
+    more, each_step: as of `with_outputs`; begun: of one cable: as of `Case.record`.
     SceneError, ComputationError: as of `hybrid.run`.
     """
-    scene = course.applied(scene)
-    lines = {k: _halved(x) for k, x in course.lines.items()} if finer else course.lines
-    first = next(iter(course.lines.values()))
-    if each_step:
-        every = float(np.median(np.diff([0.0, *first.ends]))) if first.ends else first.step
-        scene = scene.model_copy(update={"output": scene.output.model_copy(update={"every": every})})
-    target = MemoryTarget()
+    scene = with_outputs(scene, course, more, each_step, finer)
+    lines, target = course.at(finer), MemoryTarget()
     if isinstance(scene, Scene):
-        if more is not None:
-            points = np.unique([*build(scene, lines[""], spare=False).line.s, *more])
-            points = points[np.append(True, np.diff(points) > NEAR * scene.length)]
-            scene = scene.model_copy(update={"output": scene.output.model_copy(update={"points": tuple(points)})})
-        Case(scene, None).record(lines[""], target)
+        Case(scene, None).record(lines[""], target, begun=begun)
         return written_result(target)
     reporter = ProgressReporter(None, scene.require_time().duration)
     run_system(scene, target, scene_text(scene), reporter, lambda: False, resolution=SystemResolution(lines))
     return written_result(target)
+
+
+def with_outputs(
+    scene: AnyScene, course: Course, more: Sequence[float] | None = None, each_step: bool = False, finer: bool = False
+) -> AnyScene:
+    """A scene as it is computed in a replay.
+
+    more: of one cable: outputs are at its nodes and these arc lengths, m; None: where the scene asks for them;
+    each_step: there are outputs at every step, or about as often where steps are not equal, in place of when the scene
+    asks for them.
+    """
+    first, output = next(iter(course.lines.values())), dict[str, Any]()
+    if each_step:
+        output["every"] = float(np.median(np.diff([0.0, *first.ends]))) if first.ends else first.step
+    if isinstance(scene, Scene) and more is not None:
+        nodes = build(course.applied(scene), course.at(finer)[""], spare=False).line.s
+        output["points"] = at_nodes(scene, nodes, more)
+    applied = course.applied(scene)
+    out: Any = applied.model_copy(update={"output": applied.output.model_copy(update=output)})
+    return out
+
+
+def at_nodes(scene: Scene, nodes: Floats, more: Sequence[float]) -> tuple[float, ...]:
+    """Output points, m: nodes and more, of which those that round-off alone tells apart are one."""
+    points = np.unique([*nodes, *more])
+    return tuple(points[np.append(True, np.diff(points) > NEAR * scene.length)].tolist())
 
 
 def _with_nodes(scene: Scene | System, lines: Mapping[str, Resolution]) -> Course:

@@ -47,8 +47,12 @@ def seek(scene: SceneLike | System, targets: Mapping[str, float], by: Sequence[s
         zero = by[int(np.flatnonzero(start == 0.0)[0])]
         raise SceneError([Complaint(zero, "0", "a number to begin with, which keeps its sign", "a first guess")])
     goal = np.array(list(targets.values()), float)
-    scale = np.maximum(np.abs(goal), 1e-12)
     equilibria = Equilibria({"": asked}, [(key,) for key in by], [("", name) for name in targets])
+    scale = np.abs(goal)
+    if not goal.all():  # what is sought to be 0 is as large as it is at first, or as the numbers can make it
+        first_point = equilibria.at(start)
+        size = np.maximum(np.abs(first_point.values), np.abs(first_point.slopes) @ np.abs(start))
+        scale = np.where(goal == 0.0, np.maximum(size, 1e-12), scale)
 
     def off(x: Floats) -> Rows:
         point = equilibria.at(x)

@@ -24,13 +24,14 @@ from hybrid.studies.sensitivity import sensitivity as of_study
 # Error by that on half the cells, for results of second order; a fifth more, as of modes.  Part of one on a bed
 # that is never said to be known: 60 to 120 cells of a leg are off by 0.5 to 1.7 %.
 OF_DIFFERENCE, ON_BED = 0.4, 0.01
+AT_REST = "factors of the equilibrium"  # the way to derivatives of one
 # Results that go by where contact begins.
 EDGES = ("touchdown", "touchdown_position", "grounded_length")
 
 
 class Derivative(NamedTuple):
     """What one result answers to one number: value of the result, of the number, derivative in their units, elasticity
-    (per cent by per cent; NaN where one of them is 0), and the error of the derivative by the mesh."""
+    (per cent by per cent; NaN where one of them is 0), the error of the derivative, and the way to it."""
 
     of: str
     by: str
@@ -39,6 +40,7 @@ class Derivative(NamedTuple):
     derivative: float
     elasticity: float
     error: float
+    way: str
 
 
 @overload
@@ -59,7 +61,7 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
     of: results such as `tension@0` (at s, m), `max curvature`, `position.z@125`, `reaction_end.x`; of several lines
     `east/tension@end`, `max hose/curvature`.  by: keys of numbers such as `cable.sections[0].length`.  Friction of the
     bed is left out.  motion: of a run with friction, of results such as `max tension@end` (`hybrid.designs.in_motion`),
-    with errors by the step of the difference.  SceneError: a key or result that the scene does not have, or what has
+    with errors of the way to them.  SceneError: a key or result that the scene does not have, or what has
     no derivative; ComputationError: no equilibrium, or runs that do not go on as the one between them.
     """
     if by is None:
@@ -67,10 +69,10 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
     asked = as_scene_or_system(scene)
     numbers = [number_of(asked, key) for key in by]
     if motion:
-        values, found, errors = in_motion(asked, of, by)
+        values, found, errors, ways = in_motion(asked, of, by)
     else:
         refuse_edges(of)
-        fine = at_rest(asked, of)
+        fine, ways = at_rest(asked, of), len(by) * (AT_REST,)
         values, found = fine.values, fine.by(by)
         errors = OF_DIFFERENCE * np.abs(found - at_rest(asked, of, 2.0).by(by))
         if asked.environment.seabed is not None:  # there it goes up and down with the cells: two may be alike by chance
@@ -80,7 +82,7 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
         for k, name in enumerate(of):
             value, result = float(found[i, k]), float(values[k])
             elastic = value * number / result if result != 0.0 and number != 0.0 else math.nan
-            out.append(Derivative(name, key, result, number, value, elastic, float(errors[i, k])))
+            out.append(Derivative(name, key, result, number, value, elastic, float(errors[i, k]), ways[i]))
     return out
 
 

@@ -13,20 +13,21 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from hybrid.designs.bodies_at_rest import BodiesAtRest, with_bodies
 from hybrid.designs.cable_at_rest import NO_PLACES, Places, same_places
+from hybrid.designs.factors import Factors
+from hybrid.designs.gradients import Gradients
 from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, Wanted, moment_on_body, parse_result
 from hybrid.designs.numbers import OfScene, is_allowed_line, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
-from hybrid.modal.matrices import linear_network
+from hybrid.linear.matrices import linear_network
 from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby, same_nodes
-from hybrid.model.nearby_clamped import nearby_clamped, seats_know_no_shape
-from hybrid.model.system import SystemModel, SystemResolution, build_system
+from hybrid.model.nearby_clamped import nearby_clamped, seats_know_no_shape, shaped_anew
+from hybrid.model.system import SystemModel, SystemResolution
 from hybrid.scene.bodies import FreeBody, RigidBody
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.points import Fairlead
@@ -109,9 +110,12 @@ class SystemAtRest(OfScene):
             for l, (name, model, state, free) in enumerate(rows)
         ]  # fmt: skip
         A = sparse.csc_array(self._network.stiffness + self._network.skew)
-        self._factors = splu(A + self._bodies.stiffness_besides(A) if self._bodies.count else A)
+        self._factors = Factors(A + self._bodies.stiffness_besides(A) if self._bodies.count else A)
+        self._first_body = self._network.size - 6 * self._bodies.count  # of the unknowns
         self._here = self._arms(run.model), self._bodies.own(run.model)
         self.values = self._in_order([x.values() if x.wanted else np.zeros(0) for x in self.lines])
+        wanted_of = (l for l, x in enumerate(self.lines) if x.wanted)
+        self.gradients = {l: Gradients(self.lines[l], self._bodies.turns(l)) for l in wanted_of}
 
     def by(self, keys: Sequence[str]) -> Floats:
         """(P, W) derivatives of all results by numbers."""
@@ -135,17 +139,49 @@ class SystemAtRest(OfScene):
             shifts.append(shift.reshape(-1, len(keys)))
             reports.append([*zip(both, report, strict=True)])
         right = np.asarray(network.place.T @ np.concatenate(rights))
-        first = network.size - 6 * self._bodies.count
-        right[first:] += on_bodies.reshape(-1, len(keys))
-        free = self._factors.solve(right)
-        q, turned = np.asarray(network.place @ free), free[first:].reshape(-1, 6, len(keys))[:, 3:]
+        right[self._first_body :] += on_bodies.reshape(-1, len(keys))
+        many = all(x.pay_for(len(keys)) for x in self.gradients.values())
+        by_state = self.transposed(right, shifts) if many else self.forward(right, shifts)
+        blank = np.zeros((len(keys), 0))
+        return self._in_order(
+            [
+                x + line.by_scene(report, steps) if line.wanted else blank
+                for x, line, report in zip(by_state, self.lines, reports, strict=True)
+            ]
+        )
+
+    def forward(self, right: Floats, shifts: Sequence[Floats]) -> list[Floats]:
+        """(P, W) of every line by a solve for each number.
+
+        right: (free, P); shifts: (5 (N+1), P) of every line where it is held.
+        """
         out = []
-        for l, line in enumerate(self.lines):
-            moved = (q[network.at[l] : network.at[l + 1]] + shifts[l]).T.copy().reshape(len(keys), -1, SIZE)
-            blank = np.zeros((len(keys), 0))
-            by_state = line.by_state(moved, self._turns(l, turned)) if line.wanted else blank
-            out.append(by_state + line.by_scene(reports[l], steps) if line.wanted else blank)
-        return self._in_order(out)
+        for line, (moved, turns) in zip(self.lines, self.movements(right, shifts), strict=True):
+            out.append(line.by_state(moved, turns) if line.wanted else np.zeros((right.shape[1], 0)))
+        return out
+
+    def movements(self, right: Floats, shifts: Sequence[Floats]) -> list[tuple[Floats, Floats | None]]:
+        """Of every line (P, N+1, 5) of its state and (P, 2, 3) rad of its ends by numbers; None: they stay."""
+        network, count = self._network, right.shape[1]
+        free = self._factors.solve(right)
+        q, turned = np.asarray(network.place @ free), free[self._first_body :].reshape(-1, 6, count)[:, 3:]
+        out = []
+        for l, shift in enumerate(shifts):
+            moved = (q[network.at[l] : network.at[l + 1]] + shift).T.copy().reshape(count, -1, SIZE)
+            out.append((moved, self._turns(l, turned)))
+        return out
+
+    def transposed(self, right: Floats, shifts: Sequence[Floats]) -> list[Floats]:
+        """The same by a transposed solve for each result."""
+        network, out = self._network, [np.zeros((right.shape[1], 0)) for _ in self.lines]
+        for l, gradients in self.gradients.items():
+            by_unknowns = gradients.by_unknowns.reshape(len(self.lines[l].wanted), -1)
+            by_free = np.asarray(network.place[network.at[l] : network.at[l + 1]].T @ by_unknowns.T)
+            for k in self._bodies.turns(l):
+                turn = self._first_body + 6 * self._bodies.body_at(l, k) + 3
+                by_free[turn : turn + 3] += gradients.by_turns[:, k].T
+            out[l] = right.T @ self._factors.solve(by_free, transposed=True) + shifts[l].T @ by_unknowns.T
+        return out
 
     def _shift(self, l: int, every: Sequence[_Changed], steps: Floats) -> Floats:
         """(N+1, 5, P) what a line is shifted by with numbers where it is held, and where its place on a body changes.
@@ -216,20 +252,18 @@ class SystemAtRest(OfScene):
         return False
 
     def _changed(self, system: System, key: str) -> _Changed:
-        """A changed scene.  How a clamped line is seated may hang on first shapes of all: then all are built anew."""
+        """A changed scene.  How a clamped line is seated may hang on first shapes: then such lines are built anew."""
         anew = [self._hangs_on(system, name) for name in self._names]
         for new, name in zip(anew, self._names, strict=True):
             if new:
                 system.know_scene(name, self.scene.scene_of(name))
-        by_shape = any(
-            new and self._bodies.turns(l) and not seats_know_no_shape(system, name)
-            for l, (new, name) in enumerate(zip(anew, self._names, strict=True))
-        )
         built = None
-        if by_shape:
-            built = build_system(system, self._resolution)
-        elif self._bodies.count and any(getattr(system, x) is not getattr(self.scene, x) for x in OF_BODIES):
+        if self._bodies.count and any(getattr(system, x) is not getattr(self.scene, x) for x in OF_BODIES):
             built = with_bodies(self._model, system)
+        bodies = (self._model if built is None else built).bodies
+        clamped = [x for l, (x, new) in enumerate(zip(self._names, anew, strict=True)) if new and self._bodies.turns(l)]
+        by_shape = not all(seats_know_no_shape(system, x) for x in clamped)
+        shaped = shaped_anew(system, clamped, bodies, self._resolution) if by_shape else {}
         out = []
         for l, (name, line) in enumerate(zip(self._names, self.lines, strict=True)):
             if not anew[l]:
@@ -238,11 +272,10 @@ class SystemAtRest(OfScene):
             scene, frames = self._scene_of(system, name), NO_FRAMES
             if not self._bodies.turns(l):
                 model = nearby(line.model, self._scenes[name], scene, self._resolution.lines[name], LEFT_OUT)
-            elif by_shape and built is not None:
-                model = _on_same_cells(built.models[l], line.model)
-                frames = self._bodies.frames(l, built.seats[l])
+            elif by_shape:
+                model = _on_same_cells(shaped[name][0], line.model)
+                frames = self._bodies.frames(l, shaped[name][1])
             else:
-                bodies = (self._model if built is None else built).bodies
                 found = nearby_clamped(line.model, self._scenes[name], system, name, bodies, self._resolution, LEFT_OUT)
                 model, seats = (None, None) if found is None else found
                 frames = self._bodies.frames(l, seats) if seats is not None else NO_FRAMES

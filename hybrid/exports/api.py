@@ -188,11 +188,19 @@ def _usual_places(result: Result) -> np.ndarray:
     return np.unique([result["s"][0], *asked, result["s"][-1]])
 
 
+# Vectors whose error is that of another quantity: of the size of an end force.
+OF_AN_END = {"reaction_start": "end_force", "reaction_end": "end_force"}
+
+
 def _errors_of(part: Part) -> list[str]:
     """The largest estimated error of every field at every place."""
     lines = []
     for name in part.names:
         error, which = error_name(part, name)
+        total = f"error_total_{OF_AN_END.get(name, name)}"
+        if total in part.result.attributes and (not error or part.result.dims(error) != ("t", "s")):
+            unit, most = part.result.units[name], float(part.result.attributes[total])
+            lines.append(f"  {name}: at most {most:.3g} {unit}, estimated")
         if error and part.result.dims(error) == ("t", "s"):
             most, unit = part.array(error).max(axis=0), part.result.units[error]
             for s, x in zip(part.s, most, strict=True):

@@ -122,7 +122,8 @@ def make_app(session: Session, port: int, token: str) -> Guard:
         return JSONResponse(_schemas(), headers=HEADERS)
 
     async def report(request: Request) -> Response:
-        made = await session.report(request.query_params.get("of") == "motion")
+        of = request.query_params.get("of")
+        made = await (session.modes() if of == "modes" else session.report(of == "motion"))
         if "html" in made:
             return HTMLResponse(made["html"], headers=HEADERS | {"Content-Security-Policy": REPORT_POLICY})
         return PlainTextResponse(made["refused"] + "\n", 409, headers=HEADERS)

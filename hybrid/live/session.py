@@ -50,10 +50,12 @@ class Client:
 class Session:
     """What a page shows, shared by all browsers on it."""
 
-    def __init__(self, document: Document | None, playback: Playback | None = None) -> None:
-        """document: None of a result alone, which `playback` plays."""
+    def __init__(
+        self, document: Document | None, playback: Playback | None = None, workers: Workers | None = None
+    ) -> None:
+        """document: None of a result alone, which `playback` plays; workers: some that are started, or its own."""
         self.document, self.playback = document, playback
-        self.workers = Workers()
+        self.workers = workers or Workers()
         self.run: Run | None = None
         self._clients: list[Client] = []
         self._count = 0
@@ -265,6 +267,17 @@ class Session:
             return {"refused": made["problems"][0]["text"]}
         return dict(made) or {"refused": "the process that makes reports has ended: try again"}
 
+    async def modes(self) -> dict[str, Any]:
+        """The page of natural modes of the scene as it stands: `html`, or `refused`."""
+        if self.document is None:
+            return {"refused": "modes are of a scene: open it in place of its result"}
+        asked = {"do": "modes", "text": self.document.text, "file": self.document.name}
+        answer = await self.workers.ask_spare(asked)
+        made = json.loads(answer) if answer is not None else {}
+        if "problems" in made:
+            return {"refused": made["problems"][0]["text"]}
+        return dict(made) or {"refused": "the process that computes modes has ended: try again"}
+
     # ---- the motion ---------------------------------------------------------------------------
 
     def _start_run(self, client: Client, document: Document, replace: bool) -> None:
@@ -391,7 +404,7 @@ def _has_frame(answer: bytes) -> bool:
     return b'"frame": {' in answer
 
 
-def session_of(path: Path | None) -> Session:
+def session_of(path: Path | None, workers: Workers | None = None) -> Session:
     """The session of a scene file, of a result file, or, without a file, of a scene that is still to be written.
 
     SceneError or ResultError where the file cannot be read.
@@ -400,11 +413,11 @@ def session_of(path: Path | None) -> Session:
     from hybrid.store.reader import open_result
 
     if path is None:
-        return Session(Document(""))
+        return Session(Document(""), None, workers)
     path = path.expanduser().absolute()
     if path.suffix.lower() in (".h5", ".hdf5") or is_result(path):
         if not is_held(path):
             with suppress(KeyError):
                 open_result(path).close()
-        return Session(None, Playback(path))
-    return Session(Document(text_of(path), path))
+        return Session(None, Playback(path), workers)
+    return Session(Document(text_of(path), path), None, workers)

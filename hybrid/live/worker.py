@@ -1,7 +1,8 @@
 """A process that turns texts of scenes into pictures: one line of JSON in, lines of JSON out.
 
 Asked {"do": "picture", "text", "file"} it answers "compiling" perhaps, then "picture" and JSON; asked
-{"do": "report", "file"} the report of a result file, or of the last picture with file null: "report" and JSON.
+{"do": "report", "file"} the report of a result file, or of the last picture with file null: "report" and JSON;
+{"do": "modes", "text", "file"} the page of natural modes of a scene: "modes" and JSON.
 The first word of an answer and a tab stand before its JSON, so that the server passes it on without reading it.
 """
 
@@ -58,6 +59,8 @@ class Worker:
         try:
             if asked["do"] == "report":
                 self._say("report", self._report(asked["file"]))
+            elif asked["do"] == "modes":
+                self._say("modes", self._modes(asked["text"], asked["file"]))
             else:
                 self._say("picture", self._picture(asked["text"], asked["file"]))
         except Exception:
@@ -83,6 +86,17 @@ class Worker:
                     return {"html": html(result)}
             return {"html": html(self._last)} if self._last is not None else {"refused": "there is no equilibrium yet"}
         except ResultError as error:
+            return {"refused": str(error)}
+
+    def _modes(self, text: str, file: str) -> dict[str, Any]:
+        from hybrid.errors import HybridError
+        from hybrid.modal.api import modes
+        from hybrid.scene.read import parse_either
+        from hybrid.view.modes_page import html
+
+        try:
+            return {"html": html(modes(parse_either(text, file)[0]))}
+        except HybridError as error:
             return {"refused": str(error)}
 
     def _say(self, what: str, content: dict[str, Any]) -> None:

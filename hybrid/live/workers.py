@@ -34,7 +34,9 @@ class Process:
         self.ready = asyncio.Event()
 
     async def start(self) -> None:
-        """Start it; it is asked at once, and answers when it is ready."""
+        """Start it, unless it was; it is asked at once, and answers when it is ready."""
+        if self._child is not None:
+            return
         pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
         self._child = await asyncio.create_subprocess_exec(
             *own_process("from hybrid.live.worker import main; main()"), stdin=pipe, stdout=pipe, stderr=nothing,
@@ -80,9 +82,8 @@ class Workers:
         self.killed = 0  # processes that were ended because a newer text waited
 
     async def start(self) -> None:
-        """Start both."""
+        """Start the one at work.  The other starts with its first answer, so that they need not share a processor."""
         await self._at_work.start()
-        await self._spare.start()
 
     @property
     def compiling(self) -> bool:
@@ -102,18 +103,21 @@ class Workers:
                     self.killed += 1
                     await self._replace()
             found = await answer
+            await self._spare.start()
             if found is None and not (newer is not None and newer.is_set()):
                 await self._replace()  # it ended by itself: killed from outside, or out of memory
             return found
 
     async def ask_spare(self, asked: dict[str, Any]) -> bytes | None:
         """The answer of the process that computes no pictures."""
+        await self._spare.start()
         return await self._spare.ask(asked)
 
     async def _replace(self) -> None:
         """End the process at work, take the other, and start a new one beside it."""
         ended, self._at_work, self._spare = self._at_work, self._spare, Process()
         await ended.stop()
+        await self._at_work.start()
         await self._spare.start()
 
     async def stop(self) -> None:

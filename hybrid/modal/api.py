@@ -17,23 +17,18 @@ from hybrid.kernels.laws.obstacles import distances, thinner_nodes
 from hybrid.kernels.state.forces import OBSTACLES
 from hybrid.kernels.state.obstacle_rows import ONSET_OF
 from hybrid.kernels.state.state import Floats
-from hybrid.modal.eigen import Eigen, lowest_modes
-from hybrid.modal.matrices import LinearLine, LinearNetwork, linear_network
-from hybrid.model.bodies import BodyModel
-from hybrid.model.build import Model
+from hybrid.linear.eigen import Eigen, lowest_modes
+from hybrid.linear.matrices import LinearLine, LinearNetwork, linear_network
+from hybrid.linear.rest import Rest, line_at_rest, system_at_rest
 from hybrid.model.payout import payout_of
-from hybrid.model.resolution import Resolution
 from hybrid.model.system import SystemResolution
 from hybrid.scene.base import Table
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.motion_tables import Harmonic
-from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
+from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.simulation.static_case import StaticCase
-from hybrid.simulation.system_run import static_system
-from hybrid.solve.joined import JoinedLine, SystemState
-from hybrid.solve.system import SystemSolver
 
 MOST = 200  # modes that may be asked for
 # A motion whose w^2 is below this part of that of the first other mode costs nothing.
@@ -173,63 +168,20 @@ def _touched(rest: Rest) -> Iterator[str]:
             )
 
 
-@dataclass(frozen=True)
-class Rest:
-    """The equilibrium of a scene as a network; points and bodies that are free by name, models of lines and bodies."""
-
-    solver: SystemSolver
-    states: SystemState
-    names: tuple[str, ...]
-    models: tuple[Model, ...]
-    points: tuple[str, ...] = ()
-    bodies: tuple[str, ...] = ()
-    floats: tuple[BodyModel, ...] = ()
-
-
 def equilibrium_of(asked: Scene | System, cells: float = 1.0) -> Rest:
     """The equilibrium on the usual mesh, or on one whose cells are so many times as long.
 
     SceneError: a line touches itself in it, another one, a body or a sheave; ComputationError: there is none.
     """
     refuse_use(asked, "about rest", given="modes")
-    return _of_line(asked, cells) if isinstance(asked, Scene) else _of_system(asked, cells)
-
-
-def _of_line(scene: Scene, cells: float) -> Rest:
-    """One line, as a system of one."""
-    case = StaticCase(scene)
-    resolution: Resolution = resolution_at_rest(case)
-    model, found = case.at_rest(resolution.coarser(cells=cells) if cells > 1.0 else resolution)
-    if found.touch.size:
-        _refuse_contact("contact.self")
-    x = JoinedLine(
-        model.line, model.sea.at(np.inf), model.ends.at(np.inf), model.length, model.tension_scale, -np.inf, (-1, -1)
-    )  # fmt: skip
-    return Rest(SystemSolver([x], 0), SystemState([found.state]), ("cable",), (model,))
-
-
-def _of_system(system: System, cells: float) -> Rest:
-    """Several lines."""
-    resolution = SystemResolution.first(system)
+    if isinstance(asked, Scene):
+        case = StaticCase(asked)
+        resolution = resolution_at_rest(case)
+        return line_at_rest(case, resolution.coarser(cells=cells) if cells > 1.0 else resolution)
+    system = SystemResolution.first(asked)
     if cells > 1.0:
-        resolution = replace(resolution, lines={k: x.coarser(cells=cells) for k, x in resolution.lines.items()})
-    run = static_system(system, None, lambda: scene_text(system), resolution=resolution)
-    assert run.found is not None
-    if run.found.settled:
-        _refuse_contact("lines")
-    bodies = (*(body.name for body in run.model.bodies), *run.model.rigid)
-    found = run.found.solver  # which knows neither waves nor friction
-    lines = [x._replace(line=model.line) for x, model in zip(found.lines, run.model.models, strict=True)]
-    for body, state, row in zip(run.model.bodies, run.state.bodies, found.bodies, strict=False):
-        body.take_added_mass(state)  # as it is wet at rest
-        row[MASS : MASS + 36] = body.numbers[MASS : MASS + 36]
-    solver, model = SystemSolver(lines, len(found.net), found.bodies), run.model
-    return Rest(solver, run.state, tuple(model.names), model.models, tuple(model.free), bodies, model.bodies)
-
-
-def _refuse_contact(where: str) -> None:
-    expected = "an equilibrium in which no line touches itself, about which modes are known"
-    raise SceneError([Complaint(where, "contact of a line with itself", expected, "a shape that is apart")])
+        system = replace(system, lines={k: x.coarser(cells=cells) for k, x in system.lines.items()})
+    return system_at_rest(asked, system)
 
 
 class _Shape:

@@ -14,7 +14,7 @@ from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 
 if TYPE_CHECKING:
-    from hybrid.modal.response_results import LineResponse
+    from hybrid.linear.response_results import LineResponse
 
 # Part of the run that is left out, in which the motion begins; outputs to the shortest period that counts.
 BEGINS, PER_PERIOD = 0.25, 12

@@ -5,28 +5,32 @@ At every frequency of the scene's waves and motions
     (A - w^2 M - i w C) q = f,      C = C_0 + C_d,
 
 with the matrices of the modes, the damping C_0 of the sections and the bed, and drag C_d that is linear in the mean
-square, found by iteration (hybrid.modal.drag).  docs/theory.md, 21.
+square, found by iteration (hybrid.linear.drag).  docs/theory.md, 21.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.junctions.bodies import DAMPING, FRAME, V
 from hybrid.kernels.state.state import Floats
-from hybrid.modal.api import Rest, equilibrium_of, of_first_length
+from hybrid.linear.complex_solver import ComplexSolver
+from hybrid.linear.excitation import frequencies_of, refuse_motions
+from hybrid.linear.loaded_line import LoadedLine
+from hybrid.linear.loaded_members import LoadedMembers, stiffness_by_water, turning_doubts
+from hybrid.linear.matrices import linear_network
+from hybrid.linear.response_results import LineResponse, Response
+from hybrid.linear.rest import Rest
+from hybrid.modal.api import equilibrium_of, of_first_length
 from hybrid.modal.check import compared
-from hybrid.modal.excitation import frequencies_of, refuse_motions
-from hybrid.modal.loaded_line import LoadedLine
-from hybrid.modal.loaded_members import LoadedMembers, stiffness_by_water, turning_doubts
-from hybrid.modal.matrices import linear_network
-from hybrid.modal.response_results import Response
+from hybrid.modal.left_out import left_out
 from hybrid.modal.validity import doubts_of
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.read import SceneLike, as_scene_or_system
@@ -59,10 +63,10 @@ def response(scene: SceneLike | System, friction: bool = True, check: float | No
         raise SceneError([Complaint("environment.fluid.waves", "nothing that moves", expected, "add `waves`")])
     run = _Linear(rest, omegas, friction)
     rounds = run.settle()
-    lines = {x.name: x.result() for x in run.lines}
+    lines = run.results()
     notes = [
         *of_first_length(asked),
-        *run.notes(),
+        *run.notes(lines),
         *([] if rounds < ROUNDS else [f"linear drag has not settled in {ROUNDS} rounds"]),
     ]
     checks = {} if check is None else compared(asked, lines, check)
@@ -71,23 +75,6 @@ def response(scene: SceneLike | System, friction: bool = True, check: float | No
         f"not valid: {name} has a standard deviation of {x:.4g} in a run of {check:g} s" for name, x in off.items()
     ]
     return Response(asked.title, lines, run.points(), run.bodies(), rounds, checks, tuple(notes))
-
-
-def _aligned(matrices: Sequence[sparse.csc_array]) -> tuple[list[Floats], sparse.csc_array]:
-    """The numbers of matrices in the places of all of them, and a complex matrix that has these places."""
-    size = matrices[0].shape[0]
-    keys = []
-    for x in matrices:
-        columns = np.repeat(np.arange(size), np.diff(x.indptr))
-        keys.append(columns.astype(np.int64) * size + x.indices)
-    every = np.unique(np.concatenate(keys))
-    parts = []
-    for key, x in zip(keys, matrices, strict=True):
-        part = np.zeros(every.size)
-        np.add.at(part, np.searchsorted(every, key), x.data)
-        parts.append(part)
-    begin = np.searchsorted(every, np.arange(size + 1, dtype=np.int64) * size)
-    return parts, sparse.csc_array((np.zeros(every.size, complex), every % size, begin), shape=(size, size))
 
 
 class _Linear:
@@ -147,25 +134,32 @@ class _Linear:
         of_bodies = [x + self.members[b].damping() if b in self.members else x for b, x in enumerate(self.damping)]
         C = sparse.csc_array(P.T @ sparse.block_diag(dampings, format="csr") @ P) + self._of_bodies(of_bodies)
         stiffness = self.network.stiffness + self.network.skew + self.by_water
-        parts, pattern = _aligned([stiffness, self.network.mass, C])
+        self.solver = ComplexSolver([stiffness, self.network.mass, C])
         right = P.T @ np.concatenate(
             [x.loads(which, damping) for x, damping in zip(self.lines, dampings, strict=True)], axis=0
         )
         for b, members in self.members.items():
             right[self.first + 6 * b : self.first + 6 * b + 6] += members.loads(which)
         for column, f in enumerate(which):
-            w = self.omegas[f]
-            pattern.data = parts[0] - w * w * parts[1] - 1j * w * parts[2]
-            try:
-                self.vectors[f] = splu(pattern).solve(right[:, column])
-            except RuntimeError:
-                detail = f"at {w / (2.0 * np.pi):.4g} Hz, where nothing damps a mode"
-                raise ComputationError(Outcome.SINGULAR, None, None, detail) from None
+            self.vectors[f] = self.answer(self.omegas[f], right[:, column])
         whole = (P @ self.vectors[which].T).T
         for x, a, b in zip(self.lines, self.network.at[:-1], self.network.at[1:], strict=True):
             x.take(which, whole[:, a:b].reshape(which.size, -1, SIZE))
         for b, members in self.members.items():
             members.q[which] = self.vectors[which, self.first + 6 * b : self.first + 6 * b + 6]
+
+    def answer(self, w: float, right: Any) -> Any:
+        """Amplitudes (q,) of exp(-i w t) by loads (q,), with the drag as it was found last; w: 1/s."""
+        try:
+            return self.solver.solve((1.0, -w * w, -1j * w), right)
+        except RuntimeError:
+            detail = f"at {w / (2.0 * np.pi):.4g} Hz, where nothing damps a mode"
+            raise ComputationError(Outcome.SINGULAR, None, None, detail) from None
+
+    def results(self) -> dict[str, LineResponse]:
+        """Of each line, by its name."""
+        changes = left_out(self.network, self.lines, self.answer)
+        return {x.name: replace(x.result(), left_out=each) for x, each in zip(self.lines, changes, strict=True)}
 
     def points(self) -> dict[str, Floats]:
         """Complex shifts (F, 3) m of free points."""
@@ -177,11 +171,11 @@ class _Linear:
         first = self.first
         return {name: self.vectors[:, first + 6 * k : first + 6 * k + 6] for k, name in enumerate(self.rest.bodies)}
 
-    def notes(self) -> Iterator[str]:
+    def notes(self, found: Mapping[str, LineResponse]) -> Iterator[str]:
         """Where the motion is too large to be linear."""
         for x in self.lines:
             name = f"line {x.name}: " if len(self.lines) > 1 else ""
-            yield from (f"{name}not valid: {text}" for text in doubts_of(x))
+            yield from (f"{name}not valid: {text}" for text in doubts_of(x, found[x.name]))
         for name, q in self.bodies().items():
             yield from (f"not valid: {text}" for text in turning_doubts(name, q))
         for members in self.members.values():

@@ -16,7 +16,6 @@ import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.mesh.cell_lengths import COMPRESSED_SHARE, FLANK, SHARP
-from hybrid.kernels.state.forces import FRICTION, SEABED
 from hybrid.kernels.state.state import Floats, Line, State
 from hybrid.model.catenary_guess import Hanging
 from hybrid.model.contents import Entry, contents_of, followed
@@ -38,7 +37,7 @@ from hybrid.model.payout import PayoutPlan, cable_of, payout_of, payout_plan, sh
 from hybrid.model.plane import in_plane, planar
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, mesh_is_free
 from hybrid.model.scales import tension_scale
-from hybrid.model.sea import Surroundings, rubs, surroundings
+from hybrid.model.sea import Surroundings, bed_bits, surroundings
 from hybrid.model.sections import merged_sections, stiffeners_of
 from hybrid.model.self_reach import contact_bits
 from hybrid.scene.motion_checks import prescribed_twist
@@ -190,8 +189,7 @@ def build(
     # a stiff rod beside a light catenary must not hide that the catenary is slack
     slack_scale = tension_scale(scene, sections, False, fastest)
     bed = scene.environment.seabed
-    touch = 0 if bed is None else SEABED | (FRICTION if rubs(bed) else 0)
-    touch |= contact_bits(scene) | obstacle_bits(scene)
+    touch = bed_bits(bed) | contact_bits(scene) | obstacle_bits(scene)
     moves = layout is not None
     line = line_on(cable, s, rod, touch, inertia_of_zones(cable) if moves else WITH_SECTIONS)
     if sea.values.carried.size:

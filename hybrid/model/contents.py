@@ -159,6 +159,9 @@ def followed(scene: Scene, zones: Sequence[Zone]) -> Entry:
             return Entry(what, False, "no bending stiffness: there is nothing to leave out")
         if any(x.anisotropic for x in sections):
             return Entry(what, False, "bends differently in two directions: a catenary does not know which way it lies")
+    bed = scene.environment.seabed
+    if bed is not None and bed.soil is not None:
+        return Entry(what, False, "soil remembers (seabed.soil): how it answers to a shift depends on the way there")
     if any(x.intrinsic_curvature and any(x.intrinsic_curvature[:2]) for x in sections):
         return Entry(what, False, "curved without stress: a catenary does not know which way it lies")
     return Entry(what, True, "error figure; in a coarser run")
@@ -231,8 +234,13 @@ def contents_of(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) ->
         why = "sections[].moment_curvature, cable.attachments of kind bend_restrictor"
         entries.append(Entry("moment over curvature by a table", True, why))
     if line.bits & BENDING_SLIP:
-        why = "sections[].bending_slip, first_loading; in equilibria as on first loading from straight"
-        entries.append(Entry("layers that slip as the line bends", True, why))
+        if any(x.bending_slip or x.first_loading for x in scene.cable.sections):
+            why = "sections[].bending_slip, first_loading; in equilibria as on first loading from straight"
+            entries.append(Entry("layers that slip as the line bends", True, why))
+        if any(x.stiffness_per_tension for x in scene.cable.sections):
+            entries.append(Entry("bending stiffness that grows with tension", True, "sections[].stiffness_per_tension"))
+    if any(x.creep is not None for x in scene.cable.sections):
+        entries.append(Entry("strain that grows with the logarithm of time", True, "sections[].creep"))
     if any(x.dynamic_stiffness is not None for x in scene.cable.sections):
         entries.append(Entry("stiffness that depends on speed and mean tension", True, "sections[].dynamic_stiffness"))
     if "rod" in kinds:

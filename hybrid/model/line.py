@@ -18,6 +18,7 @@ from hybrid.kernels.state.forces import (
     FRICTION,
     ROTARY,
     SEABED,
+    SOIL,
     STIFFNESS_DAMPING,
 )
 from hybrid.kernels.state.state import (
@@ -91,6 +92,8 @@ def on_base(
         line = with_slip(line, material, of)
     if material.vortices.size:
         line = line._replace(wake_law=wake_law(material, s, of))
+    if bits & SOIL:
+        line = line._replace(bed_width=bed_width(material, h, of))
     return line
 
 
@@ -177,6 +180,15 @@ def torsion_zones(material: Material, h: Floats, rod: np.ndarray, of: np.ndarray
     return np.array(rows, float).reshape(-1, 5)
 
 
+def bed_width(material: Material, h: Floats, of: np.ndarray) -> Floats:
+    """`bed_width` (N+1,) m of a line with cells of lengths h (N,) m on pieces `of` (N,): means."""
+    total, length = np.zeros(h.size + 1), np.zeros(h.size + 1)
+    for side in (slice(1, None), slice(None, -1)):
+        total[side] += h * material.outer_diameter[of]
+        length[side] += h
+    return np.asarray(total / length)
+
+
 def wake_law(material: Material, s: Floats, of: np.ndarray) -> Floats:
     """`wake_law` of a line with nodes s (N+1,) m and cells on pieces `of` (N,); phases begin once round along it."""
     row, half = material.vortices[of], 0.5 * np.diff(s)
@@ -204,7 +216,7 @@ def axial_law(material: Material, h: Floats, of: np.ndarray) -> tuple[Floats, Fl
         strain, tension = np.array(piece.rows, float).T
         energy = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(strain) * (tension[1:] + tension[:-1]))])
         rows.append(np.column_stack([strain, tension, energy]))
-        law[cells, :SHIFT] = (begin, begin + strain.size, *piece.dynamic, *piece.working)
+        law[cells, :SHIFT] = (begin, begin + strain.size, *piece.dynamic, *piece.working, *piece.creep)
         begin += strain.size
     table = np.concatenate(rows)
     blank = blank_line(1)._replace(law=law, law_table=table)

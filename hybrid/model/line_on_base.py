@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.kernels.machine.binding import Packed, Table
 from hybrid.kernels.mesh.zone_criteria import HINGE, NodeKinds, blank_kinds
 from hybrid.kernels.mesh.zone_line import Cable, blank_kinds_job, blank_line_job, fill_kinds
-from hybrid.kernels.state.state import NO_PLANE, Floats, Line
+from hybrid.kernels.state.state import NO_MOVED, NO_PLANE, Floats, Line
 from hybrid.model.layout import Layout
 from hybrid.model.line import cable_on, inertia_of_zones, on_base, put_points
 from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR, Material
@@ -29,13 +30,14 @@ class LineOnBase:
         """What lines are made of; its points are those of the forces that the last line had."""
         return self._cable
 
-    def line(self, layout: Layout, bits: int, plane: Floats = NO_PLANE) -> Line:
-        """The line on a layout; bits: all forces that are on."""
+    def line(self, layout: Layout, bits: int, plane: Floats = NO_PLANE, moved: NDArray[np.int8] = NO_MOVED) -> Line:
+        """The line on a layout; bits: all forces that are on; moved: as of `Line`, of the obstacles around it."""
         if bits != self._bits:
             put_points(self._material, self._place, self._cable, bits)
             self._bits = bits
         cells = layout.base_of_cell, layout.rod_cells
-        return on_base(self._material, self._cable, layout.nodes, *cells, bits, plane, self._line_job)
+        line = on_base(self._material, self._cable, layout.nodes, *cells, bits, plane, self._line_job)
+        return line._replace(moved=moved)
 
     def kinds(self, layout: Layout, free: np.ndarray, scale: float) -> NodeKinds:
         """What criteria know of the nodes of a layout; free: (n,) of base cells; scale: tension scale, N."""

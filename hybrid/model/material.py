@@ -63,6 +63,7 @@ class StretchLaw(NamedTuple):
     rows: tuple[tuple[float, float], ...]  # strain and tension, N, at rest
     dynamic: tuple[float, float, float]  # dynamic stiffness, N, what it gains by mean tension, relaxation time, s; or 0
     working: tuple[float, float, float, float]  # shape of working curves, k1, k2, highest tension before, N; or 0
+    creep: tuple[float, float] = (0.0, 1.0)  # strain in a tenfold time, and the time under load before, s
 
 
 @dataclass
@@ -109,8 +110,8 @@ class Material:
     bends: list[Curve | None] | None = None  # (K,) tables of moment over curvature; None: there are none
     tension_torque: Floats = field(default_factory=lambda: np.zeros(0))  # (K,) N m per N; empty: none anywhere
     sections_turn: bool = False  # whether sections are given an inertia, which rods that come and go have too
-    # (K,) of pieces, of each layer that slips: stiffness, N m2, slip moment, N m, and what it gains by tension, m
-    layers: list[tuple[tuple[float, float, float], ...]] = field(default_factory=list)
+    # (K,) of pieces, of each layer that slips: stiffness, N m2, slip moment, N m, what this and that gain by tension
+    layers: list[tuple[tuple[float, float, float, float], ...]] = field(default_factory=list)
 
     @property
     def passes_torque(self) -> bool:
@@ -306,7 +307,8 @@ def stretch_law(section: Section) -> StretchLaw | None:
         x = section.syrope
         form = BY_STIFFNESS if x.by_stiffness else _FORMS[x.working]
         working = (form, x.k1, x.k2 or 0.0, x.highest_tension)
-    return StretchLaw(section.curve, dynamic, working) if section.curve else None
+    creep = (section.creep.per_decade, section.creep.loaded) if section.creep is not None else (0.0, 1.0)
+    return StretchLaw(section.curve, dynamic, working, creep) if section.curve else None
 
 
 def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:

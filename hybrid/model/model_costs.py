@@ -19,6 +19,9 @@ from hybrid.scene.schema import AdaptiveModel, CatenaryModel, RodModel, Scene
 MODELS = {"rod": RodModel, "catenary": CatenaryModel, "adaptive": AdaptiveModel}
 # Another model must cost less than this part of rods, which need no criterion and leave nothing out.
 CLEARLY = {"catenary": 0.9, "adaptive": 0.8}
+# Part of the steps of all runs of an accuracy at which the error of leaving bending out is followed: in the results of
+# zones that move, and in one of the runs that catenaries are compared with, of longer cells and steps.
+FOLLOWED = {"catenary": 0.25, "adaptive": 0.6}
 # Catenaries are a choice where criteria that count errors of position stay below 1, and that of slack below this: a
 # pre-run sees outputs alone.  What zones that move would hold as rods is above it in any of them.
 CALM = 0.25
@@ -26,6 +29,7 @@ CALM = 0.25
 NEARLY_SLACK = 0.05
 # A clamp or a point load makes so many lengths sqrt(EI/T) a rod, and what asks for it so many on either side of it.
 DISTURBED, WIDER = 4.0, 2.0
+MOST_RANGES = 4  # places of rods that are named
 # Part of what a catenary may lack along the line from which on zones that move are rod (simulation.initial_zones).
 ZONES_ALONG = 0.5
 
@@ -52,6 +56,18 @@ class ModelChoice(NamedTuple):
 NAMED = ModelChoice()  # of a scene that leaves no choice
 
 
+class Rods(NamedTuple):
+    """What zones that move would make rod at some time: part of the cells, and from where to where, m."""
+
+    share: float
+    ranges: tuple[tuple[float, float], ...] = ()
+
+    def __str__(self) -> str:
+        places = ", ".join(f"{a:.4g} to {b:.4g}" for a, b in self.ranges[:MOST_RANGES])
+        more = f" and {len(self.ranges) - MOST_RANGES} more" if len(self.ranges) > MOST_RANGES else ""
+        return f"{self.share:.0%} of them rod" + (f": s = {places}{more} m" if places else "")
+
+
 class Cost(NamedTuple):
     """A kind of model: its cells, s of processor time for a step, and why it is no choice; empty if it is one."""
 
@@ -59,7 +75,7 @@ class Cost(NamedTuple):
     cells: int
     seconds: float
     why_not: str = ""
-    rods_of: float = 1.0  # part of the cells that is rod at some time
+    rods: Rods | None = None  # of zones that move
 
 
 class Demand(NamedTuple):
@@ -110,8 +126,8 @@ def ratios(scene: Scene, model: Model, demand: Demand, tolerance: float, along: 
     return EI * demand.bent / tolerance, slack, edge, along
 
 
-def rod_share(model: Model, demand: Demand, found: Sequence[Floats], grading: Grading) -> float:
-    """Part of the cells that zones that move would make rod at some time; found: `ratios`; grading: of the cells.
+def rods_of_zones(model: Model, demand: Demand, found: Sequence[Floats], grading: Grading) -> Rods:
+    """What zones that move would make rod at some time; found: `ratios`; grading: of the cells.
 
     A rod is wider on either side than what asks for it, by the buffer of the manager and two cells.
     """
@@ -125,10 +141,21 @@ def rod_share(model: Model, demand: Demand, found: Sequence[Floats], grading: Gr
     places = np.array([*cable.at, *held])
     width = DISTURBED * np.sqrt(cable.mean_bending.max() / np.maximum(np.interp(places, s, low), 1e-300))
     a, b = np.append(a, places - 0.5 * width), np.append(b, places + 0.5 * width)
-    middle = 0.5 * (s[:-1] + s[1:])
-    rod = ((middle > a[:, None]) & (middle < b[:, None])).any(axis=0)
-    cells = np.diff(s) / grading.cell(middle)
-    return float(cells[rod].sum() / cells.sum())
+    counted = np.concatenate([[0.0], np.cumsum(np.diff(s) / grading.cell(0.5 * (s[:-1] + s[1:])))])  # cells up to s
+    ranges = united(np.clip(a, 0.0, model.length), np.clip(b, 0.0, model.length))
+    inside = sum(float(np.diff(np.interp(ends, s, counted))[0]) for ends in ranges)
+    return Rods(inside / float(counted[-1]), tuple(ranges))
+
+
+def united(a: Floats, b: Floats) -> list[tuple[float, float]]:
+    """Ranges that cover the same as those from a to b (n,), none of which meets another."""
+    found: list[tuple[float, float]] = []
+    for k in np.argsort(a):
+        if found and a[k] <= found[-1][1]:
+            found[-1] = found[-1][0], max(found[-1][1], float(b[k]))
+        else:
+            found.append((float(a[k]), float(b[k])))
+    return found
 
 
 def no_catenary(found: Sequence[Floats], s: Floats) -> str:
@@ -145,17 +172,18 @@ def no_catenary(found: Sequence[Floats], s: Floats) -> str:
 
 
 def costs(
-    scene: Scene, model: Model, rods: int, catenaries: int, share: float, why_not: str
+    scene: Scene, model: Model, rods: int, catenaries: int, of_zones: Rods, why_not: str
 ) -> tuple[Cost, Cost, Cost]:
     """Of rods, catenaries and zones that move, which have the cells of rods.
 
-    rods, catenaries: cells; share: part of the cells of zones that would be rod; why_not: why catenaries are no choice.
+    rods, catenaries: cells; of_zones: what zones would make rod; why_not: why catenaries are no choice.
     """
-    moving = step_time(scene, model, share * rods, (1.0 - share) * rods, moves=True, followed=True)
+    share, part = of_zones.share * rods, FOLLOWED["adaptive"]
+    moving = step_time(scene, model, share, rods - share, moves=True, followed=part)
     return (
         Cost("rod", rods, step_time(scene, model, rods, 0)),
-        Cost("catenary", catenaries, step_time(scene, model, 0, catenaries, followed=True), why_not),
-        Cost("adaptive", rods, moving, rods_of=share),
+        Cost("catenary", catenaries, step_time(scene, model, 0, catenaries, followed=FOLLOWED["catenary"]), why_not),
+        Cost("adaptive", rods, moving, rods=of_zones),
     )
 
 
@@ -174,5 +202,5 @@ def reasons(found: Sequence[Cost]) -> str:
 def _in_words(cost: Cost) -> str:
     if cost.why_not:
         return f"is no choice: {cost.why_not}"
-    cells = f"{cost.cells} cells, {cost.rods_of:.0%} of them rod" if cost.kind == "adaptive" else f"{cost.cells} cells"
+    cells = f"{cost.cells} cells, {cost.rods}" if cost.rods is not None else f"{cost.cells} cells"
     return f"{float(f'{1e6 * cost.seconds:.2g}'):g} µs of processor time per step ({cells})"

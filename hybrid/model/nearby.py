@@ -49,7 +49,7 @@ def nearby(
         cable = material(scene, s if layout is None else layout.base)
     on_base = LineOnBase(cable, layout.base) if layout is not None else None
     if layout is not None and on_base is not None:
-        line = on_base.line(layout, (model.line.bits | cable.bits) & ~without, model.line.plane)
+        line = on_base.line(layout, (model.line.bits | cable.bits) & ~without, model.line.plane, model.line.moved)
     else:
         inertia = WITH_SECTIONS if model.line.bits & ROTARY else NO_INERTIA
         line = line_on(cable, s, model.line.spin == 1, model.line.bits & ~PLANAR, inertia, without)
@@ -100,7 +100,7 @@ def _built(model: Model, scene: Scene, resolution: Resolution) -> Model | None:
         if not np.array_equal(found.layout.parts, here.parts) or found.on_base is None:
             return None
         layout = found.layout._replace(rod=here.rod, here=here.here)
-        line = found.on_base.line(layout, found.line.bits, found.line.plane)
+        line = found.on_base.line(layout, found.line.bits, found.line.plane, found.line.moved)
         found = replace(found, line=line, zones=layout.zones, layout=layout, sea=found.sea.on(line.h.size))
     return found if same_nodes(found.line.s, model.line.s) else None
 

@@ -6,7 +6,7 @@ no first shape: then the arrays of the line are those of its scene, and no other
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from hybrid.model.bodies import BodyModel
 from hybrid.model.build import Model
 from hybrid.model.clamps import seat_of, untwisted, with_clamps
 from hybrid.model.nearby import nearby
-from hybrid.model.system import SystemResolution, first_lines
+from hybrid.model.system import SystemResolution, build_system, first_lines
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
@@ -82,3 +82,23 @@ def nearby_clamped(
     other = with_clamps(other, found, held)
     other.ends.values.frame[held] = found.ends.values.frame[held]
     return replace(other, start=model.start), seats
+
+
+def shaped_anew(
+    system: System, names: Iterable[str], bodies: Sequence[BodyModel], resolution: SystemResolution
+) -> dict[str, tuple[Model, Floats]]:
+    """Models of some lines with their seats (2, SEAT), as first shapes have them; bodies: the free ones.
+
+    Points are turned as the lines lie that are clamped there; no other line is built.
+    """
+    if system.surfaces or system.dimension == 2:  # what a line is beside, or in which plane, hangs on all of them
+        built = build_system(system, resolution)
+        models, seats = (
+            dict(zip(built.names, built.models, strict=True)),
+            dict(zip(built.names, built.seats, strict=True)),
+        )
+        return {name: (models[name], seats[name]) for name in names}
+    maker = first_lines(system, bodies, resolution)
+    maker.turn_points()
+    order = list(system.lines)
+    return {name: (maker.model(name), maker.seats[order.index(name)]) for name in names}

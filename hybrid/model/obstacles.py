@@ -41,6 +41,7 @@ from hybrid.model.facets import facet_tables, facets_of
 from hybrid.model.payout import longest_out, whole_scene, winch_side
 from hybrid.model.scales import tension_scale
 from hybrid.model.sections import merged_sections
+from hybrid.scene.analysis import Straight
 from hybrid.scene.base import unit
 from hybrid.scene.obstacles import (
     BoxObstacle,
@@ -54,9 +55,10 @@ from hybrid.scene.obstacles import (
 )
 from hybrid.scene.schema import Scene
 
-# How deep a line lies in an obstacle under what the scene asks for, where it follows its radius and where it touches it
-# at a point, the onset of contact, and the elastic travel of friction, as parts of its diameter.
-DEPTH, DEPTH_AT_POINT, ONSET, TRAVEL = 0.02, 0.05, 0.01, 0.01
+# As parts of the diameter of a line: how deep it lies in an obstacle under what the scene asks for, where it follows
+# its radius and where it touches it at a point; how deep it goes where it hits one; the onset of contact; the elastic
+# travel of friction.
+DEPTH, DEPTH_AT_POINT, DEPTH_AT_IMPACT, ONSET, TRAVEL = 0.02, 0.05, 0.125, 0.01, 0.01
 # Cells to the radius of an obstacle where the program places them, and the most cells that this makes of a line.
 CELLS_PER_RADIUS, MOST_CELLS = 4.0, 2000
 
@@ -106,6 +108,15 @@ def pull_on_obstacles(scene: Scene) -> float:
     return pull
 
 
+def stiffness_at_impact(mass: float, speed: float, diameter: float) -> float:
+    """Stiffness (N/m per m) of an obstacle that a line of a mass (kg/m) and diameter (m) hits at a speed (m/s).
+
+    A line that is stopped as a whole goes p = v sqrt(m/k) deep, as m v^2/2 = k p^2/2.  So does one that is stopped at a
+    point: its kinks run on at sqrt(T/m), which presses 2 v sqrt(T m) on a bed of 2 sqrt(k T) N/m, whatever T is.
+    """
+    return mass * (speed / (DEPTH_AT_IMPACT * diameter)) ** 2
+
+
 def obstacle_rows(scene: Scene, pull: float | None = None) -> Floats:
     """(M, OBSTACLE) of the obstacles of a scene, in its order, as kernels.laws.obstacles has them.
 
@@ -119,7 +130,10 @@ def obstacle_rows(scene: Scene, pull: float | None = None) -> Floats:
     strand = strand_radius(scene)
     sections = whole_scene(scene)[0].cable.sections
     least = 0.5 * min(x.diameter or 0.0 for x in sections)  # by which how hard an obstacle is goes
-    weight = max(x.mass for x in sections) * (scene.environment.gravity or 1.0)
+    mass = max(x.mass for x in sections)
+    weight = mass * (scene.environment.gravity or 1.0)
+    velocity = scene.initial.velocity if isinstance(scene.initial, Straight) else None
+    at_impact = stiffness_at_impact(mass, float(np.linalg.norm(velocity or 0.0)), 2.0 * least)
     pull = pull_on_obstacles(scene) if pull is None else pull
     first = facet_tables(scene.obstacles)[2]
     for row, (name, x) in zip(rows, scene.obstacles.items(), strict=True):
@@ -130,7 +144,7 @@ def obstacle_rows(scene: Scene, pull: float | None = None) -> Floats:
         row[ROOT] = first.get(name, 0)
         # a string under a tension T that half of T presses on a point of a bed of stiffness k: T/2 = 2 sqrt(k T) depth
         at_point = pull / (4.0 * 2.0 * DEPTH_AT_POINT * least) ** 2
-        stiffness = max((weight + pull / over) / (2.0 * DEPTH * least), at_point)
+        stiffness = max((weight + pull / over) / (2.0 * DEPTH * least), at_point, at_impact)
         row[MU], row[STIFFNESS], row[DAMPING] = x.friction, x.stiffness or stiffness, x.damping
         row[ONSET_OF], row[SLIP] = 2.0 * ONSET * least, 2.0 * TRAVEL * least
     return rows

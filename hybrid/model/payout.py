@@ -11,6 +11,7 @@ import numpy as np
 
 from hybrid.kernels.reel import winch as w
 from hybrid.kernels.reel.reel import LEAVES
+from hybrid.kernels.state.forces import SOIL
 from hybrid.kernels.state.state import Floats, Line
 from hybrid.model.layout import Layout
 from hybrid.model.line import WITH_SECTIONS, inertia_of_zones, line_on, made_of
@@ -142,7 +143,7 @@ class PayoutPlan:
         ends = [zone.s_b for zone in self.zones]
         rod = np.array([x.kind == "rod" for x in self.zones])
         rods = rod[np.minimum(np.searchsorted(ends, middle), len(ends) - 1)]
-        line = line_on(cable, s, rods)
+        line = line_on(cable, s, rods, like.bits & SOIL)
         footing = self._footing(like, s.size)
         return line._replace(bits=like.bits, plane=like.plane, moved=like.moved, footing=footing)
 
@@ -200,7 +201,7 @@ class PayoutPlan:
     def line_on(self, layout: Layout, like: Line, cable: Material) -> tuple[LineOnBase, Line]:
         """The line on the cells of a layout, and what makes it; like, cable: as of `line`."""
         on_base = LineOnBase(cable, layout.base)
-        return on_base, on_base.line(layout, like.bits, like.plane)
+        return on_base, on_base.line(layout, like.bits, like.plane, like.moved)
 
     def at_winch(self, count: int, reach: float) -> np.ndarray:
         """(N,) bool, cells that are rod where zones move: those that change, and as many before them as may be taken in

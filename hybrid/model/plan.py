@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, overload
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model, build
 from hybrid.model.contents import Entry, with_accuracy
 from hybrid.model.first_state import HUNG
@@ -39,6 +40,7 @@ class CriticalTorque(NamedTuple):
     diameter: float  # m; NaN: not given
     min_bend_radius: float  # m; NaN: not given
     of_tension: float = 0.0  # N m, the torque that the line already has by its tension (tension_torque), not turned
+    rough: bool = False  # whether of an elastic catenary, without bed, bending and obstacles; else of the equilibrium
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ class Plan:
     most_seconds: float | None = None  # of processor time, if finer runs turn out to be needed; None: not known
     measured: bool = False  # whether cells, steps and seconds follow from the first steps of the run on this machine
     chosen: str = ""  # kind of model, where the pre-run has chosen it
+    why: str = ""  # and why: what a step of each kind costs, on how many cells, and where zones would be rod
 
     @property
     def ledger(self) -> tuple[Entry, ...]:
@@ -199,7 +202,7 @@ def _plan(scene: Scene) -> Plan:
     runs, most_runs = predicted_runs(scene) if scene.time else (1, 1)
     return Plan(
         model.contents, **mesh, steps=steps, step=step, seconds=seconds, runs=runs, most_runs=most_runs,
-        critical_torque=_critical_torque(scene, model), payout=paid,
+        critical_torque=_of_hanging(scene, model), payout=paid,
     )  # fmt: skip
 
 
@@ -211,20 +214,30 @@ def mesh_of(model: Model) -> dict[str, Any]:
     return {"zones": model.zones, "cells": cells, "base_cells": base, "unknowns": model.unknowns}
 
 
-def _critical_torque(scene: Scene, model: Model) -> CriticalTorque | None:
+def _of_hanging(scene: Scene, model: Model) -> CriticalTorque | None:
     """Of the elastic catenary that a search of equilibrium starts from, or would without a clamp at one end."""
+    if not model.cable.passes_torque:
+        return None
+    hangs = model.start if model.start_shape == HUNG else hung(scene, model.line, model.sea.values, clamp_leads=False)
+    if hangs is None or not hangs.T.min() > 0.0:
+        return None
+    found = critical_torque(scene, model, hangs.T)
+    return None if found is None else found._replace(rough=True)
+
+
+def critical_torque(scene: Scene, model: Model, T: Floats) -> CriticalTorque | None:
+    """The smallest torque with which a line under the tensions T (N,) N could throw a loop; 0 where it is slack.
+
+    None: no torque passes through it, or nothing resists bending.
+    """
     cable, line = model.cable, model.line
     if not cable.passes_torque:
         return None
-    hangs = model.start if model.start_shape == HUNG else hung(scene, line, model.sea.values, clamp_leads=False)
-    if hangs is None or not hangs.T.min() > 0.0:
-        return None
-    T = hangs.T
     middle = 0.5 * (line.s[:-1] + line.s[1:])
     EI = cable.weakest_bending[cable.piece(middle)]
     if not EI.min() > 0.0:
         return None
-    torque = 2.0 * np.sqrt(EI * T)
+    torque = 2.0 * np.sqrt(EI * np.maximum(T, 0.0))
     k = int(np.argmin(torque))
     of_tension = 0.0
     if line.tension_twist.size:

@@ -25,6 +25,8 @@ GASES, LIQUIDS = (0.05, 10.0), (500.0, 2500.0)
 # Friction on a seabed: chain in gravel reaches 1.  Current, m/s: the fastest tidal streams reach 8 m/s in narrows, and
 # above 5 m/s nothing is moored.  Gravity, m/s^2, of Jupiter, and of a model in a centrifuge none is known here.
 ROUGHEST, FASTEST, HEAVIEST = 2.0, 5.0, 30.0
+# Pa, shear strength a metre below the bed of the softest mud that bears anything.
+SOFTEST_SOIL = 100.0
 # Significant wave height, m: the largest measured by a buoy is 19 m.  Depth of the sea, m: the deepest is 10.9 km.
 HIGHEST_SEA, DEEPEST = 25.0, 12_000.0
 # Drag and added mass coefficients: with vortex-induced vibrations a cable's drag doubles or triples, from 1.2.
@@ -121,16 +123,21 @@ def _bed(scene: Scene) -> Iterator[tuple[str, str]]:
     if bed.friction is not None and (roughest := max(bed.friction.axial, bed.friction.lateral)) > ROUGHEST:
         why = f"environment.seabed.friction: expected 0 to {ROUGHEST:g}, a coefficient: is it in percent?"
         yield f"friction of {roughest:g}", why
+    if bed.soil is not None:
+        if bed.soil.shear_strength + bed.soil.gradient < SOFTEST_SOIL:
+            why = f"environment.seabed.soil.shear_strength: expected {SOFTEST_SOIL:g} Pa or more: is it in kPa?"
+            yield f"soil of {bed.soil.shear_strength:g} Pa", why
+        return
     deepest = 0.0
     for section in scene.cable.sections:
-        sinks = weight(section, scene) / bed.stiffness
+        sinks = weight(section, scene) / bed.spring
         diameters, least = DEEPEST_TRENCH
         if sinks > max(diameters * (section.diameter or 0.0), least):
             deepest = max(deepest, sinks)
     if deepest:
         why = "expected 1e3 to 1e6 N/m per m of line: is it in kN/m per m (kPa)? then multiply it by 1000"
         what = f"a line that sinks {deepest:.3g} m into the seabed by its own weight"
-        yield what, f"environment.seabed.stiffness, {bed.stiffness:g} N/m per m: {why}"
+        yield what, f"environment.seabed.stiffness, {bed.spring:g} N/m per m: {why}"
 
 
 def _motions(scene: Scene) -> Iterator[tuple[str, str]]:

@@ -1,6 +1,7 @@
 """How much processor time a run takes: what its steps, cells and outputs cost, as bench/test_bench_plan.py measures it.
 
-Costs are those of one core of a server of 2024; on another machine all of them change by one factor.
+Costs are those of one core of a server of 2024; on another machine all of them change by one factor.  Those of cells
+and steps are in ratio to a bare rod's cell in space, as bench/test_bench_prices.py measures them.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hybrid.kernels.laws.water import calm_below
 from hybrid.kernels.state.forces import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING, SURFACE
 from hybrid.kernels.step.generalized_alpha import weights
 from hybrid.kernels.step.step_law import SAFETY
@@ -17,19 +19,20 @@ from hybrid.model.resolution import Resolution, requested_accuracy, wants_errors
 from hybrid.scene.schema import Scene
 
 # s per cell and Newton iteration, in space and in a plane.
-COST = {"rod": (0.4e-6, 0.18e-6), "catenary": (0.1e-6, 0.09e-6)}
+COST = {"rod": (0.4e-6, 0.16e-6), "catenary": (0.095e-6, 0.09e-6)}
 # What optional forces add to that; those that are not here add nothing measurable.
 MORE = {
-    DRAG: (0.045e-6, 0.010e-6), ADDED_MASS: (0.045e-6, 0.013e-6), STIFFNESS_DAMPING: (0.05e-6, 0.0),
-    ROTARY: (0.025e-6, 0.005e-6), SURFACE: (0.035e-6, 0.015e-6), SEABED: (0.03e-6, 0.018e-6),
-    FRICTION: (0.01e-6, 0.005e-6),
+    DRAG: (0.03e-6, 0.025e-6), ADDED_MASS: (0.03e-6, 0.025e-6), STIFFNESS_DAMPING: (0.05e-6, 0.0),
+    SURFACE: (0.035e-6, 0.015e-6), SEABED: (0.024e-6, 0.018e-6), FRICTION: (0.01e-6, 0.005e-6),
 }  # fmt: skip
-# s per node, step and wave: sines and exponentials.
+MORE_OF_RODS = {ROTARY: (0.025e-6, 0.005e-6)}
+# s per node, step and wave: sines and exponentials; of nodes that are not below all motion of the water.
 COST_WAVE = 10e-9
-# s of a run, a step, an output; of a step of zones that move, and of each of their cells: reviews and changes, criteria
-# (bench/test_bench_zones.py).
+# s of a run, a step, an output.
 COST_RUN, COST_STEP, COST_OUTPUT = 0.02, 12e-6, 0.1e-3
-COST_MANAGER, COST_CRITERIA = 15e-6, 0.1e-6
+# s of a step of zones that move, and of each of their cells: criteria, and the joints of a rod.
+COST_MANAGER, COST_CRITERIA = 5e-6, 0.03e-6
+COST_CORRECTOR = 0.23e-6  # s per cell and step, where the error of leaving bending out is followed
 USUAL_ITERATIONS = 2.1
 # Part of a line of moving zones that is rod, on average over scenes, which differ from none to all.
 ROD_SHARE = 0.38
@@ -42,7 +45,6 @@ MORE_STEPS, SHARPER = 1.5, 2.2
 # Times a run that a run with its coarser ones costs; with an accuracy, also the mesh pre-run and, perhaps, a finer run.
 COST_ERRORS, COST_ACCURACY = 2.1, 2.6
 COST_SURVEY = 0.1  # s, of the mesh pre-run and of judging errors, whatever the scene
-COST_CORRECTOR = 0.3  # of the line's own, where the error of leaving bending out is followed
 
 
 def foretold_steps(scene: Scene, model: Model, resolution: Resolution, least: int) -> int:
@@ -68,20 +70,28 @@ def foretold_steps(scene: Scene, model: Model, resolution: Resolution, least: in
 
 
 def step_time(
-    scene: Scene, model: Model, rods: float, catenaries: float, moves: bool = False, followed: bool = False
+    scene: Scene, model: Model, rods: float, catenaries: float, moves: bool = False, followed: float = 0.0
 ) -> float:
     """Processor time, s, of a step of a line of so many cells of either kind.
 
-    model: of the scene, with whatever cells; moves: zones move; followed: the error of leaving bending out is followed.
+    model: of the scene, with whatever cells; moves: zones move; followed: part of the steps at which the error of
+    leaving bending out is followed.
     """
-    flat, total = model.plane is not None, rods + catenaries
+    flat, total, bits = model.plane is not None, rods + catenaries, model.line.bits
     each = COST["rod"][flat] * rods + COST["catenary"][flat] * catenaries
-    each += total * sum(cost[flat] for bit, cost in MORE.items() if model.line.bits & bit)
-    each *= USUAL_ITERATIONS * (1.0 + COST_CORRECTOR * followed)
+    each += total * sum(cost[flat] for bit, cost in MORE.items() if bits & bit)
+    each += rods * sum(cost[flat] for bit, cost in MORE_OF_RODS.items() if bits & bit)
+    each *= USUAL_ITERATIONS
     waves = scene.environment.waves
     if waves is not None:
-        each += COST_WAVE * total * waves.waves_in_sum
+        each += COST_WAVE * waves.waves_in_sum * total * _stirred(model)
+    each += COST_CORRECTOR * total * followed
     return each + COST_STEP + (COST_MANAGER + COST_CRITERIA * total) * moves
+
+
+def _stirred(model: Model) -> float:
+    """Part of the nodes of the first shape that waves reach; below them no wave is summed up."""
+    return float(np.mean(model.start.r[:, 2] > calm_below.py_func(model.sea.values)))
 
 
 def processor_time(scene: Scene, model: Model, cells: Sequence[int], steps: int, outputs: float) -> float:

@@ -9,8 +9,10 @@ import numpy as np
 
 from hybrid.kernels.laws.bed import HEIGHTS
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles
+from hybrid.kernels.laws.soil import LATERAL, LEFT_A, LEFT_L, NUMBERS, OVER, PART, STRENGTH, SUCTION, WEDGE
+from hybrid.kernels.state.forces import BREAKOUT, FRICTION, REMEMBERS, SEABED, SOIL
 from hybrid.kernels.state.obstacle_rows import ANGLE, EACH, INERTIA, ROLLED
-from hybrid.kernels.state.state import Floats, Sea, State, no_sea, with_waves
+from hybrid.kernels.state.state import NO_SLOW, Floats, Sea, State, no_sea, with_waves
 from hybrid.model.driven_end import DrivenEnd
 from hybrid.model.ends import rise
 from hybrid.model.facets import facet_tables
@@ -21,7 +23,7 @@ from hybrid.model.spectra import waves_of
 from hybrid.scene.dispersion import wavenumber
 from hybrid.scene.schema import CurrentProfile, PowerLawCurrent, Scene, Seabed, UniformCurrent
 from hybrid.scene.spectra import SumOfWaves
-from hybrid.scene.waves import GivenWaves, RecordedWaves, RegularWaves, StreamFunctionWaves, Waves
+from hybrid.scene.waves import GivenWaves, MeasuredWaves, RecordedWaves, RegularWaves, StreamFunctionWaves, Waves
 
 # Contact sets in over half the penetration of a cable at rest: it then rests on the linear part.
 ONSET = 0.5
@@ -106,8 +108,8 @@ def surroundings(scene: Scene, cells: int) -> Surroundings:
         slope = bed.slope or (0.0, 0.0)
         normal = np.array([0.0 - slope[0], 0.0 - slope[1], 1.0]) / math.hypot(*slope, 1.0)
         sea = sea._replace(
-            normal=normal, offset=float(normal[2] * bed.z), stiffness=bed.stiffness, damping=bed.damping,
-            onset=ONSET * pressing(scene) / bed.stiffness,
+            normal=normal, offset=float(normal[2] * bed.z), stiffness=bed.spring, damping=bed.damping,
+            onset=ONSET * pressing(scene) / bed.spring, soil=soil_numbers(bed),
         )  # fmt: skip
         if rubs(bed):
             friction = np.array([bed.friction.axial, bed.friction.lateral]) if bed.friction else np.zeros(2)
@@ -139,14 +141,46 @@ def _moved(scene: Scene, cells: int, around: Surroundings) -> Surroundings:
 
 
 def rubs(bed: Seabed | None) -> bool:
-    """Whether a seabed has friction."""
-    return bed is not None and bed.friction is not None and (bed.friction.axial > 0.0 or bed.friction.lateral > 0.0)
+    """Whether a seabed has friction, or resists sideways."""
+    if bed is None or bed.friction is None:
+        return False
+    lateral = bed.soil is not None and bed.soil.lateral is not None
+    return bed.friction.axial > 0.0 or bed.friction.lateral > 0.0 or lateral
+
+
+def bed_bits(bed: Seabed | None) -> int:
+    """The forces that a seabed asks for (kernels.state.forces)."""
+    if bed is None:
+        return 0
+    breaks = rubs(bed) and bed.friction is not None and bed.friction.residual is not None
+    return SEABED | FRICTION * rubs(bed) | SOIL * (bed.soil is not None) | BREAKOUT * breaks
+
+
+def soil_numbers(bed: Seabed) -> Floats:
+    """`Sea.soil` of a bed; empty: of one that does not remember."""
+    soil, friction, lateral = bed.soil, bed.friction, bed.soil.lateral if bed.soil is not None else None
+    if not bed_bits(bed) & REMEMBERS:
+        return NO_SLOW
+    out = np.zeros(NUMBERS)
+    out[PART] = 1.0
+    if soil is not None:
+        given = soil.shear_strength, soil.gradient, soil.bearing, soil.power, soil.stiffness, soil.suction
+        out[STRENGTH : SUCTION + 1] = given
+    if lateral is not None:
+        out[LATERAL : WEDGE + 1] = 1.0, lateral.unit_weight, lateral.wedge
+    if friction is not None and friction.residual is not None:
+        pairs = zip(friction.residual, (friction.axial, friction.lateral), strict=True)
+        out[LEFT_A : LEFT_L + 1] = [left / most if most > 0.0 else 1.0 for left, most in pairs]
+        out[OVER] = friction.breakout
+    return out
 
 
 def slip_length(scene: Scene, bed: Seabed) -> float:
     """Elastic travel (m) before a touching cable slides."""
+    if bed.friction is not None and bed.friction.travel is not None:
+        return bed.friction.travel
     widths = [x.diameter for x in scene.cable.sections if x.diameter]
-    return SLIP_LENGTH * min(widths) if widths else 0.1 * pressing(scene) / bed.stiffness
+    return SLIP_LENGTH * min(widths) if widths else 0.1 * pressing(scene) / bed.spring
 
 
 def current_table(scene: Scene) -> tuple[Floats, Floats]:
@@ -190,7 +224,7 @@ def components(waves: Waves, depth: float, gravity: float) -> Floats:
     elif isinstance(waves, SumOfWaves):
         seas = [waves_of(x, gravity, i, len(waves.spectra)) for i, x in enumerate(waves.spectra)]
         amplitude, omega, phase, towards = (np.concatenate(x) for x in zip(*seas, strict=True))
-    elif isinstance(waves, GivenWaves | RecordedWaves):
+    elif isinstance(waves, GivenWaves | RecordedWaves | MeasuredWaves):
         amplitude, omega, phase, heading = waves.recorded.waves.T
         towards = np.array([math.radians(x) for x in heading.tolist()])
         place = getattr(waves, "position", place)

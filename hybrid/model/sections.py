@@ -35,7 +35,7 @@ POISSON = 0.3
 def merged_sections(sections: Sequence[Section]) -> list[Section]:
     """Neighbouring sections that differ in nothing but length, and in what only reports ask for, are one section."""
     merged: list[Section] = []
-    for section in (x.model_copy(update=dict.fromkeys((*SECTION_LIMITS, "capacity"))) for x in sections):
+    for section in (x.model_copy(update=dict.fromkeys((*SECTION_LIMITS, "capacity", "code"))) for x in sections):
         if merged and merged[-1].model_copy(update={"length": section.length}) == section:
             merged[-1] = section.model_copy(update={"length": merged[-1].length + section.length})
         else:

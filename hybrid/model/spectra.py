@@ -15,6 +15,7 @@ import math
 import numpy as np
 
 from hybrid.kernels.state.state import Floats
+from hybrid.scene.measured_spectrum import FINE, shares
 from hybrid.scene.spectra import (
     JonswapWaves,
     OchiHubbleWaves,
@@ -26,8 +27,6 @@ from hybrid.scene.spectra import (
 
 # Frequencies of an irregular sea, in peak frequencies: outside lies less than 0.2 % of its energy.
 LOWEST, HIGHEST = 0.3, 6.0
-# Frequencies at which a spectrum is integrated.
-FINE = 20_001
 
 
 def jonswap(omega: Floats, peak: float, gamma: float) -> Floats:
@@ -94,25 +93,6 @@ def _torsethaugen_part(omega: Floats, height: float, peak: float, n: float, m: f
 
     fine = peak * np.geomspace(0.1, 100.0, FINE)
     return np.asarray(height**2 / 16.0 * shape(omega) / np.trapezoid(shape(fine), fine))
-
-
-def shares(omega: Floats, S: Floats, n: int, shift: float = 0.0) -> tuple[Floats, Floats]:
-    """Frequencies (n,) 1/s of n parts of a spectrum over fine frequencies, and the part of the energy in each.
-
-    Each has the root mean square of the frequencies of its part: the variance of the sea and that of its rate are then
-    those of the spectrum.  Parts are of equal energy; shift: by which part of one all but the outer edges lie lower.
-    """
-    energy, rate = (
-        np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(omega))]) for y in (S, omega**2 * S)
-    )
-    edges = np.arange(n + 1) / n
-    if shift and n > 1:
-        edges[1:-1] -= shift / n
-    parts = np.interp(edges * energy[-1], energy, rate)
-    share = np.diff(edges) if shift else np.full(n, 1.0 / n)
-    return np.asarray(
-        np.sqrt(np.diff(parts) / (share * energy[-1]) if shift else np.diff(parts) * n / energy[-1])
-    ), share
 
 
 def directions(spreading: Spreading, n: int, draw: np.random.Generator) -> Floats:

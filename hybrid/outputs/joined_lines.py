@@ -117,9 +117,8 @@ class JoinedObservation(Observation):
             name: _joined([getattr(x, name) for x in lines], name not in NODES_OF_LINE) for name in ALONG_LINE
         }
         along["h"][grid.begin[1:-1] - 1] = 0.0
-        of: dict[str, Any] = {
-            name: _joined([getattr(x, name)[0] for x in batches], False)[None] for name in NODES_OF_BATCH
-        }
+        nodes = (*NODES_OF_BATCH, "soil") if batches[0].soil.size else NODES_OF_BATCH
+        of: dict[str, Any] = {name: _joined([getattr(x, name)[0] for x in batches], False)[None] for name in nodes}
         of |= {name: _joined([getattr(x, name)[0] for x in batches], True)[None] for name in CELLS_OF_BATCH}
         rest = [name for name in Batch._fields if name not in (*of, *OF_LINE, "turn", "touch")]
         heads: dict[str, Any] = {name: np.concatenate([getattr(x, name) for x in batches]) for name in rest}

@@ -20,8 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.laws.bending_law import RIGID
+from hybrid.kernels.laws.soil import PRESSES
 from hybrid.kernels.march.link import link_of
 from hybrid.kernels.march.zone_torque import TORQUE, TURN, torsion_energy
+from hybrid.kernels.state.forces import SOIL
 from hybrid.kernels.state.report import (
     CONTACT_FORCE,
     FORCE_A,
@@ -449,6 +451,8 @@ class Observation:
     @property
     def contact(self) -> Floats:
         """(ns, nb) N/m."""
+        if self.line.bits & SOIL:
+            return np.asarray(self.grid.chords @ np.ascontiguousarray(self.batch.soil[:, :, PRESSES].T))
         q = contact_pressure(self.sea, self.depth, sinking(self.sea, self._plain.r, self._plain.v))
         return np.asarray(self.grid.chords @ carried(self.cell_lengths, q))
 

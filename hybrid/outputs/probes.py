@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybrid.kernels.laws.axial_law import CREEP
 from hybrid.kernels.march.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twist
 from hybrid.kernels.state.forces import MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea, remembers
@@ -17,8 +18,10 @@ from hybrid.model.mesh import Zone
 from hybrid.model.output_points import NEAR
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
 from hybrid.outputs.observation import Observation
+from hybrid.outputs.obstacle_forces import obstacle_force_fields, obstacle_force_values
 from hybrid.outputs.obstacles import obstacle_fields, obstacle_values
 from hybrid.outputs.output_grid import NO_HINGES, Grid
+from hybrid.outputs.shifted_bends import by_load
 from hybrid.outputs.varying_grid import VaryingGrid
 from hybrid.outputs.vectors import size
 from hybrid.solve.bending_corrector import Shift
@@ -47,7 +50,7 @@ class Probe:
 
 _S, _SX, _X, _E, _EX = ("s",), ("s", "xyz"), ("xyz",), ("edge",), ("edge", "xyz")
 # Of a line that touches nothing; where a section without torsional stiffness becomes catenary.
-MAY_BE_NAN = ("touchdown", "touchdown_position", "turns/twist", "turns/link", "von_mises", "capacity_used")
+MAY_BE_NAN = ("touchdown", "touchdown_position", "turns/twist", "turns/link", "von_mises", "capacity_used", "code_used")
 PROBES: dict[str, Probe] = {
     "position": Probe("m", "position of the centreline", _SX, lambda v: v.grid.nodes @ v.r, frame="inertial"),
     "velocity": Probe("m/s", "velocity of the centreline", _SX, lambda v: v.grid.nodes @ v.v, frame="inertial"),
@@ -120,27 +123,28 @@ WORK = {
     "stiffness_damping": "work of stiffness-proportional damping",
     "added_mass": "work of the added mass",
     "waves": "work of the pressure of waves, and of buoyancy at the surface",
-    "contact": "work of the damping of the seabed and of obstacles",
+    "contact": "work of the damping of the seabed and of obstacles, and all of soil that remembers",
     "friction": "work of friction on the seabed, on obstacles, of the line on itself; work of lines that touch it",
     "zones": "energy that zones, and cells at a winch, put in or take out when they change, and of torque where a "
     "catenary bends without it",
     "obstacles": "work done on the cable by obstacles as they move; of what rubs on a surface that turns, too",
-    "hysteresis": "work of what layers lose that slip as the line bends (bending_slip), and ropes whose stretch "
-    "depends on their highest tension (syrope)",
+    "hysteresis": "work of what layers lose that slip as the line bends (bending_slip), of ropes whose stretch "
+    "depends on their highest tension (syrope) or grows with time (creep), of stiffness that tension changes",
     "scheme": "energy change that no work accounts for: the time scheme's own (negative: dissipated)",
 }
 
 
 def works_of(line: Line) -> list[str]:
     """Names in WORK of what a line can have."""
-    absent = {"obstacles": not line.moved.size, "hysteresis": not (remembers(line) or line.slip_law.size)}
+    loses = remembers(line) or line.slip_law.size or line.law[:, CREEP].any()
+    absent = {"obstacles": not line.moved.size, "hysteresis": not loses}
     return [name for name in WORK if not absent.get(name)]
 
 
 # Quantities that may have two values at a point: what a point load, a joint or a change of section makes of them.
 SIDED = (
     "tension", "theta", "phi", "curvature", "twist", "bending_moment", "torque", "shear", "wall_tension", "von_mises",
-    "capacity_used",
+    "capacity_used", "code_used",
 )  # fmt: skip
 # What leaving bending out makes of each quantity, by name: unit, description, dimensions.
 MODEL_ERRORS = {
@@ -158,15 +162,17 @@ SIDED_ERRORS = tuple(name for name in MODEL_ERRORS if name in SIDED)
 def model_errors(plain: Observation, corrected: Observation) -> dict[str, Floats]:
     """MODEL_ERRORS on the output grid: how far what is corrected for bending is from what is not.
 
-    The curvature of a catenary, w/T, changes with its tension too, of which the moment that is left out knows nothing.
+    The curvature of a catenary, w/T, changes with its tension too, and with what its place makes of the load (by_load);
+    of both the moment that is left out knows nothing.
     """
     change, bends = np.abs(corrected.tension - plain.tension), plain.curvature_twist[:, 0]
     taut = (plain.tension > change) & plain.grid.in_catenary[:, None]
     by_tension = bends * np.divide(change, plain.tension, out=np.zeros(change.shape), where=taut)
+    by_moment = np.abs(corrected.curvature_twist[:, 0] - bends) + by_tension
     out = {
         "position": size(plain.grid.nodes @ (corrected.r - plain.r)),
         "tension": change,
-        "curvature": np.abs(corrected.curvature_twist[:, 0] - bends) + by_tension,
+        "curvature": np.maximum(by_moment, by_load(plain, corrected)),
         "bending_moment": np.abs(corrected.bending_moment - plain.bending_moment),
     }
     for k, name in enumerate(("end_force_start", "end_force_end")):
@@ -240,7 +246,8 @@ class Observer:
             for name, p in PROBES.items()
             if (not p.needs or has.intersection(p.needs.split())) and (only is None or name in only)
         }
-        self._obstacles = tuple(obstacles) if line.moved.size else ()
+        self._touched = tuple(obstacles)
+        self._obstacles = self._touched if line.moved.size else ()
         self.quantities = quantities
         may_be_nan: tuple[str, ...] = MAY_BE_NAN
         if self.quantities is not None:
@@ -287,7 +294,7 @@ class Observer:
         self.gauges = np.array(gauges, float).reshape(-1, 2)
         if len(self.gauges):
             fields.append(elevation_field(self.gauges))
-        fields += obstacle_fields(self._obstacles)
+        fields += obstacle_fields(self._obstacles) + obstacle_force_fields(self._touched)
         if finest is not None:
             text = "which of the nodes mesh/s there are: bit k % 64 of word k // 64"
             fields.append(Field(THERE, "", text, (-(-finest.size // 64),), ("word",), dtype="int64"))
@@ -326,7 +333,8 @@ class Observer:
         """The same of these probes alone."""
         other = copy(self)
         other._probes = {name: self._probes[name] for name in self._probes if name in names}
-        other._right, other._errors, other._obstacles, other._finest = [], False, (), None
+        other._right, other._errors, other._finest = [], False, None
+        other._obstacles = other._touched = ()
         other.gauges = np.zeros((0, 2))
         return other
 
@@ -409,7 +417,7 @@ class Observer:
             out |= {name: ratios[:, k] for k, name in enumerate(self._criteria)}
         if len(self.gauges):
             out["elevation"] = elevation(self.sea, self.gauges, batch.sea_now)
-        out |= obstacle_values(self._obstacles, batch.obstacles)
+        out |= obstacle_values(self._obstacles, batch.obstacles) | obstacle_force_values(self._touched, plain)
         if self._finest is not None:
             lines = [x.line for x in plain.outputs] if isinstance(plain, JoinedObservation) else [self.line]
             rows = [there(self._finest, line.s) for line in lines]

@@ -14,6 +14,7 @@ from hybrid.kernels.watch.named_quantities import LEAST_AZIMUTH
 from hybrid.model.payout import whole_scene
 from hybrid.model.sections import outer_diameter
 from hybrid.outputs.capacity import Capacities
+from hybrid.outputs.code_checks import Codes
 from hybrid.outputs.distance import nearest
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.pipe import Pipes
@@ -30,7 +31,7 @@ WHERE = "_at"
 
 def quantities_of(scene: Scene) -> Quantities | None:
     """What a scene asks for beside the usual outputs; None: nothing."""
-    along = any(x.pipe is not None or x.capacity is not None for x in scene.cable.sections)
+    along = any(x.pipe is not None or x.capacity is not None or x.code is not None for x in scene.cable.sections)
     return Quantities(scene, scene.output.quantities) if along or scene.output.quantities else None
 
 
@@ -41,6 +42,7 @@ class Quantities:
         self.wanted = dict(wanted)
         self.pipes = Pipes(scene) if any(x.pipe is not None for x in scene.cable.sections) else None
         self.capacities = Capacities(scene) if any(x.capacity for x in scene.cable.sections) else None
+        self.codes = Codes(scene) if any(x.code for x in scene.cable.sections) else None
         self._scene, self._begin = whole_scene(scene)
         self._seabed = scene.environment.seabed is not None
         # nodes (nb, m+1, 3) m and radii of cells (m,) m of other lines in the outputs that are looked at, by name
@@ -54,7 +56,7 @@ class Quantities:
 
     def probes(self) -> dict[str, Probe]:
         """Probes by name."""
-        along = (x for x in (self.pipes, self.capacities) if x is not None)
+        along = (x for x in (self.pipes, self.capacities, self.codes) if x is not None)
         found = {name: probe for x in along for name, probe in x.probes().items()}
         excursions = azimuths = 0
         for name, q in self.wanted.items():

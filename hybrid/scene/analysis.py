@@ -125,9 +125,9 @@ class Equilibrium(Table):
     friction: Annotated[Literal["neglected", "settled"], Renamed({"left_out": "neglected"})] = Field(
         default="neglected",
         description="on a seabed and on obstacles with friction: neglected (the equilibrium without it, where there is "
-        "one, which is one with it as well), or settled (guess auto or catenary: laid there without tension, then "
-        "pulled tight against friction; a given shape, or where that fails: the line comes to rest from its first "
-        "shape)",
+        "one, which is one with it as well), or settled (guess auto or catenary: laid there in still water without "
+        "tension, then pulled tight against friction; a given shape, or where that fails: the line comes to rest from "
+        "its first shape)",
     )
 
     @model_validator(mode="after")

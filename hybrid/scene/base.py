@@ -15,6 +15,7 @@ import math
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn, get_args
@@ -359,7 +360,11 @@ class Kinds:
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         tables = handler(schema)
-        descriptions = [handler.resolve_ref_schema(arm) for arm in tables.get("oneOf") or tables.get("anyOf") or []]
+        descriptions = []
+        for arm in tables.get("oneOf") or tables.get("anyOf") or []:
+            # of a table that is described behind what has it: its kind and another key are required anyway
+            with suppress(LookupError):
+                descriptions.append(handler.resolve_ref_schema(arm))
         for table in descriptions:  # a kind that no other key tells has to be given
             if table["properties"]["kind"]["const"] not in {kind for _, kind in self.implied}:
                 table["required"] = ["kind", *(x for x in table.get("required", ()) if x != "kind")]

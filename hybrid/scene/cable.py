@@ -22,11 +22,14 @@ from hybrid.scene.base import (
     refuse,
 )
 from hybrid.scene.capacity import capacity_findings
+from hybrid.scene.code_check import Code, RiserCode
 from hybrid.scene.sea import Current, CurrentPoint, CurrentProfile, PowerLawCurrent, Seabed, UniformCurrent
 from hybrid.scene.stretch import (
+    Creep,
     Curve,
     CurveFile,
     DynamicStiffness,
+    Layer,
     SlipLayer,
     TensionStrain,
     bending_findings,
@@ -275,6 +278,11 @@ class Section(Table):
         description="instead of axial_stiffness: of polyester, whose tension over strain depends on its highest mean "
         "tension so far",
     )
+    creep: Creep | None = Field(
+        default=None,
+        description="of a rope with axial_stiffness or tension_strain: strain that grows with the logarithm of time; "
+        "absent: none",
+    )
     max_strain: Positive | None = Field(
         default=None,
         description="strain that the section bears, stretched or compressed; a computation that exceeds it stops; "
@@ -303,6 +311,11 @@ class Section(Table):
         default=(),
         description="layers that slip on each other, beside the bending_stiffness or moment_curvature that is left "
         "when all of them do: hysteresis of moment over curvature, the same about any axis; absent: none",
+    )
+    stiffness_per_tension: NonNegative = Field(
+        default=0.0,
+        description="by how much the bending stiffness grows with tension, that at the start of a step, about both "
+        "axes: N m^2 per N; absent: not [m^2]",
     )
     torsional_stiffness: NonNegative | None = Field(
         default=None,
@@ -341,6 +354,11 @@ class Section(Table):
         description="what it bears of tension and bending together: corners [tension, curvature] of a polygon around "
         "no load, from [largest tension, 0] round to [0, largest curvature], or on to [-largest compression, 0]; "
         "changes nothing that is computed: the result has capacity_used; absent: none [N, 1/m]",
+    )
+    code: Code | None = Field(
+        default=None,
+        description="a code that it is checked by; changes nothing that is computed: the result has code_used; absent: "
+        "none",
     )
     rotary_inertia: OneOrTwo | None = Field(
         default=None,
@@ -381,7 +399,7 @@ class Section(Table):
         """Rows of strain and tension [N], of a section that is stretched by no constant stiffness; else None."""
         if (table := self.stretch_table) is not None:
             return table
-        if self.dynamic_stiffness is None or self.axial_stiffness is None:
+        if (self.dynamic_stiffness is None and self.creep is None) or self.axial_stiffness is None:
             return None
         return (0.0, 0.0), (1.0, self.axial_stiffness)
 
@@ -440,10 +458,11 @@ class Section(Table):
         return None if self.first_loading else self.moment_curvature
 
     @property
-    def slip_layers(self) -> tuple[tuple[float, float, float], ...]:
-        """Of each layer that slips: stiffness [N m^2], slip moment [N m], and what it gains by tension [m]."""
-        given = tuple((x.stiffness, x.moment, x.per_tension) for x in self.bending_slip)
-        return given + (layers_of(self.moment_curvature) if self.first_loading and self.moment_curvature else ())
+    def slip_layers(self) -> tuple[Layer, ...]:
+        """Layers that slip, and last one that does not, whose stiffness is what tension adds."""
+        given = tuple((x.stiffness, x.moment, x.per_tension, 0.0) for x in self.bending_slip)
+        given += layers_of(self.moment_curvature) if self.first_loading and self.moment_curvature else ()
+        return given + (((0.0, math.inf, 0.0, self.stiffness_per_tension),) if self.stiffness_per_tension else ())
 
     @property
     def weakest_bending(self) -> float | None:
@@ -502,6 +521,11 @@ class Section(Table):
             refuse([Finding(("axial_stiffness",), "nothing, because tension_strain says how it stretches", fix)])
         if table is not None:
             refuse_rows(table, "tension_strain")
+        if self.creep is not None and self.syrope is not None:
+            refuse([Finding(("creep",), "nothing, because the curves of syrope have it", "leave creep out")])
+        if self.creep is not None and self.curve is None:
+            expected = "an axial_stiffness or tension_strain beside it: what does not stretch does not creep"
+            refuse([Finding(("creep",), expected, "add `axial_stiffness: ...` (N)")])
         if self.syrope is not None:
             self._remembers(self.syrope)
             return self
@@ -553,8 +577,9 @@ class Section(Table):
         if (self.first_loading or self.bending_slip) and self.torsional_stiffness == 0.0:
             expected = "a number > 0, in N m^2: layers that have slipped lie in a direction about the axis"
             found.append(Finding(("torsional_stiffness",), expected, "leave it out for bending stiffness / 1.3"))
-        if self.bending_slip and not self.weakest_bending:
-            expected = "a number > 0, in N m^2: what is left when all layers of bending_slip slip"
+        if (self.bending_slip or self.stiffness_per_tension) and not self.weakest_bending:
+            left = "when all layers of bending_slip slip" if self.bending_slip else "without tension"
+            expected = f"a number > 0, in N m^2: what is left {left}"
             found.append(Finding(("bending_stiffness",), expected, "add `bending_stiffness: ...` (N m^2)"))
         refuse(found)
         return self
@@ -570,6 +595,16 @@ class Section(Table):
     def _capacity_goes_round(self) -> Section:
         found = capacity_findings(self.capacity) if self.capacity is not None else []
         refuse(Finding(("capacity", *x.at), x.expected, x.fix, x.given) for x in found)
+        return self
+
+    @model_validator(mode="after")
+    def _code_has_what_it_checks(self) -> Section:
+        if isinstance(self.code, RiserCode):
+            if self.pipe is None:
+                refuse([Finding(("pipe",), "the wall that DNV-OS-F201 checks", "add `pipe: {wall: ...}` (m)")])
+            if self.code.tensile_strength < self.code.yield_strength:
+                expected = f"at least yield_strength, {self.code.yield_strength:g} Pa"
+                refuse([Finding(("code", "tensile_strength"), expected, "are the two exchanged?")])
         return self
 
     @model_validator(mode="after")

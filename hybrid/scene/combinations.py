@@ -145,8 +145,18 @@ def _in_sections(*key: str, of: Callable[[Section], Any]) -> Callable[[Tables], 
 def _stretch_laws(tables: Tables) -> Iterator[Place]:
     for at, section in _sections(tables):
         if section.curve is not None:
-            given = [key for key in ("syrope", "dynamic_stiffness") if getattr(section, key) is not None]
+            given = [key for key in ("syrope", "dynamic_stiffness", "creep") if getattr(section, key) is not None]
             yield (*at, *(given or ["tension_strain"])[:1])
+
+
+def _bed(of: Callable[[Any], Any], *key: str) -> Callable[[Tables], Iterator[Place]]:
+    """A key of the seabed, where `of` is true of that."""
+
+    def find(tables: Tables) -> Iterator[Place]:
+        bed = getattr(tables.get("environment"), "seabed", None)
+        return iter([("environment", "seabed", *key)] if bed is not None and of(bed) else [])
+
+    return find
 
 
 def _curls(section: Section) -> bool:
@@ -250,9 +260,10 @@ def _tables_beside_two_stiffnesses(tables: Tables) -> Iterator[Place]:
 
 
 def _slips(tables: Tables) -> Iterator[Place]:
-    return (
-        (*at, "bending_slip" if x.bending_slip else "first_loading") for at, x in _sections(tables) if x.slip_layers
-    )
+    for at, x in _sections(tables):
+        if x.slip_layers:
+            given = (key for key in ("bending_slip", "first_loading", "stiffness_per_tension") if getattr(x, key))
+            yield *at, next(given)
 
 
 def _springs_beside_slip(tables: Tables) -> Iterator[Place]:
@@ -292,10 +303,6 @@ def _swivels_beside(of: Callable[[Section], Any]) -> Callable[[Tables], Iterator
 
 def _moving(tables: Tables) -> Iterator[Place]:
     return iter([("model",)] if isinstance(tables.get("model"), AdaptiveModel) else [])
-
-
-def _zones_of_several(tables: Tables) -> Iterator[Place]:
-    return _moving(tables) if SYSTEM in tables else iter(())
 
 
 def _of_moving(key: str) -> Callable[[Tables], Iterator[Place]]:
@@ -418,7 +425,12 @@ VORTICES = Feature("vortex-induced vibration", "vortices", _in_sections("vortice
 RESTRICTOR = Feature("bend restrictors", "attachments: kind: bend_restrictor", _attached("bend_restrictor"))
 TABLE_BESIDE = Feature("a section with a table of moment over curvature beside one of two bending stiffnesses",
                        "moment_curvature", _tables_beside_two_stiffnesses)  # fmt: skip
-SLIP = Feature("layers that slip as a line bends", "bending_slip, first_loading", _slips)
+SLIP = Feature("layers that slip as a line bends, a bending stiffness that grows with tension",
+               "bending_slip, first_loading, stiffness_per_tension", _slips)  # fmt: skip
+SOIL = Feature("soil that remembers", "seabed.soil", _bed(lambda x: x.soil, "soil"))
+NO_WIDTH = Feature("a section without diameter", "diameter",
+                   _in_sections("diameter", of=lambda x: x.diameter is None))  # fmt: skip
+CREEP = Feature("a rope that creeps", "creep", _in_sections("creep", of=lambda x: x.creep))
 SPRING_BESIDE_SLIP = Feature("an angular spring at a clamp of such a section", "bend_stiffness", _springs_beside_slip)
 DAMPED_OTHERWISE = Feature(
     "damping proportional to stiffness of laws and tables, with torque of tension, of a line clamped to what turns",
@@ -439,7 +451,6 @@ PAYOUT = Feature("line that is paid out", "ends.end.payout", _paid_out)
 PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout", _paid_out_at("start"))
 PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out_at("end"))
 TENSION_HELD = Feature("a winch that holds a tension, of a line to what is free", "payout.winch", _tension_held)
-ZONES_OF_SEVERAL = Feature("zones of several lines that move", "lines.NAME.model", _zones_of_several)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
 SHAPES = Feature("bodies that lines touch", "bodies.NAME.shape", _shapes)
 SHEAVES = Feature("sheaves that turn freely", "obstacles.NAME.bearing", _free_sheaves)
@@ -449,8 +460,6 @@ GOES_ITS_WAY = Feature(
     "contact, bodies.NAME.shape, obstacles.NAME.motion",
     _either(LINES_TOUCH, SHAPES, Feature("obstacles that move", "motion", _moving_obstacles)),
 )
-MEETS_LINES = Feature("contact of lines with each other, with bodies", "contact, bodies.NAME.shape",
-                      _either(LINES_TOUCH, SHAPES))  # fmt: skip
 MOVED_BY_LINES = Feature("contact of lines with each other, with bodies, with sheaves",
                          "contact, bodies.NAME.shape, obstacles.NAME.bearing",
                          _either(LINES_TOUCH, SHAPES, SHEAVES))  # fmt: skip
@@ -490,16 +499,26 @@ REFUSALS: tuple[Refusal, ...] = (
     ),
     Refusal(
         SLIP, MOVING_ZONES, "not worked out",
-        "zones move (model), and a catenary forgets how far its layers have slipped",
+        "zones move (model), and a catenary forgets how far layers have slipped, and what tension adds to stiffness",
         fix="leave it out, or write `model: rod`",
     ),
-    Refusal(SLIP, PAYOUT, "not worked out", "layers that slip do not travel with {key}"),
     Refusal(
-        SLIP, ABOUT_REST, "not worked out", "the stiffness of layers that slip depends on how far the line moves",
+        NO_WIDTH, SOIL, "physics", "the cable lies in soil with its width ({key})", "a number > 0, in m",
+        "add `diameter: ...` (m)",
+    ),
+    Refusal(
+        SOIL, ABOUT_REST, "not worked out", "the stiffness of soil depends on how far the line moves, and which way",
+        fix="give stiffness, that of unloading at this depth; hybrid run computes it in time",
+    ),
+    Refusal(CREEP, PAYOUT, "not worked out", "what line has crept by does not travel with {key}"),
+    Refusal(SLIP, PAYOUT, "not worked out", "layers that slip, and stiffness by tension, do not go with {key}"),
+    Refusal(
+        SLIP, ABOUT_REST, "not worked out", "the stiffness depends on how far the line moves, or on its tension",
         fix="leave it out, and give the bending_stiffness at that amplitude; hybrid run computes it in time",
     ),
     Refusal(
-        SPRING_BESIDE_SLIP, SLIP, "not worked out", "the section there has layers that slip ({key})",
+        SPRING_BESIDE_SLIP, SLIP, "not worked out",
+        "the section there has layers that slip, or is stiffer under tension ({key})",
         fix="leave it out, or put a short section without layers at the clamp",
     ),
     Refusal(
@@ -536,15 +555,6 @@ REFUSALS: tuple[Refusal, ...] = (
         fix="leave it out and give mesh.cells or mesh.nodes, or write curvature_error for cells that follow",
     ),
     # --- obstacles, and other lines ---
-    Refusal(
-        PAYOUT, MEETS_LINES, "not worked out",
-        "what touches ({key}) moves, and nodes that enter and leave do not know it",
-    ),
-    Refusal(
-        MOVING_ZONES, GOES_ITS_WAY, "not worked out",
-        "what touches ({key}) moves, and no criterion looks at what that does to a catenary",
-        "rod, catenary or zones", "write `model: rod`",
-    ),
     Refusal(
         ESTIMATED, LINES_TOUCH, "not worked out",
         "lines that meet ({key}) do so at other instants with other steps, and figures go down to a fifth of the truth",
@@ -583,9 +593,6 @@ REFUSALS: tuple[Refusal, ...] = (
     Refusal(
         TENSION_HELD, SEVERAL_LINES, "several lines", "an end of the line moves by what pulls there",
         fix="give a rate or a length, or hold what is at both ends",
-    ),
-    Refusal(
-        ZONES_OF_SEVERAL, PAYOUT, "several lines", f"{PAID}", "rod, catenary or zones", "write `model: rod`",
     ),
     Refusal(
         DAMPED_OTHERWISE, PAYOUT, "not worked out",

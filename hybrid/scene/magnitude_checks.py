@@ -14,7 +14,7 @@ from hybrid.scene.base import Finding
 from hybrid.scene.cable import Environment
 from hybrid.scene.ends import End, Ends, Triple
 from hybrid.scene.motion_tables import Motion
-from hybrid.scene.sea_checks import SUNK
+from hybrid.scene.sea_checks import deepest_place
 
 if TYPE_CHECKING:
     from hybrid.scene.motion_file import Record
@@ -68,7 +68,7 @@ def moved_into_the_ground(
     depth, surface = length, environment.fluid.surface if environment.fluid is not None else None
     if surface is not None:
         depth = max(surface - bed.height(0.0, 0.0), 0.0)
-    sunk = SUNK * depth
+    sunk = deepest_place(bed, depth)
     if place[2] - bed.height(*place[:2]) < -sunk or not _may_reach(place, motion, record, time, bed.is_level, bed.z):
         return  # complained of already, or far above it
     from hybrid.scene.motion import EndMotion

@@ -78,9 +78,9 @@ class Vessel(Table):
     rao: Text | None = Field(
         default=None,
         min_length=1,
-        description="CSV file, relative to the scene file: a row for every frequency [rad/s] and heading [deg], the "
-        "direction of the waves against that of the vessel (0: from astern, 180: from ahead); columns surge, sway, "
-        "heave (m/m), roll, pitch, yaw (deg/m), and surge_phase .. (deg behind the crest at the origin); or a dataset "
+        description="CSV file, relative to the scene file: columns frequency [rad/s] and heading [deg], the "
+        "direction of the waves against that of the vessel (0: from astern, 180: from ahead), surge, sway, heave "
+        "(m/m), roll, pitch, yaw (deg/m), and surge_phase .. (deg behind the crest at the origin); or a dataset "
         "of Capytaine in netCDF (.nc) with its RAO, or with what it follows from; absent: "
         "the motion of the vessel is in `file` beside this table",
     )

@@ -33,7 +33,8 @@ from hybrid.scene.points import Name
 _FRICTION = "coefficient of friction (Coulomb) of the line on it, in every direction [-]"
 _STIFFNESS = (
     "force per metre of line and metre of penetration; absent: so large that the line goes in by a twentieth of its "
-    "diameter at most under the tension and weight that the scene asks for [N/m per m]"
+    "diameter at most under the tension and weight that the scene asks for, and by an eighth where it hits it at the "
+    "velocity at which it starts (`initial`); what moves faster or is hit by what falls needs more [N/m per m]"
 )
 _DAMPING = "force per metre of line and speed of penetration, in contact [N s/m per m]"
 _MOTION = "how it moves, and turns about the place `at`, where it is at t = 0; absent: not at all"

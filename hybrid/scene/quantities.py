@@ -57,6 +57,7 @@ TAKEN = (
     "right", "mesh", "envelope", "limits", "zones", "events", "points", "bodies", "lines", "times", "checkpoint",
     "scene", "template", "word", "plane", "bounds", "ends", "self_distance", "extremes",
     "stress_per_tension", "stress_per_curvature", "capacity_used", "capacity", "corner", "capacity_row",
+    "code_used", "code", "code_row", "code_number",
 )  # fmt: skip
 HALF_TURN = 180.0  # deg
 # The field with the arc length at which a clearance is least: its name after that of the clearance.

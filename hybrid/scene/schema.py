@@ -67,7 +67,7 @@ from hybrid.scene.spectra import (
     SumOfWaves,
     TorsethaugenWaves,
 )
-from hybrid.scene.waves import GivenWaves, RecordedWaves, RegularWaves, StreamFunctionWaves, Waves
+from hybrid.scene.waves import GivenWaves, MeasuredWaves, RecordedWaves, RegularWaves, StreamFunctionWaves, Waves
 
 __all__ = [
     "Accuracy",
@@ -104,6 +104,7 @@ __all__ = [
     "Initial",
     "JonswapWaves",
     "Load",
+    "MeasuredWaves",
     "Mesh",
     "MeshObstacle",
     "Model",

@@ -38,6 +38,7 @@ from hybrid.scene.base import (
     unwrap,
 )
 from hybrid.scene.depths import Depths
+from hybrid.scene.soil import Soil
 
 # --- currents ----------------------------------------------------------------------------------
 
@@ -198,10 +199,35 @@ class Friction(Table):
 
     axial: NonNegative = Field(description="friction coefficient along the cable (tangential) [-]")
     lateral: NonNegative = Field(description="friction coefficient across the cable (normal, transverse) [-]")
+    residual: tuple[NonNegative, NonNegative] | None = Field(
+        default=None,
+        description="[axial, lateral], what is left of them behind a break-out; absent: they stay [-]",
+    )
+    breakout: Positive | None = Field(
+        default=None, description="way of sliding in which what is lost falls to 1/e, with residual [m]"
+    )
+    travel: Positive | None = Field(
+        default=None,
+        description="elastic travel before the cable slides; absent: a hundredth of the smallest diameter, or a tenth "
+        "of the penetration at rest [m]",
+    )
+
+    @model_validator(mode="after")
+    def _residual_is_less(self) -> Friction:
+        if (self.residual is None) != (self.breakout is None):
+            key, other = ("breakout", "residual") if self.breakout is None else ("residual", "breakout")
+            refuse([Finding((key,), f"a value, because {other} is given", f"add `{key}: ...`, or leave {other} out")])
+        for k, (key, most) in enumerate((("axial", self.axial), ("lateral", self.lateral)) if self.residual else ()):
+            if self.residual is not None and self.residual[k] > most:
+                expected = f"at most {most:g}, that of break-out ({key})"
+                refuse([Finding(("residual", k), expected, "are the two exchanged?")])
+        return self
 
 
 class Seabed(Table):
     """A bed, plane or of depths on a grid, that pushes back along its normal like a spring under each metre."""
+
+    usual = ("stiffness",)
 
     z: Number = Field(
         description="height of the bed at x = y = 0; with `depths`, the height they count down from, usually that of "
@@ -213,7 +239,14 @@ class Seabed(Table):
     depths: Depths | None = Field(
         default=None, description="an uneven bed (bathymetry): depths on a grid; absent: a plane"
     )
-    stiffness: Positive = Field(description="force per metre of cable and metre of penetration [N/m per m]")
+    stiffness: Positive | None = Field(
+        default=None,
+        description="force per metre of cable and metre of penetration; either this or soil is given [N/m per m]",
+    )
+    soil: Soil | None = Field(
+        default=None,
+        description="instead of stiffness: clay that remembers how deep the cable was, and holds it by suction",
+    )
     damping: NonNegative = Field(
         default=0.0, description="force per metre of cable and speed of penetration, in contact [N s/m per m]"
     )
@@ -240,6 +273,28 @@ class Seabed(Table):
     def is_level(self) -> bool:
         """Whether the bed is as high everywhere."""
         return self.depths is None and not any(self.slope or ())
+
+    @property
+    def spring(self) -> float:
+        """Its stiffness, of soil that of unloading [N/m per m]."""
+        if self.soil is not None:
+            return self.soil.steepest
+        assert self.stiffness is not None
+        return self.stiffness
+
+    @model_validator(mode="after")
+    def _one_resistance(self) -> Seabed:
+        if self.stiffness is None and self.soil is None:
+            refuse([Finding(("stiffness",), "a number > 0, in N/m per m", "add `stiffness: ...`, or soil")])
+        for key in ("stiffness", "damping") if self.soil is not None else ():
+            if getattr(self, key):
+                refuse([Finding((key,), "nothing, because soil says how the bed resists", f"leave {key} or soil out")])
+        travel = self.friction.travel if self.friction is not None else None
+        if self.soil is not None and self.soil.lateral is not None and travel is None:
+            expected = "a table with `travel`, over which lateral resistance grows"
+            fix = "add `friction: {axial: ..., lateral: ..., travel: ...}` (m)"
+            refuse([Finding(("friction",), expected, fix)])
+        return self
 
     @model_validator(mode="after")
     def _one_shape(self) -> Seabed:

@@ -11,6 +11,7 @@ from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.depths import Depths
 from hybrid.scene.dispersion import wavenumber
 from hybrid.scene.ends import Ends, Triple
+from hybrid.scene.sea import Seabed
 from hybrid.scene.waves import RecordedWaves, StreamFunctionWaves
 
 # Miche (1944): a wave of height H and length L breaks where H / L reaches 0.142 tanh(k depth).
@@ -18,6 +19,8 @@ STEEPEST = 0.142
 
 # How far under the seabed an end may be held, as part of the depth: a cable that rests there has sunk in a little.
 SUNK = 1e-3
+# The same in soil, m, where ends of cables and chains are buried.
+BURIED = 3.0
 
 # s: beyond it waves are tides, and so long that the formulas lose their digits.
 LONGEST_PERIOD = 1e5
@@ -169,6 +172,11 @@ def surface_over_seabed(environment: Environment, ends: Ends) -> Iterator[Findin
             return
 
 
+def deepest_place(seabed: Seabed, depth: float) -> float:
+    """How far under the bed an end may be, m; depth: m, of the water, or the length of the line."""
+    return max(SUNK * depth, BURIED if seabed.soil is not None else 0.0)
+
+
 def nothing_in_the_ground(environment: Environment, cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
     """Ends, bodies and initial shapes under the seabed."""
     seabed, fluid = environment.seabed, environment.fluid
@@ -177,6 +185,7 @@ def nothing_in_the_ground(environment: Environment, cable: Cable, ends: Ends, in
     depth = cable.length
     if fluid is not None and fluid.surface is not None:
         depth = max(fluid.surface - seabed.height(0.0, 0.0), 0.0)
+    sunk = deepest_place(seabed, depth)
     fix = "raise it, or lower environment.seabed.z"
     if seabed.depths is not None:
         yield from _within_depths(seabed.depths, ends)
@@ -186,18 +195,18 @@ def nothing_in_the_ground(environment: Environment, cable: Cable, ends: Ends, in
         named += [(("initial", "points", i), p) for i, p in enumerate(initial.points)]
     for place, (x, y, z) in named:
         under = seabed.height(x, y) - z
-        if under > SUNK * depth:
+        if under > sunk:
             given = f"[{x:.8g}, {y:.8g}, {z:.8g}], which lies {under:.4g} m under the seabed"
             yield Finding(place, f"a place on the seabed or above, z >= {seabed.height(x, y):.8g} m", fix, given)
     if isinstance(initial, Straight) and not ends.held().keys() >= {"start", "end"}:
-        yield from _straight_in_the_ground(environment, cable, ends, initial, SUNK * depth)
+        yield from _straight_in_the_ground(environment, cable, ends, initial, sunk)
     for name, (x, y, z) in ends.held().items():
         motion = ends.named()[name].prescribed_motion
         travel = motion.travel if motion is not None else None
         if travel is not None:
             x, y, z = x + travel.by[0], y + travel.by[1], z + travel.by[2]
             under = seabed.height(x, y) - z
-            if under > SUNK * depth:
+            if under > sunk:
                 given = f"a way to [{x:.8g}, {y:.8g}, {z:.8g}], {under:.4g} m under the seabed"
                 where: Place = ("ends", name, "motion", "travel", "by")
                 yield Finding(where, "a way that ends on the seabed or above", fix, given)

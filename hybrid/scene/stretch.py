@@ -109,6 +109,13 @@ class DynamicStiffness(Table):
     )
 
 
+class Creep(Table):
+    """Strain that a rope under load gains in time, per_decade x log10(1 + t/loaded), t counted from the start."""
+
+    per_decade: Positive = Field(description="strain gained in a tenfold time under load [-]")
+    loaded: Positive = Field(description="for how long it has been under load at the start [s]")
+
+
 def rows_of(given: tuple[tuple[float, float], ...] | CurveFile) -> Curve:
     """The rows of a table, given or in a file."""
     return given.rows if isinstance(given, CurveFile) else given
@@ -171,12 +178,17 @@ class SlipLayer(Table):
         return self
 
 
-def layers_of(rows: Curve) -> tuple[tuple[float, float, float], ...]:
-    """Layers whose first loading is a table of moment (N m) over curvature (1/m): stiffness, slip moment and 0 of each.
+# Of a layer: stiffness, N m^2; slip moment, N m; what this, and then what stiffness gains by tension, m and m^2.
+Layer = tuple[float, float, float, float]
+
+
+def layers_of(rows: Curve) -> tuple[Layer, ...]:
+    """Layers whose first loading is a table of moment (N m) over curvature (1/m).
 
     What the last piece of the table has from straight on is no part of them (Masing).
     """
-    return tuple((a - b, (a - b) * x, 0.0) for (a, b), (x, _) in zip(pairwise(slopes(rows)), rows[1:], strict=False))
+    steps = zip(pairwise(slopes(rows)), rows[1:], strict=False)
+    return tuple((a - b, (a - b) * x, 0.0, 0.0) for (a, b), (x, _) in steps)
 
 
 def slopes(rows: Curve) -> list[float]:

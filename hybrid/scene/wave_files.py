@@ -77,7 +77,7 @@ class Recorded:
 def given_waves(path: str, _changed: int, _size: int) -> Recorded:
     """Waves given one by one, read once for as long as the file does not change.  RecordRefused."""
     name = os.path.basename(path)
-    header, table, lines = read_table(path, _columns(GIVEN))
+    header, table, lines = read_table(path, columns_of(GIVEN))
     if not 1 <= len(lines) <= MOST_WAVES:
         expected = f"1 to {MOST_WAVES} rows, one for every wave"
         raise RecordRefused(expected, "leave waves of little energy out", f"{name}, {len(lines)} rows")
@@ -97,7 +97,7 @@ def recorded_waves(path: str, band: tuple[float, float], direction: float, _chan
     RecordRefused.
     """
     name = os.path.basename(path)
-    header, table, lines = read_table(path, _columns(RECORD))
+    header, table, lines = read_table(path, columns_of(RECORD))
     if len(lines) < FEWEST:
         raise RecordRefused(f"at least {FEWEST} rows", "give the whole record", f"{name}, {len(lines)} rows")
     t, eta = (table[:, header.index(x)] for x in RECORD)
@@ -126,7 +126,7 @@ def recorded_waves(path: str, band: tuple[float, float], direction: float, _chan
     return Recorded(waves, float(t[0]), float(t[0] + n * step), lost, mean)
 
 
-def _columns(wanted: list[str]) -> Callable[[str, list[str]], list[str]]:
+def columns_of(wanted: list[str]) -> Callable[[str, list[str]], list[str]]:
     """Checks a header for these columns, in any order."""
 
     def checked(name: str, header: list[str]) -> list[str]:

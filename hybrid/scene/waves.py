@@ -14,9 +14,11 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.base import Finding, Kinds, Number, Place, Positive, Table, Text, Whole, by_kind, refuse
 from hybrid.scene.spectra import (
+    COUNT,
     DEPTH,
     DIRECTION,
     RAMP,
+    SEED,
     JonswapWaves,
     OchiHubbleWaves,
     PiersonMoskowitzWaves,
@@ -218,6 +220,41 @@ class RecordedWaves(_OfFile):
         return self
 
 
+class MeasuredWaves(_OfFile):
+    """Irregular waves of a measured spectrum over frequency and direction: a sum of linear waves with random phases."""
+
+    kind: Literal["spectrum"] = Field(default="spectrum", description="a measured spectrum, in a file")
+    file: Text = Field(
+        min_length=1,
+        description="CSV file with columns frequency,direction,density (Hz, deg, m^2/(Hz deg)), a row for each "
+        "frequency and direction of a grid, directions those in which waves travel; or netCDF as wavespectra writes it "
+        "(freq, dir, efth), directions from which they come, clockwise from north; relative to the scene file",
+    )
+    record: Whole | None = Field(default=None, ge=0, description="of netCDF: which of several spectra, from 0 [-]")
+    north: Number = Field(default=90.0, description="of netCDF: heading of north from x, counter-clockwise [deg]")
+    seed: Whole = Field(default=1, ge=0, description=SEED)
+    components: Whole = Field(default=100, ge=1, le=1000, description=COUNT)
+    depth: Positive | None = Field(default=None, description=DEPTH)
+    ramp: Positive | None = Field(default=None, description=RAMP)
+
+    @property
+    def recorded(self) -> Recorded:
+        """The waves of the file.  Only after validation: it is readable then."""
+        from hybrid.scene.measured_spectrum import spectrum_waves
+
+        status, of = os.stat(self.file), (self.record, self.north, self.components, self.seed)
+        return spectrum_waves(self.file, *of, status.st_mtime_ns, status.st_size)
+
+    def headings(self) -> Iterator[tuple[Place, float]]:
+        """Directions [deg] that tell in which planes the water moves, with their keys."""
+        yield from ((("file",), heading) for heading in sorted({float(x) for x in self.recorded.waves[:, 3]}))
+
+    @model_validator(mode="after")
+    def _readable(self) -> MeasuredWaves:
+        self._refuse_unreadable()
+        return self
+
+
 Waves = Annotated[
     Annotated[RegularWaves, Tag("<regular>")]
     | Annotated[StreamFunctionWaves, Tag("<stream_function>")]
@@ -227,7 +264,8 @@ Waves = Annotated[
     | Annotated[TorsethaugenWaves, Tag("<torsethaugen>")]
     | Annotated[SumOfWaves, Tag("<sum>")]
     | Annotated[GivenWaves, Tag("<components>")]
-    | Annotated[RecordedWaves, Tag("<record>")],
+    | Annotated[RecordedWaves, Tag("<record>")]
+    | Annotated[MeasuredWaves, Tag("<spectrum>")],
     Discriminator(by_kind),
     Kinds(
         (
@@ -240,6 +278,7 @@ Waves = Annotated[
             "sum",
             "components",
             "record",
+            "spectrum",
         ),
         usual=("regular",),
     ),

@@ -95,6 +95,9 @@ WORTH_THREADS = 500
 # Numbers that the outputs of a run to compare with may take in memory and in checkpoints, 8 MB; more go into a file.
 MOST_IN_MEMORY = 1_000_000
 
+# What may follow a run from its first state on.
+Begun = Callable[[TimeLoop, Equilibrium | None], None]
+
 
 class Case:
     """One scene in motion, computed as often and as finely as it takes."""
@@ -133,8 +136,12 @@ class Case:
 
     # --- results --------------------------------------------------------------------------------
 
-    def record(self, resolution: Resolution, target: Target, before: Tree | None = None) -> RunSample:
-        """Compute the result into a file, or memory; what is to be compared of it.  before: what was found before.
+    def record(
+        self, resolution: Resolution, target: Target, before: Tree | None = None, begun: Begun | None = None
+    ) -> RunSample:
+        """Compute the result into a file, or memory; what is to be compared of it.  before: what was found before;
+
+        begun: called behind the first output.
 
         A file that errors will be added to, and that is complete before it had to be there, waits in `late_file`.
         """
@@ -148,6 +155,8 @@ class Case:
             recorder.amended = self.beside_result is not None
         with recorder:
             loop.begin(equilibrium)
+            if begun is not None:
+                begun(loop, equilibrium)
             loop.to_the_end(self._duration, self._exact, self.changes)
             loop.close()
         waits = recorder.late_file if isinstance(recorder, Recorder) else None

@@ -34,7 +34,7 @@ from hybrid.kernels.run import following_run as f
 from hybrid.kernels.run.run import run as steps
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, sample_size
-from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.forces import REMEMBERS
 from hybrid.kernels.state.state import Batch, Line
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import RUN, Task
@@ -49,13 +49,12 @@ from hybrid.simulation.cell_arrays import (
 )
 from hybrid.simulation.cell_views import CellViews
 from hybrid.simulation.envelope import marks_on
+from hybrid.simulation.kind_changes import plain
 from hybrid.solve.stepper import HEAVY
 
 if TYPE_CHECKING:
     from hybrid.simulation.transient import Transient
 
-# Steps from which on the tables pay where cells stay: they take the time of two or three changes by Python.
-PAYS_FROM = 10
 LEAST_CELLS = 3  # with which tables are made
 # Of the tables of a run, what depends on the cells.
 IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
@@ -94,7 +93,6 @@ class CellChanges:
         self._waiting, self._places = np.zeros((MOST_WAITING, 3), np.int64), np.zeros(MOST_PLACES, np.int64)
         self.adopted, self._synced = False, -1  # number of changes that Python knows of
         self._shifts = np.zeros(1, bool)
-        self._follows = bool(owner.switching.zones.clock[z.SHARE] > 0.0)
         self._bound = False
         self._tension_floor = TENSION_FLOOR, LEAST_TENSION * manager.scale
 
@@ -125,24 +123,12 @@ class CellChanges:
 
     @staticmethod
     def applies(owner: Transient) -> bool:
-        """Whether a run's cells, or their kinds, can change so: nothing asks Python on the way.
-
-        Of a short run whose cells stay Python changes the kinds, to the same bits: there it takes less than the tables.
-        """
-        switching, model, run = owner.switching, owner.model, owner.run
-        if switching is None or not switching.compiled:
+        """Whether the cells of a run follow the curvature, and nothing asks Python on the way."""
+        switching = owner.switching
+        if switching is None or not switching.zones.clock[z.SHARE] > 0.0:
             return False
-        if not switching.zones.clock[z.SHARE] > 0.0 and owner.steps < PAYS_FROM:
-            return False
-        if owner.payout is not None or switching.manager.layout.rod.size < LEAST_CELLS:
-            return False
-        plain = (
-            owner.correction is None
-            and run.contact is None
-            and not (model.line.torsion.size or model.line.tension_twist.size or model.line.law.size)
-            and not (model.line.bend_law.size or model.line.wake_law.size)
-        )
-        return plain and bool(model.line.bits & PLANAR or not switching.manager.twisted)
+        remembers = owner.model.line.bits & REMEMBERS
+        return plain(owner) and not remembers and switching.manager.layout.rod.size >= LEAST_CELLS
 
     def still_fits(self) -> bool:
         """Whether the line is of the kind that the arrays were made for."""
@@ -375,8 +361,7 @@ class CellChanges:
         """Other zones, of which Python's model knows nothing yet, and the energy, J, that is booked for it."""
         switching, manager, t = self._switching, self._switching.manager, self._run.t
         switching.zones.next_rod[:] = change.rod
-        if self._follows:
-            z.plan_next(switching.table.numbers)
+        z.plan_next(switching.table.numbers)
         for k, clamp in enumerate(switching.clamps(self._owner.model.ends.at(t))):
             self._held[k] = clamp is not None
             if clamp is not None:
@@ -447,7 +432,7 @@ class CellChanges:
         assert model.layout is not None
         zones, sea, work, books = self._on.zones(k, n), self._on.sea_on(n), self._on.work_on(n), self._on.books(n)
         now = sea.now.copy()
-        layout = model.layout._replace(rod=zones.rod.copy(), here=zones.here.copy() if self._follows else None)
+        layout = model.layout._replace(rod=zones.rod.copy(), here=zones.here.copy())
         model = replace(model, line=line, layout=layout, zones=layout.zones, sea=model.sea.with_values(sea))
         sea.now[:] = now
         run.books, run.states = books, (self._on.state(k, 0, n), self._on.state(k, 1, n))

@@ -16,8 +16,11 @@ from hybrid.kernels.run import following_run as f
 from hybrid.kernels.run.entry import NO_PUSH
 from hybrid.kernels.state.books import Books, sample_size
 from hybrid.kernels.state.state import (
+    NO_GRIP,
     NO_PEAK,
+    NO_SHEAVES,
     NO_SLOW,
+    NO_SOIL,
     NO_TENSION_TORQUE,
     NO_TORSION,
     NO_WAKE,
@@ -96,7 +99,15 @@ class CellViews:
         found: State = self._view(
             self.sides[k].states[which],
             cells,
-            lambda: {"turn": self._turn, "slow": NO_SLOW, "wake": NO_WAKE, "peak": NO_PEAK},
+            lambda: {
+                "turn": self._turn,
+                "slow": NO_SLOW,
+                "wake": NO_WAKE,
+                "peak": NO_PEAK,
+                "grip": NO_GRIP,
+                "sheave": NO_SHEAVES,
+                "soil": NO_SOIL,
+            },
         )
         return found
 

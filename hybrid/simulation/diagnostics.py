@@ -37,9 +37,10 @@ from hybrid.model.obstacles import CELLS_PER_RADIUS
 from hybrid.outputs.joined_lines import JoinedObservation, Output
 from hybrid.outputs.observation import Observation
 from hybrid.scene.plane import OUT
+from hybrid.simulation.contact_watch import Knot, note_departures, note_knot, sheaves_of
 from hybrid.simulation.doubtful_outputs import Bounds, doubtful, kinks_at
 from hybrid.simulation.events import EventLog
-from hybrid.simulation.hockling_watch import LOOP, note_hockling, note_loops
+from hybrid.simulation.hockling_watch import LOOP, Loops, note_hockling, note_loops
 from hybrid.simulation.section_layers import ASKEW, hidden_layer, layer_text
 from hybrid.simulation.slack_bends import TURNS, too_long_for_weight, turns_by_weight, weight_text
 from hybrid.solve.flaws import TOUCHING, behind_obstacles, obstacles_left
@@ -58,6 +59,9 @@ SUNK = 0.01
 # Energy that the scheme creates, as a part of what work, fall and start have put in: beyond the first it is
 # noted (a healthy run stays below 1 %), at the second the motion is the scheme's own and the run stops.
 GAIN_NOTED, GAIN_STOPS = 0.05, 1.0
+# The first moments of a run, in which next to nothing has been put in: less than this part of all that is put in by its
+# end.  What was created then is held against this part, as hardly anything is a part of nothing.
+FIRST_MOMENTS = 0.1
 # Energy below this part of tension scale times length is what Newton's tolerance leaves over many steps.
 NEWTON_LEAVES = 1e-7
 # Numerical dissipation, as a part of the same energy: beyond this the step was too long for the motion.
@@ -65,6 +69,8 @@ LOSS_NOTED = 0.5
 # A rod is pressed when it carries more than this part of EI/L^2: a quarter of pi^2 is the least that any rod buckles
 # under, and what Newton leaves of no tension at all is far below.
 PRESSED = 1e-3
+# A rod of an equilibrium is in compression by more than this part of its largest force, or of the tension of its scene.
+COMPRESSED = 1e-4
 # What an oscillation is wrong by after one period, as a part of it, beyond which a step is said to be too long
 # (docs/theory.md, 8): 8 steps a period with rho_inf = 1, 14 with 0.5, 24 with 0.
 COARSE = 0.35
@@ -87,19 +93,23 @@ NOWHERE: Floats = np.zeros((0, 3))
 REMEMBERED = (
     "_bend", "_twist", "_slack", "_fold", "_sunk", "_within", "_round", "_between", "_off", "_gain", "_loss", "_rested",
     "_left_out", "_jump", "_put_in", "_potential", "_alive", "_loop", "_writhe", "_writhes", "_section", "_kink",
-    "_weight",
+    "_weight", "_lay", "_knot", "_bent", "_created",
 )  # fmt: skip
 # What checkpoints of 0.6 files may lack of it: what was not watched then.
-UNWATCHED = {
+UNWATCHED: dict[str, Any] = {
     "_loop": 1.0,
     "_writhe": np.nan,
     "_writhes": LOOP,
+    "_bent": 0.0,
+    "_created": [0.0, 0.0, 0.0, 0.0],
     "_section": False,
     "_kink": KINK,
     "_within": 1.0,
     "_round": False,
     "_between": False,
     "_weight": False,
+    "_lay": np.zeros((0, 2)),
+    "_knot": [*Knot()],
 }
 
 Stop = tuple[Outcome, int] | None
@@ -159,8 +169,12 @@ class Diagnostics:
         self._rested = self._left_out = self._section = self._weight = False
         self._jump = SNAP * model.tension_scale  # N
         self._put_in = self._potential = self._alive = 0.0  # J
+        self._created = [
+            *UNWATCHED["_created"]
+        ]  # most energy beyond what may be (J), put in till then (J), t (s), s (m)
         self._kink = KINK
-        self._loop, self._writhe, self._writhes = UNWATCHED["_loop"], UNWATCHED["_writhe"], UNWATCHED["_writhes"]
+        self._knot, self._lay = [*Knot()], np.full((len(sheaves_of(model.sea.values)), 2), np.nan)
+        self._loop, (self._writhe, self._writhes, self._bent) = UNWATCHED["_loop"], Loops()
 
     def begin(self) -> None:
         """Note what the contents of the model warn of."""
@@ -205,12 +219,8 @@ class Diagnostics:
     def equilibrium(self, found: Equilibrium) -> None:
         """What a static solution leaves open."""
         self.found_by(found.pushed, found.slack, found.state)
-        if self._model.line.bits & FRICTION and not found.with_friction:
-            text = "this equilibrium is the one without friction: say `initial: {kind: equilibrium, friction: settled}`"
-            where = f"{text} for one that lies where it was laid"
-            if self._model.line.bits & OBSTACLES:
-                where = "this equilibrium is the one without friction: a run with damping that comes to rest has it"
-            self.events.event(0.0, 0.0, self._model.length, "static friction neglected", where)
+        if not found.with_friction:
+            self.friction_neglected(found.state, "initial")
         if self._model.line.bits & SELF_FRICTION and found.touch.any():
             text = "this equilibrium is the one without friction where the line touches itself"
             where = f"{text}: a run with damping that comes to rest in contact has it"
@@ -231,6 +241,22 @@ class Diagnostics:
             text = f"the stability of this equilibrium is not judged, because {why}"
             self.events.event(0.0, 0.0, self._model.length, "stability not judged", text)
 
+    def friction_neglected(self, state: State, key: str, shares: bool = False) -> None:
+        """Of an equilibrium without friction that touches what has some; key: of the scene, that asks for it.
+
+        shares: whether the line touches others.  Beside these, and what moves, friction settles in a motion alone.
+        """
+        line, sea = self._model.line, self._model.sea.values
+        if not line.bits & FRICTION or not (line.bits & OBSTACLES or (planes_under(sea, state.r)[1] > 0.0).any()):
+            return
+        under = " on obstacles" if line.bits & OBSTACLES else " on the seabed"
+        text = f"this equilibrium is the one without friction{under}: "
+        if shares or line.moved.size:
+            text += "a run with damping that comes to rest has it"
+        else:
+            text += f"say `{key}: {{kind: equilibrium, friction: settled}}` for one that lies where it was laid"
+        self.events.event(0.0, 0.0, self._model.length, "static friction neglected", text)
+
     def found_by(self, pushed: bool, slack: int, state: State) -> None:
         """An equilibrium beside one that is not stable, or with a slack catenary cell (-1: none)."""
         if pushed:
@@ -243,11 +269,27 @@ class Diagnostics:
             s, tension = float(self._model.line.s[slack]), float(state.T[slack])
             text = f"the only equilibrium found has a tension of {tension:.3g} N in a catenary at s = {s:g} m"
             self.note(0.0, slack, "slack", f"{text}: it stands like a strut, which no cable does")
+        self._compressed(state)
         if self._model.line.bits & OBSTACLES:
             if self._model.start_shape == HUNG:
                 self._lies_behind(state)
             else:
                 self._has_left(state)
+
+    def _compressed(self, state: State) -> None:
+        """Rods that are in compression, which a rope or chain would not be."""
+        line = self._model.line
+        most = COMPRESSED * max(float(np.abs(state.T).max()), self._model.tension_scale)
+        pushed = (line.spin == 1) & (state.T + most < 0.0)
+        if not pushed.any():
+            return
+        cells, worst = np.flatnonzero(pushed), int(np.argmin(np.where(pushed, state.T, np.inf)))
+        text = (
+            f"{float(line.h[cells].sum()):.3g} m of rod are in compression in this equilibrium, most at s = "
+            f"{float(line.s[worst]):.4g} m: {float(state.T[worst]):.3g} N; their bending stiffness carries it; where a "
+            f"rope or chain is meant, change its length or its ends"
+        )
+        self.events.event(0.0, float(line.s[cells[0]]), float(line.s[cells[-1] + 1]), "compression", text)
 
     def _lies_behind(self, state: State) -> None:
         """An obstacle on the side of which the line was not begun that is away from the straight span of its ends."""
@@ -263,10 +305,11 @@ class Diagnostics:
     def _has_left(self, state: State) -> None:
         """An obstacle on which the shape given lies, and the equilibrium does not."""
         line, sea = self._model.line, self._model.sea
-        for which, node in obstacles_left(line, sea.values, self._model.start, state):
+        for which, node, behind in obstacles_left(line, sea.values, self._model.start, state):
+            now = "lies on its other side" if behind else "does not touch it"
             text = (
                 f"the shape given lies on obstacle {sea.names[which]} at s = {line.s[node]:g} m, and this equilibrium "
-                f"does not touch it: on this mesh none was found there; more cells, or initial.points nearer to one, "
+                f"{now}: on this mesh none was found there; more cells, or initial.points nearer to one, "
                 f"may lead to it"
             )
             self.note(0.0, node, "several equilibria", text)
@@ -354,11 +397,12 @@ class Diagnostics:
         return stop
 
     def finish(self, books: Books) -> None:
-        """After the last step: whether steps were too long for the motion.
+        """After the last step: whether the scheme has created energy, and steps were too long for the motion.
 
         Of a x cos(w t) a step changes the acceleration by a w^3 dt; periods are too long by (beta - 1/6) (w dt)^2, with
         beta = 1/(1 + rho)^2 of generalized-alpha.
         """
+        self.created_energy()
         low, high, moved = books.clock[[b.LEAST_PEAK, b.LARGEST_PEAK, b.MOVED]].tolist()
         steps, rho, worst = int(books.counts[b.MEASURED]), float(books.clock[b.RHO]), books.worst.tolist()
         hardly = moved <= HARDLY_MOVED * self._model.length and not high - low > HARDLY_MOVED * high
@@ -408,6 +452,7 @@ class Diagnostics:
             return stop
         self.mesh(seen)
         self.loops(seen.batch.t, values, seen.grid.s)
+        self.contacts(self._model.line.s, seen.batch)
         self.rest(seen.batch, values)
         return self.energy(seen.batch, values)
 
@@ -424,6 +469,8 @@ class Diagnostics:
             self.mesh(one)
             self.rest(one.batch, {name: x[k : k + 1] for name, x in values.items()})
         self.loops(seen.batch.t, values, seen.points)
+        for _, output in lines:
+            self.contacts(output.line.s, output.batch)
         return self.energy(seen.batch, values, lines)
 
     @property
@@ -438,8 +485,28 @@ class Diagnostics:
     def loops(self, t: Floats, values: Mapping[str, Floats], s: Floats) -> None:
         """A torque that can throw a loop, and a loop, at outputs (nb,) s with fields (nb, ...) along s (ns,) m."""
         self._loop = note_hockling(self._model, t, values, s, self._loop, self.events.event)
-        known = self._writhe, self._writhes
-        self._writhe, self._writhes = note_loops(t, values, s, known, self.events.event)
+        known = Loops(self._writhe, self._writhes, self._bent)
+        self._writhe, self._writhes, self._bent = note_loops(t, values, s, known, self.events.event)
+
+    def contacts(self, s: Floats, batch: Batch) -> None:
+        """A knot that tightens, and sheaves that the line leaves, at outputs whose nodes are s (N+1,) m."""
+        if batch.touch.size:
+            for t, r, touch in zip(batch.t.tolist(), batch.r, batch.touch, strict=True):
+                self._knot = [*note_knot(t, s, r, touch, Knot(*self._knot), self.events.event)]
+        if self._lay.size:
+            sea = self._model.sea
+            for k, (t, r) in enumerate(zip(batch.t.tolist(), batch.r, strict=True)):
+                around = self._around(batch, k)
+                self._lay = note_departures(t, s, r, around, sea.names, self._lay, self.events.event)
+
+    def _around(self, batch: Batch, output: int) -> Sea:
+        """The sea with obstacles where they are at an output."""
+        sea = self._model.sea.values
+        if not batch.obstacles.size:
+            return sea
+        rows = sea.obstacles.copy()
+        put_obstacles(rows, sea.carried, batch.obstacles[output])
+        return sea._replace(obstacles=rows)
 
     def mesh(self, seen: Observation) -> None:
         """Folds that a catenary's cells do not resolve, kinks at joints of zones, and a line deep in the seabed."""
@@ -484,13 +551,11 @@ class Diagnostics:
         between whose nodes it may pass.
         """
         line, sea = self._model.line, self._model.sea
-        rows = sea.values.obstacles.copy()
-        around = sea.values._replace(obstacles=rows)
         longest = np.maximum(np.append(line.h, 0.0), np.append(0.0, line.h))
         met = cells_met(sea.values.carried, line.s) if sea.values.carried.size else None
         for k, (t, r) in enumerate(zip(batch.t.tolist(), batch.r, strict=True)):
-            if batch.obstacles.size:
-                put_obstacles(rows, sea.values.carried, batch.obstacles[k])
+            around = self._around(batch, k)
+            rows = around.obstacles
             within = depths_in_obstacles(around, r, line.s, met)
             which, node = (int(i) for i in np.unravel_index(np.argmax(within), within.shape))
             if within[which, node] > self._within:
@@ -653,21 +718,26 @@ class Diagnostics:
             fastest = int(np.argmax(np.abs(v).sum(axis=1)))
             if gained[k] > GAIN_STOPS * put_in[k] + floor:
                 return Outcome.GAINS_ENERGY, fastest
-            self._note_energy(float(batch.t[k]), float(gained[k]), float(put_in[k]), floor, fastest)
+            if gained[k] > max(self._gain * put_in[k] + floor, self._created[0]):
+                where = float(self._model.line.s[fastest])
+                self._created = [float(gained[k]), float(put_in[k]), float(batch.t[k]), where]
+            if -gained[k] > self._loss * put_in[k] + floor:
+                text = f"the time scheme has dissipated {-gained[k]:.3g} J, {_percent(-gained[k], put_in[k])} of the"
+                text += " energy put in: motion is faster than the step; make time.step smaller"
+                self.note(float(batch.t[k]), fastest, "numerical dissipation", text)
+                self._loss *= 1.3
         return None
 
-    def _note_energy(self, t: float, gained: float, put_in: float, floor: float, fastest: int) -> None:
-        part = 100.0 * abs(gained) / (put_in or 1.0)
-        if gained > self._gain * put_in + floor:
-            text = f"the time scheme has created {gained:.3g} J, {part:.0f} % of the energy put in"
-            self.note(t, fastest, "gains energy", f"{text}: {Outcome.GAINS_ENERGY.remedy}")
-            self._gain *= 3.0
-        if -gained > self._loss * put_in + floor:
-            text = f"the time scheme has dissipated {-gained:.3g} J, {part:.0f} % of the energy put in"
-            self.note(
-                t, fastest, "numerical dissipation", f"{text}: motion is faster than the step; make time.step smaller"
-            )
-            self._loss *= 1.3
+    def created_energy(self) -> None:
+        """The most energy that the scheme has created, where it is much of what was put in, at the end of a run.
+
+        What was put in till then counts as FIRST_MOMENTS of all at least.
+        """
+        gained, put_in, t, s = self._created
+        put_in = max(put_in, FIRST_MOMENTS * self._put_in)
+        if gained > 0.0 and gained > self._gain * put_in:
+            text = f"the time scheme has created {gained:.3g} J, {_percent(gained, put_in)} of the energy put in"
+            self.events.event(t, s, s, "gains energy", f"{text}: {Outcome.GAINS_ENERGY.remedy}")
 
     def rest(self, batch: Batch, values: Mapping[str, Floats]) -> None:
         """A rod at rest, or nearly, in a shape that is not stable: its stiffness is negative for some displacement."""
@@ -701,6 +771,11 @@ class Diagnostics:
                 self.note(float(batch.t[k]), int(np.argmin(state.T)), "unstable", text)
                 self._rested = True
                 return
+
+
+def _percent(part: float, whole: float) -> str:
+    """A part of an energy in words."""
+    return f"{100.0 * part / (whole or 1.0):.0f} %"
 
 
 def _with_line(model: Model, output: Output) -> Model:

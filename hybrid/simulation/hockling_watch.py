@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from hybrid.store.hockling import formation_ratio, formation_tension, pop_out
 
 # Change of writhe, turns, that is a loop: a small one has nearly 1.
 LOOP = 0.75
+# Change of writhe, turns, below which no loop is left.
+OPEN = 0.5 * LOOP
 # An event follows another when the margin is this part of what it was.
 WORSE = 1.0 / 3.0
 
@@ -56,33 +59,68 @@ def _long_enough(torque: Floats, tension: Floats, stiffness: Floats, s: Floats) 
     return out
 
 
-def note_loops(
-    t: Floats, values: Mapping[str, Floats], s: Floats, known: tuple[float, float], event: Callable[..., None]
-) -> tuple[float, float]:
-    """Write events where the writhe is that of a loop more than at the first output.
+class Loops(NamedTuple):
+    """What is remembered of loops from output to output.
 
-    known: writhe of the first output, NaN before it, and by how much that of the next event differs; the rest as of
-    `note_hockling`.
+    writhe: turns, of the first output, NaN before it; change: turns, by how much that of the next event differs;
+    bend: 1/m, largest curvature at an output since a loop formed, 0: there is none.
+    """
+
+    writhe: float = np.nan
+    change: float = LOOP
+    bend: float = 0.0
+
+    @property
+    def formed(self) -> bool:
+        """Whether a loop has formed since the first output, and not opened."""
+        return self.change > LOOP
+
+
+def note_loops(t: Floats, values: Mapping[str, Floats], s: Floats, known: Loops, event: Callable[..., None]) -> Loops:
+    """Write events where the writhe is that of a loop more than at the first output, and where it has come back.
+
+    known: what is remembered, which is returned as it is after these outputs; the rest as of `note_hockling`.
     """
     writhe = values.get("turns/writhe")
     if writhe is None:
         return known
-    first, most = known
-    if not np.isfinite(first):
-        first = float(writhe[0])
-    for k in np.flatnonzero(np.abs(writhe - first) > most):
-        change = float(writhe[k]) - first
-        if abs(change) <= most:
-            continue
-        where = float(s[int(values["curvature"][k].argmax())])
+    if not np.isfinite(known.writhe):
+        known = known._replace(writhe=float(writhe[0]))
+    change = np.abs(writhe - known.writhe)
+    if not known.formed and not (change > LOOP).any():  # most batches
+        return known
+    for k in range(len(writhe)):
+        known = _follow_loop(t, values, s, k, known, event)
+    return known
+
+
+def _follow_loop(
+    t: Floats, values: Mapping[str, Floats], s: Floats, k: int, known: Loops, event: Callable[..., None]
+) -> Loops:
+    """What is remembered of loops after output k, with an event where one has formed or opened."""
+    change, bends = float(values["turns/writhe"][k]) - known.writhe, values["curvature"][k]
+    i, pull = int(bends.argmax()), float(values["tension"][k].max())
+    where, bend = float(s[i]), max(known.bend, float(bends[i]))
+    gone = abs(known.writhe) > LOOP and change * known.writhe < 0.0 and abs(change) > LOOP  # one of the first output
+    if gone or (known.formed and abs(change) < OPEN):
+        text = f"a loop has opened: the writhe has changed by {change:.3g} turns since the first output"
+        if not gone:
+            text = (
+                f"the loop has opened: the writhe is within {abs(change):.2g} turns of that of the first output again"
+            )
+            text += f"; since it formed the line was bent to a radius of {1.0 / bend:.3g} m at the outputs"
+        text += f", and the largest tension along the line is {pull:.4g} N now"
+        event(float(t[k]), where, where, "loop opened", text, value=pull)
+        return Loops(float(values["turns/writhe"][k]) if gone else known.writhe)
+    if abs(change) > known.change:
         hand = "right" if change > 0.0 else "left"
         text = (
             f"the writhe has changed by {change:.3g} turns since the first output, about a {hand}-handed loop for "
             f"each: the line is bent most at s = {where:.6g} m; turns that it takes up no longer twist the line"
         )
-        event(float(t[k]), where, where, "loop formed", text, value=change, threshold=most)
-        most = 2.0 * max(most, abs(change))
-    return first, most
+        event(float(t[k]), where, where, "loop formed", text, value=change, threshold=known.change)
+        return known._replace(change=2.0 * max(known.change, abs(change)), bend=bend)
+    return known._replace(bend=bend) if known.formed else known
 
 
 def _text(s: float, torque: float, tension: float, stiffness: float, diameter: float) -> str:

@@ -24,7 +24,8 @@ def shared_of(model: SystemModel, rubs: bool = False) -> SharedContact | None:
     strands = []
     for k in model.touching.lines:
         x = model.models[k]
-        strands.append(TouchingLine(x.line, diameters(x), least_bending(x), x.tension_scale))
+        grows = 0.0 if x.payout is None else float(np.diff(x.payout.nodes).max())
+        strands.append(TouchingLine(x.line, diameters(x), least_bending(x), x.tension_scale, grows))
     return SharedContact(model.touching, strands, rubs)
 
 

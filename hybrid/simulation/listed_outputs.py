@@ -14,6 +14,7 @@ from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.scene.system import System
 from hybrid.simulation.case import Case
+from hybrid.simulation.pair_forces import fields_of_pairs
 from hybrid.simulation.result_file import STEP_FIELDS
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.system_lines import observer_of
@@ -43,7 +44,7 @@ def listed_outputs(scene: SceneLike | System) -> list[Listed]:
     model = build_system(asked)
     guesses = asked.guesses
     scenes = {name: asked.scene_of(name, asked.carried(name), guesses) for name in model.names}
-    found = _over_time([*fields_of(asked), *SystemQuantities(asked, scenes).fields])
+    found = _over_time([*fields_of(asked), *fields_of_pairs(model), *SystemQuantities(asked, scenes).fields])
     if asked.time is not None:
         found = _with_ranges(found, asked.output.quantities)
     for (name, each), built in zip(scenes.items(), model.models, strict=True):

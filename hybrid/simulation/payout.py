@@ -80,7 +80,7 @@ class PayingOut:
         # Rate, m/s, by which the rods of zones that move have been given at the winch: at the start, or by the last
         # node that has entered or left.
         self.foreseen = fastest(self.law)
-        self._layout: Layout | None = None  # of a line whose zones move
+        self.layout: Layout | None = None  # of a line whose zones move
         self.ended = False  # whether the end at the winch has been let go
         self.table, self._fitting, self._clock = Table(blank_reel_job()), Table(blank_reel_job()), np.zeros(CLOCK_SIZE)
         self._carrying = Table(blank_carry_job())
@@ -134,7 +134,7 @@ class PayingOut:
 
     def attach(self, run: CompiledRun, model: Model, stepper: Stepper, moving: MovingZones) -> None:
         """Let a run pay out its line from now on; moving: of its zones."""
-        self._layout = model.layout
+        self.layout = model.layout
         self.table.bind(
             line=model.line, sea=model.sea.values, ends=model.ends.values, old=run.states[0], new=run.states[1],
             clock=run.clock, counts=run.count, work=run.books.work, velocity=run.books.velocity,
@@ -430,10 +430,10 @@ class PayingOut:
         """What the next steps depend on."""
         kept = {name: getattr(self.reel, name).copy() for name in KEPT}
         cells = {}
-        if self._layout is not None:
-            cells["rod"] = self._layout.rod.copy()
+        if self.layout is not None:
+            cells["rod"] = self.layout.rod.copy()
             if self.plan.follows:
-                cells["here"] = self._layout.there
+                cells["here"] = self.layout.there
         ended = {"ended": True} if self.ended else {}
         return {"count": self.count, "law": self.law.copy(), "foreseen": self.foreseen, **ended, **kept, **cells}
 

@@ -26,9 +26,13 @@ from hybrid.kernels.run.payout_run import NodeJob, blank_line_job, blank_node_jo
 from hybrid.kernels.run.run import run as steps
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, sample_size
+from hybrid.kernels.state.forces import REMEMBERS
 from hybrid.kernels.state.state import (
+    NO_GRIP,
     NO_PEAK,
+    NO_SHEAVES,
     NO_SLOW,
+    NO_SOIL,
     NO_TENSION_TORQUE,
     NO_TORSION,
     NO_TURN,
@@ -116,7 +120,7 @@ class NodeChanges:
         plain = not any(
             getattr(line, name).size for name in ("torsion", "tension_twist", "law", "bend_law", "wake_law", "moved")
         )
-        return owner.pays_out and owner.correction is None and plain
+        return owner.pays_out and owner.correction is None and plain and not line.bits & REMEMBERS
 
     @staticmethod
     def _key(owner: Transient) -> tuple[Any, ...]:
@@ -148,7 +152,9 @@ class NodeChanges:
         return found
 
     def _state(self, k: int, which: int, cells: int) -> State:
-        found: State = self._sides[k].states[which].view(cells, turn=NO_TURN, slow=NO_SLOW, wake=NO_WAKE, peak=NO_PEAK)
+        absent = {"turn": NO_TURN, "slow": NO_SLOW, "wake": NO_WAKE, "peak": NO_PEAK}
+        absent |= {"grip": NO_GRIP, "sheave": NO_SHEAVES, "soil": NO_SOIL}
+        found: State = self._sides[k].states[which].view(cells, **absent)
         return found
 
     def _reel(self, k: int, cells: int) -> Reel:

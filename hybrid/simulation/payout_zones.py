@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hybrid.adapt.base_change import change_base
@@ -9,13 +11,13 @@ from hybrid.adapt.manager import Change, DomainManager, Reason
 from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.stiffness_ramp import soften
 from hybrid.kernels.reel.reel import MovingZones, zones_that_stay
+from hybrid.kernels.state.state import State
 from hybrid.model.build import Model, given_zones
 from hybrid.model.layout import Layout
 from hybrid.model.payout import FEWEST_CELLS, PayoutPlan
 from hybrid.scene.schema import Scene
 from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.zone_switching import ZoneSwitching
-from hybrid.solve.run import CompiledRun
 
 # Ramp times of bending stiffness within which a cell that is taken in must have become rod.
 AHEAD = 2.0
@@ -39,8 +41,11 @@ def rods_at_winch(scene: Scene, plan: PayoutPlan, model: Model, count: int, pace
 class PaidZones:
     """The zones of one line that is paid out."""
 
-    def __init__(self, scene: Scene, paying: PayingOut, switching: ZoneSwitching) -> None:
-        self.scene, self.paying, self.switching = scene, paying, switching
+    def __init__(
+        self, scene: Scene, paying: PayingOut, switching: ZoneSwitching, turning: Sequence[bool] = (False, False)
+    ) -> None:
+        """turning: whether the ends are clamped to what turns, beside which a line stays rod."""
+        self.scene, self.paying, self.switching, self._turning = scene, paying, switching, turning
 
     @property
     def manager(self) -> DomainManager:
@@ -73,8 +78,8 @@ class PaidZones:
         step = np.repeat(layout.parts // np.minimum(fewer, layout.parts), layout.parts)
         return np.append((np.arange(step.size) - np.repeat(layout.starts[:-1], layout.parts)) % step == 0, True)
 
-    def hand_over(self, run: CompiledRun) -> None:
-        """Cells whose lengths the reel has brought to their true ones are those of zones from now on.
+    def hand_over(self, t: float, state: State) -> None:
+        """At t (s): cells whose lengths the reel has brought to their true ones are those of zones from now on.
 
         Where cells follow the curvature these are as long as makes chords of arcs, and go there within a ramp time.
         """
@@ -85,23 +90,23 @@ class PaidZones:
         if paying.plan.follows:
             let &= at < paying.material - 1 - FEWEST_CELLS
         else:
-            let &= reel.since + reel.span <= run.t
+            let &= reel.since + reel.span <= t
         if not let.any():
             return
         own = np.flatnonzero(let)
-        lack, rate = paying.lengths_now(own, run.t)
+        lack, rate = paying.lengths_now(own, t)
         cells = own if paying.plan.side else reel.since.size - 1 - own
         true = np.diff(line.s)[cells]
         if paying.plan.follows:
-            less = switching.arcs_less_chords(run.state)[cells]
+            less = switching.arcs_less_chords(state)[cells]
             true, lack = true - less, lack - less
-        zones.true[cells], zones.lack[cells], zones.rate[cells], zones.since[cells] = true, lack, rate, run.t
+        zones.true[cells], zones.lack[cells], zones.rate[cells], zones.since[cells] = true, lack, rate, t
         zones.lengths[cells], zones.keeps[cells], zones.counts[z.RELAXING] = line.h[cells], False, 1
         paying.release(own)
 
-    def as_now(self, model: Model, run: CompiledRun) -> Model:
-        """Before zones change: the model with its nodes where they are now."""
-        self.hand_over(run)
+    def as_now(self, model: Model, t: float, state: State) -> Model:
+        """Before zones change at t (s): the model with its nodes where they are now."""
+        self.hand_over(t, state)
         model, switching, zones = self.paying.as_now(model), self.switching, self.switching.zones
         assert model.layout is not None and model.on_base is not None
         switching.model = model
@@ -142,6 +147,7 @@ class PaidZones:
         assert model.layout is not None and model.on_base is not None
         paying, manager = self.paying, self.manager
         given = rods_at_winch(self.scene, paying.plan, model, paying.count, manager.pace, paying.foreseen)
+        given[[0, -1]] = np.where(self._turning, 1, given[[0, -1]])
         manager.cable = paying.plan.held_as(model.cable)
         change_base(manager, model.layout, source, cells, given, model.on_base, anew)
         self.switching.take_cells(model)

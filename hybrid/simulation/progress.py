@@ -23,7 +23,7 @@ from hybrid.simulation.notebook_progress import NotebookBar, in_notebook, notebo
 
 PRE_RUN, ESTIMATION, RESULT, REFINEMENT = "mesh pre-run", "error estimation", "result", "refinement"
 
-CONTACT = "contact with itself"
+CONTACT = "contact"
 COMPILING = "compiling the kernels for this machine (first use only, up to two minutes) ..."
 REPORT_EVERY = 0.1  # s of wall time between two calls of a listener
 # The speed of the last so many reports (about 5 s) gives the time left: the compilation of the first step, or a slow

@@ -41,6 +41,7 @@ from hybrid.simulation.envelope import Envelope
 from hybrid.solve.statics import Equilibrium
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target, Text
 from hybrid.store.capacity import CORNERS
+from hybrid.store.code_checks import ROWS
 from hybrid.store.format import Field
 from hybrid.store.named_arrays import Tree
 from hybrid.store.recorder import BaseRecorder
@@ -220,6 +221,9 @@ def _limits_of_quantities(observer: Observer) -> list[tuple[Field, np.ndarray]]:
     if (capacities := observer.quantities.capacities) is not None:
         rows, what = capacities.rows(), "corners of capacity polygons: from and to (m), tension (N), curvature (1/m)"
         out.append((Field(CORNERS, "", what, rows.shape, ("corner", "capacity_row")), rows))
+    if (codes := observer.quantities.codes) is not None:
+        rows, what = codes.rows(), "sections that are checked by a code, as of hybrid.store.code_checks.Row"
+        out.append((Field(ROWS, "", what, rows.shape, ("code_row", "code_number")), rows))
     if pipes is None or np.isnan(pipes.limits).all():
         return out
     for name, s in (("", observer.s), ("right/", observer.jumps)):

@@ -113,14 +113,12 @@ def _go_on(run: SystemRun, numbers: Sequence[int], after: str) -> None:
 
     The energy of contact that comes or goes so is booked.
     """
-    moving = () if run.zones is None else run.zones.numbers
-    others = [k for k in numbers if k not in moving]
-    before = [float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) for k in others]
     if run.zones is not None:
         run.zones.go_on()
-    else:
-        renew_solver(run, after)
-    for k, energy in zip(others, before, strict=True):
+        return
+    before = [float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) for k in numbers]
+    renew_solver(run, after)
+    for k, energy in zip(numbers, before, strict=True):
         run.lines[k].books.work[0, ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
 
 

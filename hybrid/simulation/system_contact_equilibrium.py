@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import chain
+from itertools import chain, pairwise
+
+import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.junctions.carried_frames import TURNS
@@ -12,20 +14,24 @@ from hybrid.kernels.march.link import LINK, holds_twist, link_of
 from hybrid.kernels.state.forces import OBSTACLES, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
-from hybrid.model.first_state import HUNG
+from hybrid.model.first_state import HUNG, first_state
+from hybrid.model.initial_shape import hung
 from hybrid.model.system import SystemModel
-from hybrid.simulation.contact_equilibrium import KEPT, contact_of, passes_itself
+from hybrid.simulation.contact_equilibrium import KEPT, contact_of, nearness, passes_itself
 from hybrid.simulation.lines_contact import crossed, shared_of
 from hybrid.solve.contact_statics import contact_energy
 from hybrid.solve.flaws import behind_obstacles
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.shared_contact import SharedContact
+from hybrid.solve.softened import is_in_current
 from hybrid.solve.system_contact_statics import settled_system, touching_solver
-from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
+from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, in_slower_currents, solve_system_statics
 
 # Turns by which an equilibrium without contact may differ from its start, whose shape may have a writhe of its own.
 OF_SHAPE = 0.5
+# Parts of a current by whose equilibria lines come to that in all of it.
+SLOWER = tuple(np.linspace(0.875, 0.0, 8).tolist())
 
 
 def solve_with_contact(
@@ -49,17 +55,50 @@ def solve_with_contact(
             raise LineFailed(failed.line, failed.outcome, None, failed.s, tried) from None
     if not any(_touch(lines)):
         return found
-    hung = SystemState([x.start for x in model.models])
-    lost = _has_lost(lines, hung, found)
-    if model.touching is not None:
-        lost = lost or crossed(model.touching, hung, found.state) is not None
+    first_shapes = _before_current(model)
+    lost = _has_lost(lines, first_shapes, found)
+    lost = lost or _passes_another(model, lines, bodies, first_shapes, found.state)
     each = zip(_touch(lines), model.models, found.state.lines, strict=True)
     lost = lost or any(touches and passes_itself(x, state) for touches, x, state in each)
     if not (lost or _largest_energy(model, lines, bodies, found.state)):
         return found
     last: list[Start] = [] if lost else [("the equilibrium without contact", found.state)]
-    first = _first_apart(model, lines, bodies, chain(starts(), last))
+    before = [("lines hung in still water", first_shapes)] if model.touching is not None else []
+    first = _first_apart(model, lines, bodies, chain(before, starts(), last))
     return found if first is None else settle(model, lines, bodies, first)
+
+
+def _passes_another(
+    model: SystemModel, lines: Sequence[JoinedLine], bodies: Floats, first: SystemState, found: SystemState
+) -> bool:
+    """Whether a line passes through another one from its first shape to an equilibrium that knows no contact.
+
+    Where a current acts by the equilibria while it grows, as far as there are any: two lines that pass through each
+    other twice, first in a weak current and again in a strong one, do not on the straight way.
+    """
+    if model.touching is None:
+        return False
+    way = [found]
+    if any(is_in_current(lines[k].line, lines[k].sea) for k in model.touching.lines):
+        way += in_slower_currents(lines, len(model.free), bodies, found, SLOWER) or []
+    return any(crossed(model.touching, a, b) is not None for a, b in pairwise((first, *way[::-1])))
+
+
+def _before_current(model: SystemModel) -> SystemState:
+    """The first shapes of all lines, of those that touch others as they hang in still water.
+
+    They say on which side of another line each lies: a current that comes then drives it against the other one, and
+    not through it.
+    """
+    states = [x.start for x in model.models]
+    for k in model.touching.lines if model.touching is not None else ():
+        x, scene = model.models[k], model.scenes[model.names[k]]
+        sea = x.sea.values
+        if x.start_shape == HUNG and is_in_current(x.line, sea):
+            shape = hung(scene, x.line, sea._replace(current=np.zeros_like(sea.current)))
+            if shape is not None:
+                states[k] = first_state(scene, x.line, x.cable, x.sea, x.tension_scale, shape)[0]
+    return SystemState(states, model.body_places)
 
 
 def _on_the_side_of_the_span(
@@ -144,6 +183,24 @@ def energy_between(
     solver = touching_solver(lines, len(model.free), bodies, lambda: ([], shared_of(model)))
     assert solver.shared is not None
     return solver.contact_energy(state), solver.shared
+
+
+def nearness_in(
+    model: SystemModel, lines: Sequence[JoinedLine], found: SystemEquilibrium, t: float
+) -> dict[int, Floats]:
+    """How near nodes (N+1,) of lines at rest are to what they may touch, by number: above 1, nearer than two diameters.
+
+    Lines that touch neither themselves nor others are not in it.
+    """
+    each = enumerate(zip(model.models, found.state.lines, strict=True))
+    near = {k: nearness(x, t, state) for k, (x, state) in each if touches_alone(model, k)}
+    if model.touching is not None:
+        bodies = found.solver.bodies.copy()
+        solver = touching_solver(lines, len(model.free), bodies, lambda: ([], shared_of(model)))
+        assert solver.shared is not None
+        near |= solver.shared.look_ahead(1.0)
+        solver.contact_energy(found.state)
+    return near
 
 
 def _first_apart(

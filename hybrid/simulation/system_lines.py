@@ -38,8 +38,8 @@ from hybrid.kernels.state.books import (
     blank_books,
     sample_size,
 )
-from hybrid.kernels.state.forces import FRICTION, MAY_TOUCH, OBSTACLES, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one, slip_size
+from hybrid.kernels.state.forces import MAY_TOUCH, REMEMBERS, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one, sampled_size, slip_size
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import output_points
@@ -188,7 +188,7 @@ class LineResult:
     def sample_size(self) -> int:
         """Numbers of an output of the line as it is."""
         line, varies, touches = self.model.line, self.model.layout is not None, self.books.touch.size > 0
-        return sample_size(line.h.size, varies, len(line.torsion), touches, line.moved.size, slip_size(line))
+        return sample_size(line.h.size, varies, len(line.torsion), touches, line.moved.size, sampled_size(line))
 
     def make_room(self, rows: int) -> None:
         """Room for so many samples of the line as it is; what is there is gone."""
@@ -233,10 +233,8 @@ class LineResult:
         """
         line = self.model.line
         self.diagnostics.found_by(found.pushed, slack_cell(x, state), state)
-        if line.bits & FRICTION and self.number not in found.with_friction:
-            under = "obstacles" if line.bits & OBSTACLES else "the seabed"
-            text = f"this equilibrium of several lines is the one without friction on {under}"
-            self.events.event(0.0, 0.0, self.model.length, "static friction neglected", text)
+        if self.number not in found.with_friction:
+            self.diagnostics.friction_neglected(state, f"lines.{self.name}.initial", self.shares)
         touches = found.settled and bool(self.books.touch[:1].any())
         if line.bits & SELF_FRICTION and touches:
             text = f"this equilibrium is the one without friction where {self._touched}"
@@ -339,8 +337,9 @@ class LineResult:
         """The outputs that steps have sampled, as many as there are in the buffer; in arrays of their own."""
         line, books = self.model.line, self.books
         varies = self.model.layout is not None
-        sizes = line.h.size, HELD, varies, len(line.torsion), books.touch.shape[1], line.moved.size, slip_size(line)
-        return batch_of_rows(books.samples[:count].copy(), *sizes)[0]
+        sizes = line.h.size, HELD, varies, len(line.torsion), books.touch.shape[1], line.moved.size
+        kept = slip_size(line), bool(line.bits & REMEMBERS)
+        return batch_of_rows(books.samples[:count].copy(), *sizes, *kept)[0]
 
     def state_now(self, t: float, ends: Ends, state: State, work: Work) -> Batch:
         """The state at t (s), now, as an output that is made of it."""
@@ -424,6 +423,8 @@ class LineResult:
         """Record the envelope up to t (s) and the status; events as of `take_events`."""
         if status == "complete" and self._moves and not isinstance(self.recorder, ComparisonRecorder):
             self.diagnostics.finish(self.books)
+        elif status == "failed":
+            self.diagnostics.created_energy()
         values = self.envelope.values(self.model.nodes, self.books.extremes, t)
         self.recorder.replace(values)
         self.envelope.note_broken(values, self.recorder.recorded(), self.events.event)

@@ -15,7 +15,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.reel.payout import iterate, pay_out, stand_among
-from hybrid.kernels.reel.reel import ReelJob, zones_that_stay
+from hybrid.kernels.reel.reel import ReelJob
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Floats, state_for
@@ -23,6 +23,7 @@ from hybrid.model.build import Model
 from hybrid.model.system import SystemModel
 from hybrid.simulation.failure import winch_text
 from hybrid.simulation.payout import Before, PayingOut
+from hybrid.simulation.payout_zones import PaidZones, moving_zones
 from hybrid.simulation.system_contact import renew_solver
 from hybrid.solve.joined import SystemState
 from hybrid.solve.system_statics import LineFailed
@@ -39,6 +40,7 @@ class SystemPayout:
     def __init__(self, run: SystemRun) -> None:
         """Of a run whose model is that of t = 0; it gets lines with the nodes that a winch makes."""
         self._run = run
+        self.zones: dict[int, PaidZones] = {}  # of those whose zones move
         self.lines = {k: PayingOut(x) for k, x in enumerate(run.model.models) if x.payout is not None}
         self._take({k: x.on(run.model.models[k], run.model.models[k].length) for k, x in self.lines.items()})
         for k, x in self.lines.items():
@@ -54,6 +56,7 @@ class SystemPayout:
     def bind(self, solver: SystemSolver) -> None:
         """A solver finds forces with the lengths of now, of the state of now."""
         for k, x in self.lines.items():
+            x.layout = self._run.model.models[k].layout
             x.table.bind(**self._job(solver, k))
             numbers = x.table.numbers
             joined = solver.lines[k].joints[x.plan.side] >= 0
@@ -66,7 +69,7 @@ class SystemPayout:
         books, work, state = run.lines[k].books, solver.work[k], run.state.lines[k]
         job = ReelJob(
             x.line, x.sea, x.ends, state, state, run.loop.clock, run.loop.counts, books.work,
-            books.velocity, work.report, paying.reel, work.X, work.W, zones_that_stay(),
+            books.velocity, work.report, paying.reel, work.X, work.W, moving_zones(self.zones.get(k)),
         )  # fmt: skip
         return job._asdict()
 
@@ -101,8 +104,11 @@ class SystemPayout:
             if x.due:
                 self._change(k, x)
                 changed.append(k)
-        if changed:
-            before = {k: float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) for k in changed}
+        if changed and run.zones is not None:
+            run.zones.go_on("where a node enters or leaves at a winch")
+        elif changed:
+            touching = () if run.shared is None else run.shared.lines
+            before = {k: float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) for k in {*changed, *touching}}
             renew_solver(run, "where a node enters or leaves at a winch")
             for k, energy in before.items():
                 run.lines[k].books.work[0, b.ZONES] += float(run.solver.work[k].report[SELF_CONTACT_ENERGY]) - energy
@@ -111,8 +117,15 @@ class SystemPayout:
         """A node enters at the winch of a line, or leaves it."""
         run, line, states = self._run, self._run.lines[k], [*self._run.state.lines]
         line.write_down()  # with the reel as it is
-        before = Before(states[k], run.t, run.loop.clock, line.books.tension)
-        model, states[k], booked = paying.change(before, run.model.models[k])
+        zones, tension = self.zones.get(k), line.books.tension
+        first = zones.before_change() if zones is not None else None
+        if first is not None and run.zones is not None:
+            run.zones.switch(k, *first)
+            states = [*run.state.lines]
+        if zones is not None:
+            zones.hand_over(run.t, states[k])
+        before, carry = Before(states[k], run.t, run.loop.clock, tension), zones.carry if zones is not None else None
+        model, states[k], booked = paying.change(before, run.model.models[k], carry)
         if line.contact is not None or line.shares:  # whose forces kernels.reel.payout_balance does not know
             paying.leave_unbalanced()
         line.books.work[0, b.ZONES] += booked
@@ -138,7 +151,7 @@ class SystemPayout:
         """A model with other loads on the cells of t = 0, with the cells of now."""
         found = [*model.models]
         for k, x in self.lines.items():
-            found[k] = x.on(found[k], x.length)
+            found[k] = x.on(replace(found[k], layout=self._run.model.models[k].layout), x.length)
         return replace(model, models=tuple(found))
 
     # --- checkpoints ------------------------------------------------------------------------------
@@ -152,6 +165,8 @@ class SystemPayout:
         run, states = self._run, [*self._run.state.lines]
         for k, x in self.lines.items():
             model = x.restore(saved[run.lines[k].name], run.model.models[k])
+            if k in self.zones:
+                self.zones[k].resume(model)
             self._take({k: model})
             states[k] = state_for(model.line)
             run.lines[k].take_cells(model, extremes=False)

@@ -18,7 +18,6 @@ from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.junctions.bodies import FRAME, PLACE, V
 from hybrid.kernels.machine.cache import cache_folder
-from hybrid.kernels.run.system_sampling import SAMPLE_AXES, SAMPLE_PLACE
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.forces import SELF_CONTACT
 from hybrid.kernels.state.state import Floats, Moves, state_for
@@ -33,9 +32,11 @@ from hybrid.scene.system import System
 from hybrid.simulation.collapse import COLLAPSE, CONTACT, GIVE_UP, collapse_text
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import energy_gains_text
+from hybrid.simulation.floating_watch import note_dry_bodies, note_pulled_under
 from hybrid.simulation.interrupts import at_once
 from hybrid.simulation.lines_contact import shared_of, tell_meetings
 from hybrid.simulation.lines_watch import LinesWatch, tell_passages
+from hybrid.simulation.pair_forces import fields_of_pairs, values_of_pairs
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import refused, require_same
@@ -60,7 +61,7 @@ from hybrid.simulation.system_contact import (
 from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_lines import WAITING, LineResult, LineStep
 from hybrid.simulation.system_load_change import change_loads_of_lines, loaded_as, with_loads_of
-from hybrid.simulation.system_points import Rotations, Sampled, fields_of, gauges_of, times, values_of
+from hybrid.simulation.system_points import Rotations, Sampled, fields_of, gauges_of, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import begin_as_placed, blended_of_lines, equilibrium_of_system, joined_lines, named
 from hybrid.simulation.system_zones import SystemZones, managers_for, zones_as_placed, zones_at_rest
@@ -74,6 +75,7 @@ from hybrid.solve.system_steps import SystemSteps
 from hybrid.store.array_recorder import ArrayRecorder, MemoryTarget, Target, Text
 from hybrid.store.checkpoint import read_checkpoint
 from hybrid.store.comparison_recorder import ComparisonRecorder
+from hybrid.store.format import Field
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
 from hybrid.store.records import PENDING
@@ -192,6 +194,7 @@ class SystemRun:
         self._moved: list[Moves] = []  # by which ends move in compiled steps
         self._loaded = np.nan  # and `loaded`, of the loads that act there on bodies
         self.dry: set[str] = set()  # bodies that have been said to be out of the water
+        self.under: dict[str, float] = {}  # depth (m) of points that have been said to be pulled under it
         self.failures = Failures(self)
         self.zones = SystemZones(self, managers) if managers and moves else None
         self.loaded = 0.0  # s, loads that have stopped by then act no more
@@ -263,22 +266,26 @@ class SystemRun:
             attributes[PENDING] = self._pending
         if on_bodies:
             attributes["fairleads"] = json.dumps(on_bodies)
-        fields = [*fields_of(self.system), *self.quantities.fields]
         fixed = [*self.quantities.limits, *self.quantities.ranges, *places_of_elevation(gauges_of(self.system))]
         if isinstance(self.target, MemoryTarget):
             return ArrayRecorder(
-                self.target, grid_s=np.zeros(1), fields=fields, step_fields=(), attributes=attributes,
+                self.target, grid_s=np.zeros(1), fields=self._fields, step_fields=(), attributes=attributes,
                 fixed=fixed, texts={"scene": text} | self._told,
                 parts={line.name: line.target for line in self.lines if line.target is not None},
             )  # fmt: skip
         recorder = Recorder(
-            self.target, grid_s=np.zeros(1), fields=fields, step_fields=(), attributes=attributes, fixed=fixed,
+            self.target, grid_s=np.zeros(1), fields=self._fields, step_fields=(), attributes=attributes, fixed=fixed,
             texts={"scene": text if isinstance(text, str) else text()} | self._told,
             outputs=len(self.times) + 1, overwrite=True,
             before=self._before if self.kept else None, templates=cache_folder().parent, parts=self._parts,
         )  # fmt: skip
         recorder.files = self._files
         return recorder
+
+    @property
+    def _fields(self) -> list[Field]:
+        """What is recorded at every output, beside the lines."""
+        return [*fields_of(self.system), *fields_of_pairs(self.model), *self.quantities.fields]
 
     @property
     def _told(self) -> dict[str, str]:
@@ -307,9 +314,8 @@ class SystemRun:
                     raise ValueError(f"t = {self.t:g} s after an output at {point.t:g} s")
             self.model.load_bodies(self.t, self.solver.bodies, self.loaded)
             self.other, self._between = self.state.copy(), True
-            fields = [*fields_of(self.system), *self.quantities.fields]
             recorder = Recorder.again(
-                file, self.target, fields, (), point, texts, self._before, (), self._parts, self._pending
+                file, self.target, self._fields, (), point, texts, self._before, (), self._parts, self._pending
             )
         recorder.files = self._files
         if why := other_program(point):
@@ -367,9 +373,11 @@ class SystemRun:
             values = values_of(self.system, self.model, seen)
             self.rotations.go_on(values)
             by_name = {line.name: x for line, x in zip(self.lines, states, strict=True)}
+            values |= values_of_pairs(self.model, self.solver.shared, states)
             values |= self.quantities.values(by_name, {line.name: line for line in self.lines})
             self.recorder.save_batch(seen.t, values, [("lines", 0.0, 0.0)])
-        self._look_for_dry_bodies(seen)
+        note_dry_bodies(self.system, self.model, seen, self.dry, self.recorder.event)
+        note_pulled_under(self.system, self.model, seen, self.under, self.recorder.event, moves=self.moves)
         self._keep_in_plane()
         for line, x in zip(self.lines, states, strict=True):
             line.output(x)
@@ -385,25 +393,6 @@ class SystemRun:
             if max(out, float(np.abs(R @ R0.T @ normal - normal).max())) > OUT:
                 names = [*(body.name for body in self.model.bodies), *self.model.rigid]
                 raise LineFailed(-1, Outcome.LEFT_PLANE, self.t, None, f"{names[k]} leaves it")
-
-    def _look_for_dry_bodies(self, seen: Sampled) -> None:
-        """An event where a body that counts as submerged has risen out of the water."""
-        fluid = self.system.environment.fluid
-        if fluid is None or fluid.surface is None:
-            return
-        for k, body in enumerate(self.model.bodies):
-            given = self.system.free_bodies[body.name]
-            if not given.volume or body.name in self.dry:
-                continue
-            arm = times(seen.frame(k), np.array(given.centre_of_buoyancy, float))
-            centre = seen.bodies[:, k, SAMPLE_PLACE:SAMPLE_AXES] + arm
-            above = centre[:, 2] - fluid.surface
-            if (above > 0.0).any():
-                first = int((above > 0.0).argmax())
-                self.dry.add(body.name)
-                text = f"body {body.name}: the centre of its volume is {above[first]:.4g} m above the surface, but"
-                text += " all of its buoyancy still lifts it"
-                self.recorder.event(float(seen.t[first]), 0.0, 0.0, "body out of water", text)
 
     def _close(self, status: str, message: str) -> None:
         """Close all, with the events of the lines in the result of the points too."""
@@ -421,6 +410,7 @@ class SystemRun:
     def record_equilibrium(self) -> None:
         """Record the equilibrium that was found."""
         assert self.found is not None
+        self._note_partners()
         try:
             self.solver = solver = self.found.solver
             if not self.found.settled:
@@ -479,14 +469,18 @@ class SystemRun:
         for body, row in zip(self.model.bodies, bodies, strict=False):
             body.take_added_mass(row)
 
+    def _note_partners(self) -> None:
+        """Lines know whether they may touch others."""
+        for line in self.lines:
+            line.shares = self.model.touching is not None and line.number in self.model.touching.lines
+
     def make_solver(self) -> None:
         """A solver for the model as it is."""
         self.quantities.follow(self.model)
-        for line in self.lines:
-            line.shares = self.model.touching is not None and line.number in self.model.touching.lines
+        self._note_partners()
         contacts, shared = [line.touch_itself(self.t) for line in self.lines], shared_of(self.model, rubs=True)
         if shared is not None and self.shared is not None:
-            shared.restore(self.shared.checkpoint(self.t), self.t)
+            shared.restore(self.shared.checkpoint(self.t), self.t, remeshed=self.payout is not None)
         self.shared = shared
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts, shared)

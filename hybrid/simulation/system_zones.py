@@ -21,17 +21,17 @@ from hybrid.kernels.mesh import zone_step as z
 from hybrid.kernels.mesh.zone_step import LOOKAHEAD, follow_zones
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import COUNT_SIZE
-from hybrid.kernels.state.forces import SELF_CONTACT
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Ends, Line, State, state_for
 from hybrid.model.build import Model
 from hybrid.model.coarsen import picked
 from hybrid.model.system import SystemModel
 from hybrid.scene.schema import AdaptiveModel, Scene
-from hybrid.simulation.contact_equilibrium import nearness
 from hybrid.simulation.initial_zones import MOST_ROUNDS, STRICTER, manager_for, zones_without_equilibrium
+from hybrid.simulation.payout_zones import PaidZones
 from hybrid.simulation.system_contact import renew_solver
-from hybrid.simulation.system_start import solve_from
+from hybrid.simulation.system_contact_equilibrium import nearness_in
+from hybrid.simulation.system_start import joined_lines, solve_from
 from hybrid.simulation.zone_switching import LETTING_GO, LONGEST_IN_PACE, READY, ZoneSwitching, note_change, on_layout
 from hybrid.solve.joined import SystemState, SystemTaken
 from hybrid.solve.run import Tried
@@ -40,6 +40,7 @@ from hybrid.store.named_arrays import matched
 
 if TYPE_CHECKING:
     from hybrid.kernels.machine.binding import Table
+    from hybrid.simulation.system_payout import SystemPayout
     from hybrid.simulation.system_run import SystemRun
     from hybrid.solve.system_steps import SystemSteps
 
@@ -118,7 +119,7 @@ def _within(
     model: SystemModel, found: SystemEquilibrium, managers: Mapping[int, DomainManager], t: float
 ) -> tuple[SystemModel, SystemEquilibrium] | None:
     """Zones that satisfy the criteria in their own equilibrium; None: all rod.  ComputationError: there is none."""
-    rods = {k: _asked(manager, model.models[k], found.state.lines[k], t) for k, manager in managers.items()}
+    rods = _asked(managers, model, found, t)
     for _ in range(MOST_ROUNDS):
         if all(rod.all() for rod in rods.values()):
             return None
@@ -132,20 +133,24 @@ def _within(
         other = replace(model, models=tuple(models))
         start = SystemState(states, found.state.bodies)
         answer = solve_from(found, other, t, found.solver.bodies.copy(), start, "the equilibrium of rods")
-        more = {
-            k: rods[k] | _asked(manager, models[k], answer.state.lines[k], t) for k, manager in managers.items()
-        }  # fmt: skip
+        more = {k: rods[k] | asked for k, asked in _asked(managers, other, answer, t).items()}
         if all((more[k] == rods[k]).all() for k in managers):
             return other, answer
         rods = more
     return None
 
 
-def _asked(manager: DomainManager, model: Model, state: State, t: float) -> np.ndarray:
-    """Base cells that the criteria want to be rod in a state."""
-    manager.near = nearness(model, t, state) if model.line.bits & SELF_CONTACT else np.zeros(0)
-    manager.evaluate_criteria(model.line, model.sea.at(t), model.ends.at(t), state, 0.0)
-    return manager.initial_rods(state)
+def _asked(
+    managers: Mapping[int, DomainManager], system: SystemModel, found: SystemEquilibrium, t: float
+) -> dict[int, np.ndarray]:
+    """Base cells that the criteria want to be rod in an equilibrium, by number of the line."""
+    near, rods = nearness_in(system, joined_lines(system, t), found, t), {}
+    for k, manager in managers.items():
+        model, state = system.models[k], found.state.lines[k]
+        manager.near = near.get(k, np.zeros(0))
+        manager.evaluate_criteria(model.line, model.sea.at(t), model.ends.at(t), state, 0.0)
+        rods[k] = manager.initial_rods(state)
+    return rods
 
 
 def _on_fewer(state: State, full: Model, model: Model) -> State:
@@ -176,8 +181,8 @@ class _LineZones:
         longest, clock = LONGEST_IN_PACE * manager.pace * every, manager.zones.clock
         clock[z.RAMP_STEP], clock[z.CALM_STEP] = longest, longest * READY
         clock[z.LETTING_GO] = LETTING_GO * manager.pace
-        self.contact_energy = 0.0  # J, of the line with itself, after the last accepted step
         self.pending: Change | None = None
+        self.paid: PaidZones | None = None  # of a line that is paid out
 
     def follow(self, run: SystemRun, phase: int, t: float, end: float, old: State, new: State) -> None:
         """Before, after a try from t to `end` (s), or, with the states exchanged, after an accepted step."""
@@ -212,11 +217,25 @@ class SystemZones:
     def __init__(self, run: SystemRun, managers: Mapping[int, DomainManager]) -> None:
         every = run.resolution.one.every
         self._run = run
+        # (L,) J, of each line with itself and others, after the last accepted step
+        self.contact_energy = np.zeros(len(run.lines))
         self.lines = [_LineZones(k, run.model.models[k], x, every) for k, x in managers.items()]
         for k, x in managers.items():
             run.lines[k].manager = x
+        if run.payout is not None:
+            self._pay(run.payout)
         self._rescues, self._rescued = 0, 0  # of the step that is tried, after so many
         self._compiled = all(x.switching.compiled for x in self.lines)
+
+    def _pay(self, payout: SystemPayout) -> None:
+        """Zones know of the winches of their lines, and these of them."""
+        run = self._run
+        for x in self.lines:
+            paying = payout.lines.get(x.number)
+            if paying is not None:
+                turning = run.model.seats[x.number, :, TURNS] != 0.0
+                x.paid = PaidZones(run.scenes[x.number], paying, x.switching, turning.tolist())
+                payout.zones[x.number] = x.paid
 
     def attach(self, loop: SystemSteps) -> None:
         """Let the steps of a loop follow the zones from now on, or ask for what they do."""
@@ -234,15 +253,19 @@ class SystemZones:
             loop.counts[b.ASKS] |= b.ASK_BEFORE | b.ASK_STEPS
 
     def look_ahead(self) -> None:
-        """Criteria know how near lines come to themselves, by the contact that the solver has now."""
+        """Criteria know how near lines come to themselves and each other, by the contact that the solver has now."""
+        run = self._run
+        horizons = {x.number: LOOKAHEAD * x.switching.manager.pace for x in self.lines}
+        near = {} if run.shared is None else run.shared.look_ahead(max(horizons.values()))
         for x in self.lines:
-            manager, contact = x.switching.manager, self._run.lines[x.number].contact
-            manager.near = np.zeros(0) if contact is None else contact.look_ahead(LOOKAHEAD * manager.pace)
+            contact = run.lines[x.number].contact
+            if contact is not None:
+                near[x.number] = contact.look_ahead(horizons[x.number])
+            x.switching.manager.near = near.get(x.number, np.zeros(0))
 
     def _note_contact(self) -> None:
-        """Energy of contact of the state as it is, from which that of other cells is told."""
-        for x in self.lines:
-            x.contact_energy = float(self._run.solver.work[x.number].report[SELF_CONTACT_ENERGY])
+        """Energy of contact of the state as it is, from which that of other cells is told, of all lines."""
+        self.contact_energy[:] = [work.report[SELF_CONTACT_ENERGY] for work in self._run.solver.work]
 
     def begin(self) -> None:
         """Weigh the criteria of the first state."""
@@ -282,7 +305,7 @@ class SystemZones:
         """
         run = self._run
         models, states = [*run.model.models], [*run.state.lines]
-        for x in self.lines:
+        for x in (x for x in self.lines if x.paid is None):  # a winch gives its line the cells of then
             k, layout, manager = x.number, x.full.layout, x.switching.manager
             assert layout is not None
             mine = matched(saved[run.lines[k].name], {"rod": layout.rod, "switching": None}, "zones")
@@ -358,11 +381,19 @@ class SystemZones:
         if changed:
             self.go_on()
 
-    def _switch(self, x: _LineZones, change: Change) -> None:
+    def switch(self, number: int, change: Change, here: np.ndarray | None = None) -> None:
+        """Give a line other zones, whose solver has still to follow; here: as of `ZoneSwitching.switch`."""
+        self._switch(next(x for x in self.lines if x.number == number), change, here)
+
+    def _switch(self, x: _LineZones, change: Change, here: np.ndarray | None = None) -> None:
         """Give a line other zones: nothing moves, and what changes energy is booked."""
         run, k = self._run, x.number
+        if x.paid is not None:
+            x.paid.as_now(run.model.models[k], run.t, run.state.lines[k])
         sea, line = run.model.models[k].sea.at(run.t), run.lines[k]
-        model, state, booked = x.switching.switch(change, run.t, self._ends(x), run.state.lines[k], sea)
+        model, state, booked = x.switching.switch(change, run.t, self._ends(x), run.state.lines[k], sea, here)
+        if x.paid is not None:
+            x.paid.paying.fit(model, run.t)
         line.books.work[0, b.ZONES] += booked
         note_change(line.events, x.switching.manager.layout.base, run.t, change, booked)
         models, states = [*run.model.models], [*run.state.lines]
@@ -382,28 +413,37 @@ class SystemZones:
         for x in self.lines:
             for k in (k for number, k in ends if number == x.number):
                 model = self._run.model.models[x.number]
-                assert x.full.layout is not None
                 x.switching.release(k, model)
-                x.full = on_layout(model, x.full.layout)
+                self._take_full(x, model)
 
     def take_loads(self) -> None:
         """Go on with the models of the run, whose loads and motions are others on the same cells."""
         for x in self.lines:
             model = self._run.model.models[x.number]
-            assert x.full.layout is not None
-            x.full, x.switching.model = on_layout(model, x.full.layout), model
+            self._take_full(x, model)
+            x.switching.model = model
             x.switching.manager.load(model.ends.moments)
+
+    @staticmethod
+    def _take_full(x: _LineZones, model: Model) -> None:
+        """Other loads, or other ends, of the line on the cells that it began with; those of one at a winch change."""
+        assert x.full.layout is not None
+        if x.paid is None:
+            x.full = on_layout(model, x.full.layout)
 
     @property
     def numbers(self) -> list[int]:
         """Of the lines whose zones move."""
         return [x.number for x in self.lines]
 
-    def go_on(self) -> None:
-        """Another solver, for lines that have other cells, or touch themselves."""
+    def go_on(self, after: str = "after a change of zones") -> None:
+        """Another solver, for lines that have other cells, or touch themselves; after: what, for the text of a failure.
+
+        What that changes of the energy of contact is booked, of lines whose zones stay as well: of others they touch.
+        """
         run = self._run
-        renew_solver(run, "after a change of zones")
-        before = [x.contact_energy for x in self.lines]
+        renew_solver(run, after)
+        before = self.contact_energy.copy()
         self._note_contact()
-        for x, energy in zip(self.lines, before, strict=True):
-            run.lines[x.number].books.work[0, b.ZONES] += x.contact_energy - energy
+        for line, more in zip(run.lines, self.contact_energy - before, strict=True):
+            line.books.work[0, b.ZONES] += more

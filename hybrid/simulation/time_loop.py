@@ -92,6 +92,7 @@ class TimeLoop:
         self.diagnostics = Diagnostics(run.model, run.events)
         self._report, self._interrupted = report, interrupted
         self._observed = run.model  # by the observer
+        self.shown: Callable[[Batch], None] | None = None  # what looks at outputs beside the recorder
         self._cpu = clock.process_time()  # at the start of the run
         # whether steps and outputs wait in the buffers of the run until these are full
         self.patient = bool(run.resolution.ends)
@@ -331,6 +332,8 @@ class TimeLoop:
     def _record(self, batch: Batch, errors: np.ndarray) -> None:
         """Record outputs, and look at them; errors: of the model, as sampled with them."""
         run, model = self.run, self.run.model
+        if self.shown is not None:
+            self.shown(batch)
         if model is not self._observed:
             self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.cable.hinges)
             self._observed = model
@@ -400,6 +403,7 @@ class TimeLoop:
         if run.t > self.recorder.last:
             self._record_now()
         self.write_envelope()
+        self.diagnostics.created_energy()
         run.events.event(run.t, s, s, tried.outcome.name.lower(), str(error))
         run.events.write_to(self.recorder)
         raise error from None

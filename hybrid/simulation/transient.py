@@ -33,6 +33,7 @@ from hybrid.simulation.contact_start import begin_contact, comes_near, end_conta
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog
+from hybrid.simulation.kind_changes import KindChanges
 from hybrid.simulation.plane_monitor import PlaneMonitor
 from hybrid.simulation.releases import let_go, overloaded, watch_forces
 from hybrid.simulation.self_watch import SelfWatch, let_touch_itself, refuse_start_in_itself
@@ -123,6 +124,7 @@ class Transient:
         self._pending: Change | None = None
         self._reviewed: Change | None = None  # what a review asks for that is done already
         self._cells: CellChanges | None = None  # of cells that change without Python
+        self._kinds: KindChanges | None = None  # of kinds of cells that stay, likewise
         self._nodes: NodeChanges | None = None  # of nodes that enter and leave so
         self._overloaded: dict[int, str] = {}  # ends that are let go after the outputs of this step, and why
         self._leaves = self._returns = False  # whether it leaves its plane, or is back in it, after this step
@@ -221,7 +223,7 @@ class Transient:
     @property
     def cells_follow(self) -> bool:
         """Whether cells change without Python, so that outputs which wait are each of another line."""
-        return self._cells is not None and self._cells.adopted
+        return self._kinds is not None or (self._cells is not None and self._cells.adopted)
 
     @property
     def pays_out(self) -> bool:
@@ -417,6 +419,14 @@ class Transient:
             self._cells.adopt()
         return self._cells
 
+    def _changes_of_kinds(self) -> KindChanges | None:
+        """What changes kinds of cells that stay, with the line of now; None: cells follow, or Python does it."""
+        if not KindChanges.applies(self):
+            return None
+        if self._kinds is None or not self._kinds.fits:
+            self._kinds = KindChanges(self)
+        return self._kinds
+
     def _changes_of_nodes(self) -> NodeChanges | None:
         """What lets nodes enter and leave, with the line of now; None: no line is paid out, or Python is asked."""
         if self.payout is None:
@@ -549,7 +559,7 @@ class Transient:
         if before is not None:
             self._switch(*before)
         if zones is not None:
-            zones.hand_over(self.run)
+            zones.hand_over(self.t, self.state)
         carry = (zones.carry,) if zones is not None else ()
         from hybrid.simulation.payout import Before
 
@@ -593,18 +603,21 @@ class Transient:
             if self._leaves or self._overloaded:
                 cells.sync()
             return
+        kinds = self._changes_of_kinds() if here is None else None
         if cells is not None:
             booked = cells.change_zones(change)
+        elif kinds is not None:
+            booked = kinds.change(change)
         else:
             if self.paid_zones is not None:
-                self.model = self.paid_zones.as_now(self.model, self.run)
+                self.model = self.paid_zones.as_now(self.model, self.t, self.state)
             ends, sea = self.model.ends.at(self.t), self.model.sea.at(self.t)
             model, state, booked = self.switching.switch(change, self.t, ends, self.state, sea, here)
             if self.payout is not None:
                 self.payout.fit(model, self.t)
             run.books.work[0, b.ZONES] += booked
         note_change(self.events, self.switching.manager.layout.base, self.t, change, booked)
-        if cells is None:
+        if cells is None and kinds is None:
             self.set_model(model, state)
             self.evaluate_forces()
         if trying:  # the step before is done with: its state was looked at as it was then
@@ -614,6 +627,7 @@ class Transient:
         """Go on with another line: other zones, or out of the plane."""
         before, books = self.model, self.run.books
         self.model = model
+        self._kinds = None
         if self._cells is not None:
             self._cells.adopted = False
         if self._nodes is not None:

@@ -60,7 +60,7 @@ MOST_RESCUES = 20
 def on_layout(model: Model, layout: Layout) -> Model:
     """The same model with other zones; its start is not touched."""
     assert model.on_base is not None
-    line = model.on_base.line(layout, model.line.bits, model.line.plane)
+    line = model.on_base.line(layout, model.line.bits, model.line.plane, model.line.moved)
     return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
 
 
@@ -271,6 +271,7 @@ class ZoneSwitching:
         line = model.line
         before = self.zones
         changed = on_layout(model, new)
+        changed.sea.at(t)  # obstacles stand where they are now
         target, numbers = changed.line, np.zeros(NUMBERS)
         transfer = self._transfer(old, new, line, target, ends, state)
         numbers[TIME], numbers[RELAXES] = t, before.counts[z.RELAXING]

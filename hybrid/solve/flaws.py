@@ -27,6 +27,8 @@ RESOLVED = 0.3  # rad from one cell to the next, of a bend that cells show
 TOUCHING = 0.01
 # Of its radius squared: how far a line is on the other side of an obstacle than the straight span of its ends.
 BEHIND = 0.05
+# Product of mean normals from which on two places of an obstacle are on opposite sides; of its radius, for differences.
+OPPOSITE, NORMAL_STEP = 0.25, 1e-5
 
 
 def lowest_tension(line: Line, sea: Sea, state: State) -> tuple[float, int]:
@@ -111,15 +113,33 @@ def behind_obstacles(line: Line, sea: Sea, state: State) -> Iterator[tuple[int, 
             yield which, int(np.flatnonzero(nodes)[0])
 
 
-def obstacles_left(line: Line, sea: Sea, start: State, state: State) -> Iterator[tuple[int, int]]:
-    """Obstacles that a line touches at its start and not in a state, and the node that is nearest there."""
+def obstacles_left(line: Line, sea: Sea, start: State, state: State) -> Iterator[tuple[int, int, bool]]:
+    """Obstacles that a line touches at its start and in a state not, or on the other side; the node that is nearest at
+
+    the start; and whether it touches the other side.
+    """
     rows = sea.obstacles
     met = cells_met(sea.carried, line.s) if sea.carried.size else None
-    touched = depths_in_obstacles(sea, state.r, line.s, met).max(axis=1) > -TOUCHING
+    touched = depths_in_obstacles(sea, state.r, line.s, met) > -TOUCHING
     gaps = distances(sea, start.r)
     for which, gap in enumerate(gaps):
-        if rows[which, KIND] != FLAT and not touched[which] and gap.min() < BEHIND * rows[which, RADIUS]:
-            yield which, int(np.argmin(gap))
+        near = gap < BEHIND * rows[which, RADIUS]
+        if rows[which, KIND] == FLAT or not near.any():
+            continue
+        node = int(np.argmin(gap))
+        if not touched[which].any():
+            yield which, node, False
+            continue
+        before, now = (_mean_normal(sea, which, r) for r in (start.r[near], state.r[touched[which]]))
+        if before @ now < -OPPOSITE:
+            yield which, node, True
+
+
+def _mean_normal(sea: Sea, which: int, r: Floats) -> Floats:
+    """Mean (3,) of the outward normals of an obstacle at places r (n, 3) m, by differences of its distance."""
+    step = NORMAL_STEP * max(float(sea.obstacles[which, RADIUS]), NORMAL_STEP)
+    slopes = [distances(sea, r + step * axis)[which] - distances(sea, r - step * axis)[which] for axis in np.eye(3)]
+    return np.asarray(np.mean(slopes, axis=1) / (2.0 * step))
 
 
 def fold_text(line: Line, state: State, node: int) -> str:

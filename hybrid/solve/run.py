@@ -24,6 +24,8 @@ from hybrid.kernels.state.obstacle_rows import EACH, SEEN
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import (
     NO_LAYERS_SEEN,
+    NO_SOIL,
+    NO_SOIL_SEEN,
     NOT_VARYING,
     Batch,
     Ends,
@@ -34,7 +36,7 @@ from hybrid.kernels.state.state import (
     State,
     Work,
     no_torsion,
-    slip_size,
+    sampled_size,
 )
 from hybrid.kernels.step.job import blank_job
 from hybrid.kernels.step.newton import RUN, Limits, Task
@@ -106,7 +108,7 @@ class CompiledRun:
         cells = line.h.size
         followed = corrector.sampled if corrector is not None else np.zeros((2, 0))
         touches = bool(line.bits & SELF_CONTACT)
-        more = len(line.torsion), touches, line.moved.size, slip_size(line)
+        more = len(line.torsion), touches, line.moved.size, sampled_size(line)
         size = sample_size(cells, bool(self.count[b.VARIES]), *more)
         size += followed.shape[1]
         if not self._room.size:
@@ -319,7 +321,7 @@ class CompiledRun:
         touching, varies = self.books.touch.shape[1], bool(self.count[b.VARIES])
         batch, self.sampled_errors = batch_of_rows(
             rows, cells, ends.held, varies, len(self.state.turn), touching, self.state.grip.shape[1] // EACH,
-            self.state.layers.shape[1],
+            self.state.layers.shape[1], bool(self.state.soil.size),
         )  # fmt: skip
         return batch
 
@@ -333,11 +335,13 @@ def batch_of_rows(
     touching: int,
     obstacles: int = 0,
     layers: int = 0,
+    soil: bool = False,
 ) -> tuple[Batch, Floats]:
     """Samples (n, size) of a line as views (kernels.state.books.sample_size), and the columns behind them.
 
     held: (2,) as `Ends` has it; varies: whether they have lengths and stiffness; zones: that a torque passes through;
-    touching: N+1, or 0 where the line does not touch itself; obstacles: of which one moves; layers: numbers of a node.
+    touching: N+1, or 0 where the line does not touch itself; obstacles: of which one moves; layers: numbers of a node;
+    soil: whether nodes remember it.
     """
     at, count = 0, len(rows)
 
@@ -353,10 +357,11 @@ def batch_of_rows(
     h, kb = (take(cells), take(cells + 1, 3)) if varies else (NOT_VARYING, NOT_VARYING)
     turn, touch, seen = take(zones, 3), take(touching), take(obstacles, SEEN)
     slipped = take(cells + 1, layers) if layers else NO_LAYERS_SEEN
+    remembered = take(cells + 1, NO_SOIL.shape[1]) if soil else NO_SOIL_SEEN
     ends = np.repeat(held[None], count, axis=0)
     batch = Batch(
         t, r, v, vd, e, T, a1, w, ends, position, frame, spin, force, moment, report, work, sea, h, kb, turn, touch,
-        seen, slipped,
+        seen, slipped, remembered,
     )  # fmt: skip
     return batch, rows[:, at:]
 

@@ -9,8 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.contact.self_contact import blank_contact_job
+from hybrid.kernels.contact.self_contact_friction import AT, FOOT
 from hybrid.kernels.contact.self_contact_law import DISTANCE, P, Q
-from hybrid.kernels.contact.self_contact_pairs import ENERGY, POINTS, SHARES, SLIP_WITHIN, STORED, TRIED, WINDOW
+from hybrid.kernels.contact.self_contact_pairs import (
+    ENERGY,
+    HORIZON,
+    POINTS,
+    SHARES,
+    SLIP_WITHIN,
+    STORED,
+    TRIED,
+    WINDOW,
+)
 from hybrid.kernels.junctions.shared_contact import MEETING, MET, MET_OTHER, MET_S, blank_shared_job, shared_task
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.state.books import Books
@@ -31,6 +41,7 @@ class TouchingLine(NamedTuple):
     width: Floats  # (N,) m, diameters of cells
     bending: Floats  # (N,) N m2, their bending stiffness; 0: none
     tension_scale: float  # N
+    grows: float = 0.0  # m, by which it may become longer before these arrays are made anew
 
 
 class SharedContact(ContactBooks):
@@ -40,19 +51,23 @@ class SharedContact(ContactBooks):
         """strands: of the lines that may touch, in order; rubs: whether with friction."""
         self.touching, self.lines = touching, touching.lines
         friction = touching.friction if rubs else np.zeros_like(touching.friction)
-        contact = contact_of_strands([strand_of(*x) for x in strands], float(friction.max()))
+        contact = contact_of_strands([strand_of(*x[:4]) for x in strands], float(friction.max()))
         contact.meets[:], contact.rubs[:], contact.joined[:] = touching.meets, friction, touching.joined
         nodes = [x.line.s.size for x in strands]
         self.begins = np.concatenate([[0], np.cumsum(nodes)[:-1]]).astype(np.int64)
-        gap = BETWEEN * WINDOW * max(float(x.width.max()) for x in strands)
+        gap = BETWEEN * WINDOW * max(float(x.width.max()) for x in strands) + 2.0 * max(x.grows for x in strands)
         lengths = [float(x.line.s[-1] - x.line.s[0]) + gap for x in strands]
         self.starts = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]) - [float(x.line.s[0]) for x in strands]
-        s = np.concatenate([x.line.s + start for x, start in zip(strands, self.starts, strict=True)])
-        spin = np.zeros(s.size - 1, np.int64)
+        self._own = [x.line.s.copy() for x in strands]
+        s = self._places(self.starts)
+        self._lows = s[self.begins] - 0.5 * gap  # m, between the lines as parts of the one
+        h, spin, grows = np.diff(s), np.zeros(s.size - 1, np.int64), any(x.grows for x in strands)
         for begin, x in zip(self.begins, strands, strict=True):
+            if grows:  # with the length that is out other places round them
+                h[begin : begin + x.line.h.size] = x.line.h
             spin[begin : begin + x.line.spin.size] = x.line.spin
         blank = blank_line(s.size - 1)
-        self._line = blank._replace(s=s, h=np.diff(s), spin=spin.astype(blank.spin.dtype))
+        self._line = blank._replace(s=s, h=h, spin=spin.astype(blank.spin.dtype))
         super().__init__(contact, 0.5 * (s[1:] + s[:-1]))
         self._nodes = nodes
         self.beside = np.array([SHARED, 0, 0], np.int64)  # the call of the lines but the last
@@ -61,6 +76,15 @@ class SharedContact(ContactBooks):
         self.meetings = np.full((len(nodes), len(nodes), MEETING), np.nan)
         self._inner, self._jobs = Table(blank_contact_job), (Table(blank_shared_job), Table(blank_shared_job))
         self._touch = np.zeros((3, s.size))
+
+    @property
+    def s(self) -> Floats:
+        """(N+1,) m, arc lengths of the nodes of all of them, with gaps between two."""
+        return self._line.s
+
+    def _places(self, starts: Floats) -> Floats:
+        """(N+1,) m, arc lengths of the nodes of all lines as parts of the one that begin there."""
+        return np.concatenate([s + start for s, start in zip(self._own, starts, strict=True)])
 
     @property
     def last(self) -> int:
@@ -76,6 +100,14 @@ class SharedContact(ContactBooks):
         """By number of a line: where its nodes are."""
         each = zip(self.lines, self.begins.tolist(), self._nodes, strict=True)
         return {k: slice(begin, begin + count) for k, begin, count in each}
+
+    def look_ahead(self, horizon: float) -> dict[int, Floats]:
+        """From now on steps find how near nodes are to what they may touch, or will be within `horizon`, s.
+
+        Returns where (N+1,), by number of a line: above 1, nearer than two diameters.
+        """
+        self.contact.numbers[HORIZON] = horizon
+        return {k: self.contact.near[nodes] for k, nodes in self.slices().items()}
 
     # --- of states at rest ---------------------------------------------------------------------------
 
@@ -130,18 +162,37 @@ class SharedContact(ContactBooks):
         """What the steps after the time t, s, depend on."""
         latest = int(self._times[1] == t)
         more = {name: x[latest].copy() for name, x in (("pushes", self._pushes), ("shares", self._shares))}
-        more["meetings"] = self.meetings.copy()
+        more |= {"meetings": self.meetings.copy(), "starts": self.starts.copy(), "lows": self._lows.copy()}
         return super().checkpoint(t) | more
 
     def restore(self, saved: Mapping[str, Any], t: float = np.nan, remeshed: bool = False) -> None:
-        """Go on from `checkpoint` at t, s.  ValueError: that cannot be."""
-        super().restore(saved, t, remeshed)
-        mine = {"pushes": self._pushes[0], "shares": self._shares[0], "meetings": self.meetings}
+        """Go on from `checkpoint` at t, s; remeshed: of lines that had other cells.  ValueError: that cannot be."""
+        mine = {"shares": self._shares[0], "meetings": self.meetings}
+        mine |= {name: x for name, x in (("starts", self.starts), ("lows", self._lows)) if name in saved}
+        mine |= {} if remeshed else {"pushes": self._pushes[0]}  # else found with the state on its cells of now
         for name, x in mine.items():
             if saved[name].shape != x.shape:
                 raise ValueError(f"contact/{name}: of other lines")
+        if remeshed:
+            saved = self._shifted(saved)
+        elif "starts" in saved:  # of the lengths that lines had when their arrays were made
+            self._line.s[:] = self._places(saved["starts"])
+            self._middles = 0.5 * (self._line.s[1:] + self._line.s[:-1])
+        for name, x in mine.items():
             x[:] = saved[name]
-        self._times[:] = t, np.nan
+        super().restore(saved, t, remeshed)
+        self._times[:] = np.nan if remeshed else t, np.nan
+
+    def _shifted(self, saved: Mapping[str, Any]) -> dict[str, Any]:
+        """What is saved of lines that had other lengths, with the arc lengths that places have in the one line now."""
+        shift, grips, meetings = self.starts - saved["starts"], saved["grips"].copy(), saved["meetings"].copy()
+        for column in (AT, FOOT):
+            of = np.searchsorted(saved["lows"], grips[:, column], side="right") - 1
+            grips[:, column] += shift[of]
+        meetings[:, :, MET_S] += shift[:, None]
+        meetings[:, :, MET_OTHER] += shift
+        now = {"starts": self.starts.copy(), "lows": self._lows.copy()}
+        return {**saved, "grips": grips, "meetings": meetings} | now
 
     def attach(
         self, numbers: NDArray[np.int64], joints: NDArray[np.int64], books: Sequence[Books]
@@ -157,9 +208,9 @@ class SharedContact(ContactBooks):
         )  # fmt: skip
         for job, tables in zip(self._jobs, numbers, strict=True):
             job.bind(
-                tables=tables, lines=np.array(self.lines, np.int64), begins=self.begins, joints=joints,
-                inner=self._inner.numbers, pushes=self._pushes, shares=self._shares, times=self._times,
-                meetings=self.meetings,
+                tables=tables, lines=np.array(self.lines, np.int64), begins=self.begins, starts=self.starts,
+                joints=joints, inner=self._inner.numbers, pushes=self._pushes, shares=self._shares,
+                times=self._times, meetings=self.meetings,
             )  # fmt: skip
         self.call[ADDRESS] = shared_task.address(self._jobs[0].numbers)
         return self._inner.numbers, (self._jobs[0].numbers, self._jobs[1].numbers)

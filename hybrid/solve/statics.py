@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
+from hybrid.kernels.laws.soil import settle_in_soil
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import Limits
 from hybrid.kernels.state.forces import (
@@ -27,7 +28,7 @@ from hybrid.kernels.step.step import friction_axes
 from hybrid.solve.flaws import flaw_of_line, fold_text, lowest_tension
 from hybrid.solve.laid import laid_without_tension
 from hybrid.solve.settling import Settling, gyration
-from hybrid.solve.softened import softened, softest
+from hybrid.solve.softened import is_in_current, softened, softest, with_current
 from hybrid.solve.stability import Stability, is_judged
 from hybrid.solve.stepper import Stepper
 from hybrid.solve.workspaces import workspace_of
@@ -48,6 +49,10 @@ PUSHED = "pushed off an unstable equilibrium"
 SAME, MOST_PUSHES = 1e-3, 12
 # The most of them that it is let fall from, slowly, to both sides, those that grow least first.
 MOST_FALLS = 16
+# Parts of a current with which equilibria lead to that in still water: at once, else by and by; and with which one with
+# friction follows it up again where it is not found at once.
+STILLED = ((0.0,), (0.8, 0.6, 0.4, 0.2, 0.1, 0.0))
+GROWING = (0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9)
 LIMP = 1e-3  # part of the bending stiffness there
 
 
@@ -110,7 +115,7 @@ class _Solver:
             still[:] = 0.0
         limits = Limits(REACH * self.length, self.scale, MOST_TURNING if turning else MOST_ITERATIONS)
         for _ in range(BALANCING):
-            self.work.u[:] = 0.0
+            self.work.u[:], new.soil[:] = 0.0, 0.0
             if line.bits & FRICTION:
                 friction_axes(self.sea, new.r, new.e, new.slip, new.grip)
             outcome, iterations, _, where = entry.equilibrium(
@@ -120,6 +125,7 @@ class _Solver:
             new.r[:] += self.work.u
             new.vd[:], new.wd[:] = 0.0, 0.0  # of the anchor's springs
             new.slip[:] = self.sea.slid if line.bits & FRICTION else 0.0
+            settle_in_soil(line, sea or self.sea, new.r, new.soil)
             if outcome != Outcome.OK or line is not self.line or sea is not None:
                 break
             # Newton stops by turns and tensions; a very stiff seabed makes much force of little way
@@ -221,7 +227,7 @@ def _eased(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, int
         soft = soft_first ** (1.0 - x)
         now = sea.now.copy()
         now[1] = x * grown
-        easy = softened(sea, soft)._replace(now=now)
+        easy = softened(line, sea, soft)._replace(now=now)
         limp = line._replace(kb=line.kb * LIMP ** (1.0 - x))
         last = goal >= 1.0
         outcome, where, found = solver.newton(line if last else limp, ends, state, sea=None if last else easy)
@@ -248,17 +254,44 @@ def _settled(solver: _Solver, ends: Ends, start: State, shape: str) -> tuple[str
     return f"settled with friction from {shape}", *solver.newton(solver.line, ends, solver.relaxed(ends, rest))
 
 
+def _in_still_water(smooth: _Solver, ends: Ends, state: State) -> State | None:
+    """The equilibrium beside one in a current that there is without it; None: the line has none, as one that floats."""
+    for ladder in STILLED:
+        found = state
+        for part in ladder:
+            reached, _, found = smooth.newton(smooth.line, ends, found, sea=with_current(smooth.sea, part))
+            if reached != Outcome.OK:
+                break
+        else:
+            return found
+    return None
+
+
 def _pulled(
     smooth: _Solver, rough: _Solver, roads: Iterator[tuple[str, Outcome, int, State]], ends: Ends
 ) -> Iterator[tuple[str, Outcome, int, State]]:
-    """Laid where it touches, without tension, along the equilibrium without friction, then pulled tight against it."""
+    """Laid where it touches, without tension, along the equilibrium without friction, then pulled tight against it.
+
+    A line that a current acts on is laid in still water: what lies is held by friction before the current comes, and
+    the shape in the current without friction would be that of a line that has been swept along the bed.
+    """
     for how, outcome, where, state in roads:
         if outcome != Outcome.OK:
             yield f"without friction, {how}", outcome, where, state
             continue
-        rest = laid_without_tension(smooth.line, smooth.sea, ends, state)
+        calm = _in_still_water(smooth, ends, state) if is_in_current(smooth.line, smooth.sea) else None
+        place = f"where it lay without tension{' in still water' if calm is not None else ''}"
+        rest = laid_without_tension(smooth.line, smooth.sea, ends, state if calm is None else calm)
         rough.total += smooth.total
-        yield "pulled tight against friction from where it lay without tension", *rough.newton(rough.line, ends, rest)
+        yield f"pulled tight against friction from {place}", *rough.newton(rough.line, ends, rest)
+        if calm is not None:
+            for part in GROWING:
+                outcome, where, rest = rough.newton(rough.line, ends, rest, sea=with_current(rough.sea, part))
+                if outcome != Outcome.OK:
+                    break
+            else:
+                outcome, where, rest = rough.newton(rough.line, ends, rest)
+            yield f"pulled tight against friction from {place}, while the current grows", outcome, where, rest
         return
 
 

@@ -15,10 +15,11 @@ from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacle_grip import grip_obstacles
 from hybrid.kernels.laws.obstacles import stored_energy
 from hybrid.kernels.laws.seabed import normal_forces
+from hybrid.kernels.laws.soil import lie_in_soil, settle_in_soil, soil_at_rest
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.run import entry
 from hybrid.kernels.run.entry import NO_PUSH, Limits, block_rows, out_of_balance
-from hybrid.kernels.state.forces import FRICTION, PLANAR, TOUCHES, WAVES
+from hybrid.kernels.state.forces import FRICTION, PLANAR, SOIL, TOUCHES, WAVES
 from hybrid.kernels.state.report import (
     FORCE_A,
     LOCAL_ERROR,
@@ -29,7 +30,7 @@ from hybrid.kernels.state.report import (
     SLACKEST_CELL,
     USED_RHO,
 )
-from hybrid.kernels.state.state import Ends, Floats, Line, Sea, State
+from hybrid.kernels.state.state import NO_SOIL, Ends, Floats, Line, Sea, State
 from hybrid.kernels.step.step import friction_axes
 from hybrid.solve.workspaces import workspace_of
 
@@ -70,12 +71,17 @@ def static_friction_travel(line: Line, sea: Sea, r: Floats, force: Floats) -> Fl
     sea.axis must be that of the line.  Friction is -mu N travel/slip_length, along and across the line.
     """
     N = np.zeros(r.shape[0])
-    normal_forces(line, sea, r, N)
+    if line.bits & SOIL:
+        most = np.zeros((r.shape[0], 2))
+        soil_at_rest(line, sea, r, np.zeros((r.shape[0], NO_SOIL.shape[1])), N, most)
+    else:
+        normal_forces(line, sea, r, N)
+        most = N[:, None] * sea.friction
     side = np.cross(planes_under(sea, r)[0], sea.axis)
     parts = []
-    for direction, mu in ((sea.axis, sea.friction[0]), (side, sea.friction[1])):
+    for direction, held in ((sea.axis, most[:, 0]), (side, most[:, 1])):
         along = np.einsum("ij,ij->i", force, direction)
-        parts.append(np.divide(along, mu * N, out=np.zeros_like(along), where=mu * N > 0.0))
+        parts.append(np.divide(along, held, out=np.zeros_like(along), where=held > 0.0))
     size = np.maximum(np.hypot(*parts), 1.0)
     return np.asarray(sea.slip_length * ((parts[0] / size)[:, None] * sea.axis + (parts[1] / size)[:, None] * side))
 
@@ -145,6 +151,7 @@ class Stepper:
         lengthening: (N,) m/s2, second rates of the lengths of cells.
         """
         state.a[:], state.vd[:], state.wa[:], state.wd[:] = 0.0, 0.0, 0.0, 0.0
+        settle_in_soil(self.line, sea, state.r, state.soil)
         l = np.linalg.norm(state.e, axis=1)
         d = state.e / l[:, None]
         e1 = np.diff(state.v, axis=0)
@@ -195,6 +202,7 @@ class Stepper:
             wave_kinematics(sea, state.r, self.work.u)
         if self.line.bits & FRICTION:
             friction_axes(sea, state.r, state.e, state.slip, state.grip)
+        lie_in_soil(self.line, sea, state.r, state.soil)
         entry.assembly(self.line, sea, ends, state, 0.0, HEAVY, self.work)
         if self.line.bits & TOUCHES:
             self.work.report[SEABED_ENERGY] = stored_energy(self.line, sea, state.r)

@@ -28,6 +28,7 @@ from hybrid.kernels.junctions.junctions import HANDED
 from hybrid.kernels.junctions.system_contact import blank_touching_job, room_for_products, touch_system
 from hybrid.kernels.junctions.system_job import ASKED, blank_system_job
 from hybrid.kernels.laws.obstacle_motion import carry_obstacles
+from hybrid.kernels.laws.soil import lie_in_soil, settle_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.run.entry import NO_PUSH
@@ -484,6 +485,7 @@ class SystemSolver:
                 work.u[0] = -self._gaps[k, 0]
             if x.line.moved.size:
                 carry_obstacles(t, t, x.sea)
+            settle_in_soil(x.line, x.sea, state.r, state.soil)
             self._around(x, state, work)
             ends = x.ends._replace(position=state.r[[0, -1]])
             self.bind_line(k, work=work._replace(gaps=gaps), ends=ends)
@@ -530,6 +532,7 @@ class SystemSolver:
             if x.line.moved.size:
                 carry_obstacles(t, t, x.sea)
             self._around(x, state, work)
+            lie_in_soil(x.line, x.sea, state.r, state.soil)
         taken = self._solve(Task(ASSEMBLY, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states, t)
         if taken.outcome == Outcome.OK:
             self._settle_contact(states)
@@ -618,7 +621,7 @@ class SystemSolver:
         bodies where they are, so that what is found balances with these.
         """
         for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
-            work.u[:] = 0.0
+            work.u[:], state.soil[:] = 0.0, 0.0
             self._around(x, state, work)
         for contact in self._contacts.values():
             contact.forget()
@@ -633,6 +636,7 @@ class SystemSolver:
             state.vd[:], state.wd[:] = 0.0, 0.0  # of the springs
             if x.line.bits & FRICTION:
                 state.slip[:] = x.sea.slid
+            settle_in_soil(x.line, x.sea, state.r, state.soil)
         return taken
 
     def newton(self, start: SystemState) -> tuple[SystemTaken, SystemState]:

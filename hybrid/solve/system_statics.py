@@ -18,9 +18,9 @@ from hybrid.solve.flaws import fold_text, lowest_tension, slack_text
 from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
 from hybrid.solve.laid import laid_without_tension
 from hybrid.solve.settling import CALM, GROWN, RELAXING_STEPS, along, damped, growth_time, gyration, nudged
-from hybrid.solve.softened import softened, softest
+from hybrid.solve.softened import is_in_current, softened, softest, with_current
 from hybrid.solve.stability import Stability
-from hybrid.solve.statics import HARDENING, LIMP, MOST_FALLS, NEARLY_STIFF, PUSHED, SAME
+from hybrid.solve.statics import GROWING, HARDENING, LIMP, MOST_FALLS, NEARLY_STIFF, PUSHED, SAME, STILLED
 from hybrid.solve.stepper import Stepper
 from hybrid.solve.system import SystemSolver
 
@@ -112,16 +112,21 @@ def settled_with_friction(
 ) -> SystemEquilibrium:  # fmt: skip
     """The equilibrium with friction of the lines named in `ways`, by number, as of one cable.
 
-    ways: "pull": laid along the equilibrium without friction (`found`) without tension, then pulled tight, all such
-    lines together; "start", and where that fails: at rest after a damped motion from the first shapes.  LineFailed.
+    ways: "pull": laid without tension along the equilibrium without friction (`found`), or where a current acts along
+    that in still water, then pulled tight, all such lines together; "start", and where that fails: at rest after a
+    damped motion from the first shapes.  LineFailed.
     """
     kept = [x.line.bits & ~WAVES & ~(0 if k in ways else FRICTION) for k, x in enumerate(lines)]
     rough = [x._replace(line=x.line._replace(bits=bits)) for x, bits in zip(lines, kept, strict=True)]
     solver, path, total = SystemSolver(rough, points, bodies), list(found.path), found.iterations
     attempts: list[tuple[str, Callable[[], SystemState]]] = []
     if all(way == "pull" for way in ways.values()):
-        how = "pulled tight against friction from where lines lay without tension"
-        attempts.append((how, lambda: _laid(solver, ways, found.state)))
+        calm = _in_still_water(rough, points, bodies, found.state)
+        how = f"pulled tight against friction from where lines lay without tension{' in still water' if calm else ''}"
+        attempts.append((how, lambda: _laid(solver, ways, calm or found.state)))
+        if calm is not None:
+            grown = f"{how}, while the current grows"
+            attempts.append((grown, lambda: _grown(rough, points, bodies, _laid(solver, ways, calm))))
     attempts.append(("settled with friction from the first shapes", lambda: _stuck(solver, points, ways, first)))
     failed = list[tuple[SystemTaken, SystemState]]()
     for how, start in attempts:
@@ -133,6 +138,46 @@ def settled_with_friction(
             return SystemEquilibrium(states, tuple(path), total, residual, solver, with_friction=frozenset(ways))
         failed.append((taken, states))
     raise _failed(rough, *failed[0], path)
+
+
+def in_slower_currents(
+    lines: Sequence[JoinedLine], points: int, bodies: Floats, states: SystemState, parts: Sequence[float]
+) -> list[SystemState] | None:
+    """Equilibria without friction that lead from one in a current to those in these parts of it, one from the other.
+
+    None: a line has none, as one that floats.
+    """
+    smooth = [x._replace(line=x.line._replace(bits=x.line.bits & ~FRICTION)) for x in lines]
+    found = [states]
+    for part in parts:
+        slower = [x._replace(sea=with_current(x.sea, part)) for x in smooth]
+        taken, state = SystemSolver(slower, points, bodies.copy()).newton(found[-1])
+        if taken.outcome != Outcome.OK:
+            return None
+        found.append(state)
+    return found[1:]
+
+
+def _in_still_water(
+    lines: Sequence[JoinedLine], points: int, bodies: Floats, states: SystemState
+) -> SystemState | None:
+    """As of one cable (solve.statics), of all lines; None: there is none, or no current acts on any of these."""
+    if any(is_in_current(x.line, x.sea) for x in lines):
+        for ladder in STILLED:
+            if (found := in_slower_currents(lines, points, bodies, states, ladder)) is not None:
+                return found[-1]
+    return None
+
+
+def _grown(lines: Sequence[JoinedLine], points: int, bodies: Floats, states: SystemState) -> SystemState:
+    """Where friction lets lines come while the current grows to nearly all of it, as far as there are equilibria."""
+    for part in GROWING:
+        slower = [x._replace(sea=with_current(x.sea, part)) for x in lines]
+        taken, found = SystemSolver(slower, points, bodies.copy()).newton(states)
+        if taken.outcome != Outcome.OK:
+            break
+        states = found
+    return states
 
 
 def _laid(solver: SystemSolver, ways: Iterable[int], states: SystemState) -> SystemState:
@@ -265,7 +310,7 @@ def _easier(x: JoinedLine, part: float) -> JoinedLine:
     """A line over a softer bed and softer obstacles, in less current, with less bending; part: 0 the easiest to 1."""
     now = x.sea.now.copy()
     now[1] *= part
-    sea = softened(x.sea, softest(x.line, x.sea, x.length) ** (1.0 - part))._replace(now=now)
+    sea = softened(x.line, x.sea, softest(x.line, x.sea, x.length) ** (1.0 - part))._replace(now=now)
     if x.rides.size:  # a body would sink through lines that are soft
         sea = sea._replace(obstacles=x.sea.obstacles)
     return x._replace(sea=sea, line=x.line._replace(kb=x.line.kb * LIMP ** (1.0 - part)))

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
+from hybrid.store.partners import partner_of
+
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
 
@@ -30,7 +32,8 @@ LIMITED = {
 }  # fmt: skip
 # What presses on the line, by the quantity that has its force per length.
 PARTNERS = {"contact": "the seabed", "self_contact": "the line itself or another", "obstacle_contact": "an obstacle"}
-UNITS = {"min_bend_radius": "m", "max_contact_force": "N/m", "max_stress": "Pa", "capacity": "%"}  # of limits not in N
+# Of limits not in N.
+UNITS = {"min_bend_radius": "m", "max_contact_force": "N/m", "max_stress": "Pa", "capacity": "%", "code": "%"}
 # Of the largest tension: what is below is what the solver's tolerance leaves of a force of zero, as at a free end.
 NOTHING = 1e-6
 # Verdicts on limits: `verdicts` decides which.
@@ -223,8 +226,18 @@ def judged(values: Arrays) -> list[Judged]:
     return list(found.values())
 
 
-def largest_contact(result: Recorded) -> tuple[str, Extreme] | None:
+def with_partner(result: Result, x: Judged) -> Judged:
+    """A limit of contact force with the name of what presses, where the result has it."""
+    kinds = [name for name, partner in PARTNERS.items() if partner == x.partner]
+    named = partner_of(result, kinds[0], x.t) if kinds else None
+    return x._replace(partner=named) if named else x
+
+
+def largest_contact(result: Result) -> tuple[str, Extreme] | None:
     """What presses on the line most, and with what force per length (N/m); None: nothing is known to touch it."""
     each = {name: (farthest if name in result else extreme)(result, name, "max") for name in PARTNERS}
-    known = [(PARTNERS[name], x) for name, x in each.items() if x is not None and x.value > 0.0]
-    return max(known, key=lambda x: x[1].value, default=None)
+    known = [(name, x) for name, x in each.items() if x is not None and x.value > 0.0]
+    if not known:
+        return None
+    name, most = max(known, key=lambda x: x[1].value)
+    return partner_of(result, name, most.t) or PARTNERS[name], most

@@ -17,6 +17,7 @@ from hybrid.store.capacity import mooring_use
 from hybrid.store.envelope import Judged
 from hybrid.store.extrapolation import extreme_of
 from hybrid.store.names import ALIASES
+from hybrid.store.partners import Pressed, contacts_of
 from hybrid.store.verdicts import Verdicts, section_limits, verdicts_of
 
 if TYPE_CHECKING:
@@ -28,10 +29,12 @@ Window = tuple[float | None, float | None]
 # What is looked at when nothing is asked for, where the result has it; and all that its scene asks for by name.
 USUAL = (
     "end_force_start", "end_force_end", "tension", "curvature", "bending_moment", "torque", "contact", "wall_tension",
-    "von_mises", "capacity_used",
+    "von_mises", "capacity_used", "code_used",
 )  # fmt: skip
 # Histories of one value that every result may have, and no scene asks for.
 NOT_ASKED_FOR = ("t", "contact_force", "grounded_length")
+# Components of a vector.
+AXES = ("x", "y", "z")
 # Fibres around a section at which its stress is counted.
 FIBRES = 8
 
@@ -64,11 +67,13 @@ def usual_names(result: Result) -> list[str]:
 def history_of(result: Result, name: str, times: Window | None = None, at: Any = None) -> History:
     """A history of a result.  times: from and to (s); at: arc lengths (m), None: all output points.
 
+    name: of a quantity, a vector included; NAME.x, NAME.y, NAME.z of one of its components; x, y, z of the position.
     A place where the quantity jumps comes twice, with the value before and after it.
 
     ResultError for what is no history of numbers, a window with no value in it, or a place outside.
     """
-    stored = f"steps/{name}" if f"steps/{name}" in result and name not in result else ALIASES.get(name, name)
+    whole, component = component_of(result, name)
+    stored = f"steps/{whole}" if f"steps/{whole}" in result and whole not in result else ALIASES.get(whole, whole)
     values = result[stored]
     if isinstance(values, Mapping):
         raise ResultError(f"'{name}' is a group; ask for one of {', '.join(f'{name}/{key}' for key in values)}")
@@ -78,7 +83,7 @@ def history_of(result: Result, name: str, times: Window | None = None, at: Any =
     t, s = np.asarray(result[dims[0]]), None
     if t.size < 2 and result.status != "complete":
         raise ResultError(_nothing_yet(result))
-    if dims[1:] == ("s",):
+    if dims[1:2] == ("s",):
         s, values = result.both_sides(stored)
         if at is not None:
             s, values = _at_places(result, stored, s, values, np.atleast_1d(np.asarray(at, float)))
@@ -90,7 +95,26 @@ def history_of(result: Result, name: str, times: Window | None = None, at: Any =
         over = f"{t[0]:.6g} to {t[-1]:.6g} s" if t.size else "none"
         raise ResultError(f"no value of '{name}' lies between t = {a:g} and {b:g} s\n    expected: a window in {over}")
     basis = "every step" if dims[0] == "steps/t" else "every output"
-    return History(name, result.units[stored], t[inside], np.asarray(values)[inside], s, basis)
+    values = np.asarray(values)[inside]
+    if component is not None:
+        values = values[..., component]
+    return History(name, result.units[stored], t[inside], values, s, basis)
+
+
+def component_of(result: Result, name: str) -> tuple[str, int | None]:
+    """The quantity that a name is of, and which component of it; None: all of it, or it is no vector."""
+    whole, _, axis = ("position", ".", name) if name in AXES and name not in result else name.rpartition(".")
+    if whole and axis in AXES and name not in result and whole in result and result.dims(whole)[-1:] == ("xyz",):
+        return whole, AXES.index(axis)
+    return name, None
+
+
+def components_of(result: Result, name: str) -> list[str]:
+    """The names of the components of a vector; of what is none its own."""
+    whole, component = component_of(result, name)
+    if component is None and whole in result and result.dims(whole)[-1:] == ("xyz",):
+        return [f"{name}.{axis}" for axis in AXES]
+    return [name]
 
 
 def _nothing_yet(result: Result) -> str:
@@ -122,7 +146,7 @@ def _window(times: Window | None) -> tuple[float, float]:
 
 
 def _at_places(result: Result, name: str, s: Floats, values: Floats, at: Floats) -> tuple[Floats, Floats]:
-    """Arc lengths and values (nt, n) at places, of which those where the quantity jumps come twice."""
+    """Arc lengths and values (nt, n, ...) at places, of which those where the quantity jumps come twice."""
     columns, places = [], []
     for x in at:
         exact = np.flatnonzero(np.abs(s - x) <= 1e-9 * np.ptp(s)) if np.ptp(s) > 0.0 else np.zeros(1, int)
@@ -134,6 +158,14 @@ def _at_places(result: Result, name: str, s: Floats, values: Floats, at: Floats)
 
 class Histories:
     """What a result can tell of its histories."""
+
+    def contacts(self: Any) -> list[Pressed]:
+        """What presses on the line by name, or which of several lines press on each other: largest forces at outputs.
+
+        Of each its `partner`, `force` (N, over all places) at `t_force` (s), `contact` (N/m) at `t_contact` (s), and
+        the `group` in which the result has these over time.
+        """
+        return contacts_of(self)
 
     def statistics(
         self: Any, names: Sequence[str] | None = None, *, times: Window | None = None, at: Any = None
@@ -266,8 +298,9 @@ def _bends(result: Result, times: Window | None, at: Any) -> Floats:
 
 def lies_along(result: Result, name: str) -> bool:
     """Whether a quantity has a value at every arc length."""
-    known = ALIASES.get(name, name)
-    return known in result and result.dims(known)[1:] == ("s",)
+    whole, _ = component_of(result, name)
+    known = ALIASES.get(whole, whole)
+    return known in result and result.dims(known)[1:2] == ("s",)
 
 
 def _one(history: History) -> History:
@@ -277,5 +310,6 @@ def _one(history: History) -> History:
         return history._replace(values=values[:, int(np.ptp(values, axis=0).argmax())])
     if values.shape[1] != 1:
         fix = "at=..., an arc length in m" if history.s is not None else "a quantity with one value"
+        fix = f"{history.name}.x, a component" if values.shape[1] == len(AXES) else fix
         raise ResultError(f"'{history.name}' has {values.shape[1]} values at a time\n    try:      {fix}")
     return history._replace(values=values[:, 0])

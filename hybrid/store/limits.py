@@ -3,11 +3,14 @@ over the outputs."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from hybrid.store.capacity import NAME, bound_of_steps
+from hybrid.store.code_checks import NAME as CODE_USED
+from hybrid.store.code_checks import code_of_steps
 from hybrid.store.envelope import GROUP as GROUP_OF_NODES
 from hybrid.store.envelope import NOT_VERIFIED, SAME, Arrays, extremes_of_outputs, has_envelope, not_verified
 
@@ -130,7 +133,7 @@ def held_of(result: Result) -> list[Held]:
                 continue
             broken = value < allowed if limit == "smallest" else value > allowed
             found.append(Held(name, limit, unit, value, allowed, broken, t, where, moves and known is None))
-    return found + [x for x in (stress_of(result), capacity_of(result)) if x is not None]
+    return found + [x for x in (stress_of(result), capacity_of(result), code_of(result)) if x is not None]
 
 
 def capacity_of(result: Result) -> Held | None:
@@ -138,12 +141,21 @@ def capacity_of(result: Result) -> Held | None:
 
     Between outputs it is known to stay within where their ranges over all steps do, as if they came at once.
     """
-    if NAME not in result:
+    return _part_of(result, NAME, "capacity", bound_of_steps)
+
+
+def code_of(result: Result) -> Held | None:
+    """The largest part that codes of sections let it use, likewise."""
+    return _part_of(result, CODE_USED, "code", code_of_steps)
+
+
+def _part_of(result: Result, name: str, limit: str, bound_of: Callable[[Result], float | None]) -> Held | None:
+    if name not in result:
         return None
-    most = extremes_of_outputs(result, NAME)
-    value, t, s = (most[f"{GROUP_OF_NODES}/{x}"] for x in (f"{NAME}_max", f"{NAME}_t_max", "s"))
+    most = extremes_of_outputs(result, name)
+    value, t, s = (most[f"{GROUP_OF_NODES}/{x}"] for x in (f"{name}_max", f"{name}_t_max", "s"))
     if np.isnan(value).all():
         return None
-    k, bound = int(np.nanargmax(value)), bound_of_steps(result)
+    k, bound = int(np.nanargmax(value)), bound_of(result)
     open_ = len(result.times) > 1 and (bound is None or bound > 1.0)
-    return Held(NAME, "capacity", "%", float(value[k]), 100.0, bool(value[k] > 100.0), float(t[k]), float(s[k]), open_)
+    return Held(name, limit, "%", float(value[k]), 100.0, bool(value[k] > 100.0), float(t[k]), float(s[k]), open_)

@@ -306,6 +306,11 @@ class Result(Histories):
         return Result(self._source, line=name)
 
     @property
+    def whole(self) -> tuple[Result, str] | None:
+        """Of a line of several the result of all of them, opened anew, and its name there; None: it is no part."""
+        return (Result(self._source), self._line) if self._line else None
+
+    @property
     def events(self) -> list[Event]:
         """What happened and why, in the order of time."""
         with readable(self._source):

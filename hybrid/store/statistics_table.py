@@ -12,7 +12,7 @@ from hybrid.statistics.extremes import THREE_HOURS
 from hybrid.statistics.moments import exceedance
 from hybrid.store.envelope import extreme
 from hybrid.store.extrapolation import extreme_of
-from hybrid.store.histories import Window, history_of, lies_along, summary_of, usual_names
+from hybrid.store.histories import Window, components_of, history_of, lies_along, summary_of, usual_names
 from hybrid.store.limits import at_every_step
 
 if TYPE_CHECKING:
@@ -31,10 +31,10 @@ def rows_of(
     names: None for the usual ones that are not zero throughout and are known at all outputs; at: arc lengths, m, None:
     where the quantity is largest; times: from and to, s; above, below: in the unit of the quantity, `exceedance`
     (`exceedance_below`) is the part of the time above (below) it.  A row with `beyond_outputs` says how far all nodes
-    and steps went beyond what its outputs show.
+    and steps went beyond what its outputs show.  A vector has a row for each of its components.
     """
     rows = []
-    for name in usual_names(result) if names is None else names:
+    for name in _each(result, names):
         history = history_of(result, name, times, at if lies_along(result, name) else None)
         values = history.values.reshape(history.t.size, -1)
         known = np.isfinite(values).all(axis=0)
@@ -64,6 +64,32 @@ def rows_of(
                 row["beyond_outputs"] = text
             rows.append(row)
     return rows
+
+
+def values_of(
+    result: Result, names: Sequence[str] | None = None, at: Sequence[float] | None = None
+) -> list[dict[str, Any]]:
+    """One row for each value of an equilibrium: quantity, unit, arc length s (m; None: it has none) and value.
+
+    names, at: as of `rows_of`.
+    """
+    rows = []
+    for name in _each(result, names):
+        history = history_of(result, name, None, at if lies_along(result, name) else None)
+        values = history.values.reshape(-1)
+        if names is None and not np.nan_to_num(values).any():
+            continue
+        k = int(np.nan_to_num(values, nan=-np.inf).argmax())
+        picked = range(values.size) if at is not None or history.s is None else [k]
+        for i in picked:
+            s = None if history.s is None else float(history.s[i])
+            rows.append({"quantity": name, "unit": history.unit, "s": s, "value": _number(values[i] + 0.0)})
+    return rows
+
+
+def _each(result: Result, names: Sequence[str] | None) -> list[str]:
+    """The names of quantities, the usual ones or those asked for, with those of components in place of vectors."""
+    return [x for name in (usual_names(result) if names is None else names) for x in components_of(result, name)]
 
 
 def _beyond_outputs(result: Result, name: str, t: np.ndarray, largest: Any) -> str:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,7 +20,18 @@ import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, IN_SPACE, OF_AN_END
 from hybrid.store.capacity import bound_with_errors
-from hybrid.store.envelope import BROKEN, GROUP, LIMITED, NOT_VERIFIED, WITHIN, Judged, limits_of, not_verified
+from hybrid.store.code_checks import code_with_errors
+from hybrid.store.envelope import (
+    BROKEN,
+    GROUP,
+    LIMITED,
+    NOT_VERIFIED,
+    WITHIN,
+    Judged,
+    limits_of,
+    not_verified,
+    with_partner,
+)
 from hybrid.store.limits import Held, held_of
 from hybrid.store.records import Event, not_converged_in
 
@@ -36,6 +48,7 @@ EVERY = frozenset({"position", "tension", "end_force", "curvature"})  # asked, b
 ALL: frozenset[str] = frozenset()
 NOTE = "do what its note says"
 SHORTER = "a shorter time.step"
+SETTLED = "initial: {kind: equilibrium, friction: settled}, of several lines in lines.NAME"
 # Kinds of events that make values doubtful: which of them (ALL: every one), and what to do.
 Doubtful = Mapping[str, tuple[frozenset[str], str]]
 DOUBTS: Doubtful = {
@@ -71,10 +84,8 @@ DOUBTS: Doubtful = {
     "bending at point load neglected": (BENDING, "model: rod, or force_rod there"),
     "ignored": (BENDING, "model: rod"),
     "envelope incomplete": (ALL, "compute it anew"),
-}
-# Of an equilibrium alone: a motion forgets it.
-AT_REST: Doubtful = {
-    "static friction neglected": (PULL, "initial: {kind: equilibrium, friction: settled}"),
+    # of an equilibrium, and of the largest force of a motion that begins there
+    "static friction neglected": (PULL, SETTLED),
 }
 # Of an accuracy alone: nobody estimates a limit by windows.
 OF_ACCURACY: Doubtful = {"windows uncertain": (ALL, NOTE)}
@@ -139,7 +150,7 @@ def verdicts_of(result: Result) -> Verdicts:
 
 def section_limits(result: Result) -> list[Judged]:
     """Every limit of bend radius and tension of the sections, where it was broken most or nearly, with its verdict."""
-    found = [_verified(result, x) for x in limits_of(result, result)]
+    found = [_verified(result, x) for x in map(partial(with_partner, result), limits_of(result, result))]
     named = {x.limit for x in found}
     for name, limits in LIMITED.items():
         for limit in limits if name != "von_mises" else ():
@@ -201,7 +212,7 @@ def _pending(result: Result) -> Doubt | None:
 
 def _doubts(result: Result, names: frozenset[str], s: Floats, more: Doubtful = MappingProxyType({})) -> Iterator[Doubt]:
     """What makes quantities doubtful, the worst first: events, errors that are not known; more: kinds beside DOUBTS."""
-    kinds = {**DOUBTS, **more, **(AT_REST if len(result.times) == 1 else {})}
+    kinds = {**DOUBTS, **more}
     rank = {kind: k for k, kind in enumerate(EVENTS_BY_WEIGHT)}
     for event in sorted(result.events, key=lambda e: (rank.get(e.kind, len(rank)), e.t)):
         if event.kind not in kinds or _is_harmless(event):
@@ -222,6 +233,8 @@ def _of_event(
 ) -> Doubt | None:
     """The doubt that an event of a kind (as in DOUBTS) casts on quantities at places s (n,) m; None: none."""
     which, remedy = kind
+    if remedy == SETTLED and "settled" not in event.text:
+        remedy = NOTE
     if event.kind == "unresolved bend" and _is_catenary(result, event):
         which = which | PULL  # what a catenary cuts off of a bend is missing in its tension
     if which and not which & names:
@@ -330,10 +343,10 @@ def _doubt_of_held(result: Result, x: Held) -> Doubt | None:
     if x.unit == "Pa":
         return _stress_reached(result, x)
     if x.unit == "%":
-        bound = bound_with_errors(result)
+        bound = code_with_errors(result) if x.limit == "code" else bound_with_errors(result)
         if bound is None:
             return Doubt(f"the error of {x.name} is not estimated", FINER)
-        why = "with the errors of tension and curvature it may pass the limit"
+        why = f"with the errors of tension and {'moment' if x.limit == 'code' else 'curvature'} it may pass the limit"
         return None if bound <= 1.0 else Doubt(why, "a smaller accuracy")
     error = _error_of_held(result, x, clearance)
     if error is None:

@@ -152,7 +152,7 @@ def _taken(
         raise ResultError(f"'{name}' has no value at an arc length")
     history = memory.get((own, "history")) or history_of(result, name, kept.times, at)
     memory[own, "history"] = history
-    if history.s is None and history.values.ndim > 1:
+    if history.values.ndim > (1 if history.s is None else 2):
         count, fix = history.values[0].size, one_value_of(name)
         raise ResultError(f"'{name}' has {count} values at a time, and one is kept\n    try:      {fix}")
     dims, places = ((), {}) if at is None or history.s is None else _places(own, history.s)

@@ -195,7 +195,7 @@ def _ranges(results: Mapping[str, Result]) -> list[Panel]:
     panels = []
     for name in RANGES:
         found = {key: along(r, name) for key, r in results.items() if name in r}
-        peak = max((float(np.abs(x.values).max()) for x in found.values()), default=0.0)
+        peak = max((float(np.nan_to_num(np.abs(x.values)).max()) for x in found.values()), default=0.0)
         if peak <= ZERO:
             continue
         factor, unit = prefix(next(r.units[name] for r in results.values() if name in r), peak)

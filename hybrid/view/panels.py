@@ -55,7 +55,7 @@ from hybrid.view.style import (
 )
 
 MOST_CHANGES = 12  # of zones that are marked over time: more would hide the curves
-RANGES = ("tension", "curvature", "bending_moment", "torque", "shear", "contact")
+RANGES = ("tension", "curvature", "bending_moment", "torque", "shear", "contact", "capacity_used", "code_used")
 _SIZES = ("curvature", "bending_moment", "shear")  # quantities that are not below zero
 _PARTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31", "#7F7F7F")
 
@@ -215,7 +215,8 @@ def profiles(
 def ranges(result: Result, shown: Kept) -> list[Panel]:
     """Lowest, mean and highest value along the cable, over all outputs; with one output its profile."""
     found = [name for name in RANGES if name in result and len(result.times)]
-    seen = [n for n in found if n in ("tension", "curvature") or np.abs(result[n]).max() > ZERO]  # else there is none
+    sizes = {n: float(np.nan_to_num(np.abs(result[n])).max()) for n in found}
+    seen = [n for n in found if n in ("tension", "curvature") or sizes[n] > ZERO]  # else there is none
     return [_range(result, name, shown) for name in seen]
 
 
@@ -223,7 +224,8 @@ def _range(result: Result, name: str, shown: Kept) -> Panel:
     found, several = along(result, name), len(result.times) > 1
     s, values = found.s, found.values
     bounds_s, low, high, basis = extent(result, name)
-    peak = max(float(np.abs(values).max()), float(np.nanmax(np.abs([low, high]))))
+    peak = float(np.nanmax(np.abs([low, high])))
+    peak = max(float(np.nanmax(np.abs(values))), peak)
     factor, unit = prefix(result.units[name], peak)
     items: list[Item] = []
     error = _error_along(result, name, found)

@@ -140,12 +140,6 @@ def _enveloped(result: Result, name: str) -> Panel:
 
 def _history(result: Result, name: str, at: Any, times: Any) -> History:
     """Histories of a quantity; x, y and z are those of the position."""
-    if name in AXES:
-        places = np.atleast_1d(np.asarray(_places(result, name, at), float))
-        moved = history_of(result, "position", times)
-        inside = np.isin(result.times, moved.t)
-        values = result.at(s=places, names=["position"])["position"][inside, :, AXES.index(name)]
-        return History(name, "m", moved.t, values, places, "every output")
     if name in result and result.dims(name) == ("t", "s", "xyz"):
         fix = "x, y or z" if name == "position" else "a quantity of one component"
         raise ResultError(f"'{name}' has three components at every place\n    try:      {fix}")
@@ -154,7 +148,7 @@ def _history(result: Result, name: str, at: Any, times: Any) -> History:
 
 def _places(result: Result, name: str, at: Any) -> Any:
     """Arc lengths whose histories are drawn: those asked for, else the ends and the middle."""
-    if at is not None or (name not in AXES and not lies_along(result, name)):
+    if at is not None or not lies_along(result, name):
         return at
     return result.s[[0, len(result.s) // 2, -1]] if len(result.s) > 2 else result.s
 

@@ -13,9 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.store.limits import capacity_of, code_of
 from hybrid.store.reader import Result
 from hybrid.view.decimate import MOST_ON_CURVE, Kept, Store, kept, script_json
 from hybrid.view.figure import Panel
+from hybrid.view.modes_page import PagedModes, section
 from hybrid.view.notebook_card import picture
 from hybrid.view.panels import end_forces, energy, energy_parts, history, ranges, touchdown
 from hybrid.view.plotly_backend import figure_of
@@ -44,21 +46,22 @@ from hybrid.view.zones import shares, zone_map
 LEAST_MOVE = 0.02
 
 
-def write_report(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
+def write_report(result: Result, path: str | Path, *, overwrite: bool = False, modes: PagedModes | None = None) -> Path:
     """Write the report of a result as .html or .htm and return where it is; ResultError where it cannot be written.
 
-    overwrite: also replace a file that is not a report of hybrid.
+    overwrite: also replace a file that is not a report of hybrid; modes: of its scene (`hybrid.modes`), which it shows.
     """
     target = check_target(path, PAGES, overwrite=overwrite)
-    return write_file(target, lambda new: new.write_text(html(result), encoding="utf-8"))
+    return write_file(target, lambda new: new.write_text(html(result, modes), encoding="utf-8"))
 
 
-def html(result: Result) -> str:
+def html(result: Result, modes: PagedModes | None = None) -> str:
     """The page as text."""
+    swings = section(modes) if modes is not None else ""
     if result.lines:
         from hybrid.view import system_report
 
-        return system_report.html(result)
+        return system_report.html(result, swings)
     facts, store = facts_of(result), Store()
     shown = kept(result, [fact.t for fact in facts])
     scene = scenery(result, store, shown)
@@ -74,7 +77,7 @@ def html(result: Result) -> str:
         "verdict": verdict_html(facts, several),
         "facts": facts_html(facts, several),
         "cable": _cable(result, scene, shown) if scene else "",
-        "figures": _graphs(result, numbered, several),
+        "figures": _graphs(result, numbered, several) + swings,
         "statistics": statistics_html(result),
         "events": events_html(result, several),
         "energy": _energy(result, numbered["energy"]),
@@ -99,6 +102,8 @@ def _panels(result: Result, shown: Kept) -> dict[str, list[Panel]]:
     moving = [k for k in range(3) if moves[k] > LEAST_MOVE * moves.max()]
     over += [history(result, "position", points, component=k) for k in moving]
     over += [touchdown(result)] if free_edges(result) else []
+    used = (capacity_of(result), code_of(result))
+    over += [history(result, x.name, [x.s]) for x in used if x is not None and x.s is not None]
     return {
         "zones": [zone_map(result, shown)] if any(result.zones) else [],
         "histories": [panel for panel in over if panel],

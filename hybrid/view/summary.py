@@ -13,12 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import LIMIT_EVENTS, is_of_the_run
+from hybrid.store.code_checks import clauses_of
 from hybrid.store.envelope import BROKEN, GROUP, NOT_VERIFIED, NOTHING, SCALE, has_envelope, not_verified
 from hybrid.store.hockling import formation_ratio, formation_tension
 from hybrid.store.reader import Result
 from hybrid.store.records import UNKNOWN, not_converged_in
 from hybrid.store.verdicts import asked_accuracy, doubt_of, quantity_limits, section_limits
-from hybrid.view.along import along
+from hybrid.view.along import Along, along
 from hybrid.view.loops import held_loop, trapped_loop
 from hybrid.view.projections import STILL, free_edges
 from hybrid.view.style import NEWS, ZERO, prefix, short
@@ -239,13 +240,18 @@ def _doubt_of_radius(result: Result, found: Worst) -> str:
     return "" if error is None else f" ({UNKNOWN if unknown else f'± {short(100 * error / found.value, 2)} %'})"
 
 
+def _compressed(tension: Along, zero: float) -> tuple[float, int]:
+    """Of which length, m, the line is compressed at most at an output, and at how many outputs; zero: N, is none."""
+    pressed = np.asarray(tension.values) < -zero
+    weights = np.gradient(tension.s) if len(tension.s) > 1 else np.ones(1)
+    return float((pressed @ weights).max()), int(pressed.any(axis=1).sum())
+
+
 def _slack(result: Result) -> Fact:
     along_line, title = along(result, "tension"), "Lowest tension"
     found, tension = worst(result, "tension", lowest=True), along_line.values
     zero = NOTHING * max(float(np.abs(tension).max()), abs(worst(result, "tension").value))
-    pressed = tension < -zero
-    weights = np.gradient(along_line.s) if len(along_line.s) > 1 else np.ones(1)
-    length, outputs = float((pressed @ weights).max()), int(pressed.any(axis=1).sum())
+    length, outputs = _compressed(along_line, zero)
     values: dict[str, Any] = {"tension": found.value, "outputs": outputs, "length": length}
     values["headline"] = f"{amount(found.value, 'N')}{_doubt(result, 'tension', found)}" if found.value else "0 N"
     there, weight = f"{place(result, found.s)}{moment(result, found.t)}", "plain"
@@ -271,7 +277,7 @@ def _limits(result: Result) -> Fact:
     keys = "limit", "value", "allowed", "broken", "s", "t", "verdict", "why", "remedy"
     title, stresses = (
         "Limits of the sections",
-        [x for x in quantity_limits(result) if x.limit in ("max_stress", "capacity")],
+        [x for x in quantity_limits(result) if x.limit in ("max_stress", "capacity", "code")],
     )
     rows = [x._asdict() for x in section_limits(result)]
     for x in stresses:
@@ -279,13 +285,14 @@ def _limits(result: Result) -> Fact:
         rows.append({key: getattr(x, key) for key in keys} | {"used": used})
     if not rows:
         none = (
-            "None given: min_bend_radius, max_tension, min_tension, max_contact_force, capacity, or max_stress of the "
-            "pipe, of a section."
+            "None given: min_bend_radius, max_tension, min_tension, max_contact_force, capacity, code, or max_stress "
+            "of the pipe, of a section."
         )
         return Fact("limits", title, none, "absent")
     counts = [(sum(x["verdict"] == word for x in rows), word) for word in (BROKEN, NOT_VERIFIED)]
     text = ", ".join(f"{n} of {len(rows)} {word}" for n, word in counts if n) or "All are within"
     text += ", over every accepted step and output." if has_envelope(result) else ", at the outputs that were saved."
+    text += f" By {clauses}." if (clauses := clauses_of(result)) else ""
     why = dict.fromkeys(f"{not_verified(x['why'], x['remedy'])}." for x in rows if x["verdict"] == NOT_VERIFIED)
     return Fact("limits", title, " ".join([text, *(x[:1].upper() + x[1:] for x in why)]), "plain", {"limits": rows})
 
@@ -304,6 +311,29 @@ def _quantities(result: Result) -> list[Fact]:
     return facts
 
 
+def _without_loop(result: Result) -> tuple[np.ndarray, str]:
+    """The outputs (nt,) at which the line is without a loop, as its events say, and when loops formed and opened."""
+    without, said = np.ones(len(result.times), bool), []
+    for event in sorted((x for x in result.events if x.kind in ("loop formed", "loop opened")), key=lambda x: x.t):
+        formed = event.kind == "loop formed"
+        if formed == bool(without[-1]):
+            said.append(f"A loop {'formed' if formed else 'opened'} at t = {short(event.t, 5)} s.")
+        without[result.times >= event.t] = not formed
+    if said and not without.all():
+        said.append("The criterion is of a straight line, and the outputs in between are not judged by it.")
+    return without, " ".join(said)
+
+
+def _not_in_tension(result: Result, tension: Along) -> tuple[bool, str]:
+    """Whether the line is compressed at an output, and where the criterion of a line in tension does not hold."""
+    length, outputs = _compressed(tension, NOTHING * float(np.abs(tension.values).max()))
+    if not outputs:
+        return False, ""
+    part = f"at {outputs} of {len(result.times)} outputs" if len(result.times) > 1 else "at rest"
+    text = f" The cable is compressed {part}, at most {short(length, 3)} m of it: the criterion is of a line in tension"
+    return True, f"{text} and does not hold there."
+
+
 def _hockling(result: Result) -> Fact:
     title = "Loops by torque (hockling)"
 
@@ -316,21 +346,26 @@ def _hockling(result: Result) -> Fact:
     torque = np.asarray(found.values, float)
     if not np.abs(torque).max() > ZERO:
         return none("The cable carries no torque.")
-    stiffness, tension = found.of(result, "bending_stiffness"), along(result, "tension").values
+    stiffness, tension = found.of(result, "bending_stiffness"), along(result, "tension")
     if stiffness is None:
         return none("Not judged: the file has no bending stiffness to hold the torque against.")
     needed = formation_tension(torque, np.broadcast_to(stiffness, torque.shape))
-    ratio = formation_ratio(torque, np.asarray(tension), stiffness)
+    ratio = formation_ratio(torque, np.asarray(tension.values), stiffness)
+    without, loops = _without_loop(result)
+    ratio, loops = np.where(without[:, None], ratio, 0.0), f" {loops}" * bool(loops)
+    pressed, pressing = _not_in_tension(result, tension)
     if not ratio.any():
         i, k = _at(torque, int(np.abs(torque).argmax()))
-        text = f"The torque, at most {amount(abs(float(torque[i, k])), 'N m', 3)}, is far too small for loops."
+        text = f"The torque, at most {amount(abs(float(torque[i, k])), 'N m', 3)}, "
+        small = "needs next to no tension to keep the cable straight." if pressed else "is far too small for loops."
+        text += f"{'was judged at no output without a loop.' if not without.any() else small}{pressing}{loops}"
         values = {"torque": abs(float(torque[i, k])), "needed": float(needed.max()), "ratio": 0.0}
-        return Fact("hockling", title, f"{text} {HOCKLING}.", "plain", values)
+        return Fact("hockling", title, f"{text} {HOCKLING}.", "note" if pressed or loops else "plain", values)
     i, k = _at(ratio, int(ratio.argmax()))
     t, s = float(result.times[i]), float(found.s[k])
     values = {
-        "torque": float(torque[i, k]), "needed": float(needed[i, k]), "tension": float(tension[i, k]),
-        "ratio": float(ratio[i, k]), "margin": 1.0 / float(ratio[i, k]),
+        "torque": float(torque[i, k]), "needed": float(needed[i, k]),
+        "tension": float(tension.values[i, k]), "ratio": float(ratio[i, k]), "margin": 1.0 / float(ratio[i, k]),
     }  # fmt: skip
     doubt = doubt_of(result, "torque", "tension") if values["ratio"] < 1.0 else None
     there = f"{place(result, s)}{moment(result, t)}"
@@ -339,12 +374,14 @@ def _hockling(result: Result) -> Fact:
         f"{amount(values['needed'], 'N', 3)}, there is {amount(values['tension'], 'N', 3)}"
     )
     verdict = ": the criterion is broken, a straight cable would throw a loop" if values["ratio"] >= 1.0 else ""
+    if verdict and values["tension"] < 0.0:
+        verdict = ": it is compressed there, and a straight line in compression is beyond the criterion"
     if doubt is not None:
         verdict = f"; the margin is {doubt.text}"
     elif not verdict:
         verdict = f", {short(1.0 / values['ratio'], 3)} times as much"
     weight = "alarm" if values["ratio"] >= 1.0 else "note" if doubt is not None else "plain"
-    text = f"{text}{verdict}."
+    text = f"{text}{verdict}.{pressing}{loops}"
     if (loop := trapped_loop(result, found, torque)) is not None:
         values |= loop
         text += (
@@ -354,7 +391,7 @@ def _hockling(result: Result) -> Fact:
         if (kinks := loop.get("kink_margin", np.inf) < 1.0) or ("kink_margin" in loop and doubt is None):
             text += f", {short(loop['kink_margin'], 3)} of the radius allowed" + (": it kinks first" if kinks else "")
         text += "."
-    if (held := held_loop(result, found, torque, np.asarray(tension))) is not None:
+    if (held := held_loop(result, found, torque, np.asarray(tension.values))) is not None:
         values |= held
         then = moment(result, held["pop_out_time"])
         by = f"{short(held['pop_out_margin'], 3)} times its tension" if doubt is None else "a margin not verified"
@@ -407,6 +444,9 @@ def _pressed(result: Result, name: str, key: str, partner: str) -> Fact:
         return Fact(key, title, f"The cable never touches {partner}.", "plain", {"force": 0.0})
     s, t = float(result[SCALE][k]), float(result[f"{GROUP}/{name}_t_max"][k])
     text = f"It presses on {partner} with at most {amount(force[k], 'N/m', 3)} {place(result, s)}{moment(result, t)}."
+    if key == "obstacles":
+        for x in result.contacts():
+            text += f" At an output {x.partner} bears at most {amount(x.force, 'N', 3)}{moment(result, x.t_force)}."
     return Fact(key, title, text, "plain", {"force": float(force[k])}, t, s)
 
 

@@ -49,8 +49,8 @@ EXTREMES = (
 )  # fmt: skip
 
 
-def html(result: Result) -> str:
-    """The page as text."""
+def html(result: Result, modes: str = "") -> str:
+    """The page as text; modes: the section of `modes_page`."""
     store, facts = Store(), facts_of_all(result)
     every = AllLines(result)
     several = every.outputs > 1
@@ -66,7 +66,7 @@ def html(result: Result) -> str:
         "verdict": parts.verdict_html(facts, several),
         "facts": parts.facts_html([f for f in facts if f.weight != "alarm"], several) + _tables(result),
         "cable": _space(result, every, scene, shown) if scene else "",
-        "figures": _graphs(numbered),
+        "figures": _graphs(numbered) + modes,
         "statistics": _statistics(result),
         "events": parts.events_html(result, several),
         "energy": "",

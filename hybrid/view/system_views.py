@@ -229,7 +229,8 @@ def _shifts(result: Result, every: AllLines) -> list[tuple[float, Panel]]:
             title = f"motion along {axis}, from the first place"
             if rests:
                 title = f"motion along {axis}: at rest, to {short(bound, 2)} {unit}"
-            curves = {name: x[:, k] * factor for name, x in moved.items()}
+            shown = {name: x for name, x in moved.items() if rests or np.ptp(x, axis=0).max() >= least}
+            curves = {name: x[:, k] * factor for name, x in shown.items()}
             panels.append((peak, _over_time(f"motion-{axis}", title, y, every, curves)))
     return panels
 

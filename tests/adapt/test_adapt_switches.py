@@ -12,7 +12,9 @@ from adapt_scenes import CELL, DWELL, LENGTH, SCENES, changes, comes, goes, outp
 from problems import Scene, pinned, scene
 
 import hybrid
-from hybrid.simulation import cell_changes
+from hybrid.kernels.mesh.cell_errors import CURVATURE
+from hybrid.simulation import initial_zones
+from hybrid.simulation.kind_changes import KindChanges
 
 BUSY = ["deep", "bend", "point", "edge"]
 PULLS = ("end_force_start", "end_force_end")
@@ -167,12 +169,20 @@ def test_what_switches_does_not_move():
             assert jump.max() < 20.0 * 0.02**2, (t, int(jump.argmax()) * CELL)
 
 
+@pytest.mark.parametrize("share", [None, 0.03])
 @pytest.mark.parametrize("name", ["edge", "bend"])
-def test_compiled_reviews_and_switches_are_those_of_python(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """To the last bit: zones, states and energies at all outputs, and what events say; curvature to round-off."""
+def test_compiled_reviews_and_switches_are_those_of_python(
+    name: str, share: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the last bit: zones, states and energies at all outputs, and what events say; curvature to round-off.
+
+    share: of curvature that is asked, for which results treat pins, and zones must not.
+    """
+    if share is not None:
+        monkeypatch.setattr(initial_zones, "shares_asked", lambda *_: {CURVATURE: share})
     found = []
-    for pays_from in (0, 10**9):
-        monkeypatch.setattr(cell_changes, "PAYS_FROM", pays_from)
+    for applies in (KindChanges.applies, lambda owner: False):
+        monkeypatch.setattr(KindChanges, "applies", applies)
         found.append(hybrid.run(SCENES[name]()))
     one, other = found
     assert changes(one) and one.events == other.events

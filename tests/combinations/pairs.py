@@ -68,6 +68,11 @@ FEATURES: dict[str, tuple[Tables, str]] = {
         {"environment.seabed": {"z": -0.5, "stiffness": 2e3, "damping": 20, "friction": {"axial": 0.3, "lateral": 0.5},
                                 "slope": [0.02, 0.01]}}, "bed",
     ),
+    "soil": (
+        {"environment.seabed": {"z": -0.5, "soil": {"shear_strength": 500, "gradient": 900, "lateral": {}}, "friction": {
+            "axial": 0.3, "lateral": 0.5, "residual": [0.2, 0.3], "breakout": 0.02, "travel": 2e-3}, "slope": [0.02, 0.01]}},
+        "bed",
+    ),
     "clump": ({"cable.attachments": [{"kind": "clump", "at": 5.0, "mass": 2.0}]}, "items"),
     "swivel": ({"cable.attachments": [{"kind": "swivel", "at": 5.0}]}, "items"),
     "stiffener": (
@@ -84,6 +89,7 @@ FEATURES: dict[str, tuple[Tables, str]] = {
          S + "bending_slip": [{"stiffness": 12.0, "moment": 0.4, "per_tension": 1e-3}, {"stiffness": 5.0, "moment": 0.5}]},
         "bending",
     ),
+    "stiffness by tension": ({S + "stiffness_per_tension": 0.03}, "bending"),
     "stiffness damping": ({S + "damping": {"mass": 0.5, "stiffness": 0.01}}, "damping"),
     # Pinned at both ends and not at rest, a line with a direction about its axis has none that the scene gives.
     "two stiffnesses": ({S + "bending_stiffness": [20.0, 8.0]}, "bending rest"),
@@ -99,6 +105,7 @@ FEATURES: dict[str, tuple[Tables, str]] = {
          S + "syrope": {"curve": TABLE, "working": "exponential", "k1": 0.5, "k2": 0.5, "highest_tension": 2e3},
          S + "dynamic_stiffness": {"constant": 6e5, "per_tension": 10.0, "relaxation_time": 0.2}}, "stretch",
     ),
+    "creep": ({S + "creep": {"per_decade": 1e-3, "loaded": 0.1}}, "stretch"),
     "contact": ({"contact.self": True}, "contact"),
     "obstacle": (
         {"obstacles": {"pipe": {"kind": "cylinder", "at": [4, 0, -2], "axis": [0.1, 1, 0.05], "radius": 0.8,

@@ -11,8 +11,8 @@ from hybrid.designs.cable_at_rest import CableAtRest
 from hybrid.designs.line_at_rest import parse_result
 from hybrid.designs.numbers import changed_scene, with_number
 from hybrid.designs.sensitivity import at_rest
-from hybrid.model.nearby_clamped import seats_know_no_shape
-from hybrid.model.system import build_system
+from hybrid.model.nearby_clamped import seats_know_no_shape, shaped_anew
+from hybrid.model.system import SystemResolution, bodies_of, build_system
 from hybrid.scene.read import as_scene_or_system
 from tests.designs.test_system_derivatives import ANCHORS, BUOY, CHAIN, HOSE, SEA, moored
 
@@ -159,13 +159,28 @@ def test_arrays_of_clamped_lines_are_those_of_lines_that_are_built_anew(what, mo
     tables, of, keys = SCENES[what]
     made, built = as_scene_or_system(tables), []
     rest = at_rest(made, of)
-    monkeypatch.setattr(system_at_rest, "build_system", lambda *x: built.append(1) or build_system(*x))
+    monkeypatch.setattr(system_at_rest, "shaped_anew", lambda *x: built.append(1) or shaped_anew(*x))
     ours = rest.by(keys)
     assert not built
     monkeypatch.setattr(system_at_rest, "seats_know_no_shape", lambda *_: False)
     anew = rest.by(keys)
     assert built
     np.testing.assert_allclose(ours, anew, rtol=1e-7, atol=1e-9 * np.abs(anew).max())
+
+
+@pytest.mark.parametrize("what", ["two bodies", "without normals", "twist that hangs on first shapes"])
+def test_lines_that_are_built_alone_are_those_of_the_whole(what):
+    tables, _, _ = SCENES[what]
+    system = as_scene_or_system(tables)
+    resolution = SystemResolution.first(system)
+    whole = build_system(system, resolution)
+    model, seats = shaped_anew(system, ["hose"], bodies_of(system), resolution)["hose"]
+    theirs, l = whole.models[whole.names.index("hose")], whole.names.index("hose")
+    np.testing.assert_array_equal(seats, whole.seats[l])
+    assert np.abs(seats).max() > 0.0
+    np.testing.assert_array_equal(model.ends.values.frame, theirs.ends.values.frame)
+    for name, ours, x in zip(model.line._fields, model.line, theirs.line, strict=True):
+        np.testing.assert_array_equal(ours, x, err_msg=name)
 
 
 @pytest.mark.parametrize("clamped", [False, True])

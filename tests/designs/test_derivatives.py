@@ -99,6 +99,29 @@ def results(scene, of):
     return np.array(CableAtRest(scene, 1.0, [parse_result(x, scene.length) for x in of]).values)
 
 
+@pytest.mark.parametrize("part", ["sections", "float"])
+def test_the_largest_curvature_at_a_jump(part):
+    """Where curvature has two values, no parabola goes through both: the largest is that of the equilibrium, and its
+
+    slope that of equilibria on nodes that go along.  Places at nodes see the cells to both sides alike.
+    """
+    heavy, light = ({"length": x, "mass": m, "axial_stiffness": 1e6} for x, m in ((40.0, 20.0), (60.0, 8.0)))
+    tables = scene([heavy, light], pinned(0, 0, 0), pinned(75, 0, 5), "catenary", 40)
+    if part == "float":
+        tables["cable"] = {"sections": [heavy | {"length": 100.0, "diameter": 0.05}]}
+        tables["environment"]["fluid"] = {"density": 1025}
+        tables["cable"]["attachments"] = [{"kind": "float", "at": 40.0, "buoyancy": 3000.0, "mass": 20.0}]
+    made, key = hybrid.validate_scene(tables), "cable.sections[0].length"
+    wanted = [parse_result(x, made.length) for x in ("max curvature", "position.z@45")]
+    rest, still = CableAtRest(made, 1.0, wanted), hybrid.static(made)
+    assert rest.values[0] == pytest.approx(np.nanmax(still.curvature[-1]), rel=1e-6)
+    number = rest.number(key)
+    more, less = (
+        CableAtRest(changed_scene(made, key, number + x), 1.0, wanted, rest.places).values for x in (1e-4, -1e-4)
+    )
+    np.testing.assert_allclose(rest.by([key])[0], (more - less) / 2e-4, rtol=1e-5)
+
+
 @pytest.mark.parametrize("key", ["cable.sections[0].length", "cable.sections[0].mass", "ends.end.position[0]"])
 @pytest.mark.parametrize("dynamic", [None, {"constant": 2e7, "per_tension": 10.0, "relaxation_time": 60.0}])
 def test_a_rope_answers_as_it_stretches_at_rest(key, dynamic):
@@ -217,6 +240,18 @@ def test_zones_that_move_stay_where_they_were_found(cells):
         np.testing.assert_allclose(ours, slope, rtol=1e-4)
         np.testing.assert_allclose(ours[1:], theirs[1:], rtol=0.05)
         assert not np.allclose(ours, theirs, rtol=1e-8)
+
+
+def test_a_result_that_is_sought_to_be_nothing_is_reached():
+    """The end of a catenary of 21 m over 20 m is its lowest point where it hangs a (cosh(20/a) - 1), a sinh(20/a) = 21."""
+    section = {"length": 21.0, "mass": 2.0, "axial_stiffness": 1e8}
+    tables = scene(section, pinned(0, 0, 0), pinned(20, 0, -3), "catenary", 80)
+    a = 36.8
+    for _ in range(50):  # Newton
+        a -= (a * math.sinh(20 / a) - 21) / (math.sinh(20 / a) - 20 / a * math.cosh(20 / a))
+    found = hybrid.seek(tables, {"reaction_end.z": 0.0}, ["ends.end.position[2]"])
+    assert found.numbers["ends.end.position[2]"] == pytest.approx(-a * (math.cosh(20 / a) - 1), rel=2e-3)
+    assert abs(found.results["reaction_end.z"]) < 1e-6 * 2.0 * G * 21.0
 
 
 def test_friction_that_has_settled_has_no_derivative():

@@ -7,7 +7,9 @@ import pytest
 from scipy.optimize import brentq
 
 import hybrid
-from hybrid.designs.motions import PART, Motions
+from hybrid.designs.motions import PART, TANGENT, Motions, Peaks
+from hybrid.designs.numbers import scene_with
+from hybrid.designs.peaks import peaks
 from tests.designs.test_in_motion import G, W, as_lines, heaved, on_the_bed
 
 MASS, AMPLITUDE = "cable.sections[0].mass", "ends.start.motion.heave.amplitude"
@@ -46,6 +48,51 @@ def test_a_limit_over_two_seas_and_its_price():
     assert kept["high"].active and not kept["low"].active
     assert kept["high"].price == pytest.approx(-1.0 / (40.0 * (G + W**2)), rel=1e-2)
     assert found.moving == 2 and found.runs / 2 <= 20
+
+
+def test_a_sea_that_is_far_from_its_limits_is_run_where_the_search_begins_and_ends(monkeypatch):
+    """As a low swell beside a high one: what it comes to is of a run all the same."""
+    ran, run = [], Motions.run
+
+    def noted(self, point, cases, finer=False):
+        before = set(point.runs)
+        found = run(self, point, cases, finer)
+        ran.extend((x, tuple(point.x)) for x in {*point.runs} - before if not finer)
+        return found
+
+    monkeypatch.setattr(Motions, "run", noted)
+    found = hybrid.design(
+        heaved(), unknowns={"m": {"key": MASS, "low": 1, "high": 20}}, minimise="-m",
+        cases={"low": {AMPLITUDE: 0.1}, "high": {AMPLITUDE: 4.0}}, limits={"top": TOP | {"largest": 3400.0}},
+    )  # fmt: skip
+    each = {case: [x for name, x in ran if name == case] for case in ("low", "high")}
+    assert each["low"] == [(5.0,), (found.numbers["m"],)] and len(each["high"]) > 2
+    kept = {x.case: x.value for x in found.kept}
+    at = hybrid.run(found.scenes["low"])
+    assert kept["low"] == pytest.approx(at["tension"][:, 0].max(), rel=1e-3)
+    assert kept["high"] == pytest.approx(3400.0, rel=2e-3)
+
+
+def test_peaks_of_a_history_are_seen_before_they_are_the_largest():
+    """Of (time, place) the largest of each place and of each hill within a tenth, and what they are foretold to be."""
+    history = np.array([[0, 1, 0, 0.5], [2.0, 9.5, 9.3, 1], [0, 3, 2, 0], [1, 9.2, 1, 0.0], [0, 0.5, 1, 10.0]])
+    assert peaks(history, "max", (4, 3)) == [(4, 3), (1, 1), (1, 2), (3, 1)]
+    assert peaks(-history, "min", (4, 3)) == peaks(history, "max", (4, 3))
+    assert peaks(history, "mean", None) == [None]
+    found = Peaks(((4, 3), (1, 1)), np.array([10.0, 9.5]), np.array([[0.0], [1.0]]), least=False)
+    assert found.moved(np.array([1.0])).where == ((1, 1), (4, 3)) and found.moved(np.array([1.0])).values[0] == 10.5
+    assert found.nearest_to((1, 2)) == 1
+
+
+def test_one_unknown_at_its_bound_and_one_at_the_limit_of_the_higher_sea():
+    """As heavy as can be where only m L + M counts for the pull: by hand M is least, and m is what the limit leaves."""
+    found = hybrid.design(
+        heaved(), unknowns={"m": {"key": MASS, "low": 1, "high": 20}, "M": {"key": "ends.end.mass", "low": 10, "high": 200}},
+        cases={"low": {AMPLITUDE: 0.5}, "high": {AMPLITUDE: 1.0}}, minimise="-m - 0.01*M",
+        limits={"top": TOP | {"largest": 3500.0}},
+    )  # fmt: skip
+    assert found.settled and found.numbers["M"] == pytest.approx(10.0, rel=1e-6)
+    assert (40.0 * found.numbers["m"] + 10.0) * (G + W**2) == pytest.approx(3500.0, rel=3e-3)
 
 
 def test_what_has_no_equilibrium_is_designed_in_motion():
@@ -89,19 +136,18 @@ def test_slopes_of_a_motion_are_those_of_central_differences():
     scene = hybrid.validate_scene(on_the_bed())
     keys = [("cable.sections[0].drag.normal",), ("cable.sections[0].length",)]
     of = ["max tension@end", "std position.z@150", "last tension@end"]
-    from hybrid.designs.equilibria import scene_with
-
     motions = Motions(
         {"": scene}, keys, [("", f"{x} in motion") for x in of], lambda case, x: scene_with(scene, keys, x)
     )
     x = np.array([1.2, 250.0])
     here = motions.at(x)
-    assert motions.refresh(here, {""}) and not motions.refresh(here, {""})
+    assert not motions.refresh(here, {""})  # the first run has them
+    slopes = np.array([peaks.slopes[0] for peaks in motions.peaks(here, np.abs(x))[""]])
     for i in (0, 1):
         d = 0.4 * PART * x[i] * (np.arange(2) == i)
         more, less = motions.at(x + d).runs[""].values, motions.at(x - d).runs[""].values
-        np.testing.assert_allclose(here.slopes[:, i], (more - less) / (2.0 * d[i]), rtol=(1e-3, 5e-2)[i])
-    assert motions.count == 1 + 2 + 4
+        np.testing.assert_allclose(slopes[:, i], (more - less) / (2.0 * d[i]), rtol=(1e-3, 5e-2)[i])
+    assert motions.count == 1 + 2 * TANGENT + 4
 
 
 def test_written_as_a_system_it_is_the_same():

@@ -14,6 +14,7 @@ from hybrid.cli.commands import app
 from hybrid.designs.in_motion import in_motion
 from hybrid.designs.numbers import changed_scene, number_of
 from hybrid.designs.replay import course_of, replay
+from hybrid.designs.tangents import Unfollowed
 from hybrid.scene.read import as_scene_or_system
 
 G, A, PERIOD = 9.81, 1.0, 8.0
@@ -185,7 +186,11 @@ def test_steps_that_are_divided_are_no_neighbours(monkeypatch):
         lines = {key: replace(x, step=part * x.step) for key, x in course.lines.items()}
         return plain(asked, course._replace(lines=lines), *more)
 
+    def unfollowed(*_):
+        raise Unfollowed("nothing")
+
     monkeypatch.setattr(room, "replay", shorter)
+    monkeypatch.setattr(room, "by_tangents", unfollowed)
     with pytest.raises(hybrid.ComputationError, match=r"cable.sections\[0\].mass: a step was divided"):
         in_motion(scene, ["max tension@start"], ["cable.sections[0].mass"])
 

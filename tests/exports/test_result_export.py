@@ -183,6 +183,22 @@ def test_a_result_in_memory_and_one_output(tmp_path: Path) -> None:
 # ---- CSV ------------------------------------------------------------------------------------------
 
 
+def test_the_error_of_an_end_force_is_told_with_its_components(tmp_path: Path) -> None:
+    """Components of a vector along no line have no field of errors, and the file has the figure of the run."""
+    section = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e6}
+    pins = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [9, 0, 0]}}
+    tables = {"cable": {"sections": [section]}, "ends": pins, "initial": "equilibrium", "model": "catenary"}
+    told = []
+    for errors in (True, False):
+        found = hybrid.static(tables | {"output": {"errors": errors}})
+        head = export(found, tmp_path / f"{errors}.csv", names=["reaction_end"]).files[0].read_text(encoding="utf-8")
+        told.append("not estimated" in head)
+        if errors:
+            most = float(found.attributes["error_total_end_force"])
+            assert f"#   reaction_end: at most {most:.3g} N, estimated" in head
+    assert told == [False, True]
+
+
 def test_csv_keeps_every_digit(result: Result, tmp_path: Path) -> None:
     file = export(result, tmp_path / "run.csv").files[0]
     lines = file.read_text(encoding="utf-8").splitlines()
@@ -274,6 +290,57 @@ def test_vtk_reads_what_is_in_the_file(tmp_path: Path) -> None:
         assert opened["scene"][()].decode() == SCENE and opened.attrs["title"] == "Schwingt, 5 µm"
         assert opened["VTKHDF/PointData/tension"].attrs["units"] == "N"
         assert opened["VTKHDF/CellData/zone_kind"].attrs["meanings"].tolist() == ["catenary", "rod"]
+
+
+ANGLE = Path(__file__).parents[1] / "data" / "angle.obj"
+
+
+def test_vtk_has_obstacles_where_they_are(tmp_path: Path) -> None:
+    pytest.importorskip("vtk", reason="the extra `dev` is not installed, so ParaView's reader is not there to ask")
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+
+    section = {"length": 2.01, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e5}
+    obstacles = {
+        "ball": {"kind": "sphere", "at": [1, 1, 0], "radius": 0.2, "motion": {"velocity": [0, 0, 1.0], "ramp": 0.06}},
+        "pipe": {"kind": "cylinder", "at": [0, 0, -2], "axis": [0, 1, 0], "radius": 0.1},
+        "floor": {"kind": "plane", "at": [0, 0, -3], "normal": [0, 0, 1]},
+        "angle": {"kind": "mesh", "file": str(ANGLE), "scale": 0.1, "at": [1, -3, 0]},
+    }
+    result = hybrid.run({
+        "cable": {"sections": [section]}, "obstacles": obstacles, "model": "catenary", "mesh": {"cells": 10},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [2, 0, 0]}},
+        "initial": "equilibrium", "time": {"duration": 0.2, "step": 0.02}, "output": {"every": 0.1, "points": 11},
+    })  # fmt: skip
+    reader = vtkHDFReader()
+    reader.SetFileName(str(export(result, tmp_path / "run.vtkhdf", times=(0.1, None)).files[0]))
+    reader.UpdateInformation()
+    facets = len(result["obstacles/angle/triangles"])
+    for step in (1, 0):
+        reader.SetStep(step)
+        reader.Update()
+        seen = reader.GetOutput()
+        points = vtk_to_numpy(seen.GetPoints().GetData())
+        np.testing.assert_array_equal(points[:11], result.position[step + 1])
+        tension = vtk_to_numpy(seen.GetPointData().GetArray("tension"))
+        np.testing.assert_array_equal(tension[:11], result.tension[step + 1])
+        assert np.isnan(tension[11:]).all() and seen.GetNumberOfLines() == 1
+        kinds = vtk_to_numpy(seen.GetCellData().GetArray("zone_kind"))
+        assert kinds[0] == 0 and set(kinds[1:].tolist()) == {1} and kinds.size == seen.GetNumberOfCells()
+        corners = vtk_to_numpy(seen.GetPolys().GetConnectivityArray()).reshape(-1, 3)
+        assert len(corners) == seen.GetNumberOfPolys() and corners.min() == 11
+        middle = result["obstacles/ball/position"][step + 1]
+        assert middle[2] == pytest.approx(0.1 * (step + 1), abs=0.05)
+        of_ball = np.linalg.norm(points - middle, axis=1) < 0.2001
+        a, b, c = (points[corners[of_ball[corners].all(axis=1)]] - points[of_ball].mean(axis=0)).transpose(1, 0, 2)
+        volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0  # positive: seen from outside they turn left
+        assert abs(volume) == pytest.approx(4.0 / 3.0 * np.pi * 0.2**3, rel=0.05)
+        of_pipe = np.abs(np.hypot(points[:, 0], points[:, 2] + 2.0) - 0.1) < 1e-9
+        assert points[of_pipe, 1].min() < -0.3 and points[of_pipe, 1].max() > 0.3
+        mesh = result["obstacles/angle/points"] + [1, -3, 0]
+        assert (np.abs(points[:, None] - mesh[None]).max(axis=2).min(axis=0) < 1e-12).all()
+        beside = (points[corners][:, :, 1] < -2.1) & (points[corners][:, :, 2] > -1.0)
+        assert beside.all(axis=1).sum() == facets
 
 
 def test_vtk_reads_a_part_and_a_single_output(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from hybrid.kernels.state.forces import (
     ADDED_MASS,
     BENDING_LAW,
     BODIES,
+    BREAKOUT,
     DRAG,
     FLOW,
     FRICTION,
@@ -25,6 +26,7 @@ from hybrid.kernels.state.forces import (
     OBSTACLES,
     ROTARY,
     SEABED,
+    SOIL,
     STIFFNESS_DAMPING,
     SURFACE,
     VORTICES,
@@ -244,6 +246,37 @@ def test_jacobian_of_lift(zones, bits):
     J, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
     numeric = by_differences(line, sea, ends, st)
     assert np.abs(J - numeric).max() < 1e-6 * np.abs(J).max()
+
+
+def in_soil(line, sea, st):
+    """The same on soil that remembers: some nodes in it for the first time, some on their way up, some down again."""
+    g = np.random.default_rng(2)
+    soil = np.array([1.0, 0.3, 1.5, 0.25, 4.0, 0.6, 1.0, 0.5, 0.4, 0.6, 0.5, 0.7])
+    past = np.zeros((N + 1, 6))
+    past[:, 0] = g.uniform(0.2, 1.5, N + 1)
+    past[:, 2] = past[:, 0] + g.uniform(0.1, 0.5, N + 1)
+    past[:, 4] = np.arange(N + 1) % 3 - 1.0
+    past[:, 5] = g.uniform(0.0, 1.0, N + 1)
+    line = line._replace(bed_width=g.uniform(1.0, 2.0, N + 1), bits=line.bits | SEABED | SOIL)
+    return line, sea._replace(soil=soil, offset=1.0), st._replace(soil=past)
+
+
+@pytest.mark.parametrize("bits", [0, FRICTION, FRICTION | BREAKOUT, LAND])
+@pytest.mark.parametrize("zones", ["rod", "catenary"])
+def test_jacobian_of_soil_that_remembers(zones, bits):
+    """On each branch, sticking and sliding, with resistance to the side."""
+    line, sea, ends, st = random_case(3, ZONES[zones], bits)
+    bare = line._replace(bits=bits & ~BREAKOUT)
+    without, _ = assembled(bare, sea, ends, st, np.zeros_like(st.r))
+    line, sea, st = in_soil(line, sea, st)
+    J, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
+    numeric, exact = by_differences(line, sea, ends, st), J.copy()
+    for i in range(N):
+        if line.spin[i]:
+            soft = line.kb[i, 2] * line.element[i] + line.kb[i + 1, 2] * line.element[i + 1]
+            exact[5 * i + 4, 5 * i + 4] += 1e-9 * soft
+    assert np.abs(exact - numeric).max() < 1e-6 * np.abs(J).max()
+    assert np.abs(J - without).max() > 1e-3 * np.abs(J).max()
 
 
 @pytest.mark.parametrize("bits", [0, STIFFNESS_DAMPING, LAND])

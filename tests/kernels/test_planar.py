@@ -8,7 +8,7 @@ import itertools
 
 import numpy as np
 import pytest
-from test_jacobian import CA, CV, WITHOUT_OBSTACLES, ZONES, random_case, with_tables
+from test_jacobian import CA, CV, WITHOUT_OBSTACLES, ZONES, in_soil, random_case, with_tables
 
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.algebra.block_elimination_plane import KEPT, TRIPLE, WIDE, solve_again_planar
@@ -134,6 +134,18 @@ def test_both_marches_bend_by_the_same_tables(bits, seed):
     line.kb[4, 2] = 0.8
     _, x, told = in_space(line, *rest, u)
     _, y, said = in_plane(line, *rest, u)
+    assert np.abs(x[:, :4] - y[:, :4]).max() < 1e-8 * np.abs(x).max()
+    told[RESIDUAL : RESIDUAL_NODE + 1] = said[RESIDUAL : RESIDUAL_NODE + 1]
+    assert np.abs(told - said)[:22].max() < 1e-9 * np.abs(told).max()
+
+
+@pytest.mark.parametrize("bits", [0, forces.FRICTION, forces.FRICTION | forces.BREAKOUT])
+@pytest.mark.parametrize("seed", range(3))
+def test_both_marches_lie_in_the_same_soil(bits, seed):
+    line, sea, ends, st = flat_case(seed, ZONES["rod"], bits, (1, 0))
+    (line, sea, st), u = in_soil(line, sea, st), np.zeros((N + 1, 3))
+    _, x, told = in_space(line, sea, ends, st, u)
+    _, y, said = in_plane(line, sea, ends, st, u)
     assert np.abs(x[:, :4] - y[:, :4]).max() < 1e-8 * np.abs(x).max()
     told[RESIDUAL : RESIDUAL_NODE + 1] = said[RESIDUAL : RESIDUAL_NODE + 1]
     assert np.abs(told - said)[:22].max() < 1e-9 * np.abs(told).max()

@@ -22,7 +22,8 @@ from hybrid.kernels.laws.seabed import contact
 from hybrid.kernels.laws.water import FADED, SAME_WETNESS, wave_kinematics
 from hybrid.kernels.state.state import no_sea, with_waves
 from hybrid.model.sea import Surroundings, components, current_table, surroundings
-from hybrid.model.spectra import FINE, HIGHEST, LOWEST, jonswap, shares
+from hybrid.model.spectra import HIGHEST, LOWEST, jonswap
+from hybrid.scene.measured_spectrum import FINE, shares
 from hybrid.scene.spectra import JonswapWaves
 from hybrid.scene.stream_function import steady_wave
 from hybrid.scene.waves import RegularWaves, StreamFunctionWaves

@@ -422,7 +422,11 @@ def test_the_token_is_not_on_the_command_line_of_the_browser(
     (tmp_path / "scene.yaml").write_text(SCENE)
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", opened.append)
-    monkeypatch.setattr("uvicorn.Server.run", lambda self, sockets: sockets[0].close())
+
+    async def serve(self: Any, sockets: Any) -> None:
+        sockets[0].close()
+
+    monkeypatch.setattr("uvicorn.Server.serve", serve)
     with pytest.raises(SystemExit):
         main(["view", str(tmp_path / "scene.yaml"), "--json"])
     address = json.loads(capsys.readouterr().out.splitlines()[0])["address"]

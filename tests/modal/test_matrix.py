@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.designs import line_at_rest
 from hybrid.designs.cable_at_rest import CableAtRest
-from hybrid.designs.line_at_rest import parse_result
+from hybrid.designs.line_at_rest import displaced, parse_result
 from hybrid.kernels.algebra.block_elimination import SIZE
-from hybrid.modal.matrices import linear_line
+from hybrid.linear.matrices import linear_line
 from tests.solve.test_bed_of_depths import hill, mooring
 
 ROD = {
@@ -67,7 +66,7 @@ def test_it_is_what_the_equations_change_by(what):
         step = steps.get(unknown % SIZE, 1e-6 * chord)
         q = np.zeros((2, len(state.r), SIZE))
         q[:, unknown // SIZE, unknown % SIZE] = 1.0
-        moved, left = line_at_rest._moved(state, q, np.array([step, -step])), []
+        moved, left = displaced(state, q, np.array([step, -step])), []
         for k in (0, 1):
             for name, x in moved.items():
                 getattr(line._still, name)[:] = x[k]

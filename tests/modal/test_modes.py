@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
+from hybrid.linear.matrices import linear_network
 from hybrid.modal.api import _found, equilibrium_of
-from hybrid.modal.matrices import linear_network
 from hybrid.scene.read import as_scene_or_system
 
 G = 9.81

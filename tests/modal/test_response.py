@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
-from hybrid.modal.drag import across, along, size_deviation
+from hybrid.linear.drag import across, along, size_deviation
 from hybrid.scene.combinations import RESPONSE_TO_MOTION
 
 REGULAR = {"kind": "regular", "height": 1.0, "period": 7.0, "ramp": 10, "depth": 100}
@@ -99,6 +99,25 @@ def test_a_moved_end_as_in_time():
     assert response.valid and response.rounds < 10
 
 
+def test_a_float_on_a_catenary_makes_a_kink_and_no_curvature():
+    """At the float, and beside it, as in time; the kink itself would be several times as much, and grow with the mesh."""
+    tables = hung(motion={"surge": {"amplitude": 0.05, "period": 7.0}, "ramp": 10.0})
+    tables["cable"]["attachments"] = [
+        {"kind": "float", "at": 30.0, "buoyancy": 2000.0, "mass": 100.0, "drag_area": 0.6}
+    ]
+    line = hybrid.response(tables).lines["cable"]
+    places = [15.0, 29.0, 30.0, 31.0, 45.0]
+    result = hybrid.run(
+        tables | {"time": {"duration": 105.0, "step": 0.05}, "output": {"every": 0.25, "points": places}}
+    )
+    s, there = result.both_sides("curvature")
+    there = there[result.times > 35.0].std(axis=0)
+    here = np.interp(s, line.s, line.deviation("curvature"))
+    sides = np.flatnonzero(s == 30.0)
+    assert sides.size == 2 and there[sides].min() * 0.9 < here[sides[0]] < there[sides].max() * 1.1
+    np.testing.assert_allclose(np.delete(here, sides), np.delete(there, sides), rtol=0.05)
+
+
 def test_a_rod_that_a_clamp_turns_as_in_time():
     """The frame of an end that pitches bends the rod beside it."""
     tables = hung(model="rod", cells=80, damping=0.3, bending_stiffness=2e5)
@@ -112,6 +131,18 @@ def test_a_rod_that_a_clamp_turns_as_in_time():
     there = result.curvature[result.times > 30.0].std(axis=0)
     here = np.interp([50.0, 58.0, 60.0], line.s, line.deviation("curvature"))
     np.testing.assert_allclose(here, there, rtol=0.03)
+
+
+def test_what_hardly_varies_is_not_resolved(tmp_path):
+    """In short waves the lower end bends by less than a fifth of the upper one, and the command says so."""
+    waves = {"kind": "jonswap", "significant_height": 1.0, "peak_period": 5.0, "direction": 30, "depth": 100}
+    line = hybrid.response(hung(waves)).lines["cable"]
+    known, deviation = line.resolved("curvature"), line.deviation("curvature")
+    assert not known[3] and known[57]
+    assert deviation[known].min() >= 0.2 * deviation.max() > deviation[~known].max()
+    (tmp_path / "scene.yaml").write_text(json.dumps(hung(waves)))
+    out = CliRunner().invoke(app, ["response", str(tmp_path / "scene.yaml")])
+    assert "curvature is not known where" in out.output.replace("\n", " "), out.output
 
 
 def test_waves_of_many_directions_as_in_time(tmp_path):
@@ -161,11 +192,15 @@ def test_one_line_of_a_system_is_the_cable():
 
 @pytest.mark.slow
 def test_a_storm_as_in_hours_of_it():
-    """The mean of six hours: 610, 613, 616, 632, 650 N."""
+    """The mean of six hours: 610, 613, 616, 632, 650 N.  Not said to be valid: of the 6.9 % that are left out of tension about
+
+    half comes true in general, here less.
+    """
     response, here, there = compare(hung(STORM), 3600.0, seeds=range(1, 7), step=0.15, late=0.05)
     print(here, there)
     np.testing.assert_allclose(here, there, rtol=0.03)
-    assert response.valid_for("tension") and not response.valid_for("curvature")
+    assert not response.valid_for("tension") and not response.valid_for("curvature")
+    assert 0.055 < response.lines["cable"].left_out["tension"].max() < 0.08
 
 
 def test_spectrum_and_extremes():

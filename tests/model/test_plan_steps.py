@@ -45,7 +45,8 @@ def test_what_the_first_steps_show_is_in_the_plan() -> None:
 
 
 def test_a_pre_run_that_is_cut_leaves_a_plan(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hybrid.accuracy.run_forecast.PRE_RUN", 0.0)
+    for name in ("PRE_RUN", "CHOICE"):
+        monkeypatch.setattr(f"hybrid.accuracy.run_forecast.{name}", 0.0)
     plan = hybrid.plan(scene("3%"))
     assert plan.measured and plan.steps > 0 and plan.seconds > 0.0
 

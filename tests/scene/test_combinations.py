@@ -53,6 +53,8 @@ ROPE = {SECTION + "dynamic_stiffness": {"constant": 2e6, "relaxation_time": 100}
 SHEDS: dict[str, Any] = {SECTION + "vortices": {}, "environment.fluid": {"density": 1025, "current": [0.3, 0, 0]}}
 HIGH_WAVES: dict[str, Any] = {"environment.fluid": {
     "density": 1025, "surface": 5, "waves": {"kind": "stream_function", "height": 1, "period": 5, "ramp": 9}}}  # fmt: skip
+CREEPS: dict[str, Any] = {SECTION + "creep": {"per_decade": 0.001, "loaded": 100}}
+CLAY: dict[str, Any] = {"environment.seabed": {"z": -9, "soil": {"shear_strength": 2000}}}
 RAO = {"rao": str(Path(__file__).parents[1] / "data" / "rao.csv"), "origin": [8, 0, 0], "fairlead": [0, 0, 0]}
 CLAMPED = {ONE + "connections": {"end": {"kind": "clamped", "tangent": [1, 0, 0]}}}
 SHAPED = {
@@ -71,6 +73,9 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
         TWO | {"cable.attachments": [{"kind": "bend_restrictor", "range": [0, 2], "radius": 2}]}, ""
     ),
     (c.SLIP, c.MOVING_ZONES): (SLIPS | MOVING, ""),
+    (c.NO_WIDTH, c.SOIL): (CLAY | {"cable.sections": [{"length": 10, "mass": 2, "bending_stiffness": 10}]}, ""),
+    (c.SOIL, c.ABOUT_REST): (CLAY, "about rest"),
+    (c.CREEP, c.PAYOUT): (CREEPS | PAID, ""),
     (c.SLIP, c.PAYOUT): (SLIPS | PAID, ""),
     (c.SLIP, c.ABOUT_REST): (SLIPS, "about rest"),
     (c.SPRING_BESIDE_SLIP, c.SLIP): (SLIPS | {END + "bend_stiffness": 5}, ""),
@@ -81,8 +86,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.SWIVEL_BESIDE, c.DIRECTED): (SWIVEL | TWO, ""),
     (c.STRETCH_LAW, c.TORQUE_OF_TENSION): (ROPE | TORQUE, ""),
     (c.SHORTEST_CELLS, c.STAYING_CELLS): ({"model": {"kind": "adaptive", "rod_cell": 0.1}}, ""),
-    (c.MOVING_ZONES, c.GOES_ITS_WAY): ({"obstacles.ball": BALL["obstacles"]["ball"] | {"from_outside": True}} | MOVING, ""),
-    (c.PAYOUT, c.MEETS_LINES): (TWO_LINES | PAID_LINE, ""),
     (c.ESTIMATED, c.LINES_TOUCH): (TWO_LINES | {"accuracy": "3%"}, ""),
     (c.SETTLED_FRICTION, c.GOES_ITS_WAY): (TWO_LINES | {ONE + "initial": {"friction": "settled"}}, ""),
     (c.ABOUT_REST, c.MOVED_BY_LINES): (TWO_LINES, "about rest"),
@@ -94,9 +97,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.TENSION_HELD, c.SEVERAL_LINES): (
         {ONE + "connections.end.payout": {"longest": 12, "winch": {"tension": 50, "inertia": 9}},
          "points.a": {"kind": "free", "mass": 5, "initial_guess": [8, 0, -9]}}, ""
-    ),
-    (c.ZONES_OF_SEVERAL, c.PAYOUT): (
-        {ONE + "connections.end.payout": {"rate": 0.1, "ramp": 1.0}, ONE + "model": MOVING["model"]}, ""
     ),
     (c.DAMPED_OTHERWISE, c.PAYOUT): (PAID | ROPE | {SECTION + "damping": {"stiffness": 0.01}}, ""),
     (c.VORTICES, c.PLANE): (SHEDS | {"dimension": 2}, ""),
@@ -110,10 +110,11 @@ OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.TORSION, c.PLANE), {END + "turns": 2, "dimension": 2}, ""),
     ((c.SWIVEL_BESIDE, c.DIRECTED), SWIVEL | CURVED, ""),
     ((c.SLIP, c.ABOUT_REST), SLIPS, "derivatives"),
+    ((c.SLIP, c.MOVING_ZONES), {SECTION + "stiffness_per_tension": 0.01} | MOVING, ""),
+    ((c.SOIL, c.ABOUT_REST), CLAY, "derivatives"),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"time": {"duration": 3.0}}, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"output.errors": True}, ""),
     ((c.ABOUT_REST, c.MOVED_BY_LINES), TWO_LINES, "derivatives"),
-    ((c.PAYOUT, c.MEETS_LINES), SHAPED | PAID_LINE, ""),
 )
 
 

@@ -66,9 +66,10 @@ def test_those_of_a_system_likewise(duration: float, tail: str, monkeypatch: pyt
     contact: list[bool | None] = []
     make = SystemRun.__init__
 
-    def noted(self: SystemRun, given: Any, *args: Any, **more: Any) -> None:
-        contact.append(given.lines["hose"].contact.self)
-        make(self, given, *args, **more)
+    def noted(self: SystemRun, given: Any, target: Any, text: Any, moves: bool, *args: Any, **more: Any) -> None:
+        if moves:
+            contact.append(given.lines["hose"].contact.self)
+        make(self, given, target, text, moves, *args, **more)
 
     monkeypatch.setattr(SystemRun, "__init__", noted)
     scene = system(contact={"friction": RUBS["friction"]})

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import hybrid
+from hybrid.simulation.hockling_watch import Loops, note_loops
 
 EI, GJ, DIAMETER = 0.5, 0.4, 0.02
 
@@ -86,3 +88,56 @@ def test_a_loop_that_forms() -> None:
     np.testing.assert_allclose(lost, 2.0 * np.round(0.5 * lost), atol=1e-9)
     assert bool(np.round(lost).any()) == any(event.kind == "line meets itself" for event in result.events)
     assert not [event for event in hybrid.run(twisted(0.5, 6.0)).events if event.kind == "loop formed"]
+
+
+def told_of(writhe: list[float], bends: list[float], batches: int = 1) -> list[tuple[float, str, str]]:
+    """Times, kinds and texts of the events of a line of 3 points, whose middle bends, in batches of outputs."""
+    found: list[tuple[float, str, str]] = []
+    t, s, known = np.arange(float(len(writhe))), np.array([0.0, 1.0, 2.0]), Loops()
+    curvature = np.outer(bends, [0.0, 1.0, 0.5])
+    tension = 10.0 * (1.0 + t[:, None]) + s  # N, largest at the end
+    for part in np.array_split(np.arange(t.size), batches):
+        values = {"turns/writhe": np.array(writhe)[part], "curvature": curvature[part], "tension": tension[part]}
+
+        def event(t: float, a: float, b: float, kind: str, text: str, **more: float) -> None:
+            found.append((t, kind, text))
+
+        known = note_loops(t[part], values, s, known, event)
+    return found
+
+
+def test_a_loop_that_opens_is_told_with_its_pull_and_its_least_radius() -> None:
+    """It forms at 2 s, is bent to 1/8 m at 3 s and open at 5 s, and another forms; in batches as at once."""
+    writhe = [0.0, 0.5, 1.0, 1.0, 0.5, 0.1, 0.6, 0.9]
+    bends = [1.0, 2.0, 4.0, 8.0, 6.0, 1.0, 2.0, 3.0]
+    found = told_of(writhe, bends)
+    assert [(t, kind) for t, kind, _ in found] == [(2.0, "loop formed"), (5.0, "loop opened"), (7.0, "loop formed")]
+    assert "radius of 0.125 m" in found[1][2] and "tension along the line is 62 N" in found[1][2]
+    assert found == told_of(writhe, bends, 3) == told_of(writhe, bends, 8)
+    assert not told_of([0.0, 0.5, 0.7, 0.1], [1.0] * 4)
+
+
+def test_a_loop_that_is_there_from_the_start_opens_and_another_forms() -> None:
+    found = told_of([1.0, 0.9, 0.1, 0.2, 1.0], [1.0] * 5)
+    assert [(t, kind) for t, kind, _ in found] == [(2.0, "loop opened"), (4.0, "loop formed")]
+
+
+def test_a_run_that_is_resumed_in_a_loop_tells_that_it_opens(tmp_path: Path) -> None:
+    """The end comes back: the writhe is that of the start again, from one output on, and the event says so once."""
+    times = np.arange(0.0, 14.05, 0.1)
+    away = 0.4 * (1.0 - np.cos(np.pi * np.clip(np.minimum(times, 12.0 - times), 0.0, 5.0) / 5.0))
+    rows = [f"{t},{x},0,0\n" for t, x in zip(times, 3.995 - away, strict=True)]
+    (tmp_path / "away.csv").write_text("t,x,y,z\n" + "".join(rows))
+    scene = twisted(6.0, 6.0, away=0.8)
+    tables = scene.model_dump(mode="python", exclude_unset=True)
+    tables["ends"]["end"]["motion"] = {"file": str(tmp_path / "away.csv")}
+    tables["time"]["duration"] = 7.0
+    hybrid.run(tables, tmp_path / "loop.h5")
+    whole = hybrid.resume(tmp_path / "loop.h5", until=14.0)
+    writhe = np.abs(whole["turns/writhe"] - whole["turns/writhe"][0])
+    formed, opened = ([x for x in whole.events if x.kind == f"loop {word}"] for word in ("formed", "opened"))
+    assert writhe.max() > 0.75 and formed[0].t < 7.0 and len(opened) == 1
+    k = int(np.flatnonzero(whole.times > formed[-1].t)[np.argmax(writhe[whole.times > formed[-1].t] < 0.375)])
+    assert opened[0].t == pytest.approx(whole.times[k]) and opened[0].value == pytest.approx(whole["tension"][k].max())
+    since = (whole.times >= formed[0].t) & (whole.times <= whole.times[k])
+    assert f"radius of {1.0 / whole['curvature'][since].max():.3g} m" in opened[0].text

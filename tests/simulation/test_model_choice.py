@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from bits import Stopping, differences, went_on
 
 import hybrid
 from hybrid.accuracy import model_choice
+from hybrid.cli.plan_tables import plan_lines
 from hybrid.model.build import build
 from hybrid.model.model_costs import CHOSEN, Cost, cheapest
 from hybrid.model.resolution import first_resolution, model_is_free
@@ -156,6 +158,20 @@ def test_the_plan_predicts_each():
     assert hybrid.plan(TAUT | {"model": "adaptive"}).choice == plan.choice
     assert hybrid.plan(TAUT | {"model": MOVING}).choice == ()
     assert plan.no_choice == "" and hybrid.plan(CLAMPED).no_choice == "an end is clamped"
+
+
+def test_the_plan_says_which_why_and_where_rods_are():
+    """The text is that of the run's event; a clamp makes a rod beside it, which the text names."""
+    said, plan = chosen(hybrid.run(CLAMPED)), hybrid.plan(CLAMPED)
+    assert plan.chosen == "rod" and said.startswith(f"rods everywhere; {plan.why}")
+    (line,) = (x for x in plan_lines(hybrid.validate_scene(CLAMPED), plan) if x.startswith("model"))
+    assert line.startswith("model") and "rod, chosen by a pre-run: rod" in line
+    found = re.search(r"(\d+)% of them rod: s = (.*) m\)", plan.why)
+    assert found is not None
+    share, places = found.groups()
+    assert 0 < int(share) < 100
+    length = CLAMPED["cable"]["sections"][0]["length"]
+    assert any(float(x) in (0.0, length) for part in places.split(", ") for x in part.split(" to "))
 
 
 def test_the_plan_predicts_the_number_of_runs():

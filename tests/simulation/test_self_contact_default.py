@@ -76,7 +76,7 @@ def test_contact_that_begins_by_itself_is_told(led: hybrid.Result) -> None:
     assert "surfaces are" in begun[0].text and "contact: {self: false}" in begun[0].text
     said = list[tuple[float, bool, str]]()
     hybrid.run(led_through(), progress=lambda x: said.append((x.t, x.touches, x.text))).close()
-    assert all(("contact with itself" in text) == on for _, on, text in said) and said[-1][1]
+    assert all(("contact" in text) == on for _, on, text in said) and said[-1][1]
     assert all(t >= begun[0].t for t, on, _ in said if on)
     for more, told in (({}, True), ({"contact": {"self": False}}, False), ({"contact": {"self": True}}, False)):
         scene = hybrid.validate_scene(led_through(**more))

@@ -87,6 +87,42 @@ def test_compression_that_friction_holds_is_told_and_does_not_stop_the_run() -> 
     assert -MU * WEIGHT * 5.0 < result.tension.min() < 0.0
 
 
+def with_a_limit(**changes: Any) -> dict[str, Any]:
+    """A short chain of few cells whose tension may be far more than it is, with errors."""
+    scene = chain(length=430.0, cells=60, stiffness=5e6, time={"duration": 0.2, "step": 0.05}, **changes)
+    scene["cable"]["sections"][0]["max_tension"] = 1e8
+    scene["output"] = {"every": 0.1, "points": 41, "errors": True}
+    return scene
+
+
+def verdicts(result: hybrid.Result) -> list[tuple[str, str]]:
+    return [(x.verdict, x.why) for x in result.verdicts().limits]
+
+
+def test_a_run_is_as_doubtful_as_the_equilibrium_that_it_starts_from() -> None:
+    """Friction is missing in both, or in neither; a chain that hangs free misses none."""
+    neglected = with_a_limit(initial={"kind": "equilibrium"})
+    doubt = [("not verified", "static friction neglected")]
+    assert verdicts(static(neglected)) == verdicts(hybrid.run(hybrid.validate_scene(neglected))) == doubt
+    settled = with_a_limit()
+    for result in (static(settled), hybrid.run(hybrid.validate_scene(settled))):
+        assert not any("friction" in why for _, why in verdicts(result))
+    hangs = with_a_limit(initial={"kind": "equilibrium"})
+    hangs["environment"]["seabed"]["z"] = -200.0
+    hangs["cable"]["sections"][0]["axial_stiffness"] = EA
+    found = static(hangs)
+    assert verdicts(found) == [("within", "")] and not any("friction" in x.kind for x in found.events)
+
+
+def test_the_friction_of_several_lines_settles_by_the_key_that_is_named() -> None:
+    scene = as_lines(with_a_limit(initial={"kind": "equilibrium"}))
+    line = hybrid.static(scene).lines["chain"]
+    (event,) = [x for x in line.events if x.kind == "static friction neglected"]
+    assert "say `lines.chain.initial: {kind: equilibrium, friction: settled}`" in event.text
+    (limit,) = line.verdicts().limits
+    assert limit.verdict == "not verified" and "lines.NAME" in limit.remedy
+
+
 def as_lines(scene: dict[str, Any]) -> dict[str, Any]:
     """The same chain as a system of one line."""
     (section,), ends = scene["cable"]["sections"], scene["ends"]

@@ -44,7 +44,7 @@ def test_a_slack_line_lies_in_a_bow_of_the_elastica(EI: float, longer: float, se
     with hybrid.static(scene) as result:
         found = result.lines["only"] if several else result
         T, r = found.tension[-1], found.position[-1]
-        assert {x.kind for x in result.events} == {"several equilibria"}
+        assert {x.kind for x in result.events} - {"compression"} == {"several equilibria"}
     k = brentq(lambda k: 2.0 * ellipe(k * k) / ellipk(k * k) - 1.0 - SPAN / length, 1e-6, 0.9)
     crest = len(T) // 2
     assert T[crest] == pytest.approx(-EI * (2.0 * ellipk(k * k) / length) ** 2, rel=3e-3)

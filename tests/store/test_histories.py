@@ -18,7 +18,7 @@ from hybrid.statistics import fatigue, moments
 from hybrid.store.bends import bends_of
 from hybrid.store.extrapolation import extreme_of
 from hybrid.store.histories import history_of
-from hybrid.store.statistics_table import rows_of
+from hybrid.store.statistics_table import rows_of, values_of
 
 SCENE = {
     "environment": {"fluid": {"density": 1025.0}},
@@ -332,3 +332,44 @@ def test_exceedance_is_above_or_below(result: hybrid.Result) -> None:
     for asked in ({}, {"above": 1.0, "below": 2.0}):
         with pytest.raises(ResultError, match="one of above and below"):
             result.exceedance("end_force_end", **asked)
+
+
+def test_components_of_vectors_have_rows_of_their_own_at_places() -> None:
+    """x, y, z are those of the position; a vector asked for is its three components, at the places asked for."""
+    result = reported()
+    position, k = np.asarray(result["position"]), [0, int(np.searchsorted(result.s, 50.0))]
+    rows = rows_of(result, ["position", "z", "position.x"], [0.0, 50.0])
+    names = ["position.x", "position.y", "position.z", "z", "position.x"]
+    assert [(x["quantity"], x["s"]) for x in rows] == [(name, s) for name in names for s in (0.0, 50.0)]
+    for row in rows:
+        axis, at = "xyz".index(row["quantity"][-1]), k[int(row["s"] > 0.0)]
+        assert (row["minimum"], row["maximum"]) == (position[:, at, axis].min(), position[:, at, axis].max())
+    (mean,) = rows_of(result, ["z"])
+    assert mean["maximum"] == position[..., 2].max()
+    both = result.statistics(["position"], at=[25.3, 50.0])["position"]
+    assert np.shape(both.mean) == (2, 3)
+    between = result.at(s=25.3, names=["position"])["position"]
+    assert history_of(result, "z", at=[25.3]).values[:, 0] == pytest.approx(between[:, 2])
+    for name in ("w", "tension.z", "position.w"):
+        with pytest.raises(ResultError, match=name):
+            rows_of(result, [name])
+    with pytest.raises(ResultError, match=r"3 values at a time[\s\S]*position\.x"):
+        result.extreme("position", at=50.0)
+
+
+def test_an_equilibrium_has_values_at_places(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    """A place between two output points too; the command says that they are no statistics."""
+    tables = {key: value for key, value in SCENE.items() if key != "time"}
+    result = hybrid.static(hybrid.validate_scene(tables), tmp_path / "rest.h5")
+    rows = values_of(result, ["curvature", "z", "reaction_start"], [0.0, 12.3])
+    places = [x["s"] for x in rows if x["quantity"] == "curvature"]
+    assert places == [0.0, 12.3] and [x["quantity"] for x in rows[-3:]] == [f"reaction_start.{x}" for x in "xyz"]
+    wanted = {name: result.at(s=12.3, names=[name])[name][0] for name in ("curvature", "position")}
+    found = {x["quantity"]: x["value"] for x in rows if x["s"] == 12.3}
+    assert found == {"curvature": pytest.approx(wanted["curvature"]), "z": pytest.approx(wanted["position"][2])}
+    (largest,) = values_of(result, ["tension"])
+    assert largest["value"] == result["tension"].max()
+    with pytest.raises(SystemExit) as left:
+        main(["stats", str(tmp_path / "rest.h5"), "--names", "curvature", "--at", "12.3"])
+    told = capsys.readouterr()
+    assert not left.value.code and f"{wanted['curvature']:.5g}" in told.out and "equilibrium" in told.out + told.err

@@ -125,3 +125,22 @@ def test_the_plan_of_a_line_with_a_load_that_is_held_against_turning() -> None:
     weight = (2.0 - 1025.0 * np.pi * 0.025**2 / 4.0) * 9.80665  # N/m
     assert critical.torque == pytest.approx(2.0 * np.sqrt(4.0 * (6000.0 + 0.5 * weight)), rel=1e-6)
     assert critical.of_tension == pytest.approx(0.004 * (6000.0 + 125.0 * weight), rel=1e-4)
+
+
+def test_the_plan_knows_the_bed_and_the_stretch() -> None:
+    """As of the equilibrium, where that is computed: tensions of a line between clamps, part of it on the bed."""
+    section = {"length": 60.0, "mass": 5.0, "diameter": 0.05, "bending_stiffness": 200.0, "axial_stiffness": 1e6,
+               "torsional_stiffness": 150.0}  # fmt: skip
+    ends = {"start": {"kind": "clamped", "tangent": [1.0, 0.0, 0.0], "position": [0.0, 0.0, 0.0], "normal": [0.0, 1.0, 0.0]},
+            "end": {"kind": "clamped", "tangent": [0.3, 0.0, 1.0], "position": [40.0, 0.0, 35.0], "normal": [0.0, 1.0, 0.0]}}  # fmt: skip
+    scene = {
+        "environment": {"seabed": {"z": 0.0, "stiffness": 1e4}}, "cable": {"sections": [section]}, "ends": ends,
+        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 120}, "time": {"duration": 1.0, "step": 0.02},
+    }  # fmt: skip
+    rest = hybrid.static(scene)
+    measured, tables = hybrid.plan(scene).critical_torque, hybrid.plan(scene, measure=False).critical_torque
+    assert measured is not None and tables is not None and tables.rough and not measured.rough
+    least = float(rest.tension.min())
+    assert measured.torque == pytest.approx(2.0 * np.sqrt(200.0 * least), rel=0.01)
+    told = " ".join(" ".join(plan_lines(hybrid.validate_scene(scene), hybrid.plan(scene, measure=False))).split())
+    assert "a loop can form from about" in told and "hybrid static" in told

@@ -17,7 +17,7 @@ from hybrid.cli.tables import errors_facts, extremes_facts, extremes_rows
 from hybrid.errors import EVENTS_BY_WEIGHT
 from hybrid.scene.study import Kept
 from hybrid.store.reader import Result
-from hybrid.store.verdicts import AT_REST, DOUBTS, OF_ACCURACY, doubt_of
+from hybrid.store.verdicts import DOUBTS, OF_ACCURACY, doubt_of
 from hybrid.studies.collect import collected
 from hybrid.view.report_parts import verdict_html
 from hybrid.view.summary import facts_of
@@ -202,7 +202,7 @@ def test_verdicts_of_thirty_results(results: dict[tuple[str, str], Path]) -> Non
 
 
 def test_doubts_are_kinds_of_events() -> None:
-    assert {*DOUBTS, *AT_REST, *OF_ACCURACY} <= set(EVENTS_BY_WEIGHT)
+    assert {*DOUBTS, *OF_ACCURACY} <= set(EVENTS_BY_WEIGHT)
 
 
 def judged(**more: Any) -> Iterator[Any]:

@@ -390,7 +390,6 @@ def bare(tables: Tables, name: str) -> None:
         (lambda x: x["contact"].update(between=[["upper", "lowest"]]), "contact.between[0][1]", "name of a line"),
         (lambda x: x["contact"].update(between=[["upper", "upper"]]), "contact.between[0]", "lines.NAME.contact"),
         (lambda x: bare(x, "lower"), "lines.lower.sections[0].diameter", "touch each other"),
-        (lambda x: x["lines"]["upper"].update(model="adaptive"), "lines.upper.model", "moves, and no criterion"),
         (lambda x: x.update(accuracy="3%"), "accuracy", "a fifth of the truth"),
         (lambda x: x["output"].update(errors=True), "output.errors", "a fifth of the truth"),
     ],
@@ -418,3 +417,40 @@ def test_lines_that_are_within_each_other_wherever_they_begin_are_refused() -> N
     tables["environment"] = {"gravity": 0}
     with pytest.raises(SceneError, match=r"contact[\s\S]*lines upper and lower are .* apart"):
         hybrid.static(tables)
+
+
+# --- a current that drives a line against another one ----------------------------------------------------
+
+
+def clash(speed: float) -> Tables:
+    """An umbilical whose lower end is beyond a chain, in a current along both."""
+    umbilical = {"length": 130, "mass": 18, "diameter": 0.12, "axial_stiffness": 2e8, "bending_stiffness": 5e3,
+                 "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}}  # fmt: skip
+    chain = {"length": 210, "mass": 60, "diameter": 0.1, "axial_stiffness": 3e8, "bending_stiffness": 0,
+             "drag": {"normal": 2.0, "tangential": 0.3}, "added_mass": {"normal": 1.0}}  # fmt: skip
+    places = {"anchor": [180, 30, -90], "unit": [60, 10, -90], "fairlead": [12, -3, 0], "hangoff": [0, 0, -5]}
+    return {
+        "environment": {"fluid": {"density": 1025, "surface": 0, "current": [speed, 0, 0]},
+                        "seabed": {"z": -90, "stiffness": 1e4}},
+        "points": {name: {"position": place} for name, place in places.items()},
+        "contact": {"between": [["umbilical", "mooring"]]},
+        "lines": {
+            "umbilical": {"start": "unit", "end": "hangoff", "sections": [umbilical], "mesh": {"cells": 65}},
+            "mooring": {"start": "anchor", "end": "fairlead", "sections": [chain], "mesh": {"cells": 75}},
+        },
+        "output": {"points": 76, "quantities": {"gap": {"kind": "clearance", "line": "umbilical", "other": "mooring"}}},
+    }  # fmt: skip
+
+
+def test_a_current_does_not_drive_a_line_through_another_one() -> None:
+    """It lies against the chain, on the side on which it hangs in still water; without contact it is beyond it."""
+    free, held, weak = (
+        hybrid.static(clash(1.5) | {"contact": None}),
+        hybrid.static(clash(1.5)),
+        hybrid.static(clash(0.5)),
+    )
+    assert any(e.kind == "lines touch" for e in held.events)
+    assert float(held["gap"][-1]) < 0.02 < 0.5 < float(free["gap"][-1])
+    pressed = [float(np.trapezoid(x["self_contact"][0], x.s)) for x in held.lines.values()]
+    assert pressed[0] == pytest.approx(pressed[1], rel=0.1) and pressed[0] > 100.0  # N, by means between outputs
+    assert not any(e.kind == "lines touch" for e in weak.events) and float(weak["gap"][-1]) > 1.0

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 import hybrid
 from hybrid.errors import Outcome
-from hybrid.kernels.contact.self_contact_pairs import ENERGY
+from hybrid.kernels.contact.self_contact_law import DISTANCE
+from hybrid.kernels.contact.self_contact_pairs import ENERGY, POINTS
 from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, PLACE, STATE, V, W
 from hybrid.kernels.laws.obstacles import depths_in_obstacles, stored_energy
 from hybrid.kernels.march.energies import observe
@@ -40,6 +41,7 @@ class Throw(NamedTuple):
     """What a throw leaves behind."""
 
     least: float  # m, distance of centrelines, of polygons along straight ways within steps
+    apart: float  # m, that of the curves that touch (kernels.contact.self_contact_law), after steps
     energies: list[float]  # J, after every step
     momentum: Floats  # (2, 3) before and after
     turning: Floats  # (2, 3) angular momentum likewise
@@ -109,6 +111,7 @@ def throw(
     new, t, before, rho, part, tries, deepest = old.copy(), 0.0, 0.0, 0.9, step, 0, -np.inf
     masses = [x.line.mass[:, None] for x in models]
     first, energies, least = of(models, masses, old, numbers), [energy(models, old, shared, lines, numbers)], np.inf
+    apart = np.inf
     while t < duration * (1.0 - 1e-9):
         end = t + part
         for x in lines:
@@ -118,7 +121,7 @@ def throw(
             part, tries = 0.5 * part, tries + 1
             assert part > 1e-6 * step, taken
             continue
-        least = min(least, nearest(old, new))
+        least, apart = min(least, nearest(old, new)), min(apart, nearest_curves(shared))
         for x, state in zip(lines if obstacles else [], new.lines, strict=False):
             deepest = max(deepest, float(depths_in_obstacles(x.sea, state.r, x.line.s).max()))
         old, new, before, rho, t = new, old, end - t, taken.rho, end
@@ -130,7 +133,7 @@ def throw(
         for x, m in zip(old.lines, masses, strict=True)
     )
     momentum, turning = np.stack([first[0], last[0]]), np.stack([first[1], last[1]])
-    return Throw(least, energies, momentum, turning, size, tries, old, shared, models, deepest)
+    return Throw(least, apart, energies, momentum, turning, size, tries, old, shared, models, deepest)
 
 
 def energy(
@@ -183,6 +186,12 @@ def nearest(before: SystemState, after: SystemState) -> float:
                 q = (1.0 - part) * before.lines[m].r + part * after.lines[m].r
                 least = min(least, polygons_apart(p, q))
     return float(least)
+
+
+def nearest_curves(shared: SharedContact) -> float:
+    """The least distance, m, of the points of contact of the state that was looked at last; infinite: nothing touches."""
+    contact = shared.contact
+    return float(contact.points[: contact.counts[POINTS], DISTANCE].min(initial=np.inf))
 
 
 def polygons_apart(p: Floats, q: Floats) -> float:

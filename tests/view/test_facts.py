@@ -109,6 +109,37 @@ def test_torque_in_slack_rods_breaks_the_criterion() -> None:
     assert found.weight == "alarm" and (found.t, found.s) == (10.0, 50.0)
 
 
+@pytest.mark.parametrize("torque", [0.1, 2000.0], ids=["a small torque", "a large one"])
+def test_compression_is_beyond_the_criterion_of_a_line_in_tension(torque: float) -> None:
+    """-200 N over 5 m at 3 of 21 outputs: a torque that is small against tension is not said to be too small there."""
+    result = reported(torque=torque, errors=True)
+    tension = result.tension.copy()
+    at = np.searchsorted(result.s, [50.0, 55.0])
+    tension[-3:, at[0] : at[1]] = -200.0
+    result._cache["tension"] = tension
+    found, length = fact(result, "hockling"), np.gradient(result.s)[at[0] : at[1]].sum()
+    assert f"compressed at 3 of 21 outputs, at most {length:.3g} m of it" in found.text
+    assert "of a line in tension and does not hold there" in found.text and found.weight != "plain"
+    for wrong in ("far too small", "would throw a loop"):
+        assert wrong not in found.text
+
+
+def test_a_straight_line_is_not_judged_where_it_has_a_loop() -> None:
+    """The margin is least at 7.5 s; with a loop from 7 to 9 s it is that of other outputs, and the text says when."""
+    loop = [(7.0, 50.0, 50.0, "loop formed", "it"), (8.0, 50.0, 50.0, "loop formed", "twice")]
+    free = fact(reported(torque=2000.0, errors=True), "hockling")
+    found = fact(reported(torque=2000.0, errors=True, events=loop), "hockling")
+    assert free.t == 7.5 and found.t < 7.0 and found.values["margin"] > free.values["margin"]
+    assert found.text.count("A loop formed at t = 7 s.") == 1 and "not judged by it" in found.text
+    opened = fact(
+        reported(torque=2000.0, errors=True, events=[*loop, (9.0, 0.0, 0.0, "loop opened", "it")]), "hockling"
+    )
+    assert opened.t is not None and (opened.t < 7.0 or opened.t >= 9.0) and "A loop opened at t = 9 s." in opened.text
+    from_the_start = [(0.0, 50.0, 50.0, "loop formed", "it")]
+    none = fact(reported(torque=2000.0, errors=True, events=from_the_start), "hockling")
+    assert "judged at no output without a loop" in none.text and "Nearest" not in none.text
+
+
 def test_the_loop_of_the_largest_torque_is_held_against_the_bend_radius() -> None:
     """q = M D/EI = 0.05: T = 1.105 (M/D)(1 + 0.053 q); the radius at the crown is D/(2 delta), delta = 0.236."""
     found = fact(reported(torque=2000.0, allowed=0.1, errors=True), "hockling")

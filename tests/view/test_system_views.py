@@ -101,6 +101,16 @@ def test_motion_below_what_is_resolved_is_drawn_flat(result: hybrid.Result, part
     assert (np.ptp(drawn) < 1e-3 * (high - low)) == (part < 1e-6)
 
 
+def test_what_moves_by_round_off_has_no_curve_beside_what_moves(result: hybrid.Result) -> None:
+    every = AllLines(result)
+    wave = np.sin(np.arange(every.outputs))[:, None] * [1.0, 0.0, 0.0]
+    names = [f"points/{n}/position" for n in points_of(result)]
+    assert len(names) > 1
+    shaken = {name: 1e-9 * wave for name in names} | {"bodies/spar/position": 0.5 * wave}
+    (panel,) = motions(Moved(result, shaken), every)  # type: ignore[arg-type]
+    assert [x.label for x in panel.items if isinstance(x, Line) and x.label] == ["body spar"]
+
+
 def test_a_body_that_only_yaws_is_shown_to_yaw(result: hybrid.Result) -> None:
     """Its panel comes before a motion of millimetres, and its name stands above the curve."""
     every = AllLines(result)

@@ -194,6 +194,12 @@ class _Writer:
                 "a level bed: MoorDyn reads an uneven one from a file of its own, with straight lines between depths"
             )
             self._refuse("environment.seabed.depths", "a grid", expected, "give z alone, for a comparison")
+        if bed is not None and bed.soil is not None:
+            expected = "stiffness: a deck has no soil that remembers"
+            self._refuse("environment.seabed.soil", "given", expected, "give stiffness, for a comparison")
+        if bed is not None and bed.friction is not None and bed.friction.residual is not None:
+            expected = "nothing: friction of a deck does not fall"
+            self._refuse("environment.seabed.friction.residual", "given", expected, "leave it out, with breakout")
         if bed is not None and bed.slope is not None and any(bed.slope):
             expected = "a level bed, which a deck has"
             self._refuse("environment.seabed.slope", bed.slope, expected, "leave slope out, for a comparison")
@@ -213,7 +219,7 @@ class _Writer:
         yield "g", environment.gravity
         yield "rho", self.density
         yield "WtrDpth", depth
-        yield "kBot", bed.stiffness / width if bed is not None else 1.0
+        yield "kBot", bed.spring / width if bed is not None else 1.0
         yield "cBot", bed.damping / width if bed is not None else 0.0
         if bed is not None and bed.friction is not None:
             yield "MU_KA", bed.friction.axial
@@ -337,6 +343,9 @@ class _Writer:
             return "none"
         if section.bending_slip:
             self._refuse(f"{where}.bending_slip", "given", "nothing: this export writes one stiffness", "leave it out")
+        if section.stiffness_per_tension:
+            fix = "leave it out, and give the bending_stiffness at the tension you expect"
+            self._refuse(f"{where}.stiffness_per_tension", "given", "nothing: this export writes one stiffness", fix)
         if section.tension_torque:
             expected = "nothing or 0, because MoorDyn has no torsion"
             self._refuse(f"{where}.tension_torque", section.tension_torque, expected, "leave it out, for a comparison")

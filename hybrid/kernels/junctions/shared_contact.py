@@ -62,6 +62,7 @@ class SharedJob(NamedTuple):
     tables: NDArray[np.int64]  # (L, ..) jobs of all lines of the system
     lines: NDArray[np.int64]  # (K,) numbers of those that may touch
     begins: NDArray[np.int64]  # (K,) where their nodes begin
+    starts: Floats  # (K,) m, their arc lengths as parts of the one line, less their own
     joints: NDArray[np.int64]  # (L, 2) as kernels.junctions.system_job.SystemJob has it
     inner: NDArray[np.int64]  # table of a ContactJob of them as one line
     pushes: Floats  # (2, N+1, 4) N, N m, forces of other lines on nodes, moments on cells
@@ -74,8 +75,8 @@ def blank_shared_job() -> SharedJob:
     """A job with the types that every one has."""
     z, whole = np.zeros, np.int64
     return SharedJob(
-        z((1, 1), whole), z(1, whole), z(1, whole), z((1, 2), whole), z(1, whole), z((2, 1, 4)), z((2, 1, SHARES)), z(2),
-        z((1, 1, MEETING)),
+        z((1, 1), whole), z(1, whole), z(1, whole), z(1), z((1, 2), whole), z(1, whole), z((2, 1, 4)), z((2, 1, SHARES)),
+        z(2), z((1, 1, MEETING)),
     )  # fmt: skip
 
 
@@ -84,10 +85,15 @@ read_shared = reader(blank_shared_job())
 
 @inner
 def gather(job, one):
-    """Fill the one line from the lines: state, way and correction of the step that is tried."""
+    """Fill the one line from the lines: lengths, state, way and correction of the step that is tried."""
     for k in range(job.lines.shape[0]):
         line_job, at = read(job.tables[job.lines[k]]), job.begins[k]
-        old, new, work = line_job.old, line_job.new, line_job.work
+        line, old, new, work = line_job.line, line_job.old, line_job.new, line_job.work
+        if line_job.reel != 0:  # a winch changes its lengths
+            for i in range(old.r.shape[0]):
+                one.line.s[at + i] = job.starts[k] + line.s[i]
+            for i in range(old.w.shape[0]):
+                one.line.h[at + i] = line.h[i]
         for i in range(old.r.shape[0]):
             for j in range(3):
                 one.old.r[at + i, j], one.old.v[at + i, j] = old.r[i, j], old.v[i, j]
@@ -231,6 +237,9 @@ def puts_energy_in(job, one):
     numbers = contact.numbers
     if not is_judged(numbers):
         return False
+    for k in range(job.lines.shape[0]):
+        if read(job.tables[job.lines[k]]).reel != 0:  # what a winch does is not known here
+            return False
     if numbers[BEGUN] != clock[NOW]:
         if numbers[LED] == clock[NOW]:
             numbers[HAD], numbers[BALANCE] = numbers[HAS], numbers[TRIED_BALANCE]

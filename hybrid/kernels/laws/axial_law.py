@@ -9,10 +9,12 @@
     eps      strain of the cell, s(theta) + (T - theta)/E                                         -
     U        energy per length, W(theta) + (Te^2 - theta^2)/(2 E) with W the integral of T ds     J/m
     peak     highest mean tension so far, state.peak, of ropes that remember it (Syrope)          N
+    creep    strain that grows with time under load, c log10(1 + t/t0), t since the start         -
 
 Of a rope that remembers it s is the table (the original curve) while theta is its peak; below it is a working curve from
 the strain k1 s(peak), where there is no tension, to s(peak), of the shape that is given.  In a step theta is that of a tension which changes evenly (exact, whatever the step); at rest it is T.  The law of length
 is linearised about the tension that an iteration has found: eps = SHIFT + ck T, both written here before every march.
+Creep is a given strain beside eps, which stores nothing: what tension does on it is lost.
 """
 
 from __future__ import annotations
@@ -26,9 +28,10 @@ from hybrid.kernels.state.state import WORKING
 
 # Columns of Line.law: of a cell, its first row in Line.law_table and the row behind its last (equal: tension is a multiple
 # of strain there); a, b and tau; the shape of working curves (0: there are none), its two numbers, the peak before the
-# start (N); then what is written: strain without tension of the linearised law; power lost, W.
+# start (N); creep in a tenfold time, c, and t0 (s); then what is written: strain without tension of the linearised law;
+# power lost, W.
 FIRST, LAST, DYNAMIC, PER_TENSION, RELAXATION = range(WORKING)
-K1, K2, HIGHEST, SHIFT, LOSS = range(WORKING + 1, WORKING + 6)
+K1, K2, HIGHEST, CREEP, LOADED, SHIFT, LOSS = range(WORKING + 1, WORKING + 8)
 # Shapes of working curves: T/peak over the part of the way from the strain without tension to the peak.  That by a
 # stiffness is straight, with k1 its stiffness, N.
 LINEAR, BY_STIFFNESS, QUADRATIC, EXPONENTIAL = 1.0, 2.0, 3.0, 4.0
@@ -178,18 +181,28 @@ def stiffness_at(law, i, mean):
     return law[i, DYNAMIC] + b * mean, b
 
 
+@inner
+def crept(law, i, t):
+    """Strain that cell i has crept by at the time t (s)."""
+    return law[i, CREEP] * math.log10(1.0 + max(t, 0.0) / law[i, LOADED]) if law[i, CREEP] > 0.0 else 0.0
+
+
 @kernel
-def follow_law(line, old, new, work, dt, _):
+def follow_law(line, old, new, work, dt, t):
     """Linearise the laws of all cells about new.T, after a step of dt (s) from `old`; dt = 0: at rest, new.slow becomes T;
 
-    dt < 0: new.slow stays as it is.  Writes line.ck, SHIFT and LOSS of line.law, new.slow, new.peak, energy and work.
+    dt < 0: new.slow stays as it is.  t: s, the time of `new`.  Writes line.ck, SHIFT and LOSS of line.law, new.slow,
+    new.peak, energy and work.
     """
     law, table, energy, lost = line.law, line.law_table, 0.0, 0.0
     for i in range(line.h.shape[0]):
         first, last = int(law[i, FIRST]), int(law[i, LAST])
         e, h, T = get3(new.e, i), line.h[i], new.T[i]
         l = math.sqrt(dot(e, e))
-        strain = (l * l - h * h) / ((l + h) * h)
+        creep = crept(law, i, t)
+        strain = (l * l - h * h) / ((l + h) * h) - creep
+        if dt > 0.0 and creep > 0.0:
+            lost += 0.5 * h * (old.T[i] + T) * (creep - crept(law, i, t - dt))
         faster = dot(e, sub(get3(new.v, i + 1), get3(new.v, i))) / l
         if last == first:
             c = line.ck[i]
@@ -203,7 +216,7 @@ def follow_law(line, old, new, work, dt, _):
             at, c, _ = strain_at(table, first, last, T)
             elastic = tension_at(table, first, last, strain)
             _, _, stored = strain_at(table, first, last, elastic)
-            line.ck[i], law[i, SHIFT], new.slow[i] = c, at - c * T, T
+            line.ck[i], law[i, SHIFT], new.slow[i] = c, at - c * T + creep, T
             law[i, LOSS] = (T - elastic) * faster
             energy += h * stored
             continue
@@ -221,7 +234,7 @@ def follow_law(line, old, new, work, dt, _):
         E, b = stiffness_at(law, i, mean)
         eps = at + (T - mean) / E
         line.ck[i] = answers * c + (1.0 - answers - answers * b * (T - mean) / E) / E
-        law[i, SHIFT] = eps - line.ck[i] * T
+        law[i, SHIFT] = eps - line.ck[i] * T + creep
         elastic = T if dt == 0.0 else mean + E * (strain - at)
         fast = elastic - mean
         energy += h * (stored + 0.5 * (elastic * elastic - mean * mean) / E)

@@ -3,13 +3,15 @@
     symbol   meaning                                                                          unit   frame
     x        bend of an element from what has no stress, two components                       rad    Ra
     hn       length that the element stands for                                               m
-    K        stiffness that a layer adds while it sticks (Line.slip_law)                      N m2
+    K        stiffness that a layer adds while it sticks, K0 + KT max(T, 0) (Line.slip_law)   N m2
     p        curvature to which it has slipped: there it has no moment (State.layers)         1/m    Ra
     m        its moment, K (x/hn - p), of no more than `most` in size                         N m    Ra
     most     its slip moment, m0 + mT max(T, 0), T of the start of the step                   N m
 
 A step maps x to m by radial return: m = most t/|t| where t = K (x/hn - p) is more than `most`, which has the exact
 derivative K/hn most/|t| (1 - t t^T/|t|^2); then p moves by (t - m)/K.  At rest p = 0: the curve of a first loading.
+A layer whose `most` has no bound is a stiffness that grows with tension.  A step has the K of its start; behind it K
+changes at that bend, and hn dK |x/hn - p|^2/2 is no work of bending: it is booked beside what is lost.
 """
 
 from __future__ import annotations
@@ -37,25 +39,31 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import BENDING_SLIP
 from hybrid.kernels.state.report import LOST_WORK
 
-# Columns of Line.slip_law, EACH of a layer: K, N m2; m0, N m; mT, m.  K = 0: there is none (as behind the last).
-STIFFNESS, MOMENT, PER_TENSION, EACH = range(4)
-# Columns of Line.slip_now, EACH of a layer: p at the start of the step, 1/m; `most`, N m.  State.layers has KEPT of them.
-FROM, MOST, KEPT = 0, 2, 2
+# Columns of Line.slip_law, EACH of a layer: K0, N m2; m0, N m; mT, m; KT, m2.  K0, KT 0: none (as behind the last).
+STIFFNESS, MOMENT, PER_TENSION, STIFFENING, EACH = range(5)
+# Columns of Line.slip_now, EACH of a layer: p at the start of the step, 1/m; `most`, N m; K, N m2.  State.layers has KEPT.
+FROM, MOST, STIFF, KEPT = 0, 2, 3, 2
 # What `follow_slip` is asked for: before a march, in motion or at rest; behind a step, an equilibrium.
 IN_MOTION, LOADED_FIRST, BEHIND_STEP, BEHIND_REST = range(4)
 
 
 @inner
 def slips(line, i):
-    """Whether the element at node i has layers that slip."""
-    return (line.bits & BENDING_SLIP) != 0 and line.slip_law[i, STIFFNESS] > 0.0
+    """Whether the element at node i has layers that slip, or a stiffness that grows with tension."""
+    return (line.bits & BENDING_SLIP) != 0 and layered(line, i, 0)
+
+
+@inner
+def layered(line, i, j):
+    """Whether there is a layer j (its first column) at node i."""
+    return line.slip_law[i, j + STIFFNESS] > 0.0 or line.slip_law[i, j + STIFFENING] > 0.0
 
 
 @inner
 def trial(line, i, j, x, y):
     """Moment of layer j (its first column) at node i under the bend x, y, as if it stuck: two components, its size, and
     the part that is left."""
-    K, one = line.slip_law[i, j + STIFFNESS], 1.0 / line.hn[i]
+    K, one = line.slip_now[i, j + STIFF], 1.0 / line.hn[i]
     a, b = K * (x * one - line.slip_now[i, j + FROM]), K * (y * one - line.slip_now[i, j + FROM + 1])
     size, most = math.sqrt(a * a + b * b), line.slip_now[i, j + MOST]
     return a, b, size, most / size if size > most else 1.0
@@ -69,9 +77,9 @@ def slip_answer(line, i, x, y):
     """
     mx, my, c11, c12, c22, stored = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(0, line.slip_law.shape[1], EACH):
-        K = line.slip_law[i, j + STIFFNESS]
-        if not K > 0.0:
+        if not layered(line, i, j):
             break
+        K = line.slip_now[i, j + STIFF]
         a, b, size, part = trial(line, i, j, x, y)
         mx, my = mx + part * a, my + part * b
         c = K / line.hn[i] * part
@@ -79,14 +87,14 @@ def slip_answer(line, i, x, y):
         if part < 1.0:
             c /= size * size
             c11, c12, c22 = c11 - c * a * a, c12 - c * a * b, c22 - c * b * b
-        stored += 0.5 * line.hn[i] * (part * size) ** 2 / K
+        stored += 0.5 * line.hn[i] * (part * size) ** 2 / K if K > 0.0 else 0.0
     return mx, my, c11, c12, c22, stored
 
 
 @kernel
 def slip_moment(line, i, Ra, Rb, k0):
     """What layers add to M and C of `element.bending`, of the element at node i; nothing of one without."""
-    if not line.slip_law[i, STIFFNESS] > 0.0:
+    if not layered(line, i, 0):
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     k = log_rotation(relative_rotation(Ra, Rb))
     mx, my, c11, c12, c22, _ = slip_answer(line, i, k[0] - k0[0], k[1] - k0[1])
@@ -105,7 +113,7 @@ def slip_about_normal(line, a1, c, d, i, bend):
 
     Moment, N m, about the normal under a bend (rad) about it, its slope, and the stiffness about the other axis, N m/rad.
     """
-    if not line.slip_law[i, STIFFNESS] > 0.0:
+    if not layered(line, i, 0):
         return 0.0, 0.0, 0.0
     m = to_space(line.plane, (-d[1], d[0]))
     x, y = row_along_normal(line.plane, a1, c), a1[c, 0] * m[0] + a1[c, 1] * m[1] + a1[c, 2] * m[2]
@@ -137,13 +145,13 @@ def follow_slip(line, ends, old, new, work, part):
     after = part >= BEHIND_STEP
     for i in range(law.shape[0]):
         x, y = 0.0, 0.0
-        if after and law[i, STIFFNESS] > 0.0 and line.element[i]:
+        if after and layered(line, i, 0) and line.element[i]:
             Ra, Rb = frames_at(line, ends, new, i)
             k = log_rotation(relative_rotation(Ra, Rb))
             x, y = k[0] - line.k0[i, 0], k[1] - line.k0[i, 1]
         for j in range(0, law.shape[1], EACH):
-            K, at = law[i, j + STIFFNESS], j // EACH * KEPT
-            if not K > 0.0:
+            at = j // EACH * KEPT
+            if not layered(line, i, j):
                 break
             if not after:
                 rest = part == LOADED_FIRST
@@ -151,11 +159,18 @@ def follow_slip(line, ends, old, new, work, part):
                     now[i, j + FROM + m] = 0.0 if rest else old.layers[i, at + m]
                 T = pull_at(new, i) if rest else pull_at(old, i)
                 now[i, j + MOST] = law[i, j + MOMENT] + law[i, j + PER_TENSION] * T
+                now[i, j + STIFF] = law[i, j + STIFFNESS] + law[i, j + STIFFENING] * T
                 continue
+            K, p, q = now[i, j + STIFF], 0.0, 0.0
             a, b, _, left = trial(line, i, j, x, y)
-            p, q = (1.0 - left) * a / K, (1.0 - left) * b / K
+            if left < 1.0:
+                p, q = (1.0 - left) * a / K, (1.0 - left) * b / K
+                lost += line.hn[i] * left * (a * p + b * q)
             new.layers[i, at], new.layers[i, at + 1] = now[i, j + FROM] + p, now[i, j + FROM + 1] + q
-            lost += line.hn[i] * left * (a * p + b * q)
+            if part == BEHIND_STEP and law[i, j + STIFFENING] > 0.0:
+                now[i, j + STIFF] = law[i, j + STIFFNESS] + law[i, j + STIFFENING] * pull_at(new, i)
+                bent = (x / line.hn[i] - new.layers[i, at]) ** 2 + (y / line.hn[i] - new.layers[i, at + 1]) ** 2
+                lost += 0.5 * line.hn[i] * (K - now[i, j + STIFF]) * bent
     if part == BEHIND_STEP:
         work.report[LOST_WORK] = (work.report[LOST_WORK] if line.law_at.shape[0] > 0 else 0.0) - lost
     return 0

@@ -23,9 +23,10 @@ from hybrid.kernels.algebra.rotations import add, dot, get3, scale, sub
 from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.laws.node_forces import Z3, body_water
 from hybrid.kernels.laws.seabed import pressure
+from hybrid.kernels.laws.soil import borne_length
 from hybrid.kernels.laws.water import current_at
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import BODIES, FLOW, SEABED, SURFACE, WAVES
+from hybrid.kernels.state.forces import BODIES, FLOW, SEABED, SOIL, SURFACE, WAVES
 from hybrid.kernels.state.report import CONTACT_FORCE, FORCE_A, NET_A
 
 # Halvings that find where a line leaves the bed within the last cell.
@@ -53,7 +54,9 @@ def body_force(line, sea, i, x, state):
     if line.bits & SEABED and line.footing[i] > 0.0:
         n, p = bed_under(sea, x)
         all_ = dot(get3(sea.bed, i), n)
-        if p > 0.0 and all_ > 0.0:
+        if line.bits & SOIL:
+            F = add(F, scale(line.footing[i] / borne_length(line, i), get3(sea.bed, i)))
+        elif p > 0.0 and all_ > 0.0:
             q, _, _ = pressure(0.0, p, p, -dot(n, v), -dot(n, v), sea.stiffness, sea.damping, sea.onset)
             F = add(F, scale(min(line.footing[i] * q / all_, 1.0), get3(sea.bed, i)))
     return F
@@ -173,7 +176,7 @@ def note_end(line, sea, ends, state, k, x, net, report):
     report[at], report[at + 1], report[at + 2] = net
     force = net
     if ends.held[k] == 1:
-        if line.bits & SEABED:
+        if line.bits & SEABED and not line.bits & SOIL:
             n, _ = bed_under(sea, x)
             found = -dot(net, n)
             more = force_at_support(line, sea, ends, state, k, x, found) - found

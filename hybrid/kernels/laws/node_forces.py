@@ -11,6 +11,7 @@ from hybrid.kernels.laws.bed import bed_before, bed_beside, bed_under, depth_fal
 from hybrid.kernels.laws.loads import body_drag, half_cell_added_mass, half_cell_drag
 from hybrid.kernels.laws.obstacles import obstacle_forces
 from hybrid.kernels.laws.seabed import contact, friction, pressure
+from hybrid.kernels.laws.soil import left_of, soil_force
 from hybrid.kernels.laws.vortices import lift_at
 from hybrid.kernels.laws.water import current_at, wetted, wetted_stretch
 from hybrid.kernels.machine.compile import inner, kernel
@@ -23,6 +24,7 @@ from hybrid.kernels.state.forces import (
     MASS_DAMPING,
     OBSTACLES,
     SEABED,
+    SOIL,
     SURFACE,
     VORTICES,
     WAVES,
@@ -123,8 +125,48 @@ def body_water(line, i, z, eta, u, U1, vi, b, af, cv, ca):
 
 
 @inner
-def seabed_forces(line, sea, i, x, u, v, e, cv, report):
+def bed_travel(sea, i, n, u):
+    """Elastic travel of friction of node i on a bed with the normal n, as if it did not slide."""
+    w = dot(n, get3(u, i))
+    return (
+        sea.slip[i, 0] + u[i, 0] - w * n[0],
+        sea.slip[i, 1] + u[i, 1] - w * n[1],
+        sea.slip[i, 2] + u[i, 2] - w * n[2],
+    )
+
+
+@kernel  # called for every node of a line in soil
+def soil_forces(line, sea, i, x, u, past, report):
+    """Force of soil that remembers on node i, with friction: whether there is any, F, D; past: what it remembers."""
+    n, p = bed_under(sea, x)
+    N, DN, along, across, more_along, more_across = soil_force(line, sea, past, i, p)
+    for k in range(3):
+        sea.slid[i, k], sea.bed[i, k] = 0.0, 0.0
+    if N == 0.0 and DN == 0.0:
+        return False, Z3, Z9
+    F, slope, D = scale(N, n), scale(DN, n), Z9
+    report[CONTACT_FORCE] += N
+    if along > 0.0 or across > 0.0:
+        q = bed_travel(sea, i, n, u)
+        f, _, D, part = friction(q, 1.0, get3(sea.axis, i), n, along, across, sea.slip_length)
+        more, _, _, _ = friction(q, 1.0, get3(sea.axis, i), n, more_along, more_across, sea.slip_length)
+        F, slope = add(F, f), add(slope, more)
+        sea.slid[i, 0], sea.slid[i, 1], sea.slid[i, 2] = scale(part, q)
+    sea.bed[i, 0], sea.bed[i, 1], sea.bed[i, 2] = F
+    g = n
+    if sea.bed_x.shape[0] > 0:
+        g, W = depth_falls(sea, x, n, p)
+        D = madd(D, mscale(N, W))
+    return True, F, madd(D, mscale(-1.0, outer(slope, g)))
+
+
+@inner
+def seabed_forces(line, sea, i, x, u, v, state, cv, report):
     """Contact and friction at node i: whether there are any, F, D, GL, GR."""
+    if line.bits & SOIL:
+        touches, F, D = soil_forces(line, sea, i, x, u, state.soil, report)
+        return touches, F, D, Z9, Z9
+    e = state.e
     n, p = bed_under(sea, x)
     left = right = n  # normals of the bed under the nodes beside this one, and how deep these are
     pl = pr = p
@@ -155,13 +197,10 @@ def seabed_forces(line, sea, i, x, u, v, e, cv, report):
     D = Z9
     report[CONTACT_FORCE] += N
     if line.bits & FRICTION and N > 0.0:
-        w = dot(n, get3(u, i))
-        q = (
-            sea.slip[i, 0] + u[i, 0] - w * n[0],
-            sea.slip[i, 1] + u[i, 1] - w * n[1],
-            sea.slip[i, 2] + u[i, 2] - w * n[2],
-        )
-        f, g, D, part = friction(q, N, get3(sea.axis, i), n, sea.friction[0], sea.friction[1], sea.slip_length)
+        q = bed_travel(sea, i, n, u)
+        a, b = left_of(line, sea, state.soil, i)
+        a, b = a * sea.friction[0], b * sea.friction[1]
+        f, g, D, part = friction(q, N, get3(sea.axis, i), n, a, b, sea.slip_length)
         F, slope, q = add(F, f), add(n, g), scale(part, q)
     sea.slid[i, 0], sea.slid[i, 1], sea.slid[i, 2] = q
     sea.bed[i, 0], sea.bed[i, 1], sea.bed[i, 2] = F
@@ -236,7 +275,7 @@ def node_loads(line, sea, i, r, u, state, before, after, cv, ca, report):
         F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
     if line.bits & SEABED:
         x = (r[i, 0] + u[i, 0], r[i, 1] + u[i, 1], r[i, 2] + u[i, 2])
-        touches, f, Df, L, R = seabed_forces(line, sea, i, x, u, v, state.e, cv, report)
+        touches, f, Df, L, R = seabed_forces(line, sea, i, x, u, v, state, cv, report)
         if touches:
             F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
     if line.bits & OBSTACLES:

@@ -21,9 +21,21 @@ from hybrid.kernels.algebra.plane import (
 )
 from hybrid.kernels.laws.node_forces import wet_parts
 from hybrid.kernels.laws.seabed import contact, pressure
+from hybrid.kernels.laws.soil import left_of, soil_force
 from hybrid.kernels.laws.water import current_at, wetted_stretch
 from hybrid.kernels.machine.compile import inner
-from hybrid.kernels.state.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
+from hybrid.kernels.state.forces import (
+    ADDED_MASS,
+    BODIES,
+    DRAG,
+    FLOW,
+    FRICTION,
+    MASS_DAMPING,
+    SEABED,
+    SOIL,
+    SURFACE,
+    WAVES,
+)
 from hybrid.kernels.state.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_POWER, MASS_DAMPING_POWER, WAVE_POWER
 
 WATER = DRAG | ADDED_MASS | SURFACE | WAVES | BODIES
@@ -102,13 +114,41 @@ def body_water2(line, i, up, z, eta, u, U1, vi, b, af, cv, ca, report):
 
 
 @inner
-def seabed2(line, sea, i, r, u, v, e, cv, report):
-    """Contact and friction at node i: F, D, GL, GR.  The bed's normal lies in the plane."""
+def bed_travel2(plane, sea, i, n, u):
+    """Elastic travel of friction of node i on a bed with the normal n, as if it did not slide."""
+    ui, slip = row_in_plane(plane, u, i), row_in_plane(plane, sea.slip, i)
+    w = dot2(n, ui)
+    return slip[0] + ui[0] - w * n[0], slip[1] + ui[1] - w * n[1]
+
+
+@inner
+def soil2(line, sea, i, u, n, p, past, report):
+    """Force of soil that remembers on node i at depth p, with friction: F, D; past: what it remembers."""
     plane = line.plane
+    N, DN, along, _, more_along, _ = soil_force(line, sea, past, i, p)
+    F, slope, D, q = (N * n[0], N * n[1]), (DN * n[0], DN * n[1]), Z4, Z2
+    report[CONTACT_FORCE] += N
+    if along > 0.0:
+        q = bed_travel2(plane, sea, i, n, u)
+        f, g, D, kept = friction2(q, along, row_in_plane(plane, sea.axis, i), 1.0, sea.slip_length)
+        F, slope = (F[0] + f[0], F[1] + f[1]), (slope[0] + more_along * g[0], slope[1] + more_along * g[1])
+        q = (kept * q[0], kept * q[1])
+    sea.slid[i, 0], sea.slid[i, 1], sea.slid[i, 2] = to_space(plane, q)
+    sea.bed[i, 0], sea.bed[i, 1], sea.bed[i, 2] = to_space(plane, F)
+    return F, madd2(D, outer2(-1.0, slope, n))
+
+
+@inner
+def seabed2(line, sea, i, r, u, v, state, cv, report):
+    """Contact and friction at node i: F, D, GL, GR.  The bed's normal lies in the plane."""
+    plane, e = line.plane, state.e
     n = vector_in_plane(plane, sea.normal)
     p = sea.offset + 0.5 * sea.onset
     for k in range(3):
         p -= sea.normal[k] * (r[i, k] + u[i, k])
+    if line.bits & SOIL:
+        F, D = soil2(line, sea, i, u, n, p, state.soil, report)
+        return F, D, Z4, Z4
     pd = -dot2(n, row_in_plane(plane, v, i))
     N = DN = NL = NR = 0.0
     if i > 0:
@@ -130,10 +170,9 @@ def seabed2(line, sea, i, r, u, v, e, cv, report):
     D = Z4
     report[CONTACT_FORCE] += N
     if line.bits & FRICTION and N > 0.0:
-        ui, slip = row_in_plane(plane, u, i), row_in_plane(plane, sea.slip, i)
-        w = dot2(n, ui)
-        q = (slip[0] + ui[0] - w * n[0], slip[1] + ui[1] - w * n[1])
-        f, g, D, kept = friction2(q, N, row_in_plane(plane, sea.axis, i), sea.friction[0], sea.slip_length)
+        q = bed_travel2(plane, sea, i, n, u)
+        a, _ = left_of(line, sea, state.soil, i)
+        f, g, D, kept = friction2(q, N, row_in_plane(plane, sea.axis, i), a * sea.friction[0], sea.slip_length)
         F, slope, q = (F[0] + f[0], F[1] + f[1]), (n[0] + g[0], n[1] + g[1]), (kept * q[0], kept * q[1])
     sea.slid[i, 0], sea.slid[i, 1], sea.slid[i, 2] = to_space(plane, q)
     sea.bed[i, 0], sea.bed[i, 1], sea.bed[i, 2] = to_space(plane, F)
@@ -182,6 +221,6 @@ def node_loads2(line, sea, i, r, u, state, before, after, cv, ca, report):
             f, Df = body_water2(line, i, up, z, eta, w, U1, vi, b, af, cv, ca, report)
             F, D = (F[0] + f[0], F[1] + f[1]), madd2(D, Df)
     if bits & SEABED:
-        f, Df, L, R = seabed2(line, sea, i, r, u, state.v, state.e, cv, report)
+        f, Df, L, R = seabed2(line, sea, i, r, u, state.v, state, cv, report)
         F, D, GL, GR = (F[0] + f[0], F[1] + f[1]), madd2(D, Df), madd2(GL, L), madd2(GR, R)
     return F, D, GL, GR

@@ -29,7 +29,7 @@ from hybrid.kernels.laws.obstacle_motion import row3, surface_velocity, swept, w
 from hybrid.kernels.laws.seabed import contact, depth_of, stored, with_cell
 from hybrid.kernels.laws.surfaces import E9, Z3, Z9, bent, gradient_of_normal, surface
 from hybrid.kernels.machine.compile import inner, kernel
-from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SEABED
+from hybrid.kernels.state.forces import FRICTION, OBSTACLES, SEABED, SOIL
 from hybrid.kernels.state.obstacle_rows import (
     AXIS,
     BOX,
@@ -239,7 +239,7 @@ def stored_on_obstacles(line, sea, r):
 def stored_in_contact(line, sea, r):
     """Energy (J) that the bed and obstacles have stored against the line."""
     energy = 0.0
-    if line.bits & SEABED:
+    if line.bits & SEABED and not line.bits & SOIL:  # what soil takes up counts as lost
         energy = stored(line, sea, r)
     if line.bits & OBSTACLES:
         energy += stored_on_obstacles(line, sea, r)

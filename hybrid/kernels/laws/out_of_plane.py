@@ -31,10 +31,12 @@ from hybrid.kernels.algebra.plane import (
     stiffness_about_normal,
     vector_in_plane,
 )
-from hybrid.kernels.algebra.rotations import jacobian_functions
+from hybrid.kernels.algebra.rotations import get3, jacobian_functions
+from hybrid.kernels.laws.bed import bed_under
 from hybrid.kernels.laws.bending_law import moment_share
 from hybrid.kernels.laws.bending_slip import slip_about_normal
 from hybrid.kernels.laws.loads import body_drag, half_cell_added_mass, half_cell_drag
+from hybrid.kernels.laws.soil import left_of, soil_force
 from hybrid.kernels.laws.water import current_at
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import (
@@ -46,6 +48,7 @@ from hybrid.kernels.state.forces import (
     FRICTION,
     MASS_DAMPING,
     SEABED,
+    SOIL,
     SURFACE,
     WAVES,
 )
@@ -149,7 +152,14 @@ def loads_out_of_plane(line, sea, i, state):
                 inert += line.point_added[i]
     if bits & SEABED and bits & FRICTION:  # a small push does not slide
         f, n = row_in_plane(plane, sea.bed, i), vector_in_plane(plane, sea.normal)
-        stiff += sea.friction[1] * max(dot2(f, n), 0.0) / sea.slip_length
+        presses = max(dot2(f, n), 0.0)
+        if bits & SOIL:
+            _, p = bed_under(sea, get3(state.r, i))
+            _, _, _, most, _, _ = soil_force(line, sea, state.soil, i, p)
+        else:
+            _, part = left_of(line, sea, state.soil, i)
+            most = part * sea.friction[1] * presses
+        stiff += most / sea.slip_length
     return stiff, rate, inert, before, after
 
 

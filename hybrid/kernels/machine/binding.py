@@ -205,7 +205,9 @@ class Packed:
         self._plans: dict[int, Any] = {}
 
     def __call__(self, cells: int, **given: Any) -> Any:
-        """One for a line of so many cells."""
+        """One for a line of so many cells.  TypeError: a field is given that is one of the block."""
+        if more := given.keys() - {*self._given}:
+            raise TypeError(f"of the block, and not given: {', '.join(sorted(more))}")
         plan = self._plans.get(cells)
         if plan is None:
             plan = self._plans[cells] = self._plan(cells)

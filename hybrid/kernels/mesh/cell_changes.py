@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.laws.end_motion import ends_at, sea_at
 from hybrid.kernels.laws.obstacles import stored_in_contact
+from hybrid.kernels.laws.soil import lie_in_soil
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
@@ -253,6 +254,7 @@ def before_forces(table):
         wave_kinematics(job.sea, job.old.r, job.work.u)
     if job.line.bits & FRICTION:
         friction_axes(job.sea, job.old.r, job.old.e, job.old.slip, job.old.grip)
+    lie_in_soil(job.line, job.sea, job.old.r, job.old.soil)
 
 
 @kernel

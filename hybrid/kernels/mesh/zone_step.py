@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.algebra.rotations import dot, get3
+from hybrid.kernels.algebra.rotations import dot, get3, sub
 from hybrid.kernels.laws.axial_law import has_law, stretch_work
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.end_motion import end_turn
+from hybrid.kernels.laws.obstacle_motion import surface_velocity
 from hybrid.kernels.laws.surfaces import surface
 from hybrid.kernels.laws.tension_torque import twist_of_line
 from hybrid.kernels.machine.compile import inner, kernel
@@ -276,12 +277,15 @@ def weigh_contact(near, zones):
 
 @inner
 def weigh_obstacles(line, sea, state, zones, horizon):
-    """What is near an obstacle at rest, or will be within a horizon, s, as what is near the line itself."""
+    """What is near an obstacle, or will be within a horizon, s, as what is near the line itself."""
     rows, of, last = sea.obstacles, zones.kinds.base_of_cell, zones.kinds.base_of_cell.shape[0] - 1
+    moves = line.moved.shape[0] > 0
     for i in range(state.r.shape[0]):
         x, v = get3(state.r, i), get3(state.v, i)
         for k in range(rows.shape[0]):
             gap, n, _ = surface(sea, k, x)
+            if moves:
+                v = sub(get3(state.v, i), surface_velocity(sea.carried, k, x))
             gap, wide = max(gap + min(horizon * dot(n, v), 0.0), 0.0), 2.0 * rows[k, STRAND]
             raise_ratio(zones.ratios, CONTACT, of[max(i - 1, 0)], of[min(i, last)], 2.0 * wide / (gap + wide))
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, spin_about, sub, transport
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.laws.element import turns_freely
+from hybrid.kernels.laws.soil import remember_between
 from hybrid.kernels.laws.tension_torque import stretch_factor, torque_beside
 from hybrid.kernels.laws.vortices import PHASE
 from hybrid.kernels.machine.compile import inner, kernel
@@ -176,32 +177,40 @@ def carry_nodes(x, out, s, at, match, third):
 
 
 @inner
-def carry_linearly(x, out, s, at, match):
-    """The travel of friction (N+1, 3) to the new nodes."""
+def carry_rows(x, out, s, at, match):
+    """Rows of nodes linearly to the new nodes: the travel of friction, what obstacles that move keep, vortices."""
     for i in range(out.shape[0]):
         a, c = match.same[i], match.left[i]
-        if a >= 0:
-            put3(out, i, get3(x, a))
-        else:
-            part = (at[i] - s[c]) / (s[c + 1] - s[c])
-            put3(out, i, add(scale(1.0 - part, get3(x, c)), scale(part, get3(x, c + 1))))
+        part = 0.0 if a >= 0 else (at[i] - s[c]) / (s[c + 1] - s[c])
+        for k in range(out.shape[1]):
+            if a >= 0:
+                out[i, k] = x[a, k]
+            else:
+                out[i, k] = (1.0 - part) * x[c, k] + part * x[c + 1, k]
 
 
 @inner
-def carry_wake(line, state, out, at, match):
-    """Phases and means of vortices to the new nodes: phases the shorter way round between the nodes beside them."""
-    for i in range(out.wake.shape[0]):
+def carry_soil(x, out, s, at, match):
+    """What nodes remember of the bed (N+1, 6) to the new nodes."""
+    for i in range(out.shape[0]):
         a, c = match.same[i], match.left[i]
-        if a >= 0:
-            for k in range(4):
-                out.wake[i, k] = state.wake[a, k]
+        if a < 0:
+            remember_between(x, out, i, c, c + 1, (at[i] - s[c]) / (s[c + 1] - s[c]))
             continue
-        part = (at[i] - line.s[c]) / (line.s[c + 1] - line.s[c])
-        for k in range(4):
-            out.wake[i, k] = (1.0 - part) * state.wake[c, k] + part * state.wake[c + 1, k]
-        turn = state.wake[c + 1, PHASE] - state.wake[c, PHASE]
-        turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
-        out.wake[i, PHASE] = state.wake[c, PHASE] + part * turn
+        for k in range(out.shape[1]):
+            out[i, k] = x[a, k]
+
+
+@inner
+def shorter_way_round(line, state, out, at, match):
+    """Phases of vortices at new nodes, between those of the nodes beside them."""
+    for i in range(out.wake.shape[0]):
+        c = match.left[i]
+        if match.same[i] < 0:
+            turn = state.wake[c + 1, PHASE] - state.wake[c, PHASE]
+            turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+            part = (at[i] - line.s[c]) / (line.s[c + 1] - line.s[c])
+            out.wake[i, PHASE] = state.wake[c, PHASE] + part * turn
 
 
 # --- cells ----------------------------------------------------------------------------------------
@@ -477,9 +486,16 @@ def transfer_state(job):
     carry_nodes(state.v, out.v, line.s, target.s, match, third)
     carry_nodes(state.a, out.a, line.s, target.s, match, third)
     carry_nodes(state.vd, out.vd, line.s, target.s, match, third)
-    carry_linearly(state.slip, out.slip, line.s, target.s, match)
+    carry_rows(state.slip, out.slip, line.s, target.s, match)
+    carry_rows(state.grip, out.grip, line.s, target.s, match)
+    for k in range(out.sheave.shape[0]):
+        for j in range(out.sheave.shape[1]):
+            out.sheave[k, j] = state.sheave[k, j]
     if state.wake.shape[0] > 0:
-        carry_wake(line, state, out, target.s, match)
+        carry_rows(state.wake, out.wake, line.s, target.s, match)
+        shorter_way_round(line, state, out, target.s, match)
+    if state.soil.shape[0] > 0:
+        carry_soil(state.soil, out.soil, line.s, target.s, match)
     carry_cells(job)
     if job.shifts[0]:  # of cells that follow it would be a kick at every change
         keep_momentum(job)

@@ -15,6 +15,7 @@ import numpy as np
 
 from hybrid.kernels.algebra.rotations import add, cross, dot, get3, scale, sub
 from hybrid.kernels.laws.axial_law import has_law, strain_and_energy
+from hybrid.kernels.laws.soil import remember_between
 from hybrid.kernels.laws.tension_torque import couples, stretch_factor, torque_beside
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
@@ -157,6 +158,8 @@ def move_state(state, out, forward, cut, step):
         move_rows(state.wake, out.wake, forward, cut, step)
     if state.grip.shape[0] > 0:
         move_rows(state.grip, out.grip, forward, cut, step)
+    if state.soil.shape[0] > 0:
+        move_rows(state.soil, out.soil, forward, cut, step)
     for k in range(state.sheave.shape[0]):
         for j in range(state.sheave.shape[1]):
             out.sheave[k, j] = state.sheave[k, j]
@@ -385,6 +388,8 @@ def enter(job, flow, g):
     h = place_of(line, reel, i) - place_of(line, reel, g)
     part = (place - place_of(line, reel, g)) / h
     put_travels(state, out, at, before, behind, part)
+    if state.soil.shape[0] > 0:
+        remember_between(state.soil, out.soil, at, before, behind, part)
     cut, last = cell(line, reel, g), cell(line, reel, g - 1)
     slope = (state.T[cut] - state.T[last]) / (0.5 * (line.h[last] + h))
     kept, rises = mismatch(job, flow, g, g), tension_rate(line, state, job.clock, job.tension, cut)

@@ -13,7 +13,7 @@ from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.march.zone_torque import pass_torque, torsion_of
 from hybrid.kernels.run.run import in_plane, in_space
-from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.forces import PLANAR, REMEMBERS
 from hybrid.kernels.state.obstacle_rows import FREE
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import (
@@ -74,6 +74,8 @@ def check_turns(line: Line, state: State) -> None:
         raise ValueError("a state with angles of sheaves that its line does not have, or without those that it has")
     if state.layers.size != slip_size(line) * line.s.size:
         raise ValueError("a state with layers that slip, which its line does not have, or without those that it has")
+    if (state.soil.shape[0] > 0) != bool(line.bits & REMEMBERS):
+        raise ValueError("a state that remembers soil, which its line does not lie on, or one that does not")
     if state.wake.shape[0] != line.wake_law.shape[0]:
         raise ValueError(
             f"a state with {state.wake.shape[0]} phases of lift on a line that has {line.wake_law.shape[0]}"

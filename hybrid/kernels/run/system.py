@@ -203,7 +203,7 @@ def follow_laws(tables, s):
     """Mean tensions of lines whose tensions are no multiples of strains, with the last correction."""
     for l in range(tables.shape[0]):
         job = read(tables[l])
-        follow_law(job.line, job.old, job.new, job.work, s.dt, s.cv, s.ca)
+        follow_law(job.line, job.sea, job.old, job.new, job.work, s.dt, s.cv, s.ca)
 
 
 @inner
@@ -284,7 +284,7 @@ def end_lines(tables, joints, floors, s, task, good):
             if not turn < most_turn(job.contact):
                 return l, turn, cell
             report = job.work.report
-            if touches and 0.5 * task.dt >= job.books.clock[SHORTEST]:
+            if touches and job.reel == 0 and 0.5 * task.dt >= job.books.clock[SHORTEST]:
                 move_joints(job, joints[l, START], joints[l, END])
                 if ask_contact(job.contact, job.contact_table, GAIN) > 0.0:
                     return l, turn, cell  # it creates energy: in halves

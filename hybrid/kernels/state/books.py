@@ -170,7 +170,7 @@ class Books(NamedTuple):
 # A sample, one row: t, sea.now (4), of both ends position (2, 3), frame (2, 9), spin, force and moment (2, 3 each), report,
 # work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N); where they vary, h (N) and kb (N+1, 3); turns (K, 3)
 # of zones that a torque passes through; of a line that touches itself, the force of that (N+1); of obstacles of which one
-# moves, SEEN of each (kernels.state.obstacle_rows); how far layers have slipped (N+1, 2 L); of the model error, where it
+# moves, SEEN of each (kernels.state.obstacle_rows); how far layers have slipped (N+1, 2 L); what nodes remember of soil (N+1, 6); of the model error, where it
 # is followed, K numbers.
 SAMPLE_SEA, SAMPLE_POSITION, SAMPLE_FRAME, SAMPLE_SPIN, SAMPLE_FORCE, SAMPLE_MOMENT, SAMPLE_REPORT = (
     1,
@@ -190,7 +190,7 @@ def sample_size(
 ) -> int:  # fmt: skip
     """Numbers of a sample of a line of so many cells; varies: with lengths and stiffness; zones: with turns; touches:
 
-    with the force of contact with itself; obstacles: of which one moves; layers: numbers of a node of what slips.
+    with the force of contact with itself; obstacles: of which one moves; layers: numbers of a node of what slips, and soil.
 
     What is sampled of the model error comes behind them.
     """

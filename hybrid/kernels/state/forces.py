@@ -36,6 +36,10 @@ BENDING_LAW = 131072
 VORTICES = 262144
 # No force: layers of a section that slip on each other as it bends (hybrid.kernels.laws.bending_slip).
 BENDING_SLIP = 1048576
+# Bed that remembers (hybrid.kernels.laws.soil): in place of the linear one; no force: friction that falls as a line slides.
+SOIL = 2097152
+BREAKOUT = 4194304
+REMEMBERS = SOIL | BREAKOUT
 
 FORCES = {
     "drag": (DRAG, "velocity, direction; environment.fluid and sections[].drag, or drag_area of modules"),
@@ -49,7 +53,9 @@ FORCES = {
     "drag, added mass or wetting of bodies": (BODIES, "velocity, acceleration; cable.attachments, ends of kind body"),
     "lift of vortices": (VORTICES, "velocity, and a phase of its own; sections[].vortices"),
     "seabed contact": (SEABED, "height and its rate; environment.seabed"),
+    "nonlinear soil": (SOIL, "height, and what it was before; environment.seabed.soil"),
     "seabed friction": (FRICTION, "travel along the seabed; environment.seabed.friction"),
+    "friction that falls as the line slides": (BREAKOUT, "way along the seabed; environment.seabed.friction.residual"),
     "contact with obstacles": (OBSTACLES, "distance and its rate; obstacles"),
     "contact of the line with itself": (SELF_CONTACT, "distance of its parts; contact.self"),
     "friction of the line on itself": (SELF_FRICTION, "travel of its parts along each other; contact.friction"),

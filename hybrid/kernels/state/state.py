@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.machine.references import by_reference
 from hybrid.kernels.state.facet_rows import NO_BOXES, NO_FACETS
 from hybrid.kernels.state.fields import HALF, MEAN, POINT, ROD, SHARED, blank, cell, fields_of, node
+from hybrid.kernels.state.forces import REMEMBERS
 from hybrid.kernels.state.obstacle_rows import (
     CARRIED,
     EACH,
@@ -38,13 +39,13 @@ NO_TENSION_TORQUE: Floats = np.zeros(0)
 NO_TURN: Floats = np.zeros((0, 3))
 NO_TURNS: Floats = np.zeros((0, 0, 3))
 # Of a line whose tensions are multiples of strains (kernels.laws.axial_law has the columns).
-NO_LAW: Floats = np.zeros((0, 11))
+NO_LAW: Floats = np.zeros((0, 13))
 WORKING = 5  # the column that says which cells remember their highest mean tension; 0: not this one
 NO_TABLE: Floats = np.zeros((0, 3))
 # Of a line whose moments are multiples of curvature (kernels.laws.bending_law has the columns).
 NO_BEND_LAW: Floats = np.zeros((0, 7))
 # Of a line without layers that slip (kernels.laws.bending_slip has the columns).
-NO_SLIP: Floats = np.zeros((0, 3))
+NO_SLIP: Floats = np.zeros((0, 4))
 NO_LAYERS: Floats = np.zeros((0, 0))
 # Of a line without vortices (kernels.laws.vortices has the columns).
 NO_WAKE_LAW: Floats = np.zeros((0, 8))
@@ -58,6 +59,9 @@ NO_CARRIED: Floats = np.zeros((0, CARRIED))
 NO_OBSTACLES_SEEN: Floats = np.zeros((0, 0, SEEN))
 NO_GRIP: Floats = np.zeros((0, 0))
 NO_LAYERS_SEEN: Floats = np.zeros((0, 0, 0))
+# Of a line on a bed that does not remember (kernels.laws.soil has the columns), and of outputs of one.
+NO_SOIL: Floats = np.zeros((0, 6))
+NO_SOIL_SEEN: Floats = np.zeros((0, 0, 0))
 NO_SHEAVES: Floats = np.zeros((0, 4))
 NO_ROOM: Floats = np.zeros((0, 0, 0))
 NO_MOVED: NDArray[np.int8] = np.zeros(0, np.int8)
@@ -111,8 +115,8 @@ class Line(NamedTuple):
     # (K, 5) catenary zones that a torque passes through: first cell, cell after the last, compliance (rad per N m),
     # turn without torque (rad), stiffness-proportional damping time (s)
     torsion: Floats = NO_TORSION
-    # (N, 11) of cells whose tension is no multiple of strain (kernels.laws.axial_law); empty: there are none
-    law: Annotated[Floats, cell(columns=11, optional=True)] = NO_LAW
+    # (N, 13) of cells whose tension is no multiple of strain (kernels.laws.axial_law); empty: there are none
+    law: Annotated[Floats, cell(columns=13, optional=True)] = NO_LAW
     law_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: strain, tension (N), energy per length (J/m)
     law_at: NDArray[np.int64] = (
         NO_ADDRESS  # (1,) address of kernels.laws.axial_law.follow_law; empty: there is no such cell
@@ -126,11 +130,13 @@ class Line(NamedTuple):
     bend_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: curvature (1/m), moment (N m), energy per length
     # (N+1, 8) of nodes with vortices (kernels.laws.vortices); empty: there are none
     wake_law: Annotated[Floats, node(columns=8, optional=True)] = NO_WAKE_LAW
-    # (N+1, 3 L) of elements with up to L layers that slip (kernels.laws.bending_slip), and how far they have, written before
+    # (N+1, 4 L) of elements with up to L layers that slip (kernels.laws.bending_slip), and how far they have, written before
     # every march; empty: there are none
-    slip_law: Annotated[Floats, node(columns=3, optional=True)] = NO_SLIP
-    slip_now: Annotated[Floats, node(columns=3, optional=True)] = NO_SLIP
+    slip_law: Annotated[Floats, node(columns=4, optional=True)] = NO_SLIP
+    slip_now: Annotated[Floats, node(columns=4, optional=True)] = NO_SLIP
     slip_at: NDArray[np.int64] = NO_ADDRESS  # (1,) address of kernels.laws.bending_slip.follow_slip; empty: none
+    # (N+1,) m, diameter with which nodes lie in soil (kernels.laws.soil); empty: there is none
+    bed_width: Annotated[Floats, node(optional=True)] = NO_PEAK
     moved: NDArray[np.int8] = (
         NO_MOVED  # (M,) of all obstacles: 1 where one moves, 2 where one turns freely; empty: none does
     )
@@ -230,6 +236,7 @@ class Sea(NamedTuple):
     rolling: Floats  # (3 K, N+1, 5) room for answers to K sheaves that turn freely (kernels.laws.sheaves)
     boxes: Floats = NO_BOXES  # (B, BOX_ROW) boxes over facets (kernels.state.facet_rows); empty: no obstacle has any
     facets: Floats = NO_FACETS  # (F, FACET) of surfaces of triangles, in axes of their obstacles
+    soil: Floats = NO_SLOW  # of a bed that remembers (kernels.laws.soil); empty: it does not
 
 
 class State(NamedTuple):
@@ -257,13 +264,14 @@ class State(NamedTuple):
     sheave: Floats = NO_SHEAVES  # (M, 4) of all obstacles where one turns freely (kernels.laws.sheaves); else empty
     peak: Floats = NO_PEAK  # (N,) N, highest mean tension of lines with a section that remembers it; else empty
     layers: Floats = NO_LAYERS  # (N+1, 2 L) 1/m, how far layers have slipped, of lines with a `slip_law`; else empty
+    soil: Floats = NO_SOIL  # (N+1, 6) of lines on a bed that remembers (kernels.laws.soil); else empty
 
     def copy(self) -> State:
         return State(*(x.copy() for x in self))
 
 
 # What only some lines have of a state: of others it is empty, and earlier programs did not keep all of it.
-OPTIONAL_STATE = ("turn", "slow", "wake", "grip", "sheave", "peak", "layers")
+OPTIONAL_STATE = ("turn", "slow", "wake", "grip", "sheave", "peak", "layers", "soil")
 
 
 class Batch(NamedTuple):
@@ -295,6 +303,7 @@ class Batch(NamedTuple):
     touch: Floats = NOT_VARYING  # (nb, N+1) N/m, of contact of the line with itself; empty: there is none
     obstacles: Floats = NO_OBSTACLES_SEEN  # (nb, M, SEEN) where they are, and what acts on them; empty: none moves
     layers: Floats = NO_LAYERS_SEEN  # (nb, N+1, 2 L) as `State.layers`
+    soil: Floats = NO_SOIL_SEEN  # (nb, N+1, 6) as `State.soil`
 
     def line(self, k: int, line: Line) -> Line:
         """The line at output k, from the one of all outputs."""
@@ -320,6 +329,7 @@ def batch_of_one(
         **{} if touch is None else {"touch": touch[None].copy()},
         **{} if not state.grip.size else {"obstacles": obstacles_now(sea, state)[None]},
         **{} if not state.layers.size else {"layers": now.layers},
+        **{} if not state.soil.size else {"soil": now.soil},
     )  # fmt: skip
 
 
@@ -343,6 +353,7 @@ def state_in(batch: Batch, k: int, line: Line) -> State:
     state.turn[:] = batch.turn[k] if batch.turn.size else 0.0
     state.slow[:] = batch.T[k] if state.slow.size else 0.0
     state.layers[:] = batch.layers[k] if batch.layers.size else 0.0
+    state.soil[:] = batch.soil[k] if batch.soil.size else 0.0
     for name in ("r", "v", "vd", "e", "T", "a1", "w"):
         getattr(state, name)[:] = getattr(batch, name)[k]
     return state
@@ -398,12 +409,12 @@ def no_torsion() -> Torsion:
 
 def blank_state(
     n_cells: int, zones: int = 0, slow: bool = False, wake: bool = False, obstacles: int = 0,
-    sheaves: bool = False, peak: bool = False, layers: int = 0,
+    sheaves: bool = False, peak: bool = False, layers: int = 0, soil: bool = False,
 ) -> State:  # fmt: skip
     """A state of zeros with room for `n_cells` cells; zones: those that a torque passes through; slow: mean tensions;
 
     wake: phases of vortices; obstacles: of which one moves; sheaves: one of them turns freely; peak: highest mean
-    tensions; layers: that slip.
+    tensions; layers: that slip; soil: what nodes remember of the bed.
     """
     node, cell = (n_cells + 1, 3), (n_cells, 3)
     z = np.zeros
@@ -428,6 +439,7 @@ def blank_state(
         z((obstacles if sheaves else 0, 4)),
         z(n_cells if peak else 0),
         z((n_cells + 1 if layers else 0, 2 * layers)),
+        z((n_cells + 1 if soil else 0, NO_SOIL.shape[1])),
     )
 
 
@@ -436,13 +448,18 @@ def state_for(line: Line) -> State:
     free, peak = bool((line.moved == FREE).any()), remembers(line)
     return blank_state(
         line.h.size, len(line.torsion), line.law.size > 0, line.wake_law.size > 0, line.moved.size, free, peak,
-        slip_size(line) // 2,
+        slip_size(line) // 2, bool(line.bits & REMEMBERS),
     )  # fmt: skip
+
+
+def sampled_size(line: Line) -> int:
+    """Numbers of a node in a sample of a line, of layers that slip and of soil that remembers."""
+    return slip_size(line) + (NO_SOIL.shape[1] if line.bits & REMEMBERS else 0)
 
 
 def slip_size(line: Line) -> int:
     """Numbers of a node in `State.layers` of a line."""
-    return 2 * line.slip_law.size // (3 * line.s.size)
+    return 2 * line.slip_law.size // (4 * line.s.size)
 
 
 def remembers(line: Line) -> bool:

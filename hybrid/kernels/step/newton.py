@@ -101,12 +101,12 @@ def pass_torque(space, line, ends, state, work, part, cv):
 
 
 @inner
-def follow_law(line, old, new, work, dt, cv, ca):
+def follow_law(line, sea, old, new, work, dt, cv, ca):
     """Linearise the law of length where tension is no multiple of strain (kernels.laws.axial_law); dt: s, of a step, else 0."""
     if line.law_at.shape[0] != 0:
         if not dt > 0.0 and not (cv == 0.0 and ca < AT_REST):
             dt = -1.0
-        call_law(line.law_at[0], line, old, new, work, dt, ca)
+        call_law(line.law_at[0], line, old, new, work, dt, sea.now[0])
 
 
 @inner
@@ -229,7 +229,7 @@ def solve(
         it += 1
         bad, good = -1, True
         pass_torque(space, line, ends, new, work, BEFORE_MARCH, cv)
-        follow_law(line, old, new, work, task.dt, cv, ca)
+        follow_law(line, sea, old, new, work, task.dt, cv, ca)
         begin_slip(line, ends, old, new, work, task.dt, cv, ca)
         if reel != 0:
             call_reel(reel, reel_table)
@@ -289,7 +289,7 @@ def solve(
     if task.what == STEP:
         find_rates(space, line, sea, old, new, work.u, s)
     if task.what != ASSEMBLY:
-        follow_law(line, old, new, work, task.dt, cv, ca)
+        follow_law(line, sea, old, new, work, task.dt, cv, ca)
     if task.what == STEP or task.what == EQUILIBRIUM:
         end_slip(line, ends, old, new, work, BEHIND_STEP if task.what == STEP else BEHIND_REST)
     pass_torque(space, line, ends, new, work, AFTER_STEP, cv)

@@ -323,6 +323,10 @@ def sample_state(line, sea, old, new, books, where, row):
         for j in range(new.layers.shape[1]):
             row[at + j] = x * new.layers[i, j] + (1.0 - x) * old.layers[i, j]
         at += new.layers.shape[1]
+    for i in range(new.soil.shape[0]):
+        for j in range(new.soil.shape[1]):
+            row[at + j] = x * new.soil[i, j] + (1.0 - x) * old.soil[i, j]
+        at += new.soil.shape[1]
     sample_model_error(books.model_error, x, row, at)
 
 

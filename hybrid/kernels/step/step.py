@@ -14,12 +14,13 @@ from hybrid.kernels.laws.obstacle_motion import carry_obstacles
 from hybrid.kernels.laws.obstacles import normal_at, passes, stored_in_contact
 from hybrid.kernels.laws.out_of_plane import step_out_of_plane
 from hybrid.kernels.laws.sheaves import find_rates_of_sheaves, predict_sheaves
+from hybrid.kernels.laws.soil import follow_soil, slide_on
 from hybrid.kernels.laws.vortices import advance_wake
 from hybrid.kernels.laws.water import wave_kinematics
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.configuration import carry_director
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held, sharpest_in_plane, sharpest_in_space
-from hybrid.kernels.state.forces import FRICTION, OBSTACLES, ROTARY, TOUCHES, VORTICES, WAVES
+from hybrid.kernels.state.forces import FRICTION, OBSTACLES, REMEMBERS, ROTARY, TOUCHES, VORTICES, WAVES
 from hybrid.kernels.state.obstacle_rows import EACH
 from hybrid.kernels.state.report import (
     BEND,
@@ -181,6 +182,9 @@ def contact_work(line, sea, old, new, u, report):
         report[CONTACT_WORK] += along
         report[FRICTION_WORK] += dot(b, ui) - along
         new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
+    if line.bits & REMEMBERS:
+        follow_soil(line, sea, new.r, new.soil)
+        slide_on(line, sea, old, new, u)
     report[SEABED_ENERGY] = stored_in_contact(line, sea, new.r)
 
 
@@ -218,6 +222,10 @@ def begin_step(plane, space, line, sea, old, new, u, s, safe):
             wave_kinematics(sea, old.r, u)
         if line.bits & FRICTION:
             friction_axes(sea, old.r, old.e, old.slip, old.grip)
+        if line.bits & REMEMBERS:
+            for i in range(new.soil.shape[0]):
+                for k in range(new.soil.shape[1]):
+                    new.soil[i, k] = old.soil[i, k]
         if line.bits & VORTICES:
             advance_wake(line, sea, old, new, s.dt)
     return turn, cell

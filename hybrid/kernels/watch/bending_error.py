@@ -28,6 +28,7 @@ from hybrid.kernels.laws.cell import Chord
 from hybrid.kernels.laws.end_motion import end_turn
 from hybrid.kernels.laws.node_forces import Z3, inertia_and_water
 from hybrid.kernels.laws.seabed import contact, friction, pressure
+from hybrid.kernels.laws.soil import left_of
 from hybrid.kernels.laws.tension_torque import twist_of_line
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.machine.references import reader
@@ -131,7 +132,9 @@ def seabed_rates(line, sea, i, state, u, history):
             sea.slip[i, 1] + u[i, 1] - w * n[1],
             sea.slip[i, 2] + u[i, 2] - w * n[2],
         )
-        _, g, D, part = friction(t, N, get3(sea.axis, i), n, sea.friction[0], sea.friction[1], sea.slip_length)
+        along, across = left_of(line, sea, state.soil, i)
+        along, across = along * sea.friction[0], across * sea.friction[1]
+        _, g, D, part = friction(t, N, get3(sea.axis, i), n, along, across, sea.slip_length)
         # the travel differs by what it did before, and by what the error has moved since
         F = add(F, add(scale(more, g), mat_vec(D, sub(get3(history.slid, i), get3(history.old, i)))))
         size = math.sqrt(dot(t, t))

@@ -29,6 +29,7 @@ from hybrid.kernels.laws.element import frames_at, relative_rotation
 from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST, at_hinge, depth_of, fade, left_of, stiffness_share
 from hybrid.kernels.laws.obstacle_grip import pressure_of_obstacles
 from hybrid.kernels.laws.seabed import pressure
+from hybrid.kernels.laws.soil import PRESSES
 from hybrid.kernels.laws.tension_torque import rest_strain
 from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.march.resolution_checks import sharpest_in_plane, sharpest_in_space
@@ -45,7 +46,7 @@ from hybrid.kernels.state.books import (
     TENSION,
     TORQUE,
 )
-from hybrid.kernels.state.forces import OBSTACLES, PLANAR, SEABED, STIFFNESS_DAMPING
+from hybrid.kernels.state.forces import OBSTACLES, PLANAR, SEABED, SOIL, STIFFNESS_DAMPING
 from hybrid.kernels.state.report import FORCE_A
 
 # Column of strains: curvature as results have it, 1/m: with what joints take of it, without what ends do not bear.
@@ -452,6 +453,10 @@ def node_pressure(sea, state, i):
 def note_contact(line, sea, state, books, t):
     """Force per length that the nodes bear, each over its half cells, as outputs have it."""
     n = line.h.shape[0]
+    if line.bits & SOIL:
+        for i in range(n + 1):
+            widen_both(books.extremes, books.right, PRESSURE, i, state.soil[i, PRESSES], t)
+        return
     here = node_pressure(sea, state, 0)
     force = length = 0.0  # of the half cell before the node
     for i in range(n + 1):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import cross, dot, get3
-from hybrid.kernels.laws.bending_slip import EACH, FROM, KEPT
+from hybrid.kernels.laws.bending_slip import EACH, FROM, KEPT, STIFF, STIFFENING, STIFFNESS
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.machine.binding import Series
 from hybrid.kernels.machine.compile import kernel
@@ -95,10 +95,13 @@ def observe_outputs(tables):
 
 
 def slipped(line: Line, batch: Batch) -> Floats:
-    """`slip_now` (nb, N+1, 3 L) of outputs: their layers bear what they have."""
+    """`slip_now` (nb, N+1, 4 L) of outputs: their layers bear what they have, as stiff as their tension makes them."""
+    n = batch.T.shape[1]
     out = np.full((batch.t.size, *line.slip_now.shape), np.inf)
     for k in range(KEPT):
         out[:, :, FROM + k :: EACH] = batch.layers[:, :, k::KEPT]
+    T = np.maximum(0.5 * (batch.T[:, [0, *range(n)]] + batch.T[:, [*range(n), n - 1]]), 0.0)[:, :, None]
+    out[:, :, STIFF::EACH] = line.slip_law[:, STIFFNESS::EACH] + line.slip_law[:, STIFFENING::EACH] * T
     return out
 
 

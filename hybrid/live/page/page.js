@@ -291,6 +291,7 @@
   byId("stop").addEventListener("click", () => ask({ do: "stop" }));
   byId("play-result").addEventListener("click", () => { asked = "play"; ask({ do: "play" }); });
   byId("report").addEventListener("click", () => window.open(`report?of=${mode === "motion" ? "motion" : "still"}`, "_blank"));
+  byId("modes").addEventListener("click", () => window.open("report?of=modes", "_blank"));
   byId("colour").addEventListener("change", () => { space.colour(byId("colour").value); legend(); });
   byId("stretch").addEventListener("click", () => {
     const on = byId("stretch").getAttribute("aria-pressed") !== "true";
@@ -343,6 +344,8 @@
     byId("run").disabled = running || problems.some((x) => !x.note) || !still || !still.moves;
     byId("run").title = byId("run").disabled ? `Not now: ${whyNot()}` : "Compute the motion (Ctrl+Enter)";
     byId("stop").hidden = !running;
+    byId("modes").hidden = !state.editable;
+    byId("modes").disabled = !still || problems.some((x) => !x.note);
     byId("report").disabled = !(mode === "motion" ? motion : still);
     byId("play-result").hidden = !(state.editable && state.result && !state.playing && !running);
     byId("file").textContent = (state.file || "not saved yet") + (unsaved && state.file ? " • changed" : "");

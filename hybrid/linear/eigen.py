@@ -10,7 +10,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state.state import Floats
-from hybrid.modal.matrices import LinearNetwork
+from hybrid.linear.matrices import LinearNetwork
 
 # More modes are found than asked for, so that the last are not cut off from others of the same frequency.
 MORE = 4

@@ -102,13 +102,10 @@ def axes_across(d: Floats) -> Floats:
     return np.stack([first, np.cross(d, first)], axis=1)
 
 
-def of_cylinders(
-    d: Floats, axes: Floats, drag: tuple[Floats, Floats], current: Floats, u: Floats
-) -> tuple[Floats, Floats, Floats]:
+def of_cylinders(d: Floats, axes: Floats, drag: tuple[Floats, Floats], current: Floats, u: Floats) -> Floats:
     """Linear drag (H, 3, 3) N s/m of cylinders along d (H, 3) with axes (H, 2, 3) across, by a relative velocity of the
 
-    water with a mean (H, 3) m/s and amplitudes u (F, H, 3); its covariance (H, 2, 2) and mean (H, 2) across.
-    drag: across and along, (H,) N s^2/m^2.
+    water with a mean (H, 3) m/s and amplitudes u (F, H, 3).  drag: across and along, (H,) N s^2/m^2.
     """
     un, ut = np.einsum("fhi,hmi->fhm", u, axes), np.einsum("fhi,hi->fh", u, d)
     mean, forth = np.einsum("hi,hmi->hm", current, axes), np.einsum("hi,hi->h", current, d)
@@ -117,8 +114,7 @@ def of_cylinders(
         t = of_harmonic(forth[:, None], ut[0, :, None])[:, 0, 0]
     else:
         t = along(forth, np.sqrt(0.5 * (np.abs(ut) ** 2).sum(axis=0)))
-    B += (drag[1] * t)[:, None, None] * d[:, :, None] * d[:, None, :]
-    return B, covariance_of(un), mean
+    return B + (drag[1] * t)[:, None, None] * d[:, :, None] * d[:, None, :]
 
 
 def size_deviation(mean: Floats, covariance: Floats) -> Floats:

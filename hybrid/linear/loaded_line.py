@@ -13,16 +13,13 @@ from hybrid.kernels.laws.bending_law import RIGID, parts_without_spring
 from hybrid.kernels.laws.hinge_layer import FADED
 from hybrid.kernels.state.forces import BODIES, DRAG, WAVES
 from hybrid.kernels.state.state import Floats, Line, Sea
-from hybrid.modal.drag import axes_across, linear_law, of_cylinders
-from hybrid.modal.excitation import Excitation, current_at, excitations_of, half_cells
-from hybrid.modal.matrices import ANCHOR, LinearLine, by_turn, rows_at_rest, sparse_rows
-from hybrid.modal.response_results import LineResponse
+from hybrid.linear.drag import axes_across, linear_law, of_cylinders
+from hybrid.linear.excitation import Excitation, current_at, excitations_of, half_cells
+from hybrid.linear.matrices import ANCHOR, LinearLine, RestMarch, by_turn, rows_at_rest, sparse_rows
+from hybrid.linear.response_results import LineResponse
 from hybrid.model.build import Model
 from hybrid.solve.joined import JoinedLine
 
-# Of sigma^2: standard deviation of what linear drag leaves of |u| u, sqrt(3 - 8/pi) in still water, sqrt(2) in a
-# current that is faster than the motion.
-LEFT_STILL, LEFT_IN_FLOW = math.sqrt(3.0 - 8.0 / math.pi), math.sqrt(2.0)
 STRAIGHT = 1e-9  # 1/m: less is no bend
 AWRY = (0.3, 0.9, 0.4)  # along no axis
 
@@ -36,10 +33,12 @@ class LoadedLine:
         self.obstacles = model.sea.names
         count, calm = self.line.s.size, _without_drag(self.line)
 
+        rows = np.zeros((count, SIZE * WIDTH))
+        march = RestMarch(calm._replace(bits=calm.bits | WAVES), x.ends, state, rows)
+
         def rows_of(sea: Sea) -> Floats:
-            rows = np.zeros((count, SIZE * WIDTH))
-            wet = calm._replace(bits=calm.bits | WAVES)
-            rows_at_rest(wet, x._replace(sea=sea), x.ends, state, (0.0, ANCHOR), rows)
+            rows[:] = 0.0
+            march(sea, (0.0, ANCHOR))
             return rows
 
         self.excited: list[Excitation] = excitations_of(model, x.line, state, omegas, rows_of)
@@ -57,25 +56,23 @@ class LoadedLine:
     def drag_blocks(self, which: np.ndarray, start: bool) -> Floats:
         """Linear drag (N+1, 3, 3) N s/m of every node, by the motion found last at some frequencies, which stand for
         all; start: by the water alone."""
-        water = np.stack([self.excited[f].water for f in which])
-        motion = 0.0 * water if start else -1j * self.omegas[which, None, None] * self.q[which, :, 1:4]
-        relative = math.sqrt(len(self.omegas) / which.size) * (water - motion)  # (F, N+1, 3)
+        relative = math.sqrt(len(self.omegas) / which.size) * self.relative(which, start)
         blocks = np.zeros((self.line.s.size, 3, 3))
-        self.left = np.zeros(self.line.s.size)  # N, what linear drag leaves of the quadratic one, standard deviation
         used = (self.cn > 0.0) | (self.ct > 0.0)
         if used.any():
             node, d, axes = self.node[used], self.d[used], self.axes[used]
             drag = self.cn[used], self.ct[used]
-            B, covariance, mean = of_cylinders(d, axes, drag, self.current[used], relative[:, node])
-            square = np.linalg.eigvalsh(covariance)[:, -1]
-            part = np.minimum(np.linalg.norm(mean, axis=1) / np.sqrt(np.maximum(square, 1e-300)), 1.0)
-            np.add.at(self.left, node, self.cn[used] * square * (LEFT_STILL + part * (LEFT_IN_FLOW - LEFT_STILL)))
-            np.add.at(blocks, node, B)
+            np.add.at(blocks, node, of_cylinders(d, axes, drag, self.current[used], relative[:, node]))
         at = np.flatnonzero(self.point_drag)
         if at.size:
             flow = current_at(self.line, self.sea, self.linear.r[at])
             blocks[at] += self.point_drag[at][:, None, None] * linear_law(flow, relative[:, at])
         return blocks
+
+    def relative(self, which: np.ndarray, start: bool = False) -> Floats:
+        """Velocity (F, N+1, 3) m/s of the water relative to the nodes, by the motion found last; start: none."""
+        water = np.stack([self.excited[f].water for f in which])
+        return water if start else water + 1j * self.omegas[which, None, None] * self.q[which, :, 1:4]
 
     def full_damping(self) -> sparse.csr_array:
         """Over the unknowns of all blocks."""
@@ -126,14 +123,20 @@ class LoadedLine:
                     self.q[f, -k, 1:4] = self.excited[f].shifts[k]
 
     def result(self) -> LineResponse:
-        """Amplitudes of what users ask for."""
-        state, q = self.linear.state, self.q
+        """Amplitudes of what users ask for, in the motion found last."""
+        return self.response_to(self.q, np.stack([x.turns for x in self.excited]), self.omegas)
+
+    def response_to(self, q: Floats, turns: Floats, omegas: Floats) -> LineResponse:
+        """Amplitudes of what users ask for, in a motion (F, N+1, 5) with turns (F, 2, 3) rad of the frames of its ends,
+
+        at frequencies (F,) 1/s.
+        """
+        state = self.linear.state
         l = np.linalg.norm(state.e, axis=1)
         d = state.e / l[:, None]
         de = np.diff(q[:, :, 1:4], axis=1)
         dd = (de - np.einsum("fni,ni->fn", de, d)[:, :, None] * d) / l[:, None]
         frames = self.x.ends.frame.reshape(2, 3, 3)[:, :, 2]  # tangents that clamps hold
-        turns = np.stack([x.turns for x in self.excited])
         held = [np.cross(turns[:, k], frames[k])[:, None] for k in (0, 1)]
         before, after = np.vstack([frames[:1], d]), np.vstack([d, frames[1:]])
         change = np.concatenate([dd, held[1]], axis=1) - np.concatenate([held[0], dd], axis=1)
@@ -154,18 +157,29 @@ class LoadedLine:
             if self.line.element[-k] and part < RIGID:
                 size[-k] *= part
                 kappa[:, -k] *= (along, part)
+        inner = self.kinks
+        size[inner] = 0.5 * (size[inner - 1] + size[inner + 1])
+        kappa[:, inner] = 0.5 * (kappa[:, inner - 1] + kappa[:, inner + 1])
         for k in (0, 1):
             if not self.line.spin[-k] and self.hinges[k, 0] > 0.0 and len(size) > 2:
-                self._fade_at_hinge(k, size, kappa)
+                self._fade_at_hinge(k, q[:, 1:, 0], size, kappa)
         return LineResponse(
-            self.line.s.copy(), 0.5 * (self.line.s[1:] + self.line.s[:-1]), self.omegas / (2.0 * np.pi), q[:, :, 1:4],
+            self.line.s.copy(), 0.5 * (self.line.s[1:] + self.line.s[:-1]), omegas / (2.0 * np.pi), q[:, :, 1:4],
             q[:, 1:, 0], kappa[:, :, 0], kappa[:, :, 1], state.r.copy(), state.T.copy(), size,
         )  # fmt: skip
 
-    def _fade_at_hinge(self, k: int, size: Floats, kappa: Floats) -> None:
+    @property
+    def kinks(self) -> np.ndarray:
+        """Inner nodes where a body on a catenary makes a kink: curvature there is the mean of both sides."""
+        line, of = self.line, (self.line.point_mass, self.line.point_lift)
+        loaded = np.any([np.nan_to_num(x) != 0.0 for x in of], axis=0)[1:-1]
+        return 1 + np.flatnonzero(loaded & (line.spin[:-1] == 0) & (line.spin[1:] == 0))
+
+    def _fade_at_hinge(self, k: int, dT: Floats, size: Floats, kappa: Floats) -> None:
         """Take from curvature (N+1,) 1/m of a catenary, and its amplitudes (F, N+1, 2), the layer of a hinge at end k.
 
-        As results have it (outputs.end_layers), up to the first change of section; it changes with tension.
+        As results have it (outputs.end_layers), up to the first change of section; it changes with tension, whose
+        amplitudes are dT (F, N).
         """
         line, n, way, EI = self.line, len(size) - 1, 1 - 2 * k, self.hinges[k, 0]
         nodes = k * n + way * np.arange(1, n)
@@ -183,7 +197,6 @@ class LoadedLine:
         parts = np.where(taut, size_there * np.exp(-np.cumsum(slope * h)), 0.0)
         count = min(last, int(np.logical_and.accumulate(parts > FADED).sum()))
         nodes, cells, beyond, parts = nodes[:count], cells[:count], beyond[:count], parts[:count]
-        dT = self.q[:, 1:, 0]
         by_depth = np.cumsum(dT[:, cells] * h[:count] / (2.0 * np.sqrt(T[cells] * EI)), axis=1)
         by_size = 0.25 * (0.5 * (dT[:, cells] + dT[:, beyond]) / mean[:count] - dT[:, [k * (n - 1)]] / first)
         one, two = k * n + way, k * n + 2 * way

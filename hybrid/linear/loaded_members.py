@@ -1,7 +1,7 @@
 """Morison members of a free body about rest in the sea: what waves do to the body, and linear drag of its pieces.
 
 A piece at an arm a from the origin moves by  T q,  T = [1, -[a]x],  of the shifts and turns q of its body.  With the
-linear drag B of a half cell (hybrid.modal.drag) for its velocity relative to the water, amplitudes of a frequency are
+linear drag B of a half cell (hybrid.linear.drag) for its velocity relative to the water, amplitudes of a frequency are
 
     damping  sum T^T B T,    load  sum T^T (B u + w cm (a_w - d (d.a_w)) + dw/dz eta F_U),
 
@@ -19,9 +19,9 @@ import numpy as np
 from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, OWN, PLACE, V
 from hybrid.kernels.laws.members import ALONG, CM, CN, CT, MIDDLE, PIECE, PUSH, WATER, WET
 from hybrid.kernels.state.state import Floats
-from hybrid.modal.drag import axes_across, of_cylinders
-from hybrid.modal.excitation import SAME, water_of_wave
-from hybrid.modal.matrices import SHIFT, TURN, rotation
+from hybrid.linear.drag import axes_across, of_cylinders
+from hybrid.linear.excitation import SAME, water_of_wave
+from hybrid.linear.matrices import SHIFT, TURN, rotation
 from hybrid.model.members import Members
 from hybrid.solve.joined import SystemState
 from hybrid.solve.system import SystemSolver
@@ -81,12 +81,12 @@ class LoadedMembers:
         return water, force, rise
 
     def drag_blocks(self, which: np.ndarray, start: bool) -> Floats:
-        """Linear drag (n, 3, 3) N s/m of every piece, as of hybrid.modal.loaded_line."""
+        """Linear drag (n, 3, 3) N s/m of every piece, as of hybrid.linear.loaded_line."""
         motion = np.einsum("nij,fj->fni", self.T, self.q[which] * (0.0 if start else 1.0))
         u = math.sqrt(len(self.omegas) / which.size) * (
             self.water[which] + 1j * self.omegas[which, None, None] * motion
         )
-        return of_cylinders(self.d, self.axes, (self.cn, self.ct), self.current, u)[0]
+        return of_cylinders(self.d, self.axes, (self.cn, self.ct), self.current, u)
 
     def damping(self) -> Floats:
         """(6, 6) N s/m, .. of the drag as it is, against velocities of the body."""

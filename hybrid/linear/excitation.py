@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -76,15 +77,19 @@ def excitations_of(model: Model, line: Line, state: State, omegas: Floats, rows_
     rows_of(sea): fills and gives the block rows of the state in that sea.
     """
     moves, sea = model.ends.moves(), model.sea.values
+    still: Floats | None = None  # forces and velocities without waves, which are those of any wave of no height
     waves = sea.waves if line.bits & WAVES or _follows(model) else sea.waves[:0]
     count, out = line.s.size, []
+    there = SmallSea(sea, count)
     for omega in omegas:
         forces, water = np.zeros((count, 3), complex), np.zeros((count, 3), complex)
         shifts, turns = np.zeros((2, 3), complex), np.zeros((2, 3), complex)
         for wave in waves[np.abs(waves[:, 1] - omega) <= SAME * omega]:
             size = wave[0] * np.exp(1j * wave[4])
             if line.bits & WAVES:
-                by_wave, speed = _of_wave(line, sea, state, wave, rows_of)
+                if still is None:
+                    still = _in_sea(there.still(), state, rows_of)
+                by_wave, speed = _of_wave(there, state, wave, rows_of, still)
                 forces, water = forces + size * by_wave, water + size * speed
             for k in (0, 1):
                 if moves.follows[k]:
@@ -106,15 +111,18 @@ def excitations_of(model: Model, line: Line, state: State, omegas: Floats, rows_
     return out
 
 
-def _of_wave(line: Line, sea: Sea, state: State, wave: Floats, rows_of: RowsOf) -> tuple[Floats, Floats]:
-    """Forces (N+1, 3) N but drag, and velocities (N+1, 3) m/s of the water, by a wave of amplitude 1 m and phase 0."""
-    found = []
-    for there in _small_seas(sea, wave, line.s.size):
-        wave_kinematics(there, state.r, np.zeros_like(state.r))
-        forces = -rows_of(there).reshape(-1, SIZE, WIDTH)[:, 1:4, -1]
-        found.append(np.concatenate([forces, there.flow[:, :3]], axis=1))
-    both = _amplitudes(found, wave)
+def _of_wave(there: SmallSea, state: State, wave: Floats, rows_of: RowsOf, still: Floats) -> tuple[Floats, Floats]:
+    """Forces (N+1, 3) N but drag, and velocities (N+1, 3) m/s of the water, by a wave of amplitude 1 m and phase 0;
+    still: both (N+1, 6) without waves."""
+    both = _amplitudes([still, *(_in_sea(sea, state, rows_of) for sea in there.waves(wave))], wave)
     return both[:, :3], both[:, 3:]
+
+
+def _in_sea(there: Sea, state: State, rows_of: RowsOf) -> Floats:
+    """Forces (N) but drag on nodes, and velocities of the water (m/s) there, (N+1, 6)."""
+    wave_kinematics(there, state.r, np.zeros_like(state.r))
+    forces = -rows_of(there).reshape(-1, SIZE, WIDTH)[:, 1:4, -1]
+    return np.concatenate([forces, there.flow[:, :3]], axis=1)
 
 
 def water_of_wave(sea: Sea, wave: Floats, places: Floats) -> Floats:
@@ -122,22 +130,36 @@ def water_of_wave(sea: Sea, wave: Floats, places: Floats) -> Floats:
 
     amplitude 1 m and phase 0.
     """
-    found = []
-    for there in _small_seas(sea, wave, len(places)):
-        wave_kinematics(there, places, np.zeros_like(places))
-        found.append(there.flow.copy())
+    there, found = SmallSea(sea, len(places)), []
+    for each in chain([there.still()], there.waves(wave)):  # one at a time: they share their arrays
+        wave_kinematics(each, places, np.zeros_like(places))
+        found.append(each.flow.copy())
     return _amplitudes(found, wave)
 
 
-def _small_seas(sea: Sea, wave: Floats, places: int) -> Iterator[Sea]:
-    """The sea without waves, with the cosine and with the sine of one that is small."""
-    small, one = _small(wave), wave[None].copy()
-    for amplitude, phase in ((0.0, 0.0), (small, 0.0), (small, -0.5 * np.pi)):
-        one[0, 0], one[0, 4] = amplitude, phase
-        yield sea._replace(
-            waves=one, orbits=one[:, 0] * one[:, 1], now=np.array([0.0, sea.now[1], 1.0, 0.0]),
+class SmallSea:
+    """A sea with one small wave or none, whose arrays are written anew: what is bound once stays bound."""
+
+    def __init__(self, sea: Sea, places: int) -> None:
+        """places: at which there is water."""
+        self.sea = sea._replace(
+            waves=np.zeros((1, sea.waves.shape[1])), orbits=np.zeros(1), now=np.array([0.0, sea.now[1], 1.0, 0.0]),
             flow=np.zeros((places, 7)), lanes=np.zeros((12, LANES)),
         )  # fmt: skip
+
+    def still(self) -> Sea:
+        """Without waves."""
+        self.sea.waves[0], self.sea.orbits[0] = 1.0, 0.0
+        self.sea.waves[0, 0] = 0.0
+        return self.sea
+
+    def waves(self, wave: Floats) -> Iterator[Sea]:
+        """With the cosine, then with the sine of a wave (6,) that is small."""
+        for phase in (0.0, -0.5 * np.pi):
+            self.sea.waves[0] = wave
+            self.sea.waves[0, [0, 4]] = _small(wave), phase
+            self.sea.orbits[0] = self.sea.waves[0, 0] * self.sea.waves[0, 1]
+            yield self.sea
 
 
 def _small(wave: Floats) -> float:

@@ -28,7 +28,7 @@ from hybrid.kernels.march.assembly import LEAST_SPIN_STIFFNESS
 from hybrid.kernels.run import entry
 from hybrid.kernels.state.forces import AXIAL_LAW, FRICTION, PLANAR, ROTARY, WAVES
 from hybrid.kernels.state.report import MOMENT_A
-from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, State, no_torsion
+from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State, no_torsion
 from hybrid.kernels.step.step import friction_axes
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.stability import ANCHOR as STATIC_ANCHOR
@@ -191,13 +191,24 @@ def in_space(line: Line, state: State, sticks: bool, quick: bool = True) -> Line
 
 def rows_at_rest(line: Line, x: JoinedLine, ends: Ends, state: State, c: tuple[float, float], rows: Floats) -> Floats:
     """Fill the block rows of a state at rest with c_v (1/s) and c_a (1/s^2), in the sea of x; its report."""
-    work = entry.workspace_of(line)._replace(rows=rows, torsion=no_torsion())
-    still = state.copy()
-    for rate in (still.v, still.a, still.vd, still.w, still.wa, still.wd, still.slip):
-        rate[:] = 0.0
-    plain = line._replace(torsion=line.torsion[:0])
-    entry.assembly(plain, x.sea, ends, still._replace(turn=still.turn[:0]), *c, work)
-    return work.report
+    return RestMarch(line, ends, state, rows)(x.sea, c)
+
+
+class RestMarch:
+    """Marches along one line at rest: as `rows_at_rest`, in many seas."""
+
+    def __init__(self, line: Line, ends: Ends, state: State, rows: Floats) -> None:
+        self.work = entry.workspace_of(line)._replace(rows=rows, torsion=no_torsion())
+        still = state.copy()
+        for rate in (still.v, still.a, still.vd, still.w, still.wa, still.wd, still.slip):
+            rate[:] = 0.0
+        self.state, self.line = still._replace(turn=still.turn[:0]), line._replace(torsion=line.torsion[:0])
+        self.ends = ends
+
+    def __call__(self, sea: Sea, c: tuple[float, float]) -> Floats:
+        """Fill the rows in a sea; its report."""
+        entry.assembly(self.line, sea, self.ends, self.state, *c, self.work)
+        return self.work.report
 
 
 def sparse_rows(rows: Floats) -> sparse.csr_array:

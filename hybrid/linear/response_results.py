@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from hybrid.kernels.state.state import Floats
-from hybrid.modal.drag import size_deviation
+from hybrid.linear.drag import size_deviation
 from hybrid.statistics.fatigue import Curve, curve_of, dirlik_damage
 
 HOURS = 3.0
+# Part of the largest deviation along a line from which one is known: below it what goes with the square of the motion,
+# which is left out, may be several times as much.
+OF_LARGEST = 0.2
 VARIES = ("position", "tension", "curvature", "curvature_across")
+ALONE = ("tension", "curvature")  # of which notes begin with the quantity and its place
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,8 @@ class LineResponse:
 
     s: (N+1,) m; middle: (N,) m, of the cells; f: (F,) Hz.  Amplitudes of exp(-2 pi i f t): position (F, N+1, 3) m,
     tension (F, N) N, curvature (F, N+1) 1/m in the plane in which the line is bent at rest, and curvature_across it.
-    Means: (N+1, 3), (N,), (N+1,).
+    Means: (N+1, 3), (N,), (N+1,).  left_out: what the rest of quadratic drag and the stretch by swinging, which no
+    amplitude has, would add to deviations of tension (N,) and curvature (N+1,), as parts, to the first order.
     """
 
     s: Floats
@@ -47,6 +52,7 @@ class LineResponse:
     mean_position: Floats
     mean_tension: Floats
     mean_curvature: Floats
+    left_out: Mapping[str, Floats] = field(default_factory=dict)
 
     def spectrum(self, name: str) -> LineSpectrum:
         """Power by frequency of position (F, N+1, 3), tension (F, N), curvature or curvature_across (F, N+1)."""
@@ -61,6 +67,12 @@ class LineResponse:
         both = np.stack([self.curvature, self.curvature_across], axis=2)
         covariance = 0.5 * np.einsum("fnk,fnl->nkl", both, both.conj()).real
         return size_deviation(self.mean_curvature, covariance)
+
+    def resolved(self, name: str) -> Floats:
+        """Where (bool) the standard deviation is at least `OF_LARGEST` of the largest along the line: elsewhere what
+        goes with the square of the motion may be several times as much."""
+        deviation = self.deviation(name)
+        return np.asarray(deviation >= OF_LARGEST * deviation.max())
 
     def period(self, name: str) -> Floats:
         """Mean period between up-crossings, s."""
@@ -109,5 +121,7 @@ class Response:
         return not self.notes
 
     def valid_for(self, name: str) -> bool:
-        """Whether nothing speaks against a quantity: what is said of curvature alone is no doubt of others."""
-        return not any("curvature at s" not in x or name.startswith("curvature") for x in self.notes)
+        """Whether nothing speaks against a quantity: what is said of another one alone is no doubt of it."""
+        alone = {of: [x for x in self.notes if f"{of} at s" in x] for of in ALONE}
+        others = [x for of, notes in alone.items() if not name.startswith(of) for x in notes]
+        return all(x in others for x in self.notes)

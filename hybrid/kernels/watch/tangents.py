@@ -1,0 +1,375 @@
+"""What the motion of a line answers to numbers of its scene: tangents along the steps of a run (docs/theory.md, 22).
+
+A step solves R(new, old; p) = 0.  With x' the tangent of what is known of its end (`old`, predicted), another line, of
+a scene with a little more of p, stands at new + h x'; what its equations leave over, less what those of the line leave
+over, by h, is the right-hand side of the correction of x', whose matrix is the one that Newton factored last.
+
+    symbol   meaning
+    h        part of a number by which the scene of the other line differs
+    rates    tangents of r, v, a, vd, T, w, wa, wd; of the director `spin`, by which it turns about the chord
+             beyond what carries it from the chord of the line to that of the other one
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.block_elimination_plane import solve_again_planar
+from hybrid.kernels.algebra.kept_factors import solve_again
+from hybrid.kernels.algebra.rotations import add, cross, dot, get3, spin_about, sub
+from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.laws.end_motion import ends_at, sea_at
+from hybrid.kernels.laws.water import wave_kinematics
+from hybrid.kernels.machine.compile import inner, kernel
+from hybrid.kernels.march.configuration import carry_director
+from hybrid.kernels.march.left_over import left_over_in_space
+from hybrid.kernels.march.left_over_plane import left_over_in_plane
+from hybrid.kernels.state.books import LAST_DT, LAST_RHO, NOW, OUTPUT, PARITY, RHO_BEFORE, STEP_BEFORE
+from hybrid.kernels.state.forces import ROTARY, STIFFNESS_DAMPING, WAVES
+from hybrid.kernels.state.report import ASSEMBLED
+from hybrid.kernels.step.accept import keep_past
+from hybrid.kernels.step.generalized_alpha import scheme
+from hybrid.kernels.step.sampling import sample_step
+from hybrid.kernels.watch.tangent_job import (
+    ALONE,
+    BROKEN,
+    FOLLOWED,
+    LARGEST_R,
+    LARGEST_T,
+    LEFT_R,
+    LEFT_T,
+    SECOND_R,
+    SECOND_T,
+    STEPS,
+    read_job,
+    read_other,
+)
+
+# A second correction that is less than this part of all tangents is left out, behind so many steps that have two.
+ENOUGH, JUDGED = 5e-7, 10
+# Of a step: an output so near to its end is its end.
+ON_STEP = 1e-6
+
+
+@inner
+def put_other(plane, space, line, here, rates, spin, h, there):
+    """Fill `there`, where the other line stands: `here` and h times the tangents."""
+    n = here.e.shape[0]
+    for i in range(n + 1):
+        for k in range(3):
+            there.r[i, k] = here.r[i, k] + h * rates.r[i, k]
+            there.v[i, k] = here.v[i, k] + h * rates.v[i, k]
+            there.a[i, k] = here.a[i, k] + h * rates.a[i, k]
+            there.vd[i, k] = here.vd[i, k] + h * rates.vd[i, k]
+    for c in range(n):
+        for k in range(3):
+            there.e[c, k] = here.e[c, k] + h * (rates.r[c + 1, k] - rates.r[c, k])
+        there.T[c] = here.T[c] + h * rates.T[c]
+        there.w[c] = here.w[c] + h * rates.w[c]
+        there.wa[c] = here.wa[c] + h * rates.wa[c]
+        there.wd[c] = here.wd[c] + h * rates.wd[c]
+        a = get3(here.a1, c)
+        if line.spin[c]:
+            a = carry_director(plane, space, a, get3(here.e, c), get3(there.e, c))
+            if space is not None:
+                d, _, _ = chord(get3(there.e, c))
+                a = spin_about(a, d, h * spin[c])
+        there.a1[c, 0], there.a1[c, 1], there.a1[c, 2] = a
+
+
+@inner
+def carried_apart(old, new, other_old, other_new, c):
+    """By how much the director of cell c, carried to the other line before the step and along with it, is spun against
+
+    the one that is carried along with the line and to the other one behind the step, rad.
+    """
+    a, to = get3(old.a1, c), get3(other_new.e, c)
+    one = carry_director(None, 1, a, get3(old.e, c), get3(other_old.e, c))
+    one = carry_director(None, 1, one, get3(other_old.e, c), to)
+    two = carry_director(None, 1, a, get3(old.e, c), get3(new.e, c))
+    two = carry_director(None, 1, two, get3(new.e, c), to)
+    d, _, _ = chord(to)
+    return math.atan2(dot(d, cross(two, one)), dot(two, one))
+
+
+@inner
+def predict_rates(space, line, s, was, spin_was, now, spin_now):
+    """Tangents of the end of a step as they are predicted, from those before it."""
+    dt, am, af, _, be, cv, ca = s
+    n = was.T.shape[0]
+    for i in range(n + 1):
+        for k in range(3):
+            a = was.a[i, k]
+            now.r[i, k] = was.r[i, k] + dt * was.v[i, k] + 0.5 * dt * dt * a
+            now.v[i, k] = was.v[i, k] + dt * a
+            now.vd[i, k] = (am * a - af * was.vd[i, k]) / (1.0 - af) + ca * be * dt * dt * a
+            now.a[i, k] = a
+    for c in range(n):
+        now.T[c], spin_now[c] = was.T[c], spin_was[c]
+        now.w[c], now.wa[c], now.wd[c] = 0.0, 0.0, 0.0
+        if space is not None:
+            if line.spin[c]:
+                spun = dt * was.w[c] + 0.5 * dt * dt * was.wa[c]
+                now.w[c] = was.w[c] + dt * was.wa[c]
+                now.wd[c] = (am * was.wa[c] - af * was.wd[c]) / (1.0 - af) + ca * be * dt * dt * was.wa[c]
+                if line.bits & ROTARY:
+                    spin_now[c] += spun
+                else:
+                    now.w[c] -= cv * spun
+                    now.wd[c] -= ca * spun
+
+
+@inner
+def hold_ends(ends, other, s, now):
+    """Held ends are where those of the other line are held."""
+    n = now.T.shape[0]
+    for k in range(2):
+        if ends.held[k] == 1:
+            i = 0 if k == 0 else n
+            for j in range(3):
+                more = (other.ends.position[k, j] - ends.position[k, j]) / other.h - now.r[i, j]
+                now.r[i, j] += more
+                now.v[i, j] += s.cv * more
+                now.vd[i, j] += s.ca * more
+
+
+@inner
+def correct_rates(space, x, s, now, spin_now):
+    """Add a correction x (N+1, 5) to tangents."""
+    n = now.T.shape[0]
+    for i in range(n + 1):
+        for k in range(3):
+            now.r[i, k] += x[i, k + 1]
+            now.v[i, k] += s.cv * x[i, k + 1]
+            now.vd[i, k] += s.ca * x[i, k + 1]
+    for c in range(n):
+        now.T[c] += x[c + 1, 0]
+        if space is not None:
+            spin_now[c] += x[c, 4]
+            now.w[c] += s.cv * x[c, 4]
+            now.wd[c] += s.ca * x[c, 4]
+
+
+@inner
+def find_tangent_rates(space, line, s, was, now):
+    """Tangents of algorithmic accelerations (kernels.step.step.find_rates)."""
+    dt, _, _, ga, be, _, _ = s
+    for i in range(now.r.shape[0]):
+        for k in range(3):
+            rp = was.r[i, k] + dt * was.v[i, k] + dt * dt * (0.5 - be) * was.a[i, k]
+            now.a[i, k] = (now.r[i, k] - rp) / (be * dt * dt)
+    if space is not None:
+        for c in range(now.T.shape[0]):
+            if line.spin[c]:
+                now.wa[c] = (now.w[c] - was.w[c] - dt * (1.0 - ga) * was.wa[c]) / (ga * dt)
+
+
+@inner
+def predict_other(other, s, there_old, u):
+    """What the other line takes from the prediction of its step: waves where that leads."""
+    line, sea = other.line, other.sea
+    if line.bits & WAVES:
+        for i in range(u.shape[0]):
+            for k in range(3):
+                u[i, k] = s.dt * there_old.v[i, k] + 0.5 * s.dt * s.dt * there_old.a[i, k]
+        wave_kinematics(sea, there_old.r, u)
+
+
+@inner
+def damped_more(line, other, here, there, now, longer, c):
+    """By how much more the length of cell c lags behind as it stretches, m by the number, without rounding; longer: by
+
+    how much its chord is longer.
+    """
+    if not line.bits & STIFFNESS_DAMPING or not line.ck[c] > 0.0:
+        return 0.0
+    d, l, _ = chord(get3(here.e, c))
+    faster, to = sub(get3(here.v, c + 1), get3(here.v, c)), sub(get3(there.v, c + 1), get3(there.v, c))
+    more, more_v = sub(get3(now.r, c + 1), get3(now.r, c)), sub(get3(now.v, c + 1), get3(now.v, c))
+    rate = (l * dot(d, more_v) + dot(more, to) - dot(d, faster) * longer) / (l + other.h * longer)
+    turned, _, _ = chord(get3(there.e, c))
+    return (other.line.tau[c] - line.tau[c]) / other.h * dot(turned, to) + line.tau[c] * rate
+
+
+@inner
+def length_left(line, other, here, there, now, c):
+    """What the law of length of cell c leaves over, by h: without what rounding of lengths would make of tension."""
+    if c < 0:
+        return 0.0
+    h, its = other.h, other.line
+    e, more = get3(here.e, c), sub(get3(now.r, c + 1), get3(now.r, c))
+    f = (e[0] + h * more[0], e[1] + h * more[1], e[2] + h * more[2])
+    longer = dot(add(e, f), more) / (math.sqrt(dot(e, e)) + math.sqrt(dot(f, f)))
+    stretched = its.h[c] * its.ck[c] * there.T[c] - line.h[c] * line.ck[c] * here.T[c]
+    late = damped_more(line, other, here, there, now, longer, c)
+    return (stretched + (its.h[c] - line.h[c])) / h - late - longer
+
+
+@inner
+def largest_correction(x):
+    """Of positions, m, and of tensions, N, by the number."""
+    r, T = 0.0, 0.0
+    for i in range(x.shape[0]):
+        T = max(T, abs(x[i, 0]))
+        r = max(r, max(abs(x[i, 1]), max(abs(x[i, 2]), abs(x[i, 3]))))
+    return r, T
+
+
+@inner
+def note_left(r, T, before_r, before_T, wanted, now, sizes):
+    """Keep how large tangents are, and what the last of two or three corrections leaves of them; r, T: its sizes, those
+
+    of the one before.  Tangents converge by equal parts; forces at ends are those before the last correction.
+    """
+    for i in range(now.r.shape[0]):
+        for k in range(3):
+            sizes[LARGEST_R] = max(sizes[LARGEST_R], abs(now.r[i, k]))
+    for c in range(now.T.shape[0]):
+        sizes[LARGEST_T] = max(sizes[LARGEST_T], abs(now.T[c]))
+    if not wanted and sizes[ALONE] == 0.0:  # else it is what one correction has left in the steps before
+        r *= r / before_r if before_r > r else 1.0
+        T *= T / before_T if before_T > T else 1.0
+    sizes[LEFT_R], sizes[LEFT_T] = max(sizes[LEFT_R], r), max(sizes[LEFT_T], T)
+
+
+@inner
+def is_wanted(books):
+    """Whether forces are wanted of the end of the last step."""
+    clock, outputs, k = books.clock, books.outputs, books.counts[OUTPUT]
+    if k >= outputs.shape[0]:
+        return False
+    ahead = (outputs[k] - clock[NOW]) / clock[LAST_DT]  # in steps; within one, those before it count as well
+    return ahead < (2.0 if abs(ahead - round(ahead)) > ON_STEP else 0.5)
+
+
+@inner
+def needs_two(sizes):
+    """Whether one correction of tangents is not enough."""
+    enough = sizes[SECOND_R] <= ENOUGH * sizes[LARGEST_R] and sizes[SECOND_T] <= ENOUGH * sizes[LARGEST_T]
+    return not enough or sizes[STEPS] < JUDGED
+
+
+@inner
+def correct_tangent(plane, space, job, other, s, here, there_old, there):
+    """Put the other line at the tangents of the end of a step, and correct these by what its equations leave over."""
+    line, h, now, was = other.line, other.h, other.rates, other.before
+    work, b = other.work, other.left
+    put_other(plane, space, line, here, now, other.spin, h, there)
+    for i in range(b.shape[0]):
+        for k in range(3):
+            work.u[i, k] = job.work.u[i, k] + h * (now.r[i, k] - was.r[i, k])
+    if space is not None:
+        left_over_in_space(line, other.sea, other.ends, there_old.r, there, s.cv, s.ca, work, b)
+    if plane is not None:
+        left_over_in_plane(line, other.sea, other.ends, there_old.r, there, s.cv, s.ca, work, b)
+    for i in range(b.shape[0]):
+        b[i, 0] = length_left(job.line, other, here, there, now, i - 1)
+        for k in range(1, 5):
+            b[i, k] = (b[i, k] - job.left[i, k]) / h
+    if space is not None:
+        solve_again(job.work.X, job.work.W, b, work.x)
+    if plane is not None:
+        solve_again_planar(plane, job.work.X, b, work.x)
+    for k in range(2):
+        if job.ends.held[k] == 1:  # rounding would lift an end that lies at the very edge of the bed
+            i = 0 if k == 0 else b.shape[0] - 1
+            work.x[i, 1], work.x[i, 2], work.x[i, 3] = 0.0, 0.0, 0.0
+    correct_rates(space, work.x, s, now, other.spin)
+
+
+@inner
+def solve_tangent(plane, space, job, other, s, here, there_old, there):
+    """Correct the tangents of the end of a step."""
+    sizes, wanted, r, T, before_r, before_T = other.sizes, is_wanted(other.books), 0.0, 0.0, 0.0, 0.0
+    count = (2 if needs_two(sizes) else 1) + (1 if wanted else 0)
+    for k in range(count):
+        correct_tangent(plane, space, job, other, s, here, there_old, there)
+        before_r, before_T = r, T
+        r, T = largest_correction(other.work.x)
+        if k == 1:
+            sizes[SECOND_R], sizes[SECOND_T] = max(sizes[SECOND_R], r), max(sizes[SECOND_T], T)
+    if count > 1:
+        note_left(r, T, before_r, before_T, wanted, other.rates, sizes)
+    sizes[STEPS] += 1.0
+    sizes[ALONE] = 1.0 if count == 1 else 0.0
+
+
+@inner
+def turn_over(was, now, spin_was, spin_now):
+    """What was now is before the step."""
+    for i in range(was.r.shape[0]):
+        for k in range(3):
+            was.r[i, k], was.v[i, k], was.a[i, k] = now.r[i, k], now.v[i, k], now.a[i, k]
+            was.vd[i, k] = now.vd[i, k]
+    for c in range(was.T.shape[0]):
+        was.T[c], was.w[c], was.wa[c], was.wd[c] = now.T[c], now.w[c], now.wa[c], now.wd[c]
+        spin_was[c] = spin_now[c]
+
+
+@inner
+def advance(plane, space, job, other, s, old, new, report):
+    """The other line from the beginning of the last step of the run to its end; report: of the step."""
+    there_old, there = other.even, other.odd
+    if job.counts[PARITY] == 0:  # the run is in its even state
+        there_old, there = other.odd, other.even
+    line, sea, now, h = other.line, other.sea, other.rates, other.h
+    ends_at(job.clock[NOW], other.moves, sea, other.ends, other.books.velocity)
+    sea_at(job.clock[NOW], sea)
+    predict_other(other, s, there_old, other.work.u)
+    turn_over(other.before, now, other.spin_before, other.spin)
+    predict_rates(space, line, s, other.before, other.spin_before, now, other.spin)
+    hold_ends(job.ends, other, s, now)
+    if space is not None:
+        if line.bits & (ROTARY | STIFFNESS_DAMPING):
+            put_other(plane, space, line, new, now, other.spin, h, there)
+            for c in range(old.T.shape[0]):
+                if line.spin[c]:
+                    other.spin[c] += carried_apart(old, new, there_old, there, c) / h
+    solve_tangent(plane, space, job, other, s, new, there_old, there)
+    find_tangent_rates(space, line, s, other.before, now)
+    put_other(plane, space, line, new, now, other.spin, h, there)
+    mine = other.work.report
+    for j in range(mine.shape[0]):
+        if j < ASSEMBLED:
+            mine[j] = report[j] + mine[j] - job.own.report[j]
+        else:
+            mine[j] = report[j]
+    keep_past(line, other.ends, there_old, other.books, mine)
+    sample_step(line, sea, there_old, there, other.books)
+
+
+@inner
+def follow(plane, space, job):
+    """All other lines through the last step of the run."""
+    old, new = job.even, job.odd
+    if job.counts[PARITY] == 0:
+        old, new = job.odd, job.even
+    clock, found = job.clock, job.found
+    dt = clock[LAST_DT]
+    s = scheme(clock[LAST_RHO], clock[STEP_BEFORE], clock[RHO_BEFORE], dt)
+    for i in range(old.a.shape[0]):
+        for k in range(3):
+            if old.a[i, k] != job.last[i, k]:
+                found[BROKEN] = 1
+            job.last[i, k] = new.a[i, k]
+    found[FOLLOWED] += 1
+    if space is not None:
+        left_over_in_space(job.line, job.sea, job.ends, old.r, new, s.cv, s.ca, job.own, job.left)
+    if plane is not None:
+        left_over_in_plane(job.line, job.sea, job.ends, old.r, new, s.cv, s.ca, job.own, job.left)
+    for p in range(job.tables.shape[0]):
+        advance(plane, space, job, read_other(job.tables[p]), s, old, new, job.work.report)
+    return 0
+
+
+@kernel
+def follow_in_plane(table):
+    """Tangents of a line in a plane through the last step of its run; table: of a TangentJob.  Returns 0."""
+    job = read_job(table)
+    return follow(job.line.plane, None, job)
+
+
+@kernel
+def follow_in_space(table):
+    """The same of a line in space."""
+    return follow(None, 1, read_job(table))

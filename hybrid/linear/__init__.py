@@ -1,0 +1,1 @@
+"""A network about its equilibrium, linear: its matrices, lowest vibrations, drag, and what excites it."""

@@ -1,0 +1,109 @@
+"""What a linear response leaves out of a line that swings: the rest of quadratic drag, and the stretch by swinging.
+
+Both are taken from the linear motion, at times of a stretch of sea, as loads that the linear network then answers:
+
+    on half cells   f(U + u) - mean - B u,        of cells   a length of -|de|^2/2l across,
+
+with B the linear drag of a velocity u relative to the water.  To the first order it is what quadratic drag and large
+turns change, harmonics and all; what they change in turn is left out.  docs/theory.md, 21.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from hybrid.kernels.algebra.block_elimination import SIZE
+from hybrid.kernels.state.state import Floats
+from hybrid.linear.excitation import current_at
+from hybrid.linear.loaded_line import LoadedLine
+from hybrid.linear.matrices import LinearNetwork
+
+# Parts of times (of fewer, what is found scatters with the phases by more than a quarter), times of each, how many to
+# the shortest period that counts, by a part of the power; loads beyond the last of their power are left out.
+PARTS, TIMES, TO_A_PERIOD, POWER = 4, 256, 8.2, 0.01
+# Amplitudes q of exp(-i w t) that the network answers to those of loads (q,), at w, 1/s.
+Answer = Callable[[float, Any], Any]
+
+
+def left_out(network: LinearNetwork, lines: Sequence[LoadedLine], answer: Answer) -> list[dict[str, Floats]]:
+    """Of each line, whose motion is known at all frequencies: parts by which it changes standard deviations of tension
+
+    (N,) and curvature (N+1,).
+    """
+    omegas, step = lines[0].omegas, _step(lines)
+    t = step * np.arange(PARTS * TIMES)
+    turned = np.hstack([np.cos(np.outer(t, omegas)), np.sin(np.outer(t, omegas))])  # (M, 2F)
+    window = np.hanning(TIMES + 1)[:-1]  # so that no end of a part excites what hardly anything damps
+    loads = network.place.T @ np.concatenate([_loads(x, turned) for x in lines])  # (q, M)
+    there = np.fft.rfft(loads.reshape(network.size, PARTS, TIMES) * window, axis=2) / TIMES
+    nu = 2.0 * np.pi * np.fft.rfftfreq(TIMES, step)
+    power = np.cumsum((np.abs(there[:, :, 1:]) ** 2).sum(axis=(0, 1)))
+    last = 2 + int(np.searchsorted(power, (1.0 - POWER) * power[-1])) if power[-1] > 0.0 else 1
+    numbers = np.arange(1, min(last, nu.size))
+    q = np.zeros((network.size, numbers.size, PARTS), complex)
+    for row, k in enumerate(numbers):
+        q[:, row] = answer(nu[k], there[:, :, k].conj())
+    whole = network.place @ q.reshape(network.size, numbers.size * PARTS)
+    part = PARTS * float(np.mean(window**2))
+    return [_changes(x, whole[a:b], part) for x, (a, b) in zip(lines, pairwise(network.at), strict=True)]
+
+
+def _step(lines: Sequence[LoadedLine]) -> float:
+    """s, between times that show the loads."""
+    omegas = lines[0].omegas
+    every = np.arange(omegas.size)
+    power = sum((np.abs(x.relative(every)) ** 2).sum(axis=(1, 2)) for x in lines)
+    part = np.cumsum(power) / max(float(np.sum(power)), 1e-300)
+    shortest = omegas[min(int(np.searchsorted(part, 1.0 - POWER)), omegas.size - 1)]
+    return float(2.0 * np.pi / shortest / TO_A_PERIOD)
+
+
+def _at_times(turned: Floats, amplitudes: Floats) -> Floats:
+    """(..., M) of amplitudes (F, ...)."""
+    flat = amplitudes.reshape(len(amplitudes), -1)
+    both = np.ascontiguousarray(np.vstack([flat.real, flat.imag]).T)
+    return np.asarray((both @ turned.T).reshape(*amplitudes.shape[1:], len(turned)))
+
+
+def _loads(x: LoadedLine, turned: Floats) -> Floats:
+    """(5 (N+1), M): what is left out at each time, less its mean."""
+    n, count = x.line.s.size, len(turned)
+    u = _at_times(turned, x.relative(np.arange(x.omegas.size)))  # (N+1, 3, M)
+    used = np.flatnonzero((x.cn > 0.0) | (x.ct > 0.0))
+    d = x.d[used][:, :, None]
+    speed = u[x.node[used]] + x.current[used][:, :, None]
+    along = (speed * d).sum(axis=1)[:, None]
+    speed -= d * along
+    speed *= x.cn[used][:, None, None] * np.sqrt((speed**2).sum(axis=1))[:, None]
+    speed += d * (x.ct[used][:, None, None] * np.abs(along) * along)
+    gathered = sparse.csr_array((np.ones(used.size), (x.node[used], np.arange(used.size))), shape=(n, used.size))
+    force = (gathered @ speed.reshape(used.size, 3 * count)).reshape(n, 3, count)
+    at = np.flatnonzero(x.point_drag)
+    speed = u[at] + current_at(x.line, x.sea, x.linear.r[at])[:, :, None]
+    force[at] += x.point_drag[at][:, None, None] * np.sqrt((speed**2).sum(axis=1))[:, None] * speed
+    out = np.zeros((n, SIZE, count))
+    out[:, 1:4] = force - x.blocks @ u
+    l = np.linalg.norm(x.linear.state.e, axis=1)
+    direction = (x.linear.state.e / l[:, None])[:, :, None]
+    de = np.diff(_at_times(turned, x.q[:, :, 1:4]), axis=0)
+    square = (de**2).sum(axis=1) - (de * direction).sum(axis=1) ** 2
+    out[1:, 0] = -square / (2.0 * l)[:, None]
+    out -= out.mean(axis=2)[:, :, None]
+    return np.asarray(out.reshape(n * SIZE, count))
+
+
+def _changes(x: LoadedLine, whole: Any, part: float) -> dict[str, Floats]:
+    """By the amplitudes (5 (N+1), K) of what is added, in parts whose windows have mean squares of this sum."""
+    n, count = x.line.s.size, whole.shape[1]
+    moved = np.moveaxis(whole.reshape(n, SIZE, count), 2, 0)
+    added, linear = x.response_to(moved, np.zeros((count, 2, 3)), np.zeros(count)), x.result()
+    out = {}
+    for name, parts in (("tension", ["tension"]), ("curvature", ["curvature", "curvature_across"])):
+        more, alone = (sum((np.abs(getattr(of, each)) ** 2).sum(axis=0) for each in parts) for of in (added, linear))
+        out[name] = np.sqrt(1.0 + 4.0 / part * more / np.maximum(alone, 1e-300)) - 1.0
+    return out

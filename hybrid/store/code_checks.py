@@ -1,0 +1,166 @@
+"""Use of sections by the formulas of codes: a mooring line by DNV-OS-E301, a riser by DNV-OS-F201.
+
+    symbol        meaning                                                                unit
+    T, M          effective tension, size of the bending moment                          N, N m
+    T_F, M_F      their functional part: that of the equilibrium without waves, current  N, N m
+    g_F, g_E      factors of the functional part and of the rest                         -
+    g             product of the factors of safety class and material                    -
+    T_k, M_k      plastic tension and moment of the wall                                 N, N m
+    dp, p_b, p_c  pressure inside less that outside; at bursting; at collapse            Pa
+
+E301: u = (T_F g_F + (T - T_F) g_E)/strength.
+F201, inside pressure larger: u = g ((M/M_k) sqrt(1 - (dp/p_b)^2) + (T/T_k)^2) + (dp/p_b)^2, else
+u = g^2 ((M/M_k + (T/T_k)^2)^2 + (dp/p_c)^2), T and M with their factors.  Broken: u > 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hybrid.store.envelope import GROUP, SCALE, has_envelope
+
+if TYPE_CHECKING:
+    from hybrid.store.reader import Result
+
+Floats = np.ndarray
+# The field of a result, in percent; its sections with the numbers of their codes, rows of `Row`.
+NAME, ROWS = "code_used", "code"
+NOT_PRINTED = "as public sources give it, not compared with the printed standard"
+CLAUSES = {
+    "E301": f"DNV-OS-E301 (July 2021), Ch.2 Sec.2, {NOT_PRINTED}",
+    "F201": f"DNV-OS-F201 (October 2010), Sec.5 D, combined loading, {NOT_PRINTED}",
+}
+E301, F201 = 0.0, 1.0  # kinds in a row
+# Largest of alpha_c, and between which D/t and of which value beta is.
+MOST_HARDENING, THICK, THIN, BETA = 1.2, 15.0, 60.0, 0.4
+POISSON = 0.3
+
+
+class Row(NamedTuple):
+    """The code of a section from `first` to `last` (m), as a row of the file; pressures at heights as of a pipe.
+
+    strength: N, of E301; of F201 0.  outer, wall: m.  safety: g.  ovality: of the wall; fabrication: alpha_fab.
+    """
+
+    first: float
+    last: float
+    kind: float
+    functional: float
+    environment: float
+    tension: float
+    moment: float
+    strength: float
+    safety: float
+    outer: float
+    wall: float
+    modulus: float
+    yields: float
+    breaks: float
+    ovality: float
+    fabrication: float
+    inside: float
+    inside_z: float
+    content: float
+    water: float
+    surface: float
+
+
+def use(row: Row, T: Floats, M: Floats, z: Floats) -> Floats:
+    """Part that is used under tensions (N), moments (N m) at heights z (m), of any shape."""
+    T = row.functional * row.tension + row.environment * (T - row.tension)
+    if row.kind == E301:
+        return np.asarray(T / row.strength)
+    M = np.abs(row.functional * row.moment + row.environment * (np.abs(M) - row.moment))
+    outside = row.water * np.maximum(row.surface - z, 0.0)
+    inside = np.maximum(row.inside + row.content * (row.inside_z - z), 0.0)
+    return of_riser(row, T, M, inside - outside)
+
+
+def of_riser(row: Row, T: Floats, M: Floats, dp: Floats) -> Floats:
+    """F201 under design tension (N) and moment (N m), and pressure inside less that outside (Pa); 1: all of it.
+
+    NaN where pressure inside bursts the wall."""
+    D, t, fy, fu = row.outer, row.wall, row.yields, row.breaks
+    burst = 2.0 / np.sqrt(3.0) * 2.0 * t / (D - t) * min(fy, fu / 1.15)
+    q = np.where(dp > 0.0, 2.0 / np.sqrt(3.0) * dp / burst, 0.0)
+    beta = np.clip((BETA + q) * np.clip((THIN - D / t) / (THIN - THICK), 0.0, 1.0), 0.0, None)
+    hardening = np.minimum(1.0 - beta + beta * fu / fy, MOST_HARDENING)
+    M_k, T_k = fy * hardening * (D - t) ** 2 * t, fy * hardening * np.pi * (D - t) * t
+    bent, pulled = M / M_k, (T / T_k) ** 2
+    with np.errstate(invalid="ignore"):
+        within = row.safety * (bent * np.sqrt(1.0 - (dp / burst) ** 2) + pulled) + (dp / burst) ** 2
+    pressed = row.safety**2 * ((bent + pulled) ** 2 + (dp / collapse(row)) ** 2)
+    return np.asarray(np.where(dp >= 0.0, within, pressed))
+
+
+def collapse(row: Row) -> float:
+    """Pressure, Pa: (p_c - p_el)(p_c^2 - p_p^2) = p_c p_el p_p f_0 D/t, p_c below p_el and p_p."""
+    D, t = row.outer, row.wall
+    elastic = 2.0 * row.modulus * (t / D) ** 3 / (1.0 - POISSON**2)
+    plastic = 2.0 * t / D * row.yields * row.fabrication
+    roots = np.roots([1.0, -elastic, -(plastic**2) - elastic * plastic * row.ovality * D / t, elastic * plastic**2])
+    real = roots[np.abs(roots.imag) < 1e-9 * np.abs(roots).max()].real
+    return float(real[real > 0.0].min())
+
+
+def rows_of(result: Result) -> list[Row]:
+    """Sections of a result that have a code."""
+    return [Row(*x) for x in np.asarray(result[ROWS])] if ROWS in result else []
+
+
+def clauses_of(result: Result) -> str:
+    """The codes of a result, with clause and edition."""
+    kinds = {row.kind for row in rows_of(result)}
+    return "; ".join(text for kind, text in zip((E301, F201), CLAUSES.values(), strict=True) if kind in kinds)
+
+
+def inside_of(row: Row, s: Floats) -> np.ndarray:
+    """Which places (n,) m lie in a section; of a place that comes twice the first belongs to the left one."""
+    near = 1e-9 * max(float(s[-1] - s[0]), 1.0)
+    twice = np.diff(s) == 0.0
+    first, second = np.append(twice, False), np.insert(twice, 0, False)
+    late, early = first & (np.abs(s - row.first) <= near), second & (np.abs(s - row.last) <= near)
+    return (s >= row.first - near) & (s <= row.last + near) & ~late & ~early
+
+
+def code_of_steps(result: Result) -> float | None:
+    """The part that no step and node exceeds, by the ranges of tension and moment over all of them, as if they came at
+    once, at the heights of the outputs; None: the result has not all of them."""
+    names = [f"{GROUP}/{x}" for x in ("tension_min", "tension_max", "bending_moment_max")]
+    bends = any(row.kind == F201 for row in rows_of(result))
+    if not has_envelope(result) or any(name not in result for name in names[: 3 if bends else 2]):
+        return None
+    s, low, high = np.asarray(result[SCALE]), np.asarray(result[names[0]]), np.asarray(result[names[1]])
+    M = np.asarray(result[names[2]]) if bends else np.zeros_like(high)
+    z = result.position[:, :, 2]
+    heights = [np.interp(s, result.s, x) for x in (z.min(axis=0), z.max(axis=0))]
+    return _largest(
+        result, s, lambda x, at: np.max([use(x, T[at], M[at], h[at]) for T in (low, high) for h in heights], axis=0)
+    )
+
+
+def code_with_errors(result: Result) -> float | None:
+    """The part that no output exceeds, whatever the errors of tension and moment; None: they are not known."""
+    bends = any(row.kind == F201 for row in rows_of(result))
+    wanted = ("tension", "bending_moment") if bends else ("tension",)
+    if any(name not in result or f"errors/total/{name}" not in result for name in wanted):
+        return None
+    s, T = result.both_sides("tension")
+    dT = result.both_sides("errors/total/tension")[1]
+    M, dM = (
+        result.both_sides(x)[1] if bends else np.zeros_like(T)
+        for x in ("bending_moment", "errors/total/bending_moment")
+    )
+    z = np.array([np.interp(s, result.s, x) for x in result.position[:, :, 2]])
+    return _largest(
+        result, s,
+        lambda x, at: np.max([use(x, (T + k * dT)[:, at], (M + dM)[:, at], z[:, at]) for k in (-1.0, 1.0)], axis=0),
+    )  # fmt: skip
+
+
+def _largest(result: Result, s: Floats, part: Callable[[Row, np.ndarray], Floats]) -> float | None:
+    values = [v for x in rows_of(result) if (v := part(x, inside_of(x, s))).size]
+    return None if not values or any(np.isnan(v).any() for v in values) else max(float(v.max()) for v in values)

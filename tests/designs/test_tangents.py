@@ -1,0 +1,169 @@
+"""Tangents along the steps of a run against differences of runs in the same steps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.designs.in_motion import (
+    DIFFERENCES,
+    TANGENTS,
+    Motion,
+    by_differences,
+    by_tangents,
+    in_motion,
+    parse_history,
+    size_of,
+)
+from hybrid.designs.numbers import changed_scene, number_of
+from hybrid.designs.replay import course_of
+from tests.designs.test_in_motion import heaved, on_the_bed
+
+OF = ["max tension@240", "last tension@100", "std position.z@150", "max velocity.z@200", "t=3.31 tension@120"]
+SECTION = "cable.sections[0]"
+
+
+def both(tables: dict[str, Any], of: list[str], keys: list[str]) -> tuple[np.ndarray, ...]:
+    """(P, W) derivatives by tangents and by differences, their errors in turn, and results by numbers."""
+    scene = hybrid.validate_scene(tables)
+    wanted, course = [parse_history(scene, x) for x in of], course_of(scene)
+    numbers = {key: number_of(scene, key) for key in keys}
+    asked = scene, wanted, course, numbers, {key: size_of(scene, key, x) for key, x in numbers.items()}
+    found, theirs = by_tangents(*asked), by_differences(*asked)
+    np.testing.assert_allclose(found.values, theirs.values, rtol=1e-12)
+    floor = np.abs(found.values) / np.array(list(asked[-1].values()))[:, None]
+    return found.derivatives, theirs.derivatives, found.errors, theirs.errors, floor
+
+
+def agree(tables: dict[str, Any], of: list[str], keys: list[str], part: float = 1e-5) -> None:
+    """Within both stated errors; what answers less than a thousandth, in parts by parts, is compared with that."""
+    ours, theirs, stated, errors, floor = both(tables, of, keys)
+    whole = np.maximum(np.abs(theirs), 1e-3 * floor)
+    assert (np.abs(ours - theirs) <= part * whole + 2.0 * errors + stated).all(), (ours, theirs, errors, stated)
+    assert (errors <= 1e-4 * whole).mean() > 0.7  # else differences would say nothing
+    assert (stated <= 1e-4 * np.maximum(np.abs(theirs), 0.1 * floor)).all()
+    assert (np.abs(ours - theirs) <= 1e-6 * whole + 2.0 * errors).mean() > 0.7
+
+
+def in_water(tables: dict[str, Any]) -> dict[str, Any]:
+    """In waves and a current across, so that it leaves its plane."""
+    waves = {"kind": "regular", "height": 3.0, "period": 8.0, "direction": 40.0}
+    tables["environment"]["fluid"] |= {"current": [0.2, 0.3, 0.0], "waves": waves, "surface": 1.0}
+    return tables
+
+
+def twisted() -> dict[str, Any]:
+    """A hose that is clamped and twisted, with polar inertia and damping."""
+    section = {
+        "length": 12.0, "mass": 6.0, "diameter": 0.1, "axial_stiffness": 1e6, "bending_stiffness": 40.0,
+        "torsional_stiffness": 40.0, "damping": {"stiffness": 0.01},
+    }  # fmt: skip
+    ends = {
+        "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -1], "normal": [0, 1, 0], "turns": 0.3},
+        "end": {
+            "kind": "clamped", "position": [8, 1, 1], "tangent": [1, 0, 1], "normal": [0, 1, 0],
+            "motion": {"heave": {"amplitude": 0.4, "period": 2.0}, "ramp": 1.0},
+        },
+    }  # fmt: skip
+    return {
+        "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 24},
+        "time": {"duration": 2.0, "step": 0.02}, "output": {"every": 0.07, "points": 25},
+    }  # fmt: skip
+
+
+KEYS = [f"{SECTION}.drag.normal", f"{SECTION}.mass", "environment.gravity", "ends.end.motion.heave.amplitude"]
+
+
+@pytest.mark.parametrize("model", ["catenary", "rod"])
+def test_a_touchdown_that_moves(model: str) -> None:
+    agree(on_the_bed(model), OF, KEYS)
+
+
+def test_zones_that_stay() -> None:
+    zones = {"kind": "zones", "zones": [{"catenary": 150.0, "cells": 25}, {"rod": 100.0, "cells": 20}]}
+    agree(on_the_bed() | {"model": zones, "mesh": None}, OF, KEYS)
+
+
+def test_waves_and_a_current_across() -> None:
+    agree(
+        in_water(on_the_bed("rod")), OF, [f"{SECTION}.drag.normal", f"{SECTION}.mass", "environment.fluid.waves.height"]
+    )
+
+
+def test_a_hose_that_is_twisted_and_damped() -> None:
+    """Between outputs, too, which are not at the ends of steps."""
+    of = ["std position.z@5", "last position.y@7", "last torque@6", "max curvature@6", "last tension@6"]
+    keys = [f"{SECTION}.{x}" for x in ("mass", "torsional_stiffness", "bending_stiffness")]
+    agree(twisted(), of, [*keys, "ends.start.turns", "ends.end.motion.heave.amplitude"])
+
+
+@pytest.mark.parametrize("bed", [False, True])
+def test_lengths_move_nodes_into_contact_and_past_places(bed: bool) -> None:
+    """Differences go by kinks as nodes come down, and go by places: they come nearer to the tangent, the smaller they are.
+
+    150 m is at a node, to one side of which alone a length would be seen.
+    """
+    tables = on_the_bed()
+    if not bed:
+        del tables["environment"]["seabed"]
+        tables["ends"]["start"]["position"] = [0, 0, 0]
+    scene, key = hybrid.validate_scene(tables), f"{SECTION}.length"
+    of = ["last tension@end", "last tension@150", "max tension@152", "std position.z@150", "last position.x@151"]
+    wanted, course, number = [parse_history(scene, x) for x in of], course_of(scene), number_of(scene, key)
+    ours = by_tangents(scene, wanted, course, {key: number}, {key: number}).derivatives[0]
+    off = []
+    for part in (1e-4, 1e-6):
+        more, less = (
+            Motion(changed_scene(scene, key, number * (1.0 + x)), wanted, course).values for x in (part, -part)
+        )
+        off.append(np.abs((more - less) / (2.0 * part * number) - ours) / np.abs(ours))
+    assert (off[1] < 1e-5).all()
+    assert (off[1] < np.maximum(off[0], 1e-7)).all()
+
+
+def test_what_is_not_followed_is_left_to_differences_and_said() -> None:
+    tables, key = on_the_bed(), f"{SECTION}.mass"
+    tables["environment"]["seabed"]["friction"] = 0.5
+    tables["time"]["duration"] = 1.0
+    found = in_motion(hybrid.validate_scene(tables), ["last tension@end"], [key])
+    assert found.ways == (f"{DIFFERENCES}: friction of the bed",)
+    del tables["environment"]["seabed"]["friction"]
+    asked = hybrid.validate_scene(tables)
+    assert in_motion(asked, ["last tension@end"], [key]).ways == (TANGENTS,)
+    assert hybrid.sensitivity(asked, ["last tension@end"], [key], motion=True)[0].way == TANGENTS
+
+
+def test_loads_that_change_are_noticed() -> None:
+    tables = heaved()
+    tables["ends"]["end"]["thrust"] = {"value": [0, 0, -100.0], "until": 5.0}
+    scene = hybrid.validate_scene(tables | {"time": {"duration": 6.0, "step": 0.1, "rho_inf": 0.5}})
+    assert "loads change" in in_motion(scene, ["last tension@start"], [f"{SECTION}.mass"]).ways[0]
+
+
+def test_numbers_that_are_not_followed_are_differenced_beside_those_that_are() -> None:
+    """A place that turns the plane of the line; in the order asked for."""
+    tables = on_the_bed()
+    tables["time"]["duration"] = 1.0
+    scene, of = hybrid.validate_scene(tables), ["last tension@150"]
+    keys = [f"{SECTION}.mass", "ends.end.position[1]", "environment.gravity"]
+    found = in_motion(scene, of, keys)
+    assert found.ways == (TANGENTS, f"{DIFFERENCES}: the number moves the plane of the line", TANGENTS)
+    for key, row, errors in zip(keys, found.derivatives, found.errors, strict=True):
+        alone = in_motion(scene, of, [key])
+        np.testing.assert_array_equal(row, alone.derivatives[0])
+        np.testing.assert_array_equal(errors, alone.errors[0])
+    assert abs(found.derivatives[1, 0]) < 1e-6 * abs(found.values[0])  # N per m across the line, by symmetry
+
+
+def test_outputs_of_a_section_that_are_others_are_refused() -> None:
+    """Two sections that are alike have no output where they meet, and have one as soon as a number tells them apart."""
+    tables = on_the_bed("rod")
+    (section,) = tables["cable"]["sections"]
+    lengths = 101.7, section["length"] - 101.7
+    tables["cable"]["sections"] = [section | {"length": x} for x in lengths]
+    tables["time"]["duration"] = 1.0
+    with pytest.raises(hybrid.ComputationError, match="outputs of a section are more or fewer"):
+        in_motion(hybrid.validate_scene(tables), ["max curvature@sections[1]"], [f"{SECTION}.mass"])

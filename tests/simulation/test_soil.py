@@ -1,0 +1,205 @@
+"""A bed that remembers: soil with suction, resistance to the side, friction that breaks out; at rest, in motion, energy."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import exp
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bits import differences
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+import hybrid
+from hybrid.errors import SceneError
+
+Floats = NDArray[np.float64]
+D, SU, RHO, STEEP, SUCTION = 0.2, 2000.0, 1500.0, 200.0, 0.6
+SOIL = {"shear_strength": SU, "gradient": RHO}
+
+
+def ultimate(z: float) -> float:
+    """Pu, N/m."""
+    x = z / D
+    return (6.0 * x**0.25 if x > 0.1 else 6.0 * 0.1**0.25 * (10.0 * x) ** 0.5) * (SU + RHO * z) * D
+
+
+def first(z: float) -> float:
+    return ultimate(z) * z * STEEP / (D + z * STEEP)
+
+
+def history(depths: Floats) -> Floats:
+    """Force per length, N/m, at depths that are passed through one after the other."""
+    P, way, z0, P0, out = 0.0, 0, 0.0, 0.0, []
+    for last, z in pairwise([0.0, *depths.tolist()]):
+        if z <= 0.0:
+            P, way = 0.0, 0
+        else:
+            turns = 1 if z > last else -1
+            if (way or 1) != turns and last > 0.0:
+                way, z0, P0 = turns, last, P
+            P = first(z)
+            if way:
+                x = ultimate(z0) * abs(z - z0) * STEEP / D
+                Q = ultimate(z) - P0 if way > 0 else P0 + SUCTION * ultimate(z)
+                branch = P0 + way * (Q * x / (Q + x) if Q > 0.0 else Q)
+                P, way = (branch, way) if branch < P else (P, 0)
+        out.append(P)
+    return np.array(out)
+
+
+def pressed(bed: dict[str, Any], over: float, step: float, motion: dict[str, Any], **more: Any) -> dict[str, Any]:
+    """A stiff rod of a metre, level, both ends of which follow one motion from 2 cm above the bed."""
+    ends = {
+        name: {"kind": "pinned", "position": [x, 0, 0.02], "motion": {"ramp": 1.0} | motion}
+        for name, x in (("start", 0.0), ("end", 1.0))
+    }
+    return {
+        "environment": {"gravity": 0, "seabed": {"z": 0} | bed},
+        "cable": {"sections": [{"length": 1.0, "mass": 20.0, "diameter": D, "axial_stiffness": 1e8,
+                                "bending_stiffness": 1e6, "damping": 2.0}]},
+        "ends": ends, "initial": {"kind": "straight", "origin": [0, 0, 0.02], "direction": [1, 0, 0]},
+        "model": "rod", "contact": {"self": False}, "mesh": {"cells": 6},
+        "time": {"duration": over, "step": step}, "output": {"every": step, "points": 7, "exact": True},
+    } | more  # fmt: skip
+
+
+HEAVE = [{"amplitude": 0.06, "period": 8.0, "phase": -90.0}, {"amplitude": 0.004, "period": 1.7}]
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_penetration_suction_and_repenetration_follow_the_backbone(dimension: int) -> None:
+    """In, up through suction until it breaks away, in again, with small loops on the way; energy per cycle."""
+    found = hybrid.run(pressed({"soil": SOIL}, 20.0, 0.02, {"heave": HEAVE}, dimension=dimension))
+    z = -found.position[:, :, 2]
+    force, expected = found["contact_force"], np.array([history(x) for x in z.T])
+    contact = found["contact"]
+    off = np.abs(contact.T - expected).max() / 1700.0
+    print(f"pressure off by {off:.1e}, from {contact.min():.1f} to {contact.max():.1f} N/m")
+    assert contact.min() < -500.0 and contact.max() > 1500.0 and off < 1e-9
+    np.testing.assert_allclose(force, np.trapezoid(contact, found.s, axis=1), rtol=1e-6, atol=1e-3)
+    work = np.sum(0.5 * (expected[:, 1:] + expected[:, :-1]) * np.diff(z.T, axis=1), axis=1)
+    taken = float(np.trapezoid(work, found.s))
+    print(f"{-found['work/contact'][-1]:.3f} J booked, {taken:.3f} by force and way")
+    assert float(found["work/contact"][-1]) == pytest.approx(-taken, rel=1e-6)
+    assert abs(float(found["work/scheme"][-1])) < 1e-3 * taken
+
+
+def test_a_rest_in_soil_bears_its_weight_at_the_depth_of_first_penetration() -> None:
+    """A line from above onto the bed, as a rod, a catenary and one of several lines, with the depth in closed form."""
+    section = {"length": 30.0, "mass": 100.0, "diameter": D, "axial_stiffness": 1e8, "bending_stiffness": 1e3}
+    bed = {"gravity": 9.81, "seabed": {"z": 0, "soil": SOIL, "friction": 0.3}}
+    low, high = {"kind": "pinned", "position": [0, 0, 0]}, {"kind": "pinned", "position": [24.0, 0, 8.0]}
+    depth, weight = float(brentq(lambda z: first(z) - 981.0, 1e-6, 1.0)), 981.0
+    for model in ("rod", "catenary"):
+        alone = {"environment": bed, "cable": {"sections": [section]}, "ends": {"start": low, "end": high},
+                 "initial": "equilibrium", "model": model, "mesh": {"cells": 120}}  # fmt: skip
+        found = hybrid.static(alone)
+        k = int(np.argmin(np.abs(found.s - 5.0)))
+        assert found.contact[0, k] == pytest.approx(weight, rel=1e-3)
+        assert -found.position[0, k, 2] == pytest.approx(depth, rel=5e-3)
+    several = {
+        "environment": bed, "points": {"a": {"position": low["position"]}, "b": {"position": high["position"]}},
+        "lines": {"one": {"start": "a", "end": "b", "model": "catenary", "mesh": {"cells": 120}, "sections": [section]}},
+    }  # fmt: skip
+    same = hybrid.static(several).lines["one"]
+    np.testing.assert_allclose(same.position, found.position, atol=1e-6)
+    np.testing.assert_allclose(same.contact, found.contact, rtol=1e-5, atol=1e-2)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_friction_breaks_out_and_falls_to_what_is_left(dimension: int) -> None:
+    """A line that is drawn along a bed: mu N (r + (1 - r) exp(-w/l)), w the way behind the elastic travel."""
+    mu, left, over, travel = 0.5, 0.2, 0.05, 0.002
+    friction = {"axial": mu, "lateral": mu, "residual": [left, left], "breakout": over, "travel": travel}
+    tables = {
+        "environment": {"seabed": {"z": 0, "stiffness": 1e5, "friction": friction}},
+        "cable": {"sections": [{"length": 4.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e8,
+                                "damping": 0.5}]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0], "motion": {"travel": {"by": [-0.4, 0, 0], "over": 40.0}}},
+                 "end": "free"},
+        "initial": {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]}, "model": "catenary",
+        "contact": {"self": False}, "mesh": {"cells": 20}, "dimension": dimension,
+        "time": {"duration": 40.0, "step": 0.02}, "output": {"every": 0.02, "points": 21, "exact": True},
+    }  # fmt: skip
+    found = hybrid.run(tables)
+    way = -found.position[:, 10, 0] + found.position[0, 10, 0]
+    drawn = -found["reaction_start"][:, 0]
+    slid = np.maximum(way - travel, 0.0)
+    share = left / mu + (1.0 - left / mu) * np.exp(-np.concatenate([[0.0], slid[:-1]]) / over)
+    total = float(np.trapezoid(found.contact[-1], found.s))
+    k = int(np.argmax(drawn))
+    print(f"break-out {drawn[k]:.2f} N at {way[k] * 1e3:.2f} mm, {drawn[-1]:.2f} N behind {way[-1]:.3f} m")
+    sliding = (way > 2 * travel) & (found.t < 39.0)
+    np.testing.assert_allclose(drawn[sliding], total * mu * share[sliding], rtol=2e-2)
+    assert drawn[k] == pytest.approx(mu * total, rel=3e-2) and way[k] == pytest.approx(travel, rel=0.3)
+
+
+def test_soil_beside_a_line_resists_and_breaks_out() -> None:
+    """A rod that is pressed in and then moved to the side: friction on its force, and API's clay on its depth."""
+    travel, over, left = 0.004, 0.05, 0.4
+    friction = {"axial": 0.0, "lateral": 0.5, "residual": [0.0, 0.5 * left], "breakout": over, "travel": travel}
+    bed = {"soil": SOIL | {"lateral": {"unit_weight": 5000.0}}, "friction": friction}
+    down = {"amplitude": 0.07, "period": 1e6, "phase": -90.0}
+    found = hybrid.run(pressed(bed, 12.0, 0.01, {"heave": down, "sway": {"amplitude": 0.2, "period": 24.0}}))
+    y, z = found.position[:, 3, 1], -found.position[:, 3, 2]
+    force = -(found["reaction_start"][:, 1] + found["reaction_end"][:, 1])
+    su = SU + RHO * z
+    pu = np.minimum(3.0 * su + 5000.0 * z + 0.5 * su * z / D, 9.0 * su) * np.clip(z, 0.0, D)
+    N, q, w, expected = found["contact_force"], 0.0, 0.0, []
+    for k in range(y.size):
+        held = (0.5 * max(N[k], 0.0) + pu[k]) * (left + (1.0 - left) * exp(-w / over))
+        moved = q + (y[k] - y[k - 1] if k else 0.0)
+        q = min(max(moved, -travel), travel)
+        if z[k] <= 0.0:
+            q = w = 0.0
+        w += abs(moved - q) if z[k] > 0.0 else 0.0
+        expected.append(held * q / travel)
+    late = found.t > 1.5
+    scale = float(np.abs(expected).max())
+    print(f"{np.abs(force + expected)[late].max() / scale:.1e} of {scale:.0f} N; behind it {force[-300:].min():.0f} N")
+    np.testing.assert_allclose(force[late], -np.array(expected)[late], atol=1e-2 * scale)
+
+
+def test_a_run_goes_on_bit_for_bit(tmp_path: Path) -> None:
+    friction = {"axial": 0.4, "lateral": 0.5, "residual": [0.2, 0.3], "breakout": 0.05}
+    bed = {"soil": SOIL, "friction": friction}
+    motion = {"heave": HEAVE, "surge": {"amplitude": 0.1, "period": 3.0}}
+    hybrid.run(pressed(bed, 8.0, 0.02, motion), tmp_path / "whole.h5")
+    hybrid.run(pressed(bed, 5.0, 0.02, motion), tmp_path / "part.h5")
+    hybrid.resume(tmp_path / "part.h5", until=8.0)
+    assert differences(tmp_path / "whole.h5", tmp_path / "part.h5") == []
+
+
+def test_a_line_of_several_is_the_same_in_soil() -> None:
+    alone = pressed({"soil": SOIL}, 6.0, 0.02, {"heave": HEAVE}, dimension=3)
+    points = {name: {k: x for k, x in end.items() if k != "kind"} for name, end in alone["ends"].items()}
+    line = {"start": "start", "end": "end", "model": "rod", "mesh": alone["mesh"], "initial": alone["initial"],
+            "sections": alone["cable"]["sections"], "contact": {"self": False}}  # fmt: skip
+    system = {"environment": alone["environment"], "points": points, "lines": {"one": line},
+              "time": alone["time"], "output": alone["output"]}  # fmt: skip
+    one, other = hybrid.run(alone), hybrid.run(system).lines["one"]
+    np.testing.assert_allclose(other.contact, one.contact, atol=1e-6 * 1700.0)
+    assert float(other["work/contact"][-1]) == pytest.approx(float(one["work/contact"][-1]), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"cable": {"sections": [{"length": 1.0, "mass": 20.0, "bending_stiffness": 1.0}]}}, "with its width"),
+        ({"environment": {"seabed": {"z": 0, "soil": SOIL, "stiffness": 1e4}}}, "soil says how the bed resists"),
+        ({"environment": {"seabed": {"z": 0, "soil": SOIL | {"lateral": {}}}}}, "over which lateral resistance grows"),
+        ({"environment": {"seabed": {"z": 0}}}, "in N/m per m"),
+    ],
+)
+def test_what_is_refused(change: dict[str, Any], said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        hybrid.validate_scene(pressed({"soil": SOIL}, 1.0, 0.1, {"heave": HEAVE}) | change)
+
+
+def test_modes_in_soil_are_refused() -> None:
+    with pytest.raises(SceneError, match="which way"):
+        hybrid.modes(pressed({"soil": SOIL}, 1.0, 0.1, {"heave": HEAVE}))

@@ -1,0 +1,69 @@
+"""Friction that has settled in a current: what lies on the bed stays where it was laid in still water."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+
+Tables = dict[str, Any]
+CHAIN = {
+    "length": 90.0, "mass": 40.0, "diameter": 0.08, "axial_stiffness": 1.7e8, "drag": {"normal": 1.33, "tangential": 0.2},
+    "added_mass": {"normal": 1.0}, "damping": {"mass": 0.3},
+}  # fmt: skip
+ANCHOR, TOP, MU = [75.0, 0.0, -35.0], [0.0, 0.0, -13.0], 0.5
+WEIGHT = (40.0 - 1025.0 * np.pi * 0.04**2) * 9.80665  # N/m in water
+DRAG = 0.5 * 1025.0 * 1.33 * 0.08 * 0.8**2  # N/m on what lies across the current
+
+
+def sea(ramp: float = 0.0) -> Tables:
+    current = {"velocity": [0, 0.8, 0], "ramp": ramp} if ramp else [0, 0.8, 0]
+    bed = {"z": -35, "stiffness": 5e3, "damping": 5e2, "friction": MU}
+    return {"fluid": {"density": 1025, "current": current}, "seabed": bed}
+
+
+def chain(friction: str = "settled", **more: Any) -> Tables:
+    """A chain along x, most of it on the bed, in a current along y."""
+    return {
+        "environment": sea(), "cable": {"sections": [CHAIN]}, "model": "catenary", "mesh": {"cells": 90},
+        "ends": {"start": {"kind": "pinned", "position": ANCHOR}, "end": {"kind": "pinned", "position": TOP}},
+        "initial": {"kind": "equilibrium", "friction": friction}, "output": {"points": 91},
+    } | more  # fmt: skip
+
+
+def test_a_chain_across_a_current_lies_where_it_was_laid() -> None:
+    """As where the current comes up in time; without friction it is swept ten times as far."""
+    settled, swept = hybrid.static(chain()), hybrid.static(chain("neglected"))
+    grown = hybrid.run(
+        chain("neglected", environment=sea(ramp=60.0), time={"duration": 200.0, "step": 0.25}, output={"every": 50, "points": 91})
+    )  # fmt: skip
+    lies = settled.position[0, :, 2] < -34.99
+    assert DRAG < 0.3 * MU * WEIGHT  # friction holds what lies
+    bow, like, free = (np.abs(x.position[-1, :, 1]).max() for x in (settled, grown, swept))
+    assert free > 8.0 * bow
+    assert bow == pytest.approx(like, rel=0.08)
+    assert np.abs(settled.position[0, lies, 1]).max() < 0.4 * bow
+    assert float(settled.tension[0, -1]) == pytest.approx(float(grown.tension[-1, -1]), rel=0.01)
+    assert "against friction from where it lay without tension in still water" in settled.attributes["static_path"]
+
+
+def test_lines_of_a_system_are_laid_in_still_water_too() -> None:
+    """A point in the place of the upper end, which other lines hold, changes nothing of it."""
+    keys = ("model", "mesh", "initial")
+    line = {"sections": [CHAIN], "start": "anchor", "end": "top", **{k: chain()[k] for k in keys}}
+    points = {"anchor": {"position": ANCHOR}, "top": {"position": TOP}}
+    system = {"environment": sea(), "points": points, "lines": {"chain": line}, "output": {"points": 91}}
+    one, alone = hybrid.static(system).lines["chain"], hybrid.static(chain())
+    np.testing.assert_allclose(one.position, alone.position, atol=1e-6)
+    np.testing.assert_allclose(one.tension, alone.tension, rtol=1e-6, atol=1e-3)
+
+
+def test_still_water_changes_nothing_where_no_current_acts() -> None:
+    calm = sea()
+    del calm["fluid"]["current"]
+    one = hybrid.static(chain(environment=calm))
+    assert "still water" not in one.attributes["static_path"]
+    assert np.abs(one.position[0, :, 1]).max() < 1e-9

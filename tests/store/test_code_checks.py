@@ -1,0 +1,135 @@
+"""Codes of sections: the formulas against numbers worked out otherwise, every result, verdicts, the report, a study."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+import hybrid
+from hybrid.cli.commands import app
+from hybrid.errors import SceneError
+from hybrid.store.code_checks import F201, Row, code_of_steps, collapse, of_riser, use
+
+PIPE = {"outer": 0.2731, "wall": 0.0159, "modulus": 207e9, "yields": 430.08e6, "breaks": 509.76e6}
+RISER = Row(
+    first=0.0, last=1.0, kind=F201, functional=1.1, environment=1.3, tension=0.0, moment=0.0, strength=0.0,
+    safety=1.14 * 1.15, ovality=0.005, fabrication=0.85, inside=0.0, inside_z=0.0, content=0.0, water=0.0, surface=0.0,
+    **PIPE,
+)  # fmt: skip
+
+
+def test_a_riser_by_published_numbers():
+    """D 0.2731 m, t 0.0159 m, 10 MPa inside, 150 kN m, 1200 kN, normal safety class: 0.46591, as another program has it."""
+    assert float(of_riser(RISER, np.array(1.2e6), np.array(150e3), np.array(10e6))) == pytest.approx(0.46591, abs=1e-5)
+
+
+def test_a_riser_written_out():
+    """By hand, with pressure on either side; with the factors of loads; continuous where pressures are equal."""
+    D, t, fy, fu = 0.2731, 0.0159, 430.08e6, 509.76e6
+    beta = 0.4 * (60 - D / t) / 45
+    alpha = 1 - beta + beta * fu / fy
+    M_k, T_k = fy * alpha * (D - t) ** 2 * t, fy * alpha * math.pi * (D - t) * t
+    outside = (1.14 * 1.15) ** 2 * ((1e5 / M_k + (8e5 / T_k) ** 2) ** 2 + (8e6 / collapse(RISER)) ** 2)
+    assert float(of_riser(RISER, np.array(8e5), np.array(1e5), np.array(-8e6))) == pytest.approx(outside, rel=1e-12)
+    p = collapse(RISER)
+    elastic, plastic = 2 * 207e9 * (t / D) ** 3 / (1 - 0.09), 2 * t / D * fy * 0.85
+    assert 0.0 < p < min(elastic, plastic)
+    assert (p - elastic) * (p**2 - plastic**2) == pytest.approx(p * elastic * plastic * 0.005 * D / t, rel=1e-9)
+    assert collapse(RISER._replace(ovality=1e-12)) == pytest.approx(min(elastic, plastic), rel=1e-3)
+    row = RISER._replace(tension=5e5, moment=2e4)
+    assert float(use(row, np.array(8e5), np.array(-1e5), np.array(0.0))) == pytest.approx(
+        float(of_riser(RISER, np.array(1.1 * 5e5 + 1.3 * 3e5), np.array(1.1 * 2e4 + 1.3 * 8e4), np.array(0.0)))
+    )
+    assert np.isnan(of_riser(RISER, np.array(0.0), np.array(0.0), np.array(9e7)))  # it bursts
+
+
+LINE = {"mass": 110.0, "diameter": 0.2731, "axial_stiffness": 2e9, "bending_stiffness": 2e7, "damping": 0.5}
+WALL = {"pipe": {"wall": 0.0159, "pressure": 5e6, "content_density": 800}}
+CODE = {"kind": "F201", "yield_strength": 430.08e6, "tensile_strength": 509.76e6}
+MOORED = {"kind": "E301", "strength": 3e6, "pretension_factor": 1.2, "environment_factor": 1.5, "pretension": 5e4}
+
+
+def hung(**more):
+    """A pipe that is led to and fro, and a mooring line beyond it."""
+    sections = [LINE | WALL | {"length": 60.0, "code": CODE}, LINE | {"length": 40.0, "code": MOORED}]
+    return {
+        "environment": {"fluid": {"density": 1025, "surface": 0.0}},
+        "cable": {"sections": sections},
+        "ends": {
+            "start": {"kind": "clamped", "position": [0, 0, -5], "tangent": [1, 0, -0.3]},
+            "end": {
+                "kind": "pinned", "position": [99, 0, -10],
+                "motion": {"surge": {"amplitude": 0.2, "period": 8.0}, "ramp": 8},
+            },
+        },
+        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 50}, "contact": {"self": False},
+        "time": {"duration": 16.0, "step": 0.1}, "output": {"every": 0.5},
+    } | more  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def moved(tmp_path_factory):
+    path = tmp_path_factory.mktemp("codes") / "run.h5"
+    hybrid.run(hung(output={"every": 0.5, "errors": True}), path).close()
+    return path
+
+
+def test_every_output_has_what_codes_let_it_use(moved):
+    with hybrid.open(moved) as result:
+        s, used = result.both_sides("code_used")
+        T, M = result.both_sides("tension")[1], result.both_sides("bending_moment")[1]
+        z = np.array([np.interp(s, result.s, x) for x in result.position[:, :, 2]])
+        k = int(np.flatnonzero(s == 60.0)[-1])  # after where they meet
+        mooring = (1.2 * 5e4 + 1.5 * (T[:, k:] - 5e4)) / 3e6
+        np.testing.assert_allclose(used[:, k:], 100.0 * mooring, rtol=1e-6)
+        dp = np.maximum(5e6 - 800 * 9.81 * z, 0.0) + 1025 * 9.81 * np.minimum(z, 0.0)
+        riser = of_riser(RISER, 1.3 * T, 1.3 * M, dp)
+        np.testing.assert_allclose(used[:, :k], 100.0 * riser[:, :k], rtol=1e-4)
+        most = float(used.max())
+        held = next(x for x in result.verdicts().quantities if x.limit == "code")
+        assert held.value == pytest.approx(most) and held.verdict == "within"
+        assert 100.0 * code_of_steps(result) >= most
+        for name in ("E301 (July 2021)", "F201 (October 2010)"):
+            assert name in result.label("code_used")["description"]
+
+
+def test_codes_are_shown(moved, tmp_path):
+    """In `hybrid stats`, in the report with pictures along s and over time, and kept by a study."""
+    out = CliRunner().invoke(app, ["stats", str(moved)])
+    assert out.exit_code == 0 and "code_used" in out.output and "DNV-OS-F201" in out.output.replace("\n", " ")
+    with hybrid.open(moved) as result:
+        page = hybrid.report(result, tmp_path / "page.html").read_text()
+    assert 'id="plot-range-code_used"' in page and 'id="plot-code_used"' in page
+    assert "DNV-OS-E301 (July 2021)" in page and "DNV-OS-F201 (October 2010)" in page
+    (tmp_path / "scene.yaml").write_text(yaml.safe_dump(hung()))
+    study = {
+        "scene": "scene.yaml", "vary": {"push": {"key": "ends.end.motion.surge.amplitude", "values": [0.1, 0.2]}},
+        "collect": {"use": {"quantity": "code_used", "take": ["max"]}},
+    }  # fmt: skip
+    (tmp_path / "study.yaml").write_text(yaml.safe_dump(study))
+    found = hybrid.study(tmp_path / "study.yaml", workers=1)
+    (name,) = (x for x in found.data_vars if str(x).startswith("use"))
+    values = np.asarray(found[name], float)
+    assert 0.0 < values[0] < values[1]
+
+
+def test_a_code_that_is_exceeded_is_broken():
+    tables = hung()
+    tables["cable"]["sections"][1]["code"] = MOORED | {"strength": 1e3, "pretension": 0.0}
+    rest = hybrid.static({k: x for k, x in tables.items() if k not in ("time", "output")})
+    held = next(x for x in rest.verdicts().quantities if x.limit == "code")
+    assert held.broken and held.s >= 60.0
+
+
+def test_refusals():
+    tables = hung()
+    tables["cable"]["sections"][1]["code"] = CODE
+    with pytest.raises(SceneError, match="the wall that DNV-OS-F201 checks"):
+        hybrid.validate_scene(tables)
+    tables["cable"]["sections"][1]["code"] = {x: y for x, y in MOORED.items() if x != "environment_factor"}
+    with pytest.raises(SceneError, match="environment_factor"):
+        hybrid.validate_scene(tables)

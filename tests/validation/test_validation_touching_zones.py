@@ -1,0 +1,205 @@
+"""Zones that move beside what moves and is touched: other lines, bodies, obstacles that move; the answer of rods."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+import hybrid.simulation.system_run
+from tests.combinations.pairs import scene_of
+from tests.simulation.bits import FEW_STEPS, Stopping, differences
+from tests.validation.test_validation_body_contact import RADIUS, STRAND, on_two_lines, pushed
+from tests.validation.test_validation_lines_contact import RADIUS as ROPE
+from tests.validation.test_validation_lines_contact import crossing, force_between, lowered
+from tests.validation.test_validation_obstacle_zones import MOVING as FINE_MOVING
+from tests.validation.test_validation_obstacle_zones import apart, fixed
+from tests.validation.test_validation_obstacles_accuracy import MOVES, PIPE, as_system
+
+Tables = dict[str, Any]
+TOLERANCE = 2e-3  # of the length of a line
+MOVING = {"kind": "adaptive", "always_move": True, "tolerance": TOLERANCE}
+
+
+def with_zones(system: Tables, **model: Any) -> Tables:
+    """A scene of several lines with zones that move in each."""
+    tables = deepcopy(system)
+    for line in tables["lines"].values():
+        line["model"] = MOVING | model
+    return tables
+
+
+def kinds(line: Any) -> set[str]:
+    """Kinds of all zones at all outputs."""
+    return {zone.kind for row in line.zones for zone in row}
+
+
+def are_rod(line: Any, row: int, places: np.ndarray) -> bool:
+    """Whether a line is rod at all of these arc lengths at an output."""
+    zones = [z for z in line.zones[row] if z.kind == "rod"]
+    return all(any(z.s_a <= s <= z.s_b for z in zones) for s in places)
+
+
+# --- lines that touch each other -----------------------------------------------------------------------
+
+
+def limp(system: Tables) -> Tables:
+    """The ropes with a twentieth of their bending stiffness, which bends a few cells beside their crossing alone."""
+    tables = deepcopy(system)
+    for line in tables["lines"].values():
+        (section,) = line["sections"]
+        line["sections"] = [section | {"bending_stiffness": section["bending_stiffness"] / 20}]
+    return tables
+
+
+def test_crossing_ropes_at_rest_are_rods_where_they_cross() -> None:
+    rods, zones = hybrid.static(limp(crossing(0.1))), hybrid.static(with_zones(limp(crossing(0.1))))
+    off, on = force_between(zones, 0)
+    assert off == pytest.approx(on, rel=1e-6)
+    assert on == pytest.approx(force_between(rods, 0)[1], rel=0.01)
+    for name, line in zones.lines.items():
+        assert kinds(line) == {"rod", "catenary"} and are_rod(line, 0, line.s[39:42])
+        assert apart(line, rods.lines[name]) < TOLERANCE
+
+
+@pytest.fixture(scope="module")
+def down() -> Tables:
+    """The upper rope comes down onto the lower one; their zones move."""
+    return with_zones(limp(lowered()))
+
+
+@pytest.fixture(scope="module")
+def whole(down: Tables, tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
+    path = tmp_path_factory.mktemp("touching") / "whole.h5"
+    hybrid.run(down, path, progress=False).close()
+    return hybrid.open(path)
+
+
+def test_a_rope_that_comes_down_is_rod_before_it_touches_and_moves_as_rods_do() -> None:
+    """Without friction: with it a rod that nothing holds about its axis rolls, and beside catenaries it slides."""
+    smooth = limp(lowered()) | {"contact": {}}
+    rods, zones = hybrid.run(smooth), hybrid.run(with_zones(smooth))
+    first = next(e.t for e in zones.events if e.kind == "lines touch")
+    assert first == pytest.approx(next(e.t for e in rods.events if e.kind == "lines touch"), abs=0.011)
+    upper, lower = zones.lines["upper"].position, zones.lines["lower"].position
+    gap = np.linalg.norm(upper[:, :, None] - lower[:, None], axis=3)
+    for name, axis in (("upper", 2), ("lower", 1)):
+        line, like = zones.lines[name], rods.lines[name]
+        assert kinds(line) == {"rod", "catenary"}
+        assert 1e-7 < apart(line, like) < TOLERANCE
+        for row, near in enumerate((gap < 2.2 * ROPE).any(axis=axis)):
+            assert are_rod(line, row, line.s[near])
+    force, like_force = (np.array([force_between(x, k) for k in range(len(x.times))]) for x in (zones, rods))
+    late = zones.times > first + 0.3
+    assert np.abs(force - like_force)[late].max() < 0.03 * np.abs(like_force[late]).max()
+
+
+def test_what_lines_do_to_each_other_is_booked_through_changes_of_zones(whole: hybrid.Result) -> None:
+    """As of rods, 2e-3 of what the pins do is left; what changes of zones put in is booked and small."""
+    upper, lower = whole.lines["upper"], whole.lines["lower"]
+    put_in = np.abs(upper["work/start"]).max() + np.ptp(upper["energy/potential"])
+    assert max(np.abs(x["work/scheme"]).max() for x in (upper, lower)) < 2e-3 * put_in
+    assert 0.0 < max(np.abs(x["work/zones"]).max() for x in (upper, lower)) < 0.01 * put_in
+
+
+@pytest.mark.slow
+def test_a_stopped_run_goes_on_bit_for_bit(
+    down: Tables, whole: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    stopping, path = Stopping(monkeypatch), tmp_path / "run.h5"
+    for k, stop in enumerate([95, 30, -1]):  # beside each other, in contact
+        stopping.left = stop
+        try:
+            (hybrid.resume(path, progress=stopping) if k else hybrid.run(down, path, progress=stopping)).close()
+        except KeyboardInterrupt:
+            continue
+        break
+    assert k == 2 and whole.file is not None and differences(whole.file, path) == []
+
+
+# --- bodies --------------------------------------------------------------------------------------------
+
+
+def test_a_ball_rests_on_two_lines_that_are_rods_below_it_alone() -> None:
+    rods, zones = hybrid.static(on_two_lines()), hybrid.static(with_zones(on_two_lines()))
+    for side in ("left", "right"):
+        line = zones.lines[side]
+        assert kinds(line) == {"rod", "catenary"} and are_rod(line, 0, line.s[19:22])
+        assert apart(line, rods.lines[side]) < 2 * STRAND * 0.05
+    np.testing.assert_allclose(zones["bodies/ball/position"], rods["bodies/ball/position"], atol=1e-3)
+
+
+def test_a_ball_that_falls_on_lines_finds_them_rod_and_moves_with_them_as_with_rods() -> None:
+    rods, zones = hybrid.run(pushed()), hybrid.run(with_zones(pushed(), hold_time=0.02))
+    ball, like = (np.array(x["bodies/ball/position"]) for x in (zones, rods))
+    assert like[:, 2].min() < RADIUS + STRAND - 0.02  # it has struck, and the lines give way
+    assert np.abs(ball - like).max() < 9.9 * TOLERANCE
+    for line in zones.lines.values():
+        assert {z.kind for z in line.zones[-1]} == {"rod", "catenary"}
+
+
+# --- obstacles that move -------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def heaving() -> Any:
+    return hybrid.run(fixed(MOVES, FINE_MOVING))
+
+
+def test_a_line_on_a_pipe_that_moves_is_rod_there(heaving: Any) -> None:
+    """Catenaries everywhere are further off; friction is carried through changes of zones."""
+    rods, catenary = (hybrid.run(fixed(MOVES, x)) for x in ("rod", "catenary"))
+    s, r = np.array(heaving.s), np.array(heaving.position)
+    axis, motion = np.array(PIPE["axis"]) / np.linalg.norm(PIPE["axis"]), np.array(heaving["obstacles/pipe/position"])
+    w = r - motion[:, None]
+    gap = np.linalg.norm(w - (w @ axis)[..., None] * axis, axis=2) - PIPE["radius"] - 0.025
+    assert np.ptp(motion[:, 2]) > 0.2
+    for row, here in enumerate(gap):
+        assert are_rod(heaving, row, s[here < 0.02 * 0.05])
+    assert kinds(heaving) == {"rod", "catenary"} and (gap < 0.0).any()
+    assert apart(heaving, rods) < 12.0 * 1e-3 < apart(catenary, rods)
+    grips = np.abs(np.array(heaving["obstacles/pipe/force"]) - np.array(rods["obstacles/pipe/force"]))
+    assert grips.max() < 0.02 * np.abs(rods["obstacles/pipe/force"]).max()
+
+
+def test_as_a_system_of_one_line(heaving: Any) -> None:
+    system = hybrid.run(as_system(fixed(MOVES, FINE_MOVING))).lines["one"]
+    assert apart(system, heaving) < 1e-4
+
+
+def test_cells_that_follow_the_curvature_show_a_pipe_that_moves() -> None:
+    tables = fixed(MOVES, {"kind": "adaptive", "curvature_error": 0.05})
+    del tables["mesh"]
+    follows, rods = hybrid.run(tables), hybrid.run(fixed(MOVES, "rod") | {"mesh": {"cells": 384}})
+    kappa = np.array(rods["curvature"])
+    error = np.abs(np.array(follows["curvature"]) - kappa).max() / kappa.max()
+    assert 1e-3 < error < 0.05
+
+
+# Zones beside rods of their mesh; cells that follow, which are asked for a tenth of the curvature, beside fine rods.
+@pytest.mark.parametrize(
+    ("model", "cells", "part"),
+    [("zones that move", 48, 0.02), ("cells that follow", 192, 0.06)],
+    ids=["zones", "follow"],
+)
+@pytest.mark.parametrize("obstacle", ["obstacle that moves", "sheave"])
+def test_a_line_that_is_paid_out_over_what_moves_in_zones(obstacle: str, model: str, cells: int, part: float) -> None:
+    """Three features at once: catenaries on both sides of the pipe, and what it bears, as of rods everywhere."""
+    tables = scene_of("payout", model, obstacle)
+    tables["model"] = {**tables["model"], "always_move": True}
+    tables["model"].pop("force_rod", None)
+    tables["cable"]["sections"][0] |= {"bending_stiffness": 0.2, "torsional_stiffness": 0.2}
+    tables |= {"time": {"duration": 1.5, "step": 0.02}, "mesh": {"cells": 48}}
+    zones, rods = hybrid.run(tables), hybrid.run(tables | {"model": "rod", "mesh": {"cells": cells}})
+    rods_at = [(z.s_a, z.s_b) for z in zones.zones[-1] if z.kind == "rod"]
+    assert any(a > 1.0 and b < 8.0 for a, b in rods_at) and {z.kind for z in zones.zones[-1]} == {"rod", "catenary"}
+    force, like = (np.array(x["obstacles/pipe/force"]) for x in (zones, rods))
+    assert np.abs(like).max() > 20.0
+    assert np.abs(force - like).max() < part * np.abs(like).max()
+    assert np.nanmax(np.linalg.norm(zones.position - rods.position, axis=2)) < 12.0 * 1e-3
