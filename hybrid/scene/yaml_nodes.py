@@ -25,8 +25,15 @@ DEEPEST = 100
 _TAG = "tag:yaml.org,2002:"
 
 
+_DEEPER_THAN_LIBYAML = "exceeded maximum nesting depth"  # as its error says
+
+
 class TooDeep(Exception):
-    """Tables or lists within more than DEEPEST others, on which ruamel.yaml would spend seconds."""
+    """Tables or lists within more than DEEPEST others, on which ruamel.yaml would spend seconds; `place` is theirs."""
+
+    def __init__(self, mark: Any) -> None:
+        self.place = (mark.line + 1, mark.column + 1)
+        super().__init__(f"nested too deeply at {self.place}")
 
 
 def composed(text: str) -> yaml.Node | None:
@@ -36,6 +43,10 @@ def composed(text: str) -> yaml.Node | None:
     parser = CParser(text)
     try:
         return _tree(parser)
+    except yaml.MarkedYAMLError as error:
+        if error.problem == _DEEPER_THAN_LIBYAML:
+            raise TooDeep(error.problem_mark) from None
+        return None
     except (yaml.YAMLError, _Odd):
         return None
     finally:
@@ -67,7 +78,7 @@ def _tree(parser: Any) -> yaml.Node:
             opened.append(node)
             inside.append([])
             if len(inside) > DEEPEST:
-                raise TooDeep
+                raise TooDeep(event.start_mark)
         elif kind is yaml.MappingEndEvent or kind is yaml.SequenceEndEvent:
             values = inside.pop()
             pairs = zip(values[::2], values[1::2], strict=True)

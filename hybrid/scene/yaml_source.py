@@ -98,8 +98,8 @@ def _composed(text: str) -> Any:
     """The tree of a text as YAML sees it."""
     try:
         found = composed(text)
-    except TooDeep:
-        raise Unreadable(Complaint("YAML", "nested too deeply", READABLE, WRITE_OUT, 1, 1)) from None
+    except TooDeep as error:
+        raise Unreadable(Complaint("YAML", "nested too deeply", READABLE, WRITE_OUT, *error.place)) from None
     if found is not None:
         return found
     from hybrid.scene.yaml_faults import compose
