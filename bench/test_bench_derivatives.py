@@ -97,11 +97,14 @@ def test_a_derivative_beside_bodies(what: str) -> None:
 
 
 def believed(differences: list[np.ndarray]) -> np.ndarray:
-    """Of differences by falling steps, for each result that which changes least to the next."""
+    """Of differences by falling steps, for each result that which differs least from both beside it.
+
+    Of two alone it may be chance: their last digits are few.
+    """
     stacked = np.array(differences)
     changes = np.abs(np.diff(stacked, axis=0))
-    best = changes.argmin(axis=0)
-    return np.take_along_axis(stacked[1:], best[None], axis=0)[0]
+    best = np.maximum(changes[1:], changes[:-1]).argmin(axis=0)
+    return np.take_along_axis(stacked[1:-1], best[None], axis=0)[0]
 
 
 def results(scene: hybrid.Scene, wanted: list[Wanted], places: Places) -> np.ndarray:
