@@ -338,7 +338,11 @@ class Motion:
             return value[:, (s >= ends[x.section] - near) & (s <= ends[x.section + 1] + near)]
         if x.at is None:
             return value
-        return np.array([[np.interp(min(x.at, s[-1]), s, row)] for row in value])
+        k = int(np.searchsorted(s, x.at))  # the first point that is not before it
+        if k >= s.size or s[k] == x.at or k == 0:
+            return value[:, [min(k, s.size - 1)]]
+        part = (x.at - s[k - 1]) / (s[k] - s[k - 1])
+        return value[:, [k - 1]] + part * (value[:, [k]] - value[:, [k - 1]])
 
     def check(self, base: Motion, key: str) -> None:
         """ComputationError where steps or zones are not those of the base run."""

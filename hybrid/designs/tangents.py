@@ -27,7 +27,7 @@ from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books, blank_books, sample_size
 from hybrid.kernels.state.forces import FRICTION, PLANAR, SELF_CONTACT, SOIL, STIFFNESS_DAMPING, VORTICES, WAVES
 from hybrid.kernels.state.report import ASSEMBLED
-from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, Work, batch_of_one, state_for
+from hybrid.kernels.state.state import LANES, Batch, Ends, Floats, Line, Sea, State, Work, batch_of_one, state_for
 from hybrid.kernels.watch.tangent_job import (
     BROKEN,
     FOLLOWED,
@@ -40,6 +40,7 @@ from hybrid.kernels.watch.tangent_job import (
     blank_tangent_job,
 )
 from hybrid.kernels.watch.tangents import follow_in_plane, follow_in_space
+from hybrid.kernels.watch.wave_slopes import PHASES, SLOPES
 from hybrid.linear.matrices import ANCHOR
 from hybrid.model.build import Model, build
 from hybrid.model.plane import planar
@@ -236,6 +237,8 @@ class Others:
         room = Table(blank_other).numbers.size
         tables, self._kept = np.zeros((len(self.models), room), np.int64), []
         self._books: list[Books] = []
+        around = model.sea.values
+        same = [bool(model.line.bits & WAVES) and same_waves(around, x.sea.values) for x in self.models]
         for k, (x, report) in enumerate(zip(self.models, reports, strict=True)):
             ends, sea, there = x.ends.at(0.0), x.sea.at(0.0), beside(run.state, rates[k], spins[k], self._steps[k])
             books = self._books_of(compiled, cells, ends, report)
@@ -246,10 +249,10 @@ class Others:
                 line=self._lines[k], sea=x.sea.values, ends=x.ends.values, moves=x.ends.moves(), even=there,
                 odd=there.copy(), rates=rates[k], spin=spins[k], before=rates[k].copy(), spin_before=spins[k].copy(),
                 work=workspace(cells), books=books, left=np.zeros((cells + 1, 5)), sizes=self.sizes[k],
-                h=float(self._steps[k]),
+                same_waves=int(same[k]), h=float(self._steps[k]),
             )  # fmt: skip
             self._kept.append(table)
-        sea = model.sea.values._replace(slid=np.zeros((cells + 1, 3)), bed=np.zeros((cells + 1, 3)))
+        sea = around._replace(slid=np.zeros((cells + 1, 3)), bed=np.zeros((cells + 1, 3)))
         self._found = np.zeros(2, np.int64)
         even, odd = compiled.states
         own = workspace(cells)._replace(u=work.u)
@@ -257,7 +260,8 @@ class Others:
         table.bind(
             line=model.line, sea=sea, ends=model.ends.values, even=even, odd=odd, work=work, own=own,
             clock=compiled.clock, counts=compiled.count, left=np.zeros((cells + 1, 5)), last=run.state.a.copy(),
-            found=self._found, tables=tables,
+            ahead=np.zeros((cells + 1, 3)), slopes=np.zeros(((cells + 1) * any(same), SLOPES)),
+            lanes=np.zeros((PHASES + 2 * len(around.waves), LANES)), found=self._found, tables=tables,
         )  # fmt: skip
         self._kept.append(table)
         follow = follow_in_plane if self._is_planar else follow_in_space
@@ -364,6 +368,12 @@ def refuse(run: Transient) -> None:
     found = [text for text, there in what.items() if there]
     if found:
         raise Unfollowed(", ".join(found))
+
+
+def same_waves(one: Sea, other: Sea) -> bool:
+    """Whether waves are the same everywhere and at all times."""
+    names = "waves", "orbits", "stretched", "depth", "surface", "ramps"
+    return all(np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True) for name in names)
 
 
 def left_over(line: Line, sea: Sea, ends: Ends, state: State, ca: float, work: Work) -> Floats:

@@ -20,7 +20,8 @@ import hybrid
 from hybrid.kernels.laws import seabed, water
 from hybrid.kernels.laws.seabed import contact
 from hybrid.kernels.laws.water import FADED, SAME_WETNESS, wave_kinematics
-from hybrid.kernels.state.state import no_sea, with_waves
+from hybrid.kernels.state.state import LANES, no_sea, with_waves
+from hybrid.kernels.watch.wave_slopes import PHASES, SLOPES, wave_slopes, waves_beside
 from hybrid.model.sea import Surroundings, components, current_table, surroundings
 from hybrid.model.spectra import HIGHEST, LOWEST, jonswap
 from hybrid.scene.measured_spectrum import FINE, shares
@@ -181,6 +182,32 @@ def test_regular_wave_kinematics(depth, z):
         point = (4.0, -7.0, z + 3.0)
         got, exact = stirred(around, t, point)[0], airy(waves, depth, t, point, 3.0)
         assert np.abs(got - exact).max() <= ROUND_OFF * max(size, 1.0) * 10
+
+
+@pytest.mark.parametrize("depth", [math.inf, 60.0, 4.0])
+@pytest.mark.parametrize("stretched", [1.0, 0.0])
+def test_slopes_of_waves(depth, stretched):
+    """Against differences, below and above the surface, at the bed and below it, while waves grow, of more nodes than are
+
+    computed at a time; no point is so near a surface or the bed that a difference would go through it.
+    """
+    waves = components(JonswapWaves(significant_height=1.5, peak_period=6.0, direction=-40.0, seed=3), depth, G)
+    points = np.random.default_rng(5).uniform([-300.0, -300.0, -6.0], [300.0, 300.0, 2.0], (37, 3))
+    around = sea_of(waves, depth, ramp=20.0, n=len(points))
+    sea = around.at(7.0)._replace(stretched=stretched, flow=np.zeros((len(points), 7)))
+
+    def moved(way, x):
+        wave_kinematics(sea, points, x * way)
+        return sea.flow.copy()
+
+    slopes = np.zeros((len(points), SLOPES))
+    wave_slopes(sea, points, np.zeros((PHASES + 2 * len(waves), LANES)), slopes)
+    base, h = moved(points, 0.0), 1e-6
+    for way in np.random.default_rng(2).normal(size=(3, *points.shape)):
+        found = np.zeros_like(base)
+        waves_beside(base, slopes, h, way, found)
+        exact = slope(lambda x, way=way: moved(way, x), 0.0, 1e-3)
+        assert_within(np.abs((found - base) / h - exact).max(), 1e-9 * np.abs(exact).max())
 
 
 @pytest.mark.parametrize("depth", [math.inf, 60.0])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.machine.references import reader
 from hybrid.kernels.state.books import CLOCK_SIZE, COUNT_SIZE, Books, blank_books
 from hybrid.kernels.state.state import (
+    LANES,
     Ends,
     Floats,
     Line,
@@ -24,6 +25,7 @@ from hybrid.kernels.state.state import (
     no_sea,
     no_work,
 )
+from hybrid.kernels.watch.wave_slopes import PHASES, SLOPES
 
 # What is counted: steps that were followed; those that did not begin where the one before had ended.
 FOLLOWED, BROKEN = range(2)
@@ -50,6 +52,7 @@ class OtherLine(NamedTuple):
     books: Books  # the clock is that of the run; what is sampled is the other line
     left: Floats  # (N+1, 5) what its equations leave over
     sizes: Floats  # (8,) named above
+    same_waves: int  # 1 where its waves are those of the run
     h: float
 
 
@@ -67,6 +70,9 @@ class TangentJob(NamedTuple):
     counts: NDArray[np.int64]
     left: Floats  # (N+1, 5) what the equations of the line leave over
     last: Floats  # (N+1, 3) m/s2, a of the state that the last step led to
+    ahead: Floats  # (N+1, 3) m, where the prediction of a step leads nodes
+    slopes: Floats  # (N+1, 15) of waves there (kernels.watch.wave_slopes); empty: none are needed
+    lanes: Floats  # (16 + 2 W, LANES) room for them
     found: NDArray[np.int64]  # (2,) named above
     tables: NDArray[np.int64]  # (P, size) of an OtherLine each
 
@@ -76,7 +82,7 @@ def blank_other() -> OtherLine:
     state, z = blank_state(1), np.zeros
     return OtherLine(
         blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, state, z(1), state, z(1), no_work(),
-        blank_books(), z((2, 5)), z(TANGENT_SIZES), 1.0,
+        blank_books(), z((2, 5)), z(TANGENT_SIZES), 0, 1.0,
     )  # fmt: skip
 
 
@@ -85,7 +91,7 @@ def blank_tangent_job() -> TangentJob:
     state, z = blank_state(1), np.zeros
     return TangentJob(
         blank_line(1), no_sea(1), no_ends(), state, state, no_work(), no_work(), z(CLOCK_SIZE), z(COUNT_SIZE, np.int64), z((2, 5)),
-        z((2, 3)), z(2, np.int64), z((1, 1), np.int64),
+        z((2, 3)), z((2, 3)), z((0, SLOPES)), z((PHASES, LANES)), z(2, np.int64), z((1, 1), np.int64),
     )  # fmt: skip
 
 

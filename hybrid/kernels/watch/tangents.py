@@ -44,6 +44,7 @@ from hybrid.kernels.watch.tangent_job import (
     read_job,
     read_other,
 )
+from hybrid.kernels.watch.wave_slopes import wave_slopes, waves_beside
 
 # A second correction that is less than this part of all tangents is left out, behind so many steps that have two.
 ENOUGH, JUDGED = 5e-7, 10
@@ -165,14 +166,28 @@ def find_tangent_rates(space, line, s, was, now):
 
 
 @inner
-def predict_other(other, s, there_old, u):
-    """What the other line takes from the prediction of its step: waves where that leads."""
+def look_ahead(job, s, old):
+    """Slopes of waves where the prediction of the step leads the line of the run."""
+    ahead = job.ahead
+    for i in range(ahead.shape[0]):
+        for k in range(3):
+            ahead[i, k] = old.r[i, k] + s.dt * old.v[i, k] + 0.5 * s.dt * s.dt * old.a[i, k]
+    wave_slopes(job.sea, ahead, job.lanes, job.slopes)
+
+
+@inner
+def predict_other(job, other, s, there_old, u):
+    """What the other line takes from the prediction of its step, to which tangents have come: waves where that leads."""
     line, sea = other.line, other.sea
-    if line.bits & WAVES:
-        for i in range(u.shape[0]):
-            for k in range(3):
-                u[i, k] = s.dt * there_old.v[i, k] + 0.5 * s.dt * s.dt * there_old.a[i, k]
-        wave_kinematics(sea, there_old.r, u)
+    if not line.bits & WAVES:
+        return
+    if other.same_waves:
+        waves_beside(job.sea.flow, job.slopes, other.h, other.rates.r, sea.flow)
+        return
+    for i in range(u.shape[0]):
+        for k in range(3):
+            u[i, k] = s.dt * there_old.v[i, k] + 0.5 * s.dt * s.dt * there_old.a[i, k]
+    wave_kinematics(sea, there_old.r, u)
 
 
 @inner
@@ -315,9 +330,9 @@ def advance(plane, space, job, other, s, old, new, report):
     line, sea, now, h = other.line, other.sea, other.rates, other.h
     ends_at(job.clock[NOW], other.moves, sea, other.ends, other.books.velocity)
     sea_at(job.clock[NOW], sea)
-    predict_other(other, s, there_old, other.work.u)
     turn_over(other.before, now, other.spin_before, other.spin)
     predict_rates(space, line, s, other.before, other.spin_before, now, other.spin)
+    predict_other(job, other, s, there_old, other.work.u)
     hold_ends(job.ends, other, s, now)
     if space is not None:
         if line.bits & (ROTARY | STIFFNESS_DAMPING):
@@ -353,6 +368,8 @@ def follow(plane, space, job):
                 found[BROKEN] = 1
             job.last[i, k] = new.a[i, k]
     found[FOLLOWED] += 1
+    if job.slopes.shape[0] > 0:
+        look_ahead(job, s, old)
     if space is not None:
         left_over_in_space(job.line, job.sea, job.ends, old.r, new, s.cv, s.ca, job.own, job.left)
     if plane is not None:
