@@ -246,6 +246,8 @@ class LineResult:
         if found.settled and (line.element.any() or touches):
             there = f"{self._touched}; " if touches else ""
             why = f"{there}a damped motion with contact, without friction, led there"
+            if touches and found.in_hollows:
+                why = f"{why}, and without friction it would slide but for the spacing of the sample points of contact"
         if found.solver.presses_bodies:
             why = "lines touch a body that is free"
         if why:

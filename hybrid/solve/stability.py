@@ -114,8 +114,19 @@ def is_judged(line: Line, ends: Ends, length: float) -> bool:
 
     A moment that keeps its direction in space is not conservative; positive definiteness says nothing then.
     """
+    return bool(line.element.any()) and is_without_moment(line, ends, length)
+
+
+def is_without_moment(line: Line, ends: Ends, length: float) -> bool:
+    """Whether no end has a moment to speak of."""
     bending = float((line.kb * line.hn[:, None]).max(initial=0.0)) / length
-    return bool(line.element.any()) and float(np.abs(ends.moment).max()) <= NO_MOMENT * bending
+    return float(np.abs(ends.moment).max()) <= NO_MOMENT * bending
+
+
+def stiffest_bending(line: Line) -> Floats:
+    """Bending stiffness (N,) of the elements over mass and square of length, 1/s^2, of which round-off is a part."""
+    h = np.append(line.h, line.h[-1])
+    return np.asarray(line.kb[:, :2].max(axis=1) * line.element / (h * h * line.mass))
 
 
 class Stability:
@@ -138,17 +149,16 @@ class Stability:
         instead of what stays in it.
         """
         definite = self._definite_across if across else self._definite
-        mass, h = self.line.mass, np.append(self.line.h, self.line.h[-1])
         soft = NEUTRAL / ANCHOR * self.anchor
         self.blurred = False
         if definite(ends, state, soft):
             return True
         bending = self.line.kb[:, :2].max(axis=1) * self.line.element
-        lost = LOST * float((bending / (h * h * mass)).max())
+        lost = LOST * float(stiffest_bending(self.line).max())
         if lost <= soft or not definite(ends, state, lost):
             return False
         EI = (bending * self.line.hn)[self.line.element == 1].min()
-        self.blurred = bool(lost * float(mass.sum()) > HIDDEN * 3.0 * EI / self.length**3)
+        self.blurred = bool(lost * float(self.line.mass.sum()) > HIDDEN * 3.0 * EI / self.length**3)
         return True
 
     def softest_motion(self, ends: Ends, state: State, polar: Floats) -> tuple[float, Floats]:
@@ -157,7 +167,7 @@ class Stability:
         Components of the shape are at most 1.  polar: (N,) kg m^2, the inertia of the spin of each cell.
         """
         line = self.line
-        band, held = self._band(ends, state, 0.0)
+        band, held = self.band(ends, state, 0.0)
         weights = np.repeat(line.mass[:, None], band.shape[0] // 3, axis=1)  # 4 unknowns a node, 2 in a plane
         if not line.bits & PLANAR:
             weights[:-1, 3], weights[-1, 3] = np.where(line.spin != 0, polar, 1.0), 1.0
@@ -173,10 +183,10 @@ class Stability:
 
     def _definite(self, ends: Ends, state: State, soft: float) -> bool:
         """Whether a Cholesky factor of the stiffness exists, with springs of `soft` (1/s^2) times the mass."""
-        return bool(is_definite(self._band(ends, state, soft)[0]))
+        return bool(is_definite(self.band(ends, state, soft)[0]))
 
-    def _band(self, ends: Ends, state: State, soft: float) -> tuple[Floats, np.ndarray]:
-        """Band of the stiffness, and what of it is held, with springs of `soft` (1/s^2) times the mass.
+    def band(self, ends: Ends, state: State, soft: float) -> tuple[Floats, np.ndarray]:
+        """Lower band of the stiffness, and what of it is held, with springs of `soft` (1/s^2) times the mass.
 
         Axial stiffness is lowered to CHECKED_COMPLIANCE for this: it has no part in buckling,
         and at its real size its round-off would hide the softest modes of a long line.

@@ -6,6 +6,7 @@ As of one line (solve.contact_statics), of all lines, points and bodies together
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -15,13 +16,15 @@ from hybrid.kernels.junctions.bodies import MASS, V
 from hybrid.kernels.state.books import SHORTEST, blank_books
 from hybrid.kernels.state.forces import FRICTION, SELF_FRICTION, WAVES
 from hybrid.kernels.state.report import TWIST
-from hybrid.kernels.state.state import Floats, State
+from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.accept import LARGEST_TWIST
-from hybrid.solve.contact_statics import DAMPING, MOST_SPIN, ROAD, calming, stop
+from hybrid.solve.contact_stability import ContactStability
+from hybrid.solve.contact_statics import DAMPING, MOST_SPIN, ROAD, STEPS, calming, stop
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.self_contact import SelfContact
-from hybrid.solve.settling import damped, nudged
+from hybrid.solve.settling import along, damped, nudged
 from hybrid.solve.shared_contact import SharedContact
+from hybrid.solve.statics import MOST_FALLS, PUSHED, SAME
 from hybrid.solve.system import SystemSolver
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium, damped_bodies
 
@@ -33,11 +36,11 @@ class _Moving:
     """The damped motion of a system: `solve.contact_statics.Moving`."""
 
     def __init__(self, solver: SystemSolver, start: SystemState) -> None:
-        self._solver, self._t = solver, 0.0
+        self._solver, self._t, self.tries = solver, 0.0, 0
         self.state, self._other = start, start.copy()
 
     def step(self, dt: float, before: float) -> tuple[int, int, float]:
-        old, new = self.state, self._other
+        old, new, self.tries = self.state, self._other, self.tries + 1
         taken = self._solver.step(old, new, dt, 0.0, before, 0.0, self._t + dt)
         outcome, moved = taken.outcome, 0.0
         if outcome != Outcome.OK:
@@ -75,11 +78,71 @@ def touching_solver(lines: Sequence[JoinedLine], points: int, bodies: Floats, co
     return solver
 
 
-def _pushed(x: JoinedLine, state: State, length: float, time_scale: float) -> State:
-    """A small push off an unstable equilibrium; ends stay with what they are joined to."""
-    pushed = nudged(x.line, state, length, time_scale)
-    pushed.v[[0, -1]] = 0.0
-    return pushed
+class _Falls:
+    """Equilibria with contact that would not stay, and what leads away from them."""
+
+    def __init__(self, solver: SystemSolver, time_scale: float) -> None:
+        """solver: of equilibria; time_scale: s, of the damped motion."""
+        self._solver, self._time_scale = solver, time_scale
+        self._stability = ContactStability(solver)
+        self._known, self._left = list[SystemState](), list[SystemState]()
+
+    @property
+    def finds_all(self) -> bool:
+        """Whether what would not stay is found in all cases: a motion to rest needs no push."""
+        return self._stability.judges and self._stability.is_complete
+
+    @property
+    def name(self) -> str:
+        """Of the motion that led to the last equilibrium."""
+        return f"{ROAD}, {PUSHED}" if self._known else ROAD
+
+    @property
+    def are_hollows(self) -> bool:
+        """Whether the last equilibrium would not stay where contact had more sample points."""
+        return self._stability.in_hollows
+
+    def holds(self, states: SystemState) -> bool:
+        """Whether an equilibrium of the solver would stay, or whether it would is not known."""
+        self._stability.in_hollows = False
+        if not self._solver.in_contact() or not self._stability.judges:  # it has been judged without contact
+            return True
+        return self._stability.holds(states)
+
+    def is_new(self, states: SystemState) -> bool:
+        """Whether an equilibrium is none of those that have been left."""
+        return not any(self._are_same(states, x) for x in self._known)
+
+    def try_later(self, start: SystemState) -> None:
+        """Begin the next motion there, where the first leads nowhere."""
+        self._left = [start]
+
+    def next(self, states: SystemState | None) -> SystemState | None:
+        """Where the next motion begins, or None; states: an equilibrium that would not stay, None: there is none."""
+        if states is not None and self.is_new(states) and len(self._known) < MOST_FALLS:
+            square, shapes = self._stability.softest_motion(states)
+            self._known.append(states)
+            self._left = [self._along(states, shapes, way) for way in (-1.0, 1.0)] if square < 0.0 else []
+            self._left.append(self.nudged(states))  # the first, being the smallest: to the nearest rest
+        return self._left.pop() if self._left else None
+
+    def _are_same(self, one: SystemState, other: SystemState) -> bool:
+        apart = max(float(np.abs(a.r - b.r).max()) for a, b in zip(one.lines, other.lines, strict=True))
+        return apart <= SAME * self._solver.length
+
+    def _along(self, states: SystemState, shapes: Sequence[Floats], way: float) -> SystemState:
+        out = states.copy()
+        for state, shape in zip(out.lines, shapes, strict=True):
+            state.v[:] = way * along(shape, self._solver.length, self._time_scale, DAMPING)
+        return out
+
+    def nudged(self, states: SystemState) -> SystemState:
+        """States with a small push; ends stay with what they are joined to."""
+        out = []
+        for x, state in zip(self._solver.lines, states.lines, strict=True):
+            out.append(nudged(x.line, state, x.length, self._time_scale))
+            out[-1].v[[0, -1]] = 0.0
+        return SystemState(out, states.bodies.copy())
 
 
 def settled_system(
@@ -90,28 +153,45 @@ def settled_system(
 
     points: how many free points there are; contacts: makes contact, without friction; keeps_turns: a line that has lost
     turns in a state, and how many, empty: none has; near: Newton's method is tried from the start itself first.
-    LineFailed: the system does not come to rest, a line has lost turns, or ends with a catenary that is not taut.
+    An equilibrium that would not stay is left by a small push.  LineFailed: the system does not come to rest,
+    or only where it would not stay, a line has lost turns, or ends with a catenary that is not taut.
     """
     smooth = [x._replace(line=x.line._replace(bits=x.line.bits & ~(WAVES | FRICTION | SELF_FRICTION))) for x in lines]
     found = touching_solver(smooth, points, bodies, contacts)
     mass = sum(float(x.line.mass.sum()) for x in lines) + float(bodies[:, MASS].sum())
     time_scale, path, total = float(np.sqrt(mass * found.length / found.scale)), list[str](), 0
     slow = [x._replace(line=damped(x.line, x.length, time_scale, DAMPING), slackens=True) for x in smooth]
+    damped_solver = touching_solver(slow, points, damped_bodies(bodies, time_scale), contacts)
+    falls = _Falls(found, time_scale)
     first = start.copy()
-    if not near:
-        pushed = [_pushed(x, state, x.length, time_scale) for x, state in zip(smooth, start.lines, strict=True)]
-        first = SystemState(pushed, first.bodies)
-    moving = _Moving(touching_solver(slow, points, damped_bodies(bodies, time_scale), contacts), first)
-    for iterations in chain([0] if near else [], calming(moving, time_scale, found.length)):
-        line, lost = keeps_turns(moving.state)
-        if lost:  # and will not come back
-            raise LineFailed(line, Outcome.TURNS_LOST, None, None, lost)
-        taken, states = found.newton(moving.state)
-        total += taken.iterations
-        line, lost = keeps_turns(states) if taken.outcome == Outcome.OK else (taken.line, "")
-        why = lost or (taken.outcome.cause if taken.outcome != Outcome.OK else "found")
-        path.append(f"{ROAD}: {why} ({total + iterations} iterations in all)")
-        if taken.outcome == Outcome.OK and not lost:
-            return SystemEquilibrium(states, tuple(path), total + iterations, taken.residual, found, settled=True)
-    outcome = Outcome.TURNS_LOST if lost else taken.outcome
-    raise LineFailed(line, outcome, None, None, "\n              ".join(path))
+    if not near:  # what lies straight without tension may need the push, too
+        falls.try_later(falls.nudged(start))
+        first = first if falls.finds_all else falls.next(None) or first
+    while True:
+        moving = _Moving(damped_solver, first)
+        for iterations in chain([0] if near else [], calming(moving, time_scale, found.length)):
+            line, lost = keeps_turns(moving.state)
+            if lost:  # and will not come back
+                raise LineFailed(line, Outcome.TURNS_LOST, None, None, lost)
+            taken, states = found.newton(moving.state)
+            total += taken.iterations
+            line, lost = keeps_turns(states) if taken.outcome == Outcome.OK else (taken.line, "")
+            if taken.outcome == Outcome.OK and not lost and not falls.holds(states):
+                taken = replace(taken, outcome=Outcome.UNSTABLE)
+            why = lost or (taken.outcome.cause if taken.outcome != Outcome.OK else "found")
+            path.append(f"{falls.name}: {why} ({total + iterations} iterations in all)")
+            if taken.outcome == Outcome.OK and not lost:
+                return SystemEquilibrium(
+                    states, tuple(path), total + iterations, taken.residual, found, settled=True,
+                    in_hollows=falls.are_hollows,
+                )  # fmt: skip
+            if taken.outcome == Outcome.UNSTABLE and falls.is_new(states):
+                break
+        total += iterations
+        near, state = False, None
+        if moving.tries < STEPS:  # else it comes to no rest, from another start neither
+            state = falls.next(states if taken.outcome == Outcome.UNSTABLE else None)
+        if state is None:
+            outcome = Outcome.TURNS_LOST if lost else taken.outcome
+            raise LineFailed(line, outcome, None, None, "\n              ".join(path))
+        first = state

@@ -76,6 +76,21 @@ def test_crossing_ropes_rest_on_each_other(drop: float) -> None:
     assert any(e.kind == "lines touch" for e in result.events)
 
 
+@pytest.mark.parametrize("cells", [80, 100, 120, 140, 160])
+def test_crossing_ropes_rest_the_same_on_every_mesh(cells: int) -> None:
+    tables = crossing(0.1)
+    for line in tables["lines"].values():
+        line["mesh"] = {"cells": cells}
+    result = hybrid.static(tables)
+    off, on = force_between(result, 0)
+    assert off == pytest.approx(on, rel=1e-6)
+    assert on == pytest.approx(FORCES[0.1], rel=0.005)
+    upper, lower = (result.lines[x].position[0, 40] for x in ("upper", "lower"))
+    assert np.abs([upper[0], upper[1], lower[0], lower[1]]).max() < 0.2 * RADIUS
+    assert upper[2] == pytest.approx(-0.277915, abs=0.001)
+    assert lower[2] == pytest.approx(-0.287915, abs=0.001)
+
+
 def lowered(duration: float = 1.6) -> Tables:
     """The pins of the upper rope come down from above the lower one, askew, with friction."""
     tables = crossing(-0.05, contact={"friction": 0.3}, time={"duration": duration, "step": 0.01})
