@@ -395,7 +395,9 @@ class Estimate:
     def _is_of_edges(self, name: str) -> bool:
         """Whether the largest error of an equilibrium by its cells is known otherwise than by what these change."""
         edges = self.run.at_edges.get(name)
-        return edges is not None and edges.max(initial=0.0) >= self.errors.largest("mesh", name) > 0.0
+        if edges is None or self._count > 1:
+            return False
+        return bool(edges.max(initial=0.0) >= self.errors.largest("mesh", name) > 0.0)
 
     @property
     def several_equilibria(self) -> Notes:
@@ -478,7 +480,7 @@ class Estimate:
         if model is not None:
             out["model"] = model
         if by_mesh is not None:
-            found = {"mesh": np.maximum(magnitude(by_mesh, name), self.run.at_edges.get(name, 0.0))}
+            found = {"mesh": magnitude(by_mesh, name)}
             total = found["mesh"]
             if by_step is not None:
                 found["time"] = magnitude(by_step, name)
@@ -488,6 +490,9 @@ class Estimate:
                     total = SAFETY * ((1.0 - OF_SIZES) * both + OF_SIZES * total)
             for cause, error in (found | {"total": total}).items():
                 out[cause] = with_neighbours(error, a - before, b - before, starts=a == 0)
+            if name in self.run.at_edges:
+                at_edges = self.run.at_edges[name][a:b]
+                out["mesh"], out["total"] = np.maximum(out["mesh"], at_edges), np.maximum(out["total"], at_edges)
             out["total"] = out["total"] + (model if model is not None else 0.0)
             if self._apart is not None and name in self._apart.values:
                 far = np.asarray(self.run.values[name][a:b]) - np.asarray(self._apart.values[name][a:b])

@@ -23,6 +23,7 @@ from hybrid.model.plan import output_interval
 from hybrid.model.sections import section_changes
 from hybrid.model.self_reach import system_without_contact
 from hybrid.model.system import build_system
+from hybrid.outputs.edge_errors import EDGE_ERRORS
 from hybrid.scene.base import Invalid
 from hybrid.scene.system import System
 from hybrid.store.amend import amend_lines
@@ -149,6 +150,9 @@ def _errors_of(line: Result, others: Mapping[str, Result]) -> tuple[dict[str, Fl
         vector = name == "position" or name.startswith("reaction")
         for cause, change in changed.items():
             out[f"errors/{cause}/{called}"] = np.linalg.norm(change, axis=-1) if vector else np.abs(change)
+        if EDGE_ERRORS + name in line:
+            for full in (f"errors/mesh/{called}", f"errors/total/{called}"):
+                out[full] = np.maximum(out[full], line[EDGE_ERRORS + name])
     return out, doubts
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from hybrid.model.build import Model
 from hybrid.model.resolution import Resolution
+from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
 from hybrid.scene.schema import AdaptiveModel
 from hybrid.scene.system import System
 from hybrid.simulation.run_sample import COMPARED, RunSample, catenary_share, compared_cells, split_outputs
@@ -47,4 +48,5 @@ def sample_of(line: Result, resolution: Resolution, model: Model, cpu: float) ->
     return RunSample(
         resolution, values, compared_cells(model), max(len(forces), 1), cpu, resolution.every, unresolved,
         forces=forces, catenary=catenary,
+        at_edges={x: np.asarray(line[EDGE_ERRORS + x]) for x in MISSED if EDGE_ERRORS + x in line},
     )  # fmt: skip

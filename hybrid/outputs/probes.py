@@ -16,6 +16,7 @@ from hybrid.kernels.state.forces import MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SE
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea, remembers
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import NEAR
+from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED, edge_errors
 from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.obstacle_forces import obstacle_force_fields, obstacle_force_values
@@ -216,6 +217,7 @@ class Observer:
         quantities: Quantities | None = None,
         obstacles: Sequence[str] = (),
         hinges: Floats = NO_HINGES,
+        edges: bool = False,
     ) -> None:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
 
@@ -226,7 +228,8 @@ class Observer:
         section ends and the next begins; finest: m, all nodes that there may be, where cells follow the curvature;
         gauges: places (x, y), m, where the elevation of the sea is recorded.
         payout: whether the line is paid out; quantities: what the scene asks for beside the usual;
-        obstacles: their names; hinges: (2, 2) as of `Material`.
+        obstacles: their names; hinges: (2, 2) as of `Material`; edges: whether what cells miss beside edges of
+        contact is written (outputs.edge_errors).
         """
         self._finest = finest
         self._hinges = hinges.copy()
@@ -254,6 +257,7 @@ class Observer:
             self._probes |= self.quantities.probes()
             may_be_nan += tuple(self.quantities.wanted)
         self._errors = errors
+        self._edges = tuple(x for x in MISSED if edges and x in self._probes)
         self.first_energy: float | None = None  # J, at the first output
         self._with_work = with_work
         sizes = {"s": s.size, "xyz": 3, "edge": 2}
@@ -291,6 +295,12 @@ class Observer:
                 replace(f, name=sided[f.name], shape=self.jumps.shape, dims=("right/s",),
                         description=f"{f.description}, just after the point") for f in fields if f.name in sided
             ]  # fmt: skip
+        fields += [
+            Field(
+                EDGE_ERRORS + x, PROBES[x].unit, f"error of {x.replace('_', ' ')} by cells beside edges of contact",
+                (s.size,), _S,
+            ) for x in self._edges
+        ]  # fmt: skip
         self.gauges = np.array(gauges, float).reshape(-1, 2)
         if len(self.gauges):
             fields.append(elevation_field(self.gauges))
@@ -333,14 +343,14 @@ class Observer:
         """The same of these probes alone."""
         other = copy(self)
         other._probes = {name: self._probes[name] for name in self._probes if name in names}
-        other._right, other._errors, other._finest = [], False, None
+        other._right, other._errors, other._edges, other._finest = [], False, (), None
         other._obstacles = other._touched = ()
         other.gauges = np.zeros((0, 2))
         return other
 
     def dims(self, name: str) -> tuple[str, ...]:
         """Dimensions of a probe, before or after the points where it jumps."""
-        probe = self._probes.get(name.removeprefix("right/"))
+        probe = self._probes.get(name.removeprefix("right/").removeprefix(EDGE_ERRORS))
         return probe.dims if probe is not None else ()
 
     def look_at(self, outputs: Sequence[Output]) -> tuple[Observer, JoinedObservation]:
@@ -410,6 +420,9 @@ class Observer:
             if self.jumps.size:
                 after = model_errors(plain.on(self._after), corrected.on(self._after))
                 found |= {f"errors/model/right_{name}": after[name] for name in SIDED_ERRORS}
+        if self._edges:
+            missed = edge_errors(plain)
+            found |= {EDGE_ERRORS + name: missed[name] for name in self._edges}
         out = {name: plain.by_output(x, self.dims(name)) for name, x in found.items()}
         if self._criteria:
             if ratios is None:

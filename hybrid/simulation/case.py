@@ -17,7 +17,7 @@ from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, ResultError
 from hybrid.kernels.mesh.criteria import CRITERIA
 from hybrid.kernels.state.books import OUTPUT
-from hybrid.kernels.state.forces import SELF_CONTACT
+from hybrid.kernels.state.forces import SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.bending_reference import NO_DOUBT
 from hybrid.model.build import Model, build
@@ -35,6 +35,7 @@ from hybrid.model.resolution import (
 )
 from hybrid.model.sections import section_changes
 from hybrid.model.self_reach import self_reach, without_contact
+from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
 from hybrid.outputs.probes import Observer
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.obstacles import files_of
@@ -63,6 +64,7 @@ from hybrid.simulation.run_sample import (
     compared_cells,
     compared_places,
     is_along,
+    most_at_places,
     rows_key,
     split_outputs,
     usual_cells,
@@ -323,6 +325,8 @@ class Case:
                 name: StoredArray(stay, name, self._places_of(name)) if stay is not None else self._at_places(name, x)
                 for name, x in stored.items()
             }
+            edges = [x for x in MISSED if EDGE_ERRORS + x in data]
+            missed = {x: most_at_places(data[EDGE_ERRORS + x], self.places) for x in edges}
             kinds = data["events/kind"][()]
             unresolved, touches = b"unresolved bend" in kinds, b"line touches itself" in kinds
             if follows_curvature(self.scene):
@@ -343,7 +347,7 @@ class Case:
                     catenary = np.array([catenary_share(x) for x in result.zones])
         return RunSample(
             resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, bound, notes, forces=forces,
-            catenary=catenary, doubt=doubt_of(run), touches=touches, places=self.places,
+            catenary=catenary, doubt=doubt_of(run), touches=touches, places=self.places, at_edges=missed,
         )  # fmt: skip
 
     def _places_of(self, name: str) -> np.ndarray | None:
@@ -498,6 +502,7 @@ class Case:
             () if only else self.scene.output.elevation or (),
             model.payout is not None, None if only else quantities_of(self.scene),
             obstacles=() if only else model.sea.names, hinges=model.cable.hinges,
+            edges=not only and wants_errors(self.scene) and bool(model.line.bits & SEABED),
         )  # fmt: skip
 
     def _report(self, run: Transient, finished: bool) -> None:

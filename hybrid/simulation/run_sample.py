@@ -69,7 +69,8 @@ class RunSample:
     touches: bool = False  # of a result: whether the line touched itself; of others: whether contact was computed
     # Numbers of the output points at which its values along the line are (`compared_places`); in no checkpoint.
     places: np.ndarray = field(default_factory=lambda: ALL)
-    # of an equilibrium: errors (ns,) by its cells beside edges of contact (outputs.edge_errors); in no checkpoint
+    # of a result: errors (nt, ns) by its cells beside edges of contact (outputs.edge_errors), of an equilibrium beside
+    # its ends, joints and loads as well (outputs.layer_errors)
     at_edges: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def some(self, name: str, numbers: np.ndarray) -> np.ndarray:
@@ -98,7 +99,7 @@ class RunSample:
 
     def checkpoint(self) -> Tree:
         """All of it, as named arrays and plain values."""
-        kept_fields = [x.name for x in fields(self) if x.name not in ("at_edges", "places")]
+        kept_fields = [x.name for x in fields(self) if x.name != "places"]
         out = {name: getattr(self, name) for name in kept_fields} | {"resolution": resolution_tree(self.resolution)}
         kept = {} if self.rows else {"values": self.values, "model_error": self.model_error}
         blank: Tree = {"values": {}, "model_error": {}}
@@ -114,6 +115,14 @@ def compared_places(points: OutputPoints) -> np.ndarray:
         return ALL
     even = np.linspace(0, count - 1, max(MOST_PLACES - beside.size, 2)).round().astype(int)
     return np.unique(np.concatenate([beside, even]))
+
+
+def most_at_places(errors: Any, places: np.ndarray) -> np.ndarray:
+    """Of errors (n, ns) at all output points those at places: the largest from each up to the next."""
+    if not places.size:
+        return np.asarray(errors[()])
+    rows = range(0, len(errors), ROWS)
+    return np.concatenate([np.maximum.reduceat(np.asarray(errors[k : k + ROWS]), places, axis=1) for k in rows])
 
 
 def is_along(name: str) -> bool:
@@ -191,8 +200,9 @@ def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int, int], result
     outputs are not beside it.
     """
     blank = RunSample(first_resolution(scene), {}, 1, 1, 0.0).checkpoint()
-    free = dict.fromkeys(("resolution", "values", "model_error", "notes", "rows"))
+    free = dict.fromkeys(("resolution", "values", "model_error", "at_edges", "notes", "rows"))
     older = {"rows": {}, "catenary": np.zeros(0), "doubt": np.array(NO_DOUBT), "touches": False}  # not in 0.6
+    older["at_edges"] = {}  # not in 1.0
     saved = matched(older | tree, blank | free, "run")
     if saved["forces"].ndim != 2 or saved["forces"].shape[1] != 3 or not np.isfinite(saved["forces"]).all():
         raise ValueError("forces of steps that no run has")
@@ -210,6 +220,7 @@ def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int, int], result
             "resolution": resolution, "notes": restored_notes(saved["notes"]),
             "values": restored_outputs(saved["values"], shape),
             "model_error": restored_outputs(saved["model_error"], shape),
+            "at_edges": restored_outputs(saved["at_edges"], shape),
         }
     )  # fmt: skip
 

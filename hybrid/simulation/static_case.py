@@ -189,7 +189,8 @@ def _values(
     seen = observer.look(batch)
     values = {name: x[0] for name, x in observer.values_of(seen, shift=shift).items()}
     doubt = correction.doubt if correction is not None else np.array(NO_DOUBT)
-    found_errors = edge_errors(seen) if model.line.bits & SEABED else {}
+    missed = edge_errors(seen) if model.line.bits & SEABED else {}
+    found_errors = {name: error[:, 0] for name, error in missed.items()}
     loads = [int(np.argmin(np.abs(model.line.s - at))) for at in model.attached]
     for name, error in layer_errors(seen, loads).items():
         found_errors[name] = np.maximum(error, found_errors.get(name, 0.0))
@@ -205,5 +206,5 @@ def _sample(
     catenary = np.array([catenary_share(model.zones)]) if model.layout is not None else np.zeros(0)
     return RunSample(
         resolution, kept, compared_cells(model), 1, cpu, 1, False, left, catenary=catenary, doubt=doubt,
-        at_edges=at_edges,
+        at_edges={name: error[None] for name, error in at_edges.items()},
     )  # fmt: skip

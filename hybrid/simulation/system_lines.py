@@ -38,11 +38,12 @@ from hybrid.kernels.state.books import (
     blank_books,
     sample_size,
 )
-from hybrid.kernels.state.forces import MAY_TOUCH, REMEMBERS, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state.forces import MAY_TOUCH, REMEMBERS, SEABED, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_of_one, sampled_size, slip_size
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import output_points
+from hybrid.model.resolution import wants_errors
 from hybrid.model.sections import section_changes
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
@@ -106,6 +107,7 @@ def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | N
         only=only, jumps=jumps, changes=section_changes(scene), payout=moves and model.payout is not None,
         quantities=None if only else quantities_of(scene),
         obstacles=() if only else model.sea.names, hinges=model.cable.hinges,
+        edges=moves and only is None and wants_errors(scene) and bool(model.line.bits & SEABED),
     )  # fmt: skip
 
 
