@@ -4,8 +4,9 @@ pytest bench/test_bench_response.py -m bench -n 0 -s
 HYBRID_HOURS=3 pytest bench/test_bench_response.py -m bench -n 0 -s -k "taut or spread"
 
 Of each of twenty scenes ten hours (HYBRID_HOURS: fewer), each of its own seed; errors are of the mean of them, at five
-places, of curvature where it is resolved as parts of the largest there, with the standard error of that mean.  Places
-whose curvature is not resolved (`LineResponse.resolved`, and `hybrid response` says so) are printed apart.  CPU time.
+places (in brackets: at nineteen), of curvature where it is resolved as parts of the largest there, with the standard
+error of that mean.  Places whose curvature is not resolved (`LineResponse.resolved`, and `hybrid response` says so) are
+printed apart.  CPU time; of responses the median of three.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import pytest
 import hybrid
 
 pytestmark = pytest.mark.bench
+PARTS, FIVE = np.linspace(0.05, 0.95, 19), [0, 4, 9, 14, 18]
 HOUR, SEEDS = 3600.0, range(1, 1 + int(os.environ.get("HYBRID_HOURS", "10")))
 LINE = {
     "mass": 30.0, "diameter": 0.1, "axial_stiffness": 5e6, "bending_stiffness": 2e3, "torsional_stiffness": 1e3,
@@ -134,11 +136,14 @@ def seeded(tables, seed):
 def test_against_hours(name, tmp_path):
     tables = SCENES[name](tmp_path) if callable(SCENES[name]) else SCENES[name]
     hybrid.response(tables)
-    begin = clock.process_time()
-    found = hybrid.response(tables)
-    cost = clock.process_time() - begin
+    costs = []
+    for _ in range(3):
+        begin = clock.process_time()
+        found = hybrid.response(tables)
+        costs.append(clock.process_time() - begin)
+    cost = float(np.median(costs))
     line_name, line = next(iter(found.lines.items()))
-    places = [round(part * float(line.s[-1]), 3) for part in (0.05, 0.25, 0.5, 0.75, 0.95)]
+    places = [round(part * float(line.s[-1]), 3) for part in PARTS.tolist()]
     there: dict[str, list] = {"tension": [], "curvature": []}
     bends = bool(line.mean_curvature.max() > 0.0)
     begin = clock.process_time()
@@ -156,19 +161,21 @@ def test_against_hours(name, tmp_path):
     scatter = [np.std(x, axis=0, ddof=1).max() / np.sqrt(len(x)) if len(x) > 1 else np.nan for x in there.values()]
     ours = np.interp(at, line.middle, line.deviation("tension"))
     bent = np.interp(at, line.s, line.deviation("curvature"))
-    off = 100.0 * np.abs(ours / tension - 1.0).max()
+    off_tension = 100.0 * np.abs(ours / tension - 1.0)
+    off = off_tension[FIVE].max()
     added = 100.0 * line.left_out["tension"].max()
     known = line.resolved("curvature")[[int(np.abs(line.s - x).argmin()) for x in at]]
     offs = 100.0 * np.abs(bent - curvature) / (curvature.max() if bends else 1.0)
-    off_bent = offs[known].max(initial=0.0)
+    five = np.isin(np.arange(PARTS.size), FIVE)
+    off_bent = offs[known & five].max(initial=0.0)
     words = ["tension" if found.valid_for("tension") else "", "curvature" if found.valid_for("curvature") else ""]
     print(
-        f"\n{name}: tension {off:.1f} % (+-{100.0 * scatter[0] / tension.max():.1f}; {added:.1f} % are left "
-        f"out), curvature {off_bent:.1f} % "
-        f"(+-{100.0 * scatter[1] / max(curvature.max(), 1e-300):.1f}; {(~known).sum()} of {len(at)} places are not "
-        f"resolved, {offs[~known].max(initial=0.0):.1f} % there) of the largest; {cost:.2f} s of CPU for "
+        f"\n{name}: tension {off:.1f} % ({off_tension.max():.1f}; +-{100.0 * scatter[0] / tension.max():.1f}; "
+        f"{added:.1f} % are left out), curvature {off_bent:.1f} % ({offs[known].max(initial=0.0):.1f}; "
+        f"+-{100.0 * scatter[1] / max(curvature.max(), 1e-300):.1f}; {(~known).sum()} of {len(at)} places are not "
+        f"resolved, {offs[~known].max(initial=0.0):.1f} % there) of the largest; {cost:.3f} s of CPU for "
         f"{hours:.1f} s an hour, {10.0 * hours / cost:.0f} times cheaper than ten; valid for "
         f"{', '.join(x for x in words if x) or 'nothing'}{'; ' if found.notes else ''}{'; '.join(found.notes)}"
     )
-    assert not found.valid_for("tension") or off < 10.0
-    assert not found.valid_for("curvature") or off_bent < 10.0
+    assert not found.valid_for("tension") or off_tension.max() < 10.0
+    assert not found.valid_for("curvature") or offs[known].max(initial=0.0) < 10.0

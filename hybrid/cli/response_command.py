@@ -10,7 +10,7 @@ import typer
 
 import hybrid
 from hybrid.cli.app import Json, Quiet, SceneFile, Settings, UsageError, app, flag, load_either, session
-from hybrid.linear.response_results import OF_LARGEST
+from hybrid.linear.response_results import ADDED, OF_LARGEST
 
 if TYPE_CHECKING:
     from hybrid.linear.response_results import LineResponse, Response
@@ -47,14 +47,16 @@ def response(
 
 
 def _unresolved(found: Response) -> Iterator[str]:
-    """Along which part of each line curvature varies too little to be known."""
+    """Along which part of each line curvature is not known, as it varies too little or too much is left out of it."""
     for name, line in found.lines.items():
-        part, most = 1.0 - float(line.resolved("curvature").mean()), float(line.deviation("curvature").max())
-        if part > 0.0 and most > 0.0:
+        known, deviation = line.resolved("curvature"), line.deviation("curvature")
+        if not known.all() and deviation.any():
             of = f"line {name}: " if len(found.lines) > 1 else ""
+            most = "" if known[deviation.argmax()] else "; where it varies most is such a place"
             yield (
                 f"{of}curvature is not known where its standard deviation is below a fifth of the largest, "
-                f"{OF_LARGEST * most:.3g} 1/m, {100.0 * part:.0f} % of the line: it may vary several times as much"
+                f"{OF_LARGEST * deviation.max():.3g} 1/m, or where more than {100.0 * ADDED:.2g} % of it are left out, "
+                f"{100.0 * np.mean(~known):.0f} % of the line: it may vary several times as much{most}"
             )
 
 

@@ -18,6 +18,11 @@ from hybrid.kernels.state.state import Floats
 ANGLES, RADII, POINTS = 40, 4, 10
 # Standard deviations beyond which a normal velocity is its mean.
 FAR = 30.0
+# Values and weights of a normal law that show the kink of drag; standard deviations from which on the size of a bend is
+# its part in the plane of the bend at rest.
+LAW = np.linspace(-6.0, 6.0, 121)
+LAW_PARTS = np.exp(-0.5 * LAW**2) / np.exp(-0.5 * LAW**2).sum()
+BENT = 8.0
 # Phases of a single harmonic, and the part of its largest square below which a direction counts as one without motion.
 PHASES, STILL = 128, 1e-8
 
@@ -47,6 +52,9 @@ def across(mean: Floats, covariance: Floats) -> Floats:
     sizes, axes = np.linalg.eigh(covariance)
     root = axes * np.sqrt(np.maximum(sizes, 0.0))[:, None, :]
     grid, weights = _rule(m)
+    if m == 2 and not mean.any():  # each direction counts by the mean radius
+        grid = math.sqrt(0.5 * np.pi) * grid[:ANGLES] / np.linalg.norm(grid[0])
+        weights = np.full(ANGLES, 1.0 / ANGLES)
     u = mean[:, None, :] + np.matmul(grid, root.transpose(0, 2, 1))
     speed = np.linalg.norm(u, axis=2)
     scaled = u * np.sqrt(weights / np.maximum(speed, 1e-300))[:, :, None]
@@ -127,3 +135,33 @@ def size_deviation(mean: Floats, covariance: Floats) -> Floats:
     size = np.linalg.norm(u, axis=2)
     first = size @ weights
     return np.sqrt(np.maximum(((size - first[:, None]) ** 2) @ weights, 0.0))
+
+
+def shape_of_drag(mean: Floats, deviation: Floats, left_out: Floats, flow: Floats) -> Floats:
+    """Parts (n,) by which the law of drag changes the standard deviation of the size of a vector in a plane, (n,).
+
+    mean: along the first axis; deviation: (2, n) along both; flow: mean velocity of the water along the first axis, in
+    its standard deviations.  The first component has the shape of z + a (f - E f - E[df/dz] z) of a normal z, with the
+    drag f = |flow + z| (flow + z) and an a by which the rest of f adds a part left_out to the deviation.
+    """
+    out = np.zeros(len(mean))
+    (used,) = np.nonzero((mean < BENT * deviation[0]) & (left_out > 0.0))
+    if not used.size:
+        return out
+    speed = np.clip(flow[used], -FAR, FAR)[:, None] + LAW
+    force, slope = speed * np.abs(speed), 2.0 * (np.abs(speed) @ LAW_PARTS)
+    rest = force - (force @ LAW_PARTS)[:, None] - slope[:, None] * LAW
+    size = np.sqrt(rest**2 @ LAW_PARTS)
+    part = np.minimum(np.sqrt((1.0 + left_out[used]) ** 2 - 1.0), size / slope)
+    x = LAW + rest * (part / np.maximum(size, 1e-300))[:, None]
+    x /= np.sqrt(x**2 @ LAW_PARTS)[:, None]
+    y, weights = np.polynomial.hermite_e.hermegauss(7)
+    y, weights = (deviation[1, used, None, None] * y) ** 2, weights / weights.sum()
+
+    def spread(x: Floats) -> Floats:
+        square = (mean[used, None] + deviation[0, used, None] * x)[:, :, None] ** 2 + y
+        first = np.sqrt(square) @ weights @ LAW_PARTS
+        return np.sqrt(np.maximum(square @ weights @ LAW_PARTS - first**2, 0.0))
+
+    out[used] = spread(x) / spread(np.broadcast_to(LAW, x.shape)) - 1.0
+    return out

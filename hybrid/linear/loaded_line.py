@@ -138,19 +138,13 @@ class LoadedLine:
         dd = (de - np.einsum("fni,ni->fn", de, d)[:, :, None] * d) / l[:, None]
         frames = self.x.ends.frame.reshape(2, 3, 3)[:, :, 2]  # tangents that clamps hold
         held = [np.cross(turns[:, k], frames[k])[:, None] for k in (0, 1)]
-        before, after = np.vstack([frames[:1], d]), np.vstack([d, frames[1:]])
+        length, size, axes = self.bend
+        size = size.copy()
         change = np.concatenate([dd, held[1]], axis=1) - np.concatenate([held[0], dd], axis=1)
-        length = np.concatenate([[0.5 * l[0]], 0.5 * (l[1:] + l[:-1]), [0.5 * l[-1]]])
-        bend, change = (after - before) / length[:, None], change / length[:, None]
+        change = change / length[:, None]
         for k in (0, 1):
             if not self.line.element[-k]:
-                bend[-k], change[:, -k] = 0.0, 0.0
-        size = np.linalg.norm(bend, axis=1)
-        t = self.linear.t
-        first = np.where(size[:, None] > STRAIGHT, bend / np.maximum(size, 1e-300)[:, None], np.cross(t, AWRY))
-        first -= np.einsum("ni,ni->n", first, t)[:, None] * t
-        first /= np.maximum(np.linalg.norm(first, axis=1), 1e-300)[:, None]
-        axes = np.stack([first, np.cross(t, first)], axis=1)
+                change[:, -k] = 0.0
         kappa = np.einsum("fni,nki->fnk", change, axes)
         for k in (0, 1):  # what an angular spring turns is no bend of the line
             part, along = parts_without_spring(self.line, k * (len(size) - 1), float(size[-k] * length[-k]))
@@ -167,6 +161,28 @@ class LoadedLine:
             self.line.s.copy(), 0.5 * (self.line.s[1:] + self.line.s[:-1]), omegas / (2.0 * np.pi), q[:, :, 1:4],
             q[:, 1:, 0], kappa[:, :, 0], kappa[:, :, 1], state.r.copy(), state.T.copy(), size,
         )  # fmt: skip
+
+    @cached_property
+    def bend(self) -> tuple[Floats, Floats, Floats]:
+        """Of every node at rest: length (N+1,) m over which it bends, its curvature (N+1,) 1/m, and two axes across it
+
+        (N+1, 2, 3), of which the first is in the plane of the bend, inwards.
+        """
+        l = np.linalg.norm(self.linear.state.e, axis=1)
+        d = self.linear.state.e / l[:, None]
+        frames = self.x.ends.frame.reshape(2, 3, 3)[:, :, 2]
+        before, after = np.vstack([frames[:1], d]), np.vstack([d, frames[1:]])
+        length = np.concatenate([[0.5 * l[0]], 0.5 * (l[1:] + l[:-1]), [0.5 * l[-1]]])
+        bend = (after - before) / length[:, None]
+        for k in (0, 1):
+            if not self.line.element[-k]:
+                bend[-k] = 0.0
+        size = np.linalg.norm(bend, axis=1)
+        t = self.linear.t
+        first = np.where(size[:, None] > STRAIGHT, bend / np.maximum(size, 1e-300)[:, None], np.cross(t, AWRY))
+        first -= np.einsum("ni,ni->n", first, t)[:, None] * t
+        first /= np.maximum(np.linalg.norm(first, axis=1), 1e-300)[:, None]
+        return length, size, np.stack([first, np.cross(t, first)], axis=1)
 
     @property
     def kinks(self) -> np.ndarray:

@@ -10,8 +10,10 @@ turns change, harmonics and all; what they change in turn is left out.  docs/the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from itertools import pairwise
+from dataclasses import replace
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -19,21 +21,26 @@ from scipy import sparse
 
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
+from hybrid.linear.drag import shape_of_drag
 from hybrid.linear.excitation import current_at
 from hybrid.linear.loaded_line import LoadedLine
 from hybrid.linear.matrices import LinearNetwork
+from hybrid.linear.response_results import LineResponse
 
 # Parts of times (of fewer, what is found scatters with the phases by more than a quarter), times of each, how many to
 # the shortest period that counts, by a part of the power; loads beyond the last of their power are left out.
 PARTS, TIMES, TO_A_PERIOD, POWER = 4, 256, 8.2, 0.01
+# Multiplications from which a product of matrices is shared among threads, whose waiting takes more processor time than
+# products of this size.
+SHARED = 2**18
 # Amplitudes q of exp(-i w t) that the network answers to those of loads (q,), at w, 1/s.
 Answer = Callable[[float, Any], Any]
 
 
-def left_out(network: LinearNetwork, lines: Sequence[LoadedLine], answer: Answer) -> list[dict[str, Floats]]:
-    """Of each line, whose motion is known at all frequencies: parts by which it changes standard deviations of tension
+def left_out(network: LinearNetwork, lines: Sequence[LoadedLine], answer: Answer) -> list[LineResponse]:
+    """The response of each line, whose motion is known at all frequencies, with parts by which this changes standard
 
-    (N,) and curvature (N+1,).
+    deviations of tension (N,) and curvature (N+1,), and with the shape of the law of curvature.
     """
     omegas, step = lines[0].omegas, _step(lines)
     t = step * np.arange(PARTS * TIMES)
@@ -67,7 +74,12 @@ def _at_times(turned: Floats, amplitudes: Floats) -> Floats:
     """(..., M) of amplitudes (F, ...)."""
     flat = amplitudes.reshape(len(amplitudes), -1)
     both = np.ascontiguousarray(np.vstack([flat.real, flat.imag]).T)
-    return np.asarray((both @ turned.T).reshape(*amplitudes.shape[1:], len(turned)))
+    size = max(math.isqrt(SHARED // both.shape[1]), 1)
+    out = np.empty((len(both), len(turned)))
+    for rows, columns in product(range(0, len(both), size), range(0, len(turned), size)):
+        here = slice(rows, rows + size), slice(columns, columns + size)
+        np.matmul(both[here[0]], turned[here[1]].T, out=out[here])
+    return out.reshape(*amplitudes.shape[1:], len(turned))
 
 
 def _loads(x: LoadedLine, turned: Floats) -> Floats:
@@ -97,7 +109,7 @@ def _loads(x: LoadedLine, turned: Floats) -> Floats:
     return np.asarray(out.reshape(n * SIZE, count))
 
 
-def _changes(x: LoadedLine, whole: Any, part: float) -> dict[str, Floats]:
+def _changes(x: LoadedLine, whole: Any, part: float) -> LineResponse:
     """By the amplitudes (5 (N+1), K) of what is added, in parts whose windows have mean squares of this sum."""
     n, count = x.line.s.size, whole.shape[1]
     moved = np.moveaxis(whole.reshape(n, SIZE, count), 2, 0)
@@ -106,4 +118,19 @@ def _changes(x: LoadedLine, whole: Any, part: float) -> dict[str, Floats]:
     for name, parts in (("tension", ["tension"]), ("curvature", ["curvature", "curvature_across"])):
         more, alone = (sum((np.abs(getattr(of, each)) ** 2).sum(axis=0) for each in parts) for of in (added, linear))
         out[name] = np.sqrt(1.0 + 4.0 / part * more / np.maximum(alone, 1e-300)) - 1.0
-    return out
+    return replace(linear, left_out=out, shape=_shape(x, linear, out["curvature"]))
+
+
+def _shape(x: LoadedLine, linear: LineResponse, part: Floats) -> Floats:
+    """(N+1,): by which the deviation of the size of curvature changes as that in the plane of the bend is not normal.
+
+    A string bends against the load: by drag of the water that comes from inside the bend less.
+    """
+    if len(linear.f) == 1 or not (x.cn.any() and linear.mean_curvature.any()):
+        return np.zeros(part.size)
+    inwards = x.bend[2][:, 0]
+    u = np.einsum("fni,ni->fn", x.relative(np.arange(x.omegas.size)), inwards)
+    flow = -np.einsum("ni,ni->n", current_at(x.line, x.sea, x.linear.r), inwards)
+    deviation = np.stack([np.sqrt(linear.spectrum(name).moment(0)) for name in ("curvature", "curvature_across")])
+    spread = np.sqrt(0.5 * (np.abs(u) ** 2).sum(axis=0))
+    return shape_of_drag(linear.mean_curvature, deviation, part, flow / np.maximum(spread, 1e-300))

@@ -11,7 +11,6 @@ square, found by iteration (hybrid.linear.drag).  docs/theory.md, 21.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -158,8 +157,8 @@ class _Linear:
 
     def results(self) -> dict[str, LineResponse]:
         """Of each line, by its name."""
-        changes = left_out(self.network, self.lines, self.answer)
-        return {x.name: replace(x.result(), left_out=each) for x, each in zip(self.lines, changes, strict=True)}
+        found = left_out(self.network, self.lines, self.answer)
+        return {x.name: each for x, each in zip(self.lines, found, strict=True)}
 
     def points(self) -> dict[str, Floats]:
         """Complex shifts (F, 3) m of free points."""

@@ -13,7 +13,7 @@ from hybrid.kernels.laws.obstacles import distances, thinner_nodes
 from hybrid.kernels.state.forces import OBSTACLES, SEABED
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.loaded_line import LoadedLine
-from hybrid.linear.response_results import OF_LARGEST, LineResponse
+from hybrid.linear.response_results import ADDED, OF_LARGEST, LineResponse
 
 # Parts of the motion beyond which the line is not linear: share of time that it would be slack; turn of a chord, rad;
 # mean tension by the stretch of swinging, of the standard deviation of tension; length that lifts off or touches down.
@@ -21,13 +21,14 @@ SLACK_SHARE, TURN, STRETCH, LIFTS = 1e-3, 0.2, 0.25, 0.02
 # Step, of the length, by which distances to obstacles are differentiated.
 NEAR = 1e-7
 # Parts that what is left out may add to a deviation to the first order, where this is no small part of the largest
-# along the line.  Of tension about 0.55 of that comes true, which is 3 % here (bench/test_bench_response.py).
-ADDED = {"tension": 0.055, "curvature": 0.1}
+# along the line, before a quantity is not valid at all; curvature where it is more than ADDED is not resolved.
+# Part by which the law of drag, known to the first order, may change the deviation of the size of curvature.
+MOST_ADDED, SHAPE = {"tension": ADDED, "curvature": 0.1}, 0.1
 
 
 def doubts_of(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     """Each place where the motion of a line is not small, in words."""
-    for doubt in (_slack, _swing, _touchdown, _on_obstacles, _left_out):
+    for doubt in (_slack, _swing, _touchdown, _on_obstacles, _left_out, _shape):
         yield from doubt(x, found)
 
 
@@ -109,8 +110,20 @@ def _left_out(x: LoadedLine, found: LineResponse) -> Iterator[str]:
         deviation, part = found.deviation(name), found.left_out[name]
         added = np.where(deviation >= OF_LARGEST * deviation.max(), part, 0.0)
         k = int(added.argmax())
-        if added[k] > ADDED[name]:
+        if added[k] > MOST_ADDED[name]:
             yield (
                 f"{name} at s = {places[k]:.4g} m: the rest of quadratic drag and the stretch by swinging would add "
                 f"up to {100.0 * part[k]:.2g} % to its standard deviation of {deviation[k]:.3g} {unit}"
             )
+
+
+def _shape(x: LoadedLine, found: LineResponse) -> Iterator[str]:
+    """Where bends that straighten and turn over make the deviation of their size a matter of the law of drag."""
+    deviation = found.deviation("curvature")
+    change = np.where(deviation >= OF_LARGEST * deviation.max(), np.abs(found.shape), 0.0)
+    k = int(change.argmax())
+    if change[k] > SHAPE:
+        yield (
+            f"curvature at s = {found.s[k]:.4g} m, of {found.mean_curvature[k]:.3g} 1/m in the mean, turns over: that "
+            f"drag is not normal changes its standard deviation of {deviation[k]:.3g} 1/m by {100.0 * change[k]:.2g} %"
+        )

@@ -134,12 +134,18 @@ def test_a_rod_that_a_clamp_turns_as_in_time():
 
 
 def test_what_hardly_varies_is_not_resolved(tmp_path):
-    """In short waves the lower end bends by less than a fifth of the upper one, and the command says so."""
+    """In short waves the lower end bends by less than a fifth of the upper one, or what is left out there is much of it,
+
+    and the command says so.
+    """
     waves = {"kind": "jonswap", "significant_height": 1.0, "peak_period": 5.0, "direction": 30, "depth": 100}
     line = hybrid.response(hung(waves)).lines["cable"]
     known, deviation = line.resolved("curvature"), line.deviation("curvature")
     assert not known[3] and known[57]
-    assert deviation[known].min() >= 0.2 * deviation.max() > deviation[~known].max()
+    much = line.left_out["curvature"] > 0.055
+    assert (known == (deviation >= 0.2 * deviation.max()) & ~much).all() and (
+        much & (deviation > deviation[known].min())
+    ).any()
     (tmp_path / "scene.yaml").write_text(json.dumps(hung(waves)))
     out = CliRunner().invoke(app, ["response", str(tmp_path / "scene.yaml")])
     assert "curvature is not known where" in out.output.replace("\n", " "), out.output
