@@ -21,7 +21,7 @@ import pytest
 import hybrid
 
 pytestmark = pytest.mark.bench
-PARTS, FIVE = np.linspace(0.05, 0.95, 19), [0, 4, 9, 14, 18]
+PLACES, FIVE = np.linspace(0.05, 0.95, 19), [0, 4, 9, 14, 18]
 HOUR, SEEDS = 3600.0, range(1, 1 + int(os.environ.get("HYBRID_HOURS", "10")))
 LINE = {
     "mass": 30.0, "diameter": 0.1, "axial_stiffness": 5e6, "bending_stiffness": 2e3, "torsional_stiffness": 1e3,
@@ -143,7 +143,7 @@ def test_against_hours(name, tmp_path):
         costs.append(clock.process_time() - begin)
     cost = float(np.median(costs))
     line_name, line = next(iter(found.lines.items()))
-    places = [round(part * float(line.s[-1]), 3) for part in PARTS.tolist()]
+    places = [round(part * float(line.s[-1]), 3) for part in PLACES.tolist()]
     there: dict[str, list] = {"tension": [], "curvature": []}
     bends = bool(line.mean_curvature.max() > 0.0)
     begin = clock.process_time()
@@ -166,7 +166,7 @@ def test_against_hours(name, tmp_path):
     added = 100.0 * line.left_out["tension"].max()
     known = line.resolved("curvature")[[int(np.abs(line.s - x).argmin()) for x in at]]
     offs = 100.0 * np.abs(bent - curvature) / (curvature.max() if bends else 1.0)
-    five = np.isin(np.arange(PARTS.size), FIVE)
+    five = np.isin(np.arange(PLACES.size), FIVE)
     off_bent = offs[known & five].max(initial=0.0)
     words = ["tension" if found.valid_for("tension") else "", "curvature" if found.valid_for("curvature") else ""]
     print(

@@ -52,11 +52,12 @@ def _unresolved(found: Response) -> Iterator[str]:
         known, deviation = line.resolved("curvature"), line.deviation("curvature")
         if not known.all() and deviation.any():
             of = f"line {name}: " if len(found.lines) > 1 else ""
-            most = "" if known[deviation.argmax()] else "; where it varies most is such a place"
+            most, part = OF_LARGEST * deviation.max(), 100.0 * ADDED["curvature"]
+            where = "" if known[deviation.argmax()] else "; where it varies most is such a place"
             yield (
                 f"{of}curvature is not known where its standard deviation is below a fifth of the largest, "
-                f"{OF_LARGEST * deviation.max():.3g} 1/m, or where more than {100.0 * ADDED:.2g} % of it are left out, "
-                f"{100.0 * np.mean(~known):.0f} % of the line: it may vary several times as much{most}"
+                f"{most:.3g} 1/m, or where more than {part:.2g} % of it are left out, "
+                f"{100.0 * (1.0 - known.mean()):.0f} % of the line: it may vary several times as much{where}"
             )
 
 

@@ -15,9 +15,9 @@ from hybrid.statistics.fatigue import Curve, curve_of, dirlik_damage
 
 HOURS = 3.0
 # Part of the largest deviation along a line from which one is known: below it what goes with the square of the motion,
-# which is left out, may be several times as much.  Part that what is left out may add to it: about 0.55 of that comes
-# true, which is 3 % here (bench/test_bench_response.py).
-OF_LARGEST, ADDED = 0.2, 0.055
+# which is left out, may be several times as much.  Parts that what is left out may add to a deviation: half to three
+# quarters of that come true, which is 3 % here (bench/test_bench_response.py).
+OF_LARGEST, ADDED = 0.2, {"tension": 0.045, "curvature": 0.055}
 VARIES = ("position", "tension", "curvature", "curvature_across")
 ALONE = ("tension", "curvature")  # of which notes begin with the quantity and its place
 
@@ -77,7 +77,9 @@ class LineResponse:
         at most `ADDED` to it: elsewhere what goes with the square of the motion may be several times as much.
         """
         deviation = self.deviation(name)
-        return np.asarray((deviation >= OF_LARGEST * deviation.max()) & (self.left_out.get(name, 0.0) <= ADDED))
+        return np.asarray(
+            (deviation >= OF_LARGEST * deviation.max()) & (self.left_out.get(name, 0.0) <= ADDED.get(name, np.inf))
+        )
 
     def period(self, name: str) -> Floats:
         """Mean period between up-crossings, s."""

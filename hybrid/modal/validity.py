@@ -21,9 +21,9 @@ SLACK_SHARE, TURN, STRETCH, LIFTS = 1e-3, 0.2, 0.25, 0.02
 # Step, of the length, by which distances to obstacles are differentiated.
 NEAR = 1e-7
 # Parts that what is left out may add to a deviation to the first order, where this is no small part of the largest
-# along the line, before a quantity is not valid at all; curvature where it is more than ADDED is not resolved.
+# along the line, before a quantity is not valid at all; curvature is not resolved where it is more than ADDED.
 # Part by which the law of drag, known to the first order, may change the deviation of the size of curvature.
-MOST_ADDED, SHAPE = {"tension": ADDED, "curvature": 0.1}, 0.1
+MOST_ADDED, SHAPE = ADDED | {"curvature": 0.1}, 0.1
 
 
 def doubts_of(x: LoadedLine, found: LineResponse) -> Iterator[str]:

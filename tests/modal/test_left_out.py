@@ -107,7 +107,7 @@ def test_the_size_of_a_vector_with_the_law_of_drag() -> None:
         rest = force - force.mean() - (force * z).mean() * z
         x = z + np.sqrt((1.0 + part) ** 2 - 1.0) * rest / rest.std()
         there = np.hypot(mean + x / x.std(), 0.4 * y).std() / np.hypot(mean + z, 0.4 * y).std() - 1.0
-        assert shape(mean, 0.4, part, flow) == pytest.approx(there, abs=2e-3)
+        assert shape(mean, 0.4, part, flow) == pytest.approx(there, abs=3e-3)
     assert shape(1.6, 0.4, 0.05, 0.0) < -0.05 < 0.0 < shape(2.4, 0.4, 0.02, 3.2)
 
 
