@@ -36,6 +36,9 @@ from hybrid.solve.workspaces import workspace_of
 
 # Steps of the damped motion, at most; the largest, in time scales: what moves by more meets itself at full speed.
 STEPS, LARGEST = 20_000, 0.25
+# A motion that has come no further than STALLED time scales in so many tries of steps does not come to rest: what has
+# neither tension nor bending snaps from fold to fold.
+STALLING, STALLED = 2000, 0.05
 # Speed, in lengths per time scale, at which all is stopped (a start that a bed throws up, a strong torque), and the
 # most that a cell spins in a step, rad: what is faster could twist from cell to cell by half a turn unseen.
 FASTEST, MOST_SPIN = 10.0, 1.0
@@ -177,7 +180,12 @@ def stop(state: State) -> None:
 def calming(job: Moving, time_scale: float, length: float) -> Iterator[int]:
     """The damped motion: iterations so far, each time that it has calmed by another order, and at its end."""
     dt, before, calm, total, orders = 1e-3 * time_scale, 0.0, 0, 0, list(CALMER)
-    for _ in range(STEPS):
+    gone = 0.0
+    for tries in range(STEPS):
+        if tries % STALLING == 0 and tries:
+            if gone < STALLED * time_scale:
+                break
+            gone = 0.0
         outcome, iterations, moved = job.step(dt, before)
         total += iterations
         if outcome != Outcome.OK:
@@ -187,7 +195,7 @@ def calming(job: Moving, time_scale: float, length: float) -> Iterator[int]:
             if dt < 1e-9 * time_scale:
                 break
             continue
-        before = dt
+        before, gone = dt, gone + dt
         if job.speed > FASTEST * length / time_scale:
             job.rest()
             calm = 0

@@ -19,13 +19,15 @@ from hybrid.kernels.state.report import TWIST
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.step.accept import LARGEST_TWIST
 from hybrid.solve.contact_stability import ContactStability
-from hybrid.solve.contact_statics import DAMPING, MOST_SPIN, ROAD, STEPS, calming, stop
-from hybrid.solve.joined import JoinedLine, SystemState
+from hybrid.solve.contact_statics import DAMPING, MOST_SPIN, ROAD, STALLING, calming, stop
+from hybrid.solve.flaws import slack_text
+from hybrid.solve.joined import JoinedLine, SystemState, SystemTaken
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.settling import along, damped, nudged
 from hybrid.solve.shared_contact import SharedContact
 from hybrid.solve.statics import MOST_FALLS, PUSHED, SAME
 from hybrid.solve.system import SystemSolver
+from hybrid.solve.system_flaws import slack_cell
 from hybrid.solve.system_statics import LineFailed, SystemEquilibrium, damped_bodies
 
 # That of each line with itself (None: it has none), and of lines with each other, where these may touch.
@@ -145,6 +147,16 @@ class _Falls:
         return SystemState(out, states.bodies.copy())
 
 
+def _failed(lines: Sequence[JoinedLine], taken: SystemTaken, states: SystemState, path: list[str]) -> LineFailed:
+    """The error of a search that ended with a motion in these states: what has no tension has no one place to find."""
+    if taken.outcome == Outcome.NOT_CONVERGED:
+        for k, (x, state) in enumerate(zip(lines, states.lines, strict=True)):
+            if (cell := slack_cell(x, state)) >= 0:
+                detail = "\n              ".join([slack_text(x.line, state, x.scale), *path])
+                return LineFailed(k, Outcome.SLACK, None, float(x.line.s[cell]), detail)
+    return LineFailed(taken.line, taken.outcome, None, None, "\n              ".join(path))
+
+
 def settled_system(
     lines: Sequence[JoinedLine], points: int, bodies: Floats, start: SystemState, contacts: Contacts,
     keeps_turns: Callable[[SystemState], tuple[int, str]], near: bool = False,
@@ -161,14 +173,14 @@ def settled_system(
     mass = sum(float(x.line.mass.sum()) for x in lines) + float(bodies[:, MASS].sum())
     time_scale, path, total = float(np.sqrt(mass * found.length / found.scale)), list[str](), 0
     slow = [x._replace(line=damped(x.line, x.length, time_scale, DAMPING), slackens=True) for x in smooth]
-    damped_solver = touching_solver(slow, points, damped_bodies(bodies, time_scale), contacts)
+    slow_bodies = damped_bodies(bodies, time_scale)
     falls = _Falls(found, time_scale)
     first = start.copy()
     if not near:  # what lies straight without tension may need the push, too
         falls.try_later(falls.nudged(start))
         first = first if falls.finds_all else falls.next(None) or first
     while True:
-        moving = _Moving(damped_solver, first)
+        moving = _Moving(touching_solver(slow, points, slow_bodies, contacts), first)
         for iterations in chain([0] if near else [], calming(moving, time_scale, found.length)):
             line, lost = keeps_turns(moving.state)
             if lost:  # and will not come back
@@ -189,9 +201,10 @@ def settled_system(
                 break
         total += iterations
         near, state = False, None
-        if moving.tries < STEPS:  # else it comes to no rest, from another start neither
+        if taken.outcome == Outcome.UNSTABLE or moving.tries < STALLING:  # else it comes to no rest from elsewhere
             state = falls.next(states if taken.outcome == Outcome.UNSTABLE else None)
         if state is None:
-            outcome = Outcome.TURNS_LOST if lost else taken.outcome
-            raise LineFailed(line, outcome, None, None, "\n              ".join(path))
+            if lost:
+                taken = replace(taken, outcome=Outcome.TURNS_LOST, line=line)
+            raise _failed(smooth, taken, moving.state, path)
         first = state

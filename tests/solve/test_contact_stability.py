@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.errors import ComputationError, Outcome
 from hybrid.model.system import build_system
 from hybrid.simulation.system_start import equilibrium_of_system
 from hybrid.solve.contact_stability import ContactStability, contact_stiffness
@@ -104,3 +105,18 @@ def test_what_rests_between_sample_points_alone_is_said_to(drop: float, slides: 
     told = [x.text for x in result.events if x.kind == "stability not judged"]
     assert len(told) == 2
     assert all(("it would slide but for" in x) == slides for x in told)
+
+
+def test_a_slack_chain_over_a_taut_rope_is_refused_because_it_is_slack() -> None:
+    """Its legs snap from fold to fold in steps of microseconds, so that the motion does not come to rest."""
+    chain = {"length": 2.0, "mass": 0.3, "diameter": D, "axial_stiffness": 1e5, "bending_stiffness": 0}
+    a, b = [0, -0.3, 0.02], [0, 0.3, 0.02]
+    tables = on_top()
+    tables["points"] |= {"a": {"position": a}, "b": {"position": b}}
+    tables["lines"]["upper"] = {
+        "start": "a", "end": "b", "sections": [chain], "mesh": {"cells": 40}, "contact": {"self": False},
+        "initial": {"points": [a, [0, 0, 0.95], b]},
+    }  # fmt: skip
+    with pytest.raises(ComputationError, match="are compressed") as failed:
+        hybrid.static(tables)
+    assert failed.value.outcome == Outcome.SLACK
