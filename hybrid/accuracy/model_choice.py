@@ -7,7 +7,9 @@ that it needs.  docs/zone_rules.md
 from __future__ import annotations
 
 from dataclasses import replace
+from math import ceil, isinf
 
+from hybrid.model.build import Model
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.model_costs import (
     NAMED,
@@ -22,11 +24,14 @@ from hybrid.model.model_costs import (
     with_model,
 )
 from hybrid.model.resolution import Resolution, for_motion, model_is_free, wants_survey
+from hybrid.model.run_time import foretold_steps
 from hybrid.scene.schema import AdaptiveModel
 from hybrid.simulation.case import Case
+from hybrid.simulation.initial_zones import HOLD
 from hybrid.simulation.layer_mesh import layered
 from hybrid.simulation.mesh_survey import lack_along, with_survey
 from hybrid.simulation.static_case import StaticCase
+from hybrid.simulation.zone_switching import LONGEST_IN_PACE, READY
 
 
 def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
@@ -45,11 +50,20 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
     near = "it comes near itself, and contact of catenaries alone is not asked for" if case.came_near_itself else ""
     why_not = structural(scene, model.cable) or near or no_catenary(found, demand.s)
     of_zones = rods_of_zones(model, demand, found, gradings["rod"])
-    each = costs(scene, model, rods, catenaries, of_zones, why_not)
+    each = costs(scene, model, rods, catenaries, of_zones, why_not, _steps_of_zones(case, model, resolution))
     kind = cheapest(each).kind
     if kind != "rod":
         case.scene = with_model(scene, kind)
     return ModelChoice(kind, reasons(each)), replace(resolution, grading=gradings[kind])
+
+
+def _steps_of_zones(case: Case, model: Model, resolution: Resolution) -> float:
+    """Steps of zones that move for one of rods: those that follow the motion are no longer than zones let them be."""
+    time, longest = case.scene.require_time(), LONGEST_IN_PACE * READY * HOLD * model.time_scale
+    if resolution.local is None or isinf(longest):
+        return 1.0
+    rods = foretold_steps(case.scene, model, resolution, ceil(time.duration / resolution.step))
+    return max(1.0, time.duration / longest / rods)
 
 
 def chosen_and_surveyed(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resolution]:

@@ -30,6 +30,7 @@ NEARLY_SLACK = 0.05
 # A clamp or a point load makes so many lengths sqrt(EI/T) a rod, and what asks for it so many on either side of it.
 DISTURBED, WIDER = 4.0, 2.0
 MOST_RANGES = 4  # places of rods that are named
+VISIBLY = 1.05  # times the steps of rods that are named
 # Part of what a catenary may lack along the line from which on zones that move are rod (simulation.initial_zones).
 ZONES_ALONG = 0.5
 
@@ -76,6 +77,7 @@ class Cost(NamedTuple):
     seconds: float
     why_not: str = ""
     rods: Rods | None = None  # of zones that move
+    steps: float = 1.0  # for one of rods everywhere
 
 
 class Demand(NamedTuple):
@@ -172,26 +174,27 @@ def no_catenary(found: Sequence[Floats], s: Floats) -> str:
 
 
 def costs(
-    scene: Scene, model: Model, rods: int, catenaries: int, of_zones: Rods, why_not: str
+    scene: Scene, model: Model, rods: int, catenaries: int, of_zones: Rods, why_not: str, more_steps: float = 1.0
 ) -> tuple[Cost, Cost, Cost]:
     """Of rods, catenaries and zones that move, which have the cells of rods.
 
-    rods, catenaries: cells; of_zones: what zones would make rod; why_not: why catenaries are no choice.
+    rods, catenaries: cells; of_zones: what zones would make rod; why_not: why catenaries are no choice; more_steps: of
+    zones, for one of rods.
     """
     share, part = of_zones.share * rods, FOLLOWED["adaptive"]
     moving = step_time(scene, model, share, rods - share, moves=True, followed=part)
     return (
         Cost("rod", rods, step_time(scene, model, rods, 0)),
         Cost("catenary", catenaries, step_time(scene, model, 0, catenaries, followed=FOLLOWED["catenary"]), why_not),
-        Cost("adaptive", rods, moving, rods=of_zones),
+        Cost("adaptive", rods, moving, rods=of_zones, steps=more_steps),
     )
 
 
 def cheapest(found: Sequence[Cost]) -> Cost:
     """Rods, or what costs clearly less; found: rods first."""
     rods = found[0]
-    others = [x for x in found[1:] if not x.why_not and x.seconds < CLEARLY[x.kind] * rods.seconds]
-    return min(others, key=lambda x: x.seconds, default=rods)
+    others = [x for x in found[1:] if not x.why_not and x.steps * x.seconds < CLEARLY[x.kind] * rods.seconds]
+    return min(others, key=lambda x: x.steps * x.seconds, default=rods)
 
 
 def reasons(found: Sequence[Cost]) -> str:
@@ -203,4 +206,5 @@ def _in_words(cost: Cost) -> str:
     if cost.why_not:
         return f"is no choice: {cost.why_not}"
     cells = f"{cost.cells} cells, {cost.rods}" if cost.rods is not None else f"{cost.cells} cells"
-    return f"{float(f'{1e6 * cost.seconds:.2g}'):g} µs of processor time per step ({cells})"
+    more = f"; {cost.steps:.2g} times as many steps" if cost.steps > VISIBLY else ""
+    return f"{float(f'{1e6 * cost.seconds:.2g}'):g} µs of processor time per step ({cells}{more})"

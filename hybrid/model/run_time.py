@@ -31,7 +31,7 @@ COST_WAVE = 10e-9
 # s of a run, a step, an output.
 COST_RUN, COST_STEP, COST_OUTPUT = 0.02, 12e-6, 0.1e-3
 # s of a step of zones that move, and of each of their cells: criteria, and the joints of a rod.
-COST_MANAGER, COST_CRITERIA = 5e-6, 0.03e-6
+COST_MANAGER, COST_CRITERIA = 3e-6, 0.03e-6
 COST_CORRECTOR = 0.23e-6  # s per cell and step, where the error of leaving bending out is followed
 USUAL_ITERATIONS = 2.1
 # Part of a line of moving zones that is rod, on average over scenes, which differ from none to all.

@@ -144,6 +144,8 @@ def test_rods_unless_others_cost_clearly_less():
     assert cheapest([rod, Cost("catenary", 100, 0.5), Cost("adaptive", 100, 0.35)]).kind == "adaptive"
     assert cheapest([rod, Cost("catenary", 100, 0.95), Cost("adaptive", 100, 0.85)]).kind == "rod"
     assert cheapest([rod, Cost("catenary", 100, 0.5, "an end is clamped")]).kind == "rod"
+    assert cheapest([rod, Cost("adaptive", 100, 0.5, steps=1.5)]).kind == "adaptive"
+    assert cheapest([rod, Cost("adaptive", 100, 0.5, steps=2.0)]).kind == "rod"
 
 
 def test_the_plan_predicts_each():
