@@ -344,11 +344,9 @@ def priced(problem: Problem, objective: Objective, point: Point) -> Optimum:
     own, first_sizes = space.sizes(point.x), space.sizes(space.start)
     sizes = np.maximum(own, first_sizes)  # of an unknown that goes to 0, where a part of itself changes nothing more
     gradient = objective.slopes(point) * sizes
-    held = [k for k, c in enumerate(constraints) if is_active(c, point, problem.within)]
     at = np.stack([np.abs(point.x - space.low) <= AT_BOUND * own, np.abs(point.x - space.high) <= AT_BOUND * own], 1)
     columns, least, owners = [], list[float](), list[int]()
-    for k in held:
-        c = constraints[k]
+    for k, c in enumerate(constraints):  # a peak whose parabola is higher than that of the extreme holds it up, too
         values, slopes = peaks_of(c, point)
         for slope in slopes[np.abs(values - c.bound) <= problem.within.active * c.scale]:
             columns.append((c.side or 1) * slope * sizes)
