@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.view.decimate import Store, outline
-from hybrid.view.figure import Axis, Band, Box, Item, Line, Map, Marks, Panel, Rule
+from hybrid.view.figure import Axis, Band, Box, Item, Line, Map, Marks, Panel, Rule, Text
 from hybrid.view.style import INK
 
 Spec = dict[str, Any]
@@ -36,6 +36,8 @@ def figure_of(panel: Panel, store: Store) -> Spec:
             figure["now"] = {"trace": len(figure["data"]), "frames": store.add(item.frames)}
         if isinstance(item, Box | Rule):
             figure["layout"].setdefault("shapes", []).extend(_shapes(item))
+        elif isinstance(item, Text):
+            figure["layout"].setdefault("annotations", []).append(_annotation(item))
         else:
             figure["data"] += _traces(item, store, panel.y.unit if readable else None)
     seen: set[str] = set()
@@ -71,6 +73,15 @@ def _layout(panel: Panel, across: tuple[float, float], up: tuple[float, float]) 
         | {"font": {"size": 12}},
         "hoverlabel": {"bgcolor": "#FFFFFF", "bordercolor": "#9E9E9E", "align": "left"}
         | {"font": {"size": 12, "color": INK, "family": _FONT}},
+    }  # fmt: skip
+
+
+def _annotation(item: Text) -> Spec:
+    across, up = ("x domain" if "x" in item.parts else "x"), ("y domain" if "y" in item.parts else "y")
+    return {
+        "text": escape(item.text), "x": item.x, "y": item.y, "xref": across, "yref": up, "showarrow": False,
+        "xanchor": item.across, "yanchor": "bottom" if item.up == "baseline" else item.up,
+        "xshift": item.offset[0], "yshift": item.offset[1], "font": {"color": item.colour, "size": _WIDER * item.size},
     }  # fmt: skip
 
 

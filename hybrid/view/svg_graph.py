@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.view.decimate import outline
-from hybrid.view.figure import Axis, Band, Box, Item, Line, Map, Marks, Panel, Rule
+from hybrid.view.figure import Axis, Band, Box, Item, Line, Map, Marks, Panel, Rule, Text
 from hybrid.view.style import GREY, INK
 
 # px; type is readable where a page shows it half as wide as a screen, on a phone and in a column of A4.
@@ -154,6 +154,14 @@ def _drawn(item: Item, at: _Place) -> str:
             return "".join(f'<path d="M{at.left:.1f} {at.y(y):.1f}H{at.right:.1f}" {look}/>' for y in item.at)
         case Map():
             return _map(item, at)
+        case Text():
+            x = at.left + item.x * (at.right - at.left) if "x" in item.parts else float(at.x(item.x))
+            y = at.bottom - item.y * (at.bottom - at.top) if "y" in item.parts else float(at.y(item.y))
+            place = (
+                f'x="{x + item.offset[0]:.1f}" y="{y - item.offset[1] + (_TICK_TYPE if item.up == "top" else 0):.1f}"'
+            )
+            anchor = "end" if item.across == "right" else "start"
+            return f'<text {place} text-anchor="{anchor}" fill="{item.colour}">{escape(item.text)}</text>'
     raise TypeError(f"a page does not draw {type(item).__name__}")
 
 

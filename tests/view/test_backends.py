@@ -16,7 +16,7 @@ import hybrid.view
 from hybrid.store.reader import Result
 from hybrid.view import panels, zones
 from hybrid.view.decimate import Store, kept
-from hybrid.view.figure import Axis, Band, Line, Panel, Text
+from hybrid.view.figure import Area, Axis, Band, Line, Panel, Text
 from hybrid.view.matplotlib_backend import draw_panel, new_axes
 from hybrid.view.plotly_backend import figure_of
 from hybrid.view.svg_backend import draw
@@ -38,6 +38,20 @@ def array(block: bytes, value: Any) -> np.ndarray:
     if not isinstance(value, dict):
         return np.array(value, dtype=float)
     return np.frombuffer(block, f"<{value['type']}", int(np.prod(value["shape"])), value["$at"])
+
+
+def test_texts_of_a_page_stand_beside_their_places() -> None:
+    items = (
+        Line(np.zeros(2), np.ones(2)),
+        Text(4.0, 0.5, "<b>", offset=(3.0, -2.0), up="baseline"),
+        Text(0.2, 1.0, "a", parts="x"),
+    )
+    first, second = figure_of(Panel("k", "t", Axis("t", "s"), Axis("z", "m"), list(items)), Store())["layout"][
+        "annotations"
+    ]
+    assert (first["text"], first["x"], first["y"], first["xref"], first["yref"]) == ("&lt;b&gt;", 4.0, 0.5, "x", "y")
+    assert (first["xshift"], first["yshift"], first["yanchor"]) == (3.0, -2.0, "bottom")
+    assert (second["xref"], second["yref"]) == ("x domain", "y")
 
 
 def test_paper_and_page_show_the_same_curves_and_limits() -> None:
@@ -114,8 +128,8 @@ def test_a_name_at_the_edge_of_a_small_drawing_is_not_cut(at: float, up: str) ->
 
 def test_a_back_end_says_what_it_cannot_draw() -> None:
     unit = Axis("", "", 0.0, 1.0)
-    with pytest.raises(TypeError, match="Text"):
-        figure_of(Panel("p", "p", unit, unit, [Text(0.0, 0.0, "a word")]), Store())
+    with pytest.raises(TypeError, match="Area"):
+        figure_of(Panel("p", "p", unit, unit, [Area(np.zeros((1, 3, 2)), "red")]), Store())
     with pytest.raises(TypeError, match="Band"):
         draw([Panel("p", "p", unit, unit, [Band(np.zeros(2), np.zeros(2), np.ones(2))])])
 

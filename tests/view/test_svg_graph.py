@@ -14,7 +14,7 @@ from PIL import Image
 from reported import reported
 
 from hybrid.view.decimate import kept
-from hybrid.view.figure import Axis, Band, Box, Line, Map, Marks, Panel, Rule
+from hybrid.view.figure import Axis, Band, Box, Line, Map, Marks, Panel, Rule, Text
 from hybrid.view.panels import end_forces, ranges
 from hybrid.view.svg_graph import draw_graph, png, ticks_of
 from hybrid.view.zones import zone_map
@@ -52,6 +52,20 @@ def test_curves_lie_where_the_numbers_of_the_axes_say() -> None:
     shown = np.isfinite(y)
     assert drawn[:, 0] == pytest.approx(np.interp(t[shown], list(across), list(across.values())), abs=0.11)
     assert drawn[:, 1] == pytest.approx(np.interp(y[shown], list(up), list(up.values())), abs=0.11)
+
+
+def test_texts_stand_beside_their_places() -> None:
+    """By values of the axes, or by parts of the panel; offsets up are less px."""
+    curve, beside = Line(np.array([0.0, 10.0]), np.zeros(2), colour="#123456"), (3.0, -2.0)
+    items = curve, Text(4.0, 0.5, "low <tension>", offset=beside), Text(0.25, 0.75, "peak", across="right", parts="xy")
+    svg = draw_graph(panel(*items))
+    across, up = numbers(svg, "middle"), numbers(svg, "end")
+    found = {
+        text: (float(x), float(y))
+        for x, y, text in re.findall(r'<text x="([\d.]+)" y="([\d.]+)"[^>]*fill[^>]*>([^<]+)<', svg)
+    }
+    assert found["low &lt;tension&gt;"] == pytest.approx((across[4.0] + 3.0, up[0.5] + 2.0), abs=0.11)
+    assert found["peak"] == pytest.approx((0.75 * across[0.0] + 0.25 * across[10.0], up[0.5]), abs=0.11)
 
 
 def test_no_peak_of_a_long_curve_is_lost() -> None:

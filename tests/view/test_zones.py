@@ -21,6 +21,7 @@ from hybrid.view import zones as zoneplot
 from hybrid.view.figure import Axis, Map, Panel, Text
 from hybrid.view.matplotlib_backend import draw_panel
 from hybrid.view.plots import plot_zones
+from hybrid.view.svg_graph import draw_graph
 from hybrid.view.zones import WHY, rods_at_start, why_rods, zone_map
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -355,5 +356,6 @@ def test_the_picture_of_zones_says_why_a_stretch_is_rod() -> None:
         assert said.endswith("rod later: bending × 1") is any(x.kind == "grow" for x in result.events)
         words = [x.text for x in zone_map(result).items if isinstance(x, Text)]
         assert words == ["bending", "asked for by the scene"]
+        assert all(word in draw_graph(zone_map(result)) for word in words)  # in a report, too
         assert said in " ".join(texts(plot_zones(result)).split())
         result.close()
