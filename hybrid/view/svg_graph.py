@@ -155,13 +155,12 @@ def _drawn(item: Item, at: _Place) -> str:
         case Map():
             return _map(item, at)
         case Text():
-            x = at.left + item.x * (at.right - at.left) if "x" in item.parts else float(at.x(item.x))
-            y = at.bottom - item.y * (at.bottom - at.top) if "y" in item.parts else float(at.y(item.y))
-            place = (
-                f'x="{x + item.offset[0]:.1f}" y="{y - item.offset[1] + (_TICK_TYPE if item.up == "top" else 0):.1f}"'
-            )
+            across = at.left + item.x * (at.right - at.left) if "x" in item.parts else float(at.x(item.x))
+            up = at.bottom - item.y * (at.bottom - at.top) if "y" in item.parts else float(at.y(item.y))
+            up += _TICK_TYPE * (item.up == "top") - item.offset[1]
             anchor = "end" if item.across == "right" else "start"
-            return f'<text {place} text-anchor="{anchor}" fill="{item.colour}">{escape(item.text)}</text>'
+            look = f'text-anchor="{anchor}" fill="{item.colour}"'
+            return f'<text x="{across + item.offset[0]:.1f}" y="{up:.1f}" {look}>{escape(item.text)}</text>'
     raise TypeError(f"a page does not draw {type(item).__name__}")
 
 
