@@ -13,6 +13,7 @@ from hybrid.scene.study import LIMIT_OF, Kept
 from hybrid.statistics import moments
 from hybrid.store.envelope import farthest
 from hybrid.store.extrapolation import extreme_of
+from hybrid.store.fatigue_errors import too_far_apart
 from hybrid.store.histories import History, history_of, lies_along
 from hybrid.store.limits import at_every_step
 from hybrid.store.reader import Result
@@ -142,6 +143,8 @@ def _taken(
     if take == "damage":
         assert kept.curve is not None
         s, damage = result.damage(kept.curve, strength=kept.strength, section=kept.section, times=kept.times, at=at)
+        if few := too_far_apart(result, float(s[np.argmax(damage)]), kept.times):
+            raise NotAlwaysThere(few)
         text = f"fatigue damage by {kept.curve}"
         if at is None:
             along = "s" if kept.line is None else f"{own}_s"
