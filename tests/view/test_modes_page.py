@@ -16,13 +16,14 @@ from hybrid.cli.commands import app
 from hybrid.live.worker import Worker
 from hybrid.view.modes_page import section
 
+# Of two bending stiffnesses, or modes of one period could swing in any direction, along the line of sight as well.
 SCENE = """
 title: A rod between two clamps
 environment: {gravity: 0}
-cable: {sections: [{length: 10, mass: 5, diameter: 0.1, axial_stiffness: 1.0e+7, bending_stiffness: 500}]}
+cable: {sections: [{length: 10, mass: 5, diameter: 0.1, axial_stiffness: 1.0e+7, bending_stiffness: [500, 550], torsional_stiffness: 500}]}
 ends:
-  start: {kind: clamped, position: [0, 0, 0], tangent: [1, 0, 0]}
-  end: {kind: clamped, position: [10.001, 0, 0], tangent: [1, 0, 0]}
+  start: {kind: clamped, position: [0, 0, 0], tangent: [1, 0, 0], normal: [0, 0, 1]}
+  end: {kind: clamped, position: [10.001, 0, 0], tangent: [1, 0, 0], normal: [0, 0, 1]}
 initial: equilibrium
 model: rod
 mesh: {cells: 40}
