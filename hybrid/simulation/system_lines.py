@@ -245,11 +245,8 @@ class LineResult:
         why = "round-off of the bending of so short cells hides it" if self.number in found.solver.blurred else ""
         if turned and line.element.any():
             why = "a moment at a point is not conservative"
-        if found.settled and (line.element.any() or touches):
-            there = f"{self._touched}; " if touches else ""
-            why = f"{there}a damped motion with contact, without friction, led there"
-            if touches and found.in_hollows:
-                why = f"{why}, and without friction it would slide but for the spacing of the sample points of contact"
+        if found.unjudged and (line.element.any() or touches):
+            why = f"{self._touched}; {found.unjudged}" if touches else found.unjudged
         if found.solver.presses_bodies:
             why = "lines touch a body that is free"
         if why:

@@ -62,7 +62,8 @@ class ContactStability:
 
     def __init__(self, solver: SystemSolver) -> None:
         self._solver, lines, points = solver, solver.lines, len(solver.net)
-        self.in_hollows = False  # whether the last equilibrium would not stay with more sample points
+        # Of the last equilibrium: whether it would not stay with more sample points; whether round-off hides it.
+        self.in_hollows = self.blurred = False
         begins = np.concatenate([[0], np.cumsum([x.line.s.size for x in lines])])
         self._nodes = [np.arange(a, b) for a, b in pairwise(begins.tolist())]
         self._parts = [Stability(x.line, x.sea, x.length, x.scale) for x in lines]
@@ -92,6 +93,7 @@ class ContactStability:
         """Whether an equilibrium would stay; True too where round-off hides it, as of one line (`Stability.holds`)."""
         finer = self._contact(states, FINER)
         self.in_hollows = finer is not None and not self._is_definite(states, finer)
+        self.blurred = False
         return self._is_definite(states, self._contact(states, 1))
 
     def _is_definite(self, states: SystemState, contact: Any) -> bool:
@@ -100,7 +102,8 @@ class ContactStability:
         if _factor(self._matrix(states, soft, contact)[0]) is not None:
             return True
         lost = LOST * max(float(stiffest_bending(x.line).max()) for x in self._solver.lines)
-        return lost > soft and _factor(self._matrix(states, lost, contact)[0]) is not None
+        self.blurred = lost > soft and _factor(self._matrix(states, lost, contact)[0]) is not None
+        return self.blurred
 
     def softest_motion(self, states: SystemState) -> tuple[float, list[Floats]]:
         """Square (1/s^2, below 0: it grows) and shapes (N+1, 3) of the lines of the softest motion of an equilibrium.

@@ -100,13 +100,17 @@ class _Falls:
         return f"{ROAD}, {PUSHED}" if self._known else ROAD
 
     @property
-    def are_hollows(self) -> bool:
-        """Whether the last equilibrium would not stay where contact had more sample points."""
-        return self._stability.in_hollows
+    def unjudged(self) -> str:
+        """Why it is not known that the last equilibrium would stay; "": it would."""
+        if self._stability.in_hollows:
+            return "without friction it would slide but for the spacing of the sample points of contact"
+        if self._stability.blurred:
+            return "round-off of the bending of so short cells hides it"
+        return "" if self.finds_all else "a damped motion with contact, without friction, led there"
 
     def holds(self, states: SystemState) -> bool:
         """Whether an equilibrium of the solver would stay, or whether it would is not known."""
-        self._stability.in_hollows = False
+        self._stability.in_hollows = self._stability.blurred = False
         if not self._solver.in_contact() or not self._stability.judges:  # it has been judged without contact
             return True
         return self._stability.holds(states)
@@ -195,7 +199,7 @@ def settled_system(
             if taken.outcome == Outcome.OK and not lost:
                 return SystemEquilibrium(
                     states, tuple(path), total + iterations, taken.residual, found, settled=True,
-                    in_hollows=falls.are_hollows,
+                    unjudged=falls.unjudged,
                 )  # fmt: skip
             if taken.outcome == Outcome.UNSTABLE and falls.is_new(states):
                 break

@@ -36,7 +36,7 @@ class SystemEquilibrium:
     residual: float
     solver: SystemSolver  # whose reports are those of the solution
     settled: bool = False  # True where a damped motion with contact led there
-    in_hollows: bool = False  # whether it would not stay where contact had more sample points
+    unjudged: str = ""  # where settled: why it is not known that it would stay
     with_friction: frozenset[int] = frozenset()  # numbers of the lines of which friction on the bed took part
 
     @property

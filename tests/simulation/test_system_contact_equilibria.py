@@ -78,7 +78,7 @@ def test_lines_rest_as_the_cable_does() -> None:
             here, there = line[name], alone[name]
             assert np.abs(here - there).max() <= 1e-6 * np.abs(there).max() > 0.0, name
         told = {e.kind: e.text for e in line.events}
-        assert "damped motion with contact" in told["stability not judged"]
+        assert "stability not judged" not in told  # one stiffness with contact judges it
         assert "touches itself" in told["static friction neglected"] and "line touches itself" in told
     assert system.attributes["static_residual"] < 1e-9
     stays(scene, system, "line 1")

@@ -79,7 +79,7 @@ def test_a_line_on_top_of_another_one_falls_off(joined: bool) -> None:
     """Its scene lies in a plane, in which it balances; that would not stay, and the rest found does."""
     found = equilibrium(on_top(joined))
     assert "would buckle" in found.path[0] or "unstable" in found.path[0]
-    assert PUSHED in found.path[-1] and not found.in_hollows
+    assert PUSHED in found.path[-1] and not found.unjudged
     lower, *upper = (x.r for x in found.state.lines)
     middle = upper[0][-1] if joined else upper[0][25]
     assert abs(middle[1] - lower[25, 1]) > 0.9 * D
@@ -103,8 +103,8 @@ def test_what_rests_between_sample_points_alone_is_said_to(drop: float, slides: 
     """
     result = hybrid.static(crossing(drop))
     told = [x.text for x in result.events if x.kind == "stability not judged"]
-    assert len(told) == 2
-    assert all(("it would slide but for" in x) == slides for x in told)
+    assert len(told) == (2 if slides else 0)  # of each line; what was judged, and would stay, is not told
+    assert all("it would slide but for" in x for x in told)
 
 
 def test_a_slack_chain_over_a_taut_rope_is_refused_because_it_is_slack() -> None:
