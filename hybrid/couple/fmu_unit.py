@@ -132,6 +132,8 @@ class SceneUnit:
         """Three scalars, which all masters can connect."""
         if begin is not None:
             self._values[f"{end}.{name}"] = begin
+            if name == "velocity":
+                self._values[f"{end}.moves"] = np.zeros(1)  # whether the master has ever given another one than zero
         causality = Fmi3Causality.output if begin is None else Fmi3Causality.input
         for axis, letter in enumerate("xyz"):
 
@@ -147,12 +149,14 @@ class SceneUnit:
             )  # fmt: skip
             self.register_variable(variable, nested=False)  # type: ignore[attr-defined]
 
-    def placed(self, part: str, step: float) -> tuple[Floats, Floats] | None:
+    def placed(self, part: str, step: float) -> tuple[Floats, Floats | None] | None:
         """Place and velocity that are set of an end or a point, at the end of a step (s); None: none are."""
         place, speed = (self._values.get(f"{part}.{name}") for name in ("position", "velocity"))
         if place is None or speed is None:
             return None
-        return (place + step * speed if self.inputs_at_begin else place), speed
+        given = self._values[f"{part}.moves"]
+        given[0] = max(given[0], speed.any())
+        return (place + step * speed if self.inputs_at_begin else place), speed if given[0] else None
 
     def _tension(self, line: str) -> Floats:
         """Tension along a line, as recovered once for a state."""

@@ -5,6 +5,7 @@ The laws are those of laws.end_motion.driven_position and driven_frame, which mo
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,20 @@ from hybrid.kernels.state.state import Floats
 # Columns of a path: begin and end (s), position and velocity at both (m, m/s), frame at the begin, rotation vector.
 FROM, TO, AT, SPEED, THERE, SPEED_THERE, FRAME, TURN = 0, 1, 2, 5, 8, 11, 14, 23
 PATH = 26
+# Columns of what is known of its velocities: whether the last one followed from the places; of a window, its steps, how
+# far the places and the velocities given go in it (m); how far both are apart and go in all windows (m), their number;
+# whether it was said that they contradict each other.
+IMPLIED, STEPS, GONE, SAID, APART, WAY, WINDOWS, TOLD = 0, 1, 2, 5, 8, 9, 10, 11
+RECORD = 12
+# Steps over which places and velocities are compared: a motion that begins or changes within one is none of it.
+WINDOW = 4
+# Windows after which velocities may be said to contradict the places, and the part of the way that they then miss.
+ENOUGH, CONTRADICTS = 4, 0.4
+STILL = (0.0, 0.0, 0.0)
+CONTRADICTED = (
+    "the motion follows the places, work and energy the velocities: leave velocity out, or give that at the end of the "
+    "step, in m/s"
+)
 Vector = tuple[float, float, float] | Floats
 
 
@@ -22,13 +37,20 @@ class DrivenEnd:
 
     def __init__(self, path: Floats, position: Floats, frame: Floats, held: bool, turns: bool) -> None:
         """path: (PATH,) filled here; position: (3,) m; frame: (3, 3); held, turns: what is set of it."""
-        self.path, self.held, self.turns = path, held, turns
+        self.path, self.held, self.turns, self.record = path, held, turns, np.zeros(RECORD)
         self._numbers: Any = path.data  # the same, of which one number costs a third of what numpy takes
         self.stand(position, frame)
 
-    def set(self, begin: float, end: float, position: Vector, velocity: Vector, turn: Vector) -> None:
-        """From where it is at `begin` (s) to a place at `end`; turn: rotation vector in the axes of its frame, rad."""
-        path, numbers = self.path, self._numbers
+    def set(
+        self, begin: float, end: float, position: Vector, velocity: Vector | None, turn: Vector, one_step: bool = False
+    ) -> None:  # fmt: skip
+        """From where it is at `begin` (s) to a place at `end`; turn: rotation vector in the axes of its frame, rad.
+
+        velocity: (3,) m/s there, None: in one step that which the places imply, else at rest; one_step: whether the way
+        is a step of the run.
+        """
+        path, numbers, record = self.path, self._numbers, self.record
+        before = self._mean_velocity() if velocity is None and one_step else (STILL, 0.0)
         if begin < numbers[TO]:  # on its way
             path[AT:SPEED], path[SPEED:THERE], frame, _ = self.at(begin)
             path[FRAME:TURN] = np.ravel(frame)
@@ -38,8 +60,73 @@ class DrivenEnd:
                 path[FRAME:TURN] = np.ravel(path[FRAME:TURN].reshape(3, 3) @ rotation(path[TURN:PATH]))
         numbers[FROM], numbers[TO] = begin, end
         numbers[THERE], numbers[THERE + 1], numbers[THERE + 2] = position
+        if velocity is None:
+            if record[IMPLIED] and not one_step:
+                path[SPEED:THERE] = 0.0
+            velocity = self._implied(*before) if one_step else STILL
+            record[:] = 0.0
+            record[IMPLIED] = one_step
         numbers[SPEED_THERE], numbers[SPEED_THERE + 1], numbers[SPEED_THERE + 2] = velocity
         numbers[TURN], numbers[TURN + 1], numbers[TURN + 2] = turn
+        if one_step and not record[IMPLIED]:
+            self._compare()
+
+    def stay(self, begin: float, end: float, one_step: bool) -> None:
+        """Be where it is at `begin` (s) until `end`; at rest there, unless its velocity follows from its places."""
+        self.set(begin, end, self.at(begin)[0], None if self.record[IMPLIED] else STILL, STILL, one_step)
+
+    def _mean_velocity(self) -> tuple[Vector, float]:
+        """Mean velocity (3,) m/s of the way that is over, and how long that took, s; of none: zeros."""
+        p = self.path
+        dt = float(p[TO] - p[FROM])
+        return ((p[THERE:SPEED_THERE] - p[AT:SPEED]) / dt, dt) if dt > 0.0 else (STILL, 0.0)
+
+    def _implied(self, before: Vector, earlier: float) -> Floats:
+        """Velocity (3,) m/s at the end of the parabola through the last three places.
+
+        before: mean velocity (3,) m/s of the way before this one, earlier: s, how long that took; 0: it stood still.
+        By trapezoids the velocities of a motion from rest to rest add up to its way.
+        """
+        mean, dt = self._mean_velocity()
+        return np.asarray(mean + (mean - np.asarray(before)) * (dt / (dt + (earlier or dt))))
+
+    def _compare(self) -> None:
+        """Count how far the places, and the velocities that are given, go in this step."""
+        p, record = self.path, self.record
+        record[GONE:SAID] += p[THERE:SPEED_THERE] - p[AT:SPEED]
+        record[SAID:APART] += 0.5 * (p[TO] - p[FROM]) * (p[SPEED:THERE] + p[SPEED_THERE:FRAME])
+        record[STEPS] += 1
+        if record[STEPS] == WINDOW:
+            record[APART:WINDOWS] = self._compared()
+            record[WINDOWS] += 1
+            record[STEPS:APART] = 0.0
+
+    def _compared(self) -> tuple[float, float]:
+        """How far places and velocities are apart, and the way they go, with the window that is not over, m."""
+        gone, said = self.record[GONE:SAID], self.record[SAID:APART]
+        way = max(float(np.linalg.norm(gone)), float(np.linalg.norm(said)))
+        return self.record[APART] + float(np.linalg.norm(gone - said)), self.record[WAY] + way
+
+    def contradiction(self, soon: bool = False) -> str:
+        """How far the velocities that are given miss the way of the places, in words; empty: they are not known to.
+
+        soon: whether less than ENOUGH windows may say so, since something else has failed.
+        """
+        if not soon and (self.record[STEPS] or self.record[WINDOWS] < ENOUGH):
+            return ""
+        apart, way = self._compared()
+        if not apart > CONTRADICTS * way:
+            return ""
+        steps = int(WINDOW * self.record[WINDOWS] + self.record[STEPS])
+        return f"the velocities given miss {apart:.3g} of {way:.3g} m of its way in {steps} steps"
+
+    def keep(self) -> Floats:
+        """(PATH + RECORD,) what `bring_back` takes."""
+        return np.concatenate([self.path, self.record])
+
+    def bring_back(self, kept: Floats) -> None:
+        """Be on the way of then."""
+        self.path[:], self.record[:] = kept[:PATH], kept[PATH:]
 
     def at(self, t: float) -> tuple[Floats, Floats, Floats, Floats]:
         """Position (3,) m, velocity (3,) m/s, frame (3, 3), angular velocity (3,) 1/s at t (s); inertial."""
@@ -60,13 +147,26 @@ class DrivenEnd:
     def stand(self, position: Floats, frame: Floats) -> None:
         """Rest at a place (3,) m in a frame (9,) or (3, 3)."""
         columns = np.array(frame, float).ravel()  # perhaps those of the path
-        self.path[:] = 0.0
+        self.path[:] = self.record[:] = 0.0
         self.path[AT:SPEED] = self.path[THERE:SPEED_THERE] = position
         self.path[FRAME:TURN] = columns
 
     def turn_from(self, frame: Floats) -> None:
         """Stand in another frame (3, 3)."""
         self.path[FRAME:TURN], self.path[TURN:PATH] = np.ravel(frame), 0.0
+
+
+def contradictions(driven: Mapping[str, DrivenEnd], soon: bool = False) -> str:
+    """What velocities contradict the places that are set, in words; empty: none.
+
+    driven: what is set, by name; soon: as of `DrivenEnd.contradiction`; else each is told once.
+    """
+    found = ""
+    for name, end in driven.items():
+        if (soon or not end.record[TOLD]) and (text := end.contradiction(soon)):
+            end.record[TOLD] = 1.0
+            found += f"{name}: {text}; "
+    return found and f"{found}{CONTRADICTED}"
 
 
 def rotation(vector: Floats) -> Floats:

@@ -12,6 +12,8 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.state import books as b
+from hybrid.model.build import Model
+from hybrid.model.driven_end import DrivenEnd, contradictions
 from hybrid.scene.read import scene_text
 from hybrid.simulation.diagnostics import stretch_text
 from hybrid.simulation.transient import Transient
@@ -101,10 +103,18 @@ def first_remedy(run: Transient, tried: Tried) -> str:
     """What to try before the remedy of an outcome; empty: nothing."""
     if _used_up(run):
         return "restore() and a shorter step, or more iterations (most_iterations)"
+    if tried.outcome == Outcome.GAINS_ENERGY:
+        return contradictions(driven_of(run.model), soon=True)
     if tried.outcome != Outcome.SLACK or not _steps_too_long(run):
         return ""
     step = max(_planned(run) / SHORTER, float(run.run.clock[b.WAVE_STEP]))
     return f"time.step: {step:.2g} from the start, because the steps before may be to blame, not the line"
+
+
+def driven_of(model: Model) -> dict[str, DrivenEnd]:
+    """What is set from outside of one cable, by its name in the scene."""
+    ends = {f"ends.{('start', 'end')[k]}": x for k, x in model.ends.motions.items() if isinstance(x, DrivenEnd)}
+    return ends | {f"obstacles.{name}": x for name, x in model.sea.driven.items()}
 
 
 def failed_node(run: Transient, tried: Tried) -> int:

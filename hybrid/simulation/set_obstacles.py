@@ -9,12 +9,13 @@ import numpy as np
 
 from hybrid.kernels.state.obstacle_rows import SEEN_FORCE, SEEN_MOMENT, SEEN_TURN
 from hybrid.kernels.state.state import Floats, State, obstacles_now
-from hybrid.model.driven_end import DrivenEnd, rotation_vector
+from hybrid.model.driven_end import STILL, DrivenEnd, rotation_vector
 from hybrid.model.sea import Surroundings
 from hybrid.simulation.stepped import Triple, numbers, one_thread, triple
 
-STILL = (0.0, 0.0, 0.0)
-Course = tuple[Triple, Triple, Triple]  # where an obstacle is to be, how fast, and how far it turns on the way
+# Of a step: what is set for so long at most is set for one step.
+ONE_STEP = 1.5
+Course = tuple[Triple, Triple | None, Triple]  # where an obstacle is to be, how fast, and how far it turns on the way
 
 
 class ObstacleState(NamedTuple):
@@ -57,13 +58,13 @@ class SettableObstacles:
         """Where an obstacle is to be at the end of the next step or `advance`, which it reaches smoothly.
 
         name: of one with `from_outside`; position: (3,) m of its place `at`, inertial, None: where it is; velocity:
-        (3,) m/s there, None: at rest; rotation: (3, 3), about that place, since t = 0, None: as it is; less than half a
-        turn on the way.  One that is not set again stays where it is.  ValueError: there is no such obstacle.
+        (3,) m/s there, None: as of `set_end`; rotation: (3, 3), about that place, since t = 0, None: as it is; less
+        than half a turn on the way.  One that is not set again stays where it is.  ValueError: there is no such one.
         """
         self._check_open()
         now = self._obstacle_paths(name)[0].at(self.t)
         there = triple(now[0] if position is None else position, "position")
-        speed, turn = STILL if velocity is None else triple(velocity, "velocity"), STILL
+        speed, turn = None if velocity is None else triple(velocity, "velocity"), STILL
         if rotation is not None:
             wanted = numbers(rotation, "rotation")
             proper = wanted.shape == (3, 3) and np.allclose(wanted.T @ wanted, np.eye(3), atol=1e-6)
@@ -97,17 +98,20 @@ class SettableObstacles:
             raise ValueError(f"name: expected {_one_of(known)} that has from_outside, found {name!r:.60}")
         return found
 
-    def _move_obstacles(self, now: float, until: float) -> None:
-        """Those that have been set are on their way from `now` to `until` (s)."""
+    def _move_obstacles(self, now: float, until: float, one_step: bool) -> None:
+        """Those that have been set are on their way from `now` to `until` (s); one_step: whether in one step."""
         for name in self._moved:
             ends = self._obstacle_paths(name)
-            position, velocity, turn = self._courses.pop(name, None) or (ends[0].at(now)[0].tolist(), STILL, STILL)
+            course = self._courses.pop(name, None)
             for end in ends:
-                end.set(now, until, position, velocity, turn)
+                if course is None:
+                    end.stay(now, until, one_step)
+                else:
+                    end.set(now, until, *course, one_step)
 
     def _kept_courses(self) -> tuple[dict[str, Floats], dict[str, None], dict[str, Course]]:
         """What is set of obstacles, in copies."""
-        paths = {name: ends[0].path.copy() for name, ends in self._all_driven()}
+        paths = {name: ends[0].keep() for name, ends in self._all_driven()}
         return paths, dict(self._moved), dict(self._courses)
 
     def _bring_back_courses(self, kept: tuple[Mapping[str, Floats], Mapping[str, None], Mapping[str, Course]]) -> None:
@@ -116,7 +120,7 @@ class SettableObstacles:
         self._moved, self._courses = dict(moved), dict(courses)
         for name, path in paths.items():
             for end in self._obstacle_paths(name):
-                end.path[:] = path
+                end.bring_back(path)
 
     def _all_driven(self) -> Iterator[tuple[str, list[DrivenEnd]]]:
         for name, x in self.scene.obstacles.items():

@@ -11,13 +11,13 @@ import numpy as np
 from hybrid.kernels.state.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
-from hybrid.model.driven_end import DrivenEnd, rotation_vector
+from hybrid.model.driven_end import STILL, DrivenEnd, rotation_vector
 from hybrid.model.sea import Surroundings
 from hybrid.scene.schema import Scene
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.interface_stiffness import interface_stiffness
 from hybrid.simulation.payout import length_asked
-from hybrid.simulation.set_obstacles import STILL, SettableObstacles
+from hybrid.simulation.set_obstacles import SettableObstacles
 from hybrid.simulation.stepped import EndForces, Triple, numbers, one_thread, triple, vector
 from hybrid.simulation.time_loop import TimeLoop
 from hybrid.simulation.transient import StepFailed
@@ -39,7 +39,7 @@ class SteppedEnds(SettableObstacles):
     _recorder: DeferredRecorder
     _closed: bool
     _driven: dict[int, DrivenEnd]
-    _next: dict[int, tuple[Triple, Triple, Triple]]  # what ends are set to, for the next step
+    _next: dict[int, tuple[Triple, Triple | None, Triple]]  # what ends are set to, for the next step
     _failed: str  # why the last step failed; empty: it did not, or what `save` returned was restored
     _wound: tuple[float | None, float] | None  # length and rate that are set for the next step
     _driven_of: Model | None = None  # whose ends those that are set were last looked for among
@@ -74,9 +74,11 @@ class SteppedEnds(SettableObstacles):
         """Where a held end is to be at the end of the next `step` or `advance`, which it reaches smoothly.
 
         end: "start" or "end"; position: (3,) m, inertial, None: where it is (of a guided end, which only turns);
-        velocity: (3,) m/s there, None: at rest; frame: (3, 3), columns a1, a2 and the tangent along increasing s, of an
-        end that holds a direction.  An end that is not set again stays where it is.  ValueError: the end is free, has a
-        motion in the scene, holds no direction, or would leave the plane of `dimension: 2`.
+        velocity: (3,) m/s there, None: in a step of the run that which the places imply, in what takes several at rest;
+        one that contradicts the places is told as an event *implausible*.  frame: (3, 3), columns a1, a2 and the
+        tangent along increasing s, of an end that holds a direction.  An end that is not set again stays where it is.
+        ValueError: the end is free, has a motion in the scene, holds no direction, or would leave the plane of
+        `dimension: 2`.
         """
         self._check_open()
         k = self._end(end)
@@ -91,7 +93,7 @@ class SteppedEnds(SettableObstacles):
             self._driven[k] = conditions.drive(k)
             self._loop.run.run.move(conditions.moves())
         there = triple(self._driven[k].at(self.t)[0] if position is None else position, "position")
-        speed, turn = STILL if velocity is None else triple(velocity, "velocity"), STILL
+        speed, turn = None if velocity is None else triple(velocity, "velocity"), STILL
         if self.scene.dimension == 2:
             self._check_plane(end, "position", np.array(there) - self._driven[k].at(self.t)[0])
         if frame is not None:

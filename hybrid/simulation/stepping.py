@@ -20,7 +20,7 @@ from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model
-from hybrid.model.driven_end import DrivenEnd
+from hybrid.model.driven_end import DrivenEnd, contradictions
 from hybrid.model.resolution import first_resolution
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import SceneLike, as_scene_or_system
@@ -29,10 +29,11 @@ from hybrid.scene.system import System
 from hybrid.simulation.case import Case
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.direct_steps import DirectSteps
+from hybrid.simulation.failure import driven_of
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.layer_mesh import layered
 from hybrid.simulation.mesh_survey import with_survey
-from hybrid.simulation.set_obstacles import STILL
+from hybrid.simulation.set_obstacles import ONE_STEP
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.stepped import CableState, Saved, Triple, in_space, iterations_allowed, one_thread, tension_now
 from hybrid.simulation.stepped_ends import SteppedEnds
@@ -113,7 +114,7 @@ class Simulation(SteppedEnds):
         self._loop.recorder = self._recorder = DeferredRecorder(recorder)
         self._driven: dict[int, DrivenEnd] = {}
         self._wound: tuple[float | None, float] | None = None  # length and rate that are set for the next step
-        self._next: dict[int, tuple[Triple, Triple, Triple]] = {}  # what ends are set to, for the next step
+        self._next: dict[int, tuple[Triple, Triple | None, Triple]] = {}  # what ends are set to, for the next step
         self._courses, self._moved = {}, {}
         self._loop.patient = self._plain
         self._loop.run.run.count[b.MOST_ITERATIONS] = self._most
@@ -165,17 +166,22 @@ class Simulation(SteppedEnds):
         if moving.payout is not None:
             moving.payout.go_on(now, until, self._wound)
             self._wound = None
+        one_step = until - now <= ONE_STEP * (self._fixed_step or float(moving.run.clock[b.LAST_DT]))
         for k, end in self._driven.items():
-            position, velocity, turn = self._next.pop(k, None) or (end.at(now)[0].tolist(), STILL, STILL)
-            end.set(now, until, position, velocity, turn)
+            if (course := self._next.pop(k, None)) is None:
+                end.stay(now, until, one_step)
+            else:
+                end.set(now, until, *course, one_step)
         if self._moved:
-            self._move_obstacles(now, until)
+            self._move_obstacles(now, until, one_step)
         self._recorder.commit_old()
         try:
             self._step_to(min(until, duration))
         except ComputationError as error:
             self._failed = str(error)
             raise
+        if text := contradictions(driven_of(moving.model)):
+            self._recorder.event(0.0, 0.0, float(moving.model.line.s[-1]), "implausible", text)
         self._forget_released()
         if monotonic() - self._written > WRITE_EVERY:
             self._loop.write_down(everything=True)
@@ -224,7 +230,7 @@ class Simulation(SteppedEnds):
         self._recorder.commit()
         run, watch = self._loop.run, self._loop.remembered()
         state = run.run.keep() if self._plain else pack(self._loop.checkpoint())
-        paths = {k: end.path.copy() for k, end in self._driven.items()}
+        paths = {k: end.keep() for k, end in self._driven.items()}
         loads, ends = run.model.ends.keep_loads(), run.model.ends.values
         self._saves += 1
         return Saved(
@@ -259,7 +265,7 @@ class Simulation(SteppedEnds):
             self._driven = {k: end for k, end in ends.items() if isinstance(end, DrivenEnd)}
             for k, end in self._driven.items():
                 if k in saved.paths:
-                    end.path[:] = saved.paths[k]
+                    end.bring_back(saved.paths[k])
                 else:  # it has been set since, for the first time
                     end.stand(saved.places[0][k], saved.places[1][k])
             run.model.ends.bring_back_loads(saved.loads, saved.t)
@@ -274,7 +280,7 @@ class Simulation(SteppedEnds):
     def _drive_again(self, model: Model, saved: Saved) -> None:
         self._driven = {k: model.ends.drive(k) for k in saved.paths}
         for k, path in saved.paths.items():
-            self._driven[k].path[:] = path
+            self._driven[k].bring_back(path)
         model.ends.bring_back_loads(saved.loads, saved.t)
 
     @property

@@ -28,7 +28,7 @@ class SavedSystem(NamedTuple):
     marks: tuple[int, ...]  # of the recorders
     stops: tuple[float, ...]  # s, that are still to come
     paths: Mapping[str, list[Floats]]  # of points that are set from outside, for each end there
-    next: Mapping[str, tuple[Triple, Triple]]  # where points are to be at the end of the next step
+    next: Mapping[str, tuple[Triple, Triple | None]]  # where points are to be at the end of the next step
     obstacles: Any  # what is set of them
     wound: Mapping[int, tuple[float | None, float]]  # length (m) and rate (m/s) that lines are to have then
 

@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.adapt.user_criterion import UserCriterion
-from hybrid.errors import ComputationError, SceneError
+from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.kernels.state.report import FORCE_A
 from hybrid.kernels.state.state import Floats, State
-from hybrid.model.driven_end import FRAME, TURN, DrivenEnd
+from hybrid.model.driven_end import FRAME, STILL, TURN, DrivenEnd, contradictions
 from hybrid.model.sea import Surroundings
 from hybrid.model.system import SystemResolution
 from hybrid.scene.points import FixedPoint
@@ -27,7 +27,7 @@ from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import missing_time
 from hybrid.scene.system import System
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution, with_survey
-from hybrid.simulation.set_obstacles import STILL, SettableObstacles
+from hybrid.simulation.set_obstacles import ONE_STEP, SettableObstacles
 from hybrid.simulation.stepped import CableState, Triple, one_thread, triple
 from hybrid.simulation.system_run import SystemRun, static_system
 from hybrid.simulation.system_saving import SavedSystem, bring_back, commit, defer, kept, recorders
@@ -111,7 +111,7 @@ class SystemSimulation(SettableObstacles):
             raise
         self._stops = self._run.stops()
         self._driven: dict[str, list[DrivenEnd]] = {}
-        self._next: dict[str, tuple[Triple, Triple]] = {}
+        self._next: dict[str, tuple[Triple, Triple | None]] = {}
         self._wound: dict[int, tuple[float | None, float]] = {}  # length and rate that are asked of lines
         self._courses, self._moved = {}, {}
         self._owner, self._final = object(), 0  # how often what had been recorded was made final
@@ -131,8 +131,8 @@ class SystemSimulation(SettableObstacles):
     ) -> None:
         """Where a fixed point is to be at the end of the next `advance`, which it reaches smoothly.
 
-        position: (3,) m, inertial; velocity: (3,) m/s there, None: at rest.  A point that is not set again stays where
-        it is.  ValueError: there is no such point, or it is free, on a body, or has a motion in the scene.
+        position: (3,) m, inertial; velocity: (3,) m/s there, None: as of `Simulation.set_end`.  A point that is not set
+        again stays where it is.  ValueError: no such point, or it is free, on a body, or has a motion in the scene.
         """
         self._check_open()
         if not isinstance(name, str) or name not in self._driven:
@@ -146,7 +146,7 @@ class SystemSimulation(SettableObstacles):
                 model.models[model.names.index(line)].ends.drive(int(end == "end"))
                 for line, end in self.scene.lines_at(name)
             ]
-        self._next[name] = triple(position, "position"), STILL if velocity is None else triple(velocity, "velocity")
+        self._next[name] = triple(position, "position"), None if velocity is None else triple(velocity, "velocity")
 
     @one_thread
     def set_length(self, name: str, length: float, rate: float = 0.0) -> None:
@@ -201,11 +201,16 @@ class SystemSimulation(SettableObstacles):
         before = self._before() if self._final else None
         for k, paying in self._run.payout.lines.items() if self._run.payout is not None else ():
             paying.go_on(now, until, self._wound.pop(k, None))
+        one = self._run.resolution.one
+        one_step = until - now <= ONE_STEP * (one.step if one.local is None else self._run.last_step)
         for name, ends in self._driven.items():
-            position, velocity = self._next.pop(name, None) or (ends[0].at(now)[0].tolist(), STILL)
+            course = self._next.pop(name, None)
             for end in ends:
-                end.set(now, until, position, velocity, STILL)
-        self._move_obstacles(now, until)
+                if course is None:
+                    end.stay(now, until, one_step)
+                else:
+                    end.set(now, until, *course, STILL, one_step)
+        self._move_obstacles(now, until, one_step)
         try:
             while self._stops and self._stops[0] < until - sliver:
                 self._run.go_to(self._stops.pop(0))
@@ -216,7 +221,13 @@ class SystemSimulation(SettableObstacles):
                 self._run.keep()
         except LineFailed as failed:
             raise (self._fail(failed) if before is None else self._undo(failed, before)) from None
+        if text := contradictions(self._set_from_outside()):
+            self._run.recorder.event(0.0, 0.0, 0.0, "implausible", text)
         return self.t
+
+    def _set_from_outside(self) -> dict[str, DrivenEnd]:
+        found = {f"points.{name}": ends[0] for name, ends in self._driven.items() if ends}
+        return found | {f"obstacles.{name}": self._obstacle_paths(name)[0] for name in self._moved}
 
     # --- back and forth ---------------------------------------------------------------------------
 
@@ -255,7 +266,7 @@ class SystemSimulation(SettableObstacles):
         self._final, self._here = self._final + 1, None
 
     def _kept(self) -> SavedSystem:
-        paths = {name: [end.path.copy() for end in ends] for name, ends in self._driven.items()}
+        paths = {name: [end.keep() for end in ends] for name, ends in self._driven.items()}
         return SavedSystem(
             self._owner,
             self._final,
@@ -294,7 +305,7 @@ class SystemSimulation(SettableObstacles):
         """Let points that are set from outside be on these paths."""
         for name, rows in paths.items():
             for end, path in zip(self._driven[name], rows, strict=True):
-                end.path[:] = path
+                end.bring_back(path)
 
     def _undo(self, failed: LineFailed, before: SavedSystem) -> ComputationError:
         """Be back where the step began that has failed."""
@@ -312,6 +323,8 @@ class SystemSimulation(SettableObstacles):
 
     def _fail(self, failed: LineFailed) -> ComputationError:
         self._closed = True
+        if failed.outcome == Outcome.GAINS_ENERGY and (text := contradictions(self._set_from_outside(), soon=True)):
+            failed = LineFailed(failed.line, failed.outcome, failed.t, failed.s, text)
         with self._stack:
             return self._run.failed(failed)
 
