@@ -109,6 +109,7 @@ def known(
     if errors is not None and control.asked is not None:
         beside = not_asked_text(control.asked, errors, result)
         found |= {"accuracy_not_asked": beside} if beside else {}
+        found["accuracy_used"] = control.verdict(control.asked).ratio
     if control.irregular:
         each = [summary(estimate.errors) for estimate in control.statistics.values()]
         for name in each[0] if each else ():

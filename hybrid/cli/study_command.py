@@ -86,6 +86,7 @@ def study(
 def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path | None) -> None:
     """Ranges of what was kept, reasons of what failed, and where it is."""
     from hybrid.cli.progress_line import span
+    from hybrid.store.study_accuracy import unmet_accuracy
     from hybrid.store.study_file import DONE, FAILED, counts_of
 
     counts = counts_of(found["status"].values)
@@ -109,6 +110,9 @@ def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path 
         console.note(
             f"note: {lacking['case'].size} not kept in full, such as case {int(lacking['case'].values[0])}: {text}"
         )
+    for unmet in unmet_accuracy(found):
+        console.json("accuracy", **unmet._asdict())
+        console.note(f"note: {unmet}")
     empty = [row["name"] for row in rows if row["case"] is None]
     if empty:
         console.note(f"note: {', '.join(empty)}: in no case (too few peaks or up-crossings in the record)")
@@ -124,10 +128,12 @@ def ranges_of(done: Any) -> list[dict[str, Any]]:
     """Of each number that was kept: smallest, median and largest value of all cases, and the case of the largest."""
     import numpy as np
 
+    from hybrid.store.study_file import OWN
+
     rows = []
     for name in done.data_vars:
         values = done[name].values
-        if done[name].dims != ("case",) or values.dtype.kind != "f" or name == "cpu":
+        if done[name].dims != ("case",) or values.dtype.kind != "f" or name in OWN:
             continue
         if not np.isfinite(values).any():
             blank = {key: None for key in ("smallest", "median", "largest", "case")}

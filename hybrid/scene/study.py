@@ -15,7 +15,7 @@ from hybrid.scene.task_file import Kind
 # Cases of a study: each is a row in memory.
 MOST_CASES = 1_000_000
 # Columns of the table of cases that a variable must not be called.
-TAKEN = ("case", "status", "reason", "events", "cpu", "steps", "s")
+TAKEN = ("case", "status", "reason", "events", "accuracy_verdict", "accuracy_used", "cpu", "steps", "s")
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
 

@@ -11,6 +11,8 @@ Layout::
     <variable> (n)                   what was varied, and what was derived from it
     status (n)   0: not done, 1: done, 2: failed
     reason (n)   why a case failed; events (n): kinds of events of its run, by weight
+    accuracy_verdict (n)  on the accuracy that its scene asks for, with the reason and what to do; empty: none is asked
+    accuracy_used (n)     largest error over what is asked
     cpu (n) s    processor time of the run; steps (n)
     <collected> (n, ...)             NaN where a case is not done or has failed
 """
@@ -43,6 +45,8 @@ OWN: dict[str, tuple[str, str, Any, Any]] = {
     "status": ("", "0: not done, 1: done, 2: failed", "i1", OPEN),
     "reason": ("", "why the case failed", str, ""),
     "events": ("", "kinds of events of its run, the weightiest first", str, ""),
+    "accuracy_verdict": ("", "verdict on the accuracy that was asked for", str, ""),
+    "accuracy_used": ("", "largest error over what was asked", "f8", np.nan),
     "cpu": ("s", "processor time of the run", "f8", np.nan),
     "steps": ("", "time steps of the run", "i8", -1),
 }
@@ -168,7 +172,8 @@ class StudyFile:
             if name == "status":
                 continue
             if name not in self._arrays:
-                self._arrays[name] = self._array(self._group, name, column, self.cases, self.batch)
+                kind = str if column.values.dtype.kind in "UO" else None
+                self._arrays[name] = self._array(self._group, name, column, self.cases, self.batch, kind)
             text = column.values.dtype.kind in "UO"
             self._arrays[name][where] = column.values.astype(object) if text else column.values
         self._arrays["status"][where] = self._status[where] = columns["status"].values

@@ -13,6 +13,7 @@ import numpy as np
 from hybrid.accuracy.api import run, static
 from hybrid.errors import EVENTS_BY_WEIGHT, HybridError, SceneError
 from hybrid.scene.study import Kept
+from hybrid.store.study_accuracy import accuracy_of_case
 from hybrid.store.study_file import DONE, FAILED
 from hybrid.studies.cases import scene_of
 from hybrid.studies.collect import Variable, collected
@@ -34,7 +35,11 @@ class Job(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Of one case: status, reason, events, s of processor time, steps, and what was kept."""
+    """Of one case: status, reason, events, s of processor time, steps, what was kept, and the accuracy it met.
+
+    absent: why something can be kept of no run like this one; "": it can.  accuracy_verdict, accuracy_used: of what
+    was asked, as of `accuracy_of_case`.
+    """
 
     status: int
     reason: str
@@ -42,7 +47,9 @@ class Outcome(NamedTuple):
     cpu: float
     steps: int
     kept: dict[str, tuple[Variable, np.ndarray]]
-    absent: str = ""  # why something can be kept of no run like this one; "": it can
+    absent: str = ""
+    accuracy_verdict: str = ""
+    accuracy_used: float = np.nan
 
 
 def compute_batch(job: Job) -> list[Outcome]:
@@ -74,4 +81,5 @@ def _computed(job: Job, row: dict[str, Any], case: int) -> Outcome:
         found = collected(result, job.wanted)
         why = "; ".join(f"{name}: {reason}" for name, reason in found.reasons.items())
         status = DONE if found.kept else FAILED
-        return Outcome(status, NOT_KEPT * bool(why) + why, events, spent, steps, found.kept, found.absent)
+        met = accuracy_of_case(result)
+        return Outcome(status, NOT_KEPT * bool(why) + why, events, spent, steps, found.kept, found.absent, *met)

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.store.study_accuracy import unmet_accuracy
 from hybrid.store.study_file import DONE, FAILED, OPEN, counts_of, open_study
 from hybrid.view.report_parts import footer, packed, page_file, page_of, plotly_script
 from hybrid.view.save import PAGES, REPORT_MARK, check_target, write_file
 
 STATUS = {OPEN: "open", DONE: "done", FAILED: "failed"}
 # Own columns of a study, behind what was varied and kept.
-OWN = ("cpu", "steps", "events", "reason")
+OWN = ("cpu", "steps", "events", "accuracy_used", "accuracy_verdict", "reason")
 
 
 def write_study_report(study: str | Path, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -34,7 +35,7 @@ def html(study: Path) -> str:
     )  # fmt: skip
     columns = {"case": _column(found, "case")} | {name: _column(found, name) for name in variables}
     columns["status"] = {"unit": "", "description": "", "values": [STATUS[int(k)] for k in found["status"].values]}
-    columns |= {name: _column(found, name) for name in (*results, *OWN)}
+    columns |= {name: _column(found, name) for name in (*results, *OWN) if name in found}
     texts = [name for name, each in columns.items() if any(isinstance(x, str) for x in each["values"])]
     again = f"hybrid study {study.name} --case 0 -o case0.h5"
     data = {"columns": columns, "variables": variables, "results": results, "texts": texts, "again": again}
@@ -42,7 +43,7 @@ def html(study: Path) -> str:
     parts = {
         "title": escape(str(found.attrs["title"])),
         "subtitle": escape(_subtitle(found, counts)),
-        "failures": _failures(found),
+        "failures": _failures(found) + _accuracy(found),
         "ranges": _ranges(found, results),
         "shares": _shares(found),
         "example": escape(_example(found, variables)),
@@ -94,6 +95,12 @@ def _reasons(found: Any, failed: np.ndarray, what: str) -> str:
         for text, numbers in sorted(reasons.items(), key=lambda item: -len(item[1]))
     )
     return f'<div class="attention" role="alert"><h2>{int(failed.sum())} {what}</h2><ul>{rows}</ul></div>'
+
+
+def _accuracy(found: Any) -> str:
+    """How many cases missed the accuracy asked, or had it not verified, which is worst, and what to do."""
+    rows = "".join(f"<li>{escape(str(unmet))}</li>" for unmet in unmet_accuracy(found))
+    return f'<div class="attention" role="alert"><h2>Accuracy asked</h2><ul>{rows}</ul></div>' if rows else ""
 
 
 def _ranges(found: Any, results: list[str]) -> str:
