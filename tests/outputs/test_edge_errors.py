@@ -1,4 +1,4 @@
-"""What cells miss of curvature beside an edge of contact: against closed forms, and of a motion against a finer run."""
+"""What cells miss of curvature beside edges of contact and ends on the bed: against closed forms and finer runs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import root
 
 import hybrid
-from hybrid.outputs.edge_errors import PARTS, Windows, curvature, refined
+from hybrid.outputs.edge_errors import PARTS, LineEnd, Windows, between, curvature, cuts_of, refined
 
 T, Q, K = 1.4e4, 180.0, 5e3  # N, N/m, N/m2
 SEA = SimpleNamespace(stiffness=K, damping=0.0, onset=1e-9)
@@ -80,6 +80,87 @@ def test_an_edge_of_contact_against_a_closed_form(h: float, EI: float) -> None:
     assert min(ratios) > 0.9 and max(ratios) < 1.2
 
 
+class AtEnd:
+    """A rod on the bed from an end at the height where contact begins on: pinned, or clamped with slope `up`."""
+
+    def __init__(self, EI: float, up: float | None) -> None:
+        m = -np.sqrt(np.roots([EI, -T, K]).astype(complex))  # w = -Q/K + sum c exp(m s)
+        given = (m**2, 0.0) if up is None else (m, up)
+        self.m, self.c = m, np.linalg.solve(np.array([[1.0, 1.0], given[0]]), [Q / K, given[1]])
+
+    def of_order(self, n: int, s: np.ndarray) -> np.ndarray:
+        return (self.c * self.m**n * np.exp(s[:, None] * self.m)).sum(axis=1).real
+
+
+@pytest.mark.parametrize("up", [None, 0.0, -0.01], ids=["pinned", "level clamp", "sloping clamp"])
+@pytest.mark.parametrize("EI", [2e3, 5e4])
+@pytest.mark.parametrize("h", [0.8, 2.5, 9.6])
+def test_an_end_on_the_bed_against_a_closed_form(h: float, EI: float, up: float | None) -> None:
+    """On cells of half and up to six times sqrt(T/K), but for those beside where the line is kept: to 8 % of the largest error."""
+    exact, s = AtEnd(EI, up), h * np.arange(14.0)
+    load = np.full(s.size, Q * h)
+    # heights of nodes that balance, the bed integrated along chords; the last one lies as the rod does far from its end
+    below = np.eye(s.size, k=-1) + np.eye(s.size, k=1)
+    bend = (below - 2.0 * np.eye(s.size)) / h**2  # w''
+    bend[0] = 0.0
+    held = np.zeros(s.size)
+    if up is not None:
+        bend[0, :2], held[0] = np.array([-1.0, 1.0]) / h / (0.5 * h), -up / (0.5 * h)
+    bend[-1] = 0.0
+    apart = (below - 2.0 * np.eye(s.size)) / h
+    matrix = T * apart - EI * apart @ bend - K * h * (below + 4.0 * np.eye(s.size)) / 6.0
+    right = load + EI * apart @ held
+    matrix[0], matrix[-1] = np.eye(s.size)[0], np.eye(s.size)[-1]
+    right[0], right[-1] = 0.0, -Q / K
+    w = np.linalg.solve(matrix, right)[None]
+    x = Windows(s[None], w, 0.0 * w, np.full((1, s.size - 1), T), np.full(w.shape, EI))
+    k = curvature(x)
+    k[:, 0] = (bend @ w[0] + held)[0]
+    end = LineEnd(k[:, 0].copy(), np.array([np.inf if up is None else 0.5 * h]), np.zeros(1))
+    at, fine, settled = refined(x, k, SEA, end)
+    assert settled.all()
+    shown, true = between(k, cuts_of(s.size - 1, True))[0], exact.of_order(2, at[0])
+    off, said = (np.abs(shown - y)[: -2 * PARTS] for y in (true, fine[0]))
+    assert np.abs(said - off).max() < 0.08 * off.max()
+
+
+MODELS = {
+    "rod": {"kind": "rod"},
+    "catenary at the anchor": {"kind": "zones", "zones": [{"catenary": 75}, {"rod": 50}, {"catenary": 125}]},
+}
+
+
+@pytest.mark.parametrize("anchor", [-99.98, -100.0, -100.02], ids=["above", "on it", "in it"])
+@pytest.mark.parametrize("model", MODELS)
+def test_an_anchor_on_the_bed_against_a_finer_rest(model: str, anchor: float) -> None:
+    """Pinned where contact begins or 2 cm beside: cells of 2.5 m show no layer of sqrt(T/K) = 1.7 m beside it."""
+    text = hybrid.load_scene("examples/touchdown.yaml").model_dump(exclude_none=True)
+    text["ends"]["start"]["position"] = [0.0, 0.0, anchor]
+    text |= {"model": MODELS[model], "output": {"points": 1001, "errors": True}}
+    found = hybrid.static(hybrid.validate_scene(text))
+    text |= {"model": {"kind": "rod"}, "mesh": {"nodes": [*np.linspace(0, 20, 401)[:-1], *np.linspace(20, 250, 401)]}}
+    fine = hybrid.static(hybrid.validate_scene(text))
+    near = found.s < 10.0
+    off = np.abs(np.interp(found.s, fine.s, fine.curvature[0]) - found.curvature[0])[near]
+    said = found["errors/total/curvature"][0, near]
+    assert off.max() > 8e-4
+    assert 0.95 < off.max() / said.max() < 1.05
+    assert (off < 1.1 * said + 0.01 * off.max()).all()
+
+
+def test_cells_that_do_not_show_the_anchor_say_so() -> None:
+    """An accuracy of tension leaves cells of 9.6 m there: the figure of curvature was a quarter of what it is off."""
+    text = hybrid.load_scene("examples/touchdown.yaml").model_dump(exclude_none=True)
+    del text["model"], text["mesh"]
+    found = hybrid.static(hybrid.validate_scene(text | {"accuracy": {"tension": "1%"}}))
+    text |= {"model": {"kind": "rod"}, "mesh": {"cells": 2000}}
+    fine = hybrid.static(hybrid.validate_scene(text))
+    off = np.abs(found.curvature - fine.curvature)[0]
+    first = int(np.argmin(np.abs(found.s - 2.5)))
+    assert off[first] > 2e-3
+    assert 0.95 < off[first] / found["errors/total/curvature"][0, first] < 1.05
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_moving_edge_against_a_finer_run(dimension: int) -> None:
     """At every output of a line that heaves: curvature near the edge, where the figure once said a sixth of what it was."""
@@ -90,7 +171,8 @@ def test_a_moving_edge_against_a_finer_run(dimension: int) -> None:
     text["time"]["duration"] = 24.0
     text["output"] = {"every": 1.0, "points": 1001}
     found = hybrid.run(hybrid.validate_scene(text | {"output": text["output"] | {"errors": True}}))
-    text["mesh"], text["time"]["step"] = {"cells": 400}, 0.05
+    nodes = [*np.linspace(0, 15, 121)[:-1], *np.linspace(15, 250, 377)]
+    text["mesh"], text["time"]["step"] = {"nodes": nodes}, 0.05
     fine = hybrid.run(hybrid.validate_scene(text))
     ratio, stated = [], []
     for j in range(1, found.times.size):
@@ -100,6 +182,9 @@ def test_a_moving_edge_against_a_finer_run(dimension: int) -> None:
         stated.append(true / found["errors/total/curvature"][j, near].max())
         moment = found["errors/edges/bending_moment"][j, near].max()
         assert moment == pytest.approx(2e3 * found["errors/edges/curvature"][j, near].max(), rel=1e-9)
+        anchor = found.s < 6.0  # where the figure said a third
+        true = np.abs(found.curvature[j] - fine.curvature[j])[anchor].max()
+        assert 0.9 < true / found["errors/total/curvature"][j, anchor].max() < 1.1
     assert 0.85 < np.median(ratio) < 1.1
     assert min(ratio) > 0.6 and max(ratio) < 1.3
     assert max(stated) < 1.3
