@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from hybrid.kernels.state.state import Batch, Ends, Floats, State
 from hybrid.kernels.watch.bending_error import COMPLIANCE, FREE_TURN, GIVEN, TURN
 from hybrid.model.bending_reference import HALF_WRONG, NO_DOUBT, full_bending
 from hybrid.model.build import Model
+from hybrid.model.mesh import Zone
 from hybrid.solve.bending_corrector import Corrector, Shift
 
 
@@ -81,18 +82,27 @@ class Correction:
         self.model = model
         self.corrector = corrector_for(model).taking_over(self.corrector)
 
-    @property
-    def beyond(self) -> str:
-        """What to say where the error is too large for an estimate; empty where it is not."""
+    def unknown(self, zones: Sequence[Zone]) -> tuple[float, float, str]:
+        """In which of these zones (s, m, from and to) the error of the last step is not known, and why.
+
+        What the nearest catenary leaves out moves the rods beside it as well: these leave out nothing.
+        """
         c = self.corrector
+        bent = [z for z in zones if z.kind == "catenary"] or [*zones]
         if not c.finite:
-            return "the error of leaving bending out could not be estimated here: it begins anew from nothing"
-        if c.clipped:
-            return (
-                f"leaving bending out shifts the cable by more than {c.most:.3g} m here, more than a linear estimate "
-                "can know: it is clipped; make this stretch a rod"
+            text = (
+                "the linear estimate of what leaving bending out shifts the line by has no finite solution here: it "
+                "begins anew from nothing, and has only what is left out from now on; compare with model: rod"
             )
-        return ""
+            return bent[0].s_a, bent[-1].s_b, text
+        s = float(c.line.s[max(c.furthest, 0)])
+        near = min(bent, key=lambda z: max(z.s_a - s, s - z.s_b))
+        text = (
+            f"leaving bending out of the catenary from s = {near.s_a:.4g} to {near.s_b:.4g} m shifts the line by more "
+            f"than {c.most:.3g} m at s = {s:.4g} m, more than a linear estimate can know: it is clipped; make that "
+            "catenary a rod"
+        )
+        return near.s_a, near.s_b, text
 
 
 def _follow_ends(model: Model, torque: Floats) -> None:

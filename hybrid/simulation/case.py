@@ -398,7 +398,8 @@ class Case:
         values, errors = split_outputs({name: found[name] for name in found.names})
         cpu = clock.thread_time() - begin
         bound = resolution.zones * model.length if switching is not None else 0.0
-        notes = tuple({kind: (kind, text) for kind, text in reversed(found.events) if kind == NOT_ESTIMATED}.values())
+        unknown = [f"in a run to compare with, {text}" for kind, text in found.events if kind == NOT_ESTIMATED]
+        notes = tuple((NOT_ESTIMATED, text) for text in unknown[:1])
         fineness = resolution.fineness if follows_curvature(self.scene) else 0.0
         rows = found.reference() if isinstance(found, RowsRecorder) else {}
         catenary = found.catenary if switching is not None else np.zeros(0)

@@ -73,8 +73,8 @@ def note_unknown_error(moving: Transient) -> None:
     """The error of neglecting bending could not be followed through the last step: an event, once in a while."""
     assert moving.correction is not None
     if moving.t > moving.beyond:
-        s = float(moving.model.line.s[max(moving.correction.corrector.furthest, 0)])
-        moving.events.event(moving.t, s, s, NOT_ESTIMATED, moving.correction.beyond)
+        s_a, s_b, text = moving.correction.unknown(moving.model.zones)
+        moving.events.event(moving.t, s_a, s_b, NOT_ESTIMATED, text)
         moving.beyond = moving.t + moving.model.time_scale  # that it takes the whole line to move
 
 

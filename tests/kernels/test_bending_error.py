@@ -15,10 +15,11 @@ from hybrid.kernels.run.entry import assembly, workspace
 from hybrid.kernels.state.forces import ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.state.report import REPORT_SIZE
 from hybrid.kernels.state.state import no_sea
-from hybrid.kernels.watch.bending_error import History, right_hand_side
+from hybrid.kernels.watch.bending_error import FINITE, FURTHEST, History, right_hand_side
 from hybrid.kernels.watch.neglected_moments import Bending, neglected_moments, tabulate_chords
 from hybrid.model.bending_reference import full_bending
 from hybrid.model.build import build
+from hybrid.model.mesh import Zone
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.solve.stepper import Stepper
@@ -365,6 +366,34 @@ def test_error_beyond_a_tenth_of_the_length_is_clipped_and_said():
     result = hybrid.run(hybrid.validate_scene(data))
     assert any(e.kind == "model error not estimated" for e in result.events)
     assert 0.0 < result["errors/model/position"].max() < 0.15 * 20.3  # between nodes a cubic overshoots
+
+
+@pytest.mark.parametrize("first", ["rod", "catenary"])
+def test_where_an_error_is_not_known_is_the_catenary_that_leaves_bending_out(first):
+    """The node that is shifted most is the free end: of a rod all the time, it may be, which leaves out nothing."""
+    what = span(2e4, "catenary", time={"duration": 2.0, "step": 0.02}, output={"every": 0.1, "errors": True})
+    data = what.model_dump(exclude_none=True)
+    half, other = 0.5 * what.length, "catenary" if first == "rod" else "rod"
+    data["initial"] = {"kind": "straight", "direction": [1, 0, 0]}
+    data["ends"]["end"] = {"kind": "free"}
+    zones = [{first: half, "cells": 20}, {other: half, "cells": 20}]
+    data["model"] = {"kind": "zones", "slack": "warn", "zones": zones}
+    del data["mesh"]
+    with hybrid.run(hybrid.validate_scene(data)) as result:
+        (event,) = [e for e in result.events if e.kind == "model error not estimated"]
+        (bent,) = [zone for zone in result.zones[0] if zone.kind == "catenary"]
+    assert (event.s_a, event.s_b) == (bent.s_a, bent.s_b)
+    assert f"from s = {bent.s_a:.4g} to {bent.s_b:.4g} m" in event.text and "at s = 20.3 m" in event.text
+
+
+def test_an_error_that_begins_anew_says_that_its_figure_lacks_what_was_before():
+    model = build(span(2.0, "catenary", time={"duration": 0.1, "step": 0.02}))
+    correction = Correction(model)
+    correction.corrector.arrays.found[[FURTHEST, FINITE]] = -1, 0
+    rod, catenary = Zone("rod", 0.0, 5.0), Zone("catenary", 5.0, model.length)
+    s_a, s_b, text = correction.unknown([rod, catenary])
+    assert (s_a, s_b) == (5.0, model.length) and "has only what is left out from now on" in text
+    assert correction.unknown([rod])[:2] == (0.0, 5.0)
 
 
 def test_no_sea_is_needed():
