@@ -126,6 +126,25 @@ def inside_of(row: Row, s: Floats) -> np.ndarray:
     return (s >= row.first - near) & (s <= row.last + near) & ~late & ~early
 
 
+def mooring_of_steps(result: Result) -> tuple[float, float, float] | None:
+    """The largest part that E301 lets a line use at any step and node, its time (s) and arc length (m).
+
+    It goes by tension alone, of which each node has its largest.  None: there is no such section, or no step is known.
+    """
+    names = [f"{GROUP}/{x}" for x in ("tension_max", "tension_t_max")]
+    if not has_envelope(result) or any(name not in result for name in names):
+        return None
+    s, (T, t), most = np.asarray(result[SCALE]), (np.asarray(result[name]) for name in names), None
+    for row in rows_of(result):
+        at = np.flatnonzero(inside_of(row, s) & np.isfinite(T))
+        if row.kind == E301 and at.size:
+            used = use(row, T[at], np.zeros(at.size), np.zeros(at.size))
+            k = int(used.argmax())
+            if most is None or used[k] > most[0]:
+                most = float(used[k]), float(t[at[k]]), float(s[at[k]])
+    return most
+
+
 def code_of_steps(result: Result) -> float | None:
     """The part that no step and node exceeds, by the ranges of tension and moment over all of them, as if they came at
     once, at the heights of the outputs; None: the result has not all of them."""

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybrid.store.capacity import NAME, bound_of_steps
+from hybrid.store.code_checks import F201, code_of_steps, mooring_of_steps, rows_of
 from hybrid.store.code_checks import NAME as CODE_USED
-from hybrid.store.code_checks import code_of_steps
 from hybrid.store.envelope import GROUP as GROUP_OF_NODES
 from hybrid.store.envelope import NOT_VERIFIED, SAME, Arrays, extremes_of_outputs, has_envelope, not_verified
 
@@ -26,6 +26,7 @@ class Held(NamedTuple):
     """A quantity against a limit of its own: its worst value, in `unit`, when (t, s) and where (s, m; None: no place).
 
     limit: key in the scene: smallest, largest, or max_stress.  by_outputs: whether steps between outputs are not known.
+    bound: what is known not to be exceeded between outputs either; None: nothing, or value is over every step.
     value and t are NaN of a quantity that never had a value, as the touchdown of a line that touches nothing.
     verdict, why, remedy: as of `envelope.Judged`.
     """
@@ -42,6 +43,7 @@ class Held(NamedTuple):
     verdict: str = ""
     why: str = ""
     remedy: str = ""
+    bound: float | None = None
 
     @property
     def text(self) -> str:
@@ -76,6 +78,9 @@ def at_every_step(result: Result, name: str, bound: str) -> tuple[float, float, 
 
     None: the file does not have it.
     """
+    if name == CODE_USED and bound == "largest" and not _needs_moments(result):
+        found = mooring_of_steps(result)
+        return None if found is None else (100.0 * found[0], *found[1:])
     full, k = f"{EXTREMES}/{name}", ("smallest", "largest").index(bound)
     if full not in result or not np.isfinite(result[full][k]):
         return None
@@ -145,8 +150,22 @@ def capacity_of(result: Result) -> Held | None:
 
 
 def code_of(result: Result) -> Held | None:
-    """The largest part that codes of sections let it use, likewise."""
-    return _part_of(result, CODE_USED, "code", code_of_steps)
+    """The largest part that codes of sections let it use, likewise; of mooring lines over every step."""
+    found, steps = _part_of(result, CODE_USED, "code", code_of_steps), mooring_of_steps(result)
+    if found is None or steps is None:
+        return found
+    if not _needs_moments(result):
+        found = found._replace(by_outputs=False, bound=None)
+    value = 100.0 * steps[0]
+    if value > (1.0 + SAME) * found.value:
+        unknown = found.by_outputs and found.bound is None
+        found = found._replace(value=value, t=steps[1], s=steps[2], broken=value > found.allowed, by_outputs=unknown)
+    return found
+
+
+def _needs_moments(result: Result) -> bool:
+    """Whether a code takes tension and moment at once, which no step but those of outputs is known by."""
+    return any(row.kind == F201 for row in rows_of(result))
 
 
 def _part_of(result: Result, name: str, limit: str, bound_of: Callable[[Result], float | None]) -> Held | None:
@@ -158,4 +177,7 @@ def _part_of(result: Result, name: str, limit: str, bound_of: Callable[[Result],
         return None
     k, bound = int(np.nanargmax(value)), bound_of(result)
     open_ = len(result.times) > 1 and (bound is None or bound > 1.0)
-    return Held(name, limit, "%", float(value[k]), 100.0, bool(value[k] > 100.0), float(t[k]), float(s[k]), open_)
+    at_most = 100.0 * bound if open_ and bound is not None else None
+    return Held(
+        name, limit, "%", float(value[k]), 100.0, bool(value[k] > 100.0), float(t[k]), float(s[k]), open_, bound=at_most
+    )

@@ -10,10 +10,12 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.statistics.extremes import THREE_HOURS
 from hybrid.statistics.moments import exceedance
+from hybrid.store.capacity import NAME as CAPACITY_USED
+from hybrid.store.code_checks import NAME as CODE_USED
 from hybrid.store.envelope import extreme
 from hybrid.store.extrapolation import extreme_of
 from hybrid.store.histories import Window, components_of, history_of, lies_along, summary_of, usual_names
-from hybrid.store.limits import at_every_step
+from hybrid.store.limits import at_every_step, capacity_of, code_of
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
@@ -100,7 +102,7 @@ def _beyond_outputs(result: Result, name: str, t: np.ndarray, largest: Any) -> s
     elif named is not None:
         value, when, where = named[0], named[1], ""
     else:
-        return ""
+        return _bound_of_steps(result, name, largest)
     if not (t[0] <= when <= t[-1] and value - largest > WORTH_A_NOTE * abs(largest)):
         return ""
     unit = result.units[name]
@@ -109,6 +111,18 @@ def _beyond_outputs(result: Result, name: str, t: np.ndarray, largest: Any) -> s
     return (
         f"{name}: {value:.5g} {unit} at {where}t = {when:.5g} s, of {of}, {float(largest):.5g} {unit} at the outputs; "
         f"a shorter output.every{more} {shows} more of it"
+    )
+
+
+def _bound_of_steps(result: Result, name: str, largest: Any) -> str:
+    """Of what several quantities decide at once, how large it may have been between the outputs; "": no larger."""
+    held = {CAPACITY_USED: capacity_of, CODE_USED: code_of}.get(name, lambda _: None)(result)
+    if held is None or held.bound is None or not held.bound - largest > WORTH_A_NOTE * abs(largest):
+        return ""
+    unit = held.unit
+    return (
+        f"{name}: {float(largest):.5g} {unit} at the outputs, between them at most {held.bound:.5g} {unit} by the "
+        "ranges of all steps; a shorter output.every shows more of it"
     )
 
 

@@ -338,8 +338,9 @@ def _doubt_of_held(result: Result, x: Held) -> Doubt | None:
     names = frozenset(along.get(x.unit, {name}))
     if (doubt := next(_doubts(result, names, np.zeros(0)), None)) is not None:
         return doubt
-    if x.by_outputs:
-        return Doubt("its values between outputs are not known", "a shorter output.every")
+    if x.by_outputs or x.bound is not None:
+        most = "not known" if x.bound is None else f"known to be at most {x.bound:.4g} {x.unit} alone"
+        return Doubt(f"its values between outputs are {most}", "a shorter output.every")
     if x.unit == "Pa":
         return _stress_reached(result, x)
     if x.unit == "%":

@@ -13,6 +13,7 @@ import hybrid
 from hybrid.cli.commands import app
 from hybrid.errors import SceneError
 from hybrid.store.code_checks import F201, Row, code_of_steps, collapse, of_riser, use
+from hybrid.store.statistics_table import rows_of
 
 PIPE = {"outer": 0.2731, "wall": 0.0159, "modulus": 207e9, "yields": 430.08e6, "breaks": 509.76e6}
 RISER = Row(
@@ -123,6 +124,37 @@ def test_a_code_that_is_exceeded_is_broken():
     rest = hybrid.static({k: x for k, x in tables.items() if k not in ("time", "output")})
     held = next(x for x in rest.verdicts().quantities if x.limit == "code")
     assert held.broken and held.s >= 60.0
+
+
+def test_every_step_of_a_mooring_line_counts():
+    """Exactly: outputs far apart have the largest use of outputs at every step, in verdicts, statistics and studies."""
+    found = {}
+    for every in (0.1, 7.3):
+        tables = hung(output={"every": every, "points": 51}, time={"duration": 16.0, "step": 0.1})
+        tables["cable"]["sections"] = [LINE | {"length": 100.0, "code": MOORED | {"strength": 1.5e5}}]
+        result = hybrid.run(tables)
+        found[every] = next(x for x in result.verdicts().quantities if x.limit == "code")
+    every, few = found[0.1], found[7.3]
+    assert float(np.nanmax(result["code_used"])) < 98.0 and few.verdict == "broken" and not few.by_outputs
+    assert few.value == pytest.approx(every.value, rel=1e-3) and few.value > 100.0
+    assert few.t == pytest.approx(every.t, abs=0.11) and few.s == pytest.approx(every.s, abs=2.1)
+    (row,) = rows_of(result, ["code_used"])
+    assert f"code_used: {few.value:.5g} % at t = {few.t:.5g} s, of all steps" in row["beyond_outputs"]
+
+
+def test_steps_of_a_riser_between_outputs_have_a_bound():
+    """It is above what outputs at every step have, and says so where the limit stands between."""
+    code = CODE | {"yield_strength": 2.1e8, "tensile_strength": 2.6e8}
+    sections = [LINE | WALL | {"length": 100.0, "code": code}]
+    every, few = (
+        hybrid.run(hung(cable={"sections": sections}, output={"every": x, "errors": True})) for x in (0.1, 7.3)
+    )
+    held = next(x for x in few.verdicts().quantities if x.limit == "code")
+    bound, true = 100.0 * code_of_steps(few), float(np.nanmax(every["code_used"]))
+    assert held.value < 0.9 * true and held.value < 100.0 < bound and bound >= true
+    assert held.verdict == "not verified" and held.bound == pytest.approx(bound)
+    (row,) = rows_of(few, ["code_used"])
+    assert f"between them at most {bound:.5g} % by the ranges of all steps" in row["beyond_outputs"]
 
 
 def test_refusals():
