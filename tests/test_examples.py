@@ -453,7 +453,7 @@ def test_the_laid_cable_throws_a_loop_at_its_touchdown() -> None:
     result = ran("laying_loop")
     np.testing.assert_allclose(result["turns/link"][result.times > 20.1], 14.0, atol=2e-3)  # as above
     foreseen, formed = event_times(result, "loop can form")[0], event_times(result, "loop formed")[0]
-    assert foreseen == pytest.approx(34.4, abs=0.5) and formed == pytest.approx(42.8, abs=0.5)
+    assert foreseen == pytest.approx(31.4, abs=0.5) and formed == pytest.approx(42.8, abs=0.5)
     (warned,) = (event for event in result.events if event.kind == "loop can form" and event.t == foreseen)
     touchdown = result.touchdown[np.searchsorted(result.times, foreseen), 1]
     assert abs(warned.s_a - touchdown) < 3.0

@@ -45,17 +45,17 @@ def note_hockling(
 
 
 def _long_enough(torque: Floats, tension: Floats, stiffness: Floats, s: Floats) -> np.ndarray:
-    """Which points (ns,) lie in a stretch that is long enough to leave the straight line by its torque.
+    """Which points (ns,) lie in a stretch with too little tension that its torque alone could bend.
 
-    A stretch of length l between pins stays straight up to M^2/(4 EI) = T + pi^2 EI/l^2 (Greenhill); compression does
-    not count as torque.
+    Between pins a straight stretch of length l leaves the line from M^2/(4 EI) = T + pi^2 EI/l^2 on (Greenhill), which
+    without tension is one that is longer than 2 pi EI/M.  T is not taken off: in a line that has begun to leave the
+    straight line it falls in an ever shorter stretch, by about what that stretch bears, until the loop is there.
     """
     needed = formation_tension(torque, stiffness)
-    over = np.minimum(needed - tension, needed)
-    out = over > 0.0
+    out = needed > tension
     for a, b in np.flatnonzero(np.diff(np.concatenate([[0], out, [0]]))).reshape(-1, 2):
         length = s[min(b, s.size - 1)] - s[max(a - 1, 0)]
-        out[a:b] = over[a:b].mean() * length**2 > np.pi**2 * stiffness[a:b].max()
+        out[a:b] = needed[a:b].mean() * length**2 > np.pi**2 * stiffness[a:b].max()
     return out
 
 

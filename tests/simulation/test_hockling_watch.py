@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.simulation.hockling_watch import Loops, note_loops
+from hybrid.model.build import build
+from hybrid.simulation.hockling_watch import Loops, note_hockling, note_loops
 
 EI, GJ, DIAMETER = 0.5, 0.4, 0.02
 
@@ -88,6 +89,38 @@ def test_a_loop_that_forms() -> None:
     np.testing.assert_allclose(lost, 2.0 * np.round(0.5 * lost), atol=1e-9)
     assert bool(np.round(lost).any()) == any(event.kind == "line meets itself" for event in result.events)
     assert not [event for event in hybrid.run(twisted(0.5, 6.0)).events if event.kind == "loop formed"]
+
+
+FIXED, ZONES = {"duration": 5.0, "step": 0.02}, [{"rod": 3.0, "cells": 60}, {"catenary": 1.0, "cells": 10}]
+
+
+@pytest.mark.parametrize(
+    ("model", "time"),
+    [("rod", FIXED), ("rod", {"duration": 5.0}), ({"kind": "zones", "zones": ZONES}, FIXED), ("adaptive", FIXED)],
+    ids=["rod", "rod whose steps follow", "zones", "zones that move"],
+)
+def test_a_loop_that_forms_slowly_is_foreseen(model: Any, time: dict[str, float]) -> None:
+    """The straight line is left at a margin below 1 in an ever shorter stretch: no output of it was long enough."""
+    tables = twisted(6.0, 6.0, model if isinstance(model, dict) else "rod", away=0.8)
+    data = tables.model_dump(mode="python", exclude_unset=True) | {"model": model, "time": time}
+    result = hybrid.run(hybrid.validate_scene(data))
+    (formed, *_) = [event for event in result.events if event.kind == "loop formed"]
+    first, least = told(result)[0], margins(result).min(axis=1)
+    assert 0.9 < first.value < 1.0 and first.t < formed.t - 1.5
+    assert first.t <= result.times[int(np.argmax(least < 1.0))] + 0.45  # the stretch must be long enough
+
+
+def test_a_stretch_that_the_torque_alone_cannot_bend_is_too_short() -> None:
+    """Greenhill: a pinned line without tension, of length l, is bent by M = 2 pi EI/l."""
+    model, s = build(twisted(0.0)), np.linspace(0.0, 4.0, 401)
+    torque, found = np.full((1, 401), 6.0), []
+    for length in (0.95, 1.05):
+        tension = np.full((1, 401), 20.0)  # needed: 18 N
+        tension[0, np.abs(s - 2.0) < 0.5 * length * 2.0 * np.pi * EI / 6.0 - 0.01] = 17.9
+        values = {"torque": torque, "tension": tension}
+        note_hockling(model, np.zeros(1), values, s, 1.0, lambda *x, **y: found.append((x[0], y["value"])))
+        assert len(found) == (length > 1.0)
+    assert found[0][1] == pytest.approx(17.9 / 18.0)
 
 
 def told_of(writhe: list[float], bends: list[float], batches: int = 1) -> list[tuple[float, str, str]]:
