@@ -66,6 +66,7 @@ def stats(
             own = ",".join(usual_names(opened))
             fix = f"--line {next(iter(opened.lines))}" + (f", or --names {own}" if own else "")
             raise ResultError(f"{result} holds the lines {', '.join(opened.lines)}\n    try:      {fix}")
+        from hybrid.store.envelope import stored_window
         from hybrid.store.statistics_table import rows_of, values_of
 
         if len(opened.times) == 1 and opened.status == "complete" and (above, below, curve, mooring) == (None,) * 4:
@@ -88,7 +89,8 @@ def stats(
             console.json("statistics", **row)
         console.show(lambda: _table(rows, hours))
         if opened.status != "complete":
-            console.note(f"note: of a run that has not come to its end; {opened.status_text}")
+            stored = f"{opened.status_text}; stored is {stored_window(opened)}"
+            console.note(f"note: of a run that has not come to its end; {stored}")
         elif opened.pending:
             console.note(f"note: {opened.pending}")
         without: dict[str, dict[str, None]] = {}
@@ -109,7 +111,8 @@ def stats(
         moored = {} if mooring is None else _moored(opened, mooring, tuple(factors), str(pretension), line)
         if moored:
             console.show(lambda: moored["text"])
-        more = {"mooring": moored} if moored else {}
+        more: dict[str, Any] = {"mooring": moored} if moored else {}
+        more |= {"stored": stored_window(opened)} if opened.status != "complete" else {}
         console.json("done", file=str(result), status=opened.status, fatigue=facts, utilisation=used, **more)
 
 

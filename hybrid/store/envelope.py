@@ -133,6 +133,18 @@ def has_envelope(result: Result) -> bool:
     return END in result and bool(np.isfinite(result[END]))
 
 
+def stored_window(result: Result) -> str:
+    """Over which time a result was stored: outputs and steps, and extremes of nodes and steps if that differs."""
+    t = result.times
+    if not len(t):
+        return "no output"
+    text = f"t = {t[0]:.9g} to {t[-1]:.9g} s"
+    end = float(result[END]) if has_envelope(result) else float(t[-1])
+    if abs(end - t[-1]) <= 1e-9 * abs(end):
+        return text
+    return f"{text}, extremes of all nodes and steps to {end:.9g} s"
+
+
 def extreme(values: Arrays, name: str, bound: str) -> Extreme | None:
     """The lowest ("min") or highest ("max") value of a quantity of the envelope over all places; None: it has none."""
     full = f"{GROUP}/{name}_{bound}"

@@ -66,6 +66,9 @@ from hybrid.store.records import (
 if TYPE_CHECKING:
     import xarray
 
+# Of a time: a step so near to an output ends there.
+SAME_TIME = 1e-9
+
 
 class Result(Histories):
     """The recorded answer of one run.
@@ -113,6 +116,10 @@ class Result(Histories):
         self.attributes: dict[str, Any] = Attributes(
             {OLD_ATTRIBUTES.get(k, k): v for k, v in contents.attributes.items()}
         )
+        if self.status != "complete" and self._rows.get("t", 0) > 1 and self._rows.get("steps/t"):
+            # steps are written as they are made, outputs when the file is brought up to date
+            steps, last = contents.values("steps/t", self._rows["steps/t"]), float(self.times[-1])
+            self._rows["steps/t"] = int(np.searchsorted(steps, last * (1.0 + SAME_TIME), side="right"))
         table = self["zones"]
         rows = zip(*(table[k].tolist() for k in Zone._fields), strict=True)
         self.zones = ZoneHistory(table["output"], [Zone(*row) for row in rows], len(self.times))

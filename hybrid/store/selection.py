@@ -21,6 +21,7 @@ import h5py
 import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, ResultError
+from hybrid.store.envelope import stored_window
 from hybrid.store.names import ALIASES, right_of
 
 if TYPE_CHECKING:
@@ -185,6 +186,8 @@ def missing_parts(part: Part) -> list[str]:
     said, t, whole = [], part.times, part.result["t"]
     if part.result.status != "complete":
         said.append(f"the run is not complete ({part.result.status_text}): t ends at {whole[-1]:.9g} s")
+        if "extremes" in (window := stored_window(part.result)):
+            said.append(f"stored of it: {window}")
     elif part.result.pending:
         said.append(part.result.pending)
     if len(t) < len(whole):

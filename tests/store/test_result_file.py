@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +17,8 @@ import pytest
 
 import hybrid
 from hybrid.errors import ResultError
+from hybrid.exports.api import export
+from hybrid.store.envelope import stored_window
 from hybrid.store.format import Field
 from hybrid.store.hdf5_file import SLOTS, created, hold_metadata, in_memory
 from hybrid.store.reader import Result, open_result
@@ -98,6 +101,24 @@ def test_round_trip(result: Result) -> None:
     for part in ("Tëst", "run.h5", "4 outputs", "1.5 s", "5 points", "rod 1-2 m", "complete"):
         assert part in text
     assert "position" in dir(result) and "energy" in result and "moment" in result and "lift" not in result
+
+
+def test_of_a_run_that_was_killed_all_is_of_the_window_of_its_outputs(tmp_path: Path) -> None:
+    """Steps are written as they are made: those behind the last output that is there are left out, and it says so."""
+    written(tmp_path / "run.h5")
+    shutil.copy(tmp_path / "run.h5", tmp_path / "killed.h5")
+    with h5py.File(tmp_path / "killed.h5", "a") as file:
+        file.attrs["status"] = "running"
+        file["t"].resize((3,))
+        file.create_group("envelope")["end"] = 1.25
+        file["envelope/end"].attrs["units"] = "s"
+    killed, whole = open_result(tmp_path / "killed.h5"), open_result(tmp_path / "run.h5")
+    assert killed.times[-1] == 1.0 and killed["steps/t"].tolist() == [0.0, 0.5, 1.0] and len(whole["steps/t"]) == 4
+    assert killed.steps["iterations"].tolist() == [0, 1, 2]
+    assert stored_window(killed) == "t = 0 to 1 s, extremes of all nodes and steps to 1.25 s"
+    made = export(killed, tmp_path / "steps.csv", names=["steps"])
+    assert "stored of it: t = 0 to 1 s, extremes" in made.notes[1]
+    assert (tmp_path / "steps.csv").read_text(encoding="utf-8").splitlines()[-1].startswith("1.0,")
 
 
 def test_in_memory_is_the_same_as_a_file(result: Result) -> None:
