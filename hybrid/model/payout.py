@@ -103,11 +103,15 @@ class PayoutPlan:
         """Length, m, of the cell after a material node."""
         return float(self.nodes[node + 1] - self.nodes[node])
 
+    @property
+    def holds_tension(self) -> bool:
+        """Whether a winch holds a tension."""
+        return bool(self.winch[w.TENSION] > 0.0)
+
     def forecast(self, duration: float) -> PayoutForecast:
         """What will be out up to a time, s."""
-        winch = self.winch[w.TENSION] > 0.0
-        if self.from_outside or winch:
-            by = f"a winch holds {self.winch[w.TENSION]:.6g} N" if winch else "set from Python"
+        if self.from_outside or self.holds_tension:
+            by = f"a winch holds {self.winch[w.TENSION]:.6g} N" if self.holds_tension else "set from Python"
             cells = self.cells(self.longest)
             return PayoutForecast(by, self.first, math.nan, self.shortest, self.longest, math.nan, cells, math.nan)
         t = np.linspace(0.0, duration, 2001)

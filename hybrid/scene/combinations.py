@@ -180,18 +180,6 @@ def _winches(tables: Tables) -> Iterator[tuple[Place, Payout]]:
             yield ("connections", name, "payout"), payout
 
 
-def _joined(tables: Tables, end: str) -> bool:
-    """Whether a line of several ends at what moves by what pulls there."""
-    return bool(tables[SYSTEM].is_joined(getattr(tables[SYSTEM].lines[tables[LINE]], end)))
-
-
-def _tension_held(tables: Tables) -> Iterator[Place]:
-    """Winches that hold a tension, of lines an end of which moves by what pulls there."""
-    for at, payout in _winches(tables) if SYSTEM in tables else ():
-        if payout.winch is not None and any(_joined(tables, end) for end in ("start", "end")):
-            yield (*at, "winch")
-
-
 def _paid_out(tables: Tables) -> Iterator[Place]:
     return (at for at, _ in _winches(tables))
 
@@ -450,7 +438,6 @@ SELF_CONTACT = Feature("contact of a line with itself", "contact.self", _self_co
 PAYOUT = Feature("line that is paid out", "ends.end.payout", _paid_out)
 PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout", _paid_out_at("start"))
 PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out_at("end"))
-TENSION_HELD = Feature("a winch that holds a tension, of a line to what is free", "payout.winch", _tension_held)
 SEVERAL_LINES = Feature("several lines", "lines", _several)
 SHAPES = Feature("bodies that lines touch", "bodies.NAME.shape", _shapes)
 SHEAVES = Feature("sheaves that turn freely", "obstacles.NAME.bearing", _free_sheaves)
@@ -589,10 +576,6 @@ REFUSALS: tuple[Refusal, ...] = (
     # --- line that is paid out ---
     Refusal(
         PAYOUT_AT_START, PAYOUT_AT_END, "not worked out", "line is paid out at ends.end", fix="leave one out"
-    ),
-    Refusal(
-        TENSION_HELD, SEVERAL_LINES, "several lines", "an end of the line moves by what pulls there",
-        fix="give a rate or a length, or hold what is at both ends",
     ),
     Refusal(
         DAMPED_OTHERWISE, PAYOUT, "not worked out",

@@ -117,7 +117,9 @@ class SystemSolver:
         touch = {*self._contacts, *(shared.lines if shared is not None else ())}
         self._rides = lines[0].rides  # obstacles are those of all lines
         self._sheaves = int((lines[0].line.moved == FREE).sum())
-        touch |= {*range(len(lines))} if self._rides.size or self._sheaves else set()
+        self._winches = sum(x.lengthens for x in lines)
+        beside = self._sheaves or self._winches
+        touch |= {*range(len(lines))} if self._rides.size or beside else set()
         self.work = [_room(x, k in touch) for k, x in enumerate(lines)]
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
         self._floors = np.array([-np.inf if x.slackens else x.floor for x in lines])
@@ -185,8 +187,8 @@ class SystemSolver:
         self._meeting = [Table(blank_meeting_job), Table(blank_meeting_job)] if self._rides.size else []
         if self._rides.size:
             self._meet()
-        self._spinning = [Table(blank_spinning_job), Table(blank_spinning_job)] if self._sheaves else []
-        if self._sheaves:
+        self._spinning = [Table(blank_spinning_job), Table(blank_spinning_job)] if beside else []
+        if beside:
             self._spin()
         self._touching = Table(blank_touching_job), Table(blank_touching_job)
         self._at_rest = np.zeros(1, np.int64)
@@ -229,13 +231,14 @@ class SystemSolver:
             )
 
     def _spin(self) -> None:
-        """Lines turn the sheaves among the obstacles."""
+        """Lines turn the sheaves among the obstacles, and winches give of joined lines what keeps their tension."""
         nodes, bodies = [x.line.s.size for x in self.lines], len(self.bodies)
         room = {
             "gaps": np.zeros_like(self._gaps), "phase": self._phase, "asked": self._asked,
             "begins": np.append(0, np.cumsum(nodes)[:-1]).astype(np.int64), "marks": np.zeros(sum(nodes), np.int64),
             "kept": np.zeros((sum(nodes), SIZE)), "moved": np.zeros((bodies, 6)),
-            "turned": np.zeros((self._sheaves, bodies, 6)),
+            "turned": np.zeros((self._sheaves, bodies, 6)), "lengthened": np.zeros((self._winches, sum(nodes), SIZE)),
+            "drawn": np.zeros((self._winches, bodies, 6)),
         }  # fmt: skip
         for meeting, spinning in zip(self._meeting, self._spinning, strict=False):
             spinning.bind(meet=meet_bodies.address(meeting.numbers), meet_table=meeting.numbers)

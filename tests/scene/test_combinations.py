@@ -94,10 +94,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     ),
     (c.DERIVATIVES, c.SETTLED_FRICTION): ({"initial": {"kind": "equilibrium", "friction": "settled"}}, "derivatives"),
     (c.PAYOUT_AT_START, c.PAYOUT_AT_END): (PAID | {"ends.start.payout": {"rate": 0.1, "ramp": 1.0}}, ""),
-    (c.TENSION_HELD, c.SEVERAL_LINES): (
-        {ONE + "connections.end.payout": {"longest": 12, "winch": {"tension": 50, "inertia": 9}},
-         "points.a": {"kind": "free", "mass": 5, "initial_guess": [8, 0, -9]}}, ""
-    ),
     (c.DAMPED_OTHERWISE, c.PAYOUT): (PAID | ROPE | {SECTION + "damping": {"stiffness": 0.01}}, ""),
     (c.VORTICES, c.PLANE): (SHEDS | {"dimension": 2}, ""),
     (c.VORTICES, c.RESPONSE): (SHEDS, "response"),

@@ -1,9 +1,11 @@
 """Sheaves that turn freely under several lines (kernels.laws.sheaves has the symbols): one angle of each for all of them.
 
+Winches of joined lines are taken with them, and before them (kernels.junctions.joined_winches).
+
 Every line has the sheave among its obstacles, with its angle in its state, where all are the same.  M is the sum over the
 lines, p stands on the nodes of all, and z is how lines, points and bodies answer to it, with bodies that lines touch.
 kernels.run.system and kernels.junctions.system_contact call `spin_sheaves` by its address, so that systems without sheaves
-compile none of it.
+and such winches compile none of it.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from hybrid.kernels.junctions.body_contact import (
 )
 from hybrid.kernels.junctions.carried_frames import ANSWER, SEAT
 from hybrid.kernels.junctions.joined_lines import COLUMNS, FUNCTIONAL
+from hybrid.kernels.junctions.joined_winches import draw_along, find_lengthenings, give_lengths
 from hybrid.kernels.junctions.junctions import HANDED, START
 from hybrid.kernels.junctions.right_sides import answer_right_sides
 from hybrid.kernels.junctions.system_job import ASKED, PART
@@ -68,6 +71,8 @@ class SpinningJob(NamedTuple):
     kept: Floats  # (T, 5) corrections of lines without sheaves
     moved: Floats  # (B, 6) and of bodies
     turned: Floats  # (K, B, 6) z of bodies; that of lines is in their Sea.rolling
+    lengthened: Floats  # (W, T, 5) z of lines, of winches
+    drawn: Floats  # (W, B, 6) and of bodies
     meet_table: NDArray[np.int64]  # of kernels.junctions.body_contact.meet_bodies
     meet: int = 0  # its address; 0: no body has a shape
 
@@ -79,7 +84,7 @@ def blank_spinning_job() -> SpinningJob:
         one, z(ASKED), z((1, 1), whole), z((1, 2), whole), z((1, 2, SEAT)), z((1, 2, 3)), z((1, 2, 3)), one,
         z((3, 1, SIZE)), z(FUNCTIONAL), z((2, ANSWER)), z((1, 3)), z((1, NUMBERS)), z((1, STATE)), z((1, STATE)),
         z((1, WORK)), z((HANDED - 1, HANDED)), z((2, 6, 6)), z((4, 2)), z(COLUMNS), one, one, z((2, SIZE)), z((1, 6)),
-        z((1, 1, 6)), one,
+        z((1, 1, 6)), z((1, 1, SIZE)), z((1, 1, 6)), one,
     )  # fmt: skip
 
 
@@ -173,6 +178,7 @@ def find_answer(job, k, j, cv, ca):
     push_along(job, j)
     if not answer_right_sides(job, cv, ca, True):
         return False
+    draw_along(job, job.lengthened.shape[0], False)
     turn_along_all(job, j, False)
     alone = slope - row[INERTIA] * ca - row[BEARING] * cv
     row[LEFT_OVER] = moment - row[INERTIA] * state[TRUE] - row[BEARING] * state[SPIN]
@@ -191,15 +197,18 @@ def find_answer(job, k, j, cv, ca):
 
 @inner
 def turn_all(job, cv, ca):
-    """Put sheaves into the corrections of the iteration; False: not finite."""
+    """Put winches and sheaves into the corrections of the iteration; False: not finite."""
     moved, j = read(job.tables[0]).line.moved, 0
     keep_corrections(job, job.kept, job.moved)
+    if not find_lengthenings(job, cv, ca):
+        return False
     for k in range(moved.shape[0]):
         if moved[k] == FREE:
             if not find_answer(job, k, j, cv, ca):
                 return False
             j += 1
     put_corrections(job, job.kept, job.moved)
+    draw_along(job, job.lengthened.shape[0], True)
     turn_along_all(job, j, True)
     return True
 
@@ -223,13 +232,16 @@ def roll_all(job, task):
 
 @kernel
 def spin_sheaves(table):
-    """Do what is asked of sheaves that turn freely (TURN, TURN_ALONG, ROLL_ON); 0: it fails."""
+    """Do what is asked of winches and sheaves that turn freely (TURN, TURN_ALONG, ROLL_ON); 0: it fails."""
     job = read_spinning(table)
     task, phase = read(job.tables[0]).task, job.phase[0]
     if phase == TURN:
         return 1 if turn_all(job, task.cv, task.ca) else 0
     if phase == ROLL_ON:
-        roll_all(job, task)
+        give_lengths(job)
+        if job.turned.shape[0] > 0:
+            roll_all(job, task)
     else:
+        draw_along(job, job.lengthened.shape[0], False)
         turn_along_all(job, job.turned.shape[0], False)
     return 1

@@ -46,17 +46,26 @@ from hybrid.kernels.reel.payout_contact import let_material_rub, rubs
 from hybrid.kernels.reel.payout_work import book, book_contact, end_of, leave_to_reel, remember, work_of_balance
 from hybrid.kernels.reel.reel import (
     ACCELERATION,
+    ALONE,
+    CHANGE,
     DUE,
     FEWEST_STEPS,
     FLOW_KNOWN,
     FLUX,
+    GROWS_AT,
     LENGTH,
+    LENGTHENS,
     LONGEST,
+    MOVES,
+    OUT_OF_BALANCE,
+    PULLS_AT,
+    PUTS,
     RATE,
     RIDING_ON,
     SHORTEST,
     SIDE,
     UNBALANCED,
+    WAITS,
     read,
 )
 from hybrid.kernels.reel.winch import (
@@ -69,6 +78,7 @@ from hybrid.kernels.reel.winch import (
     accept,
     answer_of_cell,
     at_its_end,
+    by_length,
     last_change,
     lengthen_cell,
     losses,
@@ -298,18 +308,41 @@ def pay_out(table):
     return 1 if numbers[DUE] > 0.0 or at_its_end(winch) else 0
 
 
+@inner
+def correct_length(job, change):
+    """The length of a winch that holds a tension changes, m, in the iteration of a step."""
+    numbers, winch, t = job.reel.numbers, job.reel.winch, job.clock[b.TRY_END]
+    numbers[LENGTH] += change
+    numbers[RATE] += winch[CV] * change
+    numbers[ACCELERATION] += winch[CA] * change
+    prepare(job.line, job.reel, t)
+    put_balance_on(job.line, job.reel, t)
+
+
+@inner
+def is_of_joined(ends):
+    """Whether an end of the line moves by what pulls there: with the lengths that its winch gives, too."""
+    return ends.held[0] == JOINED or ends.held[1] == JOINED
+
+
 @kernel
 def iterate(table):
     """What an iteration of Newton's method does before it assembles its equations, and after it has eliminated them.
 
     Nodes that ride with the fairlead have the inertia, the drag, the added mass and the friction of the material that
-    they pass; a winch that holds a tension corrects the length, and the equations with it.
+    they pass; a winch that holds a tension corrects the length, and the equations with it.  That of a joined line is
+    corrected with all lines (kernels.junctions.joined_winches), and then changes its length.
     """
     job = read(table)
     line, reel, clock = job.line, job.reel, job.clock
-    numbers, winch, t = reel.numbers, reel.winch, clock[b.TRY_END]
+    numbers, winch, stage, t = reel.numbers, reel.winch, reel.stage, clock[b.TRY_END]
     state = job.old if job.counts[b.PARITY] else job.new
-    if reel.stage[RIDING_ON] == 0.0:
+    if stage[LENGTHENS] == MOVES:
+        stage[LENGTHENS] = 0.0
+        correct_length(job, stage[CHANGE])
+        return 0
+    stage[LENGTHENS] = 0.0
+    if stage[RIDING_ON] == 0.0:
         put_riding_on(line, job.sea, job.ends, state, reel, t)
         if rubs(line):
             let_material_rub(line, job.sea, job.new if job.counts[b.PARITY] else job.old, reel)
@@ -322,27 +355,26 @@ def iterate(table):
     at, n, g = last_change(line), line.h.shape[0], growing(line, reel)
     apart = end_of(reel) == 0 or g < n - 1  # the cell that grows is not the last one of the line
     more, slope = of_material(line, job.sea, job.ends, state, reel, n)
-    more = sub(more, sum_of_balance(reel, t))
+    more = (0.0, 0.0, 0.0) if is_joined(job.ends, reel) else sub(more, sum_of_balance(reel, t))
     force, _ = force_of_fairlead(reel, job.report, more)
-    if apart:
-        answer, more_pull = answer_of_cell(
-            line, state, winch, job.X, job.W, reel.columns, cell(line, reel, g), n if end_of(reel) else 1
-        )
-    else:
-        answer, more_pull = softness(line, state, winch, job.X), job.X[at]
-    pull = pull_at(force, slope) + more_pull
+    pull = pull_at(force, slope)
     lost, steep = losses(winch, numbers[RATE])
-    left = winch[INERTIA] * numbers[ACCELERATION] + lost + tension_held(winch, t) - pull
+    taken = winch[INERTIA] * numbers[ACCELERATION] + lost + tension_held(winch, t)
     carried = 0.0  # with the fairlead and the nodes that ride with it
     for j in range(g + 1, n + 1):
         carried += line.mass[node(line, reel, j)] * math.sqrt(dot(slope, slope))
-    stiff = (winch[INERTIA] + carried) * winch[CA] + steep * winch[CV] - answer
-    change = -left / stiff
-    numbers[LENGTH] += change
-    numbers[RATE] += winch[CV] * change
-    numbers[ACCELERATION] += winch[CA] * change
-    prepare(line, reel, t)
-    put_balance_on(line, reel, t)
+    stiff = (winch[INERTIA] + carried) * winch[CA] + steep * winch[CV]
+    c, before = cell(line, reel, g), n if end_of(reel) else 1
+    if is_of_joined(job.ends):
+        stage[LENGTHENS], stage[GROWS_AT], stage[PULLS_AT] = WAITS, c + 1.0, float(before)
+        stage[PUTS], stage[OUT_OF_BALANCE], stage[ALONE] = by_length(line, state, winch, c), taken - pull, stiff
+        return 0
+    if apart:
+        answer, more_pull = answer_of_cell(line, state, winch, job.X, job.W, reel.columns, c, before)
+    else:
+        answer, more_pull = softness(line, state, winch, job.X), job.X[at]
+    change = -(taken - (pull + more_pull)) / (stiff - answer)
+    correct_length(job, change)
     if apart:
         lengthen_cell(line, job.X, change, reel.columns)
     else:

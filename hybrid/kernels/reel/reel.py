@@ -44,7 +44,18 @@ FEWEST_STEPS = 8
 ) = range(16)  # fmt: skip
 NUMBERS = 16
 # Parts of `Reel.stage`.
-RIDING_ON, BALANCE_ON, UNBALANCED, FLOW_KNOWN = range(4)
+(
+    RIDING_ON, BALANCE_ON, UNBALANCED, FLOW_KNOWN,
+    # Of a winch that holds a tension, of a line with a joined end (kernels.junctions.joined_winches): what is asked of it;
+    # the block row of the cell that grows, and what its length puts there per m; the block row with the tension before the
+    # fairlead; N out of balance at the rotor, and how that grows with the length, N/m, by itself and with the answer of all
+    # lines, points and bodies.
+    LENGTHENS, GROWS_AT, PUTS, PULLS_AT, OUT_OF_BALANCE, ALONE, YIELDING,
+    CHANGE,  # m, of the length
+) = range(12)  # fmt: skip
+STAGE = 12
+# What may be asked: to be corrected with the lines; to take its change.
+WAITS, MOVES = 1.0, 2.0
 # Columns of `Reel.flow`.
 LENGTH_OF, FLOW, STRAIN_OF, TURN_FLOW = 0, 1, 2, 5
 FLOWS = 8
@@ -73,8 +84,8 @@ class Reel(NamedTuple):
     # (m+1, 3) N, by which the forces on them are more because they do not move as the material does; on the fairlead 0
     # where it is held
     riding: Floats
-    # (4,) 1 while these, or `balance`, are among the forces on the line; while `balance` is to be found; where the last
-    # assembly since the last step had `flow` in it
+    # (STAGE,) 1 while these, or `balance`, are among the forces on the line; while `balance` is to be found; where the last
+    # assembly since the last step had `flow` in it; of a winch of a joined line what is above
     stage: Floats
     balance: Floats  # (N+1, 3) N, forces on nodes, in the order of the line, that balanced them at CHANGED
     plain: Floats  # (N+1, 3) N, the forces on the line without them
@@ -97,7 +108,7 @@ def blank_reel(
         numbers, z((1, 8)) if law is None else law, z((1, 1 + COLUMNS)) if pieces is None else pieces,
         z((1, COLUMNS)), z(1), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 1, 10)),
         z(3), z(REPORT_SIZE), z((2, COLUMNS)), z(1) if layer is None else layer,
-        z((1 if layer is None else layer.size, 3)), z(4), z((cells + 1, 3)), z((cells + 1, 3)), z(WINCH) if winch is None else winch,
+        z((1 if layer is None else layer.size, 3)), z(STAGE), z((cells + 1, 3)), z((cells + 1, 3)), z(WINCH) if winch is None else winch,
         z((cells + 1 if damped else 0, FLOWS)), z((3, cells + 1, 5) if columns else (3, 0, 5)),
     )  # fmt: skip
 

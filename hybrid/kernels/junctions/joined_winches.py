@@ -1,0 +1,120 @@
+"""Winches that hold a tension, of lines with an end that moves by what pulls there: their lengths are unknowns beside those
+
+of all lines, points and bodies (kernels.reel.winch has the symbols).
+
+The rotor is out of balance by  a = I dc/dt + B(c) + T - P,  which grows with the length L by  a_L  with all else still, and
+falls with the tension before the fairlead.  z is how the corrections x answer to 1 m of L, bodies that lines touch among
+them; then  dL = (p x - a) / (a_L - p z),  with p x the change of that tension.  Sheaves and contact answer with these, too.
+"""
+
+from __future__ import annotations
+
+from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE
+from hybrid.kernels.junctions.bodies import X
+from hybrid.kernels.junctions.body_contact import clear_right_side, eliminate_right_side
+from hybrid.kernels.junctions.right_sides import answer_right_sides
+from hybrid.kernels.junctions.system_job import PART
+from hybrid.kernels.machine.compile import called, inner
+from hybrid.kernels.reel.reel import (
+    ALONE,
+    CHANGE,
+    GROWS_AT,
+    LENGTHENS,
+    MOVES,
+    OUT_OF_BALANCE,
+    PULLS_AT,
+    PUTS,
+    WAITS,
+    YIELDING,
+)
+from hybrid.kernels.reel.reel import read as read_reel
+from hybrid.kernels.step.job import call_reel, read
+
+
+@inner
+def waits(line_job):
+    """Whether the winch of a line is to be corrected with all lines."""
+    return line_job.iterated != 0 and read_reel(line_job.reel_table).reel.stage[LENGTHENS] == WAITS
+
+
+@inner
+def draw(job, w, change):
+    """Winch number w gives a change of its length, m: the corrections of all lines and bodies go along."""
+    for l in range(job.tables.shape[0]):
+        x, o = read(job.tables[l]).work.x, job.begins[l]
+        for i in range(x.shape[0]):
+            for c in range(SIZE):
+                x[i, c] += change * job.lengthened[w, o + i, c]
+    for b in range(job.work.shape[0]):
+        for c in range(6):
+            job.work[b, X + c] += change * job.drawn[w, b, c]
+
+
+@inner
+def draw_along(job, count, with_left):
+    """Put the first `count` winches into corrections that were found without them; with_left: with what is out of
+
+    balance at them.
+    """
+    w = 0
+    for l in range(job.tables.shape[0]):
+        line_job = read(job.tables[l])
+        if not waits(line_job):
+            continue
+        if w < count:
+            stage = read_reel(line_job.reel_table).reel.stage
+            left = -line_job.work.x[int(stage[PULLS_AT]), 0]
+            if with_left:
+                left += stage[OUT_OF_BALANCE]
+            draw(job, w, -left / stage[YIELDING])
+        w += 1
+
+
+@called
+def find_lengthening(job, l, w, cv, ca):
+    """How all answer to 1 m more of line l, by winch number w, with those before it; False: not finite."""
+    for k in range(job.tables.shape[0]):
+        clear_right_side(job, k)
+    line_job = read(job.tables[l])
+    x, n, stage = line_job.work.x, line_job.line.h.shape[0], read_reel(line_job.reel_table).reel.stage
+    i = int(stage[GROWS_AT])
+    job.marks[job.begins[l] + i] = 1
+    x[i, 0] = line_job.work.X[(n + 1) * ROW + i * KEPT + 62] * stage[PUTS]
+    eliminate_right_side(job, l)
+    if not answer_right_sides(job, cv, ca, True):
+        return False
+    draw_along(job, w, False)
+    stage[YIELDING] = stage[ALONE] - x[int(stage[PULLS_AT]), 0]
+    for k in range(job.tables.shape[0]):
+        z, o = read(job.tables[k]).work.x, job.begins[k]
+        for i in range(z.shape[0]):
+            for c in range(SIZE):
+                job.lengthened[w, o + i, c] = z[i, c]
+    for b in range(job.work.shape[0]):
+        for c in range(6):
+            job.drawn[w, b, c] = job.work[b, X + c]
+    return True
+
+
+@inner
+def find_lengthenings(job, cv, ca):
+    """How all answer to the lengths of all winches; False: not finite."""
+    w = 0
+    for l in range(job.tables.shape[0]):
+        if waits(read(job.tables[l])):
+            if not find_lengthening(job, l, w, cv, ca):
+                return False
+            w += 1
+    return True
+
+
+@inner
+def give_lengths(job):
+    """Winches give a part of what belongs to the corrections as they are."""
+    for l in range(job.tables.shape[0]):
+        line_job = read(job.tables[l])
+        if waits(line_job):
+            stage = read_reel(line_job.reel_table).reel.stage
+            left = stage[OUT_OF_BALANCE] - line_job.work.x[int(stage[PULLS_AT]), 0]
+            stage[CHANGE], stage[LENGTHENS] = -job.asked[PART] * left / stage[ALONE], MOVES
+            call_reel(line_job.iterated, line_job.reel_table)

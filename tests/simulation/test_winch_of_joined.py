@@ -1,0 +1,163 @@
+"""Winches that hold a tension, of lines with an end that moves by what pulls there: closed forms, and the cable."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from test_winch import G, blend
+
+import hybrid
+from tests.combinations.pairs import as_system
+from tests.validation.obstacle_scenes import CENTRELINE
+from tests.validation.test_validation_moving_obstacles import weights
+
+Tables = dict[str, Any]
+STEP = 0.02
+LINE = {
+    "length": 60.0, "mass": 0.4, "diameter": 0.02, "axial_stiffness": 2e5, "bending_stiffness": 5.0,
+    "torsional_stiffness": 4.0, "drag": {"normal": 1.2},
+}  # fmt: skip
+WINCH = {"longest": 80.0, "winch": {"tension": 150.0, "inertia": 20.0, "damping": 20.0, "ramp": 3.0}}
+MOVES = {"heave": {"amplitude": 1.0, "period": 8.0}, "surge": {"amplitude": 1.0, "period": 6.0}, "ramp": 8.0}
+
+
+def lowered(winch_first: bool = True, model: str = "catenary", clamp: bool = False) -> Tables:
+    """A load in a current hangs on a line, whose winch heaves and surges; the winch is at its start or its end."""
+    held = {"kind": "clamped", "tangent": [0, 0, -1 if winch_first else 1]} if clamp else {}
+    a, b = ("start", "end") if winch_first else ("end", "start")
+    line = {a: "top", b: "load", "model": model, "mesh": {"cells": 30}, "sections": [LINE]}
+    return {
+        "environment": {"fluid": {"density": 1025, "current": [0.3, 0, 0]}},
+        "points": {
+            "top": {"position": [0, 0, 0], "motion": MOVES},
+            "load": {"kind": "free", "mass": 10.0, "initial_guess": [5, 0, -59]},
+        },
+        "lines": {"one": line | {"connections": {a: held | {"payout": WINCH}}}},
+        "time": {"duration": 10.0, "step": STEP}, "output": {"every": 0.5},
+    }  # fmt: skip
+
+
+def floating(*anchors: float, M: float = 40.0, lift: float = 1000.0) -> Tables:
+    """A body that is lifted has a winch for each weightless line to an anchor at x; they hold as much as keeps it down."""
+    hold = {"tension": (lift - M * G - 100.0) / len(anchors), "inertia": 30.0, "damping": 15.0, "ramp": 4.0}
+    line = {"length": 50.0, "mass": 1e-6, "axial_stiffness": 1e8}
+    payout = {"connections": {"start": {"payout": {"longest": 90.0, "winch": hold}}}}
+    return {
+        "points": {
+            "eye": {"body": "frame", "place": [0, 0, -0.5]},
+            **{f"anchor {k}": {"position": [x, 0, -50.5]} for k, x in enumerate(anchors)},
+        },
+        "bodies": {"frame": {"mass": M, "inertia": [9, 9, 9], "initial_guess": [0, 0, 0], "force": [0, 0, lift]}},
+        "lines": {
+            f"line {k}": payout | {"start": "eye", "end": f"anchor {k}", "model": "catenary", "mesh": {"cells": 10},
+                                   "sections": [line], "contact": {"self": False}}
+            for k in range(len(anchors))
+        },
+        "time": {"duration": 10.0, "step": STEP}, "output": {"every": 0.5},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("anchors", [[0.0], [0.0, 0.0]], ids=["one winch", "two winches"])
+def test_a_body_that_its_own_winches_let_rise(anchors: list[float]) -> None:
+    """(M + n I) z'' + n B z' = F - M g - n T(t), by another integrator; and the pull of each line is I z'' + B z' + T."""
+    scene, n = floating(*anchors), len(anchors)
+    found = hybrid.run(scene)
+    hold = scene["lines"]["line 0"]["connections"]["start"]["payout"]["winch"]
+    first = (1000.0 - 40.0 * G) / n
+
+    def held(t: float) -> float:
+        return blend(t, first, hold["tension"], 0.0, 4.0)
+
+    def law(t: float, y: np.ndarray) -> list[float]:
+        return [y[1], (n * (first - held(t)) - 15.0 * n * y[1]) / (40.0 + 30.0 * n)]
+
+    exact = solve_ivp(law, (0.0, 10.0), [0.0, 0.0], rtol=1e-10, atol=1e-12, t_eval=found.t).y
+    assert exact[0, -1] > 5.0
+    grown = found["bodies/frame/position"][:, 2] - found["bodies/frame/position"][0, 2]
+    assert np.abs(grown - exact[0]).max() < 2e-4 * exact[0, -1]
+    for line in found.lines.values():
+        assert np.abs(line["payout/length"] - line["payout/length"][0] - exact[0]).max() < 2e-4 * exact[0, -1]
+        pull = 30.0 * np.array([law(t, y)[1] for t, y in zip(found.t, exact.T, strict=True)]) + 15.0 * exact[1]
+        pull += [held(t) for t in found.t]
+        assert np.abs(np.linalg.norm(line["reaction_start"], axis=1) / pull - 1.0).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("model", "clamp"), [("catenary", False), ("rod", False), ("rod", True), ("adaptive", False)],
+    ids=["catenary", "rod", "clamp", "zones"],
+)  # fmt: skip
+def test_lines_with_their_ends_exchanged(model: str, clamp: bool) -> None:
+    one, other = (hybrid.run(lowered(x, model, clamp)).lines["one"] for x in (True, False))
+    assert np.ptp(one["payout/length"]) > 1.0
+    assert np.abs(one["payout/length"] - other["payout/length"]).max() < 1e-7
+    assert np.abs(one.position - other.position[:, ::-1]).max() < 1e-6
+
+
+@pytest.mark.parametrize("model", ["catenary", "rod"])
+def test_a_system_of_one_line_is_the_cable(model: str) -> None:
+    """Whose load is its own end."""
+    scene = lowered(model=model)
+    cable = {key: scene[key] for key in ("environment", "time", "output")} | {
+        "cable": {"sections": [LINE]}, "model": model, "mesh": {"cells": 30}, "initial": "equilibrium", "dimension": 3,
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0], "motion": MOVES, "payout": WINCH},
+                 "end": {"kind": "body", "mass": 10.0}},
+    }  # fmt: skip
+    one, line = hybrid.run(cable), hybrid.run(scene).lines["one"]
+    assert np.abs(one["payout/length"] - line["payout/length"]).max() < 1e-6
+    assert np.abs(one.position - line.position).max() < 1e-6
+    assert np.abs(one["reaction_start"] - line["reaction_start"]).max() < 1e-5 * np.abs(one["reaction_start"]).max()
+
+
+def test_energy_is_balanced_to_second_order() -> None:
+    left, put_in = [], 0.0
+    for step in (0.04, 0.02):
+        line = hybrid.run(lowered() | {"time": {"duration": 10.0, "step": step}}).lines["one"]
+        left.append(np.abs(line["work/scheme"]).max())
+        put_in = np.abs(line["work/start"]).max()
+    assert left[1] < 1.5e-4 * put_in
+    assert left[0] > 3.0 * left[1]
+
+
+def test_resumed_bit_for_bit(tmp_path: Path) -> None:
+    scene = lowered(model="adaptive")
+    whole = hybrid.run(scene, output=tmp_path / "whole.h5").lines["one"]
+    hybrid.run(scene | {"time": {"duration": 4.0, "step": STEP}}, output=tmp_path / "part.h5")
+    resumed = hybrid.resume(tmp_path / "part.h5", until=10.0).lines["one"]
+    for name in ("position", "tension", "reaction_start", "payout/length", "payout/rate", "work/start"):
+        assert np.array_equal(whole[name], resumed[name]), name
+
+
+def over_a_sheave(inertia: float) -> Tables:
+    """A rope over a sheave that turns, with 1 kg at one end, from a winch below the other one."""
+    tables = weights(inertia)
+    points = tables["initial"]["points"]
+    hold = {"longest": 8.0, "winch": {"tension": 7.0, "inertia": 0.5, "begin": 1.0, "ramp": 0.2}}
+    tables["ends"] = {
+        "start": {"kind": "pinned", "position": points[0], "payout": hold},
+        "end": {"kind": "free", "force": {"history": [[0, 0, 0, 0], [0.2, 0, 0, -10]]}},
+    }  # fmt: skip
+    tables["mesh"], tables["time"] = {"cells": 120}, {"duration": 1.6, "step": 0.002}
+    return tables
+
+
+@pytest.mark.parametrize("inertia", [0.01, 0.1])
+def test_a_winch_lets_a_rope_run_over_a_sheave(inertia: float) -> None:
+    """(m L + J/rho^2 + I) L'' = F - T(t) by another integrator; winch and sheave stand beside each other in Newton's method."""
+    tables = over_a_sheave(inertia)
+    scene = as_system(tables)
+    assert scene is not None
+    scene["points"]["b"]["initial_guess"] = tables["initial"]["points"][-1]
+    found = hybrid.run(scene)
+    line, late = found.lines["one"], found.t > 1.2
+
+    def law(t: float, y: np.ndarray) -> list[float]:
+        return [y[1], (10.0 - blend(t, 10.0, 7.0, 1.0, 0.2)) / (0.1 * y[0] + inertia / CENTRELINE**2 + 0.5)]
+
+    begin = [float(line["payout/length"][0]), 0.0]
+    exact = solve_ivp(law, (1.0, 1.6), begin, rtol=1e-10, t_eval=found.t[late]).y
+    assert np.abs(line["payout/rate"][late] - exact[1]).max() < 5e-3 * exact[1, -1]
+    assert np.abs(line["payout/length"][late] - exact[0]).max() < 5e-3 * (exact[0, -1] - begin[0])
