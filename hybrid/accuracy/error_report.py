@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 
 from hybrid.accuracy.error_control import ErrorController
 from hybrid.accuracy.errors_by_cause import Errors, summary
-from hybrid.accuracy.refinement import END_FORCE, asked_quantities, asked_text, not_asked_text, sizes_of
+from hybrid.accuracy.refinement import END_FORCE, asked_quantities, asked_text, figures, not_asked_text, sizes_of
 from hybrid.errors import ZONE_EVENTS
 from hybrid.model.plan import output_times
 from hybrid.scene.schema import AdaptiveModel, Scene
@@ -61,9 +62,18 @@ def write_errors(
         from hybrid.accuracy.free_vibrations import of_cable
 
         found, notes = known(scene, control, result, errors, happened, partial(of_cable, scene, result))
+        if control.asked is not None:
+            found["accuracy_verdicts"] = accuracy_figures(control, result, errors)
         return attributes | found, notes
 
     amend(target, fields, blocks(), known_then, before)
+
+
+def accuracy_figures(control: ErrorController, result: RunSample, errors: Errors | None) -> str:
+    """What is asked of each quantity and its error, as the attribute of a result; errors: None: they are not known."""
+    assert control.asked is not None
+    of = [x.errors for x in control.statistics.values()] if control.irregular else [errors]
+    return json.dumps(figures(control.asked, [x for x in of if x is not None], result, control.scattered))
 
 
 def effort(scene: Scene, control: ErrorController, result: RunSample, cpu: float) -> dict[str, str | float | int]:

@@ -162,14 +162,21 @@ def not_asked_text(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> 
     return ""
 
 
-def figures(asked: RequestedAccuracy, errors: Sequence[Errors], run: RunSample) -> list[dict[str, str | float | None]]:
-    """What is asked of each quantity, and its error, the largest of several; errors: empty where they are not known."""
+def figures(
+    asked: RequestedAccuracy, errors: Sequence[Errors], run: RunSample, by_chance: Collection[str] = ()
+) -> list[dict[str, str | float | None]]:  # fmt: skip
+    """What is asked of each quantity, and its error, the largest of several; errors: empty where they are not known.
+
+    by_chance: end forces whose largest values are, so that their error misses nothing.
+    """
     out: list[dict[str, str | float | None]] = []
     for bound in bounds_of(asked, run):
         known = bool(errors) and all(bound.name in x.fields.get("total", {}) for x in errors)
         error = max(_largest(x, "total", bound) for x in errors) if known else None
         name = bound.name if bound.limit is None else bound.words
         out.append({"quantity": name, "of": bound.name, "unit": bound.unit, "asked": bound.size, "error": error})
+        if bound.name in by_chance:
+            out[-1]["by_chance"] = 1.0
     return out
 
 

@@ -9,7 +9,6 @@ error of a line may come from the cells of the next.
 from __future__ import annotations
 
 import io
-import json
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -22,7 +21,7 @@ import numpy as np
 from hybrid.accuracy.budget import Budget
 from hybrid.accuracy.error_control import ErrorController, comparison_resolutions
 from hybrid.accuracy.error_estimate import Estimate
-from hybrid.accuracy.error_report import effort, error_fields, known
+from hybrid.accuracy.error_report import accuracy_figures, effort, error_fields, known
 from hybrid.accuracy.error_statistics import statistics_of
 from hybrid.accuracy.finer_result import NOT_KEPT, Replacement, is_no_better, not_kept_text
 from hybrid.accuracy.refinement import (
@@ -30,7 +29,6 @@ from hybrid.accuracy.refinement import (
     WORTH_WRITING,
     Free,
     costly,
-    figures,
     times_the_cost,
 )
 from hybrid.accuracy.system_model_errors import Stretches, as_rods, leaves_bending_out, rods_of, with_model_errors
@@ -445,9 +443,7 @@ class SystemPasses:
             largest, notes[name] = known(scene, control, run, errors, happened[name], partial(vibrations, name))
             attributes[name] = {**effort(scene, control, run, cpu), **largest}
             if control.asked is not None:
-                of = [x.errors for x in control.statistics.values()] if control.irregular else [errors]
-                each = figures(control.asked, [x for x in of if x is not None], run)
-                attributes[name]["accuracy_verdicts"] = json.dumps(each)
+                attributes[name]["accuracy_verdicts"] = accuracy_figures(control, run, errors)
         keys = {x for each in attributes.values() for x in each if x.startswith("error_")}
         of_all: dict[str, float | str] = {
             x: max(float(each[x]) for each in attributes.values() if x in each) for x in keys

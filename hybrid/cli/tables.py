@@ -189,12 +189,12 @@ def zones_over_time(result: Result) -> dict[str, Any]:
 def errors_facts(result: Result) -> dict[str, Any]:
     """The estimated errors: largest of position (m) and of the end forces (N), by kind; whether they are met."""
     from hybrid.store.records import not_converged_in
-    from hybrid.store.verdicts import MET, MISSED, asked_accuracy
+    from hybrid.store.verdicts import MET, MISSED, accuracy_text, asked_accuracy, worst_accuracy
 
     found: dict[str, Any] = {k[6:]: float(x) for k, x in result.attributes.items() if k.startswith("error_")}
-    for asked in asked_accuracy(result) if found else ():
-        found["met"] = {MET: True, MISSED: False}.get(asked.verdict)
-        found["verdict"] = asked.text
+    if found and (each := asked_accuracy(result)):
+        found["met"] = {MET: True, MISSED: False}.get(worst_accuracy(each).verdict)
+        found["verdict"] = accuracy_text(each)
     unknown = not_converged_in(result.attributes)
     return found | ({"not_converged": sorted(unknown)} if found and unknown else {})
 

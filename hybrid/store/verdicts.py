@@ -11,7 +11,7 @@ bends too mild.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
@@ -171,18 +171,40 @@ def quantity_limits(result: Result) -> list[Held]:
 
 
 def asked_accuracy(result: Result) -> list[Asked]:
-    """The accuracy that was asked for, of a line of several by quantity; empty where none was."""
+    """The accuracy that was asked for, by quantity; empty where none was.  Files before 1.0 have one for all."""
     each = json.loads(str(result.attributes.get("accuracy_verdicts", "[]")))
     beside = str(result.attributes.get("accuracy_not_asked", ""))
     if each:
-        keys = "quantity", "unit", "asked", "error"
-        of = [_asked(result, {x.get("of", x["quantity"])}, *(x[key] for key in keys)) for x in each]
+        of = [
+            _asked(
+                result, {x.get("of", x["quantity"])}, x["quantity"], x["unit"], x["asked"], x["error"], "by_chance" in x
+            )
+            for x in each
+        ]
+        known = [x for x in of if x.error is not None and x.asked]
+        if known and _missed(result) and not any(x.verdict == MISSED for x in of):  # by what only all of it shows
+            k = of.index(max(known, key=lambda x: (x.error or 0.0) / (x.asked or 1.0)))
+            of[k] = of[k]._replace(verdict=MISSED, why="", remedy="")
         return [*of[:-1], of[-1]._replace(beside=beside)]
     if "accuracy_asked" not in result.attributes:
         return []
-    known = result.attributes.get("error_total_position")
+    largest = result.attributes.get("error_total_position")
     text, names = (str(result.attributes.get(x, "")) for x in ("accuracy_asked", "accuracy_quantities"))
-    return [_asked(result, set(names.split(",")) - {""}, text, "", None, known)._replace(beside=beside)]
+    return [_asked(result, set(names.split(",")) - {""}, text, "", None, largest)._replace(beside=beside)]
+
+
+def worst_accuracy(each: Sequence[Asked]) -> Asked:
+    """Of what was asked the worst: missed, else not verified, else met."""
+    return min(each, key=lambda x: (MISSED, NOT_VERIFIED, MET).index(x.verdict))
+
+
+def accuracy_text(each: Sequence[Asked]) -> str:
+    """The verdicts of all that was asked in words: one for all, or by quantity where they differ."""
+    texts = list(dict.fromkeys(x._replace(beside="").text for x in each))
+    if len(texts) == 1:
+        return f"{texts[0]}; {each[-1].beside}" if each[-1].beside else texts[0]
+    names = (x.quantity.replace("end_force_", "force at the ").replace("_", " ") for x in each)
+    return ", ".join(f"{name} {x.text}" for name, x in zip(names, each, strict=True))
 
 
 def doubt_of(result: Result, *names: str, s: Iterable[float] = ()) -> Doubt | None:
@@ -395,17 +417,26 @@ def _error_of_held(result: Result, x: Held, clearance: bool) -> float | None:
 # ---- accuracy -------------------------------------------------------------------------------------
 
 
+def _missed(result: Result) -> bool:
+    """Whether a run said that it misses what was asked."""
+    return any(event.kind == "accuracy missed" for event in result.events)
+
+
 def _asked(
-    result: Result, names: set[str], quantity: str, unit: str, asked: float | None, error: float | None
-) -> Asked:
-    """The verdict on an accuracy; names: the quantities that it is of, none: not known, and every doubt counts."""
+    result: Result, names: set[str], quantity: str, unit: str, asked: float | None, error: float | None,
+    chance: bool = False,
+) -> Asked:  # fmt: skip
+    """The verdict on an accuracy; names: the quantities that it is of, none: not known, and every doubt counts.
+
+    chance: whether the largest value of the quantity is by chance, so that its error misses nothing.
+    """
 
     def of(verdict: str, why: str = "", remedy: str = "") -> Asked:
         return Asked(quantity, unit, asked, error, verdict, why, remedy)
 
     if error is None:
         return of(NOT_VERIFIED, *(unfinished(result) or _pending(result) or Doubt("its error is not estimated", NOTE)))
-    if error > asked if asked is not None else any(event.kind == "accuracy missed" for event in result.events):
+    if error > asked and not chance if asked is not None else _missed(result):
         return of(MISSED)
     of_ends = {x for x in names if x.startswith("end_force")}
     doubted = frozenset(names - of_ends | ({"end_force"} if of_ends else set()) or EVERY)

@@ -18,7 +18,7 @@ from hybrid.store.envelope import BROKEN, GROUP, NOT_VERIFIED, NOTHING, SCALE, h
 from hybrid.store.hockling import formation_ratio, formation_tension
 from hybrid.store.reader import Result
 from hybrid.store.records import UNKNOWN, not_converged_in
-from hybrid.store.verdicts import asked_accuracy, doubt_of, quantity_limits, section_limits
+from hybrid.store.verdicts import accuracy_text, asked_accuracy, doubt_of, quantity_limits, section_limits
 from hybrid.view.along import Along, along
 from hybrid.view.loops import held_loop, trapped_loop
 from hybrid.view.projections import STILL, free_edges
@@ -476,10 +476,7 @@ def _errors(result: Result) -> Fact:
 def _verdicts(result: Result) -> str:
     """Whether what was asked is met, of a line of several by quantity; empty if nothing was."""
     each = asked_accuracy(result)
-    if len(each) == 1 and not each[0].unit:
-        return f": {each[0].text}."
-    names = (x.quantity.replace("end_force_", "force at the ").replace("_", " ") for x in each)
-    return f". Of that: {', '.join(f'{name} {x.text}' for name, x in zip(names, each, strict=True))}." if each else ""
+    return f": {accuracy_text(each)}." if each else ""
 
 
 def _status(result: Result) -> Fact:

@@ -17,7 +17,7 @@ from hybrid.cli.tables import errors_facts, extremes_facts, extremes_rows
 from hybrid.errors import EVENTS_BY_WEIGHT
 from hybrid.scene.study import Kept
 from hybrid.store.reader import Result
-from hybrid.store.verdicts import DOUBTS, OF_ACCURACY, doubt_of
+from hybrid.store.verdicts import DOUBTS, OF_ACCURACY, accuracy_text, doubt_of, worst_accuracy
 from hybrid.studies.collect import collected
 from hybrid.view.report_parts import verdict_html
 from hybrid.view.summary import facts_of
@@ -163,10 +163,12 @@ def test_thirty_results_say_the_same_everywhere(
             assert of_study(result) == {x: words[x] for x in LIMITS[:2]}, key
             assert {x: y.verdict for x, y in result.utilisation().items()} == {x: words[x] for x in LIMITS}, key
             for each in verdicts.accuracy:
-                met = {"met": True, "missed": False}.get(each.verdict)
+                assert each.unit and each.asked is not None and each.asked > 0.0, key
+            if verdicts.accuracy:
+                met = {"met": True, "missed": False}.get(worst_accuracy(verdicts.accuracy).verdict)
                 assert errors_facts(result)["met"] is met, key
                 (fact,) = [x for x in facts_of(result) if x.key == "errors"]
-                assert fact.text.endswith(f": {each.text}."), key
+                assert fact.text.endswith(f": {accuracy_text(verdicts.accuracy)}."), key
             for x in (*verdicts.limits, *verdicts.quantities):
                 assert bool(x.why) == bool(x.remedy) == (x.verdict == "not verified"), key
                 assert x.broken == (x.verdict == "broken"), key
@@ -195,7 +197,8 @@ def test_verdicts_of_thirty_results(results: dict[tuple[str, str], Path]) -> Non
     with hybrid.open(results["quantity", "far"]) as result:
         assert result.verdicts().words["gap smallest"] == "within"
     with hybrid.open(results["missed", "far"]) as result:
-        assert [x.verdict for x in result.verdicts().accuracy] == ["missed"]
+        assert "missed" in [x.verdict for x in result.verdicts().accuracy]
+        assert all(x.error > x.asked for x in result.verdicts().accuracy if x.verdict == "missed")
 
 
 # ---- what casts doubts -----------------------------------------------------------------------------
