@@ -43,7 +43,7 @@ from hybrid.simulation.events import EventLog
 from hybrid.simulation.hockling_watch import LOOP, Loops, note_hockling, note_loops
 from hybrid.simulation.section_layers import ASKEW, hidden_layer, layer_text
 from hybrid.simulation.slack_bends import TURNS, too_long_for_weight, turns_by_weight, weight_text
-from hybrid.solve.flaws import TOUCHING, behind_obstacles, obstacles_left
+from hybrid.solve.flaws import TOUCHING, behind_obstacles, obstacles_left, rubs_on
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium
 
@@ -246,11 +246,11 @@ class Diagnostics:
 
         shares: whether the line touches others.  Beside these, and what moves, friction settles in a motion alone.
         """
-        line, sea = self._model.line, self._model.sea.values
-        if not line.bits & FRICTION or not (line.bits & OBSTACLES or (planes_under(sea, state.r)[1] > 0.0).any()):
+        line = self._model.line
+        on = rubs_on(line, self._model.sea.values, self._model.ends.values.held, state)
+        if not line.bits & FRICTION or not on:
             return
-        under = " on obstacles" if line.bits & OBSTACLES else " on the seabed"
-        text = f"this equilibrium is the one without friction{under}: "
+        text = f"this equilibrium is the one without friction {' and '.join(on)}: "
         if shares or line.moved.size:
             text += "a run with damping that comes to rest has it"
         else:

@@ -9,9 +9,22 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, distances
+from hybrid.kernels.laws.soil import LATERAL
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held
 from hybrid.kernels.state.forces import BODIES, FRICTION, OBSTACLES, SEABED
-from hybrid.kernels.state.obstacle_rows import AXIS, FLAT, HALF_LENGTH, KIND, MESH, PLACE, RADIUS, ROUND, SHEAVE, TORUS
+from hybrid.kernels.state.obstacle_rows import (
+    AXIS,
+    FLAT,
+    HALF_LENGTH,
+    KIND,
+    MESH,
+    MU,
+    PLACE,
+    RADIUS,
+    ROUND,
+    SHEAVE,
+    TORUS,
+)
 from hybrid.kernels.state.state import Floats, Line, Sea, State
 
 # A line that lies this part of its length, and this many onsets of contact, under the bed has gone through it.
@@ -90,14 +103,31 @@ def overstretched_cell(line: Line, state: State, borne: Floats) -> int:
     return int(np.argmax(part)) if part.max() > 1.0 else -1
 
 
+def on_obstacles(line: Line, sea: Sea, state: State) -> np.ndarray:
+    """Which nodes (M, N+1) of a line, or the cells after them, lie on each obstacle."""
+    met = cells_met(sea.carried, line.s) if sea.carried.size else None
+    return depths_in_obstacles(sea, state.r, line.s, met) > -TOUCHING
+
+
+def rubs_on(line: Line, sea: Sea, held: np.ndarray, state: State) -> list[str]:
+    """On what with friction a line lies, in words, at other nodes than ends (2,) that are held, which no friction
+    moves."""
+    free, found = np.ones(line.s.size, bool), []
+    free[[0, -1]] = held == 0
+    bed = line.bits & SEABED and (sea.friction.any() or (sea.soil.size and sea.soil[LATERAL] > 0.0))
+    if bed and (planes_under(sea, state.r)[1][free] > 0.0).any():
+        found.append("on the seabed")
+    if line.bits & OBSTACLES and on_obstacles(line, sea, state)[sea.obstacles[:, MU] > 0.0][:, free].any():
+        found.append("on obstacles")
+    return found
+
+
 def behind_obstacles(line: Line, sea: Sea, state: State) -> Iterator[tuple[int, int]]:
     """Obstacles that a line touches on the side that is away from the straight span of its ends, and a node there.
 
     A line that hangs through an obstacle is begun on the side of the span.
     """
-    rows, way = sea.obstacles, state.r[-1] - state.r[0]
-    met = cells_met(sea.carried, line.s) if sea.carried.size else None
-    touched = depths_in_obstacles(sea, state.r, line.s, met) > -TOUCHING
+    rows, way, touched = sea.obstacles, state.r[-1] - state.r[0], on_obstacles(line, sea, state)
     for which, (row, nodes) in enumerate(zip(rows, touched, strict=True)):
         if row[KIND] in (FLAT, TORUS, MESH) or not nodes.any():  # through a ring a line passes on any side
             continue
@@ -118,9 +148,7 @@ def obstacles_left(line: Line, sea: Sea, start: State, state: State) -> Iterator
 
     the start; and whether it touches the other side.
     """
-    rows = sea.obstacles
-    met = cells_met(sea.carried, line.s) if sea.carried.size else None
-    touched = depths_in_obstacles(sea, state.r, line.s, met) > -TOUCHING
+    rows, touched = sea.obstacles, on_obstacles(line, sea, state)
     gaps = distances(sea, start.r)
     for which, gap in enumerate(gaps):
         near = gap < BEHIND * rows[which, RADIUS]

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles
 from hybrid.kernels.state.forces import SEABED
 from hybrid.kernels.state.state import Ends, Line, Sea, State
-from hybrid.solve.flaws import TOUCHING
+from hybrid.solve.flaws import on_obstacles
 
 
 def laid_without_tension(line: Line, sea: Sea, ends: Ends, state: State) -> State:
@@ -23,9 +22,7 @@ def laid_without_tension(line: Line, sea: Sea, ends: Ends, state: State) -> Stat
     """
     laid, cells = state.copy(), line.h.size
     laid.slip[:] = 0.0
-    met = cells_met(sea.carried, line.s) if sea.carried.size else None
-    depths = depths_in_obstacles(sea, state.r, line.s, met)
-    touches = np.asarray((depths > -TOUCHING).any(axis=0))
+    touches = np.asarray(on_obstacles(line, sea, state).any(axis=0))
     if line.bits & SEABED:
         touches |= planes_under(sea, state.r)[1] > 0.5 * sea.onset
     touches[0] |= bool(ends.held[0]) and bool(touches[1])

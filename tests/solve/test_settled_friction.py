@@ -175,3 +175,35 @@ def test_a_buoy_on_lines_with_settled_friction_stays_where_it_is() -> None:
     for each in scene["lines"].values():  # type: ignore[attr-defined]
         each["initial"] = {"kind": "equilibrium"}
     assert min(leg.tension[-1].min() for leg in hybrid.static(scene).lines.values()) > 5e4
+
+
+PIPE = {"kind": "cylinder", "axis": [0, 1, 0], "at": [18, 0, 6.5], "radius": 0.5, "friction": 0.3}
+
+
+@pytest.mark.parametrize(
+    ("length", "changes", "bed", "where"),
+    [
+        (30.5, {}, None, "on obstacles:"),
+        (30.5, {"friction": 0.0}, None, ""),
+        (30.5, {"at": [12, 0, -50.0]}, None, ""),
+        (30.5, {"friction": 0.0}, -9.0, ""),  # of the bed, which is far below
+        (29.2, {"at": [12, 0, -50.0]}, 0.0, ""),  # taut: nothing lies there but the anchor
+        (33.0, {"at": [12, 0, -50.0]}, 0.0, "on the seabed:"),
+        (33.0, {"at": [18, 0, 2.5]}, 0.0, "on the seabed and on obstacles:"),
+    ],
+)
+def test_friction_is_neglected_where_something_lies_that_has_some(
+    length: float, changes: dict[str, Any], bed: float | None, where: str
+) -> None:
+    section = {"length": length, "mass": 2, "diameter": 0.03, "axial_stiffness": 1e6}
+    ends = {
+        "start": {"kind": "pinned", "position": [0, 0, 0]},
+        "end": {"kind": "pinned", "position": [25, 0, 15]},
+    }
+    scene: dict[str, Any] = {"cable": {"sections": [section]}, "ends": ends, "obstacles": {"pipe": PIPE | changes}}
+    scene |= {"initial": "equilibrium", "model": "catenary", "mesh": {"cells": 120}}
+    if bed is not None:
+        scene["environment"] = {"seabed": {"z": bed, "stiffness": 1e4, "friction": 0.5}}
+    found = hybrid.static(hybrid.validate_scene(scene))
+    told = [event.text for event in found.events if event.kind == "static friction neglected"]
+    assert len(told) == bool(where) and all(where in text for text in told)
