@@ -44,6 +44,10 @@ SLOWEST_WAVE, SLOWEST_UNSAID = 10.0, 60.0
 # Own length, m, whose weight in air a line bears at least: hoses bear some 100 m, umbilicals and chains 400 to 3000 m,
 # ropes 5 km and more, and a thousandth of that where it is in kN.
 SHORTEST_BORNE = 5.0
+# Strain at rest that no line bears that is denser than fibres, kg/m^3, and in which tension runs faster, m/s, than in
+# hoses and rubber: chains, wire ropes and armoured cables break at 0.5 to 2 %.  Fibre ropes are lighter, and bear 3 to
+# 40 %.  Own length, m, that no rope bears: wire bears 20 km, polyester 45 km, the strongest fibres in ropes 150 km.
+STRAINED, DENSEST_FIBRE, FAST_WAVE, LONGEST_BORNE = 0.01, 1500.0, 1000.0, 200e3
 # Diameters of the smallest bend: a line is bent by no less than half of one about itself; steel pipes bear 250 without
 # yielding, cables and umbilicals 5 to 60, and 5000 where it is in mm.
 SHARPEST, MILDEST = 0.5, 2000.0
@@ -62,6 +66,8 @@ DEEPEST_TRENCH = (10.0, 0.5)
 # Speed of an end in a liquid, m/s, by its amplitudes and periods: twice that of the fastest ships.
 FASTEST_END = 40.0
 
+HALVINGS = 60  # of the range of a tension, to round-off
+
 
 class Note(NamedTuple):
     """An implausible number: what, where it stands with expected range and remedy, and the stretch of line (m)."""
@@ -78,7 +84,9 @@ def implausible(scene: Scene) -> Iterator[Note]:
         yield Note(what, why, whole)
     for at, what, why in _floats(scene):
         yield Note(what, why, (at, at))
-    begins = accumulate((x.length for x in scene.cable.sections), initial=0.0)
+    begins = [*accumulate((x.length for x in scene.cable.sections), initial=0.0)]
+    for i, what, why in _too_short(scene):
+        yield Note(what, f"cable.sections[{i}].length: {why}", (begins[i], begins[i + 1]))
     for i, (section, begin) in enumerate(zip(scene.cable.sections, begins, strict=False)):
         for what, key, why in (
             *_material(section),
@@ -249,6 +257,31 @@ def _limits(section: Section) -> Iterator[Wrong]:
             unit = f"mm? then {1e-3 * radius:g}" if radius > high else f"km? then {1e3 * radius:g}"
             why = f"expected {low:.3g} to {high:.3g} m with a diameter of {section.diameter:g} m: is it in {unit}"
             yield f"a smallest bend radius of {radius:g} m", "min_bend_radius", why
+
+
+def _too_short(scene: Scene) -> Iterator[tuple[int, str, str]]:
+    """Sections that break because the line is shorter than the way between its ends: number, what, and why."""
+    held, length = scene.ends.held(), scene.length
+    apart = math.dist(held["start"], held["end"]) if len(held) == 2 else 0.0
+    sections = scene.cable.sections
+    paid = any(getattr(end, "payout", None) is not None or not end.is_placed for end in scene.ends.both)
+    if apart <= length or paid:
+        return
+    low, high = 0.0, max((x.borne for x in sections if x.stiffness is not None), default=0.0)
+    for _ in range(HALVINGS):
+        tension = 0.5 * (low + high)
+        longer = sum(x.length * (1.0 + x.strain(tension)) for x in sections) > apart
+        low, high = (low, tension) if longer else (tension, high)
+    for i, x in enumerate(sections):
+        strain, dense = x.strain(high), x.diameter is not None and x.mass / _area(x) > DENSEST_FIBRE
+        breaks = dense and strain > STRAINED and x.stiffness is not None and x.stiffness > x.mass * FAST_WAVE**2
+        if x.max_strain is None and x.stretch_table is None and (breaks or high > LONGEST_BORNE * x.mass * G):
+            what = f"a line of {length:.6g} m between ends that are {apart:.6g} m apart: {high:.3g} N at rest, which"
+            most = f"{LONGEST_BORNE * x.mass * G:.3g} N: no rope so light bears more"
+            most = f"a strain of {STRAINED:.0%}: chain, wire and cables break at little more" if breaks else most
+            fix = f"{x.length + apart - length:.6g} m or more"
+            why = f"expected less than {most}: is it {fix}, or an end elsewhere? what stretches so has a max_strain"
+            yield i, f"{what} stretch this section by {strain:.2%}", why
 
 
 def _floats(scene: Scene) -> Iterator[tuple[float, str, str]]:

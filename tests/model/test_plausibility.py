@@ -190,6 +190,49 @@ def test_the_seabed_end_of_a_mooring_whose_ends_are_exchanged_is_refused() -> No
         read_scene(ROOT / "tests" / "data" / "defects" / "swapped_ends.yaml")
 
 
+def between(apart: float, *sections: dict[str, Any]) -> list[Any]:
+    """Notes on a line between ends that are `apart`, m."""
+    changes = {
+        "cable": {"sections": list(sections)},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, -50.0]},
+            "end": {"kind": "pinned", "position": [apart, 0, -50.0]},
+        },
+    }
+    return list(implausible(scene(**changes)))
+
+
+def test_a_line_too_short_for_the_way_between_its_ends_is_noted() -> None:
+    """2.8 % of a chain, in the section where all of it is; its tension by EA and the strains of both sections."""
+    (note,) = between(102.8, {"length": 100.0} | CHAIN | {"axial_stiffness": 4e7})
+    assert note.what.startswith("a line of 100 m between ends that are 102.8 m apart: 1.12e+06 N at rest")
+    assert "by 2.80%" in note.what and "cable.sections[0].length" in note.why and "102.8 m or more" in note.why
+    rope = {"length": 50.0, "mass": 23.0, "diameter": 0.19, "axial_stiffness": 4e8}
+    (note,) = between(152.0, {"length": 100.0} | CHAIN | {"axial_stiffness": 5.3e7}, rope)
+    assert note.s == (0.0, 100.0) and "102 m or more" in note.why
+    tension = 2.0 / (100.0 / 5.3e7 + 50.0 / 4e8)
+    assert f"{tension:.3g} N at rest" in note.what and f"by {tension / 5.3e7:.2%}" in note.what
+
+
+def test_a_tension_at_rest_that_no_rope_bears_is_noted() -> None:
+    (note,) = between(100.5, {"length": 100.0, "mass": 0.1, "diameter": 0.01, "axial_stiffness": 5e7})
+    assert "cable.sections[0].length: expected less than 1.96e+05 N" in note.why
+
+
+@pytest.mark.parametrize(
+    "section",
+    [
+        CHAIN | {"length": 102.5},  # as taut as chains are
+        {"length": 100.0, "mass": 23.0, "diameter": 0.19, "axial_stiffness": 6e7},  # polyester
+        {"length": 100.0, "mass": 5.0, "diameter": 0.1, "axial_stiffness": 3e7},  # HMPE
+        {"length": 100.0, "mass": 250.0, "diameter": 0.4, "axial_stiffness": 4e6},  # rubber hose
+        CHAIN | {"length": 100.0, "axial_stiffness": 4e7, "max_strain": 0.04},  # meant
+    ],
+)
+def test_lines_that_bear_their_strain_are_not_noted(section: dict[str, Any]) -> None:
+    assert not [x for x in between(102.8, section) if "at rest" in x.what]
+
+
 @pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.yaml")), ids=lambda x: x.stem)
 def test_no_example_is_called_implausible(path: Path) -> None:
     read, *_ = read_scene(path)
