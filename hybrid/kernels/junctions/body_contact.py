@@ -196,6 +196,19 @@ def put_corrections(job, kept, moved):
 
 
 @inner
+def add_corrections(job, part, kept, moved):
+    """A part of kept corrections to those of lines and bodies."""
+    for l in range(job.tables.shape[0]):
+        x, o = read(job.tables[l]).work.x, job.begins[l]
+        for i in range(x.shape[0]):
+            for j in range(SIZE):
+                x[i, j] += part * kept[o + i, j]
+    for b in range(job.work.shape[0]):
+        for j in range(6):
+            job.work[b, X + j] += part * moved[b, j]
+
+
+@inner
 def touches(job, r):
     """Whether response r is of a body that is touched."""
     return job.found[1 + r // EACH_BODY] > 0
@@ -211,15 +224,7 @@ def apply(job):
     substitute_small(job.coupling, job.order)
     for r in range(last):
         if touches(job, r):
-            part = job.coupling[r, last]
-            for l in range(job.tables.shape[0]):
-                x, o = read(job.tables[l]).work.x, job.begins[l]
-                for i in range(x.shape[0]):
-                    for j in range(SIZE):
-                        x[i, j] -= part * job.responses[r, o + i, j]
-            for b in range(job.work.shape[0]):
-                for j in range(6):
-                    job.work[b, X + j] -= part * job.turned[r, b, j]
+            add_corrections(job, -job.coupling[r, last], job.responses[r], job.turned[r])
 
 
 @inner

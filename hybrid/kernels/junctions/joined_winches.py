@@ -9,9 +9,13 @@ them; then  dL = (p x - a) / (a_L - p z),  with p x the change of that tension. 
 
 from __future__ import annotations
 
-from hybrid.kernels.algebra.block_elimination import KEPT, ROW, SIZE
-from hybrid.kernels.junctions.bodies import X
-from hybrid.kernels.junctions.body_contact import clear_right_side, eliminate_right_side
+from hybrid.kernels.algebra.block_elimination import KEPT, ROW
+from hybrid.kernels.junctions.body_contact import (
+    add_corrections,
+    clear_right_side,
+    eliminate_right_side,
+    keep_corrections,
+)
 from hybrid.kernels.junctions.right_sides import answer_right_sides
 from hybrid.kernels.junctions.system_job import PART
 from hybrid.kernels.machine.compile import called, inner
@@ -38,19 +42,6 @@ def waits(line_job):
 
 
 @inner
-def draw(job, w, change):
-    """Winch number w gives a change of its length, m: the corrections of all lines and bodies go along."""
-    for l in range(job.tables.shape[0]):
-        x, o = read(job.tables[l]).work.x, job.begins[l]
-        for i in range(x.shape[0]):
-            for c in range(SIZE):
-                x[i, c] += change * job.lengthened[w, o + i, c]
-    for b in range(job.work.shape[0]):
-        for c in range(6):
-            job.work[b, X + c] += change * job.drawn[w, b, c]
-
-
-@inner
 def draw_along(job, count, with_left):
     """Put the first `count` winches into corrections that were found without them; with_left: with what is out of
 
@@ -66,7 +57,7 @@ def draw_along(job, count, with_left):
             left = -line_job.work.x[int(stage[PULLS_AT]), 0]
             if with_left:
                 left += stage[OUT_OF_BALANCE]
-            draw(job, w, -left / stage[YIELDING])
+            add_corrections(job, -left / stage[YIELDING], job.lengthened[w], job.drawn[w])
         w += 1
 
 
@@ -85,14 +76,7 @@ def find_lengthening(job, l, w, cv, ca):
         return False
     draw_along(job, w, False)
     stage[YIELDING] = stage[ALONE] - x[int(stage[PULLS_AT]), 0]
-    for k in range(job.tables.shape[0]):
-        z, o = read(job.tables[k]).work.x, job.begins[k]
-        for i in range(z.shape[0]):
-            for c in range(SIZE):
-                job.lengthened[w, o + i, c] = z[i, c]
-    for b in range(job.work.shape[0]):
-        for c in range(6):
-            job.drawn[w, b, c] = job.work[b, X + c]
+    keep_corrections(job, job.lengthened[w], job.drawn[w])
     return True
 
 
