@@ -26,7 +26,7 @@ from hybrid.kernels.march.resolution_checks import lowest
 from hybrid.kernels.run.entry import sharpest
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
-from hybrid.kernels.state.forces import FRICTION, OBSTACLES, PLANAR, SEABED, SELF_FRICTION
+from hybrid.kernels.state.forces import FRICTION, OBSTACLES, PLANAR, SEABED, SELF_FRICTION, SOIL
 from hybrid.kernels.state.obstacle_rows import FLAT, KIND, RIDES
 from hybrid.kernels.state.report import BEND, TWIST_NODE
 from hybrid.kernels.state.state import Batch, Ends, Floats, Sea, State, ends_in, state_in
@@ -699,18 +699,23 @@ class Diagnostics:
     def energy(self, batch: Batch, values: Mapping[str, Floats], lines: Sequence[tuple[Model, Output]] = ()) -> Stop:
         """Energy that the time scheme creates or dissipates, held against all that was put in.
 
+        What touches the bed and obstacles in steps that are too long bounces higher than it fell.  That counts as
+        created where contact has given more than it has taken: damping takes, and only soil gives back what it had.
         lines: of each output a model of its cable and what it is, where they differ.
         """
-        gained, potential = values["work/scheme"], values["energy/potential"]
+        scheme, potential = values["work/scheme"], values["energy/potential"]
+        given = values.get("work/contact", 0.0 * scheme)  # by contact
+        bounced = np.maximum(given, 0.0) if not self._model.line.bits & SOIL else 0.0
+        gained = scheme + bounced
         alive = sum((values[x] for x in values if x.startswith("energy/")), -potential)
         if batch.t[0] == 0.0:
             self._potential, self._alive = float(potential[0]), float(alive[0])
-        put_in = np.abs(batch.work).sum(axis=1) + np.abs(potential - self._potential) + self._alive
+        put_in = np.abs(batch.work).sum(axis=1) - bounced + np.abs(potential - self._potential) + self._alive
         put_in = np.maximum.accumulate(np.append(self._put_in, put_in))[1:]
         self._put_in = float(put_in[-1])
         floor = NEWTON_LEAVES * self._model.tension_scale * self._model.length
         # all that can be worth a word; most batches have none
-        noted = (gained > self._gain * put_in + floor) | (-gained > self._loss * put_in + floor)
+        noted = (gained > self._gain * put_in + floor) | (-scheme > self._loss * put_in + floor)
         for k in np.flatnonzero(noted & (batch.t > 0.0)).tolist():
             if lines:
                 self.follow(_with_line(*lines[k]))
@@ -721,8 +726,8 @@ class Diagnostics:
             if gained[k] > max(self._gain * put_in[k] + floor, self._created[0]):
                 where = float(self._model.line.s[fastest])
                 self._created = [float(gained[k]), float(put_in[k]), float(batch.t[k]), where]
-            if -gained[k] > self._loss * put_in[k] + floor:
-                text = f"the time scheme has dissipated {-gained[k]:.3g} J, {_percent(-gained[k], put_in[k])} of the"
+            if -scheme[k] > self._loss * put_in[k] + floor:
+                text = f"the time scheme has dissipated {-scheme[k]:.3g} J, {_percent(-scheme[k], put_in[k])} of the"
                 text += " energy put in: motion is faster than the step; make time.step smaller"
                 self.note(float(batch.t[k]), fastest, "numerical dissipation", text)
                 self._loss *= 1.3
@@ -736,7 +741,8 @@ class Diagnostics:
         gained, put_in, t, s = self._created
         put_in = max(put_in, FIRST_MOMENTS * self._put_in)
         if gained > 0.0 and gained > self._gain * put_in:
-            text = f"the time scheme has created {gained:.3g} J, {_percent(gained, put_in)} of the energy put in"
+            part = _percent(gained, put_in)
+            text = f"the time scheme, with contact, has created {gained:.3g} J, {part} of the energy put in"
             self.events.event(t, s, s, "gains energy", f"{text}: {Outcome.GAINS_ENERGY.remedy}")
 
     def rest(self, batch: Batch, values: Mapping[str, Floats]) -> None:
