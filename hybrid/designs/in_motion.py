@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from hybrid.designs.line_at_rest import AXES, refuse_parts
 from hybrid.designs.numbers import number_of, scene_with
-from hybrid.designs.peaks import over_time, peaks
+from hybrid.designs.peaks import over_time, peaks, smoothed
 from hybrid.designs.replay import Course, course_of, replay, with_outputs
 from hybrid.designs.tangents import Others, Seen, Unfollowed, step_of
 from hybrid.errors import Complaint, ComputationError, Outcome, ResultError, SceneError
@@ -258,9 +258,9 @@ class Motion:
         self.peaks: list[list[Any]] = [[where] for where in self.where] if base is None else base.peaks
         if smooth and base is None:
             each = zip(wanted, self.where, strict=True)
-            self.peaks = [peaks(self._histories[x.place], x.over, where) for x, where in each]
+            self.peaks = [peaks(self._table(x), x.over, where) for x, where in each]
         if not smooth:
-            self._histories = {}
+            self._histories, self._smooth = {}, {}
 
     @staticmethod
     def more(wanted: Sequence[Wanted]) -> list[float]:
@@ -290,6 +290,7 @@ class Motion:
         for x in wanted:
             if x.place not in out:
                 out[x.place] = self._history(lines[x.line], x)
+        self._smooth: dict[Wanted, Floats] = {}
         self.shapes = {place: history.shape for place, history in out.items()}
         self._cuts = {place: self._cut(lines[place.line], place, shape[-1]) for place, shape in self.shapes.items()}
         return out
@@ -314,8 +315,18 @@ class Motion:
             if x.over == "t":
                 values[k] = np.interp(x.time, self._t[x.line], history[:, 0])
                 continue
-            values[k], where[k] = over_time(history, x.over, where[k], self._cuts[x.place] if self.smooth else None)
+            values[k], where[k] = over_time(self._table(x), x.over, where[k])
         return values
+
+    def _table(self, x: Wanted) -> Floats:
+        """The history of which a statistic is: of extremes that are those of parabolas, these."""
+        history = self._histories[x.place]
+        if not self.smooth or x.over not in ("max", "min"):
+            return history
+        key = x.place._replace(over=x.over)
+        if key not in self._smooth:
+            self._smooth[key] = smoothed(history, x.over, self._cuts[x.place])
+        return self._smooth[key]
 
     def _history(self, result: Any, x: Wanted) -> Floats:
         """(outputs, places or 1) of a result."""

@@ -34,6 +34,8 @@ SETTLED = 1e-2
 FIRST_STEP, SHORTEST = 0.2, 1e-6
 # Of what was foretold: what a step has to gain, and from which on longer ones are believed.
 ACCEPTED, TRUSTED = 0.1, 0.7
+# Part of a step by which one by other slopes differs that is tried anew.
+ALIKE = 0.05
 # A box is made narrower by SHRUNK, where there is no equilibrium by CUT; a step has to come so much nearer to limits
 # as can be, but for the part NEARER.
 SHRUNK, CUT, NEARER = 0.4, 0.2, 0.3
@@ -127,10 +129,13 @@ def optimum(problem: Problem, objective: Objective) -> Optimum:
             point = reached(problem, point.x)
             if not kept(problem, point):
                 break
-        if best is not None and objective.value(point) >= objective.value(best) - problem.within.exact * abs(
-            objective.value(best)
-        ):
-            break
+        if best is not None:
+            value, before = objective.value(point), objective.value(best)
+            near = problem.within.exact * abs(before)
+            if abs(value - before) <= near:  # of two that are as good that whose slopes are held up by more
+                best = min(best, point, key=lambda p: priced(problem, objective, p).left)
+            if value >= before - near:
+                break
         best, x = point, point.x
         if not elsewhere and (search.stopped or priced(problem, objective, point).left < held):
             break
@@ -183,6 +188,7 @@ class _Search:
         self._sizes = problem.space.sizes(start)
         self._scale = size_of(objective, self._here, self._sizes)
         self._hessian, self._penalty = CURVATURE * np.eye(start.size), PENALTY
+        self._watched = set[str]()  # cases that are run whatever is foretold: they refused a step
         self.stopped = ""  # why the last trial could not be computed
         self.exhausted = False  # whether there was something to gain after the last step that it may take
 
@@ -198,18 +204,24 @@ class _Search:
                 break
             there, gained = self._tried(step)
             if there is not None and gained < ACCEPTED * foretold:
-                if self._here.refresh(self._problem.missed(self._here, there)):
-                    continue  # by slopes that are no secants
-                # limits are bent: once more with what they came to
-                step, _ = self._step(self._after(there) - slopes @ step, slopes, width)
-                there, gained = self._tried(step)
+                # a motion that loses more than it was to gain: the step is too long, by whatever slopes
+                worst, far = self._worst(there), self._problem.moves and gained < -foretold
+                self._watched |= worst
+                if self._here.refresh(worst if far else self._problem.missed(self._here, there, 0.0)):
+                    values, slopes = self._rows(self._here)
+                    again, foretold = self._step(values, slopes, width)
+                    if np.abs(again - step).max() > ALIKE * np.abs(step).max():
+                        continue  # by slopes that are no secants
+                if not far:  # limits are bent: once more with what they came to
+                    step, _ = self._step(self._after(there) - slopes @ step, slopes, width)
+                    there, gained = self._tried(step)
             missed = set() if there is None else self._problem.missed(self._here, there)
             if there is not None and gained >= ACCEPTED * foretold:
                 there.refresh(missed)
                 self._learn(there)
                 self._here = there
                 width = min(2.0 * width, STEP) if gained >= TRUSTED * foretold else width
-            elif there is None or not self._here.refresh(missed):
+            elif there is None or gained < -foretold or not self._here.refresh(missed):
                 width = (SHRUNK if there is not None else CUT) * min(width, float(np.abs(step).max()))
                 if width < SHORTEST:
                     break
@@ -226,13 +238,18 @@ class _Search:
         space = self._problem.space
         try:
             x = np.clip(self._here.x + self._sizes * step, space.low, space.high)
-            point = self._problem.equilibria.at(x, moving=self._problem.moving(self._here, x))
+            point = self._problem.equilibria.at(x, moving=self._problem.moving(self._here, x) | self._watched)
             self._objective.parts(point)
         except (ComputationError, SceneError) as error:
             self.stopped = " ".join(str(error).split())
             return None, -np.inf
         self.stopped = ""
         return point, self._merit(self._here) - self._merit(point)
+
+    def _worst(self, point: Point) -> set[str]:
+        """The case with the limit that is least kept; none: there are no limits."""
+        rows = [c.case for c in self._problem.constraints for _ in range(2 if c.side == 0 else 1)]
+        return {rows[int(self._values(point).argmax())]} if rows else set()
 
     def _merit(self, point: Point) -> float:
         off = float(self._values(point).max(initial=0.0))

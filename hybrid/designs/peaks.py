@@ -13,17 +13,13 @@ from hybrid.kernels.state.state import Floats
 BESIDE, MOST = 0.1, 12
 
 
-def over_time(history: Floats, over: str, where: Any, cut: NDArray[np.bool_] | None) -> tuple[float, Any]:
-    """The statistic of a history, and when and where an extreme is; where: None: not known yet.
-
-    cut: extremes are those of parabolas through it and its neighbours, but for these places (places,), where a value
-    may be two; None: they are those of the history.
-    """
+def over_time(history: Floats, over: str, where: Any) -> tuple[float, Any]:
+    """The statistic of a history, and when and where an extreme is; where: None: not known yet."""
     if over in ("max", "min"):
         if where is None:
             flat = np.nanargmax(history) if over == "max" else np.nanargmin(history)
             where = np.unravel_index(int(flat), history.shape)
-        return float(history[where]) + (0.0 if cut is None else _beyond(history, where, cut)), where
+        return float(history[where]), where
     x = history[:, 0]
     return float({"mean": x.mean(), "std": x.std(), "last": x[-1]}[over]), None
 
@@ -51,16 +47,23 @@ def peaks(history: Floats, over: str, where: Any) -> list[Any]:
     return [first, *[x for x in near if x != first][: MOST - 1]]
 
 
-def _beyond(history: Floats, where: Any, cut: NDArray[np.bool_]) -> float:
-    """By how much the extremes of parabolas through an extreme and its neighbours in time and place are beyond it.
+def smoothed(history: Floats, over: str, cut: NDArray[np.bool_]) -> Floats:
+    """Of every output and place the extreme of parabolas through it and its neighbours in time and place, but for
 
-    Outputs and places count as evenly spaced there: it changes evenly where an extreme goes from one to the next.
+    these places (places,), where a value may be two.
+
+    Outputs and places count as evenly spaced there.  The largest of all changes evenly, as an extreme goes from one to
+    the next: between two it is that of either parabola.
     """
-    (i, k), out = where, 0.0
-    for row, j, along in ((history[:, k], i, False), (history[i], k, True)):
-        if 0 < j < row.size - 1 and not (along and cut[j - 1 : j + 2].any()):
-            before, here, after = row[j - 1 : j + 2]
-            bent = after - 2.0 * here + before
-            if abs(after - before) < 2.0 * abs(bent):  # it is between the neighbours
-                out -= (after - before) ** 2 / (8.0 * bent)
-    return float(out)
+    side, out = 1.0 if over == "max" else -1.0, history.copy()
+    for axis in (0, 1):
+        x, table = np.moveaxis(history, axis, 0), np.moveaxis(out, axis, 0)
+        if x.shape[0] < 3:
+            continue
+        before, here, after = x[:-2], x[1:-1], x[2:]
+        bent = after - 2.0 * here + before
+        hill = (side * bent < 0.0) & (np.abs(after - before) < 2.0 * np.abs(bent))  # it is between the neighbours
+        if axis == 1:
+            hill &= ~(cut[:-2] | cut[1:-1] | cut[2:])[:, None]
+        table[1:-1][hill] -= (after - before)[hill] ** 2 / (8.0 * bent[hill])
+    return out

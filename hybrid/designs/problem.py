@@ -155,14 +155,14 @@ class Problem(NamedTuple):
         near = [c.case for c in self.constraints if (point.values[c.row] - c.bound) * c.side >= -NEAR * c.scale]
         return self.moves and point.refresh({*near, *(self.equilibria.wanted[k][0] for k in spoken)})
 
-    def missed(self, point: Point, there: Point) -> set[str]:
-        """Cases in which another point has come nearer to a limit, or beyond it, than slopes foretold."""
+    def missed(self, point: Point, there: Point, near: float = NEAR) -> set[str]:
+        """Cases in which another point is within parts of a limit, or beyond it, and not where slopes foretold."""
         if not self.moves:
             return set()
         foretold = point.foretold(there.x)
         return {
             c.case for c in self.constraints
-            if (there.values[c.row] - c.bound) * c.side >= -NEAR * c.scale
+            if (there.values[c.row] - c.bound) * c.side >= -near * c.scale
             and abs(there.values[c.row] - foretold[c.row]) > self.within.kept * c.scale
         }  # fmt: skip
 

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 import hybrid
 from hybrid.designs.motions import PART, TANGENT, Motions, Peaks
 from hybrid.designs.numbers import scene_with
-from hybrid.designs.peaks import peaks
+from hybrid.designs.peaks import over_time, peaks, smoothed
 from tests.designs.test_in_motion import G, W, as_lines, heaved, on_the_bed
 
 MASS, AMPLITUDE = "cable.sections[0].mass", "ends.start.motion.heave.amplitude"
@@ -82,6 +82,29 @@ def test_peaks_of_a_history_are_seen_before_they_are_the_largest():
     found = Peaks(((4, 3), (1, 1)), np.array([10.0, 9.5]), np.array([[0.0], [1.0]]), least=False)
     assert found.moved(np.array([1.0])).where == ((1, 1), (4, 3)) and found.moved(np.array([1.0])).values[0] == 10.5
     assert found.nearest_to((1, 2)) == 1
+
+
+def test_the_value_of_a_limit_is_the_largest_of_its_peaks():
+    """Of two hills that of the higher parabola, not of the higher output; by hand b + (c - a)^2 / 8(2b - a - c)."""
+    history = np.array([[9.2, 9.79, 10.0, 9.79, 9.2, 9.0, 9.95, 9.94, 9.0]]).T
+    table = smoothed(history, "max", np.zeros(1, bool))
+    by_parabola = 9.95 + 0.94**2 / 8 / (2 * 9.95 - 9.94 - 9.0)
+    value, where = over_time(table, "max", None)
+    assert where == (6, 0) and value == pytest.approx(by_parabola, rel=1e-12) and table[2, 0] == 10.0
+    assert value == max(table[x] for x in peaks(table, "max", where))
+    np.testing.assert_array_equal(smoothed(-history, "min", np.zeros(1, bool)), -table)
+    np.testing.assert_array_equal(smoothed(history.T, "max", np.ones(9, bool)), history.T)  # jumps between places
+
+
+@pytest.mark.parametrize("side", ["max", "min"])
+def test_an_extreme_changes_evenly_as_it_goes_from_one_output_to_the_next(side):
+    """Of a steep crest that moves by two outputs: no leap, which a search would take for a limit that it missed."""
+    sign, t, values = 1.0 if side == "max" else -1.0, np.arange(9.0), list[float]()
+    for crest in np.linspace(3.5, 5.5, 2001):
+        u = (t - crest)[:, None]
+        table = smoothed(sign * np.exp(np.where(u < 0.0, -0.2, -0.6) * u**2), side, np.zeros(1, bool))
+        values.append(sign * over_time(table, side, None)[0])
+    assert np.abs(np.diff(values)).max() < 3e-4 and values == pytest.approx(np.ones(2001), abs=0.05)
 
 
 def test_one_unknown_at_its_bound_and_one_at_the_limit_of_the_higher_sea():
