@@ -242,6 +242,7 @@ class Motion:
         at whose nodes there are outputs.
         """
         self.course, self.smooth = course, smooth
+        self._smooth: dict[Wanted, Floats] = {}  # extremes of parabolas, where they have been asked for
         more = self.more(wanted) if smooth else None
         self._cables = {k: x.cable for k, x in scene.lines.items()} if isinstance(scene, System) else {"": scene.cable}
         each_step = any(x.over == "t" for x in wanted)
@@ -290,7 +291,7 @@ class Motion:
         for x in wanted:
             if x.place not in out:
                 out[x.place] = self._history(lines[x.line], x)
-        self._smooth: dict[Wanted, Floats] = {}
+        self._smooth = {}
         self.shapes = {place: history.shape for place, history in out.items()}
         self._cuts = {place: self._cut(lines[place.line], place, shape[-1]) for place, shape in self.shapes.items()}
         return out
