@@ -7,9 +7,11 @@ whether a finer run is needed and contact to come, is the difference between the
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, overload
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 
@@ -17,6 +19,7 @@ from hybrid.accuracy.budget import CELL, COMPARISONS, FINER, LEAST, MOST_TIMES, 
 from hybrid.accuracy.model_choice import chosen_and_surveyed
 from hybrid.errors import ComputationError
 from hybrid.kernels.machine.cache import is_warm
+from hybrid.kernels.state import books as b
 from hybrid.kernels.state.state import State
 from hybrid.model import plan as tables
 from hybrid.model.build import Model, build
@@ -43,6 +46,8 @@ ENOUGH_STEPS = 400
 MOST_CELLS = 4000
 # s of the file of a result, and of judging and writing errors (bench/test_bench_plan.py).
 FILE, JUDGING = 0.02, 0.1
+# s beyond their budget that steps take only where something is done once; after so many they have grown to the motion.
+ONCE, SETTLED = 1.0, 40
 # How much dearer steps are, over a whole run, of a line that is to touch itself: expected, and at most.
 TOUCHING, MOST_TOUCHING = 2.5, 6.0
 # Results that an accuracy takes at most over the first, where its budget allows them: finer ones may follow it.
@@ -69,6 +74,33 @@ def plan(scene: SceneLike | System, *, measure: bool = True) -> Plan | SystemPla
     return _measured(scene, found) if measure and scene.time is not None else found
 
 
+class Seen(NamedTuple):
+    """How far a run was: s of processor time, steps, time of the motion, s."""
+
+    cpu: float
+    steps: int
+    t: float
+
+
+def _cost_of_a_step(seen: Sequence[Seen]) -> float:
+    """s of processor time in the median of steps, so that what is done once does not count."""
+    parts = [((y.cpu - x.cpu) / (y.steps - x.steps), y.steps - x.steps) for x, y in pairwise(seen) if y.steps > x.steps]
+    half = 0.5 * sum(n for _, n in parts)
+    for cost, n in sorted(parts):
+        half -= n
+        if half <= 0.0:
+            return cost
+    return seen[-1].cpu - seen[0].cpu
+
+
+def _steps_a_second(seen: Sequence[Seen]) -> float:
+    """Steps in a second of motion, of the second half of the steps: the first ones are short, to begin with."""
+    end = seen[-1]
+    before = [x for x in seen if 2 * x.steps <= end.steps]
+    since = before[-1] if before else seen[0]
+    return (end.steps - since.steps) / max(end.t - since.t, 1e-9)
+
+
 class _Probe(Case):
     """A case whose passes end (KeyboardInterrupt) when their budget is used up."""
 
@@ -78,11 +110,17 @@ class _Probe(Case):
         self.at_rest: tuple[Model, State] | None = None  # where it begins, if that is an equilibrium
         self._end = np.inf
         self._most_steps = np.inf
+        self.seen: list[Seen] = []  # of the last loop
         self.interrupted = self._is_used_up
 
     def _is_used_up(self) -> bool:
-        steps = self.loop.run.steps if self.loop is not None else 0
-        return steps >= self._most_steps or clock.process_time() > self._end
+        now, steps = clock.process_time(), 0
+        if self.loop is not None:
+            steps = self.loop.run.steps
+            self.seen.append(Seen(now, steps, self.loop.run.t))
+        if steps < self._most_steps and self._end + ONCE < now < np.inf and len(self.seen) == 2:
+            self._end = now + FIRST_STEPS  # what is done once, as compiling, is no cost of a step
+        return steps >= self._most_steps or now > self._end
 
     def allow(self, seconds: float, steps: float = np.inf) -> None:
         """Processor time, s, and steps for what follows."""
@@ -90,10 +128,12 @@ class _Probe(Case):
 
     def _loop(self, *args: Any, **kwargs: Any) -> TimeLoop:
         self.loop = super()._loop(*args, **kwargs)
+        self.seen = [Seen(clock.process_time(), 0, 0.0)]
         return self.loop
 
     def first_steps(self, resolution: Resolution) -> tuple[TimeLoop, float, float]:
-        """The loop of a result after its first steps; s of processor time before them, and of them."""
+        """The loop of a result after its first steps; s of processor time before them, and of so many without what is
+        done once."""
         begin = clock.process_time()
         self.allow(np.inf)  # the budget of the pre-run may be used up, and the equilibrium has none
         model, equilibrium, switching = self._start(resolution)
@@ -105,8 +145,10 @@ class _Probe(Case):
         with suppress(KeyboardInterrupt):
             loop.begin(equilibrium)
             begun = clock.process_time()  # the first state is made once, however many steps there are
+            self.seen = [Seen(begun, loop.run.steps, loop.run.t)]
             loop.to_the_end(self._duration, self._exact)
-        return loop, begun - begin, clock.process_time() - begun
+        self.seen.append(Seen(clock.process_time(), loop.run.steps, loop.run.t))
+        return loop, begun - begin, loop.run.steps * _cost_of_a_step(self.seen)
 
 
 def _measured(scene: Scene, found: Plan) -> Plan:
@@ -125,15 +167,15 @@ def _measured(scene: Scene, found: Plan) -> Plan:
         except KeyboardInterrupt:
             cut = True
         survey, coarse = clock.process_time() - begin, case.loop
+        still = _still_to_come(case.seen, scene.require_time().duration) if cut and coarse is not None else 0.0
         if not is_warm(kernels_of(case.scene)):
             return found
         loop, setup, spent = case.first_steps(resolution)
     except ComputationError:
         return found  # the run will say why
     duration = scene.require_time().duration
-    if cut and coarse is not None:
-        survey *= duration / max(coarse.run.t, 1e-6 * duration)
-    steps = _steps(scene, resolution, loop, coarse)
+    survey += still
+    steps = _steps(scene, resolution, loop, coarse, case.seen)
     motion = steps * _dearer(found) * spent / max(loop.run.steps, 1)
     seconds, most = _of_passes(scene, setup, motion, duration / output_interval(scene), found)
     if scene.contact.self:  # by name: the first steps show nothing of it
@@ -152,6 +194,11 @@ def _measured(scene: Scene, found: Plan) -> Plan:
     )  # fmt: skip
 
 
+def _still_to_come(seen: Sequence[Seen], duration: float) -> float:
+    """s of processor time that a pre-run would still take to the end of the motion, s, which was cut."""
+    return _cost_of_a_step(seen) * _steps_a_second(seen) * max(duration - seen[-1].t, 0.0)
+
+
 def _dearer(found: Plan) -> float:
     """How much dearer a step is on average than the first ones, of a line that is paid out."""
     if found.payout is None or not np.isfinite(found.payout.mean_cells):
@@ -160,17 +207,23 @@ def _dearer(found: Plan) -> float:
     return mean / first
 
 
-def _steps(scene: Scene, resolution: Resolution, loop: TimeLoop, coarse: TimeLoop | None) -> float:
+def _steps(
+    scene: Scene, resolution: Resolution, loop: TimeLoop, coarse: TimeLoop | None, seen: Sequence[Seen]
+) -> float:  # fmt: skip
     """Steps of the result, which has come as far as its loop.
 
     coarse: of the mesh pre-run, whose steps, longer by one factor, show how many each part of the motion asks for.
+    seen: of its loop.
     """
     run, duration = loop.run, scene.require_time().duration
     if run.t >= duration:
         return float(run.steps)
     if resolution.local is None:
         return float(count_steps(scene))
-    linear = run.steps * duration / max(run.t, 1e-9 * duration)
+    rate = _steps_a_second(seen)
+    if run.steps < SETTLED:  # they still grow: not shorter than the next is to be
+        rate = min(rate, 1.0 / float(run.run.clock[b.NEXT_DT]))
+    linear = run.steps + rate * (duration - run.t)
     if coarse is None or coarse is loop or not coarse.run.steps:
         return linear
     assert isinstance(coarse.recorder, ComparisonRecorder)
@@ -224,7 +277,10 @@ def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
     spent, setup = clock.process_time() - begun, begun - begin
     steps = float(run.steps) if run.t >= time.duration else float(found.steps)
     if run.loop.controlled:
-        steps = run.steps * time.duration / max(run.t, 1e-9 * time.duration)
+        rate = run.steps / max(run.t, 1e-9 * time.duration)
+        if run.steps < SETTLED:
+            rate = min(rate, 1.0 / float(run.loop.clock[b.NEXT_DT]))
+        steps = run.steps + rate * max(time.duration - run.t, 0.0)
     motion = steps * spent / max(run.steps, 1)
     scenes = {name: system.scene_of(name) for name in system.lines}
     if not system.starts_as_placed:

@@ -8,6 +8,7 @@ import pytest
 
 import hybrid
 from hybrid.accuracy import run_forecast
+from hybrid.accuracy.run_forecast import Seen, _cost_of_a_step, _steps_a_second, _still_to_come
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -49,6 +50,25 @@ def test_a_pre_run_that_is_cut_leaves_a_plan(monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch.setattr(f"hybrid.accuracy.run_forecast.{name}", 0.0)
     plan = hybrid.plan(scene("3%"))
     assert plan.measured and plan.steps > 0 and plan.seconds > 0.0
+
+
+@pytest.mark.parametrize("settled", [0, 1000])
+def test_a_few_first_steps_do(settled: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of the shortest budget foretell the steps of a line that is paid out, and no later ones are shorter."""
+    asked = hybrid.load_scene(EXAMPLES / "laying.yaml", ["accuracy=null", "time={duration: 80}"])
+    monkeypatch.setattr(run_forecast, "FIRST_STEPS", 0.0)
+    monkeypatch.setattr(run_forecast, "SETTLED", settled)
+    foretold, run = hybrid.plan(asked), hybrid.run(asked)
+    assert foretold.measured and 0.4 < foretold.steps / len(run["steps/t"]) < 2.5
+
+
+def test_what_is_done_once_is_no_cost_of_a_step() -> None:
+    """40 s of compiling in the first 20 of 500 steps, which are short; the others take 1 ms and 0.1 s of the motion."""
+    seen = [Seen(1.0, 0, 0.0), Seen(41.0, 20, 0.02), Seen(41.2, 220, 20.02), Seen(41.48, 500, 48.02)]
+    assert _cost_of_a_step(seen) == pytest.approx(1e-3)
+    assert _steps_a_second(seen) == pytest.approx(10.0)
+    assert _still_to_come(seen, 148.02) == pytest.approx(1.0)
+    assert _cost_of_a_step(seen[:1]) == 0.0
 
 
 def test_first_steps_of_lines_are_measured_too() -> None:
