@@ -38,7 +38,8 @@ from hybrid.solve.system import SystemSolver
 ANCHOR = 1e-9
 # Shifts (of the longest line) and turns (rad) of a body by which forces of the water and its weight are differentiated.
 SHIFT, TURN = 1e-5, 1e-4
-# Strain under the largest tension that is lent to lines that do not stretch where modes are counted.
+# Where modes are counted, lines that do not stretch are lent this strain under their largest tension, or under the size
+# of tension that they are solved with; those that stretch are lent this part of their own compliance.
 NO_STRAIN = 1e-10
 # Turn, rad, of an end's frame by which the element there is differentiated.
 FRAME_TURN = 1e-5
@@ -57,6 +58,7 @@ class LinearLine:
     state: State
     stiffness: sparse.csr_array
     mass: sparse.csr_array
+    standing: sparse.csr_array  # the part of it at ends that are joined: of the free point, of clumps and floats there
     free: np.ndarray
     net: Floats  # (2, 3) N, that each end passes to what it is joined to
     turned: Floats  # (2, 3, 5 (N+1)) N, N m, .. what turns of an end's frame do, from the left; zeros: it carries none
@@ -89,6 +91,7 @@ class LinearNetwork:
     stiffness: sparse.csc_array  # A, made symmetric
     skew: sparse.csc_array  # the part of A that was not
     mass: sparse.csc_array
+    apart: sparse.csr_array  # the part of `mass` of points and bodies, without lines that end there
     points: int
     bodies: int
     slow: float  # 1/s^2, a size of w^2 of what swings slowly: the largest tension over mass and length
@@ -155,6 +158,7 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: boo
     rows_at_rest(line, x, ends, state, (0.0, high), more)
     mass = (more - base) / (high - ANCHOR)
     base -= ANCHOR * mass
+    standing = _at_joined_ends(line, x, ends, state, high, more)
     K, M = sparse_rows(base), sparse_rows(mass)
     if quick:  # what turns freely about its axis is a motion that costs nothing; at rest springs keep it where it is
         K = K - sparse.diags_array(_spin_springs(line))
@@ -173,8 +177,22 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: boo
         if x.seats[k, TURNS] != 0.0:
             turned[k], moments[k] = by_turn(line, x, ends, state, k)
     return LinearLine(
-        name, line, state, K, M, free.ravel(), forces, turned, moments
+        name, line, state, K, M, sparse_rows(standing), free.ravel(), forces, turned, moments
     )  # fmt: skip
+
+
+def _at_joined_ends(line: Line, x: JoinedLine, ends: Ends, state: State, ca: float, rows: Floats) -> Floats:
+    """Block rows of the mass that stands at ends that are joined, by the rows of the line with c_a (1/s^2)."""
+    if max(x.joints) < 0:
+        return np.zeros_like(rows)
+    mass, point, added = line.mass.copy(), line.point_mass.copy(), line.point_added.copy()
+    for at in (-k for k in (0, 1) if x.joints[k] >= 0):
+        mass[at] -= point[at]
+        point[at] = added[at] = 0.0
+    bare = np.zeros_like(rows)
+    alone = line._replace(mass=mass, point_mass=point, point_added=added)
+    rows_at_rest(alone, x, ends, state, (0.0, ca), bare)
+    return (rows - bare) / ca
 
 
 def in_space(line: Line, state: State, sticks: bool, quick: bool = True) -> Line:
@@ -346,18 +364,29 @@ def linear_network(
     place = entries.matrix(int(at[-1]), size)
     A = sparse.block_diag([x.stiffness for x in lines], format="csr")
     M = sparse.block_diag([x.mass for x in lines], format="csr")
-    A, M = sparse.csr_array(place.T @ A @ place), sparse.csr_array(place.T @ M @ place)
-    A, M = A + _couplings(coupling, at, place, own + 3 * points), M + _masses(solver, states, own + 3 * points, size)
+    standing = sparse.block_diag([x.standing for x in lines], format="csr")
+    bodies_alone = _masses(solver, states, own + 3 * points, size)
+    M, apart = (sparse.csr_array(place.T @ each @ place) + bodies_alone for each in (M, standing))
+    A = sparse.csr_array(place.T @ A @ place) + _couplings(coupling, at, place, own + 3 * points)
     A = A + _of_bodies(solver, states, extra, own + 3 * points, size)
-    tensions = np.zeros(int(at[-1]))
-    for x, a in zip(lines, at[:-1], strict=True):
-        pull = max(float(np.abs(x.state.T).max()), 1e-300)
-        tensions[a + SIZE : a + x.free.size : SIZE] = NO_STRAIN * x.line.h / pull
+    pull = max(float(np.abs(x.state.T).max()) for x in lines)
+    slow = solver.anchor / STATIC_ANCHOR * max(pull / solver.scale, 1.0)
     return LinearNetwork(
         lines, at, place, sparse.csc_array(0.5 * (A + A.T)), sparse.csc_array(0.5 * (A - A.T)),
-        sparse.csc_array(0.5 * (M + M.T)), points, bodies, solver.anchor / STATIC_ANCHOR,
-        np.asarray(place.T @ tensions),
+        sparse.csc_array(0.5 * (M + M.T)), apart, points, bodies, slow,
+        np.asarray(place.T @ _lent(lines, solver)),
     )  # fmt: skip
+
+
+def _lent(lines: Sequence[LinearLine], solver: SystemSolver) -> Floats:
+    """(all lines,) m/N: compliance that is lent to cells where modes are counted, at their tensions."""
+    out = []
+    for x, joined in zip(lines, solver.lines, strict=True):
+        own, pull = -x.stiffness.diagonal()[SIZE::SIZE], max(float(np.abs(x.state.T).max()), joined.scale)
+        lent = np.zeros(x.free.size)
+        lent[SIZE::SIZE] = NO_STRAIN * np.where(own > 0.0, own, x.line.h / pull)
+        out.append(lent)
+    return np.concatenate(out)
 
 
 def _couplings(

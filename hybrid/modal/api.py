@@ -226,14 +226,14 @@ class _Shape:
 
     @cached_property
     def energy(self) -> dict[str, float]:
-        """Parts of the kinetic energy by what moves, those beyond 1 %."""
+        """Parts of the kinetic energy by what moves, those beyond 1 %; what stands at a joined end is of its point."""
         out: dict[str, float] = {}
         several = len(self.parts) > 1
         network = self.found.network
         for x in network.lines:
-            part, name = self.parts[x.name], f"{x.name} " if several else ""
+            part, name, mass = self.parts[x.name], f"{x.name} " if several else "", x.mass - x.standing
             for word, moved in _directions(x, part).items():
-                out[name + word] = float(moved.ravel() @ (x.mass @ moved.ravel()))
+                out[name + word] = float(moved.ravel() @ (mass @ moved.ravel()))
         first = network.size - 3 * network.points - 6 * network.bodies
         for kind, begin, size, names in (
             ("point", first, 3, self.found.points),
@@ -242,7 +242,7 @@ class _Shape:
             for k, name in enumerate(names):
                 alone = np.zeros(network.size)
                 alone[begin + size * k : begin + size * (k + 1)] = self.vector[begin + size * k :][:size]
-                out[f"{kind} {name}{self._motion(name)}"] = float(alone @ (network.mass @ alone))
+                out[f"{kind} {name}{self._motion(name)}"] = float(alone @ (network.apart @ alone))
         total = sum(abs(x) for x in out.values()) or 1.0
         shares = {k: abs(x) / total for k, x in out.items()}
         return dict(sorted(((k, x) for k, x in shares.items() if x > 0.01), key=lambda item: -item[1]))
@@ -300,14 +300,14 @@ def _places(found: _Found, k: int) -> Floats:
     for x in found.network.lines:
         part, s = shape.parts[x.name], x.line.s
         at = np.linspace(0.0, float(s[-1]), PLACES)
-        moving = float(np.einsum("ij,ij->", part, (x.mass @ part.ravel()).reshape(part.shape)))
+        moving = float(np.einsum("ij,ij->", part, ((x.mass - x.standing) @ part.ravel()).reshape(part.shape)))
         here = np.column_stack([np.interp(at, s, part[:, 1 + c]) for c in range(3)])
         middle = 0.5 * (s[1:] + s[:-1])
         turning = math.sqrt(float(np.nansum(x.line.polar)) / max(float(x.line.mass.sum()), 1e-300))
         here = np.column_stack([here, turning * np.interp(at, middle, part[:-1, 4])])
         rows.append(math.sqrt(abs(moving)) * here.ravel() / max(float(np.linalg.norm(here)), 1e-300))
     first = found.network.size - 3 * found.network.points - 6 * found.network.bodies
-    rows.append(np.sqrt(np.maximum(found.network.mass.diagonal()[first:], 0.0)) * shape.vector[first:])
+    rows.append(np.sqrt(np.maximum(found.network.apart.diagonal()[first:], 0.0)) * shape.vector[first:])
     return np.concatenate(rows)
 
 

@@ -102,6 +102,18 @@ def test_closed_forms_with_order_two(name):
     assert ratio.min() > 0.7 and ratio.max() < 3.0
 
 
+@pytest.mark.parametrize("more", [{"axial_stiffness": 1e8}, {}, {"axial_stiffness": 1e8, "rotary_inertia": 0.0}])
+def test_no_mode_of_a_cantilever_without_tension_is_missing(more):
+    """w = z^2/L^2 sqrt(EI/m), cos z cosh z = -1, of which there are two: as many as the factors count below a gap."""
+    section = {"length": 5.0, "mass": 3.0, "diameter": 0.02, "bending_stiffness": 2000.0} | more
+    made = scene(section, clamped(0, 0, 0), {"kind": "free"}, "rod", 100)
+    found = hybrid.modes(made, 4)
+    exact = np.array([1.875104, 4.694091]).repeat(2) ** 2 / 25.0 * math.sqrt(2000.0 / 3.0)
+    np.testing.assert_allclose(omega(found), exact, rtol=1e-3)
+    assert found.notes == ()
+    assert _found(made, 1.0, 4, None, True).eigen.missed == 0
+
+
 def test_twist_of_a_rod():
     """omega = n pi/L sqrt(GJ/G_p) between two clamps, G_p = m d^2/8 of a round section; lumped, as the string is."""
     section = {"length": 10.0, "mass": 8.0, "diameter": 0.5, "bending_stiffness": 1e9, "torsional_stiffness": 1e3}
@@ -122,6 +134,57 @@ def test_mass_on_a_string():
     made = string(200, cable={"attachments": [{"kind": "clump", "at": 50.0, "mass": 1000.0}]})
     found = omega(hybrid.modes(made, 2))
     np.testing.assert_allclose(found, 1.720667, rtol=2e-4)
+
+
+def two_strings(cells):
+    """1000 kg in the middle of two strings of 50 m and 10 kg/m under 100 kN, as two lines: half of it to each."""
+    section = {"length": 50.0, "mass": 10.0, "axial_stiffness": 1e9}
+    points = {
+        "a": {"kind": "fixed", "position": [0, 0, 0]}, "b": {"kind": "fixed", "position": [100.01, 0, 0]},
+        "p": {"kind": "free", "mass": 1000.0, "initial_guess": [50, 0, 0]},
+    }  # fmt: skip
+    more = {"sections": [section], "model": "catenary", "mesh": {"cells": cells}}
+    lines = {"one": {"start": "a", "end": "p"} | more, "two": {"start": "p", "end": "b"} | more}
+    return {"environment": {"gravity": 0.0}, "points": points, "lines": lines}
+
+
+def tether(cells, point, **more):
+    """50 m that weigh nothing in water, 40 kg/m with the water that moves along, under what weighs 4000 kg with it."""
+    section = {
+        "length": 50.0, "mass": 20.0, "diameter": math.sqrt(0.02 * 4.0 / math.pi), "axial_stiffness": 1e9,
+        "added_mass": {"normal": 1.0},
+    }  # fmt: skip
+    line = {"start": "a", "end": "p", "sections": [section], "model": "catenary", "mesh": {"cells": cells}}
+    points = {"a": {"kind": "fixed", "position": [0, 0, -60]}, "p": point}
+    return {"environment": {"fluid": {"density": 1000.0}}, "points": points, "lines": {"l": line}} | more
+
+
+FLOAT = {"kind": "free", "initial_guess": [0, 0, -10], "mass": 1000.0, "volume": 4.0, "added_mass": 3000.0}
+EYE = {"kind": "fairlead", "body": "b", "place": [0, 0, 0]}
+BODY = {"mass": 4000.0, "inertia": [1e3] * 3, "volume": 8.0, "initial_guess": [0, 0, -10]}
+ENDS_OF_STRINGS = {
+    "point of two lines": (two_strings(10), 1.0, "point p", 2),
+    "point with added mass": (tether(10, FLOAT), 0.5, "point p", 1),
+    "body": (tether(10, EYE, bodies={"b": BODY}), 0.5, "body b", 1),
+}
+
+
+@pytest.mark.parametrize("name", ENDS_OF_STRINGS)
+def test_energy_of_a_mass_at_the_end_of_a_string(name):
+    """The shape is sin(x s/L) with x tan x = mL/M: the string has mL/2 (1 - sin 2x/2x), the mass M sin^2 x."""
+    made, ratio, what, lines = ENDS_OF_STRINGS[name]
+    x = {1.0: 0.860334, 0.5: 0.653271}[ratio]
+    assert x * math.tan(x) == pytest.approx(ratio, rel=1e-5)
+    of_line, of_mass = 0.5 * ratio * (1.0 - math.sin(2.0 * x) / (2.0 * x)), math.sin(x) ** 2
+    part = of_mass / (of_line + of_mass)
+    energy = dict(hybrid.modes(made, 2).modes[0].energy)
+    (mass,) = [energy.pop(key) for key in list(energy) if key.startswith(what)]
+    assert mass == pytest.approx(part, rel=2e-3)
+    if lines == 1:
+        assert sum(energy.values()) == pytest.approx(1.0 - part, rel=2e-2)
+    else:
+        assert [key.split()[0] for key in sorted(energy)] == ["one", "two"]
+        assert list(energy.values()) == pytest.approx([0.5 * (1.0 - part)] * 2, rel=2e-2)
 
 
 def test_riser_of_huera_huarte():
