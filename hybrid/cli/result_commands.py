@@ -19,7 +19,7 @@ from hybrid.cli.app import (
     UsageError,
     app,
     flag,
-    load,
+    load_either,
     numbers,
     opened_line,
     output_option,
@@ -183,28 +183,28 @@ def export(
         if unfit := [name for name, value in given.items() if value is not None]:
             raise UsageError(f"{', '.join(unfit)}: of a result, not of an FMU")
         with session(as_json, quiet) as console:
-            scene, unit = load(console, result, settings), output or result.with_suffix(".fmu")
+            scene, unit = load_either(console, result, settings), output or result.with_suffix(".fmu")
             console.done("co-simulation unit, FMI 3.0", hybrid.export_fmu(scene, unit, overwrite=not keep))
         return
     if settings:
         raise UsageError("--set: changes a scene, and a result has been computed; for an FMU give -o NAME.fmu")
-    from hybrid.exports.api import beside
+    from hybrid.exports.api import SUFFIXES, files_of, format_of
 
-    with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
-        target = output or beside(result, format)
-        parts = {f".{name}": one for name, one in opened.lines.items()} or {"": opened}
-        all_made = []
-        for name, part in parts.items():  # of several lines each is a file of its own
-            stem, dot, rest = target.name.partition(".")
-            to = target.with_name(f"{stem}{name}{dot}{rest}")
-            made = hybrid.export(part, to, format=format, names=names, times=times, at=at, overwrite=not keep)
-            all_made.append(made)
-            for text in made.notes:
-                console.json("note", text=text, line=name.removeprefix("."))
-                console.note(f"note: {name.removeprefix('.')}{': ' if name else ''}{text}")
-        status = "" if opened.done else f"; {opened.status_text}"
-        files, notes = [x for made in all_made for x in made.files], [x for made in all_made for x in made.notes]
-        console.done(all_made[0].text + status, *files, status=opened.status, notes=notes)
+    with session(as_json, quiet) as console:
+        kind, all_made = format_of(output, format), []
+        with opened_line(result, line) as (opened, result):
+            for file in files_of(opened, output or result.with_suffix(SUFFIXES[kind]), kind, names):
+                places, name = at if file.has_places else None, f"{file.line}: " if file.line else ""
+                made = hybrid.export(
+                    file.result, file.path, format=format, names=file.names, times=times, at=places, overwrite=not keep
+                )
+                all_made.append(made)
+                for text in made.notes:
+                    console.json("note", text=text, line=file.line)
+                    console.note(f"note: {name}{text}")
+            status = "" if opened.done else f"; {opened.status_text}"
+            files, notes = [x for made in all_made for x in made.files], [x for made in all_made for x in made.notes]
+            console.done(all_made[0].text + status, *files, status=opened.status, notes=notes)
 
 
 def _deck(source: Path, target: Path, keep: bool, quiet: bool, as_json: bool) -> None:

@@ -68,10 +68,10 @@ def export(
     all (of a CSV: the ends, and those recorded as `history`).  An older export is replaced if `overwrite`; what is
     not one never is.  ResultError when something is unknown, a package is missing, or the file cannot be written.
     """
-    kind, names = _format(path, format), [names] if isinstance(names, str) else names
+    kind, names = format_of(path, format), [names] if isinstance(names, str) else names
     if path is None and result.file is None:
         raise ResultError(f"a result in memory has no name of its own\n    try:      path='run{SUFFIXES[kind]}'")
-    file = Path(path).expanduser() if path is not None else beside(result.file or Path(), kind)
+    file = Path(path).expanduser() if path is not None else (result.file or Path()).with_suffix(SUFFIXES[kind])
     if kind == "csv":
         names, at = ["tension"] if names is None else names, _usual_places(result) if at is None else at
     if kind == "fatigue" and names is not None:
@@ -124,9 +124,45 @@ def _span(part: Part) -> str:
     return f"{len(t)} output{'s' * (len(t) != 1)}, t = {t[0]:.6g}" + (f" to {t[-1]:.6g} s" if len(t) > 1 else " s")
 
 
-def beside(source: Path, format: str | None = None) -> Path:
-    """The name of an export beside its result."""
-    return source.with_suffix(SUFFIXES[_format(None, format)])
+class File(NamedTuple):
+    """A file of an export: its place, the result and names of it (None: all), and the line, "" of all or of one."""
+
+    path: Path
+    result: Result
+    names: Sequence[str] | None
+    line: str = ""
+
+    @property
+    def has_places(self) -> bool:
+        """Whether what is in it lies along a line."""
+        return bool(self.line or not self.result.lines)
+
+
+def files_of(result: Result, target: Path, kind: str, names: Sequence[str] | None) -> list[File]:
+    """The files of an export; of several lines each has one.
+
+    What they share (points, bodies, contacts, events) is in `target` itself: where names ask for it, and in nc, which
+    holds everything.  ResultError: a format of lines alone is asked for something shared.
+    """
+    if not result.lines:
+        return [File(target, result, names)]
+    lines = result.lines.values()
+    shared = [
+        n for n in names or () if n.split("/")[0] in _SHARED or (n in result and not any(n in line for line in lines))
+    ]
+    own = None if names is None else [n for n in names if n not in shared or n.split("/")[0] == "events"]
+    if shared and kind not in ("nc", "csv"):
+        given = f"    given:    {', '.join(shared)}"
+        raise ResultError(f"{kind} is of lines alone\n{given}\n    try:      csv or nc, which hold it")
+    files, (stem, dot, rest) = [], target.name.partition(".")
+    if own is None or own or not shared:
+        for name, line in result.lines.items():
+            files.append(File(target.with_name(f"{stem}.{name}{dot}{rest}"), line, own, name))
+    return [*files, File(target, result, shared or None)] if shared or (names is None and kind == "nc") else files
+
+
+# Groups of what several lines share; each line has events of its own as well.
+_SHARED = ("points", "bodies", "contacts", "events")
 
 
 def histories(part: Part) -> dict[str, np.ndarray]:
@@ -221,9 +257,9 @@ def _table(what: str, head: Sequence[str], names: Sequence[str], columns: Sequen
     return out.getvalue().encode()
 
 
-def _format(path: str | Path | None, format: str | None) -> str:
-    """The format that was asked for, or that of the name."""
-    expected = f"    expected: {', '.join(SUFFIXES)}"
+def format_of(path: str | Path | None, format: str | None) -> str:
+    """The format of a result that was asked for, or that of the name; ResultError when there is none such."""
+    expected = f"    expected: {', '.join(SUFFIXES)} of a result; fmu of a scene"
     suffix = Path(path or "").suffix.lower().removeprefix(".")
     if format is None and path is None:
         return "nc"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import h5py
 
+from hybrid.store.copying import attach_anew
 from hybrid.store.hdf5_file import in_memory
 from hybrid.store.table import Table
 
@@ -25,8 +26,9 @@ def add_parts(file: h5py.File, parts: Mapping[str, Callable[[], bytes]]) -> None
     group.attrs["order"] = list(parts)
     for k, (name, image) in enumerate(parts.items(), 1):
         part = in_memory(image())
-        part.copy("/", group, name=name, expand_refs=True)
+        part.copy("/", group, name=name)
         part.id.close()
+        attach_anew(group[name])
         if k % TOGETHER == 0:
             file.flush()
 

@@ -149,7 +149,7 @@ class Result(Histories):
             return name
         if name in self._groups:
             raise UnknownName(f"'{name}' is a group; ask for {' or '.join(f'{name}/{key}' for key in self[name])}")
-        if self.lines:
+        if self.lines and name.split("/")[0] not in (*self._groups, "bodies", "contacts"):
             ask = f"ask one of them, as in result.lines['{next(iter(self.lines))}']"
             raise UnknownName(f"the result is of several lines, and has no '{name}' itself; {ask}")
         known = [*(n for n in self.names if "/" not in n), *self._groups, "scene_text"]
@@ -403,10 +403,18 @@ class Result(Histories):
         name = self._source.name if isinstance(self._source, Path) else "in memory"
         span = f"t = {t[0]:.6g} ... {t[-1]:.6g} s" if len(t) > 1 else (f"t = {t[0]:.6g} s" if len(t) else "none yet")
         text = f"Result of '{self.title}' ({name}): {len(t)} output{'s' * (len(t) != 1)}, {span}; "
+        if self._contents.order:
+            named = {"lines": self._contents.order, **{x: self._within(x) for x in ("points", "bodies")}}
+            text += "".join(f"{kind} {joined(list(names))}; " for kind, names in named.items() if names)
+            return f"<{text}{self.status_text}>"
         text += f"{len(s)} points on s = {s[0]:.6g} ... {s[-1]:.6g} m; "
         if len(t) and self.zones[-1]:
             text += f"last zones {joined(list(map(str, self.zones[-1])))}; "
         return f"<{text}{self.status_text}>"
+
+    def _within(self, group: str) -> dict[str, None]:
+        """Names of what has a group of its own in one of the result, such as the points in `points`."""
+        return dict.fromkeys(n.split("/")[1] for n in self.names if n.startswith(f"{group}/"))
 
     def _ipython_display_(self) -> None:
         """Show the card and the cable in space in a notebook; elsewhere IPython takes one of the other ways."""

@@ -1,0 +1,165 @@
+"""Results of several lines for other programs: the file itself in netCDF4 and xarray, and `hybrid export` of it."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas
+import pytest
+
+import hybrid
+from hybrid.cli.commands import main
+
+ROPE = {"length": 60, "mass": 4, "diameter": 0.04, "axial_stiffness": 1e7}
+SCENE: dict[str, Any] = {
+    "title": "A float between an anchor and a hull",
+    "environment": {"fluid": {"density": 1025}},
+    "points": {
+        "anchor": {"position": [-40, 0, -50]}, "fairlead": {"body": "hull", "place": [0, 0, -1]},
+        "float": {"initial_guess": [0, 0, -10], "mass": 200, "volume": 1.0},
+    },
+    "bodies": {"hull": {"position": [40, 0, -49]}},
+    "lines": {
+        "west": {"start": "anchor", "end": "float", "sections": [ROPE], "mesh": {"cells": 8}},
+        "east": {"start": "fairlead", "end": "float", "sections": [ROPE], "mesh": {"cells": 8}},
+    },
+    "time": {"duration": 0.2, "step": 0.05},
+    "output": {"points": 9},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run, one that was resumed from it, and an equilibrium."""
+    folder = tmp_path_factory.mktemp("lines")
+    hybrid.run(SCENE, folder / "run.h5").close()
+    hybrid.resume(folder / "run.h5", folder / "resumed.h5", until=0.4).close()
+    hybrid.static(SCENE, folder / "static.h5").close()
+    return folder
+
+
+def exported(
+    capsys: pytest.CaptureFixture[str], folder: Path, name: str, *arguments: str, result: str = "run.h5"
+) -> tuple[int, set[str], str]:
+    """Exit code, names of the files that were made, and what was said of an error."""
+    before = {x.name for x in folder.iterdir()}
+    with pytest.raises(SystemExit) as left:
+        main(["export", str(folder / result), "-o", str(folder / name), *arguments])
+    return left.value.code or 0, {x.name for x in folder.iterdir()} - before, capsys.readouterr().err
+
+
+@pytest.mark.parametrize("file", ["run.h5", "resumed.h5", "static.h5"])
+def test_every_dimension_of_a_file_leads_to_its_scale(folder: Path, file: str) -> None:
+    with h5py.File(folder / file) as opened:
+        found: dict[str, h5py.Dataset] = {}
+        opened.visititems(lambda name, x: found.update({name: x} if isinstance(x, h5py.Dataset) else {}))
+        assert sum(name.startswith("lines/") for name in found) > 80
+        for name, data in found.items():
+            top = "/".join(["", *name.split("/")[: 2 if name.startswith("lines/") else 0]]).rstrip("/")
+            for k, dim in enumerate(data.dims):
+                if dim.label and data.name != f"{top}/{dim.label}":  # bytes of checkpoints are scales without a label
+                    assert [x.name for x in dim.values()] == [f"{top}/{dim.label}"], (name, k)
+                    assert dim[0].is_scale and len(dim[0]) == data.shape[k]
+
+
+@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
+@pytest.mark.parametrize("file", ["run.h5", "resumed.h5", "static.h5"])
+def test_a_file_opens_in_xarray(folder: Path, file: str, engine: Any) -> None:
+    xarray = pytest.importorskip("xarray", reason="the extra `export` is not installed")
+    groups = xarray.open_groups(folder / file, engine=engine)
+    with hybrid.open(folder / file) as result:
+        for name, line in result.lines.items():
+            found = groups[f"/lines/{name}"]
+            assert found.tension.dims == ("t", "s") and found.position.dims == ("t", "s", "xyz")
+            assert np.array_equal(found.tension, line.tension) and np.array_equal(found.s, line.s)
+            assert found.tension.attrs["units"] == "N" and len(found.t) == len(result.times)
+            assert np.array_equal(groups[f"/lines/{name}/energy"].potential, line["energy/potential"])
+        assert np.array_equal(groups["/points/float"].position, result["points/float/position"])
+    for each in groups.values():
+        assert not [dim for dim in each.sizes if dim.startswith("phony")]
+        each.close()
+
+
+@pytest.mark.parametrize("file", ["run.h5", "resumed.h5", "static.h5"])
+def test_a_file_opens_in_netcdf(folder: Path, file: str) -> None:
+    netcdf = pytest.importorskip("netCDF4", reason="the extra `dev` is not installed")
+    with netcdf.Dataset(folder / file) as opened, hybrid.open(folder / file) as result:
+        west = opened["lines/west"]
+        assert west["tension"].dimensions == ("t", "s")
+        assert np.array_equal(west["tension"][:], result.lines["west"].tension)
+
+
+def test_points_and_bodies_are_exported_under_their_names(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As `hybrid.export` of the result does; a name of lines is a file of each, at the places that are asked for."""
+    assert exported(capsys, folder, "float.csv", "--names", "points/float/position") == (0, {"float.csv"}, "")
+    with hybrid.open(folder / "run.h5") as result:
+        table = pandas.read_csv(folder / "float.csv", comment="#")
+        assert np.array_equal(table.iloc[:, 1:], result["points/float/position"])
+        hybrid.export(result, folder / "same.csv", names=["points/float/position"])
+        assert (folder / "same.csv").read_bytes() == (folder / "float.csv").read_bytes()
+        made = exported(capsys, folder, "mix.csv", "--names", "tension,bodies/hull,points", "--at", "5")
+        assert made == (0, {"mix.csv", "mix.west.csv", "mix.east.csv"}, "")
+        table = pandas.read_csv(folder / "mix.csv", comment="#")
+        for key in ("bodies/hull/position", "points/fairlead/velocity"):
+            assert np.array_equal(table.filter(like=key), result[key])
+        table = pandas.read_csv(folder / "mix.east.csv", comment="#")
+        assert list(table.columns) == ["t (s)", "tension (N) at s = 5 m"]
+    assert exported(capsys, folder, "t.csv")[1] == {"t.west.csv", "t.east.csv"}, "tension, which lines alone have"
+    assert exported(capsys, folder, "e.csv", "--names", "events")[1] == {"e.csv", "e.west.csv", "e.east.csv"}
+
+
+def test_netcdf_holds_everything(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    xarray = pytest.importorskip("xarray", reason="the extra `export` is not installed")
+    assert exported(capsys, folder, "all.nc")[:2] == (0, {"all.nc", "all.west.nc", "all.east.nc"})
+    with xarray.open_dataset(folder / "all.nc") as shared, hybrid.open(folder / "run.h5") as result:
+        assert np.array_equal(shared.points_float_position, result["points/float/position"])
+    assert exported(capsys, folder, "one.nc", "--line", "west")[1] == {"one.nc"}
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "message"),
+    [
+        ("p.vtkhdf", ("--names", "points/float"), "vtkhdf is of lines alone\n    given:    points/float"),
+        ("p.csv", ("--names", "points/float/positon"), "no 'points/float/positon'; did you mean points/float/position"),
+        ("p.csv", ("--names", "contacts"), "the result has no 'contacts'"),
+        ("p.csv", ("--names", "tensoin"), "the result has no 'tensoin'; did you mean tension"),
+        (
+            "p.xyz",
+            (),
+            "'p.xyz' has no known ending\n    expected: nc, csv, vtkhdf, fatigue of a result; fmu of a scene",
+        ),
+    ],
+)
+def test_what_is_not_there_is_refused(
+    folder: Path, capsys: pytest.CaptureFixture[str], name: str, arguments: tuple[str, ...], message: str
+) -> None:
+    code, made, said = exported(capsys, folder, name, *arguments)
+    assert code == 1 and message in said and not made
+
+
+def test_a_scene_of_several_lines_becomes_a_unit(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The command makes of a file what `hybrid.export_fmu` makes of it; a wrong ending names the format."""
+    pytest.importorskip("pythonfmu3", reason="the extra `fmu` is not installed")
+    (folder / "scene.yaml").write_text(json.dumps(SCENE))
+    assert exported(capsys, folder, "lines.fmu", result="scene.yaml") == (0, {"lines.fmu"}, "")
+    (folder / "python").mkdir()
+    units = folder / "lines.fmu", hybrid.export_fmu(folder / "scene.yaml", folder / "python" / "lines.fmu")
+    names = "resources/scene.yaml", "resources/interface.json"
+    one, two = ([zipfile.ZipFile(unit).read(name) for name in names] for unit in units)
+    assert one == two
+    assert "fmu of a scene" in exported(capsys, folder, "lines.xyz", result="scene.yaml")[2]
+
+
+def test_a_result_says_what_it_is_of(folder: Path) -> None:
+    result = hybrid.open(folder / "run.h5")
+    text = "t = 0 ... 0.2 s; lines west, east; points anchor, fairlead, float; bodies hull; complete: 4 steps>"
+    assert repr(result).endswith(text)
+    result.close()
+    assert repr(result).endswith(text)
+    assert repr(hybrid.run(SCENE)).endswith(text), "in memory"
+    assert "9 points on s = 0 ... 60 m" in repr(hybrid.open(folder / "run.h5").lines["west"])
