@@ -112,7 +112,8 @@ class Envelope:
         has = {"", *({"rod"} if layout is not None else {zone.kind for zone in model.zones})}
         has |= ({"seabed"} if model.line.bits & SEABED else set()) | ({"time"} if moves else set())
         has |= {"obstacles"} if model.line.bits & OBSTACLES else set()
-        has |= {"self_contact"} if moves and model.line.bits & (SELF_CONTACT | MAY_TOUCH) else set()
+        touching = SELF_CONTACT | (MAY_TOUCH if moves else 0)
+        has |= {"self_contact"} if model.line.bits & touching else set()
         has |= {"torsion"} if "rod" in has or (model.line.torsion.size and not model.line.bits & PLANAR) else set()
         pipes = Pipes(scene) if moves and any(x.pipe for x in scene.cable.sections) else None
         has |= {"pipe"} if pipes is not None else set()
@@ -286,6 +287,8 @@ def of_equilibrium(
         np.zeros(0, int), marks_of(scene, model),
     )  # fmt: skip
     run.books.report[0] = found.report
+    if found.touch.size:
+        run.books.touch[0] = found.touch
     run.note_state()
     envelope.itself.attach(model, run)
     envelope.itself.look_at_start(run, event)

@@ -552,6 +552,10 @@ class SystemSolver:
 
         ca: 1/s2, of springs of that times the mass.
         """
+        if self.shared is not None and self.books[self.shared.last].extremes.size:
+            self._bind_states(0, states, states)  # extremes are noted of line by line, with what presses on each
+            self.books[self.shared.last].clock[NOW] = t
+            self.shared.rest_energy(self.work)
         for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
             work.u[:] = 0.0
             if x.line.moved.size:

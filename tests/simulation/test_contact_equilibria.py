@@ -104,6 +104,7 @@ def test_a_loop_in_zones_that_move_is_rod() -> None:
     result = hybrid.static(hybrid.validate_scene(twisted("adaptive")))
     assert {z.kind for z in result.zones[0]} == {"rod"} and 0.94 < apart(result) < 1.05
     assert result["turns/link"][0] == pytest.approx(3.0, abs=1e-9) and result["turns/writhe"][0] > 1.5
+    assert result["envelope/self_contact_max"].max() >= result["self_contact"].max() > 0.0  # limits count at all nodes
 
 
 def test_a_catenary_that_a_loop_presses_is_refused() -> None:

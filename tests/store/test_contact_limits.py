@@ -91,3 +91,30 @@ def test_a_line_at_rest_on_the_bed_is_held_against_it() -> None:
     result = hybrid.static(hybrid.validate_scene(scene))
     (event,) = [x for x in result.events if x.kind == "contact force above limit"]
     assert "of the seabed" in event.text and 0.98 * 98.1 < event.value < 1.3 * 98.1
+
+
+def crossing() -> dict[str, Any]:
+    """Two taut ropes without weight that cross, one drawn over the other; output points beside the place."""
+    section = {"length": 2.0, "mass": 0.5, "diameter": 0.03, "axial_stiffness": 1e4, "bending_stiffness": 0.1}
+    section |= {"max_contact_force": 100.0}
+    rope = {"sections": [section], "mesh": {"cells": 20}}
+    over, under = [[0, -1, -0.3], [0, 0, 0.05], [0, 1, -0.3]], [[-1, 0, 0], [0, 0, -0.05], [1, 0, 0]]
+    return {
+        "environment": {"gravity": 0}, "contact": {}, "output": {"points": 4},
+        "points": {f"{name}{k}": {"position": x[-k]} for name, x in (("a", under), ("b", over)) for k in (0, 1)},
+        "lines": {
+            "a": {"start": "a0", "end": "a1", "initial": {"points": under}} | rope,
+            "b": {"start": "b0", "end": "b1", "initial": {"points": over}} | rope,
+        },
+        "time": {"duration": 0.005, "step": 0.005},
+    }  # fmt: skip
+
+
+def test_an_equilibrium_of_crossing_lines_is_judged_at_its_nodes_as_a_run_is() -> None:
+    """The ropes press where no output point is: `static` and the first step of `run` name one force and one place."""
+    rest, moving = (each.lines["a"] for each in (hybrid.static(crossing()), hybrid.run(crossing())))
+    found, of_run = (x.utilisation()["max_contact_force"] for x in (rest, moving))
+    assert found.broken and found.s == of_run.s == 1.0 and found.partner == of_run.partner == "line b"
+    assert found.value == pytest.approx(of_run.value, rel=1e-3) and found.value > 5.0 * rest["self_contact"].max()
+    (event,) = [x for x in rest.events if x.kind == "contact force above limit"]
+    assert (event.value, event.s_a) == (found.value, 1.0)
