@@ -80,6 +80,28 @@ class Saved(NamedTuple):
     obstacles: Any  # what is set of them
 
 
+# Of a step: a step so short is round-off of the times of others.
+SLIVER = 1e-6
+
+
+def end_of_step(now: float, step: float | None, duration: float) -> float:
+    """Time (s) at which the next step of the scene's length ends; ValueError: steps follow the motion."""
+    if step is None:
+        raise ValueError("steps follow the motion: use advance(until), or give time.step")
+    taken, until = round(now / step), now + step
+    if abs(taken * step - now) < SLIVER * step:
+        until = (taken + 1) * step  # a multiple of the step, without round-off that adds up
+    return until if duration - until > SLIVER * step else duration
+
+
+def no_such_method(self: object, name: str, instead: Mapping[str, str]) -> AttributeError:
+    """What to say of a name that only the simulation of the other kind of scene has."""
+    kind = type(self).__name__
+    return AttributeError(
+        f"{kind} has no {name!r}" + (f": use {instead[name]}" if name in instead else ""), name=name, obj=self
+    )
+
+
 def vector(x: Sequence[float] | Floats, name: str) -> Floats:
     value = numbers(x, name)
     if value.shape != (3,) or not all(map(isfinite, value.tolist())):

@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,7 +35,18 @@ from hybrid.simulation.layer_mesh import layered
 from hybrid.simulation.mesh_survey import with_survey
 from hybrid.simulation.set_obstacles import ONE_STEP
 from hybrid.simulation.static_case import StaticCase
-from hybrid.simulation.stepped import CableState, Saved, Triple, in_space, iterations_allowed, one_thread, tension_now
+from hybrid.simulation.stepped import (
+    SLIVER,
+    CableState,
+    Saved,
+    Triple,
+    end_of_step,
+    in_space,
+    iterations_allowed,
+    no_such_method,
+    one_thread,
+    tension_now,
+)
 from hybrid.simulation.stepped_ends import SteppedEnds
 from hybrid.simulation.system_stepping import SystemSimulation
 from hybrid.simulation.transient import StepFailed
@@ -45,11 +56,11 @@ from hybrid.store.named_arrays import pack, unpack
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import Recorder
 
-# Of a step: a step so short is round-off of the times of others.
-SLIVER = 1e-6
 # s, of the wall: what waits is written down after so long, though there is room for more.
 WRITE_EVERY = 60.0
 NUMBER = (int, float, np.integer, np.floating)
+# What only SystemSimulation has, and what does it here.
+OF_SEVERAL = {"set_point": "set_end", "point": "state and forces", "line": "state"}
 
 
 class Simulation(SteppedEnds):
@@ -126,6 +137,11 @@ class Simulation(SteppedEnds):
             self.__exit__(type(error), error, None)
             raise
 
+    if not TYPE_CHECKING:  # mypy would take any name as known
+
+        def __getattr__(self, name: str) -> Any:
+            raise no_such_method(self, name, OF_SEVERAL)
+
     # --- stepping -------------------------------------------------------------------------------
 
     @property
@@ -138,14 +154,7 @@ class Simulation(SteppedEnds):
 
         ValueError: steps follow the motion (`advance` says where to), or the duration is over.
         """
-        step, duration = self._fixed_step, self._duration
-        if step is None:
-            raise ValueError("steps follow the motion: use advance(until), or give time.step")
-        now = self._loop.run.t
-        taken, until = round(now / step), now + step
-        if abs(taken * step - now) < SLIVER * step:
-            until = (taken + 1) * step  # a multiple of the step, without round-off that adds up
-        return self.advance(until if duration - until > SLIVER * step else duration)
+        return self.advance(end_of_step(self._loop.run.t, self._fixed_step, self._duration))
 
     @one_thread
     def advance(self, until: float) -> float:

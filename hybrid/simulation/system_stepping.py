@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from hybrid.scene.schema import missing_time
 from hybrid.scene.system import System
 from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution, with_survey
 from hybrid.simulation.set_obstacles import ONE_STEP, SettableObstacles
-from hybrid.simulation.stepped import CableState, Triple, one_thread, triple
+from hybrid.simulation.stepped import SLIVER, CableState, Triple, end_of_step, no_such_method, one_thread, triple
 from hybrid.simulation.system_run import SystemRun, static_system
 from hybrid.simulation.system_saving import SavedSystem, bring_back, commit, defer, kept, recorders
 from hybrid.simulation.system_start import named
@@ -38,8 +38,14 @@ from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
 from hybrid.store.reader import Result, open_result, written_result
 
-# Of a step: a step so short is round-off of the times of others.
-SLIVER = 1e-6
+# What only Simulation of one cable has, and what does it here.
+OF_ONE_CABLE = {
+    "state": "line(name)",
+    "set_end": "set_point(name, position, velocity) of a fixed point",
+    "set_force": "a force over time of the point or body in the scene",
+    "release": "break_at of the line or the point in the scene",
+    "length": "the result, or set_length(name, length)",
+}
 
 
 def layers_at_rest(system: System) -> SystemResolution | None:
@@ -117,6 +123,11 @@ class SystemSimulation(SettableObstacles):
         self._owner, self._final = object(), 0  # how often what had been recorded was made final
         self._here: SavedSystem | None = None  # what was saved of the state as it is now
 
+    if not TYPE_CHECKING:  # mypy would take any name as known
+
+        def __getattr__(self, name: str) -> Any:
+            raise no_such_method(self, name, OF_ONE_CABLE)
+
     @property
     def t(self) -> float:
         """Time of the state, s."""
@@ -180,6 +191,12 @@ class SystemSimulation(SettableObstacles):
         self._check_point(name)
         point = self.scene.points[name]
         return isinstance(point, FixedPoint) and point.motion is None
+
+    def step(self) -> float:
+        """One step of the scene's length, and the time after it (s), as of `Simulation.step`."""
+        self._check_open()
+        time = self.scene.require_time()
+        return self.advance(end_of_step(self.t, None if time.controlled else time.step, time.duration))
 
     @one_thread
     def advance(self, until: float) -> float:

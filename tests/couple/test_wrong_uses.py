@@ -58,6 +58,29 @@ def test_what_is_of_one_cable_is_said() -> None:
         hybrid.Simulation(data, most_iterations=3)
 
 
+def test_several_lines_have_the_verbs_of_one_cable() -> None:
+    """`step` does the same of both, up to the duration; a verb of the other kind of scene says what to use."""
+    with system(0.22) as stepped, system(0.22) as advanced:
+        assert [stepped.step() for _ in range(5)] == pytest.approx([0.05, 0.1, 0.15, 0.2, 0.22], abs=1e-12)
+        assert [advanced.advance(t) for t in (0.05, 0.1, 0.15, 0.2, 0.22)]
+        assert np.array_equal(stepped.line("line1").position, advanced.line("line1").position)
+        with pytest.raises(ValueError, match="duration"):
+            stepped.step()
+        for verb, instead in {"set_end": "set_point", "state": r"line\(name\)", "release": "break_at"}.items():
+            with pytest.raises(AttributeError, match=f"SystemSimulation has no '{verb}': use {instead}"):
+                getattr(stepped, verb)
+        with pytest.raises(AttributeError, match=r"SystemSimulation has no 'stepp'$"):
+            stepped.stepp()  # type: ignore[attr-defined]
+    with pytest.raises(ValueError, match="is over"):
+        stepped.step()
+    data = hybrid.parse_scene(SCENE).model_dump(exclude_none=True)
+    with (
+        hybrid.Simulation(data) as cable,
+        pytest.raises(AttributeError, match="Simulation has no 'set_point': use set_end"),
+    ):
+        cable.set_point("end", PLACE)  # type: ignore[attr-defined]
+
+
 def uses_of_a_system(s: hybrid.SystemSimulation) -> Iterator[Callable[[], Any]]:
     for x in NO_TIMES:
         yield lambda x=x: s.advance(x)
