@@ -14,6 +14,7 @@ import pytest
 
 import hybrid
 from hybrid.cli.commands import main
+from hybrid.errors import ResultError
 
 ROPE = {"length": 60, "mass": 4, "diameter": 0.04, "axial_stiffness": 1e7}
 SCENE: dict[str, Any] = {
@@ -140,6 +141,18 @@ def test_what_is_not_there_is_refused(
 ) -> None:
     code, made, said = exported(capsys, folder, name, *arguments)
     assert code == 1 and message in said and not made
+
+
+@pytest.mark.parametrize("name", ["run.vtkhdf", "run.cycles.csv", "run.csv"])
+def test_a_format_of_one_line_says_to_take_one(folder: Path, name: str) -> None:
+    kind = {"run.cycles.csv": "fatigue"}.get(name, name.split(".")[-1])
+    with hybrid.open(folder / "run.h5") as whole:
+        with pytest.raises(
+            ResultError, match=rf"{kind} is of one line, .* several: west, east\n.*result.lines\['west'\]"
+        ):
+            hybrid.export(whole, folder / "whole" / name, format=kind)
+        with pytest.raises(ResultError, match=r"'vtkhdf' has no known ending\n.*\n.*such as run.vtkhdf"):
+            hybrid.export(whole.lines["west"], "vtkhdf")
 
 
 def test_a_scene_of_several_lines_becomes_a_unit(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
