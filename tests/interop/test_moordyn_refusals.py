@@ -20,8 +20,13 @@ LINE = "1    chain      1        2        250       50       pt"
 # What is changed in chain.txt, into what; the line that is named (None: the deck), what it is about, words of the fix.
 CASES = {
     "no line types": ("- LINE TYPES -", "- SHIP TYPES -", None, "LINE TYPES", "MoorDyn input file"),
-    "no lines": ("- LINES -", "- LIMES -", None, "LINES", "MoorDyn input file"),
-    "no points": ("- POINTS -", "- PAINTS -", 15, "point 1", "add its section, POINTS"),
+    "no lines": ("- LINES -", "- ROPES -", None, "LINES", "MoorDyn input file"),
+    "no points": ("- POINTS -", "- PLACES -", 15, "point 1", "add its section, POINTS"),
+    "misspelt line types": ("- LINE TYPES -", "- LINE TIPES -", 3, "LINE TYPES", "------- LINE TYPES"),
+    "misspelt lines": ("- LINES -", "- LIMES -", 12, "LINES", "------- LINES"),
+    "misspelt points": ("- POINTS -", "- PIONTS -", 7, "POINTS", "------- POINTS"),
+    "misspelt options": ("- OPTIONS -", "- OPTOINS -", 16, "OPTIONS", "------- OPTIONS"),
+    "a title without dashes": (f"{22 * '-'} LINES {48 * '-'}", "Lines", 12, "LINES", "------- LINES"),
     "an empty table": (f"{LINE}\n", "", 12, "LINES", "fill the table"),
     "a table twice": ("- OPTIONS -", "- LINES -", 16, "LINES", "together"),
     "no row of units": (

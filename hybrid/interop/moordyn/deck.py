@@ -146,11 +146,12 @@ def read_deck(source: Source, needs_lines: bool = True) -> Deck:
     """
     without = not needs_lines and "lines" not in source.sections and bool(source.rows("points"))
     for name, title in () if without else (("line types", "LINE TYPES"), ("lines", "LINES")):
-        if name not in source.sections:
-            found = ", ".join(s.title for s in source.sections.values()) or "no section that MoorDyn knows"
+        if name not in (*source.sections, *source.misspelt):
+            found = ", ".join(f"{s.title} (line {s.line})" for s in source.sections.values())
             expected = f"a section that begins with a row such as ------- {title} -------"
-            source.complain(title, found, expected, "check that this is a MoorDyn input file", None)
-        elif not source.rows(name) and not source.complaints:
+            found, fix = found or "no section that MoorDyn knows", "check that this is a MoorDyn input file"
+            source.complain(title, found, expected, fix, None)
+        elif name in source.sections and not source.rows(name) and not source.complaints:
             section = source.sections[name]
             fix = "fill the table: names, units, then one row for each"
             source.complain(section.title, "", "at least one row under names and units", fix, section.line)

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from pathlib import Path
 
 from hybrid.errors import Complaint, SceneError
@@ -44,6 +45,8 @@ SHOWN = 70  # characters of a row that a complaint or a note shows
 LARGEST = 1e15
 # Of a row of names or units fewer cells are numbers; with three or more it is one of the data.
 FEW_NUMBERS = 3
+# Of a title and one that MoorDyn knows (ratio of difflib): LINSE is LINES, SHIP TYPES is not LINE TYPES.
+MISSPELT = 0.79
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,7 @@ class Source:
         self.fortran: list[Row] = []  # rows with an exponent that only Fortran reads
         self.sections: dict[str, Section] = {}
         self.unknown: list[Section] = []
+        self.misspelt: set[str] = set()  # sections whose title is not as MoorDyn knows it
         self.lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
         self._cut()
 
@@ -150,6 +154,9 @@ class Source:
                 current = self._begin(text, n)
             elif current is not None and text.strip():
                 current.rows.append(Row(n, text, tuple(text.split())))
+        for n, text in enumerate(self.lines, start=1):
+            if _SECTIONS.get(name := " ".join(text.upper().split()), "") not in ("", *self.sections):
+                self._misspelt(name, text, n)
         for section in (*self.sections.values(), *self.unknown):
             self._strip(section)
 
@@ -157,6 +164,10 @@ class Source:
         title = show(text.strip(" \t-=:*").rstrip(" \t-=:*"))
         words = " ".join(title.upper().split())
         name = _SECTIONS.get(words) or _SECTIONS.get(re.split(r"\s*[-(\[:,!#%]|\s{2,}", words)[0])
+        near = get_close_matches(words, _SECTIONS, n=1, cutoff=MISSPELT)
+        if name is None and near and _SECTIONS[near[0]] not in self.sections:
+            self._misspelt(near[0], text, line)
+            return None
         if name is None:
             if not self.sections or words in _ENDS:
                 return None
@@ -169,6 +180,11 @@ class Source:
             return None
         self.sections[name] = Section(name, title, line)
         return self.sections[name]
+
+    def _misspelt(self, title: str, text: str, line: int) -> None:
+        self.misspelt.add(_SECTIONS[title])
+        expected = "the title of a section that MoorDyn knows, between dashes"
+        self.complain(title, text, expected, f"write ------- {title} -------", line)
 
     def _strip(self, section: Section) -> None:
         """Take away names, units and comments."""
