@@ -80,6 +80,25 @@ def test_report_gives_facts_to_programs(call: Call) -> None:
     assert limit["limit"] == "min_bend_radius" and limit["broken"] and facts["limits"]["weight"] == "plain"
 
 
+def test_report_gives_facts_of_every_line_to_programs(call: Call) -> None:
+    """Those of several lines together, and of each those that one cable has."""
+    rope = {"length": 12, "mass": 2, "diameter": 0.02, "axial_stiffness": 1e5, "max_tension": 20}
+    points = {name: {"position": [x, 0, 0]} for name, x in (("a", -10), ("b", 0), ("c", 11))}
+    lines = {"west": {"start": "a", "end": "b"}, "east": {"start": "b", "end": "c"}}
+    lines = {name: line | {"sections": [rope], "mesh": {"cells": 8}} for name, line in lines.items()}
+    with hybrid.run({"points": points, "lines": lines, "time": {"duration": 0.2, "step": 0.05}}, "two.h5") as result:
+        said = json.loads(call("report", "two.h5", "--json")[1])
+        whole = {fact["key"]: fact for fact in said["facts"]}
+        assert set(said["lines"]) == {"west", "east"} and whole["status"]["values"]["status"] == "complete"
+        for name, line in result.lines.items():
+            facts = {fact["key"]: fact for fact in said["lines"][name]}
+            assert {"tension", "bend", "slack", "limits", "errors", "status"} <= set(facts)
+            assert facts["tension"]["values"]["tension"] == line["envelope/tension_max"].max()
+            (limit,) = facts["limits"]["values"]["limits"]
+            assert limit["broken"] == (line["envelope/tension_max"].max() > 20.0)
+    assert "lines" not in json.loads(call("report", "run.h5", "--json")[1])
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
