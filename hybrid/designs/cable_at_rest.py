@@ -113,6 +113,8 @@ class CableAtRest(OfScene):
         more, less = (with_number(self.scene, key, number + d) for d in (step, -step))
         found = []
         for scene in (more, less):
+            if number == 0.0:
+                refuse_use(scene, "derivatives", given=key)  # what it switches on
             model = nearby(self.model, self.scene, scene, self.resolution, LEFT_OUT)
             if model is None:
                 detail = f"{key}: a change of it changes the number of cells; give `mesh: {{cells: ..}}`"

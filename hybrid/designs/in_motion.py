@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.designs.line_at_rest import AXES, refuse_parts
-from hybrid.designs.numbers import number_of, scene_with
+from hybrid.designs.numbers import PLACE, length_of, number_of, refuse_computing, scene_with
 from hybrid.designs.peaks import over_time, peaks, smoothed
 from hybrid.designs.replay import Course, course_of, replay, with_outputs
 from hybrid.designs.tangents import Others, Seen, Unfollowed, step_of
@@ -35,10 +35,8 @@ OF_SECTION = re.compile(r"^sections\[(\d+)\]$")
 PARTS = (1e-3, 2e-3)
 # How derivatives were found.
 TANGENTS, DIFFERENCES = "tangents along the steps", "differences of runs"
-# Coordinates differ by parts of this part of the longest line: what they are depends on where the origin is.
-PLACE, OF_LENGTH = re.compile(r"(position\[\d\]|\.z|\.surface|\.at\[\d\])$"), 0.1
-# Tables of how a scene is computed and written.
-COMPUTING = ("time", "output", "mesh", "accuracy", "model", "resolution")
+# Coordinates differ by parts of this part of the longest line.
+OF_LENGTH = 0.1
 # Error of tangents that equations give to one side, in parts of a number by which another line differs from the line; a
 # result that answers by less than this, in parts by parts, has it of this.
 ONE_SIDED, WEAK = 1.5, 0.04
@@ -173,12 +171,9 @@ def by_differences(
 
 def size_of(asked: Scene | System, key: str, number: float) -> float:
     """What runs differ by parts of; SceneError: a number of how the scene is computed, which has no derivative."""
-    if key.split(".")[0] in COMPUTING:
-        expected = "a number of what is computed: of the cable, its ends, what is around it"
-        raise SceneError([Complaint("by", key, expected, "cable.sections[0].length, for example")])
+    refuse_computing(key)
     if PLACE.search(key):
-        lines = [x.cable.length for x in asked.lines.values()] if isinstance(asked, System) else [asked.length]
-        return OF_LENGTH * max(lines)
+        return OF_LENGTH * length_of(asked)
     return abs(number) or 1.0
 
 

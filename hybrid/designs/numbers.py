@@ -20,6 +20,14 @@ PART = re.compile(r"[^.\[\]]+")
 # Part of a number by which lines are differentiated; one that is 0 is changed by this, in its own unit.  Lengths are
 # changed by less: a place that is at a node would see the cell to one side of it as much as that to the other.
 OF_NUMBER, OF_LENGTH, LENGTH = 1e-4, 1e-5, re.compile(r"\blength$")
+# Coordinates: what they are depends on where the origin is.  Where the bed and obstacles are counts in parts of how
+# deep a line lies in them: they are changed by this part, coordinates by this part of the longest line.
+PLACE = re.compile(r"(position\[\d\]|centre\[\d\]|\.z|\.surface|\.at\[\d\]|\.depth\[\d+\]\[\d+\])$")
+TOUCHED = re.compile(r"^(obstacles|environment\.seabed)\.(?!.*(stiffness|damping|friction|soil))|\.surface$")
+OF_TOUCHED = 3e-8
+# Tables of how a scene is computed and written, and of what has names of its own.
+COMPUTING = ("time", "output", "mesh", "accuracy", "model", "resolution")
+NAMED = ("lines", "points", "bodies", "obstacles")
 
 
 def number_of(scene: Scene | System, key: str) -> float:
@@ -27,13 +35,38 @@ def number_of(scene: Scene | System, key: str) -> float:
     value: Any = scene.model_dump(mode="python")
     for part in PART.findall(key):
         try:
-            value = value[int(part)] if isinstance(value, list | tuple) else value[part]
+            value = value[_index(part)] if isinstance(value, list | tuple) else value[part]
         except (KeyError, IndexError, TypeError, ValueError):
             expected = "a key of the scene that has a number"
             raise SceneError([Complaint("by", key, expected, "cable.sections[0].length, for example")]) from None
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise SceneError([Complaint("by", key, f"a number, which {key} is not in this scene", "another key")])
     return float(value)
+
+
+def _index(part: str) -> int:
+    """Of a list, counted from 0; ValueError: it is written in another way."""
+    if part != str(abs(int(part))):
+        raise ValueError(part)
+    return int(part)
+
+
+def computing(key: str) -> str:
+    """The part of a key by which it is of how a scene is computed; "": of what is there."""
+    parts = PART.findall(key)
+    return next((x for x in (parts[2:] if parts[0] in NAMED else parts) if x in COMPUTING), "")
+
+
+def refuse_computing(key: str) -> None:
+    """SceneError: a number of how the scene is computed, on which results depend by their errors alone."""
+    if computing(key):
+        expected = "a number of what is computed: of the cable, its ends, what is around it"
+        raise SceneError([Complaint("by", key, expected, "cable.sections[0].length, for example")])
+
+
+def length_of(scene: Scene | System) -> float:
+    """Of the longest line, m."""
+    return max(x.cable.length for x in scene.lines.values()) if isinstance(scene, System) else scene.length
 
 
 def unit_of_key(scene: Scene | System, key: str) -> str:
@@ -59,8 +92,12 @@ class OfScene:
     def numbers_and_steps(self, keys: Sequence[str]) -> tuple[Floats, Floats]:
         """(P,) values of keys, and by how much lines with more and with less of each differ from the scene."""
         numbers = np.array([self.number(key) for key in keys])
-        parts = np.array([OF_LENGTH if LENGTH.search(key) else OF_NUMBER for key in keys])
-        return numbers, np.where(numbers == 0.0, parts, parts * np.abs(numbers))
+        return numbers, np.array([self._step(*row) for row in zip(keys, numbers.tolist(), strict=True)])
+
+    def _step(self, key: str, number: float) -> float:
+        if TOUCHED.search(key):
+            return OF_TOUCHED * (length_of(self.scene) if PLACE.search(key) else abs(number) or 1.0)
+        return (OF_LENGTH if LENGTH.search(key) else OF_NUMBER) * (abs(number) or 1.0)
 
 
 def changed_scene(scene: AnyScene, key: str, value: float) -> AnyScene:

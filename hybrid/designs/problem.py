@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.designs.equilibria import AnyScene, Equilibria, Point
-from hybrid.designs.in_motion import COMPUTING
 from hybrid.designs.motions import IN_MOTION
 from hybrid.designs.nearest import Space
 from hybrid.designs.numbers import PART as KEY_PART
-from hybrid.designs.numbers import number_of
+from hybrid.designs.numbers import computing, number_of
 from hybrid.designs.sensitivity import EDGES
 from hybrid.errors import SceneError
 from hybrid.kernels.state.state import Floats
@@ -267,8 +266,8 @@ def space_of(
 def _key_findings(
     key: str, place: Place, scenes: Mapping[str, AnyScene], cases: Mapping[str, Any], taken: Sequence[str]
 ) -> Iterator[Finding]:
-    if computing := [x for x in re.findall(r"\w+", key) if x in COMPUTING]:
-        expected = f"a key of what is there, not of how it is computed, as {computing[0]} is"
+    if part := computing(key):
+        expected = f"a key of what is there, not of how it is computed, as {part} is"
         yield Finding(place, expected, "cable.sections[0].length, for example", given=key)
     parts = KEY_PART.findall(key)
     if parts in [KEY_PART.findall(x) for x in taken]:

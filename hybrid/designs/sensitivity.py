@@ -12,7 +12,7 @@ import numpy as np
 from hybrid.designs.cable_at_rest import NO_PLACES, CableAtRest, Places
 from hybrid.designs.in_motion import in_motion
 from hybrid.designs.line_at_rest import parse_result
-from hybrid.designs.numbers import number_of
+from hybrid.designs.numbers import number_of, refuse_computing
 from hybrid.designs.system_at_rest import SystemAtRest
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.read import SceneLike, as_scene_or_system
@@ -72,6 +72,8 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
         values, found, errors, ways = in_motion(asked, of, by)
     else:
         refuse_edges(of)
+        for key in by:
+            refuse_computing(key)
         fine, ways = at_rest(asked, of), len(by) * (AT_REST,)
         values, found = fine.values, fine.by(by)
         errors = OF_DIFFERENCE * np.abs(found - at_rest(asked, of, 2.0).by(by))

@@ -28,6 +28,7 @@ from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby, same_nodes
 from hybrid.model.nearby_clamped import nearby_clamped, seats_know_no_shape, shaped_anew
 from hybrid.model.system import SystemModel, SystemResolution
+from hybrid.scene.base import Invalid
 from hybrid.scene.bodies import FreeBody, RigidBody
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.points import Fairlead
@@ -226,7 +227,13 @@ class SystemAtRest(OfScene):
         """The scene with a number that is more by a step, and less."""
         found = list[_Changed]()
         for scene in (with_number(self.scene, key, number + d) for d in (step, -step)):
-            changed = self._changed(scene, key)
+            if number == 0.0:
+                refuse_use(scene, "derivatives", given=key)  # what it switches on
+            try:
+                changed = self._changed(scene, key)
+            except Invalid:
+                fix = f"another number than {number:g}, which is the least or the largest that it may be"
+                raise SceneError([Complaint("by", key, "a number that may be a little more, and less", fix)]) from None
             both = zip(self._names, changed.lines, self.lines, strict=True)
             others = [name for name, x, line in both if not same_places(x.model, line.model)]
             if not found and not all(is_allowed_line(scene, name) for name in others):

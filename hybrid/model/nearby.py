@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from hybrid.kernels.state.forces import PLANAR, ROTARY
-from hybrid.kernels.state.state import Floats, Sea
+from hybrid.kernels.state.state import Floats, Line, Sea
 from hybrid.model.build import Model, build, place_cells
 from hybrid.model.initial_shape import end_conditions, frames
 from hybrid.model.layout import Layout
@@ -64,12 +65,31 @@ def nearby(
             directors = frames(scene, model.start.e, line, cable)[0]
             ends = end_conditions(scene, (directors[0], directors[-1]), chords, sea)
         else:
-            held = ends.values.frame.reshape(2, 3, 3)
-            ends = end_conditions(scene, (held[0][:, 0], held[1][:, 0]), chords, sea)
+            axes = _held_axes(model, of, scene, line, cable)
+            ends = end_conditions(scene, (axes[0], axes[1]), chords, sea)
     return replace(
         model, line=line, zones=zones, ends=ends, sea=sea, length=float(line.s[-1]), cable=cable, layout=layout,
         on_base=on_base, attached=tuple(cable.at.tolist()), inextensible=not line.ck.any(),
     )  # fmt: skip
+
+
+def _held_axes(model: Model, of: Scene, scene: Scene, line: Line, cable: Material) -> Floats:
+    """(2, 3) first directors of ends that are held: those of the model, turned as directions of the scenes turn."""
+    held = model.ends.values.frame.reshape(2, 3, 3)
+    if scene.ends.both == of.ends.both:
+        return held[:, :, 0]
+    e, turned = model.start.e, []
+    for on, at, each in ((model.line, model.cable, of), (line, cable, scene)):
+        first = frames(each, e, on, at)[0]
+        turned.append([_axes(end.held_tangent or e[-k], first[-k]) for k, end in enumerate(each.ends.both)])
+    before, now = np.array(turned)
+    return np.asarray((now @ np.swapaxes(before, 1, 2) @ held)[:, :, 0])
+
+
+def _axes(tangent: Sequence[float] | Floats, first: Floats) -> Floats:
+    """(3, 3) axes in columns, of a tangent of any length and the first director, which is normal to it."""
+    t = np.asarray(tangent, float) / np.linalg.norm(tangent)
+    return np.column_stack([first, np.cross(t, first), t])
 
 
 def _turned_by_shape(model: Model) -> bool:

@@ -193,7 +193,7 @@ def test_a_jump_at_an_anchor_on_the_bed_is_in_no_derivative(key):
 def test_numbers_that_others_match_are_refused():
     parts = {"kind": "zones", "zones": [{"rod": 60.0, "cells": 20}, {"catenary": 190.0, "cells": 20}]}
     tables = scene(LINE, pinned(0, 0, -60), pinned(205, 0, 0), parts, None, SEA) | {"mesh": None}
-    with pytest.raises(hybrid.SceneError, match="may change by itself"):
+    with pytest.raises(hybrid.SceneError, match="a number of what is computed"):
         hybrid.sensitivity(tables, ["tension@0"], ["model.zones[0].rod"])
     with pytest.raises(hybrid.SceneError, match="may change by itself"):
         hybrid.sensitivity(tables, ["tension@0"], ["cable.sections[0].length"])
@@ -351,3 +351,51 @@ def test_options_may_be_repeated(tmp_path):
     assert [(x["of"], x["by"][-6:]) for x in rows] == [
         ("tension@0", "length"), ("tension@end", "length"), ("tension@0", "].mass"), ("tension@end", "].mass"),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("held", ["tangent", "tangent and normal"])
+def test_directions_of_a_clamp(held):
+    """A clamp turns as its directions turn, and takes the material axes of a strip along."""
+    clamp = {"kind": "clamped", "position": [0, 0, -30], "tangent": [1, 0.3, 0.2]}
+    section = {"length": 60.0, "mass": 6.0, "diameter": 0.06, "axial_stiffness": 1e6, "bending_stiffness": 300.0}
+    keys = [f"ends.start.tangent[{k}]" for k in range(3)]
+    if held != "tangent":
+        clamp["normal"] = [0.1, 0.2, 1.0]
+        section |= {"bending_stiffness": [300.0, 900.0], "torsional_stiffness": 200.0}
+        section["intrinsic_curvature"] = [0.02, 0.01, 0.0]
+        keys += [f"ends.start.normal[{k}]" for k in range(3)]
+    tables = scene(section, clamp, pinned(50, 6, -28), "rod", 30, {"fluid": {"density": 1025}})
+    of = ["tension@0", "position.z@31.7", "max curvature", "moment_start.y"]
+    differ(hybrid.validate_scene(tables), of, keys)
+
+
+@pytest.mark.parametrize("where", ["bed", "pipe"])
+def test_where_a_line_lies(where):
+    """In deep water a part of a depth is more than a line sinks into the bed: what it lies on is moved by less."""
+    section = {"length": 60.0, "mass": 6.0, "diameter": 0.06, "axial_stiffness": 1e6, "bending_stiffness": 300.0}
+    tables = scene(section, pinned(0, 0, -1000), pinned(50, 0, -998), "rod", 30, {"fluid": {"density": 1025}})
+    if where == "bed":
+        tables["environment"]["seabed"] = {"z": -1004.0, "slope": [0.05, 0.02], "stiffness": 2000.0}
+        keys = ["environment.seabed.z", "environment.seabed.slope[0]"]
+    else:
+        pipe = {"kind": "cylinder", "at": [25, 0, -1012], "axis": [0, 1, 0], "radius": 4.0, "stiffness": 2e4}
+        tables["obstacles"], keys = {"pipe": pipe}, ["obstacles.pipe.at[2]", "obstacles.pipe.radius"]
+    differ(hybrid.validate_scene(tables), ["tension@0", "tension@20.3", "position.z@31.7"], keys)
+
+
+def differ(made, of, keys):
+    """Derivatives are those of differences of equilibria on the same cells."""
+    wanted = [parse_result(x, made.length) for x in of]
+    rest = CableAtRest(made, 1.0, wanted)
+    for key, ours in zip(keys, rest.by(keys), strict=True):
+        number = rest.number(key)
+        d = 1e-5 * min(abs(number), 1.0)
+        more, less = (CableAtRest(changed_scene(made, key, number + x), 1.0, wanted, rest.places) for x in (d, -d))
+        np.testing.assert_allclose(ours, (more.values - less.values) / (2.0 * d), rtol=2e-5, atol=1e-7, err_msg=key)
+
+
+def test_a_number_that_switches_something_on():
+    """Of which no derivative is known is refused as the scene with it is."""
+    tables = scene(LINE, pinned(0, 0, -100), pinned(205, 0, 0), "rod", 40, SEA)
+    with pytest.raises(hybrid.SceneError, match="stiffness_per_tension"):
+        hybrid.sensitivity(tables, ["tension@0"], ["cable.sections[0].stiffness_per_tension"])

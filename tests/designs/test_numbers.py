@@ -45,3 +45,11 @@ def test_a_number_put_in_place_is_as_read(name):
 def test_what_does_not_match_is_not_allowed():
     scene = as_scene_or_system(EXAMPLES / "03_suspension_rod.yaml")
     assert not is_allowed(with_number(scene, "cable.sections[0].mass", -1.0))
+
+
+@pytest.mark.parametrize("place", ["-1", "00", "1"])
+def test_an_item_is_counted_from_the_start(place):
+    """An item of a list written in another way would be none of the scene, and nothing would depend on it."""
+    scene = as_scene_or_system(EXAMPLES / "03_suspension_rod.yaml")
+    with pytest.raises(SceneError, match="a key of the scene that has a number"):
+        number_of(scene, f"cable.sections[{place}].mass")

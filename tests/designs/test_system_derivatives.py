@@ -108,6 +108,10 @@ def test_what_is_refused():
                       ("east/tension@999", "between 0 and 185 m"), ("east/tensoin@0", "one of .*tension")):  # fmt: skip
         with pytest.raises(hybrid.SceneError, match=words):
             hybrid.sensitivity(moored(HELD), [of], [key])
+    plain = moored({**BUOY, "drag_area": 0.0})
+    for key, words in (("points.top.drag_area", "a little more, and less"), ("lines.east.mesh.cells", "is computed")):
+        with pytest.raises(hybrid.SceneError, match=words):
+            hybrid.sensitivity(plain, ["east/tension@end"], [key])
 
 
 def test_the_command(tmp_path, monkeypatch):
