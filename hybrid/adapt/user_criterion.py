@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
-from typing import NamedTuple
+from functools import partial, update_wrapper
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,28 +37,53 @@ UserCriterion = Callable[[NodeState], Floats]
 
 def of_line(criterion: UserCriterion | None, name: str) -> UserCriterion | None:
     """The criterion for a line of several, which sees its name."""
-    return None if criterion is None else lambda nodes: criterion(nodes._replace(line=name))
+    if criterion is None:
+        return None
+    asked = criterion
+
+    def of_named(nodes: NodeState) -> Floats:
+        return asked(nodes._replace(line=name))
+
+    return update_wrapper(of_named, asked) if callable(asked) else asked
 
 
 def cell_ratios(criterion: UserCriterion, nodes: NodeState) -> Floats:
     """Ratios (N,) of cells, the larger of their nodes; ValueError: the criterion gave another shape, or no number."""
+    if not callable(criterion):
+        raise ValueError(f"criterion: expected a function of a hybrid.NodeState, found {criterion!r:.60}")
     arrays = [x for x in nodes if isinstance(x, np.ndarray)]
     for x in arrays:
         x.flags.writeable = False
     try:
-        ratio = np.asarray(criterion(nodes), float)
+        given = criterion(nodes)
     finally:
         for x in arrays:
             x.flags.writeable = True
+    try:
+        ratio = np.asarray(given, float)
+    except (TypeError, ValueError):
+        raise _refused(criterion, nodes, f"{given!r:.60} ({type(given).__name__})") from None
     if ratio.shape != nodes.s.shape:
-        raise ValueError(
-            f"the criterion gave an array of shape {ratio.shape}, expected one number per node, {nodes.s.shape}"
-        )
+        kind = f"an array of shape {ratio.shape}" if ratio.shape else f"{given!r:.60} ({type(given).__name__})"
+        raise _refused(criterion, nodes, kind)
     if not np.isfinite(ratio).all():
         i = int(np.flatnonzero(~np.isfinite(ratio))[0])
-        raise ValueError(
-            f"the criterion gave {ratio[i]} at t = {nodes.t:.6g} s, s = {nodes.s[i]:.6g} m, expected a number"
-        )
+        raise _refused(criterion, nodes, f"{ratio[i]} at s = {nodes.s[i]:.6g} m")
     cells = np.maximum(ratio[:-1], ratio[1:])
     cells[cells == 1.0] = FORCED_RATIO  # a mask
     return cells
+
+
+def _refused(criterion: UserCriterion, nodes: NodeState, given: str) -> ValueError:
+    """What a criterion gave in place of ratios: where it is written, its name, and what is expected."""
+    written: Any = inspect.unwrap(criterion)
+    while isinstance(written, partial):
+        written = written.func
+    code = getattr(written, "__code__", None) or getattr(written.__call__, "__code__", None)
+    where = f"{code.co_filename}:{code.co_firstlineno}: " if code is not None else ""
+    name = getattr(written, "__qualname__", type(written).__qualname__)
+    return ValueError(
+        f"{where}the criterion {name} returned {given} at t = {nodes.t:.6g} s\n    expected: one number per node, an "
+        f"array of shape {nodes.s.shape}: 1 or more where the line must be a rod; or a mask\n"
+        "    try:      return such as nodes.position[:, 2] < -20.0"
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from problems import Scene, clamped, pinned, scene
 
 import hybrid
 from hybrid.adapt.manager import DomainManager
+from hybrid.adapt.user_criterion import NodeState, cell_ratios, of_line
 from hybrid.kernels.mesh.criteria import BEND, CRITERIA
 from hybrid.kernels.mesh.stiffness_ramp import advance
 from hybrid.kernels.mesh.zone_step import REJECT_RATIO
@@ -81,13 +83,46 @@ def test_what_a_criterion_sees_is_not_its_own():
 
 @pytest.mark.parametrize("answer", [1.0, np.zeros(3), np.zeros((5, 2))])
 def test_a_criterion_of_another_shape(answer):
-    with pytest.raises(ValueError, match="expected one number per node"):
+    with pytest.raises(ValueError, match="expected: one number per node"):
         hybrid.run(calm(), criterion=lambda look: answer)
 
 
 def test_a_criterion_that_is_no_number():
-    with pytest.raises(ValueError, match=r"nan at t = 0 s, s = 5 m, expected a number"):
+    with pytest.raises(ValueError, match=r"returned nan at s = 5 m at t = 0 s"):
         hybrid.run(calm(), criterion=lambda look: np.where(look.s == 5.0, np.nan, 0.0))
+
+
+class Counting:
+    """A criterion that is an object."""
+
+    def __call__(self, look):
+        return "x"
+
+
+def of_words(look, word):
+    return [word] * look.s.size
+
+
+@pytest.mark.parametrize(
+    ("criterion", "name", "given"),
+    [
+        (lambda look: "x", "<lambda>", r"'x' \(str\)"),
+        (lambda look: None, "<lambda>", r"None \(NoneType\)"),
+        (Counting(), "Counting", r"'x' \(str\)"),
+        (partial(of_words, word="rod"), "of_words", r"\['rod', 'rod'.* \(list\)"),
+    ],
+)
+@pytest.mark.parametrize("of", [lambda criterion: criterion, lambda criterion: of_line(criterion, "hose")])
+def test_a_criterion_that_gives_words_is_named_with_its_place(of, criterion, name, given):
+    """File, line, function, what it returned and what is expected, of one cable and of lines."""
+    nodes = NodeState(0.5, np.arange(3.0), *np.zeros((2, 3, 3)), np.ones(2), *np.zeros((2, 3)))
+    place = rf"test_adapt_asked.py:\d+: the criterion {name} returned {given} at t = 0.5 s\n"
+    with pytest.raises(
+        ValueError, match=place + r"    expected: one number per node, an array of shape \(3,\).*\n    try: "
+    ):
+        cell_ratios(of(criterion), nodes)
+    with pytest.raises(ValueError, match="criterion: expected a function"):
+        cell_ratios(of("bend"), nodes)
 
 
 def test_a_criterion_may_be_a_mask():
