@@ -78,7 +78,7 @@ def at_every_step(result: Result, name: str, bound: str) -> tuple[float, float, 
 
     None: the file does not have it.
     """
-    if name == CODE_USED and bound == "largest" and not _needs_moments(result):
+    if name == CODE_USED and bound == "largest" and not needs_moments(result):
         found = mooring_of_steps(result)
         return None if found is None else (100.0 * found[0], *found[1:])
     full, k = f"{EXTREMES}/{name}", ("smallest", "largest").index(bound)
@@ -154,7 +154,7 @@ def code_of(result: Result) -> Held | None:
     found, steps = _part_of(result, CODE_USED, "code", code_of_steps), mooring_of_steps(result)
     if found is None or steps is None:
         return found
-    if not _needs_moments(result):
+    if not needs_moments(result):
         found = found._replace(by_outputs=False, bound=None)
     value = 100.0 * steps[0]
     if value > (1.0 + SAME) * found.value:
@@ -163,7 +163,7 @@ def code_of(result: Result) -> Held | None:
     return found
 
 
-def _needs_moments(result: Result) -> bool:
+def needs_moments(result: Result) -> bool:
     """Whether a code takes tension and moment at once, which no step but those of outputs is known by."""
     return any(row.kind == F201 for row in rows_of(result))
 

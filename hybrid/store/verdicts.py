@@ -32,7 +32,7 @@ from hybrid.store.envelope import (
     not_verified,
     with_partner,
 )
-from hybrid.store.limits import Held, held_of
+from hybrid.store.limits import Held, held_of, needs_moments
 from hybrid.store.records import Event, not_converged_in
 
 if TYPE_CHECKING:
@@ -356,7 +356,8 @@ def _doubt_of_held(result: Result, x: Held) -> Doubt | None:
     """Of a force at an end, an angle of it, or a clearance the error follows from those that are estimated."""
     name = {"N": "end_force", "deg": "end_force"}.get(x.unit, "position")
     clearance = f"{x.name}_at" in result
-    along = {"Pa": {"von_mises", "tension", "curvature"}, "%": {"tension", "curvature"}}
+    bends = {"curvature"} if x.limit != "code" or needs_moments(result) else set()  # a mooring line goes by tension
+    along = {"Pa": {"von_mises", "tension", "curvature"}, "%": {"tension"} | bends}
     names = frozenset(along.get(x.unit, {name}))
     if (doubt := next(_doubts(result, names, np.zeros(0)), None)) is not None:
         return doubt

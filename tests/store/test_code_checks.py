@@ -142,6 +142,18 @@ def test_every_step_of_a_mooring_line_counts():
     assert f"code_used: {few.value:.5g} % at t = {few.t:.5g} s, of all steps" in row["beyond_outputs"]
 
 
+def test_the_use_of_a_mooring_line_does_not_hang_by_its_bending():
+    """Which its code does not take: bending that a catenary ignores at a clamp leaves it verified, that of a riser not."""
+    tables = hung(output={"every": 0.5, "errors": True}, model="catenary")
+    tables["cable"]["sections"] = [LINE | {"length": 100.0, "code": MOORED}]
+    moored = hybrid.run(tables)
+    assert [x.kind for x in moored.events] == ["ignored"]
+    assert moored.verdicts().words["code_used code"] == "within"
+    tables["cable"]["sections"] = [LINE | WALL | {"length": 100.0, "code": CODE}]
+    riser = next(x for x in hybrid.run(tables | {"model": "rod", "mesh": {"cells": 6}}).verdicts().quantities)
+    assert riser.limit == "code" and riser.verdict == "not verified" and "bend" in riser.why
+
+
 def test_steps_of_a_riser_between_outputs_have_a_bound():
     """It is above what outputs at every step have, and says so where the limit stands between."""
     code = CODE | {"yield_strength": 2.1e8, "tensile_strength": 2.6e8}
