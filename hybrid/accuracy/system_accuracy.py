@@ -24,10 +24,10 @@ from hybrid.accuracy.error_estimate import Estimate
 from hybrid.accuracy.error_report import accuracy_figures, effort, error_fields, known
 from hybrid.accuracy.error_statistics import statistics_of
 from hybrid.accuracy.finer_result import NOT_KEPT, Replacement, is_no_better, not_kept_text
+from hybrid.accuracy.passes import free_in
 from hybrid.accuracy.refinement import (
     COSTLY_ACCURACY,
     WORTH_WRITING,
-    Free,
     costly,
     times_the_cost,
 )
@@ -45,7 +45,6 @@ from hybrid.model.resolution import (
     rubs_on_obstacles,
     wants_errors,
     wants_survey,
-    zones_are_free,
 )
 from hybrid.model.self_reach import system_without_contact
 from hybrid.model.system import SystemResolution, build_system
@@ -132,8 +131,8 @@ class SystemPasses:
         self._steps_free = moves and time is not None and time.controlled and time.tolerance is None
         self.controls = {
             name: LineController(
-                requested_accuracy(scene), Free(mesh_is_free(scene), self._steps_free, zones_are_free(scene)), moves,
-                _elsewhere, _elsewhere, irregular=moves and is_irregular(scene),
+                requested_accuracy(scene), free_in(scene)._replace(steps=self._steps_free), moves, _elsewhere,
+                _elsewhere, irregular=moves and is_irregular(scene),
                 from_rest=not (moves and system.starts_as_placed), rubs=rubs_on_obstacles(scene),
             )
             for name, scene in self.scenes.items()

@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.model.build import Model
-from hybrid.model.resolution import Resolution
+from hybrid.model.resolution import Resolution, follows_curvature
 from hybrid.outputs.edge_errors import EDGE_ERRORS, MISSED
 from hybrid.scene.schema import AdaptiveModel
 from hybrid.scene.system import System
-from hybrid.simulation.run_sample import COMPARED, RunSample, catenary_share, compared_cells, split_outputs
+from hybrid.simulation.run_sample import COMPARED, RunSample, catenary_share, compared_cells, split_outputs, usual_cells
 from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.system_run import SystemRun
 from hybrid.store.comparison_recorder import ComparisonRecorder
 from hybrid.store.reader import Result
+from hybrid.store.records import THERE
 
 
 def compared(line: LineResult, run: SystemRun, cpu: float) -> RunSample:
@@ -22,9 +23,10 @@ def compared(line: LineResult, run: SystemRun, cpu: float) -> RunSample:
     assert isinstance(found, ComparisonRecorder)
     values, _ = split_outputs({name: found[name] for name in found.names})
     catenary = found.catenary if isinstance(line.scene.model, AdaptiveModel) else np.zeros(0)
+    fineness = resolution.fineness if follows_curvature(line.scene) else 0.0
     return RunSample(
-        resolution, values, compared_cells(line.model), max(run.steps, 1), cpu, resolution.every, forces=found.steps,
-        catenary=catenary,
+        resolution, values, compared_cells(line.model, fineness), max(run.steps, 1), cpu, resolution.every,
+        forces=found.steps, catenary=catenary,
     )  # fmt: skip
 
 
@@ -45,8 +47,11 @@ def sample_of(line: Result, resolution: Resolution, model: Model, cpu: float) ->
         forces = np.column_stack([line[name] for name in columns])
     unresolved = any(event.kind == "unresolved bend" for event in line.events)
     catenary = np.array([catenary_share(zones) for zones in line.zones]) if model.layout is not None else np.zeros(0)
+    cells = compared_cells(model)
+    if THERE in line:
+        cells = compared_cells(model, resolution.fineness, usual_cells(line[THERE]))
     return RunSample(
-        resolution, values, compared_cells(model), max(len(forces), 1), cpu, resolution.every, unresolved,
+        resolution, values, cells, max(len(forces), 1), cpu, resolution.every, unresolved,
         forces=forces, catenary=catenary,
         at_edges={x: np.asarray(line[EDGE_ERRORS + x]) for x in MISSED if EDGE_ERRORS + x in line},
     )  # fmt: skip

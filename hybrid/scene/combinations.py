@@ -23,14 +23,12 @@ from hybrid.scene.start_checks import SAME_LENGTH
 from hybrid.scene.waves import StreamFunctionWaves
 
 Tables = Mapping[str, Any]
-# Why a pair is refused: it cannot be; nobody has worked it out; or the code of several lines has not got what that of
-# one cable has.
-Kind = Literal["physics", "not worked out", "several lines"]
+# Why a pair is refused: it cannot be, or nobody has worked it out.  Several lines are refused what one cable is.
+Kind = Literal["physics", "not worked out"]
 # Beside the tables: what is to be done with the scene, and of a line of several the system and the name of the line.
 USE, SYSTEM, LINE = "use", "system", "line"
 Use = Literal["", "about rest", "response", "derivatives"]
 LEAVE_OUT = "leave it out"
-ALONE = f"{LEAVE_OUT}, or compute this line alone, with `cable` and `ends`"
 IN_SPACE = "write `dimension: 3`, or leave dimension out"
 
 
@@ -377,10 +375,6 @@ def _by_rao(tables: Tables) -> Iterator[Place]:
             yield (*at, "motion", "vessel", "rao")
 
 
-def _several(tables: Tables) -> Iterator[Place]:
-    return iter([("lines",)] if SYSTEM in tables else [])
-
-
 def _either(*features: Feature) -> Callable[[Tables], Iterator[Place]]:
     """Where one of several features is asked for, which are refused for one reason."""
     return lambda tables: (at for x in features for at in x.places(tables))
@@ -393,7 +387,6 @@ def _used(*uses: Use) -> Callable[[Tables], Iterator[Place]]:
 # --- features -----------------------------------------------------------------------------------
 
 MOVING_ZONES = Feature("zones that move", "model: adaptive", _moving)
-FOLLOWING_CELLS = Feature("cells that follow the curvature", "model.curvature_error", _of_moving("curvature_error"))
 STAYING_CELLS = Feature(
     "zones that move on cells that stay", "model: adaptive",
     lambda tables: (at for at in _moving(tables) if not tables["model"].curvature_error),
@@ -438,7 +431,6 @@ SELF_CONTACT = Feature("contact of a line with itself", "contact.self", _self_co
 PAYOUT = Feature("line that is paid out", "ends.end.payout", _paid_out)
 PAYOUT_AT_START = Feature("line that is paid out at one end", "ends.start.payout", _paid_out_at("start"))
 PAYOUT_AT_END = Feature("line that is paid out at the other end", "ends.end.payout", _paid_out_at("end"))
-SEVERAL_LINES = Feature("several lines", "lines", _several)
 SHAPES = Feature("bodies that lines touch", "bodies.NAME.shape", _shapes)
 SHEAVES = Feature("sheaves that turn freely", "obstacles.NAME.bearing", _free_sheaves)
 LINES_TOUCH = Feature("contact of lines with each other", "contact", _lines_touch)
@@ -591,9 +583,5 @@ REFUSALS: tuple[Refusal, ...] = (
         "a response by frequency is linear about rest, and wakes oscillate by themselves, with a size and a frequency "
         "that their locking in to the motion decides",
         fix="leave it out; hybrid run computes it in time",
-    ),
-    # --- several lines ---
-    Refusal(
-        FOLLOWING_CELLS, SEVERAL_LINES, "several lines", "cells of several lines have lengths that stay", fix=ALONE
     ),
 )  # fmt: skip

@@ -90,7 +90,7 @@ def _with_followed_cells(scene: Scene, model: Model, manager: DomainManager, t: 
     free = manager.given >= 0
     if free.all() and not scene.ends.turns and not model.line.bits & SELF_CONTACT:
         try:
-            fewer = _with_fewer_cells(model)
+            fewer = with_fewer_cells(model)
             found = equilibrium_of(scene, fewer, t)
             if not found.touch.size:
                 return _on_planned_cells(fewer, found, manager, t)
@@ -99,35 +99,29 @@ def _with_followed_cells(scene: Scene, model: Model, manager: DomainManager, t: 
     found = equilibrium_of(scene, model, t)
     if not free.all():
         fewer = on_layout(model, model.layout._replace(rod=free))
-        found = _equilibrium(fewer, t, _on_fewer(found.state, model.line, fewer.line, model.ends.at(t)), found)
+        found = _equilibrium(fewer, t, on_fewer(found.state, model.line, fewer.line, model.ends.at(t)), found)
         assert fewer.layout is not None
         manager.set_layout(fewer.layout)
         return fewer, found
     return model, found
 
 
-def _with_fewer_cells(model: Model) -> Model:
+def with_fewer_cells(model: Model) -> Model:
     """All rod, with every fourth node of the finest mesh where that has many cells: its equilibrium is found sooner."""
     assert model.layout is not None
     here, ends = np.zeros(model.layout.starts[-1] + 1, bool), model.ends.values
     here[:: FEWER if model.cells > MANY else 1] = True
     new = on_layout(model, model.layout._replace(here=here))
-    others = tuple((name, _on_fewer(x, model.line, new.line, ends)) for name, x in model.other_starts)
-    return replace(new, start=_on_fewer(model.start, model.line, new.line, ends), other_starts=others)
+    others = tuple((name, on_fewer(x, model.line, new.line, ends)) for name, x in model.other_starts)
+    return replace(new, start=on_fewer(model.start, model.line, new.line, ends), other_starts=others)
 
 
 def _on_planned_cells(model: Model, found: Equilibrium, manager: DomainManager, t: float) -> tuple[Model, Equilibrium]:
     """The equilibrium with cells as its curvature asks for, from one with others; ComputationError: there is none."""
-    sea, ends, before = model.sea.at(t), model.ends.at(t), None
+    before = None
     for _ in range(MOST_ROUNDS):
         assert model.layout is not None
-        manager.set_layout(model.layout)
-        manager.evaluate_criteria(model.line, sea, ends, found.state, 0.0)
-        switching = ZoneSwitching(model, manager)
-        for _ in range(CALM_STEPS):  # for which cells must have been too short
-            here = switching.plan(model.layout.rod, sea, ends, found.state)
-        manager.reset()
-        manager.zones.calm[:] = 0
+        here = planned_cells(model, manager, found.state, t)
         if before is not None and not (here & ~before).any():
             return model, found
         before = here if before is None else here | before
@@ -135,6 +129,21 @@ def _on_planned_cells(model: Model, found: Equilibrium, manager: DomainManager, 
         answer = _equilibrium(new, t, refined(found.state, model.line, new.line), found)
         model, found = new, answer
     raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "cells become shorter and shorter")
+
+
+def planned_cells(model: Model, manager: DomainManager, state: State, t: float) -> np.ndarray:
+    """Places of the finest mesh where a state at rest under the loads of t wants nodes, of rods as they are."""
+    assert model.layout is not None
+    sea, ends = model.sea.at(t), model.ends.at(t)
+    manager.set_layout(model.layout)
+    manager.evaluate_criteria(model.line, sea, ends, state, 0.0)
+    switching = ZoneSwitching(model, manager)
+    for _ in range(CALM_STEPS):  # for which cells must have been too short
+        here = switching.plan(model.layout.rod, sea, ends, state)
+    manager.reset()
+    manager.zones.calm[:] = 0
+    assert here is not None
+    return here
 
 
 def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: UserCriterion | None) -> DomainManager:
@@ -203,7 +212,7 @@ def equilibrium_zones(model: Model, manager: DomainManager, t: float, found: Equ
     free = manager.given >= 0
     if not free.all():  # the most rod that the scene lets it have
         most = on_layout(model, model.layout._replace(rod=free))
-        equilibrium = _equilibrium(most, t, _on_fewer(found.state, model.line, most.line, model.ends.at(t)), found)
+        equilibrium = _equilibrium(most, t, on_fewer(found.state, model.line, most.line, model.ends.at(t)), found)
     assert most.layout is not None
     allowed = manager.tolerance
     try:
@@ -233,7 +242,7 @@ def zones_without_equilibrium(model: Model, manager: DomainManager) -> Model:
         return model
     new = on_layout(model, model.layout._replace(rod=free))
     manager.set_layout(model.layout._replace(rod=free))
-    return replace(new, start=_on_fewer(model.start, model.line, new.line, model.ends.values))
+    return replace(new, start=on_fewer(model.start, model.line, new.line, model.ends.values))
 
 
 def _zones_within(
@@ -248,7 +257,7 @@ def _zones_within(
             return None
         layout = model.layout._replace(rod=rod)
         new = on_layout(model, layout)
-        answer = _equilibrium(new, t, _on_fewer(full, model.line, new.line, model.ends.at(t)), found)
+        answer = _equilibrium(new, t, on_fewer(full, model.line, new.line, model.ends.at(t)), found)
         manager.set_layout(layout)
         more = rod | _rods(new, manager, answer.state, t)
         if (more == rod).all():
@@ -278,7 +287,7 @@ def _equilibrium(model: Model, t: float, start: State, like: Equilibrium) -> Equ
     return solve_model(model, t, start, settle="start" if like.with_friction else "")
 
 
-def _on_fewer(state: State, full: Line, line: Line, ends: Ends) -> State:
+def on_fewer(state: State, full: Line, line: Line, ends: Ends) -> State:
     """The state of a line at the nodes of one that has fewer.  ComputationError: it folds onto itself there."""
     found = picked(line, state, np.searchsorted(full.s, line.s - 1e-9 * full.s[-1]))
     if found is None:

@@ -145,9 +145,10 @@ def zones_of_today(zones: Any) -> Any:
     if not (isinstance(zones, dict) and all(isinstance(x, dict) for x in zones.values())):
         return zones
     return {
-        name: x | {"switching": zoning_of_today(x["switching"])} if isinstance(x.get("switching"), dict) else x
+        name: {"here": None} | x | {"switching": zoning_of_today(x["switching"])}
+        if isinstance(x.get("switching"), dict) else x
         for name, x in zones.items()
-    }
+    }  # fmt: skip
 
 
 def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:

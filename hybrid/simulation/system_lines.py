@@ -43,7 +43,7 @@ from hybrid.kernels.state.state import Batch, Ends, Floats, State, Work, batch_o
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import output_points
-from hybrid.model.resolution import wants_errors
+from hybrid.model.resolution import follows_curvature, wants_errors
 from hybrid.model.sections import section_changes
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
@@ -102,10 +102,11 @@ def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | N
     zones_move = moves and model.layout is not None
     kinds = {"rod", "catenary"} if zones_move else None
     criteria = [(x.name, x.ratio) for x in CRITERIA] if scene.output.criteria and zones_move and only is None else ()
+    finest = model.finest_nodes if zones_move and follows_curvature(scene) and only is None else None
     return Observer(
         model.line, model.sea.values, model.zones, s, moves and only is None, model.attached, kinds, criteria,
-        only=only, jumps=jumps, changes=section_changes(scene), payout=moves and model.payout is not None,
-        quantities=None if only else quantities_of(scene),
+        only=only, jumps=jumps, changes=section_changes(scene), finest=finest,
+        payout=moves and model.payout is not None, quantities=None if only else quantities_of(scene),
         obstacles=() if only else model.sea.names, hinges=model.cable.hinges,
         edges=moves and only is None and wants_errors(scene) and bool(model.line.bits & SEABED),
     )  # fmt: skip

@@ -63,8 +63,8 @@ from hybrid.simulation.system_lines import WAITING, LineResult, LineStep
 from hybrid.simulation.system_load_change import change_loads_of_lines, loaded_as, with_loads_of
 from hybrid.simulation.system_points import Rotations, Sampled, fields_of, gauges_of, values_of
 from hybrid.simulation.system_quantities import SystemQuantities
-from hybrid.simulation.system_start import begin_as_placed, blended_of_lines, equilibrium_of_system, joined_lines, named
-from hybrid.simulation.system_zones import SystemZones, managers_for, zones_as_placed, zones_at_rest
+from hybrid.simulation.system_start import begin_as_placed, blended_of_lines, joined_lines, named
+from hybrid.simulation.system_zones import SystemZones, managers_for, start_at_rest, zones_as_placed
 from hybrid.simulation.time_loop import SAME_STOP, WORK, apart, falls_on
 from hybrid.solve.joined import SystemState, SystemTaken
 from hybrid.solve.run import MOST_SAMPLED, ROWS
@@ -159,10 +159,7 @@ class SystemRun:
             self.state = SystemState([x.start for x in self.model.models], self.model.body_places).copy()
         else:
             with at_once():
-                self.found = equilibrium_of_system(system, self.model, 0.0 if moves else np.inf)
-                if system.adaptive:
-                    start = zones_at_rest(scenes, self.model, self.found, 0.0 if moves else np.inf, criterion)
-                    self.model, self.found, managers = start
+                self.model, self.found, managers = start_at_rest(system, scenes, self.model, moves, criterion)
             self.state = self.found.state.copy()
         self.start_from(self.state.bodies if self._begins else self.model.body_places)
         self.payout: SystemPayout | None = None  # of lines that are paid out
@@ -480,7 +477,8 @@ class SystemRun:
         self._note_partners()
         contacts, shared = [line.touch_itself(self.t) for line in self.lines], shared_of(self.model, rubs=True)
         if shared is not None and self.shared is not None:
-            shared.restore(self.shared.checkpoint(self.t), self.t, remeshed=self.payout is not None)
+            other = self.payout is not None or (self.zones is not None and self.zones.follow_curvature)
+            shared.restore(self.shared.checkpoint(self.t), self.t, remeshed=other)
         self.shared = shared
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts, shared)

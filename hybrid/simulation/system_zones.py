@@ -24,11 +24,19 @@ from hybrid.kernels.state.books import COUNT_SIZE
 from hybrid.kernels.state.report import SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Ends, Line, State, state_for
 from hybrid.model.build import Model
-from hybrid.model.coarsen import picked
+from hybrid.model.layout import Layout
 from hybrid.model.system import SystemModel
 from hybrid.scene.schema import AdaptiveModel, Scene
-from hybrid.simulation.initial_zones import MOST_ROUNDS, STRICTER, manager_for, zones_without_equilibrium
+from hybrid.scene.system import System
+from hybrid.simulation.initial_zones import (
+    MOST_ROUNDS,
+    STRICTER,
+    manager_for,
+    on_fewer,
+    zones_without_equilibrium,
+)
 from hybrid.simulation.payout_zones import PaidZones
+from hybrid.simulation.system_cells import equilibrium_on_cells, following
 from hybrid.simulation.system_contact import renew_solver
 from hybrid.simulation.system_contact_equilibrium import nearness_in
 from hybrid.simulation.system_start import joined_lines, solve_from
@@ -72,15 +80,24 @@ def managers_for(
     return managers
 
 
-def zones_at_rest(
-    scenes: Mapping[str, Scene], model: SystemModel, found: SystemEquilibrium, t: float, criterion: UserCriterion | None
+def start_at_rest(
+    system: System, scenes: Mapping[str, Scene], model: SystemModel, moves: bool, criterion: UserCriterion | None
 ) -> Start:
-    """Zones for the equilibrium of a system whose lines are all rod, and that equilibrium: rod only where it is needed.
+    """Equilibrium with its zones and cells; moves: whether a motion begins there, else it has loads of full size."""
+    t, managers = (0.0 if moves else np.inf), managers_for(scenes, model, criterion)
+    follow = following(model, managers) if moves else {}
+    rest = equilibrium_on_cells(system, model, follow, t)
+    return Start(*_zones_at_rest(*rest, {k: x for k, x in managers.items() if k not in follow}, t), managers)
+
+
+def _zones_at_rest(
+    model: SystemModel, found: SystemEquilibrium, managers: Mapping[int, DomainManager], t: float
+) -> tuple[SystemModel, SystemEquilibrium]:
+    """Zones for the equilibrium of a system whose lines with managers are all rod: rod only where it is needed.
 
     As of one cable (simulation.initial_zones): where the two equilibria are further apart than the tolerance of a line
     criteria become stricter, and where that does not help zones stay rod.
     """
-    managers = managers_for(scenes, model, criterion)
     allowed = {k: manager.tolerance for k, manager in managers.items()}
     try:
         for part in STRICTER:
@@ -89,15 +106,15 @@ def zones_at_rest(
                 manager.tolerance = part * allowed[k]
             answer = _within(model, found, managers, t)
             if answer is None:
-                return Start(model, found, managers)
+                return model, found
             if all(_apart(k, model, found, *answer) <= allowed[k] for k in managers):
-                return Start(*answer, managers)
+                return answer
     except ComputationError:
         pass
     for k, manager in managers.items():
         manager.held, manager.tolerance = True, allowed[k]
         _take_rods(manager, model.models[k])
-    return Start(model, found, managers)
+    return model, found
 
 
 def zones_as_placed(
@@ -108,6 +125,14 @@ def zones_as_placed(
     for k, manager in managers.items():
         models[k] = zones_without_equilibrium(models[k], manager)
     return replace(model, models=tuple(models)), managers
+
+
+def _saved_layout(layout: Layout, saved: Mapping[str, Any]) -> Layout:
+    """The layout of a checkpoint, of the same base cells.  ValueError: it is none."""
+    here = saved["here"]
+    if here is not None and not (here.dtype == bool and here.shape == (layout.parts.sum() + 1,)):
+        raise ValueError("cells that no line has")
+    return layout._replace(rod=saved["rod"], here=here)
 
 
 def _take_rods(manager: DomainManager, model: Model) -> None:
@@ -128,7 +153,7 @@ def _within(
             full = model.models[k]
             assert full.layout is not None
             models[k] = on_layout(full, full.layout._replace(rod=rods[k]))
-            states[k] = _on_fewer(states[k], full, models[k])
+            states[k] = on_fewer(states[k], full.line, models[k].line, full.ends.at(t))
             manager.set_layout(full.layout._replace(rod=rods[k]))
         other = replace(model, models=tuple(models))
         start = SystemState(states, found.state.bodies)
@@ -151,15 +176,6 @@ def _asked(
         manager.evaluate_criteria(model.line, model.sea.at(t), model.ends.at(t), state, 0.0)
         rods[k] = manager.initial_rods(state)
     return rods
-
-
-def _on_fewer(state: State, full: Model, model: Model) -> State:
-    """The state of a line at the nodes of one that has fewer.  ComputationError: it folds onto itself there."""
-    s, nodes = full.line.s, model.line.s
-    found = picked(model.line, state, np.searchsorted(s, nodes - 1e-9 * s[-1]))
-    if found is None:
-        raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "base nodes lie at the same place in the start")
-    return found
 
 
 def _apart(
@@ -280,6 +296,11 @@ class SystemZones:
         return self._run.model.models[x.number].ends.at(self._run.t)
 
     @property
+    def follow_curvature(self) -> bool:
+        """Whether cells of a line follow the curvature: its nodes come and go."""
+        return any(x.switching.zones.clock[z.SHARE] > 0.0 for x in self.lines)
+
+    @property
     def longest(self) -> float:
         """Longest step (s) that what is ramped allows."""
         return min(
@@ -293,7 +314,8 @@ class SystemZones:
         """Base cells that are rod, and what is under way, of each line by name; between two steps."""
         return {
             self._run.lines[x.number].name: {
-                "rod": x.switching.manager.layout.rod.copy(), "switching": x.switching.checkpoint(),
+                "rod": x.switching.manager.layout.rod.copy(), "here": x.switching.manager.layout.here,
+                "switching": x.switching.checkpoint(),
             }
             for x in self.lines
         }  # fmt: skip
@@ -308,8 +330,8 @@ class SystemZones:
         for x in (x for x in self.lines if x.paid is None):  # a winch gives its line the cells of then
             k, layout, manager = x.number, x.full.layout, x.switching.manager
             assert layout is not None
-            mine = matched(saved[run.lines[k].name], {"rod": layout.rod, "switching": None}, "zones")
-            model = on_layout(models[k], layout._replace(rod=mine["rod"]))
+            mine = matched(saved[run.lines[k].name], {"rod": layout.rod, "here": None, "switching": None}, "zones")
+            model = on_layout(models[k], _saved_layout(layout, mine))
             assert model.layout is not None
             manager.set_layout(model.layout)
             x.switching, x.pending = ZoneSwitching(model, manager, followed=True), None
@@ -389,6 +411,7 @@ class SystemZones:
         """Give a line other zones: nothing moves, and what changes energy is booked."""
         run, k = self._run, x.number
         if x.paid is not None:
+            run.lines[k].write_down()  # with the reel as it is
             x.paid.as_now(run.model.models[k], run.t, run.state.lines[k])
         sea, line = run.model.models[k].sea.at(run.t), run.lines[k]
         model, state, booked = x.switching.switch(change, run.t, self._ends(x), run.state.lines[k], sea, here)

@@ -40,7 +40,6 @@ SWIVEL = {"cable.attachments": [{"kind": "swivel", "at": 5}], END + "normal": [0
 BALL: dict[str, Any] = {"obstacles": {"ball": {"kind": "sphere", "at": [4, 0, -9], "radius": 1}}}
 PAID: dict[str, Any] = {END + "payout": {"rate": 0.1, "ramp": 1.0}}
 MOVING = {"model": {"kind": "adaptive"}}
-FOLLOWING = {"model": {"kind": "adaptive", "curvature_error": 0.05}}
 TWO = {SECTION + "bending_stiffness": [10, 20], END + "normal": [0, 1, 0]}
 _HALF = {key: x for key, x in CABLE["cable"]["sections"][0].items() if key != "bending_stiffness"} | {"length": 5}
 TABLE_BESIDE_TWO = {
@@ -99,7 +98,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.VORTICES, c.RESPONSE): (SHEDS, "response"),
     (c.FINITE_WAVES, c.RESPONSE): (HIGH_WAVES, "response"),
     (c.BY_RAO, c.FINITE_WAVES): (HIGH_WAVES | {END + "motion": {"vessel": RAO}}, ""),
-    (c.FOLLOWING_CELLS, c.SEVERAL_LINES): ({ONE + "model": FOLLOWING["model"]}, ""),
 }  # fmt: skip
 # Other examples of pairs whose one reason is that of several features.
 OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (

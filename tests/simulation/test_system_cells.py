@@ -1,0 +1,169 @@
+"""Cells that follow the curvature in lines of several: as of one cable, beside others, at a winch, resumed, stepped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bits import FEW_STEPS, Stopping, differences
+from test_payout_cells import pinned
+from test_system_contact_zones import alone
+from test_system_contact_zones import system as touching_themselves
+from test_system_payout_zones import as_system
+from test_system_zones import ROPE, SEA, mooring, slackening
+
+import hybrid
+import hybrid.simulation.system_run
+
+Tables = dict[str, Any]
+SHARE = 0.05
+FOLLOWS = {"kind": "adaptive", "curvature_error": SHARE}
+
+
+def followed(**more: Any) -> Tables:
+    """Three ropes to a weight, whose cells follow the curvature."""
+    scene = mooring(**more)
+    for line in scene["lines"].values():
+        line["model"] = FOLLOWS
+    return scene
+
+
+def cells(line: hybrid.Result) -> list[int]:
+    return [mesh.s.size - 1 for mesh in line.mesh]
+
+
+@pytest.fixture(scope="module")
+def three(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
+    path = tmp_path_factory.mktemp("cells") / "three.h5"
+    hybrid.run(followed(), path).close()
+    return hybrid.open(path)
+
+
+def test_a_system_of_one_line_has_the_cells_of_the_cable() -> None:
+    one, several = slackening()
+    one["model"] = several["lines"]["rope"]["model"] = FOLLOWS
+    cable, rope = hybrid.run(one), hybrid.run(several).lines["rope"]
+    assert cells(rope) == cells(cable) and len({*cells(cable)}) > 3
+    assert np.abs(rope.position - cable.position).max() < 1e-9
+    assert np.abs(rope.tension - cable.tension).max() < 1e-7 * cable.tension.max()
+    assert np.abs(rope.curvature - cable.curvature).max() < 1e-7 * cable.curvature.max()
+    assert np.isclose(rope["work/zones"][-1], cable["work/zones"][-1], rtol=1e-6)
+
+
+def test_a_line_that_touches_itself_has_the_cells_of_the_cable() -> None:
+    """With friction, whose grips find their places on the cells that come: more are asked for as the legs touch."""
+    one, several = alone(), touching_themselves(0.0)
+    one["model"] = several["lines"]["line 0"]["model"] = FOLLOWS | {"curvature_error": 0.01}
+    one["mesh"] = {"cells": 16}
+    several["lines"]["line 0"] = several["lines"]["line 0"] | {"mesh": {"cells": 16}}
+    for scene in (one, several):
+        scene |= {"time": {"duration": 3.4, "step": 0.01}}
+    cable, line = hybrid.run(one), hybrid.run(several).lines["line 0"]
+    touches = cable["energy/self_contact"] > 0.0
+    assert touches.sum() > 5 and cells(line) == cells(cable)
+    assert np.abs(line.position - cable.position).max() < 1e-8
+    for name in ("energy/self_contact", "work/friction", "work/zones", "tension"):
+        assert np.abs(line[name] - cable[name]).max() <= 1e-5 * np.abs(cable[name]).max() > 0.0, name
+
+
+@pytest.mark.parametrize("rate", [0.8, -0.8])
+def test_a_line_that_is_paid_out_has_the_cells_of_the_cable(rate: float) -> None:
+    scene = pinned(rate, dimension=3)
+    cable, line = hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"]
+    assert cells(line) == cells(cable) and len({*cells(cable)}) > 3
+    for name in ("position", "tension", "reaction_end", "work/end", "work/zones"):  # to Newton's tolerance
+        assert np.abs(line[name] - cable[name]).max() < 1e-5 * np.abs(cable[name]).max(), name
+
+
+def test_against_rods(three: hybrid.Result) -> None:
+    """The curvature within the share of its largest that is asked for, with a quarter of the cells."""
+    scene = mooring()
+    for line in scene["lines"].values():
+        line |= {"model": "rod", "mesh": {"cells": 240}}
+    rods = hybrid.run(scene)
+    for name, line in three.lines.items():
+        fine = rods.lines[name]
+        assert len({*cells(line)}) > 2 and np.mean(cells(line)) < 0.3 * 240, name
+        assert np.abs(line.curvature - fine.curvature).max() < SHARE * fine.curvature.max(), name
+        assert np.abs(line.position - fine.position).max() < 1e-3 * 60.0, name
+        assert np.abs(line.tension - fine.tension).max() < 0.01 * fine.tension.max(), name
+
+
+def test_a_stopped_run_goes_on_bit_for_bit(
+    three: hybrid.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
+    stopping, path = Stopping(monkeypatch), tmp_path / "run.h5"
+    stopping.left = 70
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(followed(), path, progress=stopping)
+    hybrid.resume(path).close()
+    assert three.file is not None and differences(three.file, path) == []
+
+
+def test_steps_from_outside_are_those_of_a_run(three: hybrid.Result) -> None:
+    """Bit for bit, also where each is computed twice across changes of cells."""
+    with hybrid.SystemSimulation(followed()) as simulation:
+        times, saved = 0.02 * np.arange(5, 100, 5), simulation.save()
+        for k, t in enumerate(times):
+            simulation.advance(float(t))
+            if k % 6 == 5:
+                simulation.restore(saved)
+                for again in times[k - 5 : k + 1]:
+                    simulation.advance(float(again))
+                saved = simulation.save()
+        result = simulation.result()
+    for name, line in result.lines.items():
+        run, n = three.lines[name], len(times) + 1
+        assert np.array_equal(line.position, run.position[:n]) and np.array_equal(line.tension, run.tension[:n])
+        assert cells(line) == cells(run)[:n]
+    assert len({*cells(result.lines["east"])}) > 2
+
+
+@pytest.mark.parametrize("held", ["end", "start"])
+def test_clamped_to_what_turns(held: str) -> None:
+    """Cells beside a clamp to a body that floats follow the bend there; its layer changes faster than they do."""
+    scene = on_a_body(held)
+    found, fine = hybrid.run(scene).lines["leg"], hybrid.run(on_a_body(held, {"kind": "rod"}, 320)).lines["leg"]
+    assert len({*cells(found)}) > 1 and max(cells(found)) < 160
+    off = np.abs(found.curvature - fine.curvature) / fine.curvature.max()
+    assert np.quantile(off, 0.99) < SHARE and off.max() < 2.0 * SHARE
+    assert np.abs(found.position - fine.position).max() < 1e-3 * 60.0
+
+
+def on_a_body(held: str, model: Tables | None = None, count: int = 0) -> Tables:
+    """A rope from the bed to a body that floats and is pushed to and fro, clamped to it at its start or its end."""
+    other = "start" if held == "end" else "end"
+    line = {
+        held: "seat", other: "foot", "sections": [ROPE | {"torsional_stiffness": 80}], "model": model or FOLLOWS,
+        "connections": {held: {"kind": "clamped", "tangent": [0, 0, 1 if held == "end" else -1]}},
+    }  # fmt: skip
+    if count:
+        line["mesh"] = {"cells": count}
+    push = [[0, 0, 0, 0], [3, 150, 80, 0], [6, 0, 0, 0]]
+    body = {"mass": 300, "inertia": [80, 80, 80], "volume": 0.36, "initial_guess": [0, 0, -40],
+            "force": {"history": push}}  # fmt: skip
+    return {
+        "environment": SEA, "bodies": {"buoy": body},
+        "points": {"foot": {"position": [30, 0, -80]}, "seat": {"body": "buoy", "place": [0, 0, -0.5]}},
+        "lines": {"leg": line}, "time": {"duration": 6.0, "step": 0.05}, "output": {"every": 0.2, "points": 61},
+    }  # fmt: skip
+
+
+def test_with_an_accuracy_the_error_that_is_said_holds() -> None:
+    scene = mooring(accuracy={"position": "5 cm", "tension": "2%"}, time={"duration": 2.0})
+    for line in scene["lines"].values():
+        line |= {"model": FOLLOWS}
+        line.pop("mesh")
+    found = hybrid.run(scene)
+    fine = mooring(time={"duration": 2.0, "step": 0.005})
+    for line in fine["lines"].values():
+        line |= {"model": "rod", "mesh": {"cells": 240}}
+    rods = hybrid.run(fine)
+    for name, line in found.lines.items():
+        off = np.linalg.norm(line.position - rods.lines[name].position, axis=2).max()
+        said = line["errors/total/position"].max()
+        assert off < 1.5 * said and said < 0.05, (name, off, said)
