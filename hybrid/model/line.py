@@ -137,10 +137,12 @@ def put_points(material: Material, place: np.ndarray, cable: Cable, bits: int) -
 def spins_freely(material: Material) -> bool:
     """Whether only inertia holds the spin of rods that come and go.
 
-    Where no torque passes from end to end, a rod between joints turns freely about its chords, and the damping of its
-    bend turns it: at once by half a turn where the bend goes through zero and nothing has inertia.
+    Where no torque passes from end to end, a rod between joints turns freely about its chords, and what turns it there
+    turns it at once where nothing has inertia: the damping of its bend by half a turn where the bend goes through zero,
+    friction until nothing slides.
     """
-    return not material.passes_torque and bool(material.bits & STIFFNESS_DAMPING) and bool(material.polar.any())
+    turned = material.rubs or material.bits & STIFFNESS_DAMPING
+    return not material.passes_torque and bool(turned) and bool(material.polar.any())
 
 
 def inertia_of_zones(material: Material) -> int:

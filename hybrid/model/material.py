@@ -109,6 +109,7 @@ class Material:
     around: float = np.inf
     bends: list[Curve | None] | None = None  # (K,) tables of moment over curvature; None: there are none
     tension_torque: Floats = field(default_factory=lambda: np.zeros(0))  # (K,) N m per N; empty: none anywhere
+    rubs: bool = False  # whether friction with itself or other lines may turn it about its axis
     sections_turn: bool = False  # whether sections are given an inertia, which rods that come and go have too
     # (K,) of pieces, of each layer that slips: stiffness, N m2, slip moment, N m, what this and that gain by tension
     layers: list[tuple[tuple[float, float, float, float], ...]] = field(default_factory=list)
@@ -335,7 +336,7 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         hinged=(not start.acts_by_moment, not end.acts_by_moment),
         at=np.zeros(0), lift=np.zeros(0), footing=np.zeros(0), points={name: np.zeros(0) for name in POINT},
     )  # fmt: skip
-    out.sections_turn = any(x.turns for x in of)
+    out.sections_turn, out.rubs = any(x.turns for x in of), scene.contact.rubs
     if any(x.curve for x in of):
         out.curves = [stretch_law(x) for x in of]
     if any(x.tension_torque for x in of):

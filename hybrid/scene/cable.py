@@ -204,6 +204,18 @@ class Contact(Table):
         description="coefficient of friction between parts of the cable that touch each other, with `self` [-]",
     )
     _ends_are_set: bool = PrivateAttr(default=False)
+    _rubs_on_others: bool = PrivateAttr(default=False)
+
+    @property
+    def rubs(self) -> bool:
+        """Whether friction with itself or other lines may turn the line about its axis."""
+        return self._rubs_on_others or (self.friction > 0.0 and self.self is not False)
+
+    def beside_others(self, friction: float) -> Contact:
+        """The same of a line that touches others, with this friction."""
+        found = self.model_copy()
+        found._rubs_on_others = friction > 0.0
+        return found
 
     @property
     def ends_are_set(self) -> bool:

@@ -455,7 +455,7 @@ class System(Table):
             return (scene or self.scene_of(name)).model_copy(update=tables)
         tables |= {
             "environment": self.environment, "cable": line.cable, "model": line.chosen_model, "mesh": line.mesh,
-            "resolution": line.resolution, "contact": line.contact, "obstacles": self.surfaces,
+            "resolution": line.resolution, "contact": self._contact_of(name), "obstacles": self.surfaces,
             "accuracy": self._accuracy_of(line),
         }  # fmt: skip
         if self.time is not None:
@@ -468,6 +468,12 @@ class System(Table):
         given["criteria"] = self.output.criteria and (name in self.adaptive or not self.adaptive)  # none: each says so
         tables["output"] = {key: value for key, value in given.items() if value is not None}
         return Scene.model_validate(tables)
+
+    def _contact_of(self, name: str) -> Contact:
+        """Contact of a line with itself, which knows whether it rubs on others."""
+        own = self.lines[name].contact
+        touches = self.contact is not None and any(name in pair for pair in self.touching_pairs)
+        return own.beside_others(self.contact.friction) if self.contact is not None and touches else own
 
     def checked_scene(self, name: str) -> Scene:
         """The scene of a line as `scene_of`, checked anew; ValidationError of pydantic: what is wrong with it."""

@@ -16,6 +16,7 @@ from test_system_zones import ROPE, SEA, mooring, slackening
 
 import hybrid
 import hybrid.simulation.system_run
+from tests.validation.test_validation_lines_contact import force_between, lowered
 
 Tables = dict[str, Any]
 SHARE = 0.05
@@ -62,7 +63,7 @@ def test_a_line_that_touches_itself_has_the_cells_of_the_cable() -> None:
         scene |= {"time": {"duration": 3.4, "step": 0.01}}
     cable, line = hybrid.run(one), hybrid.run(several).lines["line 0"]
     touches = cable["energy/self_contact"] > 0.0
-    assert touches.sum() > 5 and cells(line) == cells(cable)
+    assert touches.sum() > 5 and cells(line) == cells(cable) and len({*np.array(cells(cable))[touches]}) > 1
     assert np.abs(line.position - cable.position).max() < 1e-8
     for name in ("energy/self_contact", "work/friction", "work/zones", "tension"):
         assert np.abs(line[name] - cable[name]).max() <= 1e-5 * np.abs(cable[name]).max() > 0.0, name
@@ -120,7 +121,23 @@ def test_steps_from_outside_are_those_of_a_run(three: hybrid.Result) -> None:
         run, n = three.lines[name], len(times) + 1
         assert np.array_equal(line.position, run.position[:n]) and np.array_equal(line.tension, run.tension[:n])
         assert cells(line) == cells(run)[:n]
-    assert len({*cells(result.lines["east"])}) > 2
+    assert max(len({*cells(line)}) for line in result.lines.values()) > 1
+
+
+def test_lines_that_touch_with_friction() -> None:
+    """Cells become short where ropes cross as they come down onto each other; these rub and roll as fine rods do."""
+    fine, follow = lowered(), lowered()
+    for line in fine["lines"].values():
+        line["mesh"] = {"cells": 160}
+    for line in follow["lines"].values():
+        line |= {"mesh": {"cells": 20}, "model": {"kind": "adaptive", "curvature_error": 0.02}}
+    rods, found = hybrid.run(fine), hybrid.run(follow)
+    for name, line in found.lines.items():
+        like = rods.lines[name]
+        assert np.abs(line.position - like.position).max() < 1e-3 and len({*cells(line)}) > 2
+        assert line["work/friction"][-1] == pytest.approx(like["work/friction"][-1], rel=0.03)
+    first, late = (force_between(x, len(x.times) - 1)[0] for x in (rods, found))
+    assert late == pytest.approx(first, rel=0.03)
 
 
 @pytest.mark.parametrize("held", ["end", "start"])
