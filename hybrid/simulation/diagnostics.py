@@ -43,7 +43,7 @@ from hybrid.simulation.events import EventLog
 from hybrid.simulation.hockling_watch import LOOP, Loops, note_hockling, note_loops
 from hybrid.simulation.section_layers import ASKEW, hidden_layer, layer_text
 from hybrid.simulation.slack_bends import TURNS, too_long_for_weight, turns_by_weight, weight_text
-from hybrid.solve.flaws import TOUCHING, behind_obstacles, obstacles_left, rubs_on
+from hybrid.solve.flaws import TOUCHING, behind_obstacles, obstacles_left, passed_obstacles, rubs_on
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium
 
@@ -303,9 +303,18 @@ class Diagnostics:
             self.note(0.0, node, "several equilibria", text)
 
     def _has_left(self, state: State) -> None:
-        """An obstacle on which the shape given lies, and the equilibrium does not."""
-        line, sea = self._model.line, self._model.sea
-        for which, node, behind in obstacles_left(line, sea.values, self._model.start, state):
+        """An obstacle on which the shape given lies, and the equilibrium does not; one that is between both."""
+        line, sea, start = self._model.line, self._model.sea, self._model.start
+        left = list(obstacles_left(line, sea.values, start, state))
+        for which, node in passed_obstacles(sea.values, start.r, state.r):
+            if which not in [x for x, *_ in left]:
+                text = (
+                    f"obstacle {sea.names[which]} is between the shape given and this equilibrium at s = "
+                    f"{line.s[node]:g} m: a line that has not slid off its end has passed through it; initial.points "
+                    f"nearer to an equilibrium choose one"
+                )
+                self.note(0.0, node, "several equilibria", text)
+        for which, node, behind in left:
             now = "lies on its other side" if behind else "does not touch it"
             text = (
                 f"the shape given lies on obstacle {sea.names[which]} at s = {line.s[node]:g} m, and this equilibrium "

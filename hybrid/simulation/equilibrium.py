@@ -17,13 +17,14 @@ from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
 from hybrid.model.equilibrium_hints import reasons_against
 from hybrid.model.first_state import HUNG
+from hybrid.model.initial_shape import GIVEN
 from hybrid.model.plane import leaves_plane, planar, untwist
 from hybrid.model.self_reach import touching
 from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.schema import Scene
 from hybrid.simulation.contact_equilibrium import with_contact
 from hybrid.simulation.diagnostics import borne_strain
-from hybrid.solve.flaws import behind_obstacles, overstretched_cell
+from hybrid.solve.flaws import behind_obstacles, overstretched_cell, passed_obstacles
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import PUSHED, Equilibrium, solve_statics
 
@@ -129,7 +130,9 @@ def solve_model(
         line = planar(model.line, model.plane)
         flat = _untwisted(model, line, start)
         try:
-            found = solve_statics(line, sea, ends, flat, *rest, shape=model.start_shape, settle=settle, quick=True)
+            found = solve_statics(
+                line, sea, ends, flat, *rest, shape=model.start_shape, settle=settle, quick=True, refused=refused
+            )
             judged = line if found.with_friction else line._replace(bits=line.bits & ~FRICTION)
             if is_stable(judged, sea, ends, found.state, model.length, model.tension_scale):
                 return found
@@ -169,16 +172,21 @@ def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equil
             return Outcome.OVERSTRETCHED, cell
         return Outcome.OK, -1
 
-    def behind(state: State) -> tuple[Outcome, int]:
+    def elsewhere(state: State) -> tuple[Outcome, int]:
         outcome, cell = refused(state)
-        node = next((node for _, node in behind_obstacles(model.line, model.sea.values, state)), -1)
-        return (Outcome.BURIED, node) if outcome == Outcome.OK and node >= 0 else (outcome, cell)
+        if outcome != Outcome.OK:
+            return outcome, cell
+        sea = model.sea.values
+        through = passed_obstacles(sea, model.start.r, state.r)
+        others = behind_obstacles(model.line, sea, state) if model.start_shape == HUNG else through
+        node = next((node for _, node in others), -1)
+        return (Outcome.BURIED, node) if node >= 0 else (Outcome.OK, -1)
 
     solve = partial(solve_model, model, t, model.start, settle, quick, slack, model.other_starts)
-    if lies and model.start_shape == HUNG:
+    if lies and model.start_shape in (HUNG, GIVEN):
         try:
-            return solve(behind)
-        except ComputationError:  # where no way leads to the side of the span, the other may be meant
+            return solve(elsewhere)
+        except ComputationError:  # where no way leads to the side of the span, or of the shape, the other may be meant
             if quick:
                 raise
     return solve(refused if counts or lies else None)

@@ -15,12 +15,12 @@ from hybrid.kernels.state.forces import OBSTACLES, SELF_CONTACT
 from hybrid.kernels.state.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.first_state import HUNG, first_state
-from hybrid.model.initial_shape import hung
+from hybrid.model.initial_shape import GIVEN, hung
 from hybrid.model.system import SystemModel
 from hybrid.simulation.contact_equilibrium import KEPT, contact_of, nearness, passes_itself
 from hybrid.simulation.lines_contact import crossed, shared_of
 from hybrid.solve.contact_statics import contact_energy
-from hybrid.solve.flaws import behind_obstacles
+from hybrid.solve.flaws import behind_obstacles, passed_obstacles
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.shared_contact import SharedContact
@@ -106,21 +106,23 @@ def _on_the_side_of_the_span(
 ) -> SystemEquilibrium:
     """As `solve_system_statics`, and where a way leads there, with lines that hang on obstacles on the side of their
 
-    straight spans, as one cable does.
+    straight spans, and others on that of the shapes that the scene gives, as one cable does.
     """
-    hung = [
-        k for k, x in enumerate(model.models)
-        if x.start_shape == HUNG and x.line.bits & OBSTACLES and len(x.sea.values.obstacles)
-    ]  # fmt: skip
+    there = [k for k, x in enumerate(model.models) if x.line.bits & OBSTACLES and len(x.sea.values.obstacles)]
+    hung, given = ([k for k in there if model.models[k].start_shape == shape] for shape in (HUNG, GIVEN))
 
     def behind(states: SystemState) -> tuple[Outcome, int, int]:
         for k in hung:
             x = model.models[k]
             for _, node in behind_obstacles(x.line, x.sea.values, states.lines[k]):
                 return Outcome.BURIED, k, node
+        for k in given:
+            x = model.models[k]
+            for _, node in passed_obstacles(x.sea.values, x.start.r, states.lines[k].r):
+                return Outcome.BURIED, k, node
         return Outcome.OK, -1, -1
 
-    if hung:
+    if there:
         try:
             every = chain(starts(), _other_starts(model, hung))
             return solve_system_statics(lines, len(model.free), bodies.copy(), every, behind)

@@ -8,7 +8,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.laws.bed import planes_under
-from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, distances
+from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles, distances, half_thickness
 from hybrid.kernels.laws.soil import LATERAL
 from hybrid.kernels.march.resolution_checks import lowest, lowest_not_held
 from hybrid.kernels.state.forces import BODIES, FRICTION, OBSTACLES, SEABED
@@ -21,8 +21,10 @@ from hybrid.kernels.state.obstacle_rows import (
     MU,
     PLACE,
     RADIUS,
+    RIDES,
     ROUND,
     SHEAVE,
+    STRAND,
     TORUS,
 )
 from hybrid.kernels.state.state import Floats, Line, Sea, State
@@ -42,6 +44,9 @@ TOUCHING = 0.01
 BEHIND = 0.05
 # Product of mean normals from which on two places of an obstacle are on opposite sides; of its radius, for differences.
 OPPOSITE, NORMAL_STEP = 0.25, 1e-5
+# Of half of how thick an obstacle is: how deep in it the straight way of a place has come that has passed through it.
+# Golden sections of that way; places that are looked at in a cell.
+PASSED, SECTIONS, PLACES = 0.8, 24, 4
 
 
 def lowest_tension(line: Line, sea: Sea, state: State) -> tuple[float, int]:
@@ -161,6 +166,29 @@ def obstacles_left(line: Line, sea: Sea, start: State, state: State) -> Iterator
         before, now = (_mean_normal(sea, which, r) for r in (start.r[near], state.r[touched[which]]))
         if before @ now < -OPPOSITE:
             yield which, node, True
+
+
+def passed_obstacles(sea: Sea, start: Floats, end: Floats) -> Iterator[tuple[int, int]]:
+    """Obstacles that a line has passed through on the straight way between two shapes outside of them; the node there.
+
+    start, end: (N+1, 3) m.  A line that has slid off the end of an obstacle, or over its brim, may count as well.
+    What a free body carries is left out: it has moved, too.
+    """
+    x = np.linspace(0.0, 1.0, PLACES, endpoint=False)[:, None, None]
+    a, b = (((1.0 - x) * r[:-1] + x * r[1:]).transpose(1, 0, 2).reshape(-1, 3) for r in (start, end))
+    thick, golden = half_thickness(sea.obstacles), 0.5 * (np.sqrt(5.0) - 1.0)
+    rides = sea.carried[:, RIDES] if sea.carried.size else np.zeros(len(thick))
+    for which, (row, *gaps) in enumerate(zip(sea.obstacles, distances(sea, a), distances(sea, b), strict=True)):
+        if row[KIND] in (FLAT, TORUS) or rides[which] or min(x.min() for x in gaps) < -row[STRAND]:
+            continue
+        low, high = np.zeros((len(a), 1)), np.ones((len(a), 1))
+        for _ in range(SECTIONS):  # the distance to what is convex is so along a straight way
+            p, q = high - golden * (high - low), low + golden * (high - low)
+            left = (distances(sea, a + p * (b - a)) < distances(sea, a + q * (b - a)))[which, :, None]
+            low, high = np.where(left, low, p), np.where(left, q, high)
+        least = distances(sea, a + 0.5 * (low + high) * (b - a))[which]
+        if least.min() < -PASSED * thick[which]:
+            yield which, int(least.argmin()) // PLACES
 
 
 def _mean_normal(sea: Sea, which: int, r: Floats) -> Floats:
