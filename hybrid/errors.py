@@ -144,6 +144,7 @@ EVENTS_BY_WEIGHT = (
     "bending at point load neglected",
     "zones fixed",
     "static friction neglected",
+    "bodies overlap",
     "body out of water",
     "pulled under",
     "waves on body neglected",

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from hybrid.simulation.listed_outputs import Listed
 
 NAME, COLUMNS = 13, 80  # columns of names, and of the short form
+MOST_PAIRS = 6  # of lines that touch each other, by name
 # Forces whose names are too long for it.
 SHORT = {
     "mass-proportional damping": "mass damping",
@@ -82,7 +83,7 @@ def system_plan_lines(system: System, plan: SystemPlan) -> list[str]:
         "bodies": ", ".join(f"{name} ({body.kind})" for name, body in system.bodies.items()),
         "mesh": f"{_count(plan.cells, 'cell')}, {plan.unknowns} unknowns",
         "forces": _forces(on),
-        "contact": _contact(on),
+        "contact": "; ".join(x for x in (_of_lines(system), _contact(on)) if x),
         "time": _steps(system.time, plan),
         "runs": _runs(max(every, key=lambda x: x.most_runs)),
         "accuracy": _accuracy(on),
@@ -122,6 +123,25 @@ def _contact(on: Mapping[str, str]) -> str:
     """Why a line may touch itself where nobody asks for it, and what that costs."""
     why = on.get("contact of the line with itself", "")
     return f"of the line with itself, {why}" if why.startswith(WHERE_NEAR) else ""
+
+
+def _of_lines(system: System) -> str:
+    """Which lines touch each other, and what else they touch."""
+    pairs, found = [f"{a} with {b}" for a, b in system.touching_pairs], []
+    if pairs:
+        named = ", ".join(pairs[:MOST_PAIRS]) + (
+            f" and {len(pairs) - MOST_PAIRS} more" if len(pairs) > MOST_PAIRS else ""
+        )
+        rubs = (
+            f", friction {system.contact.friction:g}" if system.contact is not None and system.contact.friction else ""
+        )
+        found.append(f"of lines with each other{rubs}: {named}")
+    elif len(system.lines) > 1:
+        found.append("lines pass through each other, and an event says where: contact: {} keeps them apart")
+    shapes = [name for name, body in system.free_bodies.items() if body.shape is not None]
+    for what, names in (("obstacles", [*system.obstacles]), ("bodies", shapes)):
+        found += [f"of every line with {what} {', '.join(names)}"] if names else []
+    return "; ".join(found)
 
 
 def _accuracy(on: Mapping[str, str]) -> str:

@@ -5,9 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from hybrid.errors import IN_SPACE, Outcome
+import numpy as np
+
+from hybrid.errors import IN_SPACE, Complaint, Outcome, SceneError
+from hybrid.kernels.laws.obstacles import cells_met, depths_in_obstacles
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.forces import MAY_TOUCH
+from hybrid.kernels.state.forces import MAY_TOUCH, OBSTACLES
+from hybrid.kernels.state.state import State
 from hybrid.model.self_reach import touching, touching_no_more
 from hybrid.simulation.self_watch import deepest_text, within_itself
 from hybrid.solve.self_contact import SelfContact
@@ -18,6 +22,19 @@ if TYPE_CHECKING:
 
 # Kind of the event of contact that is given up because no step leads on with it.
 GIVEN_UP = "contact given up"
+
+
+def refuse_start_in_obstacles(model: Model, state: State, key: str = "initial") -> None:
+    """SceneError: a line that begins where the scene has it is deep in an obstacle; key: of its start."""
+    line, sea = model.line, model.sea.at(0.0)
+    if not line.bits & OBSTACLES:
+        return
+    met = cells_met(sea.carried, line.s) if sea.carried.size else None
+    within = depths_in_obstacles(sea, state.r, line.s, met)
+    which, node = (int(x) for x in np.unravel_index(np.argmax(within), within.shape))
+    if within[which, node] > 1.0:
+        given = f"a shape that is in obstacle {model.sea.names[which]} at s = {line.s[node]:.6g} m"
+        raise SceneError([Complaint(key, given, "a start outside of obstacles", "move it, or the obstacle")])
 
 
 def comes_near(moving: Transient) -> bool:

@@ -29,6 +29,7 @@ from hybrid.model.system import SystemResolution, build_system
 from hybrid.scene.plane import OUT
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
+from hybrid.simulation.body_overlap import note_overlaps
 from hybrid.simulation.collapse import COLLAPSE, CONTACT, GIVE_UP, collapse_text
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.events import energy_gains_text
@@ -190,7 +191,7 @@ class SystemRun:
         self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
         self._moved: list[Moves] = []  # by which ends move in compiled steps
         self._loaded = np.nan  # and `loaded`, of the loads that act there on bodies
-        self.dry: set[str] = set()  # bodies that have been said to be out of the water
+        self.dry: set[str] = set()  # bodies said to be out of the water, or in another one
         self.under: dict[str, float] = {}  # depth (m) of points that have been said to be pulled under it
         self.failures = Failures(self)
         self.zones = SystemZones(self, managers) if managers and moves else None
@@ -374,6 +375,7 @@ class SystemRun:
             values |= self.quantities.values(by_name, {line.name: line for line in self.lines})
             self.recorder.save_batch(seen.t, values, [("lines", 0.0, 0.0)])
         note_dry_bodies(self.system, self.model, seen, self.dry, self.recorder.event)
+        note_overlaps(self.model, seen, self.dry, self.recorder.event)
         note_pulled_under(self.system, self.model, seen, self.under, self.recorder.event, moves=self.moves)
         self._keep_in_plane()
         for line, x in zip(self.lines, states, strict=True):

@@ -21,6 +21,7 @@ from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.scene.system_checks import floating_groups
 from hybrid.simulation.blended import blended_text, rotate_ends_in
+from hybrid.simulation.contact_start import refuse_start_in_obstacles
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.equilibrium import count_turns, settling
 from hybrid.simulation.events import EventLog
@@ -174,7 +175,9 @@ def begin_as_placed(
 
     reached smoothly, and what lies still on the seabed has the friction that keeps it there.
     """
-    for x, joints, scene, one, log in zip(model.models, model.joints, scenes, state.lines, events, strict=True):
+    each = zip(model.names, model.models, model.joints, scenes, state.lines, events, strict=True)
+    for name, x, joints, scene, one, log in each:
+        refuse_start_in_obstacles(x, one, f"lines.{name}.initial")
         rotate_ends_in(scene, x, one, log, (joints[0] < 0, joints[1] < 0))
         stepper = Stepper(x.line, x.length, x.tension_scale)
         stepper.static_friction(x.sea.at(0.0), joined_ends(x.ends.at(0.0), joints), one)

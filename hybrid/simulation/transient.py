@@ -29,7 +29,13 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.blended import note_blended, rotate_ends_in
 from hybrid.simulation.cell_changes import CellChanges
-from hybrid.simulation.contact_start import begin_contact, comes_near, end_contact, gives_up_contact
+from hybrid.simulation.contact_start import (
+    begin_contact,
+    comes_near,
+    end_contact,
+    gives_up_contact,
+    refuse_start_in_obstacles,
+)
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog
@@ -246,6 +252,7 @@ class Transient:
             if self._begins_at_once:
                 self.set_model(model, state_for(model.line))
             state = model.start.copy()
+            refuse_start_in_obstacles(model, state)
             rotate_ends_in(self.scene, model, state, self.events)
             if not state.v.any():
                 self.stepper.static_friction(model.sea.at(0.0), model.ends.at(0.0), state)

@@ -60,6 +60,7 @@ DOUBTS: Doubtful = {
     "end force between outputs": (PULL, "the output.every of its note"),
     "line meets itself": (ALL, "contact: {self: true}"),
     "lines pass through each other": (ALL, "contact: {between: [[a, b]]}"),
+    "bodies overlap": (ALL, "bodies that stay apart"),
     "contact given up": (ALL, "cells as short as its note says"),
     "slack": (BENDING | PULL, "model: rod, or force_rod there"),
     "unstable": (ALL, NOTE),

@@ -190,6 +190,24 @@ def test_plan_of_lines_has_their_forces_their_time_and_no_text_that_is_cut(call:
     assert re.fullmatch(r"10 s in 100 steps of 0.1 s; about [\d.]+ m?s of CPU for all runs", rows["time"]), rows["time"]
 
 
+def test_plan_of_lines_says_what_touches_what(call: Call) -> None:
+    Path("bridle.yaml").write_text(BRIDLE)
+    apart = " ".join(call("plan", "bridle.yaml").out.split())
+    assert "lines pass through each other, and an event says where" in apart
+    diameters = [f"lines.{name}.sections[0].diameter=0.02" for name in ("port", "starboard", "tow")]
+    more = [
+        "contact={friction: 0.2, between: [[port, tow]]}",
+        "obstacles={pile: {at: [0, 50, 0], axis: [0, 0, 1], radius: 1}}",
+    ]
+    said = call("plan", "bridle.yaml", *(x for key in (*diameters, *more) for x in ("--set", key)))
+    flat = " ".join(said.out.split())
+    assert (
+        said.code == 0
+        and "of lines with each other, friction 0.2: port with tow; of every line with obstacles pile" in flat
+    )
+    assert "pass through" not in flat
+
+
 def test_plan_says_what_is_on_and_computes_nothing(call: Call) -> None:
     # 10^11 steps would not end; and what is on is the same.
     long = ("--set", "time.duration=1e8", "--set", "time.step=1e-3", "--set", "output.every=1e6")

@@ -492,3 +492,31 @@ def test_a_shape_has_the_name_of_no_obstacle() -> None:
     tables["obstacles"] = {"ball": {"kind": "sphere", "at": [0, 0, 9], "radius": 1}}
     with pytest.raises(SceneError, match="no obstacle has"):
         hybrid.static(tables)
+
+
+def test_bodies_that_are_in_each_other_or_in_what_is_around_are_told() -> None:
+    def body(x: float, z: float, shape: dict[str, Any]) -> dict[str, Any]:
+        return {"initial_guess": [x, 5.0, z], "mass": 2, "inertia": [0.1] * 3, "shape": shape}
+
+    ball, bar = {"kind": "sphere", "radius": 0.3}, {"kind": "cylinder", "axis": [1, 0, 0], "length": 1.0, "radius": 0.1}
+    crate = {"kind": "box", "size": [0.4, 0.4, 0.4], "rounding": 0.05}
+    section = {"length": 2.0, "mass": 0.2, "diameter": 0.02, "axial_stiffness": 1e4, "bending_stiffness": 0.02}
+    scene = {
+        "environment": {"seabed": {"z": -1.0, "stiffness": 1e4}},
+        "obstacles": {"pile": {"kind": "cylinder", "at": [9, 5, 0], "axis": [0, 0, 1], "radius": 0.2}},
+        "points": {"a": {"position": [0, 0, 2]}, "b": {"position": [2, 0, 2]}},
+        "bodies": {
+            "one": body(0.0, 0.0, ball), "two": body(0.5, 0.0, ball), "apart": body(2.0, 0.0, ball),
+            "bar": body(8.5, 0.0, bar), "low": body(4.0, -0.85, crate), "high": body(6.0, -0.5, crate),
+        },
+        "lines": {
+            "l": {"start": "a", "end": "b", "sections": [section], "model": "rod", "mesh": {"cells": 20},
+                  "initial": {"kind": "straight", "direction": [1, 0, 0]}},
+        },
+        "time": {"duration": 0.02, "step": 0.01},
+    }  # fmt: skip
+    told = {x.text.partition(":")[0] for x in hybrid.run(scene).events if x.kind == "bodies overlap"}
+    assert told == {
+        "body one is 0.1 m deep in body two", "body low is 0.05 m deep in the seabed",
+        "body bar is 0.3 m deep in obstacle pile",
+    }  # fmt: skip

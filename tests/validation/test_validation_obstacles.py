@@ -282,3 +282,25 @@ def test_a_thin_pipe_that_may_pass_between_nodes_is_said(cells: int, said: bool)
     found = [x for x in result.events if x.kind == "unresolved contact"]
     assert bool(found) == said
     assert all("cells of 0.12 m would meet it" in x.text for x in found)
+
+
+@pytest.mark.parametrize("several", [False, True], ids=["cable", "lines"])
+@pytest.mark.parametrize("z", [0.0, 0.15])  # along the axis of the pipe, where its normal is not known, and within it
+def test_a_start_in_an_obstacle_is_refused(several: bool, z: float) -> None:
+    section = {"length": 2.0, "mass": 0.3, "diameter": 0.02, "axial_stiffness": 1e4, "bending_stiffness": 0.02}
+    straight = {"kind": "straight", "direction": [1, 0, 0]}
+    common: dict[str, Any] = {
+        "obstacles": {"pipe": {"kind": "cylinder", "at": [0, 0, 0], "axis": [1, 0, 0], "radius": 0.2}},
+        "time": {"duration": 0.1, "step": 0.01},
+    }
+    line = {"sections": [section], "model": "rod", "mesh": {"cells": 20}}
+    if several:
+        points = {"a": {"initial_guess": [-1, 0, z]}, "b": {"initial_guess": [1, 0, z]}}
+        scene = common | {"points": points, "lines": {"l": line | {"start": "a", "end": "b", "initial": straight}}}
+    else:
+        scene = common | {
+            "cable": {"sections": line.pop("sections")}, "ends": {"start": "free", "end": "free"},
+            "initial": straight | {"origin": [-1, 0, z]},
+        } | line  # fmt: skip
+    with pytest.raises(SceneError, match=r"outside of obstacles\.pipe" if several else "in obstacle pipe"):
+        hybrid.run(scene)
