@@ -108,7 +108,7 @@ def draw_panel(panel: Panel, ax: Axes, *, legend: bool | None = None) -> dict[st
         seen.add(label)
         behind = isinstance(item, Area | Box | Map)  # the grid is at 0.5
         for n, artist in enumerate(artists):
-            if free and isinstance(item, Marks):
+            if free and isinstance(item, Marks) and _is_within(item, panel.limits()):
                 artist.set_clip_on(False)  # a mark on the rim is drawn whole
             artist.set_zorder((0.1 if behind else 1.0) + 0.001 * k + 0.0001 * n)
         if isinstance(item, Map):
@@ -123,6 +123,13 @@ def draw_panel(panel: Panel, ax: Axes, *, legend: bool | None = None) -> dict[st
     if panel.legend if legend is None else legend:
         ax.legend(fontsize=SMALL, framealpha=0.75, edgecolor="none", handlelength=2.0, borderpad=0.2)
     return images
+
+
+def _is_within(marks: Marks, limits: tuple[tuple[float, float], tuple[float, float]]) -> bool:
+    """Whether all marks are where a panel shows what is there."""
+    return all(
+        bool(np.all((low <= x) & (x <= high))) for x, (low, high) in zip((marks.x, marks.y), limits, strict=True)
+    )
 
 
 def _style(ax: Axes, panel: Panel) -> None:

@@ -22,7 +22,7 @@ from hybrid.store.obstacle_surfaces import (
 from hybrid.store.reader import Result
 from hybrid.view.figure import Area, Item, Line
 from hybrid.view.mesh_edges import closed_way, sharp_edges, turned_to_eye
-from hybrid.view.projections import View, extent_in
+from hybrid.view.projections import View, line_extent_in
 from hybrid.view.style import STONE, STONE_EDGE, short
 
 # Beyond the picture, in sizes of that, endless obstacles go on.
@@ -33,7 +33,7 @@ MANY = 5000  # triangles of a mesh that is drawn as its hull in a plane
 def outlines(result: Result, view: View, output: int, moving: bool | None = None) -> list[Item]:
     """Obstacles in a plane of view: filled outlines of round ones, and what is behind planes seen from the side."""
     items: list[Item] = []
-    box = extent_in(view, result)
+    box = line_extent_in(view, result)
     size = float(np.ptp(box, axis=1).max()) or 1.0
     for body in obstacles_at(result, output, moving):
         if body.kind == PLANE:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.store.obstacle_surfaces import MESH, PLANE, obstacles_at, surface_rings
 from hybrid.store.reader import Result
 from hybrid.store.records import Zone
 from hybrid.view.style import short
@@ -16,7 +17,8 @@ from hybrid.view.style import short
 Numbers = Sequence[float] | np.ndarray
 STILL = 1e-6  # of the cable's extent: motion and deflection below this are round-off
 _SHAPES = 9  # earlier shapes on a page; more become a blur
-_NEAR = 0.4  # of the height of a shape: a seabed or a surface so close to it is shown with it
+_NEAR = 0.4  # of the height of a shape: a seabed or a surface so close to it is shown with it, an obstacle is so far
+ALONG = 0.999  # cosine of an axis with the direction of view, from which on an endless pipe is seen from its end
 
 
 class View(NamedTuple):
@@ -143,7 +145,30 @@ def bed_in(view: View, result: Result) -> tuple[float, float] | None:
 
 
 def extent_in(view: View, result: Result) -> np.ndarray:
-    """What is in view, low and high, across and up (2, 2): the cable, and a seabed or a surface near to it."""
+    """What is in view, low and high, across and up (2, 2): the cable, and what is near to it.
+
+    These are obstacles and bodies where they are at some outputs, a seabed, a surface.
+    """
+    box = line_extent_in(view, result)
+    room, out = _NEAR * float(np.ptp(box, axis=1).max()), np.cross(view.across, view.up)
+    far = box + room * np.array([[-1.0, 1.0]])
+    outputs = np.unique(
+        np.linspace(0, len(result.position) - 1, min(len(result.position), _SHAPES)).round().astype(int)
+    )
+    for body in (x for k in outputs for x in obstacles_at(result, int(k))):
+        endless = not np.isfinite(body.half) and abs(float(body.axis @ out)) < ALONG
+        if body.kind == PLANE or endless:
+            continue
+        points = body.points if body.kind == MESH else surface_rings(body, 0.0, 0.0).reshape(-1, 3)
+        seen = np.array([[x.min(), x.max()] for x in view.project(points)])
+        if (seen[:, 1] > far[:, 0]).all() and (seen[:, 0] < far[:, 1]).all():
+            seen = np.clip(seen, far[:, :1], far[:, 1:])
+            box = np.column_stack([np.minimum(box[:, 0], seen[:, 0]), np.maximum(box[:, 1], seen[:, 1])])
+    return box
+
+
+def line_extent_in(view: View, result: Result) -> np.ndarray:
+    """The same of the cable, and a seabed or a surface near to it, alone."""
     across, up = view.project(result.position)
     box = np.array([[across.min(), across.max()], [up.min(), up.max()]])
     room = _NEAR * max(np.ptp(box[1]), 0.3 * np.ptp(box[0]))

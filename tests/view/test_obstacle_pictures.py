@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import hybrid
 from hybrid.live.drawing import around, frames
-from hybrid.view.figure import Area
+from hybrid.view.figure import Area, Axis, Marks, Panel
+from hybrid.view.matplotlib_backend import draw_panel
 from hybrid.view.obstacles import hull, obstacles_at, outlines, surfaces
-from hybrid.view.projections import view_named
+from hybrid.view.projections import extent_in, view_named
 
 BALL = {"kind": "sphere", "at": [0.5, 0.3, -0.4], "radius": 0.1}
 PIPE = {"kind": "cylinder", "at": [1.0, 0.5, -0.6], "axis": [0, 1, 0], "radius": 0.05}
@@ -91,3 +93,18 @@ def test_a_hull_holds_all_points() -> None:
     after = np.roll(corners, -1, axis=0) - corners
     for a, d in zip(corners, after, strict=True):
         assert (d[0] * (points[:, 1] - a[1]) - d[1] * (points[:, 0] - a[0]) > -1e-12).all()
+
+
+def test_a_picture_shows_what_is_near_to_the_line_at_all_times(result: Any) -> None:
+    """The ball from its first place to its last one, and the pipe seen from its end."""
+    box = extent_in(view_named("xz"), result)
+    assert box[1, 0] == pytest.approx(-0.65, abs=1e-3) and box[0].tolist() == [0.0, 2.0]
+
+
+def test_marks_outside_of_a_panel_are_not_drawn_over_what_is_beside() -> None:
+    ax = Figure().subplots()
+    axis = Axis("x", "m", 0.0, 1.0)
+    for at, clipped in ((0.5, False), (3.0, True)):
+        marks = Marks(np.array([at]), np.array([0.5]), "o")
+        draw_panel(Panel("p", "", axis, axis, [marks], aspect=1.0), ax)
+        assert ax.lines[-1].get_clip_on() == clipped
