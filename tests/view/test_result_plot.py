@@ -636,6 +636,8 @@ def test_no_pyplot_and_no_matplotlib_before_something_is_drawn() -> None:
 class Drawn:
     """A line in the x-z plane, as far as views ask."""
 
+    names: tuple[str, ...] = ()
+
     def __init__(self, x: np.ndarray, z: np.ndarray) -> None:
         self.position = np.stack([x, 0.0 * x, z], axis=1)[None]
 
