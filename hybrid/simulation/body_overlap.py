@@ -56,7 +56,7 @@ def note_overlaps(model: SystemModel, seen: Sampled, told: set[str], tell: Tell)
 def _overlaps(sea: Sea, names: Sequence[str], bed: bool) -> Iterator[tuple[tuple[str, str], float]]:
     """Pairs of a body with what it is in, and how deep (m); bed: whether there is one."""
     rows, rides = sea.obstacles, sea.carried[:, RIDES] != 0.0
-    for a in np.flatnonzero(rides):
+    for a in np.flatnonzero(rides).tolist():
         radius, core = rows[a, RADIUS] - rows[a, STRAND], _core(rows[a])
         gaps = (distances(sea, core) + rows[:, STRAND, None]).min(axis=1) - radius
         for b, gap in enumerate(gaps):
