@@ -36,7 +36,7 @@ from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.simulation.case import Case
-from hybrid.simulation.first_use import OF_LINES, compile_beside, kernels_of
+from hybrid.simulation.first_use import compile_beside, kernels_of, kernels_of_lines
 from hybrid.simulation.interrupts import interrupts
 from hybrid.simulation.layer_mesh import layered
 from hybrid.simulation.progress import (
@@ -220,7 +220,7 @@ def _move_lines(
     if criterion is not None and not system.adaptive:
         raise TypeError(NO_ZONES)
     duration, listener = system.require_time().duration, listener_of(progress)
-    tell_of_compiling(listener, OF_LINES)
+    tell_of_compiling(listener, kernels_of_lines(system))
     with interrupts() as stopped, ProgressReporter(listener, duration) as reporter:
         notes: list[tuple[str, str]] = []
         pending = ERROR_ESTIMATE if system.output.errors else ""

@@ -31,7 +31,7 @@ from hybrid.model.run_time import COST_STEP
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
 from hybrid.simulation.case import Case
-from hybrid.simulation.first_use import OF_LINES, kernels_of
+from hybrid.simulation.first_use import kernels_of, kernels_of_lines
 from hybrid.simulation.time_loop import TimeLoop
 from hybrid.store.comparison_recorder import ComparisonRecorder
 
@@ -253,7 +253,7 @@ def _of_passes(scene: Scene, setup: float, motion: float, outputs: float, found:
 
 def _measured_lines(system: System, found: SystemPlan) -> SystemPlan:
     """The same of several lines: their first steps, as often as all runs would take them."""
-    if found.cells > MOST_CELLS or not is_warm(OF_LINES):
+    if found.cells > MOST_CELLS or not is_warm(kernels_of_lines(system)):
         return found
     from hybrid.simulation.system_run import SystemRun
     from hybrid.solve.system_statics import LineFailed

@@ -35,9 +35,9 @@ def resume_lines(console: Console, asked: System, source: Path, target: Path, pl
 def _moved(console: Console, asked: System, target: Path, picture: Path | None, compute: Callable[..., Result]) -> None:
     """Compute a motion, and print what it has reached; picture: where all lines are drawn, None: nowhere."""
     from hybrid.cli.progress_line import span
-    from hybrid.simulation.first_use import OF_LINES
+    from hybrid.simulation.first_use import kernels_of_lines
 
-    console.compiling_kernels(OF_LINES)
+    console.compiling_kernels(kernels_of_lines(asked))
     begin = clock.perf_counter()
     with console.progress() as tell:
         result = compute(progress=tell)
@@ -54,11 +54,11 @@ def _moved(console: Console, asked: System, target: Path, picture: Path | None, 
 def static_lines(console: Console, asked: System, target: Path, plot: bool, keep: bool) -> None:
     """Find the equilibrium of several lines."""
     from hybrid.cli.progress_line import span
-    from hybrid.simulation.first_use import OF_LINES
+    from hybrid.simulation.first_use import kernels_of_lines
 
     console.will_write(target)
     picture = picture_beside(target, plot)
-    console.compiling_kernels(OF_LINES)
+    console.compiling_kernels(kernels_of_lines(asked, static=True))
     begin = clock.perf_counter()
     result = hybrid.static(asked, target, overwrite=not keep)
     wall = clock.perf_counter() - begin

@@ -15,7 +15,7 @@ from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import located_in, parse_either, scene_text
 from hybrid.scene.schema import Scene
-from hybrid.simulation.first_use import compile_beside, kernels_of
+from hybrid.simulation.first_use import compile_beside, kernels_of, kernels_of_lines
 from hybrid.simulation.static_case import StaticCase
 from hybrid.simulation.system_run import static_system
 from hybrid.store.array_recorder import MemoryTarget
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 # Points along a line in a picture: one for each cell, as far as a screen shows them apart.
 LEAST_POINTS, MOST_POINTS = 101, 401
-SYSTEM_KERNELS = ("system.solve_system", "run.in_space", "observed_outputs.observe_outputs")
 
 
 def picture_of(text: str, file: str, compiling: Callable[[], None]) -> tuple[dict[str, Any], Result | None]:
@@ -84,7 +83,7 @@ def equilibrium(scene: Scene | System, made: Plan | SystemPlan) -> Result:
 
 def _begin_to_compile(scene: Scene | System, compiling: Callable[[], None]) -> None:
     """Begin to compile what an equilibrium calls, once on a machine; `compiling` hears of it beforehand."""
-    names = list(SYSTEM_KERNELS) if not isinstance(scene, Scene) else kernels_of(scene, static=True)
+    names = kernels_of(scene, True) if isinstance(scene, Scene) else kernels_of_lines(scene, True)
     if not is_warm(names):
         compiling()
         if isinstance(scene, Scene):

@@ -19,16 +19,21 @@ from hybrid.model.resolution import first_resolution, wants_errors
 from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.read import validate_scene
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import Equilibrium, Scene
+from hybrid.scene.system import System
 
 # What is compiled together, by the kernel that stands for it: the last.
 SOLVER = ("run.in_plane", "run.in_space")
-OUTPUTS, ZONES = "observed_outputs.observe_outputs", "zone_step.follow_zones"
+OUTPUTS, ZONES, CRITERIA = "observed_outputs.observe_outputs", "zone_step.follow_zones", "zone_step.evaluate_criteria"
 MODEL_ERROR = "bending_error.advance_error"
 PAYOUT = "payout_run.go_on"
 STEPS = "run.run"  # around the solver of either kind
-OF_LINES = ("system.solve_system", SOLVER[1], "system_run.run_system", OUTPUTS)  # of several lines
-STABILITY = "out_of_plane.wrong_pivots_at_rest"
+STABILITY, TOUCHING = "out_of_plane.wrong_pivots_at_rest", "self_contact.contact_task"
+# Of several lines: what all of them call, steps, equilibria, those that touch, those that are paid out.
+OF_LINES = ("system.solve_system", SOLVER[1], OUTPUTS)
+STEPS_OF_LINES, REST_OF_LINES = "system_run.run_system", "system_run.sample_system"
+TOUCHING_LINES = "system_contact.touch_system", "shared_contact.shared_task"
+PAYOUT_OF_LINES = "payout.pay_out", "payout.stand_among"
 
 # A cable for the second process to compile with; nothing is computed of it.
 SAMPLE = {
@@ -47,12 +52,26 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     beside = _beside_solver(scene, static)
     tables = scene.environment, scene.cable, scene.ends, scene.initial
     leaves = plane_of(*tables, TYPED if scene.dimension == 2 else EXACT)[1]
-    in_space = scene.dimension == 3 or scene.contact.self or bool(scene.obstacles) or bool(leaves)
-    if scene.dimension is None and MODEL_ERROR in beside:
-        in_space = True  # what leaving bending out does is followed in space
+    in_space = scene.dimension == 3 or bool(scene.contact.self or scene.obstacles or leaves)
+    solvers = [SOLVER[in_space]]
+    if scene.dimension is None and not in_space and MODEL_ERROR in beside:
+        solvers.insert(0, SOLVER[1])  # what leaving bending out does is followed in space
     turned = any(load.what == "moment" for end in scene.ends.both for load in end.loads)
-    judged = static and not in_space and _has_rods(scene) and not turned
-    return [SOLVER[in_space], *beside, *([STABILITY] if judged else [])]
+    rests = static or isinstance(scene.initial, Equilibrium)
+    more = [STABILITY] if rests and not in_space and _has_rods(scene) and not turned else []
+    return [*solvers, *beside, *more, *([TOUCHING] if scene.contact.self else [])]
+
+
+def kernels_of_lines(system: System, static: bool = False) -> list[str]:
+    """The same of several lines."""
+    found = [*OF_LINES, REST_OF_LINES if static else STEPS_OF_LINES]
+    if system.adaptive:
+        found.append(CRITERIA if static else ZONES)
+    if system.contact is not None:
+        found += TOUCHING_LINES
+    if not static and any(payout_of(system.scene_of(name)) for name in system.lines):
+        found += PAYOUT_OF_LINES
+    return found
 
 
 def _has_rods(scene: Scene) -> bool:
@@ -63,11 +82,11 @@ def _has_rods(scene: Scene) -> bool:
 
 def _beside_solver(scene: Scene, static: bool) -> list[str]:
     """In the order in which they are best compiled beside the solver."""
-    needed = [OUTPUTS] if static or scene.time is None else [STEPS, OUTPUTS]
+    needed = [STEPS, OUTPUTS]  # steps: their kernel notes the extremes of an equilibrium, too
     if scene.time is not None and not static and payout_of(scene) is not None:
         needed.insert(1, PAYOUT)  # asked for before the first step
     if scene.time is not None and scene.model.kind == "adaptive":
-        needed.append(ZONES)
+        needed.append(CRITERIA if static else ZONES)
     if wants_errors(scene) and scene.model.kind != "rod":
         needed.append(MODEL_ERROR)
     return needed
@@ -118,8 +137,8 @@ def compile_all(names: Sequence[str]) -> None:
         _compile_outputs(model)
     if SOLVER[1] in names:
         in_space.compile_unless_busy(table)
-    if ZONES in names:
-        _compile_zones(scene, model)
+    if ZONES in names or CRITERIA in names:
+        _compile_zones(scene, model, moves=ZONES in names)
     if MODEL_ERROR in names:
         _compile_model_error(model)
 
@@ -154,7 +173,7 @@ def _compile_outputs(model: Model) -> None:
     stored_energy(model.line, model.sea.values, model.start.r)
 
 
-def _compile_zones(scene: Scene, model: Model) -> None:
+def _compile_zones(scene: Scene, model: Model, moves: bool) -> None:
     from hybrid.kernels.mesh.zone_step import follow_zones
     from hybrid.simulation.initial_zones import manager_for
 
@@ -162,7 +181,8 @@ def _compile_zones(scene: Scene, model: Model) -> None:
     manager.evaluate_criteria(model.line, model.sea.values, model.ends.values, model.start, 0.0)
     manager.initial_rods(model.start)
     manager.review(0.0, model.start)
-    follow_zones.compile_unless_busy(np.zeros(0, np.int64))
+    if moves:
+        follow_zones.compile_unless_busy(np.zeros(0, np.int64))
 
 
 def _compile_model_error(model: Model) -> None:

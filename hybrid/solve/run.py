@@ -198,10 +198,13 @@ class CompiledRun:
         self.table.bind(moves=moves)
 
     def note_state(self) -> None:
-        """Keep the extremes of the state as it is, of which `books.report` is the report; no step is taken."""
+        """Keep the extremes of the state as it is, of which `books.report` is the report.
+
+        No step is taken: the kernel that solves them, whose compilation takes longest, is not asked for.
+        """
         self.clock[b.STOP] = self.clock[b.NOW]
         self.count[b.PHASE], self.count[b.AFTER_START], self.count[b.NEW_STATE] = b.START, b.BEGIN_STEP, 1
-        self.go()
+        run(self.table.numbers)
 
     def solver_address(self) -> int:
         """Of the kernel that solves its steps, which is compiled now, where it is needed, if it has not been."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -10,8 +11,10 @@ from typing import Any
 import pytest
 
 import hybrid
+from hybrid.kernels.machine.kept_code import KeptCode
 from hybrid.kernels.reel import payout, payout_nodes
 from hybrid.kernels.run import payout_run
+from hybrid.scene.read import as_scene_or_system
 from hybrid.simulation import first_use
 
 
@@ -60,3 +63,71 @@ def test_kernels_of_a_line_that_is_paid_out_are_compiled_beside() -> None:
     })  # fmt: skip
     assert first_use.PAYOUT in first_use.kernels_of(scene)
     assert first_use.PAYOUT not in first_use.kernels_of(scene, static=True)
+
+
+ROPE = {"length": 12, "mass": 2.0, "diameter": 0.02, "axial_stiffness": 1e5}
+WIRE = ROPE | {"bending_stiffness": 5.0}
+POINTS = {"a": {"position": [0, 0, 0]}, "b": {"position": [10, 0, 0]}, "c": {"position": [10, 5, 0]}}
+TIME = {"time": {"duration": 0.1, "step": 0.05}}
+
+
+def one(section: dict[str, Any], model: str, **more: Any) -> dict[str, Any]:
+    ends = {name: {"kind": "pinned", "position": POINTS[at]["position"]} for name, at in (("start", "a"), ("end", "b"))}
+    return {
+        "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "model": model, "mesh": {"cells": 12},
+        "contact": {"self": False},
+    } | TIME | more  # fmt: skip
+
+
+def two(section: dict[str, Any] = ROPE, line: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
+    lines = {x: {"sections": [section], "mesh": {"cells": 12}, "start": "a", "end": x} for x in "bc"}
+    lines["b"] |= line or {}
+    return {"points": POINTS, "lines": lines} | TIME | more
+
+
+WINCH = {"connections": {"end": {"payout": {"rate": 0.1, "ramp": 0.1}}}}
+KINDS = {
+    "catenary": one(ROPE, "catenary"),
+    "rod in a plane": one(WIRE, "rod"),
+    "rod in space": one(WIRE, "rod", dimension=3),
+    "zones that move": one(WIRE, "adaptive"),
+    "error of bending": one(WIRE, "catenary", output={"errors": True}),
+    "contact with itself": one(WIRE, "rod", contact={"self": True}),
+    "two lines": two(),
+    "two lines that touch": two(contact={"friction": 0.2}),
+    "two lines whose zones move": two(WIRE, {"model": "adaptive"}),
+    "two lines and a winch": two(line=WINCH),
+}
+
+
+@pytest.mark.parametrize("static", [True, False])
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_a_scene_calls_is_known_beforehand(kind: str, static: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the kernels that take long to compile: else a machine would be said to be ready while they compile."""
+    called: set[str] = set()
+    taking = KeptCode.taking
+    monkeypatch.setattr(KeptCode, "taking", lambda self, args: (called.add(self._name), taking(self, args))[1])
+    scene = as_scene_or_system(KINDS[kind])
+    if isinstance(scene, hybrid.Scene):
+        known = first_use.kernels_of(scene, static)
+    else:
+        known = first_use.kernels_of_lines(scene, static)
+    hybrid.static(scene) if static else hybrid.run(scene)
+    texts = [x for value in vars(first_use).values() for x in (value if isinstance(value, tuple) else (value,))]
+    large = {x for x in texts if isinstance(x, str) and x.count(".") == 1}
+    assert {"run.in_space", "run.run"} < large
+    before = {first_use.ZONES: first_use.CRITERIA, first_use.STEPS_OF_LINES: first_use.REST_OF_LINES}
+    stood_for = {before[name] for name in known if name in before}  # compiled before those, by the same calls
+    if "zones" in kind:
+        stood_for.add(first_use.STABILITY)  # zones may come out without a rod: nobody knows before
+    assert not (called & large) - set(known) - stood_for
+
+
+def test_an_equilibrium_in_a_plane_asks_for_no_solver_in_space() -> None:
+    """Whose compilation takes longest; in a process of its own, where nothing is compiled or loaded yet."""
+    code = "import hybrid, json, sys; from hybrid.kernels.run import run; hybrid.static(json.loads(sys.argv[1])); "
+    code += "print(len(run.in_plane.signatures), len(run.in_space.signatures), len(run.run.signatures))"
+    done = subprocess.run(
+        [sys.executable, "-c", code, json.dumps(KINDS["rod in a plane"])], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["1", "0", "1"]
