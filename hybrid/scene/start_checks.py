@@ -235,12 +235,17 @@ def _polyline_start(cable: Cable, ends: Ends, initial: Points | Equilibrium, all
     s = initial.arc_lengths if isinstance(initial, Points) else None
     if s is not None:
         yield from _pieces_fit(points, s, length, allowed)
-    elif abs(total - length) > allowed * length:
-        exact = "the length of the inextensible cable"
-        why = exact if allowed == SAME_PLACE else "the length of the cable, within 20 %"
-        expected = f"a polyline {length:.8g} m long, {why}"
-        fix = f"move the points, or make the cable {total:.8g} m long"
-        yield Finding(("initial", "points"), expected, fix, f"{len(points)} points, {total:.8g} m in all")
+    else:
+        borne = min(x.strain_limit for x in cable.sections) if isinstance(initial, Points) else allowed
+        if abs(total - length) > min(allowed, borne) * length:
+            exact = "the length of the inextensible cable"
+            why = exact if allowed == SAME_PLACE else "the length of the cable, within 20 %"
+            if borne < allowed:
+                why = f"the length of the cable, within the {100 * borne:.3g} % that a section bears (max_strain)"
+            expected = f"a polyline {length:.8g} m long, {why}"
+            fix = f"move the points, or make the cable {total:.8g} m long"
+            given = f"{len(points)} points, {total:.8g} m in all"
+            yield Finding(("initial", "points"), expected, fix, given)
     for name, index in (("start", 0), ("end", len(points) - 1)):
         position = ends.held().get(name)
         if position is not None and math.dist(points[index], position) > SAME_PLACE * length:

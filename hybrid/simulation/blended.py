@@ -1,9 +1,12 @@
 """What an end does that the start of a cable does not fit: blended in, with an event that says how.
 
-Motion files that do not start at rest where the end is, and tangents that the initial shape does not have.
+Motion files that do not start at rest where the end is, and tangents that the initial shape does not have; and what the
+line itself does not fit: points that are further apart, or nearer to each other, than it is long.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -11,11 +14,13 @@ from hybrid.kernels.state.state import State
 from hybrid.model.build import Model
 from hybrid.scene.end_loads import Triple
 from hybrid.scene.motion_tables import Motion
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import Points, Scene
 from hybrid.scene.vessel_record import motion_record
 from hybrid.simulation.events import EventLog
 
 AT_REST = 1e-9  # m, deg, m/s or deg/s, below which a record starts at rest
+# Of the strain that a section bears, the part beyond which a line along points starts stretched: 0.1 % of wire.
+DRAWN = 0.02
 
 
 def note_blended(scene: Scene, events: EventLog) -> None:
@@ -48,6 +53,24 @@ def blended_text(where: str, motion: Motion | None, position: Triple | None, tur
         f"the motion of {where} in {record.name} {begins}: it is blended in over {motion.ramp:g} s (ramp), and "
         "followed exactly from then on"
     )
+
+
+def note_drawn(scene: Scene, events: EventLog) -> None:
+    """An event for a line that starts stretched, or compressed, as its points are drawn and its ends do not ask for."""
+    initial, cable, held = scene.initial, scene.cable, scene.ends.held()
+    if not isinstance(initial, Points) or initial.arc_lengths is not None or cable.inextensible:
+        return
+    fits = max(cable.length, math.dist(held["start"], held["end"]) if len(held) == 2 else 0.0)
+    drawn = initial.knots[-1]
+    if abs(drawn - fits) > DRAWN * cable.length * min(x.strain_limit for x in cable.sections):
+        strain = drawn / cable.length - 1.0
+        how = "stretched" if strain > 0.0 else "compressed"
+        text = (
+            f"a line of {cable.length:.6g} m that starts along {drawn:.6g} m of points, {how} by {abs(strain):.2%}: "
+            f"initial.points: expected {fits:.6g} m in all: move the points; or write `kind: equilibrium`, "
+            "and it starts at rest; where it is meant, give initial.arc_lengths"
+        )
+        events.event(0.0, 0.0, cable.length, "implausible", text)
 
 
 def rotate_ends_in(

@@ -20,7 +20,7 @@ from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 from hybrid.scene.system_checks import floating_groups
-from hybrid.simulation.blended import blended_text, rotate_ends_in
+from hybrid.simulation.blended import blended_text, note_drawn, rotate_ends_in
 from hybrid.simulation.contact_start import refuse_start_in_obstacles
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.equilibrium import count_turns, settling
@@ -173,11 +173,12 @@ def begin_as_placed(
 ) -> None:
     """Make a start that is no equilibrium ready, of each line as of one cable: clamps that its shape does not fit are
 
-    reached smoothly, and what lies still on the seabed has the friction that keeps it there.
+    reached smoothly, what is drawn is noted, and what lies still on the seabed has the friction that keeps it there.
     """
     each = zip(model.names, model.models, model.joints, scenes, state.lines, events, strict=True)
     for name, x, joints, scene, one, log in each:
         refuse_start_in_obstacles(x, one, f"lines.{name}.initial")
+        note_drawn(scene, log)
         rotate_ends_in(scene, x, one, log, (joints[0] < 0, joints[1] < 0))
         stepper = Stepper(x.line, x.length, x.tension_scale)
         stepper.static_friction(x.sea.at(0.0), joined_ends(x.ends.at(0.0), joints), one)

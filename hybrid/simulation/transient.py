@@ -27,7 +27,7 @@ from hybrid.model.scales import wave_step
 from hybrid.outputs.joined_lines import Output, outputs_in
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
-from hybrid.simulation.blended import note_blended, rotate_ends_in
+from hybrid.simulation.blended import note_blended, note_drawn, rotate_ends_in
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.contact_start import (
     begin_contact,
@@ -253,6 +253,7 @@ class Transient:
                 self.set_model(model, state_for(model.line))
             state = model.start.copy()
             refuse_start_in_obstacles(model, state)
+            note_drawn(self.scene, self.events)
             rotate_ends_in(self.scene, model, state, self.events)
             if not state.v.any():
                 self.stepper.static_friction(model.sea.at(0.0), model.ends.at(0.0), state)

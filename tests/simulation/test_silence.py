@@ -129,6 +129,32 @@ def test_round_off_of_points_is_no_blow():
     assert np.abs(result.tension[:, 0] / 9810 - 1).max() < 1e-6
 
 
+@pytest.mark.parametrize(("long", "told"), [(100.05, ""), (100.3, "stretched by 0.30%"), (99.0, "compressed by 1.00%")])
+def test_a_line_that_its_points_stretch_says_so(long, told):
+    points = {"initial": {"kind": "points", "points": [[0, 0, 0], [0.9 * long, 0, 0], [long, 0, 0]]}}
+    rope = section(length=100.0, mass=5.0, diameter=0.05, axial_stiffness=1e6, bending_stiffness=10.0)
+    held = {"ends": {"start": pinned(0, 0, 0), "end": "free"}, "model": "rod", "mesh": {"cells": 20}}
+    more = held | {"time": {"duration": 2e-3, "step": 1e-3}}
+    events = [x for x in run(rope, more, points).events if x.kind == "implausible"]
+    assert [told in x.text and "expected 100 m in all" in x.text for x in events] == [True] * bool(told)
+    points["initial"]["arc_lengths"] = [0, 90, 100]
+    assert "implausible" not in kinds(run(rope, more, points))
+    del points["initial"]["arc_lengths"]
+    assert "implausible" not in kinds(static(rope, held, {"initial": points["initial"] | {"kind": "equilibrium"}}))
+
+
+def test_points_that_stretch_a_line_beyond_what_it_bears_are_refused():
+    points = {"initial": {"kind": "points", "points": [[0, 0, 0], [106, 0, 0]]}, "time": {"duration": 1, "step": 1e-3}}
+    ends = {"ends": {"start": pinned(0, 0, 0), "end": "free"}, "model": "catenary"}
+    with pytest.raises(hybrid.SceneError, match=r"within the 5 % that a section bears \(max_strain\)"):
+        run(section(length=100.0, mass=5.0, axial_stiffness=1e6), ends, points)
+    run(
+        section(length=100.0, mass=5.0, axial_stiffness=1e6, max_strain=0.2),
+        ends,
+        points | {"time": {"duration": 1e-3, "step": 1e-3}},
+    )
+
+
 def test_a_record_that_starts_with_an_acceleration(tmp_path):
     t = np.linspace(0, 2, 201)
     rows = np.column_stack([t, 0 * t, 0 * t, 1.5 * t**2])
