@@ -16,6 +16,7 @@ from hybrid.model.sections import bending_stiffness, rotary_inertia, weight
 from hybrid.scene.attachments import Float
 from hybrid.scene.motion_tables import SHIFTS
 from hybrid.scene.schema import Scene, Section
+from hybrid.scene.start_checks import apart_in_motion
 
 G = 9.81  # m/s^2
 # Mean densities of real cables, kg/m^3, with room: from hollow and foamed to solid heavy metal.
@@ -261,11 +262,15 @@ def _limits(section: Section) -> Iterator[Wrong]:
 
 def _too_short(scene: Scene) -> Iterator[tuple[int, str, str]]:
     """Sections that break because the line is shorter than the way between its ends: number, what, and why."""
-    held, length = scene.ends.held(), scene.length
-    apart = math.dist(held["start"], held["end"]) if len(held) == 2 else 0.0
-    sections = scene.cable.sections
+    held, length, sections = scene.ends.held(), scene.length, scene.cable.sections
     paid = any(getattr(end, "payout", None) is not None or not end.is_placed for end in scene.ends.both)
-    if apart <= length or paid:
+    if len(held) < 2 or paid:
+        return
+    apart, when = math.dist(held["start"], held["end"]), ""
+    moved = apart_in_motion(scene.ends, scene.time, length)
+    if moved is not None and moved.distance > apart:
+        apart, when = moved.distance, f" at t = {moved.t:.4g} s"
+    if apart <= length:
         return
     low, high = 0.0, max((x.borne for x in sections if x.stiffness is not None), default=0.0)
     for _ in range(HALVINGS):
@@ -276,7 +281,9 @@ def _too_short(scene: Scene) -> Iterator[tuple[int, str, str]]:
         strain, dense = x.strain(high), x.diameter is not None and x.mass / _area(x) > DENSEST_FIBRE
         breaks = dense and strain > STRAINED and x.stiffness is not None and x.stiffness > x.mass * FAST_WAVE**2
         if x.max_strain is None and x.stretch_table is None and (breaks or high > LONGEST_BORNE * x.mass * G):
-            what = f"a line of {length:.6g} m between ends that are {apart:.6g} m apart: {high:.3g} N at rest, which"
+            what = (
+                f"a line of {length:.6g} m between ends that are {apart:.6g} m apart{when}: {high:.3g} N at rest, which"
+            )
             most = f"{LONGEST_BORNE * x.mass * G:.3g} N: no rope so light bears more"
             most = f"a strain of {STRAINED:.0%}: chain, wire and cables break at little more" if breaks else most
             fix = f"{x.length + apart - length:.6g} m or more"

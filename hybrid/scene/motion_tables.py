@@ -151,6 +151,10 @@ class Motion(Table):
         named = (*SHIFTS, "velocity", "travel", "follow", "vessel")
         return [name for name in named if getattr(self, name) is not None]
 
+    def grown(self, t: float) -> float:
+        """The part of its harmonic motion that has grown at t [s]."""
+        return smooth_step(t / self.ramp)[0] if self.ramp else 1.0
+
     def carried(self, t: float) -> tuple[Triple, Triple]:
         """How far velocity and travel have carried the end at t [s], and how fast they do: m and m/s, inertial."""
         ways: list[tuple[Triple, float, float]] = []  # along which vector, how much of it, how fast

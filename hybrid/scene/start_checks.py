@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import NamedTuple
 
 from hybrid.scene.analysis import Equilibrium, Initial, Points, Straight, Time
 from hybrid.scene.attachments import BendRestrictor, Spread
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import Ends, Triple
+from hybrid.scene.ways import farthest, moving_key, shift, smaller
 
 # Positions that differ by less than this part of the cable's length are the same place:
 # people write six to eight digits.
@@ -77,31 +79,46 @@ def span(cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
 
 
 def span_in_motion(cable: Cable, ends: Ends, time: Time | None) -> Iterator[Finding]:
-    """Two held ends that travel apart farther than the cable joins them, unless line is paid out."""
-    if any(getattr(end, "payout", None) is not None or not end.is_placed for end in ends.both):
+    """Two held ends that move apart farther than the cable joins them, unless line is paid out."""
+    held, found = ends.held(), apart_in_motion(ends, time, cable.length if cable.inextensible else cable.reach)
+    if found is None or too_short(cable, math.dist(held["start"], held["end"])):
         return
+    if (expected := too_short(cable, found.distance)) is None:
+        return
+    given = f"motion to {_at(found.place)} at t = {found.t:.6g} s, {found.distance:.8g} m from the other end"
+    more = f"a longer cable, {found.distance:.6g} m or more, or {smaller(found.key)}"
+    yield Finding(("ends", found.end, "motion", found.key), expected, more, given)
+
+
+class Apart(NamedTuple):
+    """Two ends that are farthest from each other: distance [m] and time [s]; the one that moves, where it is then, by
+
+    which key of its motion.
+    """
+
+    distance: float
+    t: float
+    end: str
+    key: str
+    place: Triple
+
+
+def apart_in_motion(ends: Ends, time: Time | None, within: float = 0.0) -> Apart | None:
+    """When two held ends are farthest from each other; None: they are not held, let go, or another length is paid out.
+
+    within: m, a distance of which only what is beyond is of interest.
+    """
     held = ends.held()
-    motions = {name: ends.named()[name].prescribed_motion for name in held}
-    carriers = {name: m for name, m in motions.items() if m is not None and (m.travel or m.velocity)}
-    if time is None or len(held) < 2 or not carriers or too_short(cable, math.dist(held["start"], held["end"])):
-        return
-    moments = {time.duration}
-    for motion in carriers.values():
-        if motion.travel is not None:
-            moments.add(min(motion.travel.begin + motion.travel.over, time.duration))
-    for t in sorted(moments):
-        there = dict(held)
-        for name, motion in carriers.items():
-            far, _ = motion.carried(t)
-            there[name] = (held[name][0] + far[0], held[name][1] + far[1], held[name][2] + far[2])
-        distance = math.dist(there["start"], there["end"])
-        expected = too_short(cable, distance)
-        if expected is not None:
-            name = "end" if "end" in carriers else "start"
-            key = "travel" if carriers[name].travel is not None else "velocity"
-            given = f"motion to {_at(there[name])} at t = {t:.6g} s, {distance:.8g} m from the other end"
-            yield Finding(("ends", name, "motion", key), expected, "a shorter way, or a longer cable", given)
-            return
+    paid = any(getattr(end, "payout", None) is not None or not end.is_placed for end in ends.both)
+    if time is None or len(held) < 2 or paid or any(end.release is not None for end in ends.both):
+        return None
+    start, end = (x.prescribed_motion for x in ends.both)
+    distance, t = farthest((held["start"], held["end"]), (start, end), time.duration, within)
+    for name, motion in (("end", end), ("start", start)):
+        if motion is not None and (key := moving_key(motion)):
+            (x, y, z), by = held[name], shift(motion, t)
+            return Apart(distance, t, name, key, (x + by[0], y + by[1], z + by[2]))
+    return None
 
 
 # --- where the cable starts --------------------------------------------------------------------

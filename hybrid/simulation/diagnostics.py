@@ -152,7 +152,11 @@ def stretch_text(model: Model, state: State) -> str:
     """How far the cable is stretched or compressed (a negative strain), and how far it may be."""
     cell = most_stretched(model, state)
     strain, borne = np.linalg.norm(state.e[cell]) / model.line.h[cell] - 1.0, borne_strain(model)[cell]
-    return f"a strain of {100.0 * strain:.3g} % under {state.T[cell]:.4g} N, where max_strain is {100.0 * borne:.3g} %"
+    text = f"a strain of {100.0 * strain:.3g} % under {state.T[cell]:.4g} N, where max_strain is {100.0 * borne:.3g} %"
+    apart, length = float(np.linalg.norm(state.r[-1] - state.r[0])), float(model.line.h.sum())
+    if strain < 0.0 or apart <= length:
+        return text
+    return f"{text}; its ends are {apart:.6g} m apart, and it is {length:.6g} m long: too short for where they are"
 
 
 class Diagnostics:
