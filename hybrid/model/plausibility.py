@@ -64,8 +64,9 @@ AXIAL_OF_A_PIPE, BENDING_OF_A_PIPE = (0.2, 500.0), (0.2, 5.0)
 WIDEST_INERTIA = 2.0
 # A line at rest sinks into real beds by less than this many of its diameters, or by less than half a metre.
 DEEPEST_TRENCH = (10.0, 0.5)
-# Speed of an end in a liquid, m/s, by its amplitudes and periods: twice that of the fastest ships.
-FASTEST_END = 40.0
+# Speed of an end in a liquid, m/s, by its amplitudes and periods: twice that of the fastest ships.  Force at an end, N,
+# that the strongest moorings bear.
+FASTEST_END, STRONGEST_LINE = 40.0, 1e8
 
 HALVINGS = 60  # of the range of a tension, to round-off
 
@@ -81,7 +82,7 @@ class Note(NamedTuple):
 def implausible(scene: Scene) -> Iterator[Note]:
     """Numbers that are more likely in another unit."""
     whole = (0.0, scene.length)
-    for what, why in (*_water(scene), *_bed(scene), *_motions(scene)):
+    for what, why in (*_water(scene), *_bed(scene), *_motions(scene), *_loads(scene)):
         yield Note(what, why, whole)
     for at, what, why in _floats(scene):
         yield Note(what, why, (at, at))
@@ -161,6 +162,16 @@ def _motions(scene: Scene) -> Iterator[tuple[str, str]]:
             if key in SHIFTS and speed > FASTEST_END:
                 why = f"expected at most {FASTEST_END:g} m/s: is the amplitude in m and the period in s?"
                 yield f"an end that moves at {speed:.3g} m/s", f"ends.{name}.motion.{key}: {why}"
+
+
+def _loads(scene: Scene) -> Iterator[tuple[str, str]]:
+    """Forces at ends that no line holds."""
+    for name, end in scene.ends.named().items():
+        for load in end.loads:
+            force = max(math.hypot(*value) for value in load.values)
+            if load.what == "force" and force > STRONGEST_LINE:
+                why = f"expected at most {STRONGEST_LINE:g} N, which the strongest moorings bear: is it in N?"
+                yield f"a force of {force:.3g} N at an end", f"ends.{name}.{'.'.join(load.key)}: {why}"
 
 
 # What is wrong with a section: what, the key, and why.

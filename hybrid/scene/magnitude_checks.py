@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 # No solid has a coefficient of friction of 10; a chain in gravel reaches 1.
 ROUGHEST = 10.0
-# N; the strongest moorings bear some 1e8.  Far above it, so that scenes in units of their own are none of its matter.
+# N; what is beyond the 1e8 that the strongest moorings bear is noted (model/plausibility.py), and far above it refused:
+# scenes in units of their own are none of its matter.
 LARGEST_FORCE = 1e13
 # Times at which a motion near the seabed is looked at: to a period, and in all.
 TO_A_PERIOD, MOST_TIMES = 24, 4000
@@ -45,7 +46,7 @@ def end_forces(ends: Ends) -> Iterator[Finding]:
         for load in end.loads:
             force = max(math.hypot(*value) for value in load.values)
             if load.what == "force" and force > LARGEST_FORCE:
-                expected = f"less than {LARGEST_FORCE:g} N: the strongest moorings bear 1e8 N"
+                expected = f"less than {LARGEST_FORCE:g} N, a hundred thousand times what the strongest moorings bear"
                 yield Finding(
                     ("ends", name, *load.key), expected, "check the number; forces are in N", f"{force:.4g} N"
                 )

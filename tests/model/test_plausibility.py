@@ -265,3 +265,20 @@ REAL = {
 @pytest.mark.parametrize("name", REAL)
 def test_real_lines_are_not_called_implausible(name: str) -> None:
     assert list(implausible(scene(REAL[name]))) == []
+
+
+@pytest.mark.parametrize(
+    ("force", "verdict"), [(0.99e8, ""), (1.01e8, "noted"), (0.99e13, "noted"), (1.01e13, "refused")]
+)
+def test_a_force_at_an_end_is_noted_from_where_the_page_says(force: float, verdict: str) -> None:
+    page = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
+    assert "less than 1e+13 N" in page and "From 1e8 N on it is accepted, and [implausible]" in page
+    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": [force, 0, 0]}}
+    if verdict == "refused":
+        with pytest.raises(SceneError, match=r"ends\.end\.force(?s:.*)less than 1e\+13 N"):
+            scene(ends=ends)
+        return
+    noted = [x for x in implausible(scene(ends=ends)) if "at an end" in x.what]
+    assert [x.why for x in noted] == (
+        ["ends.end.force: expected at most 1e+08 N, which the strongest moorings bear: is it in N?"] if verdict else []
+    )
