@@ -103,6 +103,7 @@ class Bound(NamedTuple):
 def bounds_of(asked: RequestedAccuracy, run: RunSample) -> list[Bound]:
     """What is asked of a run that has it."""
     bounds: list[Bound] = []
+    step = run.resolution.step if run.steps > 1 else 0.0
     if asked.position is not None:
         position = asked.sized(run.reach).position if asked.of_motion is not None else asked.position
         assert position is not None
@@ -111,7 +112,7 @@ def bounds_of(asked: RequestedAccuracy, run: RunSample) -> list[Bound]:
         if asked.tension is not None:
             bounds.append(Bound(name, "N", asked.tension))
         if asked.of_end_force is not None:
-            size = max(asked.of_end_force * run.largest_end_force, asked.round_off("N"))
+            size = max(asked.of_end_force * run.largest_end_force, asked.round_off("N", step))
             bounds.append(Bound(name, "N", size, run.largest_end_force))
     for name, unit, part in (
         ("curvature", "1/m", asked.of_curvature), ("bending_moment", "N m", asked.of_moment),
@@ -119,7 +120,7 @@ def bounds_of(asked: RequestedAccuracy, run: RunSample) -> list[Bound]:
     ):  # fmt: skip
         if part is not None and name in run.values:
             largest = run.largest(name)
-            bounds.append(Bound(name, unit, max(part * largest, asked.round_off(unit)), largest))
+            bounds.append(Bound(name, unit, max(part * largest, asked.round_off(unit, step)), largest))
     for x in (limit.at(run.places) for limit in asked.limits):
         if x.quantity in run.values:
             used = _used(x, run)

@@ -52,8 +52,9 @@ TURN, MOST_TURN = 1.0, 2.0
 # soon more than cells and steps are; of an equilibrium, whose errors need not fall evenly.
 MOST_REFINEMENTS, IRREGULAR_REFINEMENTS, REFINEMENTS_AT_REST = 3, 1, 6
 # Part of the force, the moment and the curvature typical of a scene below which an error is one of round-off: parts of
-# a force that is nothing are not asked for.
-ROUND_OFF = 1e-12
+# a force that is nothing are not asked for.  The same of the tension that would stretch a line by its length, and of a
+# length that inertia must account for in a step (kernels.step.newton, by which a step with more does not converge).
+ROUND_OFF, OF_STRETCH, OF_LENGTH, MOST_NOISE = 1e-12, 1e-15, 2.5e-16, 1e-3
 # Half the diameter of a line that gives none, as a part of its length: no position is asked finer by a part of motion.
 SLENDER = 1e-4
 # Least steps to a run, and the shortest step, as a part of the longest, before a step counts as failed.
@@ -113,6 +114,8 @@ class RequestedAccuracy:
     along: bool = False  # whether values along the line are asked by name, which cells and zones follow
     why: str = ""  # why curvature is asked that is not named
     limits: tuple[Limited, ...] = ()
+    stiffness: float = 0.0  # N, the largest axial stiffness; 0: nothing stretches, or not known
+    mass: float = 0.0  # kg, of the line; 0: not known
 
     def sized(self, reach: Reach) -> RequestedAccuracy:
         """The same with the position in m, by how far the line moves."""
@@ -126,10 +129,17 @@ class RequestedAccuracy:
         """The part beyond which an error that nobody asks for is worth a word."""
         return self.every or ROUGHEST
 
-    def round_off(self, unit: str) -> float:
-        """Error of a quantity in N, N m or 1/m that numbers of this scene have by round-off alone."""
+    def round_off(self, unit: str, step: float = 0.0) -> float:
+        """Error of a quantity in N, N m or 1/m that numbers of this scene have by round-off alone.
+
+        step: s, of a run; 0: of an equilibrium.
+        """
         scales = {"N": self.force, "N m": self.force * self.length, "1/m": 1.0 / self.length if self.length else 0.0}
-        return ROUND_OFF * scales.get(unit, 0.0)
+        least = ROUND_OFF * scales.get(unit, 0.0)
+        if unit != "N":
+            return least
+        by_step = OF_LENGTH * self.length * self.mass * (2.0 / step) ** 2 if step else 0.0
+        return max(least, OF_STRETCH * self.stiffness, min(by_step, MOST_NOISE * self.force))
 
     def asks(self, name: str) -> bool:
         """Whether an output is asked for: position, tension (of the line), curvature, bending_moment, an end force."""
@@ -280,7 +290,8 @@ def requested_accuracy(scene: Scene) -> RequestedAccuracy | None:
     return RequestedAccuracy(
         position, tension, of_end_force, curvature, moment, line_tension, accuracy.instant is not None,
         tension_scale(scene, scene.cable.sections, True), scene.length, every, of_motion, least, along, why,
-        _limits(scene, min(parts, default=ONE)),
+        _limits(scene, min(parts, default=ONE)), max(x.stiffness or 0.0 for x in scene.cable.sections),
+        sum(x.mass * x.length for x in scene.cable.sections),
     )  # fmt: skip
 
 

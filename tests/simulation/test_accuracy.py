@@ -18,7 +18,7 @@ from hybrid.accuracy.error_report import error_fields
 from hybrid.accuracy.error_statistics import statistics_of
 from hybrid.accuracy.errors_by_cause import Errors
 from hybrid.accuracy.finer_result import Judged
-from hybrid.accuracy.refinement import OF_MODEL, Free, Verdict, costly, judge, not_converged, refined
+from hybrid.accuracy.refinement import OF_MODEL, Free, Verdict, bounds_of, costly, judge, not_converged, refined
 from hybrid.cli.console import Console
 from hybrid.cli.tables import errors_facts, errors_table, extremes_facts, extremes_table
 from hybrid.errors import SceneError
@@ -556,7 +556,7 @@ def test_what_is_missed_is_named_with_what_is_met():
 
     largest = {"position": 0.013, "end_force_start": 7.0, "end_force_end": 9.4}
     errors = SimpleNamespace(largest=lambda cause, name: largest[name] if cause == "total" else 0.0)
-    run = SimpleNamespace(largest_end_force=200.0, values={})
+    run = SimpleNamespace(largest_end_force=200.0, values={}, steps=1)
     asked = RequestedAccuracy(0.01, None, 0.01)
     assert judge(asked, errors, run).reached == "position: 0.015 m, tension: 5.2%"
     run.largest_end_force = 20.0  # more than a tenth of it can only be asked in newtons
@@ -838,3 +838,12 @@ def test_the_spline_through_outputs_is_that_of_scipy(count):
     x, y = np.cumsum(g.uniform(0.1, 1.0, count)), g.normal(size=count)
     at = np.append(g.uniform(x[0], x[-1], 40), x)
     np.testing.assert_allclose(cubic_spline(x, y, at), CubicSpline(x, y)(at), rtol=0.0, atol=1e-12)
+
+
+def test_a_part_of_a_tension_is_asked_down_to_its_round_off_and_no_further():
+    """Of 1e7 N of stiffness a strain of 1e-15; of 5 kg and 10 m in steps of 0.01 s their inertia; a real one in full."""
+    asked = RequestedAccuracy(None, None, 0.05, force=25.0, length=10.0, stiffness=1e7, mass=50.0)
+    for force, steps, size in ((1e-12, 1, 1e-8), (1e-12, 100, 1e-8), (0.1, 100, 0.005)):
+        run = RunSample(Resolution(1.0, 0.01, 1e-3, 1e-3), {"reaction_end": np.array([[force, 0, 0]])}, 50, steps, 0.0)
+        assert [x.size for x in bounds_of(asked, run)] == pytest.approx([size] * 2)  # at both ends
+    assert asked.round_off("N", 1e-3) == pytest.approx(2.5e-16 * 500.0 * 4e6) and asked.round_off("N m") == 2.5e-10
