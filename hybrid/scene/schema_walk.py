@@ -103,6 +103,15 @@ def follow(root: type[Table], loc: Place) -> Spot:
 
 def tables_at(root: type[Table], path: Place) -> list[type[Table]]:
     """The tables that any branch of the schema has at `path`."""
+    return [table for a in _types_at(root, path) for table in tables(a)]
+
+
+def takes_names(root: type[Table], path: Place) -> bool:
+    """Whether what is at `path` may be a table whose keys are names."""
+    return any(_named(a) for a in _types_at(root, path))
+
+
+def _types_at(root: type[Table], path: Place) -> list[Any]:
     annotations: list[Any] = [root]
     for part in path:
         if isinstance(part, int) or any(_named(a) for a in annotations):
@@ -111,7 +120,7 @@ def tables_at(root: type[Table], path: Place) -> list[type[Table]]:
             found = [t.model_fields.get(t.former.get(part, part)) for a in annotations for t in tables(a)]
             annotations = [field.annotation for field in found if field is not None]
         annotations = [a for a in annotations if a is not None]
-    return [table for a in annotations for table in tables(a)]
+    return annotations
 
 
 def keys_at(root: type[Table], path: Place) -> list[str]:

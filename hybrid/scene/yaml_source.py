@@ -13,7 +13,7 @@ from typing import Any
 
 from hybrid.errors import Complaint
 from hybrid.scene.base import Place, Table, dotted
-from hybrid.scene.schema_walk import keys_at, shorthand_keys, tables_at
+from hybrid.scene.schema_walk import keys_at, shorthand_keys, tables_at, takes_names
 from hybrid.scene.suggestions import decimal_comma, did_you_mean
 from hybrid.scene.yaml_nodes import READABLE, WRITE_OUT, TooDeep, composed
 
@@ -251,7 +251,10 @@ def from_data(data: Any) -> Node:
 
 
 def override(root: Node, text: str, schema: type[Table]) -> Complaint | None:
-    """Set one value of the tree, ``cable.sections[0].mass=2``; the complaint if that cannot be."""
+    """Set one value of the tree, ``cable.sections[0].mass=2``; the complaint if that cannot be.
+
+    A whole entry is added where keys are names, ``points.c={position: [0, 0, 0]}``; null takes a key or entry out.
+    """
     name, equals, value_text = text.partition("=")
     name = name.strip()
     if not equals or not _PATH.fullmatch(name):
@@ -278,17 +281,27 @@ def override(root: Node, text: str, schema: type[Table]) -> Complaint | None:
             refusal = f"the number of an entry of {dotted(path[:depth])} in brackets, counted from 0", fix
         else:
             known = keys_at(schema, path[:depth])
-            if not known and isinstance(here.value, dict):  # a table whose keys are names
-                known = list(here.value)
-            refusal = _no_key(here, path[:depth], part, known)
+            named = not known and takes_names(schema, path[:depth]) and isinstance(here.value, dict)
+            if named and (part in here.value or (depth == len(path) - 1 and value.value is not None)):
+                refusal = None
+            elif named:
+                whole = f"{dotted(path[: depth + 1])}={{...}} adds it, with all of its keys"
+                fix = f"{did_you_mean(part, list(here.value))}; {whole}" if here.value else whole
+                refusal = f"an entry of {dotted(path[:depth])} that exists", fix
+            else:
+                refusal = _no_key(here, path[:depth], part, known)
         if refusal is not None:
             return Complaint(name, text, *refusal)
         if isinstance(part, str):
             part = _spelling(here.value, part, tables_at(schema, path[:depth]))
         if depth == len(path) - 1:
-            here.value[part] = value
             here.key_places.pop(str(part), None)
-        elif isinstance(part, str) and part not in here.value:
+            if value.value is None and value.written and isinstance(part, str):
+                here.value.pop(part, None)
+            else:
+                here.value[part] = value
+            return None
+        if isinstance(part, str) and part not in here.value:
             here.value[part] = Node({}, None, note="override")
         here = here.value[part]
     return None

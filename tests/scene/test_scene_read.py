@@ -295,6 +295,44 @@ def test_override_below_a_word() -> None:
     assert parse_scene(text, overrides=["model.slack=warn"]).model == CatenaryModel(slack="warn")
 
 
+def test_named_entries_are_added_whole_and_null_takes_out() -> None:
+    more = [
+        "output.quantities.pull={kind: horizontal_force, end: start}",
+        "obstacles.pile={kind: sphere, at: [0, 9, 0], radius: 1}",
+    ]
+    more += ["cable.sections[0].diameter=2e-3"]
+    scene = parse_scene(SUSPENSION, overrides=more)
+    assert list(scene.output.quantities) == ["pull"] and list(scene.obstacles) == ["pile"]
+    bare = parse_scene(SUSPENSION, overrides=[*more, "obstacles=null", "output.quantities.pull=null"])
+    assert not bare.obstacles and not bare.output.quantities
+    chain = "cable: {sections: [{length: 9, mass: 1}]}\nends: {start: {kind: pinned, position: [0, 0, 0]}, end: free}\ninitial: equilibrium\nmodel: catenary"
+    for gone in ("environment=null", "environment.gravity=~"):
+        scene = parse_scene(chain, overrides=["environment={gravity: 1.6}", gone])
+        assert scene.environment.gravity == 9.81
+
+
+def test_a_key_that_has_to_be_there_is_asked_for_where_null_takes_it_out() -> None:
+    (complaint,) = complaints(SUSPENSION, ("cable=null",))
+    assert complaint.where == "cable" and "add `cable: {sections: ...}`" in complaint.fix
+
+
+def test_points_and_lines_are_added_whole() -> None:
+    section = "sections: [{length: 300, mass: 5, axial_stiffness: 1.0e+7}]"
+    text = f"points: {{a: {{position: [0, 0, 0]}}, b: {{position: [9, 0, 0]}}}}\nlines: {{x: {{start: a, end: b, {section}}}}}"
+    more = ["points.c={position: [1, 9, 0]}", f"lines.y={{start: b, end: c, {section}}}"]
+    system, _ = parse_either(text, overrides=more)
+    assert isinstance(system, System) and (list(system.points), list(system.lines)) == (["a", "b", "c"], ["x", "y"])
+    system, _ = parse_either(text, overrides=[*more, "lines.y=null", "points.c=null"])
+    assert isinstance(system, System) and (list(system.points), list(system.lines)) == (["a", "b"], ["x"])
+    for override, told in (
+        ("points.bb.position=[1, 9, 0]", "did you mean b?; points.bb={...} adds it, with all of its keys"),
+        ("points.bb=null", "did you mean b?"), ("obstacles.o.kind=plane", "obstacles.o={...} adds it"),
+    ):  # fmt: skip
+        with pytest.raises(SceneError) as refused:
+            parse_either(text, overrides=[override])
+        assert told in refused.value.complaints[0].fix
+
+
 OVERRIDES = {
     "time.stp=1": ("time.stp", "did you mean step?"),
     "tme.step=1": ("tme.step", "did you mean time?"),
