@@ -92,5 +92,8 @@ def _tables(found: list[Derivative]) -> Any:
 
 
 def _keys(found: list[Derivative], way: str) -> str:
-    """By which numbers derivatives were found in a way."""
-    return ", ".join(dict.fromkeys(x.by for x in found if x.way == way))
+    """By which numbers derivatives were found in a way; results, where these are what tells ways apart."""
+    own = [x for x in found if x.way == way]
+    results = dict.fromkeys(x.of for x in own)
+    of_results = sum(x.of in results for x in found) == len(own)
+    return ", ".join(results if of_results else dict.fromkeys(x.by for x in own))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybrid.designs.component_ports import NOTHING, inputs_of, outputs_of, refuse_ports
 from hybrid.designs.design import task_of
+from hybrid.designs.edges import refuse_edges
 from hybrid.designs.problem import as_asked, problem_of, refused_result
 from hybrid.errors import SceneError
 from hybrid.scene.design import Design
@@ -45,6 +46,7 @@ def openmdao_component(
     task, scene = task_of(source, unknowns, more)
     refuse_ports(task)
     asked = as_asked(scene, task)
+    refuse_edges(asked, [x.quantity for x in task.asked.targets.values()])  # a design takes them as they are
     problem = problem_of(task, asked)
     try:
         problem.equilibria.at(problem.space.start)

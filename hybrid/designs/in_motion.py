@@ -17,8 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.designs.edges import refuse_edges
 from hybrid.designs.line_at_rest import AXES, refuse_parts
-from hybrid.designs.numbers import PLACE, length_of, number_of, refuse_computing, scene_with
+from hybrid.designs.numbers import at_a_bound, number_of, scene_with, size_of
 from hybrid.designs.peaks import over_time, peaks, smoothed
 from hybrid.designs.replay import Course, course_of, replay, with_outputs
 from hybrid.designs.tangents import Others, Seen, Unfollowed, step_of
@@ -35,8 +36,6 @@ OF_SECTION = re.compile(r"^sections\[(\d+)\]$")
 PARTS = (1e-3, 2e-3)
 # How derivatives were found.
 TANGENTS, DIFFERENCES = "tangents along the steps", "differences of runs"
-# Coordinates differ by parts of this part of the longest line.
-OF_LENGTH = 0.1
 # Error of tangents that equations give to one side, in parts of a number by which another line differs from the line; a
 # result that answers by less than this, in parts by parts, has it of this.
 ONE_SIDED, WEAK = 1.5, 0.04
@@ -83,6 +82,7 @@ def in_motion(asked: Scene | System, of: Sequence[str], by: Sequence[str]) -> Sl
     SceneError: no such key or result; ComputationError: a run fails, or steps or zones of runs with other numbers are
     not those of the base run.
     """
+    refuse_edges(asked, of)
     wanted, course = [parse_history(asked, x) for x in of], course_of(asked)
     numbers = {key: number_of(asked, key) for key in by}
     sizes = {key: size_of(asked, key, number) for key, number in numbers.items()}
@@ -115,7 +115,12 @@ def by_tangents(
     steps = {key: step_of(key, sizes[key]) for key in numbers}
 
     def other(key: str, d: float) -> Scene:
-        return scene_with(asked, [(key,)], np.array([numbers[key] + d]))
+        try:
+            return scene_with(asked, [(key,)], np.array([numbers[key] + d]))
+        except SceneError as error:
+            if numbers[key] == 0.0:
+                raise at_a_bound(key, 0.0) from error
+            raise
 
     pairs = [(other(key, h), other(key, -h)) for key, h in steps.items()]
     base, values, off = followed(asked, wanted, course, pairs, [*steps.values()])
@@ -167,14 +172,6 @@ def by_differences(
         slopes[i] = (4.0 * found[0] - found[1]) / 3.0
         errors[i] = np.abs(slopes[i] - found[0])
     return Slopes(base.values, slopes, errors, len(numbers) * (DIFFERENCES,))
-
-
-def size_of(asked: Scene | System, key: str, number: float) -> float:
-    """What runs differ by parts of; SceneError: a number of how the scene is computed, which has no derivative."""
-    refuse_computing(key)
-    if PLACE.search(key):
-        return OF_LENGTH * length_of(asked)
-    return abs(number) or 1.0
 
 
 def parse_history(asked: Scene | System, text: str) -> Wanted:

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.designs.edges import NAMES as EDGES
 from hybrid.designs.equilibria import AnyScene
 from hybrid.designs.motions import IN_MOTION
 from hybrid.designs.problem import cable_of
-from hybrid.designs.sensitivity import EDGES
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES

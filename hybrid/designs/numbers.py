@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar, cast
@@ -25,6 +26,9 @@ OF_NUMBER, OF_LENGTH, LENGTH = 1e-4, 1e-5, re.compile(r"\blength$")
 PLACE = re.compile(r"(position\[\d\]|centre\[\d\]|\.z|\.surface|\.at\[\d\]|\.depth\[\d+\]\[\d+\])$")
 TOUCHED = re.compile(r"^(obstacles|environment\.seabed)\.(?!.*(stiffness|damping|friction|soil))|\.surface$")
 OF_TOUCHED = 3e-8
+# What runs, and equilibria far apart, differ by parts of: of coordinates this part of the longest line, of angles (deg)
+# at least a radian.
+PART_OF_LENGTH, RADIAN = 0.1, math.degrees(1.0)
 # Tables of how a scene is computed and written, and of what has names of its own.
 COMPUTING = ("time", "output", "mesh", "accuracy", "model", "resolution")
 NAMED = ("lines", "points", "bodies", "obstacles")
@@ -64,9 +68,25 @@ def refuse_computing(key: str) -> None:
         raise SceneError([Complaint("by", key, expected, "cable.sections[0].length, for example")])
 
 
+def at_a_bound(key: str, number: float) -> SceneError:
+    """A number that may not be a little more, or less."""
+    fix = f"another number than {number:g}, which is the least or the largest that it may be"
+    return SceneError([Complaint("by", key, "a number that may be a little more, and less", fix)])
+
+
 def length_of(scene: Scene | System) -> float:
     """Of the longest line, m."""
     return max(x.cable.length for x in scene.lines.values()) if isinstance(scene, System) else scene.length
+
+
+def size_of(asked: Scene | System, key: str, number: float) -> float:
+    """What runs differ by parts of; SceneError: a number of how the scene is computed, which has no derivative."""
+    refuse_computing(key)
+    if PLACE.search(key):
+        return PART_OF_LENGTH * length_of(asked)
+    if unit_of_key(asked, key) == "deg":
+        return max(abs(number), RADIAN)
+    return abs(number) or 1.0
 
 
 def unit_of_key(scene: Scene | System, key: str) -> str:

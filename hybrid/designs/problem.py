@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybrid.designs.edges import is_edge
 from hybrid.designs.equilibria import AnyScene, Equilibria, Point
 from hybrid.designs.motions import IN_MOTION
 from hybrid.designs.nearest import Space
 from hybrid.designs.numbers import PART as KEY_PART
 from hybrid.designs.numbers import computing, number_of
-from hybrid.designs.sensitivity import EDGES
 from hybrid.errors import SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
@@ -318,8 +318,7 @@ def _moved(task: TaskFile[Design], at: Place, error: SceneError) -> SceneError:
 
 def _result(task: TaskFile[Design], at: Place, asked: OfEquilibrium, take: str, scene: AnyScene) -> str:
     """A result as `hybrid.sensitivity` names it; SceneError: the scene has no such line or section."""
-    quantity = asked.quantity.split(".")[0]
-    if quantity in EDGES and at[0] != "targets":
+    if at[0] != "targets" and is_edge(scene, asked.quantity):
         fix = "a target, which takes it as it is"
         expected = "a result that changes evenly: where contact begins goes by the nodes that come to the bed"
         raise task.refusal([Finding((*at, "quantity"), expected, fix)])

@@ -10,11 +10,13 @@ from typing import Any, NamedTuple, overload
 import numpy as np
 
 from hybrid.designs.cable_at_rest import NO_PLACES, CableAtRest, Places
+from hybrid.designs.edges import WAY as BY_CELLS
+from hybrid.designs.edges import by_cells, is_edge
 from hybrid.designs.in_motion import in_motion
 from hybrid.designs.line_at_rest import parse_result
 from hybrid.designs.numbers import number_of, refuse_computing
 from hybrid.designs.system_at_rest import SystemAtRest
-from hybrid.errors import Complaint, SceneError
+from hybrid.errors import ComputationError, Outcome
 from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
@@ -25,8 +27,6 @@ from hybrid.studies.sensitivity import sensitivity as of_study
 # that is never said to be known: 60 to 120 cells of a leg are off by 0.5 to 1.7 %.
 OF_DIFFERENCE, ON_BED = 0.4, 0.01
 AT_REST = "factors of the equilibrium"  # the way to derivatives of one
-# Results that go by where contact begins.
-EDGES = ("touchdown", "touchdown_position", "grounded_length")
 
 
 class Derivative(NamedTuple):
@@ -68,33 +68,39 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
         return of_study(scene, of)
     asked = as_scene_or_system(scene)
     numbers = [number_of(asked, key) for key in by]
+    edges = [] if motion else [k for k, x in enumerate(of) if is_edge(asked, x)]
     if motion:
         values, found, errors, ways = in_motion(asked, of, by)
     else:
-        refuse_edges(of)
         for key in by:
             refuse_computing(key)
-        fine, ways = at_rest(asked, of), len(by) * (AT_REST,)
+        fine, ways = at_rest(asked, of), len(by) * (way_at_rest(asked),)
         values, found = fine.values, fine.by(by)
         errors = OF_DIFFERENCE * np.abs(found - at_rest(asked, of, 2.0).by(by))
         if asked.environment.seabed is not None:  # there it goes up and down with the cells: two may be alike by chance
             errors = np.maximum(errors, ON_BED * np.abs(found))
+        if edges:
+            names = [of[k] for k in edges]
+            if lost := [of[k] for k in edges if not math.isfinite(values[k])]:
+                raise ComputationError(Outcome.NOT_REACHED, None, None, f"{lost[0]} has no value in the equilibrium")
+            for i, key in enumerate(by):
+                each = by_cells(asked, fine, key, lambda x: at_rest(x, names, 1.0, fine.places).values)
+                found[i, edges], errors[i, edges] = each
     out = []
     for i, (key, number) in enumerate(zip(by, numbers, strict=True)):
         for k, name in enumerate(of):
             value, result = float(found[i, k]), float(values[k])
             elastic = value * number / result if result != 0.0 and number != 0.0 else math.nan
-            out.append(Derivative(name, key, result, number, value, elastic, float(errors[i, k]), ways[i]))
+            way = BY_CELLS if k in edges else ways[i]
+            out.append(Derivative(name, key, result, number, value, elastic, float(errors[i, k]), way))
     return out
 
 
-def refuse_edges(of: Sequence[str]) -> None:
-    """Where contact begins and ends moves from node to node: the line of cells has no derivative that means it."""
-    for text in of:
-        name = text.split("@")[0].split("/")[-1].split(" ")[-1].split(".")[0]
-        if name in EDGES:
-            expected = "a result that changes evenly: where contact begins goes by the nodes that come to the bed"
-            raise SceneError([Complaint("of", text, expected, "compare two `hybrid static`; `hybrid seek` finds it")])
+def way_at_rest(asked: Scene | System) -> str:
+    """The way to derivatives at rest, with what is left out of them."""
+    bed = asked.environment.seabed
+    rubs = [x for x in (bed and bed.friction, *(y.friction for y in asked.obstacles.values())) if x]
+    return f"{AT_REST}, friction left out" if rubs else AT_REST
 
 
 def at_rest(

@@ -17,9 +17,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.stats import pearsonr
 
+from hybrid.designs.edges import refuse_edges
 from hybrid.designs.in_motion import in_motion
 from hybrid.designs.numbers import AnyScene
-from hybrid.designs.sensitivity import at_rest, refuse_edges
+from hybrid.designs.sensitivity import at_rest
 from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.outputs.probes import PROBES
@@ -144,7 +145,7 @@ def _slopes(scene: AnyScene, text: str, keys: Mapping[str, list[str]], static: b
     """(P,) derivatives of a result by variables, each of which sets its keys."""
     each = [key for group in keys.values() for key in group]
     if static:
-        refuse_edges([text])
+        refuse_edges(scene, [text])
         by_key = at_rest(scene, [text]).by(each)[:, 0]
     else:
         by_key = in_motion(scene, [text], each).derivatives[:, 0]

@@ -19,7 +19,7 @@ from hybrid.designs.cable_at_rest import NO_PLACES, Places, same_places
 from hybrid.designs.factors import Factors
 from hybrid.designs.gradients import Gradients
 from hybrid.designs.line_at_rest import LEFT_OUT, NO_FRAMES, Beside, LineAtRest, Wanted, moment_on_body, parse_result
-from hybrid.designs.numbers import OfScene, is_allowed_line, with_number
+from hybrid.designs.numbers import OfScene, at_a_bound, is_allowed_line, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
@@ -232,8 +232,7 @@ class SystemAtRest(OfScene):
             try:
                 changed = self._changed(scene, key)
             except Invalid:
-                fix = f"another number than {number:g}, which is the least or the largest that it may be"
-                raise SceneError([Complaint("by", key, "a number that may be a little more, and less", fix)]) from None
+                raise at_a_bound(key, number) from None
             both = zip(self._names, changed.lines, self.lines, strict=True)
             others = [name for name, x, line in both if not same_places(x.model, line.model)]
             if not found and not all(is_allowed_line(scene, name) for name in others):

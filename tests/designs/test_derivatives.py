@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from typer.testing import CliRunner
 
 import hybrid
@@ -336,10 +337,61 @@ def test_the_error_of_a_derivative_on_a_bed_covers_it():
         assert abs(found.derivative - fine) < 1.5 * found.error < 0.15 * abs(fine)
 
 
-@pytest.mark.parametrize("of", ["touchdown", "grounded_length", "touchdown_position.x"])
-def test_where_contact_begins_has_no_derivative(of):
+def lies(length: float, far: float, stretch: float) -> float:
+    """Length on a hard level bed of a chain whose upper end is 95 m above it and `far` m from its anchor.
+
+    stretch: w / EA, 1/m; elastic catenary (on the bed the pull is the same all along it).
+    """
+
+    def too_far(a: float) -> float:  # pull over weight, m
+        hung = hanging(a)
+        return length - hung + a * math.asinh(hung / a) + stretch * a * length - far
+
+    def hanging(a: float) -> float:
+        return brentq(lambda x: math.hypot(a, x) - a + 0.5 * stretch * x * x - 95.0, 1.0, length, xtol=1e-12)
+
+    return length - hanging(brentq(too_far, 10.0, 500.0, xtol=1e-12))
+
+
+@pytest.mark.parametrize("cells", [60, 100, 121])
+def test_where_contact_begins_answers_as_the_line_does(cells):
+    """From node to node it would answer by half of that: of a probe and of quantities of the scene, by a length, a place
+
+    and what does nothing to it.
+    """
+    tables = chain_leg(cells)
+    kinds = {"lie": {"kind": "touchdown", "end": "end"}, "far": {"kind": "layback", "end": "end"}}
+    tables["output"] = {"quantities": kinds}
+    keys = ["cable.sections[0].length", "ends.end.position[0]", "environment.seabed.stiffness"]
+    found = {(x.of, x.by): x for x in hybrid.sensitivity(tables, ["touchdown", "lie", "far", "tension@end"], keys)}
+    stretch, d = G * (100 - 1025 * math.pi * 0.03 * 0.12) / 5e8, 1e-3
+    exact = (lies(400 + d, 370, stretch) - lies(400 - d, 370, stretch)) / (2 * d)
+    by_place = (lies(400, 370 + d, stretch) - lies(400, 370 - d, stretch)) / (2 * d)
+    for of, by, value in (("touchdown", keys[0], exact), ("lie", keys[0], exact), ("far", keys[0], -exact),
+                          ("lie", keys[1], by_place), ("far", keys[1], 1.0 - by_place)):  # fmt: skip
+        one = found[of, by]
+        assert abs(one.derivative - value) < one.error + 0.01 * abs(value)
+        assert one.error < 0.1 * abs(value) and one.way == "differences of equilibria, from cell to cell"
+    still = found["lie", keys[2]]
+    assert still.error == abs(still.derivative) and abs(still.elasticity) < 0.01
+    assert found["tension@end", keys[0]].way == "factors of the equilibrium"
+
+
+@pytest.mark.parametrize("of", ["last touchdown", "mean far", "max touchdown_position.x"])
+def test_where_contact_begins_in_a_motion_has_no_derivative(of):
+    tables = chain_leg(60) | {"time": {"duration": 1.0, "step": 0.1}}
+    tables["output"] = {"quantities": {"far": {"kind": "layback", "end": "end"}}}
     with pytest.raises(hybrid.SceneError, match="goes by the nodes that come to the bed"):
-        hybrid.sensitivity(chain_leg(60), [of], ["cable.sections[0].length"])
+        hybrid.sensitivity(tables, [of], ["cable.sections[0].length"], motion=True)
+
+
+def test_friction_that_is_left_out_is_said():
+    tables, key = chain_leg(40), "cable.sections[0].mass"
+    tables["environment"]["seabed"]["friction"] = 0.5
+    (found,) = hybrid.sensitivity(tables, ["tension@end"], [key])
+    assert found.way == "factors of the equilibrium, friction left out"
+    (plain,) = hybrid.sensitivity(chain_leg(40), ["tension@end"], [key])
+    assert plain._replace(way="") == found._replace(way="")
 
 
 def test_options_may_be_repeated(tmp_path):

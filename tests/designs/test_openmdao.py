@@ -199,6 +199,10 @@ def test_what_has_no_equilibrium_is_an_analysis_error(length: float):
         ({"unknowns": {"a": {"key": "mesh.cells"}}, "results": {"top": TOP}}, "a key of what is there"),
         ({"unknowns": {"a": {"key": LENGTH}}, "measured": {"file": "shape.csv"}}, "an identification has no outputs"),
         ({"unknowns": {"a": {"key": LENGTH}}, "results": {"b": {"quantity": "touchdown_position"}}}, "changes evenly"),
+        (
+            {"unknowns": {"a": {"key": LENGTH}}, "targets": {"b": {"quantity": "touchdown", "value": 9}}},
+            "changes evenly",
+        ),
     ],
 )
 def test_refusals(more: dict, what: str):

@@ -87,6 +87,14 @@ def test_zones_that_stay() -> None:
     agree(on_the_bed() | {"model": zones, "mesh": None}, OF, KEYS)
 
 
+def test_a_phase_that_is_nothing() -> None:
+    """A part of a degree would be lost in the rounding of places: angles are changed by parts of a radian."""
+    tables, key = on_the_bed(), "ends.end.motion.heave.phase"
+    agree(tables, ["last tension@end", "std position.z@150"], [key])
+    scene = hybrid.validate_scene(tables)
+    assert size_of(scene, key, 0.0) == pytest.approx(180.0 / np.pi)
+
+
 def test_waves_and_a_current_across() -> None:
     agree(
         in_water(on_the_bed("rod")), OF, [f"{SECTION}.drag.normal", f"{SECTION}.mass", "environment.fluid.waves.height"]
