@@ -161,3 +161,82 @@ def test_a_winch_lets_a_rope_run_over_a_sheave(inertia: float) -> None:
     exact = solve_ivp(law, (1.0, 1.6), begin, rtol=1e-10, t_eval=found.t[late]).y
     assert np.abs(line["payout/rate"][late] - exact[1]).max() < 5e-3 * exact[1, -1]
     assert np.abs(line["payout/length"][late] - exact[0]).max() < 5e-3 * (exact[0, -1] - begin[0])
+
+
+def test_stepped_from_outside_bit_for_bit() -> None:
+    """Every other step is taken twice, elsewhere at first."""
+    scene = lowered() | {"time": {"duration": 3.0, "step": STEP}}
+    with hybrid.Simulation(scene) as sim:
+        while sim.t < 3.0:
+            saved = sim.save()
+            sim.advance(min(sim.t + 0.3 * STEP, 3.0))
+            sim.restore(saved)
+            sim.step()
+            sim.step()
+        stepped = sim.result().lines["one"]
+    whole = hybrid.run(scene).lines["one"]
+    assert np.ptp(whole["payout/length"]) > 0.05
+    for name in ("position", "tension", "reaction_start", "payout/length", "payout/rate", "work/start"):
+        assert np.array_equal(whole[name], stepped[name]), name
+
+
+def test_an_accuracy_that_is_asked_holds() -> None:
+    """Positions lie within their stated error of those of short fixed steps on twice the cells."""
+    fine = lowered() | {"time": {"duration": 4.0, "step": 0.005}}
+    fine["lines"]["one"]["mesh"] = {"cells": 60}
+    true = hybrid.run(fine).lines["one"]
+    asked = hybrid.run(lowered() | {"time": {"duration": 4.0}, "accuracy": "5%"})
+    line, stated = asked.lines["one"], float(asked.attributes["error_total_position"])
+    assert np.array_equal(line.times, true.times) and np.ptp(true["payout/length"]) > 0.2
+    off = np.linalg.norm(line.position - true.position, axis=-1).max()
+    assert 0.05 * stated < off < stated
+    assert not [x for x in asked.events if x.kind == "accuracy missed"]
+
+
+def pressed(friction: float, winch_first: bool = True, step: float = 0.01) -> Tables:
+    """A winch hauls in a load, on a rope that it has moved against a bar of another line."""
+    a, b = ("start", "end") if winch_first else ("end", "start")
+    hold = {"tension": 70.0, "inertia": 5.0, "damping": 60.0, "begin": 0.5, "ramp": 0.5}
+    rope = {"length": 2.0, "mass": 0.05, "diameter": 0.02, "axial_stiffness": 1e5}
+    bar = {"length": 1.99, "mass": 20.0, "diameter": 0.1, "axial_stiffness": 2e7, "damping": {"mass": 5.0}}
+    surge = {"surge": {"amplitude": 0.6, "period": 8.0}, "ramp": 0.5}
+    return {
+        "points": {
+            "winch": {"position": [0, 0, 0], "motion": surge}, "left": {"position": [0.08, -1, -0.8]},
+            "right": {"position": [0.08, 1, -0.8]}, "load": {"kind": "free", "mass": 5.0, "initial_guess": [0, 0, -2]},
+        },
+        "lines": {
+            "rope": {a: "winch", b: "load", "model": "catenary", "mesh": {"cells": 60}, "sections": [rope],
+                     "connections": {a: {"payout": {"longest": 4.0, "winch": hold}}}},
+            "bar": {"start": "left", "end": "right", "model": "catenary", "mesh": {"cells": 20}, "sections": [bar]},
+        },
+        "contact": {"friction": friction}, "time": {"duration": 2.5, "step": step}, "output": {"every": 0.1, "points": 81},
+    }  # fmt: skip
+
+
+def test_a_rope_that_another_line_holds_by_friction() -> None:
+    """Without friction the load feels the winch; with it less, by at most e^(mu theta), and what slides takes energy."""
+    ratios, hauled = {}, {}
+    for friction in (0.0, 0.3):
+        found = hybrid.run(pressed(friction))
+        rope, bar = found.lines["rope"], found.lines["bar"]
+        x, weight, height = rope.position[20], 0.05 * G, -0.8
+        upper, lower = (
+            x[0] - x[np.linalg.norm(x - x[0], axis=1) > 0.3][0],
+            x[np.linalg.norm(x - x[-1], axis=1) > 0.3][-1] - x[-1],
+        )
+        angle = np.arccos(upper @ lower / np.linalg.norm(upper) / np.linalg.norm(lower))
+        T = rope.tension[20, 0] - weight * (x[0, 2] - height), rope.tension[20, -1] + weight * (height - x[-1, 2])
+        ratios[friction], hauled[friction] = np.log(T[0] / T[1]) / angle, 2.0 - rope["payout/length"][-1]
+        assert angle > 0.6 and found["contacts/rope/bar/contact_force"][20] > 25.0
+        work = {name: rope[name][-1] + bar[name][-1] for name in rope.names if name.startswith("work/")}
+        assert abs(work["work/scheme"]) < 5e-4 * work["work/start"]
+        assert (work["work/friction"] < -2.0) == (friction > 0.0) and work["work/friction"] < 1e-3
+    assert abs(ratios[0.0]) < 0.03 and 0.15 < ratios[0.3] < 0.3
+    assert 0.3 < hauled[0.3] < 0.8 * hauled[0.0]
+
+
+def test_a_rope_under_friction_with_its_ends_exchanged() -> None:
+    one, other = (hybrid.run(pressed(0.3, first)).lines["rope"] for first in (True, False))
+    assert np.abs(one["payout/length"] - other["payout/length"]).max() < 1e-6
+    assert np.abs(one.position - other.position[:, ::-1]).max() < 1e-5
