@@ -97,8 +97,11 @@ class Envelope:
     Places are nodes; those where a quantity may have two values come twice, the left value first.
     """
 
-    def __init__(self, scene: Scene, model: Model, moves: bool) -> None:
-        """moves: whether there are steps; of an equilibrium the nodes are those of its line."""
+    def __init__(self, scene: Scene, model: Model, moves: bool, touches: bool = False) -> None:
+        """moves: whether there are steps; of an equilibrium the nodes are those of its line.
+
+        touches: whether it is one in which lines touch each other.
+        """
         layout = model.layout if moves else None
         nodes = model.line.s.copy() if layout is None else layout.finest.nodes
         if moves and model.payout is not None:
@@ -113,7 +116,7 @@ class Envelope:
         has |= ({"seabed"} if model.line.bits & SEABED else set()) | ({"time"} if moves else set())
         has |= {"obstacles"} if model.line.bits & OBSTACLES else set()
         touching = SELF_CONTACT | (MAY_TOUCH if moves else 0)
-        has |= {"self_contact"} if model.line.bits & touching else set()
+        has |= {"self_contact"} if touches or model.line.bits & touching else set()
         has |= {"torsion"} if "rod" in has or (model.line.torsion.size and not model.line.bits & PLANAR) else set()
         pipes = Pipes(scene) if moves and any(x.pipe for x in scene.cable.sections) else None
         has |= {"pipe"} if pipes is not None else set()

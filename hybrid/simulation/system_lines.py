@@ -139,7 +139,7 @@ class LineResult:
         self.diagnostics = Diagnostics(model, self.events)
         self._moves = outputs > 0
         self.observer = observer_of(scene, model, self._moves, COMPARED if target is None else None)
-        self.envelope = Envelope(scene, model, self._moves)
+        self.envelope = Envelope(scene, model, self._moves, found is not None and found.settled)
         self._marked = marked_places(scene, model)
         self.envelope.itself.on &= target is not None or bool(model.line.bits & MAY_TOUCH)
         self._itself = LineWatch(self.envelope.itself, model)

@@ -142,3 +142,15 @@ def test_a_rope_across_two_others_presses_on_each_by_its_own_force() -> None:
         on = float(lower.reaction_start[0, 2] + lower.reaction_end[0, 2]) - WEIGHT
         assert on > 0.05 and sign * result[f"contacts/{pair}/force"][0, 2] == pytest.approx(on, rel=2e-3)
     assert "contacts/one/two/force" not in result
+
+
+def test_the_largest_force_at_rest_is_that_of_nodes_whatever_the_output_points_are() -> None:
+    """On the pair, from which of both lines it is looked at; five output points have the crossing, sixteen do not."""
+    largest = []
+    for points in (5, 16):
+        result = hybrid.static(crossing(0.1) | {"output": {"points": points}})
+        (pair,) = result.contacts()
+        each = [extremes_facts(x)["contact_max"]["value"] for x in result.lines.values()]
+        assert max(each) == pytest.approx(pair.contact, rel=1e-6)
+        largest.append(each)
+    assert largest[0] == pytest.approx(largest[1], rel=1e-12)
