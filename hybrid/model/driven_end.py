@@ -24,6 +24,7 @@ RECORD = 12
 WINDOW = 4
 # Windows after which velocities may be said to contradict the places, and the part of the way that they then miss.
 ENOUGH, CONTRADICTS = 4, 0.4
+LEAST_WAY = 1e-6  # m, of all windows: a shorter one is what the solver of another program leaves of a thing that rests
 STILL = (0.0, 0.0, 0.0)
 CONTRADICTED = (
     "the motion follows the places, work and energy the velocities: leave velocity out, or give that at the end of the "
@@ -115,7 +116,7 @@ class DrivenEnd:
         if not soon and (self.record[STEPS] or self.record[WINDOWS] < ENOUGH):
             return ""
         apart, way = self._compared()
-        if not apart > CONTRADICTS * way:
+        if way < LEAST_WAY or not apart > CONTRADICTS * way:
             return ""
         steps = int(WINDOW * self.record[WINDOWS] + self.record[STEPS])
         return f"the velocities given miss {apart:.3g} of {way:.3g} m of its way in {steps} steps"

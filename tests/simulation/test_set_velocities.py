@@ -108,3 +108,15 @@ def test_the_velocity_of_places() -> None:
     assert sum(0.5 * dt * (a[0] + b[0]) for a, b in pairwise(rates)) == pytest.approx(12.5)
     end.set(0.9, 5.0, [20.0, 0, 0], None, np.zeros(3), False)  # in what takes several steps: from rest to rest
     assert not end.path[5:8].any() and not end.path[11:14].any()
+
+
+@pytest.mark.parametrize(("size", "told"), [(1e-9, False), (1e-3, True)])
+def test_what_another_solver_leaves_of_a_thing_that_rests_is_no_way(size: float, told: bool) -> None:
+    """Places that go back and forth by so many m, with velocities of the other sign."""
+    with hybrid.Simulation(touchdown("model=catenary", PINNED)) as simulation:
+        for k in range(40):
+            phase, w = 2.0 * np.pi / 2.0 * 0.05 * (k + 1), 2.0 * np.pi / 2.0
+            velocity = [0.0, 0.0, -size * w * np.sin(phase)]
+            simulation.set_end("end", [205.0, 0.0, size * (1.0 - np.cos(phase))], velocity)
+            simulation.step()
+        assert bool([x for x in simulation.result().events if x.kind == "implausible"]) == told
