@@ -86,5 +86,5 @@ def _refuse_folds(chords: Floats, s: Floats, rod: np.ndarray) -> None:
     if folded.size:
         angle = np.degrees(np.arccos(cosine[folded[0]]))
         given = f"a corner of {angle:.0f} deg at s = {s[folded[0] + 1]:g} m in a rod zone"
-        fix = "round it with a few points, or make the zone a catenary"
+        fix = "round it with a few points, or make the zone a catenary if it stays taut"
         raise SceneError([Complaint("initial.points", given, "corners below 150 deg, because a rod bends", fix)])

@@ -105,7 +105,7 @@ def _rods_can_bend(cable: Cable, model: Model) -> Iterator[Finding]:
             continue
         here: Place = ("cable", "sections", i)
         if not section.weakest_bending:
-            fix = "add `bending_stiffness: ...` (N m^2), or make that stretch a catenary"
+            fix = "add `bending_stiffness: ...` (N m^2), or make that stretch a catenary if it stays taut"
             if isinstance(model, AdaptiveModel):
                 fix = (
                     "add `bending_stiffness: ...` (N m^2; small for a chain), "

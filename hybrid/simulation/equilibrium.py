@@ -24,6 +24,7 @@ from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.schema import Scene
 from hybrid.simulation.contact_equilibrium import with_contact
 from hybrid.simulation.diagnostics import borne_strain
+from hybrid.simulation.slack_bends import slack_remedy
 from hybrid.solve.flaws import behind_obstacles, overstretched_cell, passed_obstacles
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import PUSHED, Equilibrium, solve_statics
@@ -50,7 +51,9 @@ def equilibrium_of(scene: Scene, model: Model, t: float) -> Equilibrium:
             settled = with_contact(keeps, t, None)
         except ComputationError as too:
             tried = "\n              ".join(x for x in (failed.detail, too.detail) if x)
-            raise ComputationError(failed.outcome, None, failed.s, tried) from None
+            raise ComputationError(
+                failed.outcome, None, failed.s, tried, first=slack_remedy(model, failed.outcome, failed.s)
+            ) from None
         if settled is None:
             raise
         return settled
@@ -66,13 +69,14 @@ def _without_contact(scene: Scene, model: Model, t: float) -> Equilibrium:
     except ComputationError as failed:
         flexible = float(model.line.h[model.line.spin == 0].max(initial=0.0))
         reasons = reasons_against(scene, (bool(model.line.spin[0]), bool(model.line.spin[-1])), flexible)
-        if not reasons:
+        first = slack_remedy(model, failed.outcome, failed.s)
+        if not reasons and not first:
             raise
         roads = failed.detail.splitlines()
         ways = f"{len(roads)} ways to an equilibrium were" if len(roads) > 1 else "1 way to an equilibrium was"
         tried = f"{ways} tried, the last: {roads[-1].strip()}"
-        because = "\n              ".join([*reasons, tried])
-        raise ComputationError(failed.outcome, None, failed.s, because) from None
+        because = "\n              ".join([*reasons, tried]) if reasons else failed.detail
+        raise ComputationError(failed.outcome, None, failed.s, because, first=first) from None
 
 
 def count_turns(scene: Scene, model: Model, t: float, state: State, given: tuple[float, float] | None = None) -> None:

@@ -16,6 +16,7 @@ from hybrid.model.build import Model
 from hybrid.model.driven_end import DrivenEnd, contradictions
 from hybrid.scene.read import scene_text
 from hybrid.simulation.diagnostics import stretch_text
+from hybrid.simulation.slack_bends import slack_remedy
 from hybrid.simulation.transient import Transient
 from hybrid.solve.run import Tried
 
@@ -91,7 +92,7 @@ def _slack_detail(run: Transient, tried: Tried, dt: float) -> str:
 
 def _steps_too_long(run: Transient) -> bool:
     """Whether waves of tension pass many cells in the step that fails, as it was to be: so they did in those before."""
-    return _planned(run) > MOST_PASSED * float(run.run.clock[b.WAVE_STEP])
+    return run.steps > 0 and _planned(run) > MOST_PASSED * float(run.run.clock[b.WAVE_STEP])
 
 
 def _planned(run: Transient) -> float:
@@ -106,7 +107,7 @@ def first_remedy(run: Transient, tried: Tried) -> str:
     if tried.outcome == Outcome.GAINS_ENERGY:
         return contradictions(driven_of(run.model), soon=True)
     if tried.outcome != Outcome.SLACK or not _steps_too_long(run):
-        return ""
+        return slack_remedy(run.model, tried.outcome, float(run.model.line.s[failed_node(run, tried)]))
     step = max(_planned(run) / SHORTER, float(run.run.clock[b.WAVE_STEP]))
     return f"time.step: {step:.2g} from the start, because the steps before may be to blame, not the line"
 

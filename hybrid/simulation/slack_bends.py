@@ -14,15 +14,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from hybrid.errors import Outcome
 from hybrid.kernels.state.state import Floats, Line
-from hybrid.model.build import LEAST_WEIGHT
+from hybrid.model.build import LEAST_WEIGHT, Model
 from hybrid.model.material import Material
 from hybrid.outputs.observation import Observation
 
 # rad, from one cell to the next: less is the sag of a line that lies or hangs almost straight.
 TURNS = 0.05
-# Cells that show the bend, as a part of l.
-SHOWS = 0.25
+# Cells that show the bend, as a part of l; and l over a cell that no note of such a bend is about.
+SHOWS, SPANS = 0.25, 1.25
 
 
 def too_long_for_weight(cable: Material, line: Line) -> tuple[np.ndarray, Floats, Floats]:
@@ -52,4 +53,23 @@ def weight_text(l: float, s: float, h: float, turn: float, ask: str) -> str:
         f"weight bends the slack cable within {l:.2g} m at s = {s:g} m, on a cell of {h:.2g} m "
         f"({np.degrees(turn):.0f} deg to the next): curvature and moment are wrong there; cells of {SHOWS * l:.2g} m "
         f"would do ({ask}, or `accuracy: {{curvature: 5%}}`)"
+    )
+
+
+def slack_remedy(model: Model, outcome: Outcome, s: float | None) -> str:
+    """What to write where a catenary is slack at s, m, so that its bending carries it; empty: nothing is known."""
+    if outcome != Outcome.SLACK or s is None or model.layout is not None:
+        return ""
+    cable, line = model.cable, model.line
+    node = int(np.clip(np.searchsorted(line.s, s), 1, line.h.size))
+    piece = cable.piece(np.array([s]))[0]
+    if cable.weakest_bending[piece] > 0.0:
+        return "`model: adaptive`, which makes a rod of it where it is slack"
+    w, h = abs(float(cable.weight[piece])), float(line.h[node - 1])
+    if not w:
+        return ""
+    least = float(f"{w * (SPANS * h) ** 3:.2g}")
+    return (
+        f"`model: adaptive`, and the bending_stiffness of the section; where none is known, {least:g} N m^2 makes its "
+        f"slack bends as long as a cell of {h:.3g} m, and shorter cells take less"
     )

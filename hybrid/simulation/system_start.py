@@ -25,6 +25,7 @@ from hybrid.simulation.contact_start import refuse_start_in_obstacles
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.equilibrium import count_turns, settling
 from hybrid.simulation.events import EventLog
+from hybrid.simulation.slack_bends import slack_remedy
 from hybrid.simulation.system_contact_equilibrium import settle, solve_with_contact
 from hybrid.solve.joined import JoinedLine, SystemState, joined_ends
 from hybrid.solve.stepper import Stepper
@@ -199,4 +200,6 @@ def named(failed: LineFailed, model: SystemModel, first: str = "") -> Computatio
     where = f"line {model.names[failed.line]}" if failed.line >= 0 else "the points"
     detail = f"{where}; {failed.detail}" if failed.detail else where
     name = model.names[failed.line] if failed.line >= 0 else ""
+    if not first and failed.line >= 0:
+        first = slack_remedy(model.models[failed.line], failed.outcome, failed.s)
     return ComputationError(failed.outcome, failed.t, failed.s, detail, first=first, line_name=name)

@@ -1,6 +1,7 @@
 """Never a wrong answer in silence: ways to get one that were found by attack, each now answered, noted or refused."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -339,3 +340,27 @@ def test_an_accuracy_is_not_missed_by_round_off_of_a_tension_that_is_nothing():
     result = run(NO_GRAVITY, rod, free, {"accuracy": "5%"})
     assert np.abs(result.tension).max() < 1e-8 and not {"accuracy missed", "error uncertain"} & set(kinds(result))
     assert {x.verdict for x in result.verdicts().accuracy} == {"met"}
+
+
+def test_remedies_of_a_slack_catenary_lead_to_a_result():
+    """A chain that is 10 m too long for the bed: what the message asks for computes, without a note of a bend too sharp."""
+    held = {"start": pinned(0, 0, 0), "end": pinned(100, 0, 0)}
+    bed = {"environment": {"seabed": {"z": 0, "stiffness": 1e4}}, "ends": held}
+    chain = {"length": 110.0, "mass": 5.0, "diameter": 0.05, "axial_stiffness": 1e7}
+    with pytest.raises(hybrid.ComputationError, match="`model: adaptive`, and the bending_stiffness") as stop:
+        static(bed, section(**chain), {"model": "catenary"})
+    named = re.search(r"where none is known, (\S+) N m\^2", str(stop.value))
+    assert named is not None and float(named[1]) == pytest.approx(5.0 * 9.81 * (1.25 * 1.1) ** 3, rel=0.05)
+    with pytest.raises(hybrid.ComputationError, match="`model: adaptive`, which makes a rod of it"):
+        static(bed, section(**chain, bending_stiffness=float(named[1])), {"model": "catenary"})
+    result = static(bed, section(**chain, bending_stiffness=float(named[1])), {"model": "adaptive"})
+    assert result.status == "complete" and "unresolved slack bend" not in kinds(result)
+
+
+def test_no_step_before_the_first_one_is_to_blame_for_slack():
+    fold = {"kind": "points", "points": [[0, 0, 0], [0.5, 0, 4.97], [1, 0, 0]]}
+    ends = {"start": pinned(0, 0, 0), "end": pinned(1, 0, 0)}
+    more = {"ends": ends, "initial": fold, "model": "catenary", "time": {"duration": 1, "step": 0.01}}
+    with pytest.raises(hybrid.ComputationError, match=r"the line is slack(?s:.*)`model: adaptive`") as stop:
+        run(section(length=10.0, mass=1.0, diameter=0.02, axial_stiffness=1e6), more)
+    assert "time.step" not in str(stop.value)
