@@ -114,7 +114,8 @@ def _unknown_key(root: type[Table], path: Place, spot: Spot) -> Finding:
     key, owner = str(path[-1]), spot.owner
     if owner is None:
         return Finding(path, f"a key of {dotted(path[:-1]) or 'a scene'}", "take it out")
-    table = "a scene" if len(path) == 1 else f"kind: {spot.kind}" if "kind" in owner.model_fields else dotted(path[:-1])
+    has_kind = bool(spot.kind) and "kind" in owner.model_fields
+    table = "a scene" if len(path) == 1 else f"kind: {spot.kind}" if has_kind else dotted(path[:-1])
     kinds = [kind for kind, other in spot.beside.items() if key in other.model_fields or key in other.former]
     own = {name: f for name, f in owner.model_fields.items() if name != "kind"}
     known = {name: f.description or "" for name, f in own.items()}

@@ -235,6 +235,16 @@ def test_a_complaint_reads_well() -> None:
     )
 
 
+def test_an_unknown_key_names_its_table_where_the_kind_is_no_table_of_its_own() -> None:
+    section = {"length": 2.0, "mass": 1.0, "axial_stiffness": 1e5}
+    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"}
+    pull = {"kind": "vertical_force", "at": "end"}
+    with pytest.raises(SceneError) as caught:
+        validate_scene({"cable": {"sections": [section]}, "ends": ends, "output": {"quantities": {"pull": pull}}})
+    (wrong,) = [x for x in caught.value.complaints if x.where == "output.quantities.pull.at"]
+    assert wrong.expected == "a key of output.quantities.pull" and wrong.fix == "did you mean end?"
+
+
 def test_nothing_is_said_twice() -> None:
     (kind,) = complaints(change(SUSPENSION, PINNED, "{kind: xyzzy, position: [0, 0, 0]}"))
     assert kind.expected == "one of: pinned, clamped, guided, free, body" and kind.fix == "write one of these"
