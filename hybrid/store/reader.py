@@ -313,6 +313,11 @@ class Result(Histories):
         return Result(self._source, line=name)
 
     @property
+    def line_name(self) -> str:
+        """Of a line of several its name there; of all of them, and of one cable, empty."""
+        return self._line
+
+    @property
     def whole(self) -> tuple[Result, str] | None:
         """Of a line of several the result of all of them, opened anew, and its name there; None: it is no part."""
         return (Result(self._source), self._line) if self._line else None

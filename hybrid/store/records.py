@@ -220,9 +220,8 @@ def error_words(attributes: Mapping[str, Any]) -> str:
     """The largest errors of position and of the end forces in words, from the attributes of a result that has them."""
     unknown = not_converged_in(attributes)
     figures = (("position", "position", "m", ""), ("end_force", "end forces", "N", " at the ends"))
-    return ", ".join(
-        f"of {called} not known (not converged)"
-        if name in unknown
-        else f"{float(attributes[f'error_total_{name}']):.2g} {unit}{where}"
-        for name, called, unit, where in figures
-    )
+    texts = []
+    for name, called, unit, where in figures:
+        two = f"{float(attributes[f'error_total_{name}']):.2g}" if name not in unknown else ""  # digits
+        texts.append(f"{float(two):.9g} {unit}{where}" if two else f"of {called} not known (not converged)")
+    return ", ".join(texts)

@@ -48,7 +48,7 @@ EVERY = frozenset({"position", "tension", "end_force", "curvature"})  # asked, b
 ALL: frozenset[str] = frozenset()
 NOTE = "do what its note says"
 SHORTER = "a shorter time.step"
-SETTLED = "initial: {kind: equilibrium, friction: settled}, of several lines in lines.NAME"
+SETTLED = "initial: {kind: equilibrium, friction: settled}"
 # Kinds of events that make values doubtful: which of them (ALL: every one), and what to do.
 Doubtful = Mapping[str, tuple[frozenset[str], str]]
 DOUBTS: Doubtful = {
@@ -201,11 +201,15 @@ def worst_accuracy(each: Sequence[Asked]) -> Asked:
 
 def accuracy_text(each: Sequence[Asked]) -> str:
     """The verdicts of all that was asked in words: one for all, or by quantity where they differ."""
-    texts = list(dict.fromkeys(x._replace(beside="").text for x in each))
-    if len(texts) == 1:
-        return f"{texts[0]}; {each[-1].beside}" if each[-1].beside else texts[0]
-    names = (x.quantity.replace("end_force_", "force at the ").replace("_", " ") for x in each)
-    return ", ".join(f"{name} {x.text}" for name, x in zip(names, each, strict=True))
+    named: dict[str, list[str]] = {}
+    for x in each:
+        name = x.quantity.replace("end_force_", "force at the ").replace("_", " ")
+        named.setdefault(x._replace(beside="").text, []).append(name)
+    if len(named) == 1:
+        text = next(iter(named))
+        return f"{text}; {each[-1].beside}" if each[-1].beside else text
+    parts = [f"{', '.join(x[:-1])} and {x[-1]} {text}" if x[1:] else f"{x[0]} {text}" for text, x in named.items()]
+    return "; ".join([*parts, *([each[-1].beside] if each[-1].beside else [])])
 
 
 def doubt_of(result: Result, *names: str, s: Iterable[float] = ()) -> Doubt | None:
@@ -258,6 +262,8 @@ def _of_event(
     which, remedy = kind
     if remedy == SETTLED and "settled" not in event.text:
         remedy = NOTE
+    elif remedy == SETTLED and (result.line_name or result.lines):
+        remedy = f"lines.{result.line_name or 'NAME'}.{SETTLED}"
     if event.kind == "unresolved bend" and _is_catenary(result, event):
         which = which | PULL  # what a catenary cuts off of a bend is missing in its tension
     if which and not which & names:

@@ -17,7 +17,8 @@ from hybrid.cli.tables import errors_facts, extremes_facts, extremes_rows
 from hybrid.errors import EVENTS_BY_WEIGHT
 from hybrid.scene.study import Kept
 from hybrid.store.reader import Result
-from hybrid.store.verdicts import DOUBTS, OF_ACCURACY, accuracy_text, doubt_of, worst_accuracy
+from hybrid.store.records import error_words
+from hybrid.store.verdicts import DOUBTS, OF_ACCURACY, Asked, accuracy_text, doubt_of, worst_accuracy
 from hybrid.studies.collect import collected
 from hybrid.view.report_parts import verdict_html
 from hybrid.view.summary import facts_of
@@ -202,6 +203,27 @@ def test_verdicts_of_thirty_results(results: dict[tuple[str, str], Path]) -> Non
 
 
 # ---- what casts doubts -----------------------------------------------------------------------------
+
+
+def test_an_accuracy_in_words_says_each_verdict_once() -> None:
+    met, missed = (
+        Asked("position", "m", 1.0, 0.5, "met"),
+        Asked("curvature", "1/m", 1.0, 2.0, "missed", beside="x is so"),
+    )
+    doubts = [
+        Asked(name, "N", 9.0, 3.0, "not verified", "friction neglected", "settle it")
+        for name in ("end_force_start", "end_force_end", "tension")
+    ]
+    found = accuracy_text([met, *doubts, missed])
+    several = "force at the start, force at the end and tension not verified: friction neglected; try: settle it"
+    assert found == f"position met; {several}; curvature missed; x is so"
+    assert accuracy_text([met, met]) == "met"
+
+
+def test_errors_in_words_have_no_exponent() -> None:
+    assert (
+        error_words({"error_total_position": 0.01612, "error_total_end_force": 301.2}) == "0.016 m, 300 N at the ends"
+    )
 
 
 def test_doubts_are_kinds_of_events() -> None:
