@@ -43,8 +43,9 @@ def number_of(scene: Scene | System, key: str) -> float:
         except (KeyError, IndexError, TypeError, ValueError):
             expected = "a key of the scene that has a number"
             raise SceneError([Complaint("by", key, expected, "cable.sections[0].length, for example")]) from None
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise SceneError([Complaint("by", key, f"a number, which {key} is not in this scene", "another key")])
+    if not isinstance(value, float):
+        kind = "a number that may change by a little" if isinstance(value, int) else "a number"
+        raise SceneError([Complaint("by", key, f"{kind}, which {key} is not in this scene", "another key")])
     return float(value)
 
 

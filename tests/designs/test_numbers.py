@@ -53,3 +53,12 @@ def test_an_item_is_counted_from_the_start(place):
     scene = as_scene_or_system(EXAMPLES / "03_suspension_rod.yaml")
     with pytest.raises(SceneError, match="a key of the scene that has a number"):
         number_of(scene, f"cable.sections[{place}].mass")
+
+
+def test_a_number_of_things_is_none_to_differentiate_by():
+    """Whole numbers, such as the seed of a sea, have no neighbours; numbers that are written without a point have."""
+    scene = as_scene_or_system(EXAMPLES / "irregular_sea.yaml")
+    for key in ("environment.fluid.waves.seed", "environment.fluid.waves.components"):
+        with pytest.raises(SceneError, match="may change by a little"):
+            number_of(scene, key)
+    assert number_of(scene, "ends.start.position[0]") == scene.ends.start.position[0]
