@@ -24,16 +24,9 @@ class ComplexSolver:
 
     def __init__(self, matrices: Sequence[sparse.csc_array]) -> None:
         size = matrices[0].shape[0]
-        keys = []
-        for x in matrices:
-            columns = np.repeat(np.arange(size), np.diff(x.indptr))
-            keys.append(columns.astype(np.int64) * size + x.indices)
-        every = np.unique(np.concatenate(keys))
-        self._parts = []
-        for key, x in zip(keys, matrices, strict=True):
-            part = np.zeros(every.size)
-            np.add.at(part, np.searchsorted(every, key), x.data)
-            self._parts.append(part)
+        keys = [_places(x) for x in matrices]
+        self._every = every = np.unique(np.concatenate(keys))
+        self._parts = [self._part(x, key) for key, x in zip(keys, matrices, strict=True)]
         begin = np.searchsorted(every, np.arange(size + 1, dtype=np.int64) * size)
         self._pattern = sparse.csc_array((np.zeros(every.size, complex), every % size, begin), shape=(size, size))
         either = sparse.csr_array((np.ones(every.size), (every % size, every // size)), shape=(size, size))
@@ -42,20 +35,43 @@ class ComplexSolver:
         place[self._order] = np.arange(size)
         row, column = place[every % size], place[every // size]
         self._below, self._above = int((row - column).max()), int((column - row).max())
-        self._at = self._below + self._above + row - column, column
+        self._wide = 2 * self._below + self._above + 1
+        self._at = self._below + self._above + row - column + self._wide * column  # in a band by columns
+
+    def replace(self, k: int, matrix: sparse.csc_array) -> bool:
+        """Put another matrix in place of A_k; False: it has numbers where no matrix had any, and is not taken."""
+        key = _places(matrix)
+        if not np.isin(key, self._every).all():
+            return False
+        self._parts[k] = self._part(matrix, key)
+        return True
+
+    def _part(self, x: sparse.csc_array, key: np.ndarray) -> Floats:
+        return np.bincount(np.searchsorted(self._every, key), x.data, self._every.size)
 
     def solve(self, factors: Sequence[complex], right: Floats) -> Floats:
         """x (n, ...) for right-hand sides (n, ...); RuntimeError: the matrix is singular."""
-        data = sum(z * part for z, part in zip(factors, self._parts, strict=True))
-        wide = 2 * self._below + self._above + 1
-        if wide > WIDEST:
-            self._pattern.data = np.asarray(data, complex)
+        data = np.zeros(self._at.size, complex)
+        for z, part in zip(factors, self._parts, strict=True):
+            if z.real:
+                data.real += z.real * part
+            if z.imag:
+                data.imag += z.imag * part
+        if self._wide > WIDEST:
+            self._pattern.data = data
             return np.asarray(splu(self._pattern).solve(right))
-        band = np.zeros((wide, len(right)), complex, order="F")
+        band = np.zeros(self._wide * len(right), complex)
         band[self._at] = data
+        band = band.reshape((self._wide, -1), order="F")
         _, _, found, singular = zgbsv(self._below, self._above, band, right[self._order], overwrite_ab=True)
         if singular:
             raise RuntimeError("the matrix is singular")
         out = np.empty_like(found)
         out[self._order] = found
         return out
+
+
+def _places(x: sparse.csc_array) -> np.ndarray:
+    """Of every number of a matrix, increasing by columns."""
+    size = x.shape[0]
+    return np.repeat(np.arange(size, dtype=np.int64), np.diff(x.indptr)) * size + x.indices

@@ -100,7 +100,8 @@ def linear_law(mean: Floats, u: Floats) -> Floats:
 
 def covariance_of(u: Floats) -> Floats:
     """(n, m, m) of amplitudes (F, n, m)."""
-    return np.asarray(0.5 * np.einsum("fhm,fhn->hmn", u, u.conj()).real)
+    parts = np.concatenate([u.real, u.imag]).transpose(1, 2, 0)
+    return np.asarray(0.5 * parts @ parts.transpose(0, 2, 1))
 
 
 def axes_across(d: Floats) -> Floats:
@@ -115,9 +116,9 @@ def of_cylinders(d: Floats, axes: Floats, drag: tuple[Floats, Floats], current: 
 
     water with a mean (H, 3) m/s and amplitudes u (F, H, 3).  drag: across and along, (H,) N s^2/m^2.
     """
-    un, ut = np.einsum("fhi,hmi->fhm", u, axes), np.einsum("fhi,hi->fh", u, d)
+    un, ut = (u.transpose(1, 0, 2) @ axes.transpose(0, 2, 1)).transpose(1, 0, 2), (u * d).sum(axis=2)
     mean, forth = np.einsum("hi,hmi->hm", current, axes), np.einsum("hi,hi->h", current, d)
-    B = np.einsum("hmi,hmn,hnj->hij", axes, linear_law(mean, un), axes) * drag[0][:, None, None]
+    B = axes.transpose(0, 2, 1) @ linear_law(mean, un) @ axes * drag[0][:, None, None]
     if len(u) == 1:
         t = of_harmonic(forth[:, None], ut[0, :, None])[:, 0, 0]
     else:

@@ -95,9 +95,7 @@ def excitations_of(model: Model, line: Line, state: State, omegas: Floats, rows_
                 if moves.follows[k]:
                     place = moves.position[k]
                     shifts[k, 2] += size * np.exp(1j * (wave[2] * place[0] + wave[3] * place[1]))
-        for k, axis, amplitude, w, phase in moves.harmonics:
-            if abs(w - omega) > SAME * omega:
-                continue
+        for k, axis, amplitude, _, phase in moves.harmonics[np.abs(moves.harmonics[:, 3] - omega) <= SAME * omega]:
             size, end = 1j * amplitude * np.exp(-1j * phase), int(k)
             if axis < 3:
                 shifts[end, int(axis)] += size

@@ -45,6 +45,10 @@ class LoadedLine:
         still, moving = np.zeros((count, SIZE * WIDTH)), np.zeros((count, SIZE * WIDTH))
         rows_at_rest(calm, x, x.ends, state, (0.0, ANCHOR), still)
         rows_at_rest(calm, x, x.ends, state, (1.0, ANCHOR), moving)
+        self.forces, self.water, self.shifts, self.turns = (
+            np.array([getattr(e, of) for e in self.excited], complex).reshape(len(omegas), rows, 3)
+            for of, rows in (("forces", count), ("water", count), ("shifts", 2), ("turns", 2))
+        )
         self.damping = sparse_rows(moving - still)  # of the sections and of the bed
         self.node, self.d, self.cn, self.ct, self.current = half_cells(self.line, self.sea, state)
         self.axes = axes_across(self.d)
@@ -71,7 +75,7 @@ class LoadedLine:
 
     def relative(self, which: np.ndarray, start: bool = False) -> Floats:
         """Velocity (F, N+1, 3) m/s of the water relative to the nodes, by the motion found last; start: none."""
-        water = np.stack([self.excited[f].water for f in which])
+        water = self.water[which]
         return water if start else water + 1j * self.omegas[which, None, None] * self.q[which, :, 1:4]
 
     def full_damping(self) -> sparse.csr_array:
@@ -88,22 +92,18 @@ class LoadedLine:
 
     def loads(self, which: np.ndarray, C: sparse.csr_array) -> Floats:
         """Right-hand sides (5 (N+1), F): forces of the water, and motions of held ends."""
-        n, excited = self.line.s.size, [self.excited[f] for f in which]
-        w = self.omegas[which]
+        n, w = self.line.s.size, self.omegas[which]
         force, held = np.zeros((n, SIZE, which.size), complex), np.zeros((n, SIZE, which.size), complex)
-        for f, x in enumerate(excited):
-            force[:, 1:4, f] = x.forces
-            for k in (0, 1):
-                held[-k, 1:4, f] += x.shifts[k]
-        water = np.stack([x.water for x in excited], axis=2)
-        force[:, 1:4] += np.einsum("nij,njf->nif", self.blocks, water)
+        force[:, 1:4] = self.forces[which].transpose(1, 2, 0) + self.blocks @ self.water[which].transpose(1, 2, 0)
+        for k in (0, 1):
+            held[-k, 1:4] += self.shifts[which, k].T
         out = force.reshape(n * SIZE, -1)
         if held.any():
             moved = held.reshape(n * SIZE, -1)
             K, M = self.linear.stiffness, self.linear.mass
             out = out - (K @ moved - (M @ moved) * w**2 - 1j * (C @ moved) * w)
         for k in (0, 1):
-            turns = np.stack([x.turns[k] for x in excited], axis=1)
+            turns = self.turns[which, k].T
             if turns.any() and self.line.element[-k]:
                 out = out - self.turned[k].T @ turns
         return out
@@ -117,14 +117,13 @@ class LoadedLine:
     def take(self, which: np.ndarray, q: Floats) -> None:
         """Keep the motion (F, N+1, 5) at some frequencies, with that of the ends that are held in it."""
         self.q[which] = q
-        for f in which:
-            for k in (0, 1):
-                if self.x.joints[k] < 0 and self.x.ends.held[k]:
-                    self.q[f, -k, 1:4] = self.excited[f].shifts[k]
+        for k in (0, 1):
+            if self.x.joints[k] < 0 and self.x.ends.held[k]:
+                self.q[which, -k, 1:4] = self.shifts[which, k]
 
     def result(self) -> LineResponse:
         """Amplitudes of what users ask for, in the motion found last."""
-        return self.response_to(self.q, np.stack([x.turns for x in self.excited]), self.omegas)
+        return self.response_to(self.q, self.turns, self.omegas)
 
     def response_to(self, q: Floats, turns: Floats, omegas: Floats) -> LineResponse:
         """Amplitudes of what users ask for, in a motion (F, N+1, 5) with turns (F, 2, 3) rad of the frames of its ends,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.state.state import Floats
-from hybrid.linear.drag import size_deviation
+from hybrid.linear.drag import covariance_of, size_deviation
 from hybrid.statistics.fatigue import Curve, curve_of, dirlik_damage
 
 HOURS = 3.0
@@ -68,9 +68,12 @@ class LineResponse:
         """Standard deviation, in the unit of the quantity; of `curvature` that of its size, with what is across."""
         if name != "curvature":
             return np.sqrt(self.spectrum(name).moment(0))
-        both = np.stack([self.curvature, self.curvature_across], axis=2)
-        covariance = 0.5 * np.einsum("fnk,fnl->nkl", both, both.conj()).real
-        return np.asarray(size_deviation(self.mean_curvature, covariance) * (1.0 + self.shape))
+        return np.asarray(size_deviation(self.mean_curvature, self.covariance) * (1.0 + self.shape))
+
+    @property
+    def covariance(self) -> Floats:
+        """(N+1, 2, 2) 1/m^2, of curvature in the plane of the bend and across it."""
+        return covariance_of(np.stack([self.curvature, self.curvature_across], axis=2))
 
     def resolved(self, name: str) -> NDArray[np.bool_]:
         """Where the standard deviation is at least `OF_LARGEST` of the largest of the line, and what is left out adds
@@ -90,16 +93,23 @@ class LineResponse:
     def most_probable(self, name: str, hours: float = HOURS) -> Floats:
         """Most probable largest deviation from the mean in so many hours of a Gaussian process; never more than all
 
-        amplitudes together.
+        amplitudes together.  ValueError: hours are no time.
         """
+        _above_zero("hours", hours)
         period = self.period(name)
         cycles = np.maximum(3600.0 * hours / np.where(period > 0.0, period, np.inf), 1.0)
         together = np.abs(getattr(self, name)).sum(axis=0)
         return np.minimum(self.deviation(name) * np.sqrt(2.0 * np.log(cycles)), together)
 
     def damage(self, curve: str | Mapping[str, float | str] | Curve, strength: float, hours: float = HOURS) -> Floats:
-        """Fatigue damage (N,) of the tension by Dirlik's law, with a T-N curve over a strength (N)."""
+        """Fatigue damage (N,) of the tension by Dirlik's law, with a T-N curve over a strength (N).
+
+        ValueError: strength or hours are not above 0, or the curve is one of stress."""
         found = curve_of(curve)
+        _above_zero("strength", strength)
+        _above_zero("hours", hours)
+        if found.kind != "T-N":
+            raise ValueError(f"a curve of kind {found.kind}: expected T-N, over the strength; stress is not known here")
         spectrum = self.spectrum("tension")
         scaled: Any = LineSpectrum(spectrum.f, spectrum.power / strength**2)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -128,7 +138,16 @@ class Response:
         return not self.notes
 
     def valid_for(self, name: str) -> bool:
-        """Whether nothing speaks against a quantity: what is said of another one alone is no doubt of it."""
+        """Whether nothing speaks against a quantity: what is said of another one alone is no doubt of it.
+
+        ValueError: it is none of `VARIES`."""
+        if name not in VARIES:
+            raise ValueError(f"{name!r}: one of {', '.join(VARIES)}")
         alone = {of: [x for x in self.notes if f"{of} at s" in x] for of in ALONE}
         others = [x for of, notes in alone.items() if not name.startswith(of) for x in notes]
         return all(x in others for x in self.notes)
+
+
+def _above_zero(name: str, value: float) -> None:
+    if not 0.0 < value < np.inf:
+        raise ValueError(f"{name} = {value:g}: expected a number above 0")

@@ -112,6 +112,7 @@ def modes(scene: SceneLike | System, count: int = 10, near: float | None = None,
     """
     asked = as_scene_or_system(scene)
     _check(count, near)
+    count = int(count)
     fine, coarse = (_found(asked, cells, count, near, friction) for cells in (1.0, 2.0))
     squares = fine.eigen.squares
     costly = squares > COSTS_NOTHING * max(float(np.abs(squares).max()), 1e-300)
@@ -135,7 +136,7 @@ def modes(scene: SceneLike | System, count: int = 10, near: float | None = None,
 
 
 def _check(count: int, near: float | None) -> None:
-    if not 1 <= count <= MOST:
+    if not 1 <= count <= MOST or count != int(count):
         raise SceneError([Complaint("modes", str(count), f"a number of modes from 1 to {MOST}", "--count 10")])
     if near is not None and not 0.0 < near < math.inf:
         raise SceneError([Complaint("modes", f"{near:g}", "a period > 0, in s", "--near 8")])

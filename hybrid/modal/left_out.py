@@ -114,15 +114,24 @@ def _changes(x: LoadedLine, whole: Any, part: float) -> LineResponse:
     n, count = x.line.s.size, whole.shape[1]
     moved = np.moveaxis(whole.reshape(n, SIZE, count), 2, 0)
     added, linear = x.response_to(moved, np.zeros((count, 2, 3)), np.zeros(count)), x.result()
-    out = {}
-    for name, parts in (("tension", ["tension"]), ("curvature", ["curvature", "curvature_across"])):
-        more, alone = (sum((np.abs(getattr(of, each)) ** 2).sum(axis=0) for each in parts) for of in (added, linear))
-        out[name] = np.sqrt(1.0 + 4.0 / part * more / np.maximum(alone, 1e-300)) - 1.0
-    return replace(linear, left_out=out, shape=_shape(x, linear, out["curvature"]))
+    own, more = linear.covariance, added.covariance
+    # of the size of curvature, by where the bend points: fast bends across hide nothing of the plane of the bend
+    points = own.copy()
+    points[:, 0, 0] += linear.mean_curvature**2
+    pairs = {
+        "tension": [(np.abs(of.tension) ** 2).sum(axis=0) for of in (added, linear)],
+        "curvature": [(points * of).sum(axis=(1, 2)) for of in (more, own)],
+        "in plane": [of[:, 0, 0] for of in (more, own)],
+    }
+    out = {k: np.sqrt(1.0 + 4.0 / part * m / np.maximum(alone, 1e-300)) - 1.0 for k, (m, alone) in pairs.items()}
+    in_plane = out.pop("in plane")
+    return replace(linear, left_out=out, shape=_shape(x, linear, in_plane))
 
 
 def _shape(x: LoadedLine, linear: LineResponse, part: Floats) -> Floats:
     """(N+1,): by which the deviation of the size of curvature changes as that in the plane of the bend is not normal.
+
+    part: (N+1,) that what is left out adds to the deviation in that plane.
 
     A string bends against the load: by drag of the water that comes from inside the bend less.
     """

@@ -99,6 +99,7 @@ class _Linear:
                 stiffness[b] = stiffness_by_water(rest.solver, rest.states, b, members)
         self.damping, self.by_water = damping, self._of_bodies(stiffness)
         self.loaded: list[LoadedLine | LoadedMembers] = [*self.lines, *self.members.values()]
+        self.solver: ComplexSolver | None = None
         self.vectors = np.zeros((len(omegas), self.network.size), complex)
 
     def _of_bodies(self, blocks: Sequence[Floats]) -> sparse.csc_array:
@@ -132,8 +133,9 @@ class _Linear:
         dampings = [x.full_damping() for x in self.lines]
         of_bodies = [x + self.members[b].damping() if b in self.members else x for b, x in enumerate(self.damping)]
         C = sparse.csc_array(P.T @ sparse.block_diag(dampings, format="csr") @ P) + self._of_bodies(of_bodies)
-        stiffness = self.network.stiffness + self.network.skew + self.by_water
-        self.solver = ComplexSolver([stiffness, self.network.mass, C])
+        if self.solver is None or not self.solver.replace(2, C):
+            stiffness = self.network.stiffness + self.network.skew + self.by_water
+            self.solver = ComplexSolver([stiffness, self.network.mass, C])
         right = P.T @ np.concatenate(
             [x.loads(which, damping) for x, damping in zip(self.lines, dampings, strict=True)], axis=0
         )
@@ -149,6 +151,7 @@ class _Linear:
 
     def answer(self, w: float, right: Any) -> Any:
         """Amplitudes (q,) of exp(-i w t) by loads (q,), with the drag as it was found last; w: 1/s."""
+        assert self.solver is not None  # of the last round
         try:
             return self.solver.solve((1.0, -w * w, -1j * w), right)
         except RuntimeError:

@@ -13,10 +13,11 @@ from typing import NamedTuple
 
 from hybrid.model.sea import current_table
 from hybrid.model.sections import bending_stiffness, rotary_inertia, weight
-from hybrid.scene.attachments import Float
+from hybrid.scene.attachments import BendRestrictor, BendStiffener, Float
 from hybrid.scene.motion_tables import SHIFTS
 from hybrid.scene.schema import Scene, Section
 from hybrid.scene.start_checks import apart_in_motion
+from hybrid.scene.waves import GivenWaves
 
 G = 9.81  # m/s^2
 # Mean densities of real cables, kg/m^3, with room: from hollow and foamed to solid heavy metal.
@@ -30,6 +31,8 @@ ROUGHEST, FASTEST, HEAVIEST = 2.0, 5.0, 30.0
 SOFTEST_SOIL = 100.0
 # Significant wave height, m: the largest measured by a buoy is 19 m.  Depth of the sea, m: the deepest is 10.9 km.
 HIGHEST_SEA, DEEPEST = 25.0, 12_000.0
+# Mean period of waves that wind makes, s: the longest swell has 25 s.
+SLOWEST_SEA = 40.0
 # Drag and added mass coefficients: with vortex-induced vibrations a cable's drag doubles or triples, from 1.2.
 LARGEST_COEFFICIENT = 10.0
 # Young's modulus, Pa, and speed of tension waves, m/s: ten times those of diamond, so that a line that is meant not to
@@ -68,6 +71,12 @@ DEEPEST_TRENCH = (10.0, 0.5)
 # that the strongest moorings bear.
 FASTEST_END, STRONGEST_LINE = 40.0, 1e8
 
+# Young's modulus, Pa, of the softest elastomers of sleeves; yield strengths, Pa, of the walls of pipes, with room: from
+# plastics to the hardest wire.
+SOFTEST_SLEEVE, WALLS = 1e5, (1e6, 1e10)
+# Diameters of its cable that a bend stiffener has at most: real ones are up to ten times as thick.
+THICKEST_SLEEVE = 100.0
+
 HALVINGS = 60  # of the range of a tension, to round-off
 
 
@@ -86,6 +95,8 @@ def implausible(scene: Scene) -> Iterator[Note]:
         yield Note(what, why, whole)
     for at, what, why in _floats(scene):
         yield Note(what, why, (at, at))
+    for x, what, why in _sleeves(scene):
+        yield Note(what, why, x.range)
     begins = [*accumulate((x.length for x in scene.cable.sections), initial=0.0)]
     for i, what, why in _too_short(scene):
         yield Note(what, f"cable.sections[{i}].length: {why}", (begins[i], begins[i + 1]))
@@ -94,6 +105,7 @@ def implausible(scene: Scene) -> Iterator[Note]:
             *_material(section),
             *_stiffness(section),
             *_limits(section),
+            *_checked(section),
             *_use(section, scene),
         ):
             yield Note(what, f"cable.sections[{i}].{key}: {why}", (begin, begin + section.length))
@@ -119,6 +131,9 @@ def _water(scene: Scene) -> Iterator[tuple[str, str]]:
     if height > HIGHEST_SEA:
         why = f"expected at most {HIGHEST_SEA:g} m; the largest ever measured is 19 m: is it in m?"
         yield f"a significant wave height of {height:g} m", f"environment.fluid.waves.significant_height: {why}"
+    if isinstance(fluid.waves, GivenWaves) and fluid.waves.main_period > SLOWEST_SEA:
+        why = f"expected at most {SLOWEST_SEA:g} s; frequencies of this file are in rad/s: are these in Hz?"
+        yield f"waves of {fluid.waves.main_period:.3g} s", f"environment.fluid.waves.file: {why}"
     depth = scene.environment.depth
     if depth is not None and depth > DEEPEST:
         why = f"expected at most {DEEPEST:g} m; the deepest sea has 10 900 m: is seabed.z in m?"
@@ -269,6 +284,51 @@ def _limits(section: Section) -> Iterator[Wrong]:
             unit = f"mm? then {1e-3 * radius:g}" if radius > high else f"km? then {1e3 * radius:g}"
             why = f"expected {low:.3g} to {high:.3g} m with a diameter of {section.diameter:g} m: is it in {unit}"
             yield f"a smallest bend radius of {radius:g} m", "min_bend_radius", why
+
+
+def _checked(section: Section) -> Iterator[Wrong]:
+    """Tables of bending, capacity and strengths of codes that are in another unit, or in another order."""
+    rows, least = section.moment_curvature, SHORTEST_BORNE * section.mass * G
+    if rows and section.diameter and rows[1][0] * section.diameter > 1.0 / SHARPEST:
+        why = f"expected less than {1.0 / (SHARPEST * section.diameter):.3g} 1/m, where it is bent about itself"
+        what = f"a first curvature of {rows[1][0]:g} 1/m in a table of bending"
+        yield what, "moment_curvature", f"{why}: are its columns curvature, moment?"
+    code, given = section.code, [("capacity", section.capacity[0][0])] if section.capacity else []
+    if code is not None and code.kind == "E301":
+        given.append(("code.strength", code.strength))
+    for key, value in given:
+        if value < least:
+            why = f"expected more than {least:.3g} N, the weight of {SHORTEST_BORNE:g} m of it in air"
+            yield f"a strength of {value:g} N", key, f"{why}: is it in kN? then {1e3 * value:g}"
+    if code is not None and code.kind == "F201" and not WALLS[0] <= code.yield_strength <= WALLS[1]:
+        why = f"expected {WALLS[0]:g} to {WALLS[1]:g} Pa: is it in Pa?"
+        yield f"a yield strength of {code.yield_strength:g} Pa", "code.yield_strength", why
+
+
+def _sleeves(scene: Scene) -> Iterator[tuple[BendStiffener | BendRestrictor, str, str]]:
+    """Sleeves into which their cable does not fit, or that add nothing: which, what, and why."""
+    ends = [*accumulate(x.length for x in scene.cable.sections)]
+    for i, x in enumerate(scene.cable.attachments):
+        if not isinstance(x, BendStiffener | BendRestrictor):
+            continue
+        begins = [0.0, *ends[:-1]]
+        within = zip(begins, ends, scene.cable.sections, strict=True)
+        d = max((c.diameter or 0.0 for a, b, c in within if a < x.range[1] and b > x.range[0]), default=0.0)
+        at = f"cable.attachments[{i}]"
+        if isinstance(x, BendRestrictor):
+            if x.radius < SHARPEST * d:
+                why = f"expected {SHARPEST * d:g} m or more around a cable of {d:g} m: is it in m?"
+                yield x, f"a bend restrictor of {x.radius:g} m", f"{at}.radius: {why}"
+            continue
+        if x.bore is not None and x.bore < d * (1.0 - 1e-9):
+            why = f"expected {d:g} m or more, the diameter of the cable in it: is it in m, and a diameter?"
+            yield x, f"a bend stiffener with a bore of {x.bore:g} m", f"{at}.bore: {why}"
+        if d and x.diameters is not None and max(x.diameters) > THICKEST_SLEEVE * d:
+            why = f"expected at most {THICKEST_SLEEVE * d:g} m around a cable of {d:g} m: is it in m?"
+            yield x, f"a bend stiffener of {max(x.diameters):g} m", f"{at}.diameters: {why}"
+        if x.modulus is not None and x.modulus < SOFTEST_SLEEVE:
+            why = f"expected {SOFTEST_SLEEVE:g} Pa or more: is it in Pa? in MPa it were {1e6 * x.modulus:g}"
+            yield x, f"a bend stiffener of {x.modulus:g} Pa", f"{at}.modulus: {why}"
 
 
 def _too_short(scene: Scene) -> Iterator[tuple[int, str, str]]:

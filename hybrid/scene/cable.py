@@ -611,12 +611,10 @@ class Section(Table):
 
     @model_validator(mode="after")
     def _code_has_what_it_checks(self) -> Section:
-        if isinstance(self.code, RiserCode):
-            if self.pipe is None:
-                refuse([Finding(("pipe",), "the wall that DNV-OS-F201 checks", "add `pipe: {wall: ...}` (m)")])
-            if self.code.tensile_strength < self.code.yield_strength:
-                expected = f"at least yield_strength, {self.code.yield_strength:g} Pa"
-                refuse([Finding(("code", "tensile_strength"), expected, "are the two exchanged?")])
+        if self.code is not None:
+            refuse(Finding(("code", *x.at), x.expected, x.fix, x.given) for x in self.code.findings())
+        if isinstance(self.code, RiserCode) and self.pipe is None:
+            refuse([Finding(("pipe",), "the wall that DNV-OS-F201 checks", "add `pipe: {wall: ...}` (m)")])
         return self
 
     @model_validator(mode="after")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from hybrid.scene.base import Kinds, NonNegative, Positive, Table, by_kind
+from hybrid.scene.base import Finding, Kinds, NonNegative, Positive, Table, by_kind
 
 # Factors of safety classes of DNV-OS-F201.
 SAFETY_CLASSES = {"low": 1.04, "normal": 1.14, "high": 1.26}
@@ -24,6 +25,13 @@ class MooringCode(Table):
     pretension: NonNegative = Field(
         default=0.0, description="smallest tension of the section at rest without current and waves; 0: none counts [N]"
     )
+
+    def findings(self) -> Iterator[Finding]:
+        """Numbers that do not fit each other."""
+        yield from _factors("pretension_factor", self.pretension_factor, self.environment_factor)
+        if self.pretension >= self.strength:
+            expected = f"less than the strength, {self.strength:g} N"
+            yield Finding(("pretension",), expected, "check both; they are in N", f"{self.pretension:g}")
 
 
 class RiserCode(Table):
@@ -47,10 +55,24 @@ class RiserCode(Table):
         default=0.85, description="fabrication factor, for collapse; 0.85: UOE pipe, 1: seamless [-]"
     )
 
+    def findings(self) -> Iterator[Finding]:
+        """Numbers that do not fit each other."""
+        yield from _factors("functional_factor", self.functional_factor, self.environment_factor)
+        if self.tensile_strength < self.yield_strength:
+            expected = f"at least yield_strength, {self.yield_strength:g} Pa"
+            yield Finding(("tensile_strength",), expected, "are the two exchanged?")
+
     @property
     def safety(self) -> float:
         """Product of the factors of safety class and material."""
         return SAFETY_CLASSES[self.safety_class] * self.material_factor
+
+
+def _factors(first: str, factor: float, environment: float) -> Iterator[Finding]:
+    """What is known best has the smaller factor: else to leave it at 0 were not on the safe side."""
+    if environment < factor:
+        expected = f"at least {first}, {factor:g}"
+        yield Finding(("environment_factor",), expected, "are the two exchanged?", f"{environment:g}")
 
 
 Code = Annotated[

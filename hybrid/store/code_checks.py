@@ -8,9 +8,10 @@
     T_k, M_k      plastic tension and moment of the wall                                 N, N m
     dp, p_b, p_c  pressure inside less that outside; at bursting; at collapse            Pa
 
-E301: u = (T_F g_F + (T - T_F) g_E)/strength.
+Design values: X = g_F X_F + g_E (X - X_F), and no less than g_F X, which is more where X is below its functional part.
+E301: u = T/strength.
 F201, inside pressure larger: u = g ((M/M_k) sqrt(1 - (dp/p_b)^2) + (T/T_k)^2) + (dp/p_b)^2, else
-u = g^2 ((M/M_k + (T/T_k)^2)^2 + (dp/p_c)^2), T and M with their factors.  Broken: u > 1.
+u = g^2 ((M/M_k + (T/T_k)^2)^2 + (dp/p_c)^2); the root is 0 where dp alone bursts the wall.  Broken: u > 1.
 """
 
 from __future__ import annotations
@@ -70,19 +71,23 @@ class Row(NamedTuple):
 
 def use(row: Row, T: Floats, M: Floats, z: Floats) -> Floats:
     """Part that is used under tensions (N), moments (N m) at heights z (m), of any shape."""
-    T = row.functional * row.tension + row.environment * (T - row.tension)
+    T = _design(row, T, row.tension)
     if row.kind == E301:
         return np.asarray(T / row.strength)
-    M = np.abs(row.functional * row.moment + row.environment * (np.abs(M) - row.moment))
+    M = _design(row, np.abs(M), row.moment)
     outside = row.water * np.maximum(row.surface - z, 0.0)
     inside = np.maximum(row.inside + row.content * (row.inside_z - z), 0.0)
     return of_riser(row, T, M, inside - outside)
 
 
-def of_riser(row: Row, T: Floats, M: Floats, dp: Floats) -> Floats:
-    """F201 under design tension (N) and moment (N m), and pressure inside less that outside (Pa); 1: all of it.
+def _design(row: Row, x: Floats, functional: float) -> Floats:
+    """Design value of a tension or moment."""
+    both = row.functional * functional + row.environment * (x - functional)
+    return np.where(x < 0.0, both, np.maximum(both, row.functional * x))
 
-    NaN where pressure inside bursts the wall."""
+
+def of_riser(row: Row, T: Floats, M: Floats, dp: Floats) -> Floats:
+    """F201 under design tension (N) and moment (N m), and pressure inside less that outside (Pa); 1: all of it."""
     D, t, fy, fu = row.outer, row.wall, row.yields, row.breaks
     burst = 2.0 / np.sqrt(3.0) * 2.0 * t / (D - t) * min(fy, fu / 1.15)
     q = np.where(dp > 0.0, 2.0 / np.sqrt(3.0) * dp / burst, 0.0)
@@ -90,8 +95,7 @@ def of_riser(row: Row, T: Floats, M: Floats, dp: Floats) -> Floats:
     hardening = np.minimum(1.0 - beta + beta * fu / fy, MOST_HARDENING)
     M_k, T_k = fy * hardening * (D - t) ** 2 * t, fy * hardening * np.pi * (D - t) * t
     bent, pulled = M / M_k, (T / T_k) ** 2
-    with np.errstate(invalid="ignore"):
-        within = row.safety * (bent * np.sqrt(1.0 - (dp / burst) ** 2) + pulled) + (dp / burst) ** 2
+    within = row.safety * (bent * np.sqrt(np.maximum(1.0 - (dp / burst) ** 2, 0.0)) + pulled) + (dp / burst) ** 2
     pressed = row.safety**2 * ((bent + pulled) ** 2 + (dp / collapse(row)) ** 2)
     return np.asarray(np.where(dp >= 0.0, within, pressed))
 

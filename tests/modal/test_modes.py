@@ -360,6 +360,8 @@ def test_periods_that_meet_and_what_turns_freely():
 def test_what_is_refused():
     with pytest.raises(hybrid.SceneError, match="a number of modes from 1 to 200"):
         hybrid.modes(string(10), 0)
+    with pytest.raises(hybrid.SceneError, match="a number of modes from 1 to 200"):
+        hybrid.modes(chain(10), count=2.5)
     with pytest.raises(hybrid.SceneError, match="a period > 0"):
         hybrid.modes(string(10), 3, near=-1.0)
 

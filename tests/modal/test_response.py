@@ -12,7 +12,10 @@ from typer.testing import CliRunner
 import hybrid
 from hybrid.cli.commands import app
 from hybrid.linear.drag import across, along, size_deviation
+from hybrid.linear.response_results import LineResponse, Response
 from hybrid.scene.combinations import RESPONSE_TO_MOTION
+
+T_N = {"kind": "T-N", "log_a": 3.0, "m": 3.0}
 
 REGULAR = {"kind": "regular", "height": 1.0, "period": 7.0, "ramp": 10, "depth": 100}
 STORM = {"kind": "jonswap", "significant_height": 4.0, "peak_period": 12.0, "direction": 30, "ramp": 10, "depth": 100}
@@ -247,6 +250,31 @@ def test_a_slow_motion_bends_a_sprung_clamp_as_equilibria_do(law, spring):
     assert found.mean_curvature[0] == pytest.approx(rest, rel=1e-3)
     assert abs(found.curvature[0, 0]) == pytest.approx(0.5 * abs(high - low), rel=1e-3)
     assert abs(found.curvature[0, 0]) > 1e-12
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        lambda x: x.most_probable("tension", hours=-3.0),
+        lambda x: x.damage(T_N, strength=0.0),
+        lambda x: x.damage(T_N, strength=math.nan),
+        lambda x: x.damage(T_N, strength=1e6, hours=0.0),
+        lambda x: x.damage({"kind": "S-N", "log_a": 12.0, "m": 3.0}, strength=1e6),
+        lambda x: x.deviation("moment"),
+    ],
+)
+def test_what_makes_no_sense_is_no_number(asked):
+    """Damage of no strength, or of none of stress, was 0."""
+    ones = np.ones((2, 3), complex)
+    line = LineResponse(
+        np.arange(3.0), np.arange(3.0), np.array([0.1, 0.2]), ones[:, :, None], ones, ones, ones, np.ones((3, 1)),
+        np.ones(3), np.ones(3),
+    )  # fmt: skip
+    assert (line.damage(T_N, strength=10.0) > 0.0).all()
+    with pytest.raises(ValueError, match=r"expected|one of"):
+        asked(line)
+    with pytest.raises(ValueError, match="one of"):
+        Response("", {}, {}, {}, 1, {}, ()).valid_for("moment")
 
 
 def test_where_it_is_not_valid():

@@ -76,6 +76,16 @@ SECTIONS = {
     "EA of a pipe in kN": (PIPE | {"axial_stiffness": 5e6}, "axial_stiffness", "kN"),
     "rotary inertia in g m": (CHAIN | {"rotary_inertia": 6.0}, "rotary_inertia", "at most 0.00625 kg m"),
     "drag of a percentage": (CHAIN | {"drag": {"normal": 120}}, "drag", "at most 10"),
+    "moments before curvatures": (
+        {"mass": 20.0, "diameter": 0.05, "axial_stiffness": 8.5e7, "moment_curvature": [[0, 0], [50, 0.02], [90, 0.1]]},
+        "moment_curvature", "less than 40 1/m"),
+    "capacity in kN": (CHAIN | {"capacity": [[900.0, 0], [0, 0.5]]}, "capacity", "in kN? then 900000"),
+    "strength of a code in kN": (
+        CHAIN | {"code": {"kind": "E301", "strength": 900.0, "pretension_factor": 1.2, "environment_factor": 1.5}},
+        "code.strength", "in kN? then 900000"),
+    "strengths of a wall in MPa": (
+        PIPE | {"code": {"kind": "F201", "yield_strength": 430.0, "tensile_strength": 510.0}},
+        "code.yield_strength", "is it in Pa?"),
     "a rubber cord under its weight": (
         {"mass": 20.0, "diameter": 0.1, "axial_stiffness": 4e3}, "axial_stiffness", "max_strain"),
 }  # fmt: skip
@@ -110,6 +120,27 @@ def test_a_float_in_a_wrong_unit_is_noted_at_its_place(name: str) -> None:
             assert note.s == (120.0, 120.0)
 
 
+CONE = {"kind": "bend_stiffener", "diameters": [0.3, 0.1], "bore": 0.05, "modulus": 7e7}
+SLEEVES = {
+    "in mm": (CONE | {"diameters": [300.0, 100.0], "bore": 50.0}, "diameters: expected at most 5 m"),
+    "a bore that is a radius": (CONE | {"bore": 0.025}, "bore: expected 0.05 m or more"),
+    "modulus in MPa": (CONE | {"modulus": 70.0}, "modulus: expected 100000 Pa or more: is it in Pa? in MPa"),
+    "radius in km": ({"kind": "bend_restrictor", "radius": 0.003}, "radius: expected 0.025 m or more"),
+    "usual": (CONE, ""),
+    "usual restrictor": ({"kind": "bend_restrictor", "radius": 3.0}, ""),
+}
+
+
+@pytest.mark.parametrize("name", SLEEVES)
+def test_a_sleeve_that_does_not_fit_is_noted(name: str) -> None:
+    given, words = SLEEVES[name]
+    cable = {"sections": [{"length": 50.0} | CHAIN, {"length": 200.0} | CHAIN]}
+    notes = list(implausible(scene(cable=cable | {"attachments": [given | {"range": [48.0, 52.0]}]})))
+    assert len(notes) == bool(words), notes
+    for note in notes:
+        assert note.why.startswith(f"cable.attachments[0].{words}") and note.s == (48.0, 52.0)
+
+
 SURROUNDINGS = {
     "friction in tens of percent": (environment(friction=5.0), "friction of 5"),
     "current in cm/s": (environment(current={"speed": 50.0, "direction": 30.0}), "a current of 50 m/s"),
@@ -121,6 +152,18 @@ SURROUNDINGS = {
         "ends": {"start": {"kind": "pinned", "position": [0, 0, -20_000.0]},
                  "end": {"kind": "pinned", "position": [205.0, 0, 0]}}}, "a depth of 20000 m"),
 }  # fmt: skip
+
+
+def test_waves_of_a_file_in_hertz_are_noted(tmp_path: Path) -> None:
+    """Frequencies of 0.6 and 1.2 rad/s, written in rad/s and in Hz."""
+    for unit, expected in ((1.0, 0), (6.283, 1)):
+        (path := tmp_path / f"sea{unit}.csv").write_text(
+            f"amplitude,frequency,direction,phase\n0.5,{0.6 / unit},0,0\n0.2,{1.2 / unit},0,90\n"
+        )
+        notes = list(implausible(scene(**environment(waves={"kind": "components", "file": str(path)}))))
+        assert [x.why.startswith("environment.fluid.waves.file: expected at most 40 s") for x in notes] == [
+            True
+        ] * expected
 
 
 @pytest.mark.parametrize("name", SURROUNDINGS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from typer.testing import CliRunner
 import hybrid
 from hybrid.cli.commands import app
 from hybrid.errors import SceneError
-from hybrid.store.code_checks import F201, Row, code_of_steps, collapse, of_riser, use
+from hybrid.store.code_checks import E301, F201, Row, code_of_steps, collapse, of_riser, use
 from hybrid.store.statistics_table import rows_of
 
 PIPE = {"outer": 0.2731, "wall": 0.0159, "modulus": 207e9, "yields": 430.08e6, "breaks": 509.76e6}
@@ -45,7 +46,35 @@ def test_a_riser_written_out():
     assert float(use(row, np.array(8e5), np.array(-1e5), np.array(0.0))) == pytest.approx(
         float(of_riser(RISER, np.array(1.1 * 5e5 + 1.3 * 3e5), np.array(1.1 * 2e4 + 1.3 * 8e4), np.array(0.0)))
     )
-    assert np.isnan(of_riser(RISER, np.array(0.0), np.array(0.0), np.array(9e7)))  # it bursts
+    burst = 2 / math.sqrt(3) * 2 * t / (D - t) * min(fy, fu / 1.15)
+    parts = of_riser(RISER, np.array(0.0), np.array(1e5), burst * np.array([1 - 1e-9, 1.0, 1.5]))
+    np.testing.assert_allclose(parts, [1.0, 1.0, 2.25], rtol=1e-4)  # pressure alone bursts it
+
+
+def test_less_than_the_functional_part_is_no_relief():
+    """A tension or moment below what is said to be functional has the factor of that, and never less than nothing."""
+    row = RISER._replace(tension=5e5, moment=2e4)
+    low = use(row, np.array(3e5), np.array(1e4), np.array(0.0))
+    assert float(low) == pytest.approx(float(of_riser(RISER, np.array(1.1 * 3e5), np.array(1.1e4), np.array(0.0))))
+    line = row._replace(kind=E301, strength=1e6, tension=2e5)
+    T = np.array([0.0, 1e5, 2e5, 4e5])
+    np.testing.assert_allclose(use(line, T, T, T), [0.0, 0.11, 0.22, 0.48], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("pretension_factor", 1.6, "at least pretension_factor, 1.6"),
+        ("pretension", 4e6, "less than the strength, 3e+06 N"),
+        ("strength", None, "a number > 0"),
+        ("environment_factor", None, "a number > 0"),
+    ],
+)
+def test_numbers_of_a_code_that_do_not_fit_are_refused(key, value, words):
+    code = {k: x for k, x in (MOORED | {key: value}).items() if x is not None}
+    with pytest.raises(SceneError, match=re.escape(words)):
+        hybrid.static({"cable": {"sections": [LINE | {"length": 100.0, "code": code}]}, "model": "rod",
+                       "ends": hung()["ends"], "environment": hung()["environment"]})  # fmt: skip
 
 
 LINE = {"mass": 110.0, "diameter": 0.2731, "axial_stiffness": 2e9, "bending_stiffness": 2e7, "damping": 0.5}
