@@ -47,7 +47,7 @@ class ComplexSolver:
         return True
 
     def _part(self, x: sparse.csc_array, key: np.ndarray) -> Floats:
-        return np.bincount(np.searchsorted(self._every, key), x.data, self._every.size)
+        return np.bincount(np.searchsorted(self._every, key), x.data, self._every.size).astype(float)
 
     def solve(self, factors: Sequence[complex], right: Floats) -> Floats:
         """x (n, ...) for right-hand sides (n, ...); RuntimeError: the matrix is singular."""
