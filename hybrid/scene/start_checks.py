@@ -12,6 +12,7 @@ from hybrid.scene.attachments import BendRestrictor, Spread
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import Ends, Triple
+from hybrid.scene.obstacles import Obstacles
 from hybrid.scene.ways import farthest, moving_key, shift, smaller
 
 # Positions that differ by less than this part of the cable's length are the same place:
@@ -151,11 +152,16 @@ def _guess(cable: Cable, ends: Ends, initial: Equilibrium) -> Iterator[Finding]:
             )
 
 
-def equilibrium_exists(environment: Environment, cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
+def equilibrium_exists(
+    environment: Environment, cable: Cable, ends: Ends, initial: Initial, obstacles: Obstacles
+) -> Iterator[Finding]:
     """A cable that nothing holds rests on the seabed or floats at the surface, or has no equilibrium."""
     if not isinstance(initial, Equilibrium) or ends.held():
         return
     reason, fix = _drifts(environment, cable, ends)
+    if reason and obstacles:
+        reason = "no end is held, and the search does not find a rest of a cable that obstacles alone hold"
+        fix = "hold an end, and let it go in a motion (`release_at`); or start from `initial: {kind: points}`"
     if reason:
         yield Finding(("initial", "kind"), f"at least one end with a position, because {reason}", fix)
     elif initial.points is None and len(ends.initial_guesses()) < 2:

@@ -364,3 +364,20 @@ def test_no_step_before_the_first_one_is_to_blame_for_slack():
     with pytest.raises(hybrid.ComputationError, match=r"the line is slack(?s:.*)`model: adaptive`") as stop:
         run(section(length=10.0, mass=1.0, diameter=0.02, axial_stiffness=1e6), more)
     assert "time.step" not in str(stop.value)
+
+
+def test_a_rope_that_a_sheave_alone_holds_is_refused_with_what_computes_it():
+    """It was said that nothing holds it, and that there is no seabed; with friction it stays where points lay it."""
+    angle, radius = np.linspace(math.pi, 0.0, 13), 0.315 / math.cos(math.pi / 24.0)
+    over = [[radius * math.cos(x), 0.0, radius * math.sin(x)] for x in angle]
+    points = [[-0.315, 0.0, -2.5], *over, [0.315, 0.0, -2.5]]
+    length = sum(map(math.dist, points, points[1:]))
+    rope = section(length=length, mass=0.5, diameter=0.02, axial_stiffness=1e5, bending_stiffness=0.05)
+    drum = {"kind": "cylinder", "at": [0, 0, 0], "axis": [0, 1, 0], "radius": 0.3, "friction": 0.3}
+    weights = {"start": {"kind": "body", "mass": 10}, "end": {"kind": "body", "mass": 10}}
+    more = {"ends": weights, "obstacles": {"drum": drum}, "model": "rod", "mesh": {"cells": 160}}
+    with pytest.raises(hybrid.SceneError, match=r"that obstacles alone hold(?s:.*)initial: \{kind: points\}"):
+        static(rope, more)
+    start = {"initial": {"kind": "points", "points": points}, "time": {"duration": 0.5, "step": 0.002}}
+    fallen = -2.5 - run(rope, more, start).position[:, [0, -1], 2]
+    assert np.abs(fallen).max() < 0.05 * 0.5 * 9.81 * 0.5**2  # it tightens by 5 mm round the drum, and bounces
