@@ -93,7 +93,7 @@ class Member(Table):
     """A cylinder of a body that water flows around: drag, added mass and the force of waves after Morison."""
 
     start: Vector = Field(description="one end of its axis, from the origin of the body in axes of the body [m]")
-    end: Vector = Field(description="its other end [m]")
+    end: Vector = Field(description="other end of its axis [m]")
     diameter: Positive = Field(description="diameter [m]")
     drag: NonNegative = Field(default=0.0, description="drag coefficient Cd across the axis, on the diameter [-]")
     axial_drag: NonNegative = Field(
