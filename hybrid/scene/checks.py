@@ -135,6 +135,7 @@ OF_A_REEL = {
     "moment_curvature": "the moment over curvature",
     "tension_torque": "the torque of tension",
     "vortices": "the vortices",
+    "creep": "the creep",
 }
 
 

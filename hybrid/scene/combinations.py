@@ -411,7 +411,6 @@ SLIP = Feature("layers that slip as a line bends, a bending stiffness that grows
 SOIL = Feature("soil that remembers", "seabed.soil", _bed(lambda x: x.soil, "soil"))
 NO_WIDTH = Feature("a section without diameter", "diameter",
                    _in_sections("diameter", of=lambda x: x.diameter is None))  # fmt: skip
-CREEP = Feature("a rope that creeps", "creep", _in_sections("creep", of=lambda x: x.creep))
 SPRING_BESIDE_SLIP = Feature("an angular spring at a clamp of such a section", "bend_stiffness", _springs_beside_slip)
 DAMPED_OTHERWISE = Feature(
     "damping proportional to stiffness of laws and tables, with torque of tension, of a line clamped to what turns",
@@ -489,7 +488,6 @@ REFUSALS: tuple[Refusal, ...] = (
         SOIL, ABOUT_REST, "not worked out", "the stiffness of soil depends on how far the line moves, and which way",
         fix="give stiffness, that of unloading at this depth; hybrid run computes it in time",
     ),
-    Refusal(CREEP, PAYOUT, "not worked out", "what line has crept by does not travel with {key}"),
     Refusal(SLIP, PAYOUT, "not worked out", "layers that slip, and stiffness by tension, do not go with {key}"),
     Refusal(
         SLIP, ABOUT_REST, "not worked out", "the stiffness depends on how far the line moves, or on its tension",

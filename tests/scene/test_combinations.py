@@ -52,7 +52,6 @@ ROPE = {SECTION + "dynamic_stiffness": {"constant": 2e6, "relaxation_time": 100}
 SHEDS: dict[str, Any] = {SECTION + "vortices": {}, "environment.fluid": {"density": 1025, "current": [0.3, 0, 0]}}
 HIGH_WAVES: dict[str, Any] = {"environment.fluid": {
     "density": 1025, "surface": 5, "waves": {"kind": "stream_function", "height": 1, "period": 5, "ramp": 9}}}  # fmt: skip
-CREEPS: dict[str, Any] = {SECTION + "creep": {"per_decade": 0.001, "loaded": 100}}
 CLAY: dict[str, Any] = {"environment.seabed": {"z": -9, "soil": {"shear_strength": 2000}}}
 RAO = {"rao": str(Path(__file__).parents[1] / "data" / "rao.csv"), "origin": [8, 0, 0], "fairlead": [0, 0, 0]}
 CLAMPED = {ONE + "connections": {"end": {"kind": "clamped", "tangent": [1, 0, 0]}}}
@@ -74,7 +73,6 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.SLIP, c.MOVING_ZONES): (SLIPS | MOVING, ""),
     (c.NO_WIDTH, c.SOIL): (CLAY | {"cable.sections": [{"length": 10, "mass": 2, "bending_stiffness": 10}]}, ""),
     (c.SOIL, c.ABOUT_REST): (CLAY, "about rest"),
-    (c.CREEP, c.PAYOUT): (CREEPS | PAID, ""),
     (c.SLIP, c.PAYOUT): (SLIPS | PAID, ""),
     (c.SLIP, c.ABOUT_REST): (SLIPS, "about rest"),
     (c.SPRING_BESIDE_SLIP, c.SLIP): (SLIPS | {END + "bend_stiffness": 5}, ""),

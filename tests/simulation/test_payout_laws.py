@@ -1,4 +1,4 @@
-"""Lines that are paid out with torque of tension, polyester, vortices, and whose end at the winch is let go."""
+"""Lines that are paid out with torque of tension, polyester, creep, vortices, and whose end at the winch is let go."""
 
 from __future__ import annotations
 
@@ -49,7 +49,11 @@ def shedding(step: float = 0.02) -> dict[str, Any]:
     return paid(SHEDS, step=step, model="rod", EA=2e6, EI=2e4) | {"environment": SEA}
 
 
-SCENES = {"torque": twisting, "polyester": polyester, "vortices": shedding}
+def creeping(step: float = 0.05) -> dict[str, Any]:
+    return paid({"axial_stiffness": 2e6, "creep": {"per_decade": 2e-3, "loaded": 1.0}}, False, step)
+
+
+SCENES = {"creep": creeping, "torque": twisting, "polyester": polyester, "vortices": shedding}
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -113,6 +117,24 @@ def test_a_torque_of_tension_is_that_of_a_line_of_the_final_length() -> None:
     assert found.position[-1, 0, 2] == pytest.approx(-length * (1.0 + mean / EA), rel=2e-5)
 
 
+def test_a_rope_creeps_as_it_is_paid_out() -> None:
+    """Under a constant pull, what has just come from the reel too: its end is at L(t) (1 + F/EA + c log10(1 + t/t0))."""
+    pull, EA, c, loaded = 2e4, 1e6, 4e-3, 5.0
+    section = {"length": 10.0, "mass": 1.0, "axial_stiffness": EA, "damping": {"mass": 2.0},
+               "creep": {"per_decade": c, "loaded": loaded}}  # fmt: skip
+    scene = hanging({"lengths": [[0, 10], [20, 12], [60, 12]]}, 60.0, mesh={"cells": 20}, environment={"gravity": 0})
+    scene["cable"]["sections"] = [section]
+    scene["ends"]["start"] = {"kind": "free", "force": [0, 0, -pull]}
+    found = hybrid.run(scene)
+    stretch = 1.0 + pull / EA + c * np.log10(1.0 + found.t / loaded)
+    assert found["payout/length"][-1] == pytest.approx(12.0)
+    assert np.abs(-found.position[:, 0, 2] / found["payout/length"] / stretch - 1.0)[1:].max() < 2e-5
+    lost, out = -found["work/hysteresis"], found["payout/length"]
+    rates = c / np.log(10.0) / (found.t + loaded) * pull * out  # W, by what is out then
+    done = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(found.t) * (rates[1:] + rates[:-1]))])
+    assert np.abs(lost - done).max() < 0.01 * done[-1]
+
+
 def test_polyester_that_stays_below_its_highest_tension_is_a_longer_rope() -> None:
     """A straight working curve from e0 on, strain = e0 + f T: a rope (1 + e0) times as long, of stiffness (1 + e0)/f."""
     highest, at, k1, E = 4000.0, 0.02, 0.5, 9e5
@@ -158,9 +180,16 @@ def test_lift_grows_with_the_length_that_is_out() -> None:
 
 
 def test_what_differs_on_the_reel_is_refused() -> None:
-    for scene, key in ((twisting(), "tension_torque"), (shedding(), "vortices"), (polyester(), "syrope")):
+    all_of_them = (
+        (twisting(), "tension_torque"),
+        (shedding(), "vortices"),
+        (polyester(), "syrope"),
+        (creeping(), "creep"),
+    )
+    for scene, key in all_of_them:
         section = dict(scene["cable"]["sections"][0])
-        other = {"tension_torque": 1e-3, "vortices": {"lift": 0.5}}.get(key)
+        other: Any = {"tension_torque": 1e-3, "vortices": {"lift": 0.5}, "creep": {"per_decade": 5e-3, "loaded": 1.0}}
+        other = other.get(key)
         changed = section | {key: other} if other else section | {key: section[key] | {"highest_tension": 2500.0}}
         scene["ends"]["end"]["payout"]["reel"] = [changed]
         with pytest.raises(SceneError) as refused:

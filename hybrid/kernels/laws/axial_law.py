@@ -14,7 +14,8 @@
 Of a rope that remembers it s is the table (the original curve) while theta is its peak; below it is a working curve from
 the strain k1 s(peak), where there is no tension, to s(peak), of the shape that is given.  In a step theta is that of a tension which changes evenly (exact, whatever the step); at rest it is T.  The law of length
 is linearised about the tension that an iteration has found: eps = SHIFT + ck T, both written here before every march.
-Creep is a given strain beside eps, which stores nothing: what tension does on it is lost.
+Creep is a given strain beside eps, which stores nothing: what tension does on it is lost.  Line on a reel creeps as what
+is out.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ from hybrid.kernels.state.state import WORKING
 # Columns of Line.law: of a cell, its first row in Line.law_table and the row behind its last (equal: tension is a multiple
 # of strain there); a, b and tau; the shape of working curves (0: there are none), its two numbers, the peak before the
 # start (N); creep in a tenfold time, c, and t0 (s); then what is written: strain without tension of the linearised law;
-# power lost, W.
+# power lost, W; creep.
 FIRST, LAST, DYNAMIC, PER_TENSION, RELAXATION = range(WORKING)
-K1, K2, HIGHEST, CREEP, LOADED, SHIFT, LOSS = range(WORKING + 1, WORKING + 8)
+K1, K2, HIGHEST, CREEP, LOADED, SHIFT, LOSS, CREPT = range(WORKING + 1, WORKING + 9)
 # Shapes of working curves: T/peak over the part of the way from the strain without tension to the peak.  That by a
 # stiffness is straight, with k1 its stiffness, N.
 LINEAR, BY_STIFFNESS, QUADRATIC, EXPONENTIAL = 1.0, 2.0, 3.0, 4.0
@@ -191,7 +192,7 @@ def crept(law, i, t):
 def follow_law(line, old, new, work, dt, t):
     """Linearise the laws of all cells about new.T, after a step of dt (s) from `old`; dt = 0: at rest, new.slow becomes T;
 
-    dt < 0: new.slow stays as it is.  t: s, the time of `new`.  Writes line.ck, SHIFT and LOSS of line.law, new.slow,
+    dt < 0: new.slow stays as it is.  t: s, the time of `new`.  Writes line.ck, what is written of line.law, new.slow,
     new.peak, energy and work.
     """
     law, table, energy, lost = line.law, line.law_table, 0.0, 0.0
@@ -199,7 +200,7 @@ def follow_law(line, old, new, work, dt, t):
         first, last = int(law[i, FIRST]), int(law[i, LAST])
         e, h, T = get3(new.e, i), line.h[i], new.T[i]
         l = math.sqrt(dot(e, e))
-        creep = crept(law, i, t)
+        law[i, CREPT] = creep = crept(law, i, t)
         strain = (l * l - h * h) / ((l + h) * h) - creep
         if dt > 0.0 and creep > 0.0:
             lost += 0.5 * h * (old.T[i] + T) * (creep - crept(law, i, t - dt))
@@ -266,11 +267,11 @@ def strain_and_energy(line, state, i):
     law, first, last = line.law, int(line.law[i, FIRST]), int(line.law[i, LAST])
     if not law[i, DYNAMIC] > 0.0:
         strain, _, stored = strain_at(line.law_table, first, last, T)
-        return strain, stored
+        return strain + law[i, CREPT], stored
     mean = state.slow[i]
     strain, _, stored = rest_at(law, line.law_table, i, mean, peak_before(law, i, state))
     E, _ = stiffness_at(law, i, mean)
-    return strain + (T - mean) / E, stored + 0.5 * (T * T - mean * mean) / E
+    return strain + (T - mean) / E + law[i, CREPT], stored + 0.5 * (T * T - mean * mean) / E
 
 
 @inner

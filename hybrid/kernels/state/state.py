@@ -39,7 +39,7 @@ NO_TENSION_TORQUE: Floats = np.zeros(0)
 NO_TURN: Floats = np.zeros((0, 3))
 NO_TURNS: Floats = np.zeros((0, 0, 3))
 # Of a line whose tensions are multiples of strains (kernels.laws.axial_law has the columns).
-NO_LAW: Floats = np.zeros((0, 13))
+NO_LAW: Floats = np.zeros((0, 14))
 WORKING = 5  # the column that says which cells remember their highest mean tension; 0: not this one
 NO_TABLE: Floats = np.zeros((0, 3))
 # Of a line whose moments are multiples of curvature (kernels.laws.bending_law has the columns).
@@ -116,7 +116,7 @@ class Line(NamedTuple):
     # turn without torque (rad), stiffness-proportional damping time (s)
     torsion: Floats = NO_TORSION
     # (N, 13) of cells whose tension is no multiple of strain (kernels.laws.axial_law); empty: there are none
-    law: Annotated[Floats, cell(columns=13, optional=True)] = NO_LAW
+    law: Annotated[Floats, cell(columns=14, optional=True)] = NO_LAW
     law_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: strain, tension (N), energy per length (J/m)
     law_at: NDArray[np.int64] = (
         NO_ADDRESS  # (1,) address of kernels.laws.axial_law.follow_law; empty: there is no such cell
