@@ -38,6 +38,7 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
         "t": run.t, "steps": run.steps, "last": run.last_step, "rho": run.last_rho, "loaded": run.loaded,
         "interval": run.interval, "worked": run.loop.worked[1, :, :SPRING],
         "leg": [*run.leg], "cpu": run.cpu, "dry": sorted(run.dry), "under": dict(run.under),
+        "overlaps": sorted(run.overlaps),
         "bodies": run.state.bodies, "body_work": body_work,
         "lines": lines, "broken": [*run.failures.broken], "rest": run.rest,
         "control": run.loop.control(), "changes": run.changed,
@@ -71,9 +72,9 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         run.payout.restore(saved["payout"])
     if run.zones is not None or run.payout is not None or near:
         run.make_solver()
-    template = checkpoint(run) | {"dry": None, "under": None, "broken": None, "control": None}
+    template = checkpoint(run) | {"dry": None, "overlaps": None, "under": None, "broken": None, "control": None}
     template |= {name: None for name in ("contact", "met", "passed", "payout") if name in template}  # as there are
-    saved = {"quantities": run.quantities.unknown(), "under": {}, **saved}  # nor did it keep ranges
+    saved = {"quantities": run.quantities.unknown(), "under": {}, "overlaps": [], **saved}  # nor did it keep ranges
     saved["quantities"] = run.quantities.of_today(saved["quantities"])
     saved["lines"] = of_today(saved.get("lines"), template["lines"])
     for name, line in template["lines"].items():
@@ -86,6 +87,8 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     found = matched(dict(saved), template)
     if not (isinstance(found["dry"], list) and set(found["dry"]) <= set(run.system.bodies)):
         raise ValueError("dry: names of bodies were expected")
+    if not (isinstance(found["overlaps"], list) and all(isinstance(x, str) for x in found["overlaps"])):
+        raise ValueError("overlaps: what is in each other was expected")
     if not (isinstance(found["under"], dict) and set(found["under"]) <= set(run.system.points)):
         raise ValueError("under: names of points were expected")
     if not (0.0 <= found["leg"][0] <= found["t"] and found["leg"][1] >= 0 and found["steps"] >= 0):
@@ -156,6 +159,7 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
     run.stand_at(found["t"], found["steps"], found["last"], found["rho"], found["interval"])
     run.loaded = found["loaded"]
     run.leg, run.dry, run.cpu = (found["leg"][0], found["leg"][1]), set(found["dry"]), found["cpu"]
+    run.overlaps = set(found["overlaps"])
     run.under = {name: float(depth) for name, depth in found["under"].items()}
     run.loop.take_control(found["control"])
     run.passed, run.met = (_pairs(found[name]) for name in ("passed", "met"))

@@ -191,7 +191,8 @@ class SystemRun:
         self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
         self._moved: list[Moves] = []  # by which ends move in compiled steps
         self._loaded = np.nan  # and `loaded`, of the loads that act there on bodies
-        self.dry: set[str] = set()  # bodies said to be out of the water, or in another one
+        self.dry: set[str] = set()  # bodies that have been said to be out of the water
+        self.overlaps: set[str] = set()  # and what has been said to be in each other
         self.under: dict[str, float] = {}  # depth (m) of points that have been said to be pulled under it
         self.failures = Failures(self)
         self.zones = SystemZones(self, managers) if managers and moves else None
@@ -375,7 +376,7 @@ class SystemRun:
             values |= self.quantities.values(by_name, {line.name: line for line in self.lines})
             self.recorder.save_batch(seen.t, values, [("lines", 0.0, 0.0)])
         note_dry_bodies(self.system, self.model, seen, self.dry, self.recorder.event)
-        note_overlaps(self.model, seen, self.dry, self.recorder.event)
+        note_overlaps(self.model, seen, self.overlaps, self.recorder.event)
         note_pulled_under(self.system, self.model, seen, self.under, self.recorder.event, moves=self.moves)
         self._keep_in_plane()
         for line, x in zip(self.lines, states, strict=True):
