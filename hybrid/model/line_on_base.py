@@ -47,5 +47,5 @@ class LineOnBase:
             least=LEAST_TENSION * scale,
         )  # fmt: skip
         fill_kinds(self._kinds_job.numbers)
-        kinds.node[[0, -1]] = np.where(self._material.hinges[:, 0] > 0.0, HINGE, kinds.node[[0, -1]])
+        kinds.node[[0, -1]] = np.where(self._material.hinges[:2, 0] > 0.0, HINGE, kinds.node[[0, -1]])
         return kinds

@@ -52,6 +52,7 @@ STIFFENER_CELLS = 20
 LOCKED = 100.0  # bending stiffness of a restrictor that is locked, over that of the cable
 # Of its height, from which on the added mass of a body without mass counts in full.
 LEAST_DRAUGHT = 0.05
+SAME_RATIO = 1e-9  # part by which the EI/GJ of sections may differ and be one number
 SMALLEST_BODY = 0.01  # m, over which a body without volume and drag passes through the surface
 OF_SECTIONS = ("mass", "ck", "rotary", "polar")  # per length, whatever else a scene asks for
 POINT = tuple(name for name in OF_POINTS if name not in ("point_lift", "footing"))
@@ -140,12 +141,17 @@ class Material:
 
     @property
     def hinges(self) -> Floats:
-        """(2, 2) of each end where the curvature of a rod fades to nothing: EI, N m2, and how far from the end on, m.
+        """(3, 2) of each end where the curvature of a rod fades to nothing: EI, N m2, and how far from the end on, m.
 
         EI 0 where an end bends the line, and where a catenary cannot know what a rod would do: bent without stress, or
-        differently in two directions.
+        differently in two directions.  Behind them EI/GJ of all sections; 0 where it is not one number, or where a
+        section is curved, has a table or layers.
         """
-        found, EI = np.zeros((2, 2)), self.mean_bending
+        found, EI, ratio = np.zeros((3, 2)), self.mean_bending, np.zeros(1)
+        if self.B.all() and not (self.kappa.any() or any(self.bends or ()) or any(self.layers)):
+            ratio = self.B[:, :2] / self.B[:, 2:]
+        if np.ptp(ratio) <= SAME_RATIO * ratio.max():
+            found[2, 0] = ratio.mean()
         for k, (hinged, order) in enumerate(zip(self.hinged, (1, -1), strict=True)):
             if hinged and not self.kappa[-k, :2].any() and self.B[-k, 0] == self.B[-k, 1]:
                 same = np.flatnonzero(EI[::order] != EI[-k])

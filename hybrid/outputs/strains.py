@@ -15,18 +15,16 @@ from numpy.typing import NDArray
 from hybrid.kernels.laws.bending_law import LAST_A, LAST_B, RIGID, curvature_under, parts_without_spring
 from hybrid.kernels.laws.hinge_layer import FADED, FARTHEST
 from hybrid.kernels.march.zone_torque import TORQUE
-from hybrid.kernels.state.forces import PLANAR
 from hybrid.kernels.state.state import Floats, Line
 from hybrid.outputs.end_layers import EndLayer, end_layers
 from hybrid.outputs.moments import across
-from hybrid.outputs.vectors import cross, dot, size
+from hybrid.outputs.soft_rods import parts_of_stiffness, restored
+from hybrid.outputs.vectors import cross, directions_of, dot, size
 
 if TYPE_CHECKING:
     from hybrid.outputs.observation import Observation
 
 Integers = NDArray[np.int64]
-# Of a node where the line is straight.
-ANY_DIRECTION = np.array([0.0, 1.0, 0.0])[:, None]
 
 
 class SpanEnds(NamedTuple):
@@ -61,7 +59,10 @@ def strains(view: Observation) -> tuple[Floats, list[tuple[EndLayer, Floats]]]:
     if not rods.all():
         out[~of_rod, 0] = view.bends[nodes[~of_rod]]
         _end_catenaries(view, out, spans[~rods])
+    whole = restored(view, out, spans, rods)
     _put_layers_back(view, out, spans, rods)
+    for rows, soft, curvature in whole:
+        out[rows, 0] = np.where(soft, curvature, out[rows, 0])
     return out, _take_layers_at_ends(view, out)
 
 
@@ -73,7 +74,7 @@ def bend_directions(view: Observation) -> Floats:
     """
     nodes, d, line = view.grid.side_nodes, view.d, view.line
     inner = np.clip(nodes, 1, max(len(d) - 1, 1))
-    out = _directions(line, cross(d[inner - 1], d[np.minimum(inner, len(d) - 1)]))
+    out = directions_of(line, cross(d[inner - 1], d[np.minimum(inner, len(d) - 1)]))
     spans = np.array(view.grid.spans).reshape(-1, 3)
     rods, at = np.tile([zone.kind == "rod" for zone in view.grid.parts], 2), ends_of(spans)
     outer = np.isin(at.node, view.end_nodes)
@@ -81,16 +82,8 @@ def bend_directions(view: Observation) -> Floats:
     out[at.row[beside]] = out[at.row[beside] + at.inward[beside]]
     bent = np.flatnonzero(outer & rods & ~line.k0[at.node].any(axis=1))
     moment = across(view.node_moment[at.node[bent]], view.node_tangent[at.node[bent]])
-    out[at.row[bent]] = np.where(size(moment)[:, None] > 0.0, _directions(line, moment), out[at.row[bent]])
+    out[at.row[bent]] = np.where(size(moment)[:, None] > 0.0, directions_of(line, moment), out[at.row[bent]])
     return out
-
-
-def _directions(line: Line, x: Floats) -> Floats:
-    """Of vectors (n, 3, outputs), or on which side of the plane of the line they are."""
-    if line.bits & PLANAR:
-        return np.where(np.einsum("j,njk->nk", line.plane[2], x) < 0.0, -1.0, 1.0)[:, None]
-    length = size(x)[:, None]
-    return np.where(length > 0.0, x / np.where(length > 0.0, length, 1.0), ANY_DIRECTION)
 
 
 def _end_rods(view: Observation, out: Floats, spans: Integers) -> None:
@@ -186,7 +179,7 @@ def _put_layers_back(view: Observation, out: Floats, spans: Integers, rods: NDAr
             continue
         node, parts, directions = spans[k + 1, 0], _layer(view, spans[k + 1, 0], way, span), view._bend_directions
         before, after = _stiffness_shares(view, node, way)
-        turned = _directions(view.line, np.cross(view.d[node - 1], view.d[node], axis=0)[None])[0]
+        turned = directions_of(view.line, np.cross(view.d[node - 1], view.d[node], axis=0)[None])[0]
         turn, held = view.bends[node], before * out[its - way, 0]
         along = (turned * directions[its]).sum(axis=0)
         square = np.maximum(turn * turn + 2.0 * along * turn * held + held * held, 0.0)
@@ -290,7 +283,7 @@ def _bend_of_moment(view: Observation, node: Integers, cell: Integers) -> Floats
         for z, (first, last) in enumerate(line.torsion[:, :2]):
             torque[(node == first) | (node == last)] = view.batch.turn[:, z, TORQUE]
     inner = np.where(cell == node, cell + 1, cell)
-    B = view.stiffness(inner) * view.of_line("hn", inner)[:, None]
+    B = view.stiffness(inner) * (view.of_line("hn", inner) / parts_of_stiffness(view, inner, cell))[:, None]
     a1, d, M = view.directors(cell), view.d[cell], view.node_moment[node]
     body = np.stack([dot(a1, M), dot(cross(d, a1), M), dot(d, M) + torque], axis=1)
     k = np.divide(body, B, out=np.zeros_like(body), where=np.broadcast_to(B > 0, body.shape))

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.kernels.state.state import Floats
+from hybrid.kernels.state.forces import PLANAR
+from hybrid.kernels.state.state import Floats, Line
+
+# Of a node where the line is straight.
+ANY_DIRECTION = np.array([0.0, 1.0, 0.0])[:, None]
 
 
 def cross(a: Floats, b: Floats) -> Floats:
@@ -24,3 +28,11 @@ def dot(a: Floats, b: Floats) -> Floats:
 def size(a: Floats) -> Floats:
     """Length of vectors (n, 3, nb)."""
     return np.asarray(np.sqrt(dot(a, a)))
+
+
+def directions_of(line: Line, x: Floats) -> Floats:
+    """Of vectors (n, 3, outputs), or on which side of the plane of the line they are."""
+    if line.bits & PLANAR:
+        return np.where(np.einsum("j,njk->nk", line.plane[2], x) < 0.0, -1.0, 1.0)[:, None]
+    length = size(x)[:, None]
+    return np.where(length > 0.0, x / np.where(length > 0.0, length, 1.0), ANY_DIRECTION)

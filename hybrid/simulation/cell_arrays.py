@@ -98,7 +98,7 @@ def blank_kept(n: int, extra: int, some: bool) -> Kept:
     """extra: marked nodes; some: whether extremes are kept."""
     nodes, z = n + 1, np.zeros
     return Kept(
-        z((2, n)), z(n), z((nodes if some else 0, 4)), z((nodes, 3)), z(nodes, np.int8), z(nodes, np.int64),
+        z((2, n)), z(n), z((nodes if some else 0, b.STRAINS)), z((nodes, 3)), z(nodes, np.int8), z(nodes, np.int64),
         z((4, b.EXTREMES, nodes + extra)) if some else z((4, 0, nodes)),
     )  # fmt: skip
 

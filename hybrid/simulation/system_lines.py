@@ -32,6 +32,7 @@ from hybrid.kernels.state.books import (
     RHO,
     STIFF,
     STORED,
+    STRAINS,
     STRETCHED,
     VARIES,
     Books,
@@ -181,7 +182,7 @@ class LineResult:
         books.counts[STIFF], books.counts[VARIES] = self.model.inextensible, self.model.layout is not None
         books.clock[RHO] = self.scene.time.rho_inf if self.scene.time is not None else 0.0
         return books._replace(
-            strains=np.zeros((nodes, 4)), marks=marks, right=right, start=begin.copy(), base=base,
+            strains=np.zeros((nodes, STRAINS)), marks=marks, right=right, start=begin.copy(), base=base,
             placed=begin[base], borne=1.0 + borne_strain(self.model),
             extremes=no_extremes(nodes + marked.size),
             touch=self._blank_touch(),

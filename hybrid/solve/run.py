@@ -18,7 +18,7 @@ from hybrid.kernels.mesh.zone_step import follow_zones
 from hybrid.kernels.run.entry import NO_PUSH, check_turns
 from hybrid.kernels.run.run import in_plane, in_space, run
 from hybrid.kernels.state import books as b
-from hybrid.kernels.state.books import blank_books, sample_size
+from hybrid.kernels.state.books import STRAINS, blank_books, sample_size
 from hybrid.kernels.state.forces import PLANAR, SELF_CONTACT
 from hybrid.kernels.state.obstacle_rows import EACH, SEEN
 from hybrid.kernels.state.report import REPORT_SIZE
@@ -119,7 +119,7 @@ class CompiledRun:
         right = np.arange(nodes)
         right[marked] = nodes + np.arange(marked.size)
         books = self.books._replace(
-            borne=borne, base=first.astype(np.int64), strains=np.zeros((nodes, 4) if some else (0, 4)), marks=marks,
+            borne=borne, base=first.astype(np.int64), strains=np.zeros((nodes if some else 0, STRAINS)), marks=marks,
             right=right, start=np.zeros((nodes, 3)), model_error=followed,
             extremes=no_extremes(nodes + marked.size) if some else np.zeros((4, 0, nodes)),
             touch=np.zeros((3, nodes if touches else 0)),

@@ -126,6 +126,7 @@ LOADED, SEAM = 1, 2  # a point load; where one section ends and the next begins
     TENSION, CURVATURE, MOMENT, TORQUE, PRESSURE, DISPLACEMENT, SELF_PRESSURE, WALL_TENSION, VON_MISES, OBSTACLE_PRESSURE,
 ) = range(10)  # fmt: skip
 EXTREMES = 10
+STRAINS = 8  # columns of `strains`
 
 
 class Books(NamedTuple):
@@ -142,9 +143,9 @@ class Books(NamedTuple):
     velocity: Floats  # (2, 3) m/s, of held ends now
     imposed: Floats  # (2, 2, 21) now and before the last step, of each end: position, frame, spin, force, moment
     loaded: NDArray[np.int8]  # (2,) 1 where there is a body at the end
-    hinges: (
-        Floats  # (2, 2) of ends where the curvature of a rod fades to nothing: EI, N m2 (0: it does not), how far, m
-    )
+    # (3, 2) of ends where the curvature of a rod fades to nothing: EI, N m2 (0: it does not), how far, m; then EI/GJ of
+    # all of the line (0: it is not one number)
+    hinges: Floats
     base: NDArray[np.int64]  # nodes whose displacement is watched
     placed: Floats  # (base.size, 3) m, where they were at the start
     borne: Floats  # (N,) length over unstretched length that each cell bears
@@ -152,7 +153,9 @@ class Books(NamedTuple):
     log: Floats  # (rows, len(LOG))
     samples: Floats  # (rows, sample_size(N) + K)
     model_error: Floats  # (2, K) what samples take of the model error now and before the last step; K = 0: not followed
-    strains: Floats  # (N+1, 4) of elements: curvature (1/m), bending moment (N m), torque (N m), curvature as results have it; empty: not wanted
+    # (N+1, STRAINS) of elements: curvature (1/m), bending moment (N m), torque (N m), curvature as results have it, and
+    # what kernels.watch.soft_rods finds that by; empty: not wanted
+    strains: Floats
     start: Floats  # (N+1, 3) m, positions from which displacements count
     marks: NDArray[np.int8]  # (N+1,)
     right: NDArray[np.int64]  # (N+1,) column of `extremes` for the value just after a node; of K marked nodes behind N
@@ -211,9 +214,9 @@ def blank_books(cells: int = 1, rows: int = 1) -> Books:
     z, nodes = np.zeros, cells + 1
     return Books(
         clock=z(CLOCK_SIZE), counts=z(COUNT_SIZE, np.int64), outputs=z(0), power=z((2, RATES)), work=z((2, WORKS)),
-        report=z((3, REPORT_SIZE)), tension=z((2, cells)), twist=z((2, 2)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), hinges=z((2, 2)), base=z(0, np.int64), placed=z((0, 3)),
+        report=z((3, REPORT_SIZE)), tension=z((2, cells)), twist=z((2, 2)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), hinges=z((3, 2)), base=z(0, np.int64), placed=z((0, 3)),
         borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
-        samples=z((rows, sample_size(cells))), model_error=z((2, 0)), strains=z((0, 4)), start=z((nodes, 3)), marks=z(nodes, np.int8),
+        samples=z((rows, sample_size(cells))), model_error=z((2, 0)), strains=z((0, STRAINS)), start=z((nodes, 3)), marks=z(nodes, np.int8),
         right=np.arange(nodes),
         extremes=z((4, 0, nodes)), touch=z((3, 0)), asked=z((0, 0)), reached=z((0, 0)), path=z((0, 0)), radii=z((0, 2)), walls=z((0, 0)),
     )  # fmt: skip

@@ -48,9 +48,8 @@ from hybrid.kernels.state.books import (
 )
 from hybrid.kernels.state.forces import OBSTACLES, PLANAR, SEABED, SOIL, STIFFNESS_DAMPING
 from hybrid.kernels.state.report import FORCE_A
+from hybrid.kernels.watch.soft_rods import BENT, LINE, bend_direction, of_chords, part_of_stiffness, restore_stiffness
 
-# Column of strains: curvature as results have it, 1/m: with what joints take of it, without what ends do not bear.
-BENT = 3
 SAME_PLACE = 1e-9  # part of a length
 
 
@@ -181,15 +180,6 @@ def is_smooth(line, marks, i):
 
 
 @inner
-def of_chords(line, state, i):
-    """Curvature, 1/m, at node i of the circle that its two chords are tangents of."""
-    d, _, _ = chord(get3(state.e, i - 1))
-    dn, _, _ = chord(get3(state.e, i))
-    s = cross(d, dn)
-    return 2.0 * math.sqrt(dot(s, s)) / (max(1.0 + dot(d, dn), 1e-12) * line.hn[i])
-
-
-@inner
 def towards(line, state, marks, i, side):
     """Curvature at what may be a kink, node i, as the nodes on its side (-1, 1) lead to."""
     x = 0.0
@@ -226,14 +216,6 @@ def note_catenary(line, state, books, i, t):
             continue
         x = beside_kink(line, state, books, i, side)
         widen(books.extremes, CURVATURE, i if side < 0 else books.right[i], x, t)
-
-
-@inner
-def bend_direction(state, i):
-    """Direction across both chords at inner node i."""
-    x = cross(chord(get3(state.e, i - 1))[0], chord(get3(state.e, i))[0])
-    length = math.sqrt(dot(x, x))
-    return scale(1.0 / length, x) if length > 0.0 else (0.0, 1.0, 0.0)
 
 
 @inner
@@ -317,7 +299,7 @@ def put_layers_back(line, ends, state, books):
         if line.spin[i] == line.spin[i - 1]:
             continue
         way = 1 if line.spin[i] else -1
-        own, _, _ = at_rod_end(line, ends, state, i, way, 0.0)
+        own, _, _ = at_rod_end(line, ends, state, books, i, way, 0.0)
         bent[i, 0], bent[i, BENT] = towards(line, state, books.marks, i, -way), own
         j, outer = i + way, i - way
         if not (0 < j < n and is_smooth(line, books.marks, outer) and goes_on(line, books.marks, j, way)):
@@ -350,7 +332,7 @@ def cell_bend(line, ends, state, j):
 
 
 @inner
-def at_rod_end(line, ends, state, i, side, passed):
+def at_rod_end(line, ends, state, books, i, side, passed):
     """Curvature, moment and torque at node i, where the rod on its side (-1, 1) ends without element."""
     n, cell = line.h.shape[0], i - 1 if side < 0 else i
     d, _, _ = chord(get3(state.e, cell))
@@ -369,7 +351,7 @@ def at_rod_end(line, ends, state, i, side, passed):
         elif has_bend_law(line, j):
             curvature += curvature_under(line, j, -side, moment)
         elif stiffness > 0.0:
-            curvature += moment / stiffness
+            curvature += moment / (stiffness / part_of_stiffness(line, j, books.hinges[LINE, 0]))
     return curvature, moment, torque
 
 
@@ -391,7 +373,7 @@ def note_rod_end(line, ends, state, books, i, passed, t):
                 widen(books.extremes, MOMENT, i if side < 0 else books.right[i], 0.0, t)
                 widen(books.extremes, TORQUE, i if side < 0 else books.right[i], passed, t)
             continue
-        curvature, moment, torque = at_rod_end(line, ends, state, i, side, passed)
+        curvature, moment, torque = at_rod_end(line, ends, state, books, i, side, passed)
         if 0 < i < n:
             curvature = abs(books.strains[i, BENT])
         at = i if side < 0 else books.right[i]
@@ -409,8 +391,11 @@ def beside_seam(line, books, i, j):
         return curvature_under(line, i, j - i, books.strains[i, 1])
     own = min(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
     stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
-    x = books.strains[i, 0]
-    if line.element[j] and own > 0.0 and stiffness > 0.0:
+    x, bent, ratio = books.strains[i, 0], abs(books.strains[i, BENT]), books.hinges[LINE, 0]
+    if bent != x:  # of a rod with all of its stiffness
+        parts = part_of_stiffness(line, j, ratio) / part_of_stiffness(line, i, ratio) if line.element[j] else 1.0
+        x = bent * (own / stiffness * parts if line.element[j] and stiffness > 0.0 else 1.0)
+    elif line.element[j] and own > 0.0 and stiffness > 0.0:
         x = max(0.0, x + books.strains[i, 1] * (1.0 / stiffness - 1.0 / own))
     return x
 
@@ -477,6 +462,7 @@ def note_extremes(line, sea, ends, state, books, t):
     n = line.h.shape[0]
     note_tension(line, ends, state, books, t)
     put_layers_back(line, ends, state, books)
+    restore_stiffness(line, ends, state, books)
     if line.bits & SEABED:
         note_contact(line, sea, state, books, t)
     zone, zones = 0, line.torsion.shape[0]

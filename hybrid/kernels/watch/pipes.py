@@ -65,7 +65,7 @@ def bend_and_torque(line, ends, state, books, i, side, passed):
     if i == 0 or i == n:
         side = 1 if i == 0 else -1
     if line.spin[i - 1 if side < 0 else i]:
-        curvature, _, torque = at_rod_end(line, ends, state, i, side, passed)
+        curvature, _, torque = at_rod_end(line, ends, state, books, i, side, passed)
         return abs(books.strains[i, BENT]) if 0 < i < n else curvature, torque
     return beside_kink(line, state, books, i, side), passed
 

@@ -1,0 +1,195 @@
+"""Curvature of rods whose stiffness is on its way in or out: what the line would have if it had all of it.
+
+Where a rod has grown past a joint, the kink of that joint stays until the stiffness of its element has come: a bend of
+one cell that no rod has.  The same forces across the line are in balance with its turns now and with all of the stiffness:
+
+    T w^_i - D(K w^)_i = T w_i - D(p K w)_i,    D(M)_i = (M_i+1 - M_i)/h_i - (M_i - M_i-1)/h_i-1
+
+Hence w^ = p w + M/K, where M is what its neighbours bear of what an element lacks:
+
+    (T/K)_i M_i - D(M)_i = T_i (1 - p_i) w_i
+
+A joint has p = 0; of the catenary behind it the curvature of its next node goes on, as in kernels.laws.hinge_layer.
+Beyond a clamp there is no cell, and an end without a clamp has M = 0.  It is exact for small turns at rest.
+
+    symbol  meaning                                                                             unit
+    w, w^   turn of the chords at a node now; with all of the stiffness; vectors across both    rad
+    p       part of the bending stiffness that an element has; its torsion has all of it        1
+    K       all of that stiffness: EI over the length of the node                               N m
+    M       see above                                                                           N m
+    T, h    tension at a node; length of a cell                                                 N, m
+
+Columns of books.strains while it is solved, from the first node on: M_i = d_i - c_i M_i+1.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.algebra.rotations import add, cross, dot, get3, get9, scale
+from hybrid.kernels.laws.cell import chord
+from hybrid.kernels.machine.compile import inner, kernel
+
+# Columns of books.strains: curvature of elements, that of results; c and d of above.
+RAW, BENT, C, D = 0, 3, 4, 5
+WHOLE = 1.0 - 1e-9  # p from which on a rod has all of its stiffness
+LINE = 2  # row of books.hinges with EI/GJ
+SLACK = 2.5e-5  # least h T/K, for lines with hardly any tension: M fades within some 200 cells
+
+
+@inner
+def of_chords(line, state, i):
+    """Curvature, 1/m, at node i of the circle that its two chords are tangents of."""
+    d, _, _ = chord(get3(state.e, i - 1))
+    dn, _, _ = chord(get3(state.e, i))
+    s = cross(d, dn)
+    return 2.0 * math.sqrt(dot(s, s)) / (max(1.0 + dot(d, dn), 1e-12) * line.hn[i])
+
+
+@inner
+def across(a, b):
+    """Direction across a and b."""
+    x = cross(a, b)
+    length = math.sqrt(dot(x, x))
+    return scale(1.0 / length, x) if length > 0.0 else (0.0, 1.0, 0.0)
+
+
+@inner
+def bend_direction(state, i):
+    """Direction across both chords at inner node i."""
+    return across(chord(get3(state.e, i - 1))[0], chord(get3(state.e, i))[0])
+
+
+@inner
+def bend_at(line, ends, state, books, i):
+    """Curvature of the chords at a node of a rod, a vector, 1/m; 0 at an end without an element."""
+    n = line.h.shape[0]
+    if 0 < i < n:
+        size = books.strains[i, RAW] if line.element[i] else of_chords(line, state, i)
+        return scale(size, bend_direction(state, i))
+    if not line.element[i]:
+        return (0.0, 0.0, 0.0)
+    R, d = get9(ends.frame, 0 if i == 0 else 1), chord(get3(state.e, min(i, n - 1)))[0]
+    t = (R[2], R[5], R[8])
+    return scale(books.strains[i, RAW], across(t, d) if i == 0 else across(d, t))
+
+
+@inner
+def EI_by_torsion(line, i, ratio):
+    """EI, N m2, of the element at node i, by its torsion; 0 where there is none, as at swivels.  ratio: EI/GJ."""
+    n = line.h.shape[0]
+    if i < 0 or i > n or not line.element[i]:
+        return 0.0
+    length = line.hn[i] if 0 < i < n else 0.5 * line.h[min(i, n - 1)]  # an angular spring at a clamp does not twist
+    return ratio * line.kb[i, 2] * length
+
+
+@inner
+def part_of_stiffness(line, i, ratio):
+    """p of the element at node i, 1 where it has all of its stiffness or ratio, EI/GJ, is not known (0)."""
+    if not line.element[i] or ratio <= 0.0:
+        return 1.0
+    EI, n = EI_by_torsion(line, i, ratio), line.h.shape[0]
+    give = line.hn[i] / EI if EI > 0.0 else 0.0
+    if EI == 0.0:  # of a swivel by the elements beside it
+        before, after = EI_by_torsion(line, i - 1, ratio), EI_by_torsion(line, i + 1, ratio)
+        before, after = max(before, after if before == 0.0 else 0.0), max(after, before if after == 0.0 else 0.0)
+        if before > 0.0:
+            inside = 0 < i < n
+            give = 0.5 * (line.h[i - 1] if inside else line.hn[i]) / before
+            give += 0.5 * (line.h[i] if inside else line.hn[i]) / after
+    part = line.kb[i, 0] * give
+    return part if 0.0 < part < WHOLE else 1.0
+
+
+@inner
+def all_stiffness(line, i, ratio, way):
+    """K of node i; at a joint of the rod on its side `way` (-1, 1)."""
+    j = i if line.element[i] else i + way
+    return line.kb[j, 0] / part_of_stiffness(line, j, ratio) * (line.hn[j] / line.hn[i])
+
+
+@inner
+def goes_on_outside(line, marks, i):
+    """Whether inner node i is of a catenary, without what may make a kink there."""
+    return not line.element[i] and not line.spin[i - 1] and not line.spin[i] and not marks[i]
+
+
+@inner
+def balance(line, ends, state, books, i, a, b):
+    """Diagonal and right side of the balance of node i of the rod from node a to b, if a is not an end that turns."""
+    n, h, ratio, inside = line.h.shape[0], line.h, books.hinges[LINE, 0], a < i < b
+    way = 1 if i == a else -1
+    K, rod = all_stiffness(line, i, ratio, way), min(max(i, a), b - 1)
+    T = 0.5 * (state.T[i - 1] + state.T[i]) if inside else state.T[rod]
+    T = max(T, SLACK * K / h[rod])
+    lack = 1.0 - part_of_stiffness(line, i, ratio) if line.element[i] else 1.0
+    rhs = scale(T * lack * line.hn[i], bend_at(line, ends, state, books, i))
+    diagonal = T / K + (1.0 / h[i - 1] if i > a else 0.0) + (1.0 / h[i] if i < b else 0.0)
+    outer = i - way
+    if not inside and 0 < outer < n and goes_on_outside(line, books.marks, outer):
+        cell = 1.0 / h[min(i, outer)]
+        diagonal += cell
+        rhs = add(rhs, scale(K * line.hn[i] * cell * of_chords(line, state, outer), bend_direction(state, outer)))
+    return diagonal, rhs
+
+
+@inner
+def turns_freely(line, i):
+    """Whether node i is an end of the line that has no moment, or one that is given."""
+    return (i == 0 or i == line.h.shape[0]) and not line.element[i]
+
+
+@inner
+def get_solved(bent, i):
+    return (bent[i, D], bent[i, D + 1], bent[i, D + 2])
+
+
+@kernel
+def restore_rod(line, ends, state, books, a, b):
+    """Into column BENT the curvature of the rod from node a to b with all of its stiffness; of joints into RAW as well:
+
+    on the side of the catenary it is the same.
+    """
+    bent, ratio, h, n = books.strains, books.hinges[LINE, 0], line.h, line.h.shape[0]
+    for i in range(a, b + 1):
+        if turns_freely(line, i):
+            for k in range(4):
+                bent[i, C + k] = 0.0
+            continue
+        diagonal, rhs = balance(line, ends, state, books, i, a, b)
+        if i > a:
+            diagonal -= bent[i - 1, C] / h[i - 1]
+            rhs = add(rhs, scale(1.0 / h[i - 1], get_solved(bent, i - 1)))
+        bent[i, C] = 1.0 / (h[i] * diagonal) if i < b else 0.0
+        for k in range(3):
+            bent[i, D + k] = rhs[k] / diagonal
+    M = (0.0, 0.0, 0.0)
+    for j in range(b - a + 1):
+        i = b - j
+        M = add(get_solved(bent, i), scale(bent[i, C], M))
+        bend, part = bend_at(line, ends, state, books, i), 0.0
+        if line.element[i]:
+            part = part_of_stiffness(line, i, ratio)
+        K = all_stiffness(line, i, ratio, 1 if i == a else -1)
+        whole = add(scale(part, bend), scale(1.0 / (K * line.hn[i]), M))
+        bent[i, BENT] = math.copysign(math.sqrt(dot(whole, whole)), dot(whole, bend))
+        if not line.element[i] and 0 < i < n:
+            bent[i, RAW] = abs(bent[i, BENT])
+
+
+@kernel
+def restore_stiffness(line, ends, state, books):
+    """`restore_rod` of all rods with an element that has not all of its stiffness, if EI/GJ is known."""
+    n, ratio, a = line.h.shape[0], books.hinges[LINE, 0], 0
+    while ratio > 0.0 and a < n:
+        if not line.spin[a]:
+            a += 1
+            continue
+        b, soft = a + 1, False
+        while b < n and line.spin[b]:
+            soft |= line.kb[b, 2] > 0.0 and part_of_stiffness(line, b, ratio) < WHOLE
+            b += 1
+        if soft:
+            restore_rod(line, ends, state, books, a, b)
+        a = b

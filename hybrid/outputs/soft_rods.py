@@ -1,0 +1,156 @@
+"""Curvature of rods whose stiffness is under way, in outputs: what kernels.watch.soft_rods has in every step.
+
+symbol   meaning                                                                    shape            unit
+part     part of its bending stiffness that an element has                          (m, nb)          1
+K        all of that stiffness, EI over the length of the node                      (m, nb)          N m
+bend     curvature of the chords, vectors or along the plane's normal               (m, 3 or 1, nb)  1/m
+M        what neighbours bear of what an element lacks                              (m, 3 or 1, nb)  N m
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.state.state import Floats
+from hybrid.kernels.watch.soft_rods import LINE, SLACK, WHOLE
+from hybrid.outputs.vectors import cross, directions_of
+
+if TYPE_CHECKING:
+    from hybrid.outputs.observation import Observation
+
+Integers = NDArray[np.int64]
+Restored = tuple[Integers, NDArray[np.bool_], Floats]
+
+
+def restored(view: Observation, out: Floats, spans: Integers, rods: NDArray[np.bool_]) -> list[Restored]:
+    """Of each rod with stiffness under way: rows of sides, outputs (nb,) in which it is, and curvature (rows, nb) 1/m.
+
+    out: (n sides, 2, nb) curvature and twist without layers; spans: (n, 3) first and last node and first row of the
+    stretches; rods: (n,) which of them are rods.
+    """
+    found = list[Restored]()
+    if view.grid.hinges[LINE, 0] <= 0.0 or not rods.any():
+        return found
+    first = np.flatnonzero(rods & ~np.append(False, rods[:-1] & (spans[:-1, 1] == spans[1:, 0])))
+    for k in first.tolist():
+        last = k  # a rod goes on across point loads
+        while last + 1 < len(spans) and rods[last + 1] and spans[last, 1] == spans[last + 1, 0]:
+            last += 1
+        a, b = int(spans[k, 0]), int(spans[last, 1])
+        nodes = np.arange(a, b + 1)
+        part = parts_of_stiffness(view, nodes, np.minimum(nodes, b - 1))
+        twists = view.stiffness(nodes[1:-1])[:, 2] > 0.0  # others have of their stiffness what is beside them
+        soft = np.asarray(((part[1:-1] < 1.0) & twists).any(axis=0))
+        if not soft.any():
+            continue
+        rows = np.arange(spans[k, 2], spans[last, 2] + b - spans[last, 0] + 1)
+        K, hn = _stiffness(view, nodes, part), view.of_line("hn", nodes)
+        whole = _whole(view, out, rows, nodes, part, K)
+        at = view.grid.side_nodes[rows] - a
+        curvature = whole[at] * _of_sides(view, spans[k : last + 1], K * hn)
+        bare = np.isin(nodes, view.end_nodes) & (view.line.element[nodes] == 0)  # by the moment that is given there
+        found.append((rows[~bare[at]], soft, curvature[~bare[at]]))
+        for node, row in ((a, rows[0] - 1), (b, rows[-1] + 1)):  # a catenary has the same at a joint
+            if node not in view.end_nodes:
+                found.append((np.array([row]), soft, np.abs(whole[[node - a]])))
+    return found
+
+
+def parts_of_stiffness(view: Observation, nodes: Integers, cells: Integers) -> Floats:
+    """(m, nb) of the elements at nodes (m,), each beside one of the cells (m,); 1 where nothing lacks or is known."""
+    if view.grid.hinges[LINE, 0] <= 0.0:
+        return np.ones((len(nodes), view.columns))
+    EI, hn = _EI_by_torsion(view, nodes, cells), view.of_line("hn", nodes)
+    give = np.divide(hn, EI, out=np.zeros_like(EI), where=EI > 0.0)
+    swivels = np.flatnonzero((view.line.element[nodes] != 0) & (view.stiffness(nodes)[:, 2] == 0.0).any(axis=1))
+    for k in swivels.tolist():  # by the elements beside them
+        node, cell = int(nodes[k]), int(cells[k])
+        inner, inside = 2 * cell + 1 - node, node not in view.end_nodes
+        beside = [(node - 1, node - 1), (node + 1, node)] if inside else [(inner, cell)] * 2
+        found = [_EI_by_torsion(view, np.array([j]), np.array([c]))[0] for j, c in beside]
+        found = [np.where(x > 0.0, x, y) for x, y in zip(found, found[::-1], strict=True)]
+        lengths = [view.cell_lengths[c] if inside else hn[k] for _, c in beside]
+        for x, length in zip(found, lengths, strict=True):
+            give[k] += np.divide(0.5 * length, x, out=np.zeros_like(x), where=x > 0.0)
+    part = view.stiffness(nodes)[:, 0] * give
+    return np.where((part > 0.0) & (part < WHOLE), part, 1.0)
+
+
+def _EI_by_torsion(view: Observation, nodes: Integers, cells: Integers) -> Floats:
+    """(m, nb) N m2 of elements, by the torsion of which all is there; 0 where there is none, as at swivels."""
+    ends = np.isin(nodes, view.end_nodes)[:, None]  # an angular spring at a clamp does not twist
+    length = np.where(ends, 0.5 * view.cell_lengths[cells], view.of_line("hn", nodes))
+    EI = view.grid.hinges[LINE, 0] * view.stiffness(nodes)[:, 2] * length
+    return np.array(np.broadcast_to(EI, (len(nodes), view.columns)))
+
+
+def _stiffness(view: Observation, nodes: Integers, part: Floats) -> Floats:
+    """K of a rod's nodes; of those without an element as of the next one."""
+    K, hn = view.stiffness(nodes)[:, 0] / part, view.of_line("hn", nodes)
+    for end, beside in ((0, 1), (-1, -2)):
+        if view.line.element[nodes[end]] == 0:
+            K[end] = K[beside] * (hn[beside] / hn[end])
+    return np.asarray(K)
+
+
+def _of_sides(view: Observation, spans: Integers, EI: Floats) -> Floats:
+    """Factors (rows, nb) of the curvature of a rod's stretches: where sections meet, the moment is one."""
+    (a, _, start), (_, b, _) = spans[0], spans[-1]
+    found = np.ones((spans[-1, 2] + b - spans[-1, 0] + 1 - start, EI.shape[1]))
+    for first, last, row in (spans - [0, 0, start]).tolist():
+        for node, inner, at in ((first, first + 1, row), (last, last - 1, row + last - first)):
+            if node in view.changes and view.line.element[node] and view.line.element[inner]:
+                found[at] = EI[node - a] / EI[inner - a]
+    return found
+
+
+def _whole(view: Observation, out: Floats, rows: Integers, nodes: Integers, part: Floats, K: Floats) -> Floats:
+    """Curvature (m, nb) of a rod at its nodes, negative where it is against the direction of its chords."""
+    bend, direction = _bends(view, rows, nodes)
+    element, hn = (view.line.element[nodes] != 0)[:, None], view.of_line("hn", nodes)
+    part = np.where(element, part, 0.0)
+    T, link = view.T[nodes[:-1]], 1.0 / np.broadcast_to(view.cell_lengths[nodes[:-1]], (len(nodes) - 1, view.columns))
+    T = np.concatenate([T[:1], 0.5 * (T[1:] + T[:-1]), T[-1:]])
+    T = np.maximum(T, SLACK * K * np.concatenate([link, link[-1:]]))
+    rhs = (T * (1.0 - part) * hn)[:, None] * bend
+    diagonal = T / K + np.concatenate([link, 0.0 * link[-1:]]) + np.concatenate([0.0 * link[:1], link])
+    M = np.zeros_like(rhs)
+    upper = np.concatenate([link, 0.0 * link[-1:]])
+    for k in (0, -1):
+        cell = nodes[-1] if k else nodes[0] - 1
+        outer, row = (nodes[-1] + 1, rows[-1] + 2) if k else (nodes[0] - 1, rows[0] - 2)
+        if nodes[k] in view.end_nodes:
+            if not element[k, 0]:  # it has no moment, or one that is given
+                diagonal[k], rhs[k], upper[k] = np.inf, 0.0, 0.0
+        elif outer not in view.end_nodes and (view.grid.side_nodes == outer).sum() == 1:
+            outside = 1.0 / view.cell_lengths[cell]
+            diagonal[k] += outside
+            rhs[k] += (K[k] * hn[k] * outside * out[row, 0]) * view._bend_directions[row]
+    for i in range(len(nodes)):
+        if i > 0:
+            diagonal[i] -= link[i - 1] * upper[i - 1]
+            rhs[i] += link[i - 1] * rhs[i - 1]
+        upper[i], rhs[i] = upper[i] / diagonal[i], rhs[i] / diagonal[i]
+    M[-1] = rhs[-1]
+    for i in range(len(nodes) - 2, -1, -1):
+        M[i] = rhs[i] + upper[i] * M[i + 1]
+    whole = part[:, None] * bend + M / (K * hn)[:, None]
+    return np.asarray(np.copysign(np.sqrt((whole * whole).sum(axis=1)), (whole * direction).sum(axis=1)))
+
+
+def _bends(view: Observation, rows: Integers, nodes: Integers) -> tuple[Floats, Floats]:
+    """Curvature vectors of the chords at nodes, and their directions."""
+    direction = np.zeros((len(nodes), *view._bend_directions.shape[1:]))
+    direction[view.grid.side_nodes[rows] - nodes[0]] = view._bend_directions[rows]
+    strain = view.element_strains[nodes]
+    size = np.hypot(strain[:, 0], strain[:, 1]) / view.of_line("hn", nodes)
+    size[view.line.element[nodes] == 0] = 0.0
+    for node in nodes[[0, -1]].tolist():
+        if node not in view.end_nodes:
+            at = node - nodes[0]
+            direction[at] = directions_of(view.line, cross(view.d[[node - 1]], view.d[[node]]))[0]
+            size[at] = view.bends[node]
+    return direction * size[:, None], direction

@@ -1,0 +1,139 @@
+"""Curvature of rods whose stiffness is under way: a kink that a joint leaves behind is no bend of the line."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.model.build import build
+from hybrid.model.material import Material
+from hybrid.scene.read import validate_scene
+from tests.combinations.pairs import BASE, END, FEATURES, SECTION, as_system
+from tests.problems import tables_with
+
+MOVES = {"kind": "adaptive", "always_move": True}
+LINES: dict[str, dict[str, Any]] = {
+    "60 m, level": {"lengths": [60], "end": [40, 0, 0], "EI": 10},
+    "60 m, in space": {"lengths": [60], "end": [20, 0, -30], "EI": 100, "across": 0.4},
+    "100 m": {"lengths": [100], "end": [60, 0, -20], "EI": 100},
+    "two sections, clamped": {"lengths": [35, 25], "end": [35, 0, 0], "EI": 10, "tangent": [0.2, 0, 1]},
+}
+
+
+def slack(
+    lengths: list[float], end: list[float], EI: float, model: Any, across: float = 0.0, tangent: Any = None
+) -> dict[str, Any]:
+    """A slack line in water of 480 cells, whose upper end heaves; outputs at every step and node.
+
+    The second section is four times as stiff as the first.
+    """
+    section = {"diameter": 0.025, "mass": 0.65, "axial_stiffness": 1e6, "drag": {"normal": 1.2}}
+    sections = [section | {"length": x, "bending_stiffness": EI * 4**k} for k, x in enumerate(lengths)]
+    motion = {"heave": {"amplitude": 1.0, "period": 7.0}, "ramp": 7.0}
+    held = {"kind": "pinned"} if tangent is None else {"kind": "clamped", "tangent": tangent}
+    return {
+        "environment": {"fluid": {"density": 1025, "current": [0.3, across, 0]}},
+        "cable": {"sections": sections},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0], "motion": motion},
+            "end": held | {"position": end},
+        },
+        "initial": "equilibrium",
+        "contact": {"self": False},
+        "mesh": {"cells": 480},
+        "time": {"duration": 12.0, "step": 0.05},
+        "model": model,
+        "output": {"every": 0.05, "points": 481},
+    }
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_a_joint_that_moves_on_leaves_no_bend_behind(name: str) -> None:
+    """The smallest bend radius of zones that move is that of rods: half and a third of it, before."""
+    moves, rods = (hybrid.run(slack(**LINES[name], model=x)) for x in (MOVES, {"kind": "rod"}))
+    assert sum(event.kind == "grow" for event in moves.events) >= 3
+    smallest, true = (1.0 / np.nanmax(x["envelope/curvature_max"]) for x in (moves, rods))
+    print(f"{name}: smallest bend radius {smallest:.2f} m, of rods {true:.2f} m")
+    assert smallest == pytest.approx(true, rel=0.05)
+    largest, of_rods = moves.curvature.max(axis=0), rods.curvature.max(axis=0)
+    counts = of_rods > 0.2 * of_rods.max()
+    assert (largest < 1.2 * np.maximum(of_rods, 0.2 * of_rods.max())).all()
+    assert (largest > 0.9 * of_rods)[counts].all()
+
+
+def test_while_line_is_paid_out_as_well() -> None:
+    scenes = [slack(**LINES["60 m, level"], model=x) | {"mesh": {"cells": 240}} for x in (MOVES, {"kind": "rod"})]
+    for scene in scenes:
+        scene["ends"]["end"]["payout"] = {"rate": 0.2, "ramp": 2.0}
+    moves, rods = map(hybrid.run, scenes)
+    assert sum(event.kind == "grow" for event in moves.events) >= 3
+    smallest, true = (1.0 / np.nanmax(x["envelope/curvature_max"]) for x in (moves, rods))
+    assert smallest == pytest.approx(true, rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["60 m, in space", "two sections, clamped"])
+def test_steps_and_outputs_have_the_same(name: str) -> None:
+    """Where every step has an output and every node a point, extremes are those of the outputs."""
+    found = hybrid.run(slack(**LINES[name], model=MOVES))
+    before = np.append(True, np.diff(found["envelope/s"][:]) > 0.0)  # where sections meet the side that points show
+    np.testing.assert_allclose(found["envelope/s"][before], found.s, atol=1e-9)
+    changes = np.array([event.t for event in found.events])  # then a step ends with other zones than its output has
+    times = found["envelope/curvature_t_max"][before]
+    apart = np.abs(times[:, None] - changes).min(axis=1) > 0.01
+    apart[[0, -1]] = False
+    assert apart.mean() > 0.8
+    envelope, outputs = found["envelope/curvature_max"][before][apart], found.curvature.max(axis=0)[apart]
+    np.testing.assert_allclose(envelope, outputs, rtol=1e-6, atol=1e-9 * outputs.max())
+
+
+SAME = ("curvature", "envelope/curvature_max")
+
+
+def stepped(scene: dict[str, Any], again: bool) -> hybrid.Result:
+    """From outside; again: steps while stiffness is under way are taken back and computed again."""
+    with hybrid.Simulation(scene) as sim:
+        while sim.t < 11.99:
+            if again and 2.9 < sim.t < 4.2:
+                saved = sim.save()
+                sim.step()
+                sim.restore(saved)
+            sim.step()
+        return sim.result()
+
+
+def test_stepped_from_outside_and_as_a_system_it_is_the_same() -> None:
+    """Steps that are taken back leave every bit; times of steps differ by a bit or two from those of a run."""
+    scene = slack(**LINES["60 m, level"], model=MOVES)
+    whole, plain, again = hybrid.run(scene), stepped(scene, False), stepped(scene, True)
+    one = hybrid.run(cast(Any, as_system(scene))).lines["one"]
+    for name in SAME:
+        np.testing.assert_array_equal(again[name][:], plain[name][:])
+        np.testing.assert_allclose(plain[name][:], whole[name][:], rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(one[name][:], whole[name][:], rtol=1e-6, atol=1e-9)
+
+
+MOMENT = {END: {"kind": "free", "force": [40, 3, 30], "moment": [0, 1, 0]}}
+SECTIONS = [SECTION | {"length": 5.0}, SECTION | {"length": 7.0, "bending_stiffness": 80, "torsional_stiffness": 60}]
+STIFF: dict[str, dict[str, Any]] = {
+    "sprung clamp": FEATURES["zones"][0] | FEATURES["sprung clamp"][0],
+    "swivel": FEATURES["swivel"][0],
+    "given moment": FEATURES["clamp"][0] | MOMENT,
+    "sections": {"cable.sections": SECTIONS},
+    "swivel at a clamp": FEATURES["zones"][0] | FEATURES["swivel at a clamp"][0],
+}
+
+
+@pytest.mark.parametrize("name", STIFF)
+def test_rods_with_all_of_their_stiffness_are_as_they_were(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the last bit; of lines whose EI/GJ is not one number nothing is restored."""
+    scene = tables_with(BASE, STIFF[name])
+    assert build(validate_scene(scene)).cable.hinges[2, 0] == pytest.approx(20.0 / 15.0)
+    found, hinges = hybrid.run(scene), cast(Any, Material.hinges).fget
+    monkeypatch.setattr(Material, "hinges", property(lambda self: hinges(self) * [[1.0], [1.0], [0.0]]))
+    plain = hybrid.run(scene)
+    np.testing.assert_array_equal(found.curvature, plain.curvature)
+    for key in ("curvature_max", "curvature_min"):
+        np.testing.assert_array_equal(found[f"envelope/{key}"][:], plain[f"envelope/{key}"][:])
