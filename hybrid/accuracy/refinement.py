@@ -159,7 +159,8 @@ def not_asked_text(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> 
         if not asked.asks(name) and largest > 0.0 and error > asked.coarsest_part * largest:
             if asked.asks("curvature"):
                 continue  # a moment goes with it
-            return f"{name.replace('_', ' ')} is not asked, its error is {100.0 * error / largest:.2g} % of its largest"
+            part = float(f"{100.0 * error / largest:.2g}")
+            return f"{name.replace('_', ' ')} is not asked, its error is {part:.9g} % of its largest"
     return ""
 
 

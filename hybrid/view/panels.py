@@ -55,6 +55,7 @@ from hybrid.view.style import (
 )
 
 MOST_CHANGES = 12  # of zones that are marked over time: more would hide the curves
+FAR_BEYOND = 3.0  # times the range of a curve: an error that large is said, not drawn to its end
 RANGES = ("tension", "curvature", "bending_moment", "torque", "shear", "contact", "capacity_used", "code_used")
 _SIZES = ("curvature", "bending_moment", "shear")  # quantities that are not below zero
 _PARTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31", "#7F7F7F")
@@ -187,6 +188,7 @@ def profiles(
     top: float | None = None
     for k, (name, found) in enumerate(drawn):
         s, values = found.s, found.values * factor
+        low = high = values
         if len(values) > 1:
             places, low, high, _ = extent(result, name)
             low, high = low * factor, high * factor
@@ -202,6 +204,11 @@ def profiles(
         error = _error_along(result, name, found)
         if error is not None:
             items.append(_doubt(s, values[output], error[output] * factor, size=name in _SIZES))
+            most, span = float(np.nanmax(error[output])) * factor, float(np.nanmax(high) - np.nanmin(low))
+            if len(drawn) == 1 and top is None and 0.0 < FAR_BEYOND * span < most:  # it would press the curve flat
+                bottom, top = float(np.nanmin(low)) - 0.1 * span, float(np.nanmax(high)) + span
+                place = short(s[np.nanargmax(error[output])], 4)
+                items.append(Text(0.03, 0.91, f"error up to {short(most, 2)} {unit} at s = {place} m", parts="xy"))
         items.append(Line(*found.curve(values[output]), title_of(name), width=1.3, dash="dash" * bool(k)))
     name_of = title_of(names[0]).replace("bending ", "").replace("contact force", "contact")
     up = ",\n".join(

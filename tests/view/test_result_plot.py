@@ -200,6 +200,20 @@ def test_a_passing_spike_does_not_press_the_rest_to_the_ground() -> None:
     assert [t.get_text() for t in ax.texts] == ["peak 5 1/m at s = 97.5 m"]
 
 
+def test_an_error_far_beyond_a_curve_is_said_and_leaves_the_curve_its_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Curvature of 2 1/km at most, whose error is 400 1/km at one place and small elsewhere."""
+    monkeypatch.setattr(
+        panels, "_error_along", lambda _, __, found: np.where(found.s == 50.0, 0.4, 1e-4) + 0 * found.values
+    )
+    ax = Figure().subplots()
+    draw_panel(panels.profiles(made(sag), "curvature"), ax)
+    assert ax.get_ylim() == pytest.approx((-0.2, 4.0), abs=0.1)
+    assert [t.get_text() for t in ax.texts] == ["error up to 400 1/km at s = 50 m"]
+    monkeypatch.setattr(panels, "_error_along", lambda _, __, found: 1e-3 + 0 * found.values)
+    draw_panel(panels.profiles(made(sag), "curvature"), ax := Figure().subplots())
+    assert not ax.texts and ax.get_ylim()[1] < 4.0
+
+
 def relaxing(s: np.ndarray, t: float) -> Sequence[Any]:
     return s, 0.0, 30.0 * np.sin(np.pi * s / 100.0) * np.exp(-3.0 * t)
 
