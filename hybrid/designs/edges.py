@@ -11,10 +11,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from hybrid.designs.cable_at_rest import CableAtRest
+from hybrid.designs.line_at_rest import LineAtRest
 from hybrid.designs.numbers import changed_scene, number_of, size_of
 from hybrid.designs.system_at_rest import SystemAtRest
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.state.state import Floats
+from hybrid.outputs.touchdown import penetration
 from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 
@@ -24,7 +26,9 @@ NAMES = ("touchdown", "touchdown_position", "grounded_length")
 # first and at most.
 CELLS, PARTS = (2.0, 6.0), (1e-2, 0.2)
 TRIES = 8
-UNSURE = 0.02  # part of a derivative that is never said to be known
+# Error in parts of what twice the way changes, one draw of what goes up and down with the cells; part of a derivative
+# that is never said to be known.
+OF_CHANGE, UNSURE = 1.5, 0.02
 
 
 def is_edge(asked: Scene | System, text: str) -> bool:
@@ -55,8 +59,7 @@ def by_cells(
     ComputationError: there is no equilibrium beside this one.
     """
     number, size = number_of(asked, key), size_of(asked, key, number_of(asked, key))
-    lines = [rest.model] if isinstance(rest, CableAtRest) else [x.model for x in rest.lines]
-    cell = max(float(x.line.h.max()) for x in lines)
+    cell = max(_cell(x) for x in ([rest.line] if isinstance(rest, CableAtRest) else rest.lines))
 
     def change(step: float) -> Floats:
         more, less = (values_of(changed_scene(asked, key, number + x)) for x in (step, -step))
@@ -83,4 +86,11 @@ def by_cells(
     except (ComputationError, SceneError):
         return near, np.abs(near)
     few = (np.abs(found) < 0.5 * CELLS[0] * cell) | (np.abs(found) > 2.0 * CELLS[1] * cell)
-    return far, np.where(few, np.abs(far), np.maximum(np.abs(far - near), UNSURE * np.abs(far)))
+    return far, np.where(few, np.abs(far), np.maximum(OF_CHANGE * np.abs(far - near), UNSURE * np.abs(far)))
+
+
+def _cell(line: LineAtRest) -> float:
+    """The longest cell in which contact begins or ends, m; of a line without contact of all."""
+    lies = penetration(line.here.sea, line.state.r[:, :, None])[:, 0] > 0.0
+    there = np.flatnonzero(lies[1:] != lies[:-1])
+    return float(line.model.line.h[there if there.size else slice(None)].max())

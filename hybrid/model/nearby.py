@@ -76,7 +76,8 @@ def nearby(
 def _held_axes(model: Model, of: Scene, scene: Scene, line: Line, cable: Material) -> Floats:
     """(2, 3) first directors of ends that are held: those of the model, turned as directions of the scenes turn."""
     held = model.ends.values.frame.reshape(2, 3, 3)
-    if scene.ends.both == of.ends.both:
+    directions = [[(x.held_tangent, x.held_normal, x.held_turns) for x in each.ends.both] for each in (of, scene)]
+    if directions[0] == directions[1]:
         return held[:, :, 0]
     e, turned = model.start.e, []
     for on, at, each in ((model.line, model.cable, of), (line, cable, scene)):
