@@ -8,7 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.special import ndtr
 
+from hybrid.kernels.laws.axial_law import DYNAMIC, STRAIN, TENSION
 from hybrid.kernels.laws.bed import planes_under
+from hybrid.kernels.laws.bending_law import MOMENT
 from hybrid.kernels.laws.obstacles import distances, thinner_nodes
 from hybrid.kernels.state.forces import OBSTACLES, SEABED
 from hybrid.kernels.state.state import Floats
@@ -18,6 +20,8 @@ from hybrid.linear.response_results import ADDED, OF_LARGEST, LineResponse
 # Parts of the motion beyond which the line is not linear: share of time that it would be slack; turn of a chord, rad;
 # mean tension by the stretch of swinging, of the standard deviation of tension; length that lifts off or touches down.
 SLACK_SHARE, TURN, STRETCH, LIFTS = 1e-3, 0.2, 0.25, 0.02
+# Part by which a stiffness changes at a point of a table, beyond which it is no small one.
+KINK = 0.1
 # Step, of the length, by which distances to obstacles are differentiated.
 NEAR = 1e-7
 # Parts that what is left out may add to a deviation to the first order, where this is no small part of the largest
@@ -28,7 +32,7 @@ MOST_ADDED, SHAPE = ADDED | {"curvature": 0.1}, 0.1
 
 def doubts_of(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     """Each place where the motion of a line is not small, in words."""
-    for doubt in (_slack, _swing, _touchdown, _on_obstacles, _left_out, _shape):
+    for doubt in (_slack, _swing, _kinks, _touchdown, _on_obstacles, _left_out, _shape):
         yield from doubt(x, found)
 
 
@@ -64,6 +68,30 @@ def _swing(x: LoadedLine, found: LineResponse) -> Iterator[str]:
                 f"swinging alone stretches the line, which would take {pull:.3g} N in the mean where the standard "
                 f"deviation of the tension is {deviation[at]:.3g} N (s = {found.middle[at]:.4g} m)"
             )
+
+
+def _kinks(x: LoadedLine, found: LineResponse) -> Iterator[str]:
+    """Where a line whose law is straight between points goes to and fro over one of them, within two deviations."""
+    line = x.line
+    tables = (
+        ("tension", line.law, line.law_table[:, [TENSION, STRAIN]], found.mean_tension, found.middle, "N"),
+        ("curvature", line.bend_law, line.bend_table[:, :MOMENT + 1], found.mean_curvature, found.s, "1/m"),
+    )  # fmt: skip
+    for name, law, table, mean, places, unit in tables:
+        deviation = found.deviation(name)
+        for i in range(len(law)):
+            first, last = int(law[i, 0]), int(law[i, 1])
+            if last - first < 3 or (name == "tension" and law[i, DYNAMIC] > 0.0):
+                continue
+            at, value = table[first:last].T
+            slopes = np.diff(value) / np.diff(at)
+            bends = np.abs(slopes[1:] / slopes[:-1] - 1.0) > KINK
+            if (bends & (np.abs(at[1:-1] - mean[i]) < 2.0 * deviation[i])).any():
+                yield (
+                    f"{name} at s = {places[i]:.4g} m, {mean[i]:.4g} {unit} in the mean with a standard deviation of "
+                    f"{deviation[i]:.3g} {unit}, passes over a point of its table, where the stiffness changes"
+                )
+                break
 
 
 def _touchdown(x: LoadedLine, found: LineResponse) -> Iterator[str]:

@@ -253,6 +253,35 @@ def test_a_slow_motion_bends_a_sprung_clamp_as_equilibria_do(law, spring):
 
 
 @pytest.mark.parametrize(
+    ("law", "quantity"),
+    [
+        ({"tension_strain": [[0, 0], [0.01, 2.001e4], [0.02, 8e4]]}, "tension"),
+        ({"tension_strain": [[0, 0], [0.02, 4e4], [0.03, 2e5]]}, ""),
+        ({"axial_stiffness": 2e6, "moment_curvature": [[0, 0], [2e-4, 2.0], [1e-3, 3.0]]}, "curvature"),
+        ({"axial_stiffness": 2e6, "moment_curvature": [[0, 0], [0.1, 1e3], [0.2, 1.5e3]]}, ""),
+    ],
+)
+def test_a_law_of_pieces_is_told_where_its_stiffness_changes(law, quantity):
+    """A line of 2e4 N whose end moves along it by 200 N, and across it so that it bends by 1e-3 1/m."""
+    T, motion = 2e4, {"surge": {"amplitude": 0.01, "period": 2.0}, "heave": {"amplitude": 0.2, "period": 2.0}}
+    section = {"length": 100.0, "mass": 10.0, "diameter": 0.05, "bending_stiffness": 1e4, "torsional_stiffness": 1e3}
+    if "moment_curvature" in law:
+        section.pop("bending_stiffness")
+    scene = {
+        "environment": {"gravity": 0.0}, "cable": {"sections": [section | {"damping": 0.05} | law]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {"kind": "pinned", "position": [101.0, 0, 0], "motion": motion | {"ramp": 10.0}},
+        },
+        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20},
+    }  # fmt: skip
+    response = hybrid.response(scene)
+    assert T / 2.0 < response.lines["cable"].mean_tension[0] < 2.0 * T
+    told = [x for x in response.notes if "passes over a point of its table" in x]
+    assert [x.split()[2] for x in told] == [quantity] * bool(quantity), response.notes
+
+
+@pytest.mark.parametrize(
     "asked",
     [
         lambda x: x.most_probable("tension", hours=-3.0),
