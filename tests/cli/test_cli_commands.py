@@ -44,7 +44,7 @@ cable:
     - {length: 10.0, mass: 1.0, axial_stiffness: 1.0e6}
 ends:
   start: {kind: pinned, position: [0, 0, 0]}
-  end: {kind: pinned, position: [10.01, 0, 0], motion: {surge: {amplitude: -3.0, period: 1.0}, ramp: 0.5}}
+  end: {kind: pinned, position: [10.01, 0, 0], motion: {travel: {by: [-3.0, 0, 0], over: 0.5}}}
 initial: equilibrium
 model: catenary
 mesh: {cells: 20}

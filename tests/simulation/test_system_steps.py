@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -67,10 +68,13 @@ def test_lines_that_meet_nothing_are_as_in_a_system_of_their_own() -> None:
         assert [x.kind for x in line.events] == [x.kind for x in other.events]
 
 
-def test_a_line_that_meets_nothing_and_fails_is_named() -> None:
+def test_a_line_that_meets_nothing_and_fails_is_named(tmp_path: Path) -> None:
     """A slack catenary between lines that go on: the line, the time and the place are those of it alone."""
     slack = scene(ALONE)["lines"]["middle"] | {"model": "catenary", "sections": [ROPE | {"length": 52}]}
-    plunge = {"heave": {"amplitude": 12.0, "period": 1.5}, "ramp": 0.5}
+    t = np.linspace(0.0, 3.0, 601)
+    rows = np.column_stack([t, 10.0 + 0.0 * t, 100.0 + 0.0 * t, 12.0 * np.sin(2.0 * np.pi * t / 1.5) ** 3])
+    np.savetxt(tmp_path / "plunge.csv", rows, delimiter=",", header="t,x,y,z", comments="")
+    plunge = {"file": str(tmp_path / "plunge.csv")}
     points = ALONE["points"] | {"ship": {"position": [10, 100, 0], "motion": plunge}}
     part = {"points": points, "lines": {"middle": slack}}
     found = []

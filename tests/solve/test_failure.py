@@ -122,8 +122,16 @@ def test_energy_from_nowhere_is_noted_and_stops():
     assert "fastest point" in str(stop.value)
 
 
-def test_a_cable_pulled_beyond_its_length():
-    motion = {"surge": {"amplitude": 0.6, "period": 2.0}, "ramp": 0.4}
+def surging(path, x, amplitude, period):
+    """A record that moves an end from x: a harmonic motion out of reach is refused before it is computed."""
+    t = np.linspace(0.0, 4.0, 401)
+    rows = np.column_stack([t, x + amplitude * np.sin(2.0 * np.pi * t / period) ** 3, 0.0 * t, 0.0 * t])
+    np.savetxt(path / "surge.csv", rows, delimiter=",", header="t,x,y,z", comments="")
+    return {"file": str(path / "surge.csv")}
+
+
+def test_a_cable_pulled_beyond_its_length(tmp_path):
+    motion = surging(tmp_path, 1.5, 0.6, 2.0)
     end = {"kind": "pinned", "position": [1.5, 0, 0], "motion": motion}
     with pytest.raises(hybrid.ComputationError, match="does not stretch beyond 2 m"):
         hybrid.run(scene("rod", ends={"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end}))
@@ -160,7 +168,7 @@ def test_an_equilibrium_that_no_section_bears_is_refused():
 def test_a_line_that_is_pulled_beyond_what_it_bears_stops(tmp_path):
     """Stretched by 4 % at rest; its end moves on until it is 7 %."""
     line = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e5}
-    motion = {"surge": {"amplitude": 0.6, "period": 8.0}, "ramp": 1.0}
+    motion = surging(tmp_path, 20.8, 0.6, 8.0)
     data = {
         "environment": {"gravity": 0.0},
         "cable": {"sections": [line, line | {"max_strain": 0.2}]},
