@@ -44,6 +44,7 @@ def number_of(scene: Scene | System, key: str) -> float:
             expected = "a key of the scene that has a number"
             raise SceneError([Complaint("by", key, expected, "cable.sections[0].length, for example")]) from None
     if not isinstance(value, float):
+        refuse_computing(key)
         kind = "a number that may change by a little" if isinstance(value, int) else "a number"
         raise SceneError([Complaint("by", key, f"{kind}, which {key} is not in this scene", "another key")])
     return float(value)

@@ -67,13 +67,13 @@ def sensitivity(scene: Any, of: Any, by: Sequence[str] | None = None, motion: bo
     if by is None:
         return of_study(scene, of)
     asked = as_scene_or_system(scene)
+    for key in by:
+        refuse_computing(key)
     numbers = [number_of(asked, key) for key in by]
     edges = [] if motion else [k for k, x in enumerate(of) if is_edge(asked, x)]
     if motion:
         values, found, errors, ways = in_motion(asked, of, by)
     else:
-        for key in by:
-            refuse_computing(key)
         fine, ways = at_rest(asked, of), len(by) * (way_at_rest(asked),)
         values, found = fine.values, fine.by(by)
         errors = OF_DIFFERENCE * np.abs(found - at_rest(asked, of, 2.0).by(by))

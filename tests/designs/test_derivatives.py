@@ -371,7 +371,7 @@ def test_where_contact_begins_answers_as_the_line_does(cells):
                           ("lie", keys[1], by_place), ("far", keys[1], 1.0 - by_place)):  # fmt: skip
         one = found[of, by]
         assert abs(one.derivative - value) < one.error + 0.01 * abs(value)
-        assert one.error < 0.1 * abs(value) and one.way == "differences of equilibria, from cell to cell"
+        assert one.error < 0.15 * abs(value) and one.way == "differences of equilibria, from cell to cell"
     still = found["lie", keys[2]]
     assert still.error == abs(still.derivative) and abs(still.elasticity) < 0.01
     assert found["tension@end", keys[0]].way == "factors of the equilibrium"
