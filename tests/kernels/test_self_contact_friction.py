@@ -53,12 +53,14 @@ def keep(line, contact):
 
 
 class Rubbing(Tangle):
-    """A tangle with friction."""
+    """A tangle with friction; uneven: of diameters that differ from piece to piece, which share their distance."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, uneven: bool = False) -> None:
         super().__init__(SHAPES[name], friction=MU)
-        self.energy(np.zeros_like(self.r))
         self.parts = self.contact.contact
+        if uneven:
+            self.parts.width[:] *= 0.995 + 0.005 * np.cos(np.arange(self.parts.width.size))
+        self.energy(np.zeros_like(self.r))
         assert self.count > 1
 
     @property
@@ -84,10 +86,11 @@ def shifts(tangle: Rubbing, size: float, seed: int = 5) -> np.ndarray:
     return x
 
 
+@pytest.mark.parametrize("uneven", [False, True], ids=["even", "uneven"])
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("size", [1e-7, 0.3], ids=["sticks", "slides"])
-def test_forces_and_moments_add_up_to_nothing(name: str, size: float) -> None:
-    tangle = Rubbing(name)
+def test_forces_and_moments_add_up_to_nothing(name: str, size: float, uneven: bool) -> None:
+    tangle = Rubbing(name, uneven)
     out = tangle.move(shifts(tangle, size))
     slides = tangle.holds[:, SLIDES] > 0.0
     assert not slides.any() if size < 1e-3 else slides.any()
@@ -117,11 +120,12 @@ def test_it_is_coulomb_at_most_along_the_way(name: str) -> None:
     assert np.abs(across).max() < 1e-13 * size.max()
 
 
+@pytest.mark.parametrize("uneven", [False, True], ids=["even", "uneven"])
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("size", [1e-7, 0.01, 0.3], ids=["sticks", "slides", "slides far"])
-def test_its_stiffness_is_its_derivative(name: str, size: float) -> None:
+def test_its_stiffness_is_its_derivative(name: str, size: float, uneven: bool) -> None:
     """With directions, feet, arms and the force across that change, and a travel from before that turns with strand p."""
-    tangle = Rubbing(name)
+    tangle = Rubbing(name, uneven)
     tangle.move(shifts(tangle, 3e-6, seed=4))
     assert not (tangle.holds[:, SLIDES] > 0.0).any()  # one that has slid is between sticking and sliding
     keep(tangle.line, tangle.parts)
@@ -141,9 +145,10 @@ def test_its_stiffness_is_its_derivative(name: str, size: float) -> None:
     assert np.abs(out - slope).max() < 1e-7 * np.abs(slope).max()
 
 
+@pytest.mark.parametrize("uneven", [False, True], ids=["even", "uneven"])
 @pytest.mark.parametrize("name", SHAPES)
-def test_a_rigid_motion_rubs_nothing(name: str) -> None:
-    tangle = Rubbing(name)
+def test_a_rigid_motion_rubs_nothing(name: str, uneven: bool) -> None:
+    tangle = Rubbing(name, uneven)
     axis, angle = np.array([0.48, 0.6, 0.64]), 1e-4
     turn = angle * np.cross(axis, tangle.r) + 0.7 * WIDTH  # and a shift
     d = np.diff(tangle.r, axis=0)

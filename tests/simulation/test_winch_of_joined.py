@@ -215,7 +215,10 @@ def pressed(friction: float, winch_first: bool = True, step: float = 0.01) -> Ta
 
 
 def test_a_rope_that_another_line_holds_by_friction() -> None:
-    """Without friction the load feels the winch; with it less, by at most e^(mu theta), and what slides takes energy."""
+    """Without friction the load feels the winch; with it less, and what slides takes energy.
+
+    It acts on the surface of the bar, of 5 cm, and not on the axis of the rope, 6 cm from that of the bar: e^(5/6 mu theta).
+    """
     ratios, hauled = {}, {}
     for friction in (0.0, 0.3):
         found = hybrid.run(pressed(friction))
@@ -232,7 +235,7 @@ def test_a_rope_that_another_line_holds_by_friction() -> None:
         work = {name: rope[name][-1] + bar[name][-1] for name in rope.names if name.startswith("work/")}
         assert abs(work["work/scheme"]) < 5e-4 * work["work/start"]
         assert (work["work/friction"] < -2.0) == (friction > 0.0) and work["work/friction"] < 1e-3
-    assert abs(ratios[0.0]) < 0.03 and 0.15 < ratios[0.3] < 0.3
+    assert abs(ratios[0.0]) < 0.03 and ratios[0.3] == pytest.approx(0.3 * 5 / 6, abs=0.02)
     assert 0.3 < hauled[0.3] < 0.8 * hauled[0.0]
 
 

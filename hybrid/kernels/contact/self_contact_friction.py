@@ -1,14 +1,15 @@
 """Friction where a line touches itself: an elastic travel at every point of contact, forces and moments on both strands.
 
-The strands touch halfway between x and y.  In a step their surfaces shift against each other there by
+The strands touch where the line from x to y is parted as their diameters D_p and D_q are, halfway for equal ones.  In a
+step their surfaces shift against each other there by
 
-    g = P (W_x u_p - W_y u_q - (d/2) (phi_p + phi_q) x n),    P = 1 - n n^T
+    g = P (W_x u_p - W_y u_q - (d/2) (b_p phi_p + b_q phi_q) x n),    P = 1 - n n^T,    b_p = 2 D_p/(D_p + D_q)
 
 with the displacements u of the nodes and the rotation phi = psi d + d x de/l of each strand, between those of the two
 cells of a piece.  The travel q of a point, kept along and across strand p, becomes q + g, with the force -k q on p and
 k q on q; where that is more than mu N it slides, and q keeps mu N/k.  So nothing creeps, and nothing gives back more
-than it has stored.  Off the centre lines the force is a force f on the centre line and a moment -(d/2) n x f on both
-strands, along the chord into the balance of spin, across it as a couple: no angular momentum is lost.
+than it has stored.  Off the centre lines the force is a force f on the centre line and a moment -(d/2) b n x f on each
+strand, along the chord into the balance of spin, across it as a couple: no angular momentum is lost.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ TRY, WHO, WHOSE, BEFORE, TURNS_BACK = 10, 11, 12, 13, 16
 SHUT, OPENS, TURNED, ASIDE, ABOUT, LEANS = 17, 18, 21, 24, 27, 30
 HOLD = 31
 # How a point turns with one of its four cells: chord; what the cell has become longer in the step, a vector (m); inverse
-# of its length (1/m); its part in the turn; its spin in the step (rad); 1 where it has one.
+# of its length (1/m); its part in the turn, times b; its spin in the step (rad); 1 where it has one.
 CHORD, LONGER, INVERSE, SHARE, SPUN, SPINS = 0, 3, 6, 7, 8, 9
 ARM = 10
 SHRINKS = 0.9  # part to which a shift falls that goes to none; one that falls by less slides indeed
@@ -70,12 +71,18 @@ def arc_length(line, kind, p, u):
 
 
 @inner
+def lever(contact, own, other):
+    """b of a strand at its piece `own` on the piece `other`: its part of their distance from axis to axis, twice."""
+    return 2.0 * (contact.width[own] / (contact.width[own] + contact.width[other]))
+
+
+@inner
 def keep_arms(line, contact, k):
     """How point k turns with its strands: of the two cells beside each, what contact.arms holds."""
     row, at, x = contact.points[k], contact.at, contact.x
     for j in range(4):
         node, u = int(row[P if j < 2 else Q]), row[PLACE if j < 2 else FOOT_PLACE]
-        c, part = node - 1 + j % 2, u if j % 2 == 1 else 1.0 - u
+        c, part = node - 1 + j % 2, (u if j % 2 == 1 else 1.0 - u) * lever(contact, node, int(row[Q if j < 2 else P]))
         d, _, il = chord(sub(get3(at, c + 1), get3(at, c)))
         longer, arm = sub(get3(x, c + 1), get3(x, c)), contact.arms[k, j]
         for m in range(3):
@@ -94,7 +101,7 @@ def turn_of(arm, x, c):
 
 @inner
 def turn_of_strands(contact, k, x):
-    """The turn of both strands at point k by x, one and the other together."""
+    """The turn of both strands at point k by x, one and the other together, each times its b."""
     p, q, arms = int(contact.points[k, P]), int(contact.points[k, Q]), contact.arms[k]
     first = add(turn_of(arms[0], x, p - 1), turn_of(arms[1], x, p))
     return add(first, add(turn_of(arms[2], x, q - 1), turn_of(arms[3], x, q)))
@@ -280,9 +287,10 @@ def add_held_product(contact, k, x, out):
     t, gives, force = vector(hold, SLIDING), hold[GIVES], scale(-1.0, vector(hold, HELD))
     z, theta = way_apart(row, x), turn_of_strands(contact, k, x)
     nearer = dot(z, n)
+    b = lever(contact, q, p)
     dv = row[FORCE] * row[FOLLOWS] * (dot(y, z) + dot(n, spline_point(x, q, vector(row, RATES))))
     theta = add(theta, add(change_of_turn(arms[0], x, p - 1, 0.0), change_of_turn(arms[1], x, p, 0.0)))
-    theta = add(theta, add(change_of_turn(arms[2], x, q - 1, -dv), change_of_turn(arms[3], x, q, dv)))
+    theta = add(theta, add(change_of_turn(arms[2], x, q - 1, -b * dv), change_of_turn(arms[3], x, q, b * dv)))
     away = sub(z, scale(d * dv, y))
     dn = scale(1.0 / d, sub(away, scale(nearer, n)))
     g = sub(z, scale(0.5 * d, cross(theta, n)))
@@ -305,8 +313,8 @@ def add_held_product(contact, k, x, out):
     load_turns(contact, k, scale(-0.5, add(cross(away, force), scale(d, cross(n, f)))), out)
     load_change(arms[0], moment, x, p - 1, 0.0, out)
     load_change(arms[1], moment, x, p, 0.0, out)
-    load_change(arms[2], moment, x, q - 1, -dv, out)
-    load_change(arms[3], moment, x, q, dv, out)
+    load_change(arms[2], moment, x, q - 1, -b * dv, out)
+    load_change(arms[3], moment, x, q, b * dv, out)
 
 
 @inner
