@@ -113,9 +113,9 @@ def _unknown_key(root: type[Table], path: Place, spot: Spot) -> Finding:
     """A key that its table does not have: one of another kind, misspelt, called otherwise, or of another table."""
     key, owner = str(path[-1]), spot.owner
     if owner is None:
-        return Finding(path, f"a key of {dotted(path[:-1]) or 'a scene'}", "take it out")
+        return Finding(path, f"a key of {dotted(path[:-1]) or _kind_of_file(root)}", "take it out")
     has_kind = bool(spot.kind) and "kind" in owner.model_fields
-    table = "a scene" if len(path) == 1 else f"kind: {spot.kind}" if has_kind else dotted(path[:-1])
+    table = _kind_of_file(root) if len(path) == 1 else f"kind: {spot.kind}" if has_kind else dotted(path[:-1])
     kinds = [kind for kind, other in spot.beside.items() if key in other.model_fields or key in other.former]
     own = {name: f for name, f in owner.model_fields.items() if name != "kind"}
     known = {name: f.description or "" for name, f in own.items()}
@@ -129,6 +129,10 @@ def _unknown_key(root: type[Table], path: Place, spot: Spot) -> Finding:
         near = nearest(key, known, {name: _named(name, f) for name, f in own.items()})
         fix = near or _elsewhere(root, key) or f"known here: {', '.join(owner.model_fields)}"
     return Finding(path, f"a key of {table}", fix)
+
+
+def _kind_of_file(root: type[Table]) -> str:
+    return {"Design": "a design", "Study": "a study"}.get(root.__name__, "a scene")
 
 
 def _elsewhere(root: type[Table], key: str) -> str:
@@ -161,7 +165,7 @@ def _missing_fix(key: str, words: str, spot: Spot, bare: bool) -> str:
     else:
         usual = {kind: a for kind in kinds.usual for a, marks in found if Tag(f"<{kind}>") in marks}
         return "add " + " or ".join(f"`{key}: {_example(kind, table)}`" for kind, table in usual.items())
-    article = "" if what.startswith(("how ", "what ", "where ")) else "the "
+    article = "" if what.startswith(("how ", "what ", "where ", "its ", "one ")) else "the "
     return f"{fix}, {article}{what.removeprefix('the ')}" if what else fix
 
 

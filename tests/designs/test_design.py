@@ -331,6 +331,8 @@ def test_a_number_that_two_unknowns_set_is_refused(folder):
 def test_bad_cases_are_refused_with_their_line(folder):
     cases = 'cases:\n  far: {"cable.sections[0].lenght": 3}\n'
     Path("design.yaml").write_text(DESIGN + cases)
+    with pytest.raises(hybrid.SceneError, match=r"unknown[^$]*expected: a key of a design[^$]*did you mean unknowns"):
+        hybrid.design({"scene": "scene.yaml", "unknown": {}, "unknowns": {"length": {"key": LENGTH}}})
     with pytest.raises(
         hybrid.SceneError, match=r"design\.yaml:9:37: cases\.far\.cable\.sections\[0\]\.lenght[^$]*did you mean length"
     ):
