@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Thread
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +20,9 @@ from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.read import validate_scene
 from hybrid.scene.schema import Equilibrium, Scene
-from hybrid.scene.system import System
+
+if TYPE_CHECKING:  # its tables take long to make
+    from hybrid.scene.system import System
 
 # What is compiled together, by the kernel that stands for it: the last.
 SOLVER = ("run.in_plane", "run.in_space")
