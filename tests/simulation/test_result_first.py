@@ -22,7 +22,7 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.model.resolution import Resolution
 from hybrid.model.system import SystemResolution
 from hybrid.simulation import case as cases
-from hybrid.simulation import system_run
+from hybrid.simulation import system_cells, system_run
 from hybrid.simulation.case import Case
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress
 from hybrid.simulation.static_case import StaticCase
@@ -265,7 +265,7 @@ def test_a_stop_is_heard_while_the_equilibrium_is_searched(
         reached.append("the end of a long search")
 
     monkeypatch.setattr(cases, "equilibrium_of", long)
-    monkeypatch.setattr(system_run, "equilibrium_of_system", long)
+    monkeypatch.setattr(system_cells, "equilibrium_of_system", long)
     with pytest.raises(KeyboardInterrupt):
         hybrid.run(scene, tmp_path / "run.h5")
     assert not reached and not list(tmp_path.iterdir())
