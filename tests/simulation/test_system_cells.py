@@ -75,7 +75,8 @@ def test_a_line_that_is_paid_out_has_the_cells_of_the_cable(rate: float) -> None
     cable, line = hybrid.run(scene), hybrid.run(as_system(scene)).lines["one"]
     assert cells(line) == cells(cable) and len({*cells(cable)}) > 3
     for name in ("position", "tension", "reaction_end", "work/end", "work/zones"):  # to Newton's tolerance
-        assert np.abs(line[name] - cable[name]).max() < 1e-5 * np.abs(cable[name]).max(), name
+        off = 1e-6 if name == "position" else 5e-5
+        assert np.abs(line[name] - cable[name]).max() < off * np.abs(cable[name]).max(), name
 
 
 def test_against_rods(three: hybrid.Result) -> None:
