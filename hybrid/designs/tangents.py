@@ -312,7 +312,7 @@ class Others:
             scene = scene.model_copy(update={"output": output})
         case = Case(scene, None)
         observer = case.observer(model, False, case.points.s, None)
-        observer = observer.on(line, model.sea.values, model.zones, model.cable.hinges).of(names)
+        observer = observer.on(line, model.sea.values, model.zones, model.hinges).of(names)
         return Seen(scene, observer.values_of(observer.look(batch)), np.asarray(observer.s), batch.t.copy())
 
 

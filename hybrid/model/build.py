@@ -92,6 +92,14 @@ class Model:
         return int(self.line.h.size)
 
     @property
+    def hinges(self) -> Floats:
+        """`Material.hinges`, without EI/GJ where zones stay: steps look for no stiffness that is under way there."""
+        found = self.cable.hinges
+        if self.layout is None:
+            found[2] = 0.0
+        return found
+
+    @property
     def nodes(self) -> Floats:
         """(N+1,) m, nodes by which extremes are kept: the fairlead of a line that is paid out is the next one."""
         if self.payout is not None and self.layout is not None:

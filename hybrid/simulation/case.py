@@ -502,7 +502,7 @@ class Case:
             model.finest_nodes if follows_curvature(self.scene) and model.layout and not only else None,
             () if only else self.scene.output.elevation or (),
             model.payout is not None, None if only else quantities_of(self.scene),
-            obstacles=() if only else model.sea.names, hinges=model.cable.hinges,
+            obstacles=() if only else model.sea.names, hinges=model.hinges,
             edges=not only and wants_errors(self.scene) and bool(model.line.bits & SEABED),
         )  # fmt: skip
 

@@ -159,7 +159,7 @@ class StaticCase:
             jumps=jumps, changes=section_changes(self.scene),
             gauges=() if only else self.scene.output.elevation or (),
             quantities=None if only else quantities_of(self.scene), obstacles=() if only else model.sea.names,
-            hinges=model.cable.hinges,
+            hinges=model.hinges,
         )  # fmt: skip
 
 

@@ -142,7 +142,7 @@ def iterations_allowed(most: Any) -> int:
 def tension_now(loop: TimeLoop) -> Floats:
     """Tension (ns,) N at the points of the result, as it would be written now."""
     run, model = loop.run, loop.run.model
-    books, observer = run.run.books, loop.observer.on(model.line, model.sea.values, model.zones, model.cable.hinges)
+    books, observer = run.run.books, loop.observer.on(model.line, model.sea.values, model.zones, model.hinges)
     batch = batch_of_one(run.t, model.ends.at(run.t), run.state, books.report[0], books.work[0], model.sea.at(run.t))
     if run.payout is not None:
         _, seen, _ = run.payout.look(observer, model, batch)

@@ -108,7 +108,7 @@ def observer_of(scene: Scene, model: Model, moves: bool, only: Sequence[str] | N
         model.line, model.sea.values, model.zones, s, moves and only is None, model.attached, kinds, criteria,
         only=only, jumps=jumps, changes=section_changes(scene), finest=finest,
         payout=moves and model.payout is not None, quantities=None if only else quantities_of(scene),
-        obstacles=() if only else model.sea.names, hinges=model.cable.hinges,
+        obstacles=() if only else model.sea.names, hinges=model.hinges,
         edges=moves and only is None and wants_errors(scene) and bool(model.line.bits & SEABED),
     )  # fmt: skip
 
@@ -177,7 +177,7 @@ class LineResult:
         right[marked] = nodes + np.arange(marked.size)
         books, base = blank_books(line.h.size), self.model.always.astype(np.int64)
         books.loaded[:] = self.model.loaded_ends
-        books.hinges[:] = self.model.cable.hinges
+        books.hinges[:] = self.model.hinges
         books.clock[[LEAST_PEAK, RELEASE_START, RELEASE_END]] = np.inf
         books.counts[STIFF], books.counts[VARIES] = self.model.inextensible, self.model.layout is not None
         books.clock[RHO] = self.scene.time.rho_inf if self.scene.time is not None else 0.0
@@ -281,9 +281,9 @@ class LineResult:
             return
         self.write_down()
         self.model, first = model, self.observer.first_energy
-        self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.cable.hinges)
+        self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.hinges)
         self.observer.first_energy = first
-        self.books.hinges[:] = model.cable.hinges
+        self.books.hinges[:] = model.hinges
         self.diagnostics.follow(model)
         self._itself = LineWatch(self.envelope.itself, model)
         if self.touches != bool(self.books.touch.size):

@@ -335,7 +335,7 @@ class TimeLoop:
         if self.shown is not None:
             self.shown(batch)
         if model is not self._observed:
-            self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.cable.hinges)
+            self.observer = self.observer.on(model.line, model.sea.values, model.zones, model.hinges)
             self._observed = model
         observer, ratios, count = self.observer, None, batch.t.size
         if observer.writes_criteria:

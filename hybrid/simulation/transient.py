@@ -136,7 +136,7 @@ class Transient:
         self._leaves = self._returns = False  # whether it leaves its plane, or is back in it, after this step
         self._rescues = 0, 0  # the step before, and repetitions with more rod since
         self.run.books.loaded[:] = model.loaded_ends
-        self.run.books.hinges[:] = model.cable.hinges
+        self.run.books.hinges[:] = model.hinges
         self.run.clock[b.FLOOR] = model.slack_floor if model.slack == "stop" else -np.inf
         self.run.count[b.STIFF] = model.inextensible
         if not self._begins_at_once:
@@ -647,7 +647,7 @@ class Transient:
         touches = bool(model.line.bits & SELF_CONTACT)
         keep = touches or self.correction is not None or (self.payout is not None and self.payout.solves_twice)
         self.stepper = Stepper(model.line, model.length, model.tension_scale, keep=keep)
-        books.hinges[:] = model.cable.hinges
+        books.hinges[:] = model.hinges
         self.run.clock[b.WAVE_STEP] = wave_step(model.line, model.tension_scale)
         self.run.attach(
             model.line, model.sea.values, model.ends.values, model.ends.moves(), self.stepper.work,
