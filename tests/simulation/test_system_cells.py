@@ -12,7 +12,7 @@ from test_payout_cells import pinned
 from test_system_contact_zones import alone
 from test_system_contact_zones import system as touching_themselves
 from test_system_payout_zones import as_system
-from test_system_zones import ROPE, SEA, mooring, slackening
+from test_system_zones import ROPE, SEA, mooring, slackening, stepped_again
 
 import hybrid
 import hybrid.simulation.system_run
@@ -108,16 +108,8 @@ def test_a_stopped_run_goes_on_bit_for_bit(
 
 def test_steps_from_outside_are_those_of_a_run(three: hybrid.Result) -> None:
     """Bit for bit, also where each is computed twice across changes of cells."""
-    with hybrid.SystemSimulation(followed()) as simulation:
-        times, saved = 0.02 * np.arange(5, 100, 5), simulation.save()
-        for k, t in enumerate(times):
-            simulation.advance(float(t))
-            if k % 6 == 5:
-                simulation.restore(saved)
-                for again in times[k - 5 : k + 1]:
-                    simulation.advance(float(again))
-                saved = simulation.save()
-        result = simulation.result()
+    times = 0.02 * np.arange(5, 100, 5)
+    result = stepped_again(followed(), times)
     for name, line in result.lines.items():
         run, n = three.lines[name], len(times) + 1
         assert np.array_equal(line.position, run.position[:n]) and np.array_equal(line.tension, run.tension[:n])

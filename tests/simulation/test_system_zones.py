@@ -220,10 +220,10 @@ def test_what_is_not_computed_is_refused(line: dict[str, Any], scene: dict[str, 
     assert where in refused.value.complaints[0].where
 
 
-def test_steps_from_outside_are_those_of_a_run(three: hybrid.Result) -> None:
-    """Bit for bit, also where each is computed twice, and several again, across changes of zones."""
-    with hybrid.SystemSimulation(mooring()) as simulation:
-        times, saved = 0.02 * np.arange(5, 130, 5), simulation.save()  # to the bit the ends of its steps
+def stepped_again(scene: dict[str, Any], times: np.ndarray) -> hybrid.Result:
+    """A scene stepped from outside to these times (s), six of which are gone back over and computed twice each time."""
+    with hybrid.SystemSimulation(scene) as simulation:
+        saved = simulation.save()
         for k, t in enumerate(times):
             simulation.advance(float(t))
             if k % 6 == 5:
@@ -231,7 +231,12 @@ def test_steps_from_outside_are_those_of_a_run(three: hybrid.Result) -> None:
                 for again in times[k - 5 : k + 1]:
                     simulation.advance(float(again))
                 saved = simulation.save()
-        result = simulation.result()
+        return simulation.result()
+
+
+def test_steps_from_outside_are_those_of_a_run(three: hybrid.Result) -> None:
+    """Bit for bit, also where each is computed twice, and several again, across changes of zones."""
+    result = stepped_again(mooring(), 0.02 * np.arange(5, 130, 5))  # to the bit the ends of its steps
     for name, line in result.lines.items():
         run = three.lines[name]
         assert np.array_equal(line.position, run.position[:26]) and np.array_equal(line.tension, run.tension[:26])
