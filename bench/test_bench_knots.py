@@ -1,4 +1,6 @@
-"""A trefoil that is pulled, against the law of elastic knots: F h^2/EI = e^4/2 + 0.492 mu e^3, e = (h/R)^(1/2).
+"""Friction of lines against closed forms: a trefoil that is pulled, and a rope over a bar of another line.
+
+The law of elastic knots: F h^2/EI = e^4/2 + 0.492 mu e^3, e = (h/R)^(1/2).
 
 B. Audoly, N. Clauvelin and S. Neukirch, Elastic knots, Phys. Rev. Lett. 99 (2007) 164301; h the radius of the cord, mu its
 friction, + where the knot is being tightened.  The law is of thin cords (e small), whose loop is a circle of radius R;
@@ -13,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_winch_of_joined import held_by_friction, pressed
 
 import hybrid
 
@@ -56,3 +59,14 @@ def test_a_trefoil_holds_the_pull_of_the_law() -> None:
         print(f"{force:7.3f}  {friction:3.1f}  {e:6.4f}  {pull:9.3e}  {smooth - rub:9.3e} to {smooth + rub:9.3e}  {above:>10}"
               f"  {cpu:6.1f}   moves by {1e3 * still:.2g} mm in the last second")  # fmt: skip
         assert 0.85 * (smooth - rub) < pull < 1.3 * (smooth + rub)
+
+
+def test_a_rope_is_held_by_a_bar_of_another_line() -> None:
+    """Exponent of the capstan, ln(T1/T2) over the angle: mu R/(R + r) of a bar of R, 5 cm, and a rope of r, 1 cm."""
+    print("\ncells of the rope   exponent   angle, rad     (exponent 0.25)")
+    for cells in (60, 240):
+        scene = pressed(0.3)
+        scene["lines"]["rope"]["mesh"] = {"cells": cells}
+        exponent, angle = held_by_friction(hybrid.run(scene))
+        print(f"{cells:17d}  {exponent:9.3f}  {angle:11.3f}")
+        assert abs(exponent - 0.3 * 5 / 6) < 0.01

@@ -214,6 +214,22 @@ def pressed(friction: float, winch_first: bool = True, step: float = 0.01) -> Ta
     }  # fmt: skip
 
 
+def held_by_friction(found: hybrid.Result) -> tuple[float, float]:
+    """ln(T1/T2) over the angle by which the rope turns at the bar, and that angle, rad, at 2 s.
+
+    T1, T2: tensions of both ends, less the weight of the rope between each and the bar.
+    """
+    rope, weight, height = found.lines["rope"], 0.05 * G, -0.8
+    x = rope.position[20]
+    upper, lower = (
+        x[0] - x[np.linalg.norm(x - x[0], axis=1) > 0.3][0],
+        x[np.linalg.norm(x - x[-1], axis=1) > 0.3][-1] - x[-1],
+    )
+    angle = np.arccos(upper @ lower / np.linalg.norm(upper) / np.linalg.norm(lower))
+    T = rope.tension[20, 0] - weight * (x[0, 2] - height), rope.tension[20, -1] + weight * (height - x[-1, 2])
+    return float(np.log(T[0] / T[1]) / angle), float(angle)
+
+
 def test_a_rope_that_another_line_holds_by_friction() -> None:
     """Without friction the load feels the winch; with it less, and what slides takes energy.
 
@@ -223,20 +239,41 @@ def test_a_rope_that_another_line_holds_by_friction() -> None:
     for friction in (0.0, 0.3):
         found = hybrid.run(pressed(friction))
         rope, bar = found.lines["rope"], found.lines["bar"]
-        x, weight, height = rope.position[20], 0.05 * G, -0.8
-        upper, lower = (
-            x[0] - x[np.linalg.norm(x - x[0], axis=1) > 0.3][0],
-            x[np.linalg.norm(x - x[-1], axis=1) > 0.3][-1] - x[-1],
-        )
-        angle = np.arccos(upper @ lower / np.linalg.norm(upper) / np.linalg.norm(lower))
-        T = rope.tension[20, 0] - weight * (x[0, 2] - height), rope.tension[20, -1] + weight * (height - x[-1, 2])
-        ratios[friction], hauled[friction] = np.log(T[0] / T[1]) / angle, 2.0 - rope["payout/length"][-1]
+        ratios[friction], angle = held_by_friction(found)
+        hauled[friction] = 2.0 - rope["payout/length"][-1]
         assert angle > 0.6 and found["contacts/rope/bar/contact_force"][20] > 25.0
         work = {name: rope[name][-1] + bar[name][-1] for name in rope.names if name.startswith("work/")}
         assert abs(work["work/scheme"]) < 5e-4 * work["work/start"]
         assert (work["work/friction"] < -2.0) == (friction > 0.0) and work["work/friction"] < 1e-3
     assert abs(ratios[0.0]) < 0.03 and ratios[0.3] == pytest.approx(0.3 * 5 / 6, abs=0.02)
     assert 0.3 < hauled[0.3] < 0.8 * hauled[0.0]
+
+
+def zones_that_touch(diameter: float) -> Tables:
+    """`pressed`, with zones that move in both lines, 12 cm of diameters; the bar is clamped, else it would turn."""
+    scene = pressed(0.3)
+    for name, width, stiffness in (("rope", 0.12 - diameter, 1e-2), ("bar", diameter, 200.0)):
+        line = scene["lines"][name]
+        more = {"diameter": width, "bending_stiffness": stiffness, "torsional_stiffness": stiffness}
+        line["sections"] = [line["sections"][0] | more]
+        line["model"] = {"kind": "adaptive", "always_move": True}
+    clamp = {"kind": "clamped", "tangent": [0, 1, 0]}
+    scene["lines"]["bar"]["connections"] = {"start": clamp, "end": clamp}
+    return scene
+
+
+@pytest.mark.parametrize("diameter", [0.1, 0.11])
+def test_friction_acts_where_surfaces_of_zones_that_move_touch(diameter: float) -> None:
+    """e^(mu theta R/(R + r)) of a bar of R and a rope of r: R + r = 6 cm from axis to axis in both."""
+    found = hybrid.run(zones_that_touch(diameter))
+    rope, bar = found.lines["rope"], found.lines["bar"]
+    for line in (rope, bar):  # they have become rods where they touch
+        assert any(event.kind in ("grow", "split") and event.criterion == "contact" for event in line.events)
+        assert {zone.kind for zone in line.zones[20]} == {"rod", "catenary"}
+    ratio, angle = held_by_friction(found)
+    assert angle > 0.6 and ratio == pytest.approx(0.3 * diameter / 0.12, abs=0.01)
+    work = {name: rope[name][-1] + bar[name][-1] for name in ("work/scheme", "work/start", "work/friction")}
+    assert abs(work["work/scheme"]) < 5e-4 * work["work/start"] and work["work/friction"] < -2.0
 
 
 def test_a_rope_under_friction_with_its_ends_exchanged() -> None:
