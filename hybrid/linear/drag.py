@@ -1,8 +1,8 @@
 """Drag that stands for the quadratic one in a Gaussian motion: the mean of its derivative (docs/theory.md, 21).
 
 For f = c |u| u of a velocity u = U + x with x normal and of covariance S,  E[df/du] = c E[|u| 1 + u u^T/|u|];
-it is the linear law that leaves least in the mean square.  That of a single harmonic, which is not normal, is the one
-with the same first harmonic:  E[f x^T] E[x x^T]^-1  over its phases.
+it is the linear law that leaves least in the mean square.  A sum of few harmonics is not normal: its law, the best in
+the same sense, is  E[f x^T] E[x x^T]^-1  over their phases; of a single one it has the same first harmonic.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import math
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.kernels.state.state import Floats
 
@@ -23,8 +24,12 @@ FAR = 30.0
 LAW = np.linspace(-6.0, 6.0, 121)
 LAW_PARTS = np.exp(-0.5 * LAW**2) / np.exp(-0.5 * LAW**2).sum()
 BENT = 8.0
-# Phases of a single harmonic, and the part of its largest square below which a direction counts as one without motion.
-PHASES, STILL = 128, 1e-8
+# Frequencies up to which a sum is no normal process; multiples of one frequency up to which they are seen over its
+# period, and the part within which they are such.
+FEW, MULTIPLES, MULTIPLE = 10, 40, 1e-6
+# Phases over a period, of its highest harmonic at least, of several that drift apart; the part of the largest square
+# below which a direction counts as one without motion.
+PHASES, OF_HIGHEST, DRIFTING, STILL = 128, 8, 512, 1e-8
 
 
 @cache
@@ -73,28 +78,47 @@ def along(mean: Floats, deviation: Floats) -> Floats:
     return np.asarray(2.0 * (gauss + mean * erf(ratio / math.sqrt(2.0))))
 
 
-def of_harmonic(mean: Floats, amplitude: Floats) -> Floats:
-    """The law (n, m, m) of a harmonic about mean velocities (n, m), of complex amplitudes (n, m); m = 1, 2 or 3.
+def phases_of(omegas: Floats) -> NDArray[np.complex128] | None:
+    """exp(-i phase) (P, F) at which a sum of frequencies (F,), increasing, is seen; None: many, a normal process.
 
-    In directions without motion, E[df/du].
+    Multiples of the lowest keep to each other: over its period.  Of others, few, all phases are as likely.
     """
-    angle = 2.0 * np.pi * (np.arange(PHASES) + 0.5) / PHASES
-    x = (amplitude[:, None, :] * np.exp(-1j * angle)[None, :, None]).real
+    multiples = np.rint(omegas / omegas[0])
+    if multiples[-1] <= MULTIPLES and np.abs(omegas / omegas[0] - multiples).max() < MULTIPLE:
+        count = max(PHASES, OF_HIGHEST * int(multiples[-1]))
+        return np.asarray(np.exp(-2j * np.pi * np.outer((np.arange(count) + 0.5) / count, multiples)))
+    if omegas.size > FEW:
+        return None
+    ratio = 2.0  # powers of the root of x^(F+1) = x + 1 fill a cube evenly
+    for _ in range(50):
+        ratio = (1.0 + ratio) ** (1.0 / (omegas.size + 1))
+    part = np.outer(np.arange(DRIFTING) + 0.5, ratio ** -np.arange(1.0, omegas.size + 1))
+    found = np.exp(-2j * np.pi * part)
+    return np.concatenate([found, -found])  # as far to one side as to the other
+
+
+def of_few(mean: Floats, amplitudes: Floats, phases: NDArray[np.complex128]) -> Floats:
+    """The law (n, m, m) of few harmonics about mean velocities (n, m), of complex amplitudes (F, n, m); m = 1, 2 or 3.
+
+    phases: (P, F).  In directions without motion, E[df/du].
+    """
+    count, (n, m) = len(phases), mean.shape
+    x = (phases @ amplitudes.reshape(-1, n * m)).real.reshape(count, n, m).transpose(1, 0, 2)
     u = mean[:, None, :] + x
     speed = np.linalg.norm(u, axis=2)
-    covariance = np.einsum("npi,npj->nij", x, x) / PHASES
+    covariance = np.einsum("npi,npj->nij", x, x) / count
     inverse = np.linalg.pinv(covariance, rcond=STILL, hermitian=True)
-    B = np.einsum("np,npi,npj->nij", speed, u, x) / PHASES @ inverse
+    B = np.einsum("np,npi,npj->nij", speed, u, x) / count @ inverse
     scaled = u / np.sqrt(np.maximum(speed, 1e-300))[:, :, None]
-    mean_slope = np.einsum("npi,npj->nij", scaled, scaled) / PHASES
-    mean_slope += speed.mean(axis=1)[:, None, None] * np.eye(mean.shape[1])
-    return np.asarray(B + mean_slope @ (np.eye(mean.shape[1]) - covariance @ inverse))
+    mean_slope = np.einsum("npi,npj->nij", scaled, scaled) / count
+    mean_slope += speed.mean(axis=1)[:, None, None] * np.eye(m)
+    return np.asarray(B + mean_slope @ (np.eye(m) - covariance @ inverse))
 
 
-def linear_law(mean: Floats, u: Floats) -> Floats:
-    """The law (n, m, m) by mean velocities (n, m) and amplitudes (F, n, m); m = 2 or 3."""
-    if len(u) == 1:
-        return of_harmonic(mean, u[0])
+def linear_law(mean: Floats, u: Floats, phases: NDArray[np.complex128] | None) -> Floats:
+    """The law (n, m, m) by mean velocities (n, m) and amplitudes (F, n, m); m = 2 or 3; phases: of few frequencies."""
+    if phases is not None:
+        return of_few(mean, u, phases)
     return across(mean, covariance_of(u))
 
 
@@ -111,16 +135,20 @@ def axes_across(d: Floats) -> Floats:
     return np.stack([first, np.cross(d, first)], axis=1)
 
 
-def of_cylinders(d: Floats, axes: Floats, drag: tuple[Floats, Floats], current: Floats, u: Floats) -> Floats:
+def of_cylinders(
+    d: Floats, axes: Floats, drag: tuple[Floats, Floats], current: Floats, u: Floats,
+    phases: NDArray[np.complex128] | None,
+) -> Floats:  # fmt: skip
     """Linear drag (H, 3, 3) N s/m of cylinders along d (H, 3) with axes (H, 2, 3) across, by a relative velocity of the
 
-    water with a mean (H, 3) m/s and amplitudes u (F, H, 3).  drag: across and along, (H,) N s^2/m^2.
+    water with a mean (H, 3) m/s and amplitudes u (F, H, 3).  drag: across and along, (H,) N s^2/m^2; phases: (P, F) of
+    few frequencies.
     """
     un, ut = (u.transpose(1, 0, 2) @ axes.transpose(0, 2, 1)).transpose(1, 0, 2), (u * d).sum(axis=2)
     mean, forth = np.einsum("hi,hmi->hm", current, axes), np.einsum("hi,hi->h", current, d)
-    B = axes.transpose(0, 2, 1) @ linear_law(mean, un) @ axes * drag[0][:, None, None]
-    if len(u) == 1:
-        t = of_harmonic(forth[:, None], ut[0, :, None])[:, 0, 0]
+    B = axes.transpose(0, 2, 1) @ linear_law(mean, un, phases) @ axes * drag[0][:, None, None]
+    if phases is not None:
+        t = of_few(forth[:, None], ut[:, :, None], phases)[:, 0, 0]
     else:
         t = along(forth, np.sqrt(0.5 * (np.abs(ut) ** 2).sum(axis=0)))
     return B + (drag[1] * t)[:, None, None] * d[:, :, None] * d[:, None, :]

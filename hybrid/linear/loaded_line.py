@@ -13,7 +13,7 @@ from hybrid.kernels.laws.bending_law import RIGID, parts_without_spring
 from hybrid.kernels.laws.hinge_layer import FADED
 from hybrid.kernels.state.forces import BODIES, DRAG, WAVES
 from hybrid.kernels.state.state import Floats, Line, Sea
-from hybrid.linear.drag import axes_across, linear_law, of_cylinders
+from hybrid.linear.drag import axes_across, linear_law, of_cylinders, phases_of
 from hybrid.linear.excitation import Excitation, current_at, excitations_of, half_cells
 from hybrid.linear.matrices import ANCHOR, LinearLine, RestMarch, by_turn, rows_at_rest, sparse_rows
 from hybrid.linear.response_results import LineResponse
@@ -54,7 +54,7 @@ class LoadedLine:
         self.axes = axes_across(self.d)
         self.point_drag = np.nan_to_num(self.line.point_drag) if self.line.bits & BODIES else np.zeros(count)
         self.q = np.zeros((len(omegas), count, SIZE), complex)
-        self.omegas = omegas
+        self.omegas, self.phases = omegas, phases_of(omegas) if omegas.size else None
         self.blocks = np.zeros((count, 3, 3))
 
     def drag_blocks(self, which: np.ndarray, start: bool) -> Floats:
@@ -66,11 +66,11 @@ class LoadedLine:
         if used.any():
             node, d, axes = self.node[used], self.d[used], self.axes[used]
             drag = self.cn[used], self.ct[used]
-            np.add.at(blocks, node, of_cylinders(d, axes, drag, self.current[used], relative[:, node]))
+            np.add.at(blocks, node, of_cylinders(d, axes, drag, self.current[used], relative[:, node], self.phases))
         at = np.flatnonzero(self.point_drag)
         if at.size:
             flow = current_at(self.line, self.sea, self.linear.r[at])
-            blocks[at] += self.point_drag[at][:, None, None] * linear_law(flow, relative[:, at])
+            blocks[at] += self.point_drag[at][:, None, None] * linear_law(flow, relative[:, at], self.phases)
         return blocks
 
     def relative(self, which: np.ndarray, start: bool = False) -> Floats:

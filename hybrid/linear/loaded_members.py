@@ -19,7 +19,7 @@ import numpy as np
 from hybrid.kernels.junctions.bodies import FRAME, NUMBERS, OWN, PLACE, V
 from hybrid.kernels.laws.members import ALONG, CM, CN, CT, MIDDLE, PIECE, PUSH, WATER, WET
 from hybrid.kernels.state.state import Floats
-from hybrid.linear.drag import axes_across, of_cylinders
+from hybrid.linear.drag import axes_across, of_cylinders, phases_of
 from hybrid.linear.excitation import SAME, water_of_wave
 from hybrid.linear.matrices import SHIFT, TURN, rotation
 from hybrid.model.members import Members
@@ -37,7 +37,7 @@ class LoadedMembers:
 
     def __init__(self, name: str, members: Members, state: Floats, omegas: Floats) -> None:
         """state: (STATE,) of the body at rest; omegas: (F,) 1/s."""
-        self.name, self.omegas, R = name, omegas, state[FRAME:V].reshape(3, 3)
+        self.name, self.omegas, self.phases, R = name, omegas, phases_of(omegas), state[FRAME:V].reshape(3, 3)
         rows = members.pieces.copy()
         members.stir(np.inf, state, 0.0, rows)
         arms, self.d = rows[:, MIDDLE:ALONG] @ R.T, rows[:, ALONG:CN] @ R.T
@@ -86,7 +86,7 @@ class LoadedMembers:
         u = math.sqrt(len(self.omegas) / which.size) * (
             self.water[which] + 1j * self.omegas[which, None, None] * motion
         )
-        return of_cylinders(self.d, self.axes, (self.cn, self.ct), self.current, u)
+        return of_cylinders(self.d, self.axes, (self.cn, self.ct), self.current, u, self.phases)
 
     def damping(self) -> Floats:
         """(6, 6) N s/m, .. of the drag as it is, against velocities of the body."""

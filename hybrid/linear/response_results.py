@@ -10,14 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.state.state import Floats
-from hybrid.linear.drag import covariance_of, size_deviation
-from hybrid.statistics.fatigue import Curve, curve_of, dirlik_damage
+from hybrid.linear.drag import covariance_of, phases_of, size_deviation
+from hybrid.statistics.fatigue import Curve, curve_of, damage, dirlik_damage
 
 HOURS = 3.0
 # Part of the largest deviation along a line from which one is known: below it what goes with the square of the motion,
 # which is left out, may be several times as much.  Parts that what is left out may add to a deviation: half to three
 # quarters of that come true, which is 3 % here (bench/test_bench_response.py).
 OF_LARGEST, ADDED = 0.2, {"tension": 0.045, "curvature": 0.055}
+# Longest periods in which cycles of few frequencies are counted, values to the shortest period of those that have more
+# than a small part of the power.
+COUNTED, PER_PERIOD, SMALL = 50, 32, 1e-5
 VARIES = ("position", "tension", "curvature", "curvature_across")
 ALONE = ("tension", "curvature")  # of which notes begin with the quantity and its place
 
@@ -68,6 +71,10 @@ class LineResponse:
         """Standard deviation, in the unit of the quantity; of `curvature` that of its size, with what is across."""
         if name != "curvature":
             return np.sqrt(self.spectrum(name).moment(0))
+        phases = phases_of(self.f)
+        if phases is not None:
+            in_plane, aside = (phases @ self.curvature).real, (phases @ self.curvature_across).real
+            return np.asarray(np.hypot(self.mean_curvature + in_plane, aside).std(axis=0))
         return np.asarray(size_deviation(self.mean_curvature, self.covariance) * (1.0 + self.shape))
 
     @property
@@ -102,18 +109,34 @@ class LineResponse:
         return np.minimum(self.deviation(name) * np.sqrt(2.0 * np.log(cycles)), together)
 
     def damage(self, curve: str | Mapping[str, float | str] | Curve, strength: float, hours: float = HOURS) -> Floats:
-        """Fatigue damage (N,) of the tension by Dirlik's law, with a T-N curve over a strength (N).
+        """Fatigue damage (N,) of the tension, with a T-N curve over a strength (N): by Dirlik's law, but of few
 
-        ValueError: strength or hours are not above 0, or the curve is one of stress."""
+        frequencies, whose sum is no normal process, by the cycles that it has.  ValueError: strength or hours are not
+        above 0, or the curve is one of stress; ResultError: cycles cannot be counted without the package rainflow.
+        """
         found = curve_of(curve)
         _above_zero("strength", strength)
         _above_zero("hours", hours)
         if found.kind != "T-N":
             raise ValueError(f"a curve of kind {found.kind}: expected T-N, over the strength; stress is not known here")
+        if len(self.f) == 1:
+            return np.asarray(3600.0 * hours * self.f[0] / found.cycles(2.0 * np.abs(self.tension[0]) / strength))
+        if phases_of(self.f) is not None:
+            return self._counted(found, strength) * 3600.0 * hours * self.f[0] / COUNTED
         spectrum = self.spectrum("tension")
         scaled: Any = LineSpectrum(spectrum.f, spectrum.power / strength**2)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.nan_to_num(dirlik_damage(scaled, found, 3600.0 * hours))
+
+    def _counted(self, curve: Curve, strength: float) -> Floats:
+        """Damage (N,) in `COUNTED` of the longest periods."""
+        power = self.spectrum("tension").power
+        counts = self.f[(power > SMALL * power.sum(axis=0)).any(axis=1)]
+        if not counts.size:
+            return np.zeros(self.middle.size)
+        t = np.linspace(0.0, COUNTED / self.f[0], 1 + round(PER_PERIOD * COUNTED * counts[-1] / self.f[0]))
+        turned = np.exp(-2j * np.pi * np.outer(t, self.f))
+        return np.array([damage((turned @ x).real, curve, 1.0 / strength) for x in self.tension.T])
 
 
 @dataclass(frozen=True)

@@ -135,7 +135,7 @@ def _shape(x: LoadedLine, linear: LineResponse, part: Floats) -> Floats:
 
     A string bends against the load: by drag of the water that comes from inside the bend less.
     """
-    if len(linear.f) == 1 or not (x.cn.any() and linear.mean_curvature.any()):
+    if x.phases is not None or not (x.cn.any() and linear.mean_curvature.any()):
         return np.zeros(part.size)
     inwards = x.bend[2][:, 0]
     u = np.einsum("fni,ni->fn", x.relative(np.arange(x.omegas.size)), inwards)

@@ -37,7 +37,8 @@ from hybrid.scene.system import System
 
 # Rounds of the linear drag, and the relative change of its largest part at which they end.
 ROUNDS, SETTLED, RELAXED = 30, 2e-3, 0.8
-# Of many frequencies one in so many serves for the iteration, and at least so many do.
+# Of many frequencies one in so many serves for the iteration, and at least so many do: more than those of
+# hybrid.linear.drag, whose sum is no normal process.
 FEWER, LEAST_FREQUENCIES = 4, 12
 # Part by which a run in time may differ before that is told: short runs of a sea differ by as much.
 MOST_APART = 0.15

@@ -11,9 +11,10 @@ from typer.testing import CliRunner
 
 import hybrid
 from hybrid.cli.commands import app
-from hybrid.linear.drag import across, along, size_deviation
+from hybrid.linear.drag import across, along, of_few, phases_of, size_deviation
 from hybrid.linear.response_results import LineResponse, Response
 from hybrid.scene.combinations import RESPONSE_TO_MOTION
+from hybrid.statistics.fatigue import damage
 
 T_N = {"kind": "T-N", "log_a": 3.0, "m": 3.0}
 
@@ -52,6 +53,19 @@ def test_linear_drag_of_a_normal_velocity():
     # of the size of a vector: Rayleigh's, and that along the mean where this is large
     found = size_deviation(np.array([0.0, 50.0]), np.repeat(both, 2, axis=0))
     np.testing.assert_allclose(found, [math.sqrt(2.0 - math.pi / 2.0), 1.0], rtol=1e-3)
+
+
+@pytest.mark.parametrize("w", [[0.6, 0.97], [0.4, 0.8], [0.5, 0.71, 1.03]])
+def test_linear_drag_of_few_harmonics(w):
+    """What leaves least of |u| u in the mean square, of the sum in time: of two that drift apart, an octave, three."""
+    draw = np.random.default_rng(3)
+    x = draw.normal(size=(len(w), 1, 2)) + 1j * draw.normal(size=(len(w), 1, 2))
+    mean, t = np.array([[0.3, -0.1]]), 2000.0 * np.pi / 0.4 * (np.arange(200_000) + 0.5) / 200_000
+    moved = (np.exp(-1j * np.outer(t, w)) @ x[:, 0]).real
+    u = mean + moved
+    best = np.linalg.lstsq(moved, np.linalg.norm(u, axis=1)[:, None] * u, rcond=None)[0].T
+    np.testing.assert_allclose(of_few(mean, x, phases_of(np.array(w)))[0], best, rtol=0.01, atol=0.01 * best.max())
+    assert phases_of(np.linspace(0.3, 1.7, 11)) is None
 
 
 def test_bar_that_is_moved_at_its_end():
@@ -100,6 +114,40 @@ def test_a_moved_end_as_in_time():
     response, here, there = compare(hung(motion=motion), 150.0)
     np.testing.assert_allclose(here, there, rtol=5e-3)
     assert response.valid and response.rounds < 10
+
+
+def leg(waves):
+    """A leg of fibre rope, 0.6 % stretched, where drag is most of what damps it."""
+    rope = {"length": 133.7, "mass": 6.0, "diameter": 0.08, "axial_stiffness": 2e6, "bending_stiffness": 0.0}
+    tables = hung(waves, end=(100, 0, -5), torsional_stiffness=0.0, **rope)
+    tables["ends"]["start"]["position"] = [0, 0, -95]
+    return tables
+
+
+def test_one_component_is_one_wave():
+    """A spectrum of one component is the regular wave of its energy, with the fatigue of equal cycles."""
+    sea = STORM | {"significant_height": 2.0, "peak_period": 8.0, "components": 1}
+    one = hybrid.response(leg(sea)).lines["cable"]
+    wave = {"kind": "regular", "height": math.sqrt(2.0), "period": float(1.0 / one.f[0]), "direction": 30, "depth": 100}
+    same = hybrid.response(leg(wave)).lines["cable"]
+    for name in ("tension", "curvature"):
+        np.testing.assert_allclose(one.deviation(name), same.deviation(name), rtol=1e-5)
+    ranges = 2.0 * np.abs(one.tension[0]) / 1e4
+    np.testing.assert_allclose(one.damage(T_N, 1e4, hours=2.0), 7200.0 * one.f[0] * ranges**3 / 1e3, rtol=1e-12)
+    t = np.exp(-2j * np.pi * np.linspace(0.0, 1.0, 4001)[:-1])[:, None]
+    size = np.hypot(one.mean_curvature + (t * one.curvature[0]).real, (t * one.curvature_across[0]).real)
+    np.testing.assert_allclose(one.deviation("curvature")[1:-1], size.std(axis=0)[1:-1], rtol=2e-3)
+
+
+def test_few_components_as_in_time():
+    """Two components: drag and fatigue of their sum, which is no sea (by a normal law 7 % less tension)."""
+    tables = leg(STORM | {"significant_height": 2.0, "peak_period": 8.0, "components": 2})
+    response, here, there = compare(tables, 1200.0, step=0.15)
+    np.testing.assert_allclose(here, there, rtol=0.015)
+    line = response.lines["cable"]
+    x = (np.exp(-2j * np.pi * np.outer(np.arange(0.0, 7200.0, 0.1), line.f)) @ line.tension[:, 30]).real
+    assert line.damage(T_N, 1e4, hours=2.0)[30] == pytest.approx(float(damage(x, T_N, 1e-4)), rel=0.02)
+    assert response.valid_for("tension")
 
 
 def test_a_float_on_a_catenary_makes_a_kink_and_no_curvature():

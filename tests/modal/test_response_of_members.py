@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.linear.drag import of_harmonic
+from hybrid.linear.drag import of_few, phases_of
 from hybrid.linear.loaded_members import turning_doubts
 from tests.simulation.test_members import RHO, G, body, floating, scene
 
@@ -129,19 +129,20 @@ def test_modes_have_the_added_mass_of_the_wetted_length_at_rest():
 
 def test_drag_of_a_single_harmonic():
     """8/(3 pi) of an amplitude along one way, the radius of a circle, and the tangent in a fast current."""
+    one = phases_of(np.array([0.6]))
     ways = np.array([[0.7, 0.0], [0.7, 0.7j], [0.35 - 0.1j, 0.2j]])
-    forth, circle, _ = of_harmonic(np.zeros((3, 2)), ways)
+    forth, circle, _ = of_few(np.zeros((3, 2)), ways[None], one)
     assert forth[0, 0] == pytest.approx(8.0 / (3.0 * math.pi) * 0.7, rel=2e-4) and abs(forth[1, 0]) < 1e-12
     np.testing.assert_allclose(circle, 0.7 * np.eye(2), atol=1e-12)
     fast = np.array([3.0, 4.0]) / 5.0
-    near = of_harmonic(100.0 * fast[None], ways[2:])[0]
+    near = of_few(100.0 * fast[None], ways[2:][None], one)[0]
     np.testing.assert_allclose(near, 100.0 * (np.eye(2) + np.outer(fast, fast)), atol=2e-3)
     # what the law makes of an ellipse in a current is the first harmonic of |u| u
     mean, x = np.array([[0.2, -0.1]]), ways[2:]
     angle = np.linspace(0.0, 2.0 * math.pi, 4001)[:-1]
     u = mean + (x * np.exp(-1j * angle)[:, None]).real
     first = 2.0 * (np.linalg.norm(u, axis=1)[:, None] * u * np.exp(1j * angle)[:, None]).mean(axis=0)
-    np.testing.assert_allclose(of_harmonic(mean, x)[0] @ x[0], first, rtol=1e-4)
-    line = of_harmonic(np.array([[0.3]]), np.array([[0.5 + 0j]]))[0, 0, 0]
+    np.testing.assert_allclose(of_few(mean, x[None], one)[0] @ x[0], first, rtol=1e-4)
+    line = of_few(np.array([[0.3]]), np.array([[[0.5 + 0j]]]), one)[0, 0, 0]
     speed = 0.3 + 0.5 * np.cos(angle)
     assert line == pytest.approx(2.0 * (np.abs(speed) * speed * np.cos(angle)).mean() / 0.5, rel=1e-4)
