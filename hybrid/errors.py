@@ -176,6 +176,8 @@ OF_THE_RUN = frozenset({
 })  # fmt: skip
 # How an event "ignored" begins that is about what an end bends the line by.
 OF_AN_END = "moment and tangent at ends."
+# Of an event "kink at joint": bends are too sharp by it, and not too mild.
+KINK_COUNTS = "counts as a bend"
 # Of an event "out of plane": the motion is right, because it is one in space from there on.
 IN_SPACE = "it goes on in space"
 # Kind of the event of a run that another program had begun.

@@ -48,6 +48,7 @@ SHORTEST = 2  # cells that make a zone
 CHECKPOINTED = (
     "tolerance", "held", "ratios", "seen", "grown", "leaving", "haste", "calm_since", "calmed", "patience", "released",
     "going", "next_review", "total_twist", "past", "recent", "age", "recent_age", "largest", "fastest",
+    "kinked",
 )  # fmt: skip
 
 
@@ -129,6 +130,7 @@ class DomainManager:
         n = layout.rod.size
         self.cable, self.layout, self.dwell, self.given = cable, layout, dwell, given
         self.pace, self.held = pace or dwell, False
+        self.kinked = False  # whether it has been said that kinks of joints count as bends
         self.scale, self.user, self.free = scale, user, (given >= 0).astype(np.int8)
         places = layout.starts[-1] + 1
         self.zones = blank_zones(1, n)._replace(  # what the compiled run knows of them
@@ -379,6 +381,17 @@ class DomainManager:
         asks = spread(wanted(self.ratios, np.zeros(n, bool)), self.layout.base, rules.buffer)
         self._reset_ratios()
         return np.asarray(tidied(asks, asks, rules.shortest) & (self.given >= 0))
+
+    def joint_passed(self, change: Change) -> float | None:
+        """Place, m, of the first joint that a rod grows past by a change; None: no rod does."""
+        base, rod = self.layout.base, change.rod
+        for why in change.reasons:
+            if why.kind == "grow" or (why.kind == "retry" and not change.stiff[why.a : why.b].any()):
+                if why.a > 0 and rod[why.a - 1]:
+                    return float(base[why.a])
+                if why.b < rod.size and rod[why.b]:
+                    return float(base[why.b])
+        return None
 
     def force_rods(self, cells: np.ndarray, why: str) -> Change:
         """Rods at once, whatever the criteria: after a failed step."""

@@ -140,18 +140,28 @@ class Material:
         return self._of_tables(max, self.mean_initial_bending) + stuck
 
     @property
+    def kinks_count(self) -> str:
+        """What the line has by which kinks of joints count as bends (kernels.watch.soft_rods); "": nothing."""
+        if any(self.bends or ()):
+            return "tables of moment"
+        if any(self.layers):
+            return "layers that slip"
+        if self.kappa.any():
+            return "intrinsic curvature"
+        ratio = self.B[:, :2] / np.maximum(self.B[:, 2:], np.finfo(float).tiny)
+        same = self.B.all() and np.ptp(ratio) <= SAME_RATIO * ratio.max()
+        return "" if same else "sections, or a bend stiffener, that differ in bending over torsional stiffness"
+
+    @property
     def hinges(self) -> Floats:
         """(3, 2) of each end where the curvature of a rod fades to nothing: EI, N m2, and how far from the end on, m.
 
         EI 0 where an end bends the line, and where a catenary cannot know what a rod would do: bent without stress, or
-        differently in two directions.  Behind them EI/GJ of all sections; 0 where it is not one number, or where a
-        section is curved, has a table or layers.
+        differently in two directions.  Behind them EI/GJ of all sections; 0 where `kinks_count`.
         """
-        found, EI, ratio = np.zeros((3, 2)), self.mean_bending, np.zeros(1)
-        if self.B.all() and not (self.kappa.any() or any(self.bends or ()) or any(self.layers)):
-            ratio = self.B[:, :2] / self.B[:, 2:]
-        if np.ptp(ratio) <= SAME_RATIO * ratio.max():
-            found[2, 0] = ratio.mean()
+        found, EI = np.zeros((3, 2)), self.mean_bending
+        if not self.kinks_count:
+            found[2, 0] = (self.B[:, :2] / self.B[:, 2:]).mean()
         for k, (hinged, order) in enumerate(zip(self.hinged, (1, -1), strict=True)):
             if hinged and not self.kappa[-k, :2].any() and self.B[-k, 0] == self.B[-k, 1]:
                 same = np.flatnonzero(EI[::order] != EI[-k])

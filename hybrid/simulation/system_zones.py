@@ -418,7 +418,7 @@ class SystemZones:
         if x.paid is not None:
             x.paid.paying.fit(model, run.t)
         line.books.work[0, b.ZONES] += booked
-        note_change(line.events, x.switching.manager.layout.base, run.t, change, booked)
+        note_change(line.events, x.switching.manager, run.t, change, booked)
         models, states = [*run.model.models], [*run.state.lines]
         models[k], states[k] = model, state
         run.model, run.state = replace(run.model, models=tuple(models)), run.state._replace(lines=states)

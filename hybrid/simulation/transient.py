@@ -406,7 +406,7 @@ class Transient:
             if change is None:
                 code = cells.go(reviewed=True)
             elif booked is not None:
-                note_change(self.events, switching.manager.layout.base, self.t, change, booked)
+                note_change(self.events, switching.manager, self.t, change, booked)
                 code = cells.go()
             else:
                 self._reviewed = change
@@ -624,7 +624,7 @@ class Transient:
             if self.payout is not None:
                 self.payout.fit(model, self.t)
             run.books.work[0, b.ZONES] += booked
-        note_change(self.events, self.switching.manager.layout.base, self.t, change, booked)
+        note_change(self.events, self.switching.manager, self.t, change, booked)
         if cells is None and kinds is None:
             self.set_model(model, state)
             self.evaluate_forces()

@@ -153,7 +153,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
 def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
     """The zones of a checkpoint, of an older version too: that had no cells that follow, or one largest curvature, or
 
-    did not look at velocities.
+    did not look at velocities, or said nothing of kinks.
     """
     saved = {"following": None} | saved
     following, manager, largest = saved["following"], saved.get("manager"), np.zeros(QUANTITIES)
@@ -164,7 +164,7 @@ def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
     if isinstance(following, dict) and isinstance(following.get("calm"), np.ndarray):
         saved["following"] = {"waves": np.zeros(following["calm"].shape)} | following
     if isinstance(manager, dict):
-        saved["manager"] = {"largest": largest, "fastest": 0.0} | manager
+        saved["manager"] = {"largest": largest, "fastest": 0.0, "kinked": False} | manager
     return saved
 
 

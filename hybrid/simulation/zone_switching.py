@@ -11,7 +11,7 @@ import numpy as np
 from hybrid.adapt.manager import Change, DomainManager
 from hybrid.adapt.state_transfer import Clamp, transfer_to
 from hybrid.adapt.zone_rules import blank_review_job, quiet_review
-from hybrid.errors import Outcome
+from hybrid.errors import KINK_COUNTS, Outcome
 from hybrid.kernels.machine.binding import Table
 from hybrid.kernels.march.torque_transfer import carry_torque
 from hybrid.kernels.mesh import zone_step as z
@@ -64,14 +64,24 @@ def on_layout(model: Model, layout: Layout) -> Model:
     return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
 
 
-def note_change(events: EventLog, base: Floats, t: float, change: Change, booked: float) -> None:
-    """Events of a change of zones at t (s); base: (B+1,) m, nodes of the base mesh; booked: J, that it puts in."""
+def note_change(events: EventLog, manager: DomainManager, t: float, change: Change, booked: float) -> None:
+    """Events of a change of zones at t (s) that the manager has adopted; booked: J, that it puts in."""
+    base = manager.layout.base
     for k, why in enumerate(change.reasons):
         events.event(
             t, float(base[why.a]), float(base[why.b]), why.kind, why.text,
             criterion=why.criterion, value=why.value, threshold=why.threshold,
             energy=booked if k == 0 else 0.0,  # of all that change now
         )  # fmt: skip
+    cause = "" if manager.kinked else manager.cable.kinks_count
+    if cause and (at := manager.joint_passed(change)) is not None:
+        manager.kinked = True
+        text = (
+            f"at s = {at:.4g} m a rod has grown past its joint: while its stiffness comes in, the kink of the joint "
+            f"{KINK_COUNTS} there, and of every joint that is passed from now on, because the line has {cause}; the "
+            f"smallest bend radius may be a third of the true one; model: rod, or model.force_rod where the line bends"
+        )
+        events.event(t, float(base[0]), float(base[-1]), "kink at joint", text)
 
 
 class ZoneSwitching:

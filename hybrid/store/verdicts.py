@@ -5,20 +5,21 @@ is within, and an accuracy met, by values that are resolved, whose error is esti
 neglected.  What is not verified has its reason, and the one thing to do.
 
 A value beyond its limit breaks it whatever its error: cells that are too long, and bending that is neglected, make
-bends too mild.
+bends too mild.  Only the kink of a joint that counts as a bend makes them too sharp.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import EVENTS_BY_WEIGHT, IN_SPACE, OF_AN_END
+from hybrid.errors import EVENTS_BY_WEIGHT, IN_SPACE, KINK_COUNTS, OF_AN_END
 from hybrid.store.capacity import bound_with_errors
 from hybrid.store.code_checks import code_with_errors
 from hybrid.store.envelope import (
@@ -48,6 +49,7 @@ EVERY = frozenset({"position", "tension", "end_force", "curvature"})  # asked, b
 ALL: frozenset[str] = frozenset()
 NOTE = "do what its note says"
 SHORTER = "a shorter time.step"
+KINK_REMEDY = "a border of the zones elsewhere, or model: rod"
 SETTLED = "initial: {kind: equilibrium, friction: settled}"
 # Kinds of events that make values doubtful: which of them (ALL: every one), and what to do.
 Doubtful = Mapping[str, tuple[frozenset[str], str]]
@@ -68,7 +70,7 @@ DOUBTS: Doubtful = {
     "unresolved twist": (TORQUE, "more mesh.cells"),
     "unresolved bend": (BENDING, "cells as short as its note says"),
     "unresolved slack bend": (BENDING, "cells as short as its note says"),
-    "kink at joint": (BENDING, "a border of the zones elsewhere, or model: rod"),
+    "kink at joint": (BENDING, KINK_REMEDY),
     "unresolved change of section": (BENDING, "accuracy: {curvature: 5%}, with model: rod"),
     "deep in the seabed": (ALL, "check seabed.stiffness, in N/m per m"),
     "deep in an obstacle": (ALL, "a larger stiffness of the obstacle, or more cells"),
@@ -301,9 +303,11 @@ def _words(name: str) -> str:
 
 def _verified(result: Result, x: Judged) -> Judged:
     """A limit of the sections with its verdict."""
-    if x.broken:
-        return x._replace(verdict=BROKEN)
     name = next(name for name, limits in LIMITED.items() if x.limit in limits)
+    if x.broken:
+        if (doubt := _too_sharp(result, {name}, x.t)) is None:
+            return x._replace(verdict=BROKEN)
+        return x._replace(verdict=NOT_VERIFIED, broken=False, why=doubt.why, remedy=doubt.remedy, used=None)
     s, allowed = result.both_sides(x.limit) if f"right/{x.limit}" in result else (result.s, result[x.limit])
     held = s[np.isfinite(allowed)]
     # at a clamp or joint of the mesh that no output point shows, limits are those of the envelope
@@ -317,6 +321,13 @@ def _verified(result: Result, x: Judged) -> Judged:
     if doubt is None:
         return x._replace(verdict=WITHIN)
     return x._replace(verdict=NOT_VERIFIED, why=doubt.why, remedy=doubt.remedy, used=None)
+
+
+def _too_sharp(result: Result, names: AbstractSet[str], t: float) -> Doubt | None:
+    """That a kink of a joint, which is no bend, may be what takes quantities beyond their limit at t (s)."""
+    kinks = [event for event in result.events if event.kind == "kink at joint" and KINK_COUNTS in event.text]
+    counts = BENDING & names and any(event.t <= t for event in kinks)
+    return Doubt("kink at joint", KINK_REMEDY) if counts else None
 
 
 def _reached(result: Result, name: str, x: Judged) -> Doubt | None:
@@ -346,7 +357,9 @@ def _size(x: Judged, allowed: Floats | float, values: Floats | float, errors: Fl
 def _held(result: Result, x: Held) -> Held:
     """A limit of a quantity with its verdict."""
     if x.broken:
-        return x._replace(verdict=BROKEN)
+        if (doubt := _too_sharp(result, _names_of_held(result, x), x.t)) is None:
+            return x._replace(verdict=BROKEN)
+        return x._replace(verdict=NOT_VERIFIED, broken=False, why=doubt.why, remedy=doubt.remedy)
     doubt = unfinished(result) or _no_value(x) or _doubt_of_held(result, x)
     if doubt is None:
         return x._replace(verdict=WITHIN)
@@ -359,14 +372,18 @@ def _no_value(x: Held) -> Doubt | None:
     return None
 
 
-def _doubt_of_held(result: Result, x: Held) -> Doubt | None:
-    """Of a force at an end, an angle of it, or a clearance the error follows from those that are estimated."""
+def _names_of_held(result: Result, x: Held) -> frozenset[str]:
+    """The quantities that a quantity with a limit follows from."""
     name = {"N": "end_force", "deg": "end_force"}.get(x.unit, "position")
-    clearance = f"{x.name}_at" in result
     bends = {"curvature"} if x.limit != "code" or needs_moments(result) else set()  # a mooring line goes by tension
     along = {"Pa": {"von_mises", "tension", "curvature"}, "%": {"tension"} | bends}
-    names = frozenset(along.get(x.unit, {name}))
-    if (doubt := next(_doubts(result, names, np.zeros(0)), None)) is not None:
+    return frozenset(along.get(x.unit, {name}))
+
+
+def _doubt_of_held(result: Result, x: Held) -> Doubt | None:
+    """Of a force at an end, an angle of it, or a clearance the error follows from those that are estimated."""
+    clearance = f"{x.name}_at" in result
+    if (doubt := next(_doubts(result, _names_of_held(result, x), np.zeros(0)), None)) is not None:
         return doubt
     if x.by_outputs or x.bound is not None:
         most = "not known" if x.bound is None else f"known to be at most {x.bound:.4g} {x.unit} alone"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -113,6 +114,64 @@ def test_stepped_from_outside_and_as_a_system_it_is_the_same() -> None:
         np.testing.assert_array_equal(again[name][:], plain[name][:])
         np.testing.assert_allclose(plain[name][:], whole[name][:], rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(one[name][:], whole[name][:], rtol=1e-6, atol=1e-9)
+
+
+LEFT: dict[str, dict[str, Any]] = {
+    "tables of moment": {"moment_curvature": [[0, 0], [0.1, 1.0], [0.3, 2.4]], "bending_stiffness": None},
+    "intrinsic curvature": {"intrinsic_curvature": [0, 0.001, 0], "torsional_stiffness": 8.0},
+}
+
+
+def limited(radius: float, **section: Any) -> dict[str, Any]:
+    """A slack line of 240 cells whose zones move, with a smallest allowed bend radius, m."""
+    scene = slack(**LINES["60 m, level"], model=MOVES) | {"mesh": {"cells": 240}}
+    scene["cable"]["sections"][0] |= {"min_bend_radius": radius} | section
+    scene["time"]["duration"] = 4.0
+    return scene
+
+
+def kinks(result: hybrid.Result) -> list[Any]:
+    return [event for event in result.events if event.kind == "kink at joint"]
+
+
+@pytest.mark.parametrize("name", LEFT)
+def test_where_kinks_count_as_bends_an_event_says_so(name: str) -> None:
+    """Of one cable and of a line of a system, once, of all the line; no verdict on bends, beyond the limit or within it."""
+    broken, within = (limited(radius, **LEFT[name]) for radius in (8.0, 0.1))
+    lines = hybrid.run(cast(Any, as_system(within))).lines
+    for found, radius in ((hybrid.run(broken), 8.0), (lines["one"], 0.1)):
+        (said,) = kinks(found)
+        first = next(event for event in found.events if event.kind == "grow")
+        assert said.t == first.t > 0.0 and (said.s_a, said.s_b) == (0.0, 60.0)
+        assert name in said.text and "model: rod" in said.text
+        place = float(said.text.split()[3])
+        assert min(abs(place - first.s_a), abs(place - first.s_b)) < 0.01
+        (limit,) = found.verdicts().limits
+        assert limit.allowed == radius and (limit.value < radius) == (radius == 8.0)
+        assert limit.verdict == "not verified" and not limit.broken and limit.used is None
+        assert limit.why == "kink at joint" and "model: rod" in limit.remedy
+
+
+def test_what_no_kink_can_have_broken_is_broken() -> None:
+    """Of lines of one EI/GJ; and a limit that is broken before a rod grows stays so."""
+    early = limited(8.0, **LEFT["intrinsic curvature"])
+    early["ends"]["end"] |= {"kind": "clamped", "tangent": [0.2, 0, 1]}
+    found = hybrid.run(early)
+    (limit,) = found.verdicts().limits
+    assert limit.verdict == "broken" and limit.t < kinks(found)[0].t
+    found = hybrid.run(limited(12.0))
+    assert any(event.kind == "grow" for event in found.events) and not kinks(found)
+    (limit,) = found.verdicts().limits
+    assert limit.verdict == "broken" and limit.value > 10.0
+
+
+def test_a_run_that_is_resumed_says_it_once(tmp_path: Path) -> None:
+    scene = limited(8.0, **LEFT["tables of moment"])
+    whole = hybrid.run(scene)
+    hybrid.run(scene | {"time": scene["time"] | {"duration": 3.5}}, output=tmp_path / "part.h5")
+    resumed = hybrid.resume(tmp_path / "part.h5", until=4.0)
+    assert [(x.t, x.kind, x.text) for x in resumed.events] == [(x.t, x.kind, x.text) for x in whole.events]
+    assert len(kinks(resumed)) == 1 and sum(x.kind == "grow" and x.t > 3.5 for x in resumed.events) > 0
 
 
 MOMENT = {END: {"kind": "free", "force": [40, 3, 30], "moment": [0, 1, 0]}}

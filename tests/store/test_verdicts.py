@@ -287,6 +287,18 @@ def test_what_bends_where_no_radius_is_allowed_casts_no_doubt() -> None:
     assert there.why == f"{kind} at s = 100 m" and "force_rod" in there.remedy
 
 
+def test_a_kink_that_counts_as_a_bend_may_be_what_breaks_a_limit() -> None:
+    """Of 60 m that are allowed 50 are reached: too sharp by the kink of a joint, or of what else is doubtful broken."""
+    counts, plain = ((2.0, 0.0, 100.0, "kink at joint", text) for text in ("it counts as a bend", "it is so"))
+    (found,) = reported(allowed=60.0, errors=True, events=[counts]).verdicts().limits
+    assert found.verdict == "not verified" and found.why == "kink at joint" and "model: rod" in found.remedy
+    assert not found.broken and found.text == "bend radius of 50 m, 60 m allowed at least (min_bend_radius)"
+    later = (3.0, *counts[1:])  # than what is reached, at 2.5 s
+    for events in ([later], [plain], [(2.0, 0.0, 100.0, "unresolved bend", "it counts as a bend")], []):
+        (found,) = reported(allowed=60.0, errors=True, events=events).verdicts().limits
+        assert found.verdict == "broken" and found.broken
+
+
 def test_a_motion_that_goes_on_in_space_is_no_doubt() -> None:
     (found,) = judged(events=[(2.0, 50.0, 50.0, "out of plane", "a push has grown; it goes on in space")])
     assert found.verdict == "within"
