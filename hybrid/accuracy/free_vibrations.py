@@ -20,7 +20,7 @@ from scipy.sparse.linalg import splu
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE, WIDTH
 from hybrid.kernels.junctions.bodies import DAMPING, FRAME, V
-from hybrid.kernels.state.forces import BODIES, DRAG
+from hybrid.kernels.state.forces import BENDING_SLIP, BODIES, DRAG, SOIL
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.eigen import BELOW, lowest_modes
 from hybrid.linear.excitation import frequencies_of
@@ -172,7 +172,8 @@ def _is_steady(rest: Rest) -> bool:
         moves, ends = model.ends.moves(), model.ends
         towed = moves.velocity.any() and bool(model.line.bits & (DRAG | BODIES))  # the drag of the tow is not known
         let_go = np.isfinite([*ends.release_times, *ends.release_forces]).any()
-        if model.payout is not None or len(moves.loads) or let_go or towed:
+        loses = model.line.bits & (BENDING_SLIP | SOIL)  # as much as the size of the motion decides
+        if model.payout is not None or len(moves.loads) or let_go or towed or loses:
             return False
     return not any(x.loads or x.members is not None for x in rest.floats)
 

@@ -18,7 +18,7 @@ from hybrid.accuracy.api import resolution_at_rest
 from hybrid.designs.factors import Factors
 from hybrid.designs.gradients import Gradients
 from hybrid.designs.line_at_rest import LEFT_OUT, Beside, LineAtRest, Wanted
-from hybrid.designs.numbers import OfScene, is_allowed, with_number
+from hybrid.designs.numbers import OfScene, at_a_bound, is_allowed, with_number
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.algebra.block_elimination import SIZE
 from hybrid.kernels.state.state import Floats
@@ -122,7 +122,10 @@ class CableAtRest(OfScene):
             if scene is more and not same_places(model, self.model) and not is_allowed(more):
                 fix = "a number that others do not have to match, as lengths of zones have to"
                 raise SceneError([Complaint("by", key, "a number that may change by itself", fix)])
-            found.append(self.line.beside(scene, model))
+            try:
+                found.append(self.line.beside(scene, model))
+            except ValueError:
+                raise at_a_bound(key, number) from None
         return found[0], found[1]
 
 

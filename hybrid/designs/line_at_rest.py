@@ -16,8 +16,9 @@ from hybrid.kernels.march.zone_torque import TORQUE
 from hybrid.kernels.run.entry import assembly, workspace_of
 from hybrid.kernels.state.forces import FRICTION, PLANAR, WAVES
 from hybrid.kernels.state.report import MOMENT_A, NET_A
-from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, batch_of_one
+from hybrid.kernels.state.state import Batch, Ends, Floats, Line, Sea, State, batch_of_one, slip_size
 from hybrid.linear.matrices import ANCHOR, rotation
+from hybrid.linear.memory import settle_layers
 from hybrid.model.build import Model
 from hybrid.model.output_points import jump_points
 from hybrid.outputs.joined_lines import Output
@@ -172,7 +173,12 @@ class LineAtRest:
         return right.ravel(), work.report.copy()
 
     def beside(self, scene: Scene, model: Model, frames: Frames = NO_FRAMES) -> Beside:
-        """The line of another scene; what is around it is evaluated where it is not what is here."""
+        """The line of another scene; what is around it is evaluated where it is not what is here.
+
+        ValueError: it has layers that slip which this one does not have, or lacks some.
+        """
+        if slip_size(model.line) != slip_size(self.model.line):
+            raise ValueError("layers that slip")
         ends = self.here.ends if model.ends is self.model.ends and not frames else self._ends(model, frames)
         sea = self.here.sea if model.sea is self.model.sea else model.sea.at(np.inf)
         return Beside(scene, model, ends, sea)
@@ -239,6 +245,9 @@ class LineAtRest:
             here = ends if turns is None else ends._replace(frame=batch.frame[k].copy())
             assembly(self._line, self.here.sea, here, self._tried, 0.0, 0.0, self._work)
             batch.report[k] = self._work.report
+            if self._tried.layers.size:
+                settle_layers(self._line, here, self._tried, self._work)
+                batch.layers[k] = self._tried.layers
         found = self._of_states(batch)
         return self._slopes(found[::2], found[1::2], steps)
 
@@ -320,7 +329,9 @@ class LineAtRest:
         for k in self._free:
             position[k] = self.state.r[-k]
         ends = x.ends._replace(held=held, position=position)
-        return batch_of_one(0.0, ends, self.state, report, np.zeros(len(POWERS)), x.sea)
+        state = self.state._replace(layers=self.state.layers.copy())
+        settle_layers(x.model.line, ends, state, self._work)
+        return batch_of_one(0.0, ends, state, report, np.zeros(len(POWERS)), x.sea)
 
     def _results(self, values: Mapping[str, Floats], places: Sequence[tuple[Floats, Floats]]) -> Floats:
         """(n, W) of what is wanted, of values of n outputs; places: of each, arc lengths of values and of nodes, m."""
@@ -372,9 +383,9 @@ def _at_rest(line: Line) -> Line:
 
 
 def _without_rates(state: State) -> State:
-    """A copy at rest, as a line without zones that a torque passes through has it."""
+    """A copy at rest, as a line without zones that a torque passes through has it, on soil as it was first."""
     still = state.copy()
-    for rate in (still.v, still.a, still.vd, still.w, still.wa, still.wd, still.slip):
+    for rate in (still.v, still.a, still.vd, still.w, still.wa, still.wd, still.slip, still.soil):
         rate[:] = 0.0
     return still._replace(turn=still.turn[:0])
 

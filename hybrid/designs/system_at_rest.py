@@ -28,7 +28,6 @@ from hybrid.model.build import Model, places_of
 from hybrid.model.nearby import nearby, same_nodes
 from hybrid.model.nearby_clamped import nearby_clamped, seats_know_no_shape, shaped_anew
 from hybrid.model.system import SystemModel, SystemResolution
-from hybrid.scene.base import Invalid
 from hybrid.scene.bodies import FreeBody, RigidBody
 from hybrid.scene.combinations import refuse_use
 from hybrid.scene.points import Fairlead
@@ -231,7 +230,7 @@ class SystemAtRest(OfScene):
                 refuse_use(scene, "derivatives", given=key)  # what it switches on
             try:
                 changed = self._changed(scene, key)
-            except Invalid:
+            except ValueError:
                 raise at_a_bound(key, number) from None
             both = zip(self._names, changed.lines, self.lines, strict=True)
             others = [name for name, x, line in both if not same_places(x.model, line.model)]

@@ -30,6 +30,7 @@ from hybrid.kernels.state.forces import AXIAL_LAW, FRICTION, PLANAR, ROTARY, WAV
 from hybrid.kernels.state.report import MOMENT_A
 from hybrid.kernels.state.state import NO_ADDRESS, Ends, Floats, Line, Sea, State, no_torsion
 from hybrid.kernels.step.step import friction_axes
+from hybrid.linear.memory import by_layers, with_layers, with_soil
 from hybrid.solve.joined import JoinedLine, SystemState
 from hybrid.solve.stability import ANCHOR as STATIC_ANCHOR
 from hybrid.solve.system import SystemSolver
@@ -140,9 +141,11 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: boo
     """A line about an equilibrium, with ends that are joined as if they were free: the network holds them.
 
     sticks: whether friction holds it elastically where it lies on the bed, as before it slides; else there is none.
-    quick: whether ropes are as stiff as they are to quick motions, else as to what is slow.
+    quick: whether ropes, layers that slip and soil are as stiff as they are to small motions, else as to what is slow
+    and loads them first.
     """
     line, count = in_space(x.line, state, sticks, quick), x.line.s.size
+    state = with_soil(line, x.sea, state, turns=quick)
     if line.bits & FRICTION:
         friction_axes(x.sea, state.r, state.e, np.zeros_like(state.slip), state.grip)
     held, joined = x.ends.held.copy(), [x.joints[k] >= 0 for k in (0, 1)]
@@ -166,6 +169,8 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: boo
         K = K + _through_zones(line)
     if line.tension_twist.size:
         K = _by_length(K)
+    if line.slip_law.size:
+        K = K + by_layers(line, state, quick, lambda other: _left(other, x, ends, state))
     free = np.ones((count, SIZE), bool)
     free[0, 0], free[-1, 4] = False, False
     free[:-1, 4] = line.spin != 0
@@ -202,6 +207,7 @@ def in_space(line: Line, state: State, sticks: bool, quick: bool = True) -> Line
         dynamic = line.law[:, DYNAMIC] + line.law[:, PER_TENSION] * np.maximum(state.T, 0.0)
         ck = np.where(line.law[:, DYNAMIC] > 0.0, 1.0 / np.maximum(dynamic, 1e-300), ck)
     off = PLANAR | WAVES | (0 if sticks else FRICTION)
+    line = with_layers(line, state, sticks=quick)
     if quick:
         return line._replace(bits=line.bits & ~(off | AXIAL_LAW), law_at=NO_ADDRESS, ck=ck)
     return line._replace(bits=line.bits & ~off, ck=ck.copy(), law=line.law.copy())  # the law writes both
@@ -210,6 +216,13 @@ def in_space(line: Line, state: State, sticks: bool, quick: bool = True) -> Line
 def rows_at_rest(line: Line, x: JoinedLine, ends: Ends, state: State, c: tuple[float, float], rows: Floats) -> Floats:
     """Fill the block rows of a state at rest with c_v (1/s) and c_a (1/s^2), in the sea of x; its report."""
     return RestMarch(line, ends, state, rows)(x.sea, c)
+
+
+def _left(line: Line, x: JoinedLine, ends: Ends, state: State) -> Floats:
+    """(N+1, 5) what is left over of the equations of a state at rest, in the signs of `sparse_rows`."""
+    rows = np.zeros((line.s.size, SIZE * WIDTH))
+    rows_at_rest(line, x, ends, state, (0.0, ANCHOR), rows)
+    return rows.reshape(-1, SIZE, WIDTH)[:, :, -1].copy()
 
 
 class RestMarch:

@@ -11,10 +11,14 @@ from scipy.special import ndtr
 from hybrid.kernels.laws.axial_law import DYNAMIC, STRAIN, TENSION
 from hybrid.kernels.laws.bed import planes_under
 from hybrid.kernels.laws.bending_law import MOMENT
+from hybrid.kernels.laws.bending_slip import EACH, PER_TENSION, STIFF
+from hybrid.kernels.laws.bending_slip import MOMENT as SLIPS_AT
 from hybrid.kernels.laws.obstacles import distances, thinner_nodes
-from hybrid.kernels.state.forces import OBSTACLES, SEABED
+from hybrid.kernels.laws.soil import DEPTH, PRESSES, STEEP, SUCTION
+from hybrid.kernels.state.forces import OBSTACLES, SEABED, SOIL
 from hybrid.kernels.state.state import Floats
 from hybrid.linear.loaded_line import LoadedLine
+from hybrid.linear.memory import pulls
 from hybrid.linear.response_results import ADDED, OF_LARGEST, LineResponse
 
 # Parts of the motion beyond which the line is not linear: share of time that it would be slack; turn of a chord, rad;
@@ -32,7 +36,7 @@ MOST_ADDED, SHAPE = ADDED | {"curvature": 0.1}, 0.1
 
 def doubts_of(x: LoadedLine, found: LineResponse) -> Iterator[str]:
     """Each place where the motion of a line is not small, in words."""
-    for doubt in (_slack, _swing, _kinks, _touchdown, _on_obstacles, _left_out, _shape):
+    for doubt in (_slack, _swing, _kinks, _layers, _soil, _touchdown, _on_obstacles, _left_out, _shape):
         yield from doubt(x, found)
 
 
@@ -92,6 +96,43 @@ def _kinks(x: LoadedLine, found: LineResponse) -> Iterator[str]:
                     f"{deviation[i]:.3g} {unit}, passes over a point of its table, where the stiffness changes"
                 )
                 break
+
+
+def _layers(x: LoadedLine, found: LineResponse) -> Iterator[str]:
+    """Where layers slip that a response has sticking, within two deviations."""
+    line, deviation, T = x.line, found.deviation("curvature"), pulls(found.mean_tension)
+    for j in range(0, line.slip_law.shape[1] if line.slip_law.size else 0, EACH):
+        law = line.slip_law[:, j : j + EACH]
+        K = line.slip_now[:, j + STIFF]
+        most = law[:, SLIPS_AT] + law[:, PER_TENSION] * T
+        over = np.where(K > 0.0, 2.0 * deviation * K - most, -1.0)
+        k = int(over.argmax())
+        if over[k] > 0.0:
+            yield (
+                f"curvature at s = {found.s[k]:.4g} m has a standard deviation of {deviation[k]:.3g} 1/m: layers slip "
+                f"beyond {most[k] / K[k]:.3g} 1/m to either side, and the line is softer than this response has it"
+            )
+            return
+
+
+def _soil(x: LoadedLine, found: LineResponse) -> Iterator[str]:
+    """Where soil is softer than to small motions, between turning points of two deviations."""
+    if not x.line.bits & SOIL:
+        return
+    normals, _ = planes_under(x.sea, found.mean_position)
+    way = np.einsum("fni,ni->fn", found.position, normals)
+    soil, width, remembered = x.sea.soil, x.line.bed_width, x.linear.state.soil
+    for k in np.flatnonzero(remembered[:, DEPTH] > 0.0):
+        borne, steep = remembered[k, PRESSES], soil[STEEP] / width[k]
+        ultimate = borne * (1.0 + 1.0 / (remembered[k, DEPTH] * steep))
+        least = min(borne + soil[SUCTION] * ultimate, ultimate - borne)
+        range_ = 4.0 * math.sqrt(0.5 * float((np.abs(way[:, k]) ** 2).sum())) * ultimate * steep
+        if range_ > KINK * least:
+            yield (
+                f"at s = {found.s[k]:.4g} m the line moves so far in the soil that its stiffness falls by "
+                f"{100.0 * range_ / (range_ + least):.2g} %: tension and curvature near the touchdown are doubtful"
+            )
+            return
 
 
 def _touchdown(x: LoadedLine, found: LineResponse) -> Iterator[str]:

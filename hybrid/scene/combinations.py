@@ -484,15 +484,7 @@ REFUSALS: tuple[Refusal, ...] = (
         NO_WIDTH, SOIL, "physics", "the cable lies in soil with its width ({key})", "a number > 0, in m",
         "add `diameter: ...` (m)",
     ),
-    Refusal(
-        SOIL, ABOUT_REST, "not worked out", "the stiffness of soil depends on how far the line moves, and which way",
-        fix="give stiffness, that of unloading at this depth; hybrid run computes it in time",
-    ),
     Refusal(SLIP, PAYOUT, "not worked out", "layers that slip, and stiffness by tension, do not go with {key}"),
-    Refusal(
-        SLIP, ABOUT_REST, "not worked out", "the stiffness depends on how far the line moves, or on its tension",
-        fix="leave it out, and give the bending_stiffness at that amplitude; hybrid run computes it in time",
-    ),
     Refusal(
         SPRING_BESIDE_SLIP, SLIP, "not worked out",
         "the section there has layers that slip, or is stiffer under tension ({key})",

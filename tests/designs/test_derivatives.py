@@ -445,6 +445,24 @@ def test_where_a_line_lies(where):
     differ(hybrid.validate_scene(tables), ["tension@0", "tension@20.3", "position.z@31.7"], keys)
 
 
+def test_what_remembers_is_loaded_first_in_every_equilibrium():
+    """Layers that have slipped, with moments by tension, and soil that has been pressed on: also results of moments."""
+    section = {"length": 10.0, "mass": 4.0, "diameter": 0.05, "axial_stiffness": 1e6, "bending_stiffness": 200.0,
+               "torsional_stiffness": 100.0, "stiffness_per_tension": 0.3,
+               "bending_slip": [{"stiffness": 300.0, "moment": 5.0, "per_tension": 0.02}]}  # fmt: skip
+    start = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}
+    keys = [f"cable.sections[0].{x}" for x in ("mass", "bending_slip[0].moment", "stiffness_per_tension")]
+    keys += ["ends.end.position[2]"]
+    of = ["tension@end", "position.z@4.1", "bending_moment@0", "bending_moment@0.6", "max curvature"]
+    differ(hybrid.validate_scene(scene(section, start, pinned(9, 0, 1), "rod", 40)), of, keys)
+    soil = SEA | {
+        "seabed": {"z": -100, "soil": {"shear_strength": 500, "gradient": 900, "bearing": 6.0, "power": 0.25}}
+    }
+    made = hybrid.validate_scene(scene(LINE, pinned(0, 0, -100), pinned(205, 0, 0), "rod", 100, soil))
+    keys = ["environment.seabed.z", "environment.seabed.soil.power", "cable.sections[0].mass"]
+    differ(made, ["tension@250", "position.z@125", "max curvature", "reaction_end.x"], keys)
+
+
 def differ(made, of, keys):
     """Derivatives are those of differences of equilibria on the same cells."""
     wanted = [parse_result(x, made.length) for x in of]

@@ -46,6 +46,12 @@ SCENES = {
     "tension by a table": lambda: scene(
         tension_strain=[[0, 0], [0.01, 2e4], [0.03, 2e5]], without=["axial_stiffness"]
     ),
+    "layers that slip, stiffer under tension": lambda: scene(
+        bending_slip=[{"stiffness": 800, "moment": 2, "per_tension": 1e-3}, {"stiffness": 300, "moment": 40}],
+        stiffness_per_tension=0.05, damping={"stiffness": 0.01},
+    ),
+    "in soil": lambda: scene(more={"environment": {
+        "fluid": {"density": 1025}, "seabed": {"z": -13, "soil": {"shear_strength": 100, "gradient": 500}}}}),
     "at the surface, in a sheared current": lambda: scene(
         3.0, [FLOAT], current={"kind": "profile", "table": SHEARED}
     ),
