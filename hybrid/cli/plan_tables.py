@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybrid.cli.progress_line import span
 from hybrid.kernels.state.forces import FORCES
+from hybrid.model.lines_contact import OTHERS
 from hybrid.model.self_reach import WHERE_NEAR
 from hybrid.store.hockling import kink_torque
 
@@ -83,7 +84,7 @@ def system_plan_lines(system: System, plan: SystemPlan) -> list[str]:
         "bodies": ", ".join(f"{name} ({body.kind})" for name, body in system.bodies.items()),
         "mesh": f"{_count(plan.cells, 'cell')}, {plan.unknowns} unknowns",
         "forces": _forces(on),
-        "contact": "; ".join(x for x in (_of_lines(system), _contact(on)) if x),
+        "contact": "; ".join(x for x in (_of_lines(system, on), _contact(on)) if x),
         "time": _steps(system.time, plan),
         "runs": _runs(max(every, key=lambda x: x.most_runs)),
         "accuracy": _accuracy(on),
@@ -125,7 +126,7 @@ def _contact(on: Mapping[str, str]) -> str:
     return f"of the line with itself, {why}" if why.startswith(WHERE_NEAR) else ""
 
 
-def _of_lines(system: System) -> str:
+def _of_lines(system: System, on: Mapping[str, str]) -> str:
     """Which lines touch each other, and what else they touch."""
     pairs, found = [f"{a} with {b}" for a, b in system.touching_pairs], []
     if pairs:
@@ -136,6 +137,8 @@ def _of_lines(system: System) -> str:
             f", friction {system.contact.friction:g}" if system.contact is not None and system.contact.friction else ""
         )
         found.append(f"of lines with each other{rubs}: {named}")
+    elif OTHERS in on:
+        found.append(f"of lines with each other, {on[OTHERS]}")
     elif len(system.lines) > 1:
         found.append("lines pass through each other, and an event says where: contact: {} keeps them apart")
     shapes = [name for name, body in system.free_bodies.items() if body.shape is not None]

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.state.forces import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state.forces import MAY_MEET, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Floats, Line
-from hybrid.model.self_reach import self_reach
+from hybrid.model.self_reach import payouts, self_reach
 from hybrid.scene.bodies import FreeBody
 from hybrid.scene.points import Fairlead, FreePoint
 from hybrid.scene.schema import Scene
@@ -36,6 +36,11 @@ class Touching:
         mine = self.lines.index(number)
         return tuple(k for j, k in enumerate(self.lines) if j != mine and self.meets[mine, j])
 
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        """Numbers of lines that may touch each other, two each, in order."""
+        return [(self.lines[j], self.lines[k]) for j, k in np.argwhere(np.triu(self.meets, 1)).tolist()]
+
     def bits(self, line: Line) -> Line:
         """The line with the bits of one that is in contact from the start."""
         more = SELF_CONTACT | (SELF_FRICTION if self.friction.any() else 0)
@@ -47,21 +52,55 @@ def touching_of(system: System, scenes: Mapping[str, Scene]) -> Touching | None:
 
     scenes: of the lines by name.  What is held, or moved, is one thing: ends there are beside each other.
     """
-    if system.contact is None:
+    names = list(system.lines)
+    return touching_among(system, scenes, [(names.index(a), names.index(b)) for a, b in system.touching_pairs])
+
+
+def touching_among(
+    system: System, scenes: Mapping[str, Scene], pairs: Iterable[tuple[int, int]]
+) -> Touching | None:
+    """Lines of which these pairs, by number, touch each other; scenes: of the lines by name; None: there is no pair."""
+    names, pairs = list(system.lines), [*pairs]
+    lines = sorted({k for pair in pairs for k in pair})
+    if not lines:
         return None
-    names, pairs = list(system.lines), system.touching_pairs
-    lines = [k for k, name in enumerate(names) if any(name in pair for pair in pairs)]
-    place = {names[k]: j for j, k in enumerate(lines)}
+    place = {k: j for j, k in enumerate(lines)}
     meets, friction = np.zeros((len(lines), len(lines)), np.int64), np.zeros((len(lines), len(lines)))
     for a, b in pairs:
         for j, k in ((place[a], place[b]), (place[b], place[a])):
-            meets[j, k], friction[j, k] = 1, system.contact.friction
+            meets[j, k], friction[j, k] = 1, system.contact.friction if system.contact is not None else 0.0
     for j, k in enumerate(lines):
         line, scene = system.lines[names[k]], scenes[names[k]]
         reach = self_reach(scene)
         if reach.asked or reach.may:
             meets[j, j], friction[j, j] = 1, line.contact.friction
     return Touching(tuple(lines), meets, friction, joined_ends_of(system)[lines])
+
+
+# Of the contents of a line that may come to touch others.
+OTHERS, WHERE_NEAR = "contact with other lines", "from where they come near each other"
+
+
+def beside_others(line: Line) -> Line:
+    """The line with the bit of one that may come to touch others."""
+    return line._replace(bits=line.bits | MAY_MEET)
+
+
+def that_may_meet(system: System, scenes: Mapping[str, Scene]) -> tuple[int, ...]:
+    """Numbers of the lines that touch each other from where they come near, because a scene says nothing of contact.
+
+    scenes: of the lines by name.  They have diameters, steps are given, and no error is estimated (scene.combinations).
+    """
+    time = system.time
+    if system.contact is not None or system.dimension == 2 or time is None or not (time.step or time.tolerance):
+        return ()
+    found = tuple(k for k, name in enumerate(system.lines) if _may_meet(scenes[name]))
+    return found if len(found) > 1 else ()
+
+
+def _may_meet(scene: Scene) -> bool:
+    sections = [*scene.cable.sections, *(x for paid in payouts(scene) for x in paid.reel or ())]
+    return scene.accuracy is None and not scene.output.errors and all(x.diameter is not None for x in sections)
 
 
 def joined_ends_of(system: System) -> NDArray[np.int64]:

@@ -30,7 +30,7 @@ from hybrid.model.contents import IDLE, Entry, obstacle_entries
 from hybrid.model.ends import EndLoad
 from hybrid.model.first_state import first_state
 from hybrid.model.initial_shape import dead_loads, hung
-from hybrid.model.lines_contact import Touching, touching_of
+from hybrid.model.lines_contact import OTHERS, WHERE_NEAR, Touching, beside_others, that_may_meet, touching_of
 from hybrid.model.obstacles import obstacle_rows, pull_on_obstacles
 from hybrid.model.payout_law import said_of_line
 from hybrid.model.resolution import Resolution, first_resolution
@@ -93,6 +93,7 @@ class SystemModel:
     moments: tuple[tuple[EndLoad, ...], ...]  # that are given to each of the points in `rigid`
     turns: tuple[tuple[float, float], ...]  # by which the start and the end of each line are twisted
     touching: Touching | None = None  # which lines touch each other
+    may_meet: tuple[int, ...] = ()  # numbers of those that do from where they come near each other
     loose: frozenset[tuple[int, int]] = frozenset()  # ends (line, 0 or 1) that have left their points
     # (M,) number of the body that carries an obstacle, -1: none does; empty: no body has a shape
     rides: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
@@ -196,6 +197,8 @@ def build_system(
     touching = touching_of(system, maker.scenes)
     if touching is not None:
         models = _with_contact(system, models, touching)
+    may_meet = that_may_meet(system, maker.scenes)
+    models = [_beside_others(x) if k in may_meet else x for k, x in enumerate(models)]
     if _takes_current(system, models):
         models = [replace(x, contents=tuple(e for e in x.contents if e.what != IDLE)) for x in models]
     if system.dimension == 2:
@@ -210,7 +213,7 @@ def build_system(
         tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends), places, made, maker.bodies,
         np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
         maker.seats, known, maker.scenes, resolution, tuple(loads_of(system.moments_on(x)) for x in system.rigid),
-        tuple(_turns_of(x.connections) for x in system.lines.values()), touching, rides=rides,
+        tuple(_turns_of(x.connections) for x in system.lines.values()), touching, may_meet, rides=rides,
     )  # fmt: skip
 
 
@@ -314,6 +317,12 @@ def _with_contact(system: System, models: Sequence[Model], touching: Touching) -
         x = found[k]
         found[k] = replace(x, line=touching.bits(x.line), contents=(*x.contents, entry))
     return found
+
+
+def _beside_others(model: Model) -> Model:
+    """The model of a line that touches others from where it comes near them."""
+    entry = Entry(OTHERS, True, f"{WHERE_NEAR}; contact: {{between: []}} switches it off")
+    return replace(model, line=beside_others(model.line), contents=(*model.contents, entry))
 
 
 def _takes_current(system: System, models: Sequence[Model]) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 
 from hybrid.kernels.laws.axial_law import CREEP
 from hybrid.kernels.march.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twist
-from hybrid.kernels.state.forces import MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
+from hybrid.kernels.state.forces import MAY_MEET, MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Batch, Floats, Line, Sea, remembers
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import NEAR
@@ -243,7 +243,7 @@ class Observer:
         has |= {"link"} if holds_twist(line) and not line.bits & PLANAR else set()
         has |= {"payout"} if payout else set()
         has |= {"obstacles"} if line.bits & OBSTACLES else set()
-        has |= {"self_contact"} if line.bits & (SELF_CONTACT | MAY_TOUCH * with_work) else set()
+        has |= {"self_contact"} if line.bits & (SELF_CONTACT | (MAY_TOUCH | MAY_MEET) * with_work) else set()
         self._probes = {
             name: p
             for name, p in PROBES.items()

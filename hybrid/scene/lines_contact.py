@@ -11,12 +11,14 @@ from hybrid.scene.points import Name
 
 
 class LinesContact(Table):
-    """Lines that touch each other in a run and at rest: they keep a diameter apart, the mean of theirs."""
+    """Lines that touch each other in a run and at rest: they keep a diameter apart, the mean of theirs.
+
+    Where a scene does not speak of it they touch in runs by given steps, from where they come near each other.
+    """
 
     between: tuple[Annotated[tuple[Name, Name], Field(description="names of two lines")], ...] | None = Field(
         default=None,
-        min_length=1,
-        description="pairs of lines that touch each other; absent: all of them",
+        description="pairs of lines that touch each other; absent: all of them; empty: none",
     )
     friction: NonNegative = Field(
         default=0.0, description="coefficient of friction (Coulomb) between lines that touch each other [-]"

@@ -17,7 +17,7 @@ from hybrid.errors import LIMIT_EVENTS
 from hybrid.kernels.contact.self_distance import OF_0_6, blank_itself
 from hybrid.kernels.state import books as b
 from hybrid.kernels.state.books import Books
-from hybrid.kernels.state.forces import MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
+from hybrid.kernels.state.forces import MAY_MEET, MAY_TOUCH, OBSTACLES, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state.state import Floats
 from hybrid.kernels.watch.carried_extremes import pass_on
 from hybrid.kernels.watch.extremes import fold_extremes
@@ -115,7 +115,8 @@ class Envelope:
         has = {"", *({"rod"} if layout is not None else {zone.kind for zone in model.zones})}
         has |= ({"seabed"} if model.line.bits & SEABED else set()) | ({"time"} if moves else set())
         has |= {"obstacles"} if model.line.bits & OBSTACLES else set()
-        touching = SELF_CONTACT | (MAY_TOUCH if moves else 0)
+        later = MAY_TOUCH | MAY_MEET if moves else 0
+        touching = SELF_CONTACT | later
         has |= {"self_contact"} if touches or model.line.bits & touching else set()
         has |= {"torsion"} if "rod" in has or (model.line.torsion.size and not model.line.bits & PLANAR) else set()
         pipes = Pipes(scene) if moves and any(x.pipe for x in scene.cable.sections) else None
@@ -133,7 +134,7 @@ class Envelope:
         if pipes is not None:
             self._stress = pipes.largest_allowed(beside, True)
         self._grows = model.payout is not None
-        if moves and model.line.bits & MAY_TOUCH and not model.line.bits & SELF_CONTACT:
+        if model.line.bits & later and not model.line.bits & SELF_CONTACT:
             self.bounds[:, b.SELF_PRESSURE] = 0.0  # there is no contact before it is computed
         self.itself = SelfWatch(model, no_contact(scene)) if moves else SelfWatch(model)
         asked = scene.output.quantities if moves else {}

@@ -1,7 +1,8 @@
-"""Lines of a system that overlap, their centrelines nearer than the mean of their diameters, without contact."""
+"""Lines of a system between which no contact is computed: whether they overlap, or come near, where contact begins."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -9,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.junctions.lines_distance import (
+    ASKS,
     AT,
     HAVE_MET,
+    MET,
     MOVED,
+    NEAR,
     OTHER,
     ROOM,
     TIME,
@@ -38,11 +42,16 @@ def watched_pairs(system: System, model: SystemModel) -> list[tuple[int, int]]:
 
 
 class LinesWatch:
-    """What looks after every step whether two of such lines have met."""
+    """What looks after every step whether two of such lines have met, or are near."""
 
-    def __init__(self, system: System, model: SystemModel, met: set[tuple[int, int]], clock: Floats) -> None:
-        """met: lines of which it is known; clock: of the run."""
-        self._pairs = np.array([(*x, x in met) for x in watched_pairs(system, model)], np.int64).reshape(-1, WATCHED)
+    def __init__(
+        self, system: System, model: SystemModel, met: set[tuple[int, int]], clock: Floats,
+        alone: Collection[tuple[int, int]] = (),
+    ) -> None:  # fmt: skip
+        """met: lines of which it is known; clock: of the run; alone: lines that may meet, but are let pass."""
+        may = set(combinations(model.may_meet, 2)) - set(alone)
+        rows = [(*x, MET * (x in met), x in may, 0) for x in watched_pairs(system, model)]
+        self._pairs = np.array(rows, np.int64).reshape(-1, WATCHED)
         self._room = np.zeros((len(self._pairs), ROOM))
         width = [diameters(x) for x in model.models]
         begins = np.concatenate([[0], np.cumsum([x.size for x in width])[:-1]]).astype(np.int64)
@@ -55,7 +64,7 @@ class LinesWatch:
     @property
     def is_needed(self) -> bool:
         """Whether there is anything that may still meet."""
-        return bool(len(self._pairs)) and not self._pairs[:, HAVE_MET].all()
+        return bool((self._pairs[:, HAVE_MET] != MET).any())
 
     def attach(self, tables: NDArray[np.int64]) -> tuple[np.ndarray, np.ndarray, int]:
         """Tables for both parities and the address of the kernel; tables: (2, L, ..) jobs of the lines."""
@@ -78,8 +87,16 @@ class LinesWatch:
         """Lines that have met, two each: numbers, when (s), and at which arc lengths (m)."""
         return [
             (int(a), int(b), float(row[TIME]), float(row[AT]), float(row[OTHER]))
-            for (a, b, has), row in zip(self._pairs, self._room, strict=True)
-            if has
+            for (a, b, has, *_), row in zip(self._pairs, self._room, strict=True)
+            if has == MET
+        ]
+
+    def near(self) -> list[tuple[int, int, float, float]]:
+        """Lines that are near each other, and contact begins, two each: numbers, and at which arc lengths (m)."""
+        return [
+            (int(a), int(b), float(row[AT]), float(row[OTHER]))
+            for (a, b, has, *_), row in zip(self._pairs, self._room, strict=True)
+            if has == NEAR
         ]
 
 

@@ -1,4 +1,4 @@
-"""Forces between lines that touch each other, at the outputs of a system: which pairs there are, and their values."""
+"""Forces between lines that touch each other, at the outputs of a system: which pairs are named, and their values."""
 
 from __future__ import annotations
 
@@ -42,8 +42,11 @@ def values_of_pairs(model: SystemModel, shared: SharedContact | None, states: Se
 
 
 def _pairs(model: SystemModel) -> dict[tuple[int, int], tuple[int, int]]:
-    """Numbers of two lines, or of one twice, by their places among the lines that touch others, first <= second."""
-    if model.touching is None:
+    """Numbers of two lines, or of one twice, by their places among the lines that touch others, first <= second.
+
+    None, where nobody asks for their contact: which lines will meet is not known when a file is begun.
+    """
+    if model.touching is None or model.may_meet:
         return {}
     lines = model.touching.lines
     each = zip(*np.nonzero(np.triu(model.touching.meets)), strict=True)

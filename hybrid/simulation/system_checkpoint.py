@@ -16,6 +16,7 @@ from hybrid.model.system import SystemResolution
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.obstacles import files_of as obstacle_files
 from hybrid.scene.system import System
+from hybrid.simulation.lines_contact_start import touch_each_other
 from hybrid.simulation.restore import program, refused, resolution_from, resolution_tree
 from hybrid.simulation.system_contact import let_touch
 from hybrid.simulation.transient_checkpoint import FIRST_REPORT, FIRST_WORKS, zoning_of_today
@@ -45,6 +46,7 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
         "quantities": run.quantities.checkpoint(), "rotations": run.rotations.last.copy(),
         "zones": run.zones.checkpoint() if run.zones is not None else {},
         "passed": sorted(list(x) for x in run.passed), "met": sorted(list(x) for x in run.met),
+        "let_pass": sorted(list(x) for x in run.let_pass), "between": _begun(run),
         **({} if run.payout is None else {"payout": run.payout.checkpoint()}),
         **({} if run.shared is None else {"contact": run.shared.checkpoint(run.t)}),
     }  # fmt: skip
@@ -58,7 +60,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         run.failures.again(saved["broken"])
     # It took members as at the first guess, and rotations were within half a turn of 0.
     older: dict[str, Any] = {"broken": [], "rest": run.rest, "control": [], "zones": {}, "changes": 0}
-    older |= {"rotations": run.rotations.last, "passed": [], "met": []}
+    older |= {"rotations": run.rotations.last, "passed": [], "met": [], "let_pass": [], "between": []}
     older["rho"] = run.system.require_time().rho_inf
     complete = "interval" in saved  # else steps ended at outputs
     older |= {"interval": 0.0, "worked": run.loop.worked[1, :, :SPRING]}
@@ -66,14 +68,17 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     saved["zones"] = zones_of_today(saved["zones"])
     near = [x.number for x in run.lines if "self_contact" in _of(saved, x.name) and not x.touches]
     let_touch(run, near)
+    between = _pairs(saved["between"])
+    if between:
+        touch_each_other(run, between)
     if run.zones is not None:
         run.zones.take_rods(saved["zones"])
     if run.payout is not None:
         run.payout.restore(saved["payout"])
-    if run.zones is not None or run.payout is not None or near:
+    if run.zones is not None or run.payout is not None or near or between:
         run.make_solver()
     template = checkpoint(run) | {"dry": None, "overlaps": None, "under": None, "broken": None, "control": None}
-    template |= {name: None for name in ("contact", "met", "passed", "payout") if name in template}  # as there are
+    template |= {name: None for name in ("contact", "between", "let_pass", "met", "passed", "payout") if name in template}  # as there are
     saved = {"quantities": run.quantities.unknown(), "under": {}, "overlaps": [], **saved}  # nor did it keep ranges
     saved["quantities"] = run.quantities.of_today(saved["quantities"])
     saved["lines"] = of_today(saved.get("lines"), template["lines"])
@@ -101,10 +106,16 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
             line.impose_now()
 
 
+def _begun(run: SystemRun) -> list[list[int]]:
+    """Lines that touch each other because they have come near, two each."""
+    touching = run.model.touching if run.system.contact is None else None
+    return [list(x) for x in touching.pairs] if touching is not None else []
+
+
 def _pairs(saved: Any) -> set[tuple[int, int]]:
     """Numbers of lines, two each.  ValueError: that cannot be."""
     if not (isinstance(saved, list) and all(isinstance(x, list) and len(x) == 2 for x in saved)):
-        raise ValueError("passed, met: pairs of numbers of lines were expected")
+        raise ValueError("passed, met, between: pairs of numbers of lines were expected")
     return {(int(a), int(b)) for a, b in saved}
 
 
@@ -162,7 +173,7 @@ def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
     run.overlaps = set(found["overlaps"])
     run.under = {name: float(depth) for name, depth in found["under"].items()}
     run.loop.take_control(found["control"])
-    run.passed, run.met = (_pairs(found[name]) for name in ("passed", "met"))
+    run.passed, run.met, run.let_pass = (_pairs(found[name]) for name in ("passed", "met", "let_pass"))
     run.watch_lines()  # what has met since has not
     if run.shared is not None:
         run.shared.restore(found["contact"], run.t)

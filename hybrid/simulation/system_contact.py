@@ -17,6 +17,8 @@ from hybrid.model.system import SystemModel
 from hybrid.simulation.contact_equilibrium import contact_of
 from hybrid.simulation.contact_start import GIVEN_UP, given_up
 from hybrid.simulation.lines_contact import pair_text
+from hybrid.simulation.lines_contact_start import given_up_text, lines_near, touch_each_other, touching_now
+from hybrid.simulation.lines_watch import tell_passages
 from hybrid.simulation.self_watch import deepest_text
 from hybrid.simulation.system_contact_equilibrium import energy_between, touches_alone
 from hybrid.solve.contact_statics import contact_energy
@@ -108,8 +110,28 @@ def end_contact(run: SystemRun, numbers: Sequence[int]) -> None:
     _go_on(run, numbers, "where contact of the line with itself ends")
 
 
+def begin_between(run: SystemRun) -> bool:
+    """Contact is computed from now on of lines that have come near each other; whether any begins."""
+    pairs = lines_near(run)
+    if not pairs:  # they are let pass
+        tell_passages(run)
+        run.watch_lines()
+        return False
+    now = run.model.touching.pairs if run.model.touching is not None else []
+    _change_pairs(run, {*now, *pairs}, "where contact of lines with each other begins")
+    return True
+
+
+def _change_pairs(run: SystemRun, pairs: Iterable[tuple[int, int]], after: str) -> None:
+    """These lines, two each, touch each other from now on, and no others."""
+    numbers = set(run.model.touching.lines) if run.model.touching is not None else set()
+    touch_each_other(run, pairs)
+    numbers |= set(run.model.touching.lines) if run.model.touching is not None else set()
+    _go_on(run, sorted(numbers), after)
+
+
 def _go_on(run: SystemRun, numbers: Sequence[int], after: str) -> None:
-    """Another solver, for lines of these numbers that touch themselves now, or no longer.
+    """Another solver, for lines of these numbers that touch themselves, or each other, now, or no longer.
 
     The energy of contact that comes or goes so is booked.
     """
@@ -135,7 +157,22 @@ def gives_up_contact(run: SystemRun, dt: float) -> bool:
         numbers.append(line.number)
     if numbers:
         end_contact(run, numbers)
-    return bool(numbers)
+    return _gives_up_pairs(run, dt) or bool(numbers)
+
+
+def _gives_up_pairs(run: SystemRun, dt: float) -> bool:
+    """The same of lines that touch each other because they have come near: those that touch now are let pass."""
+    touches = touching_now(run)
+    if not touches:
+        return False
+    run.recorder.event(run.t, 0.0, 0.0, GIVEN_UP, given_up_text(run, dt))
+    assert run.model.touching is not None
+    alone = {a for a, b in touches if a == b}
+    pairs = run.model.touching.pairs
+    passing = {x for x in pairs if x in touches or alone & set(x)}
+    run.let_pass |= passing
+    _change_pairs(run, [x for x in pairs if x not in passing], "where contact of lines with each other ends")
+    return True
 
 
 def let_touch(run: SystemRun, numbers: Iterable[int], touch: bool = True) -> None:

@@ -37,6 +37,11 @@ def loaded_as(
     other = build_system(system, model.resolution, model)
     other = other if fit is None else fit(other)
     models = tuple(_line_as(*each, system, t) for each in zip(model.names, model.models, other.models, strict=True))
+    touching = model.touching
+    if touching is not None:
+        models = tuple(
+            replace(x, line=touching.bits(x.line)) if k in touching.lines else x for k, x in enumerate(models)
+        )
     return replace(
         model, models=models, bodies=other.bodies, known=other.known, scenes=other.scenes, moments=other.moments
     )

@@ -53,6 +53,7 @@ from hybrid.simulation.system_checkpoint import (
 )
 from hybrid.simulation.system_contact import (
     AT_START,
+    begin_between,
     begin_contact,
     begin_where_near,
     end_contact,
@@ -182,6 +183,7 @@ class SystemRun:
         self.met: set[tuple[int, int]] = set()  # lines that have been said to touch
         self.watch: LinesWatch | None = None  # whether others meet, between which no contact is computed
         self.passed: set[tuple[int, int]] = set()  # and those that have been said to
+        self.let_pass: set[tuple[int, int]] = set()  # lines that may meet, but of which contact can not begin, or go on
         self.rotations = Rotations(system, self.model)
         self.quantities = SystemQuantities(system, scenes)
         if moves and target is not None:
@@ -478,10 +480,13 @@ class SystemRun:
         """A solver for the model as it is."""
         self.quantities.follow(self.model)
         self._note_partners()
+        own = {line.number: line.contact for line in self.lines if line.shares and line.contact is not None}
         contacts, shared = [line.touch_itself(self.t) for line in self.lines], shared_of(self.model, rubs=True)
-        if shared is not None and self.shared is not None:
+        if shared is not None and self.shared is not None and shared.lines == self.shared.lines:
             other = self.payout is not None or (self.zones is not None and self.zones.follow_curvature)
             shared.restore(self.shared.checkpoint(self.t), self.t, remeshed=other)
+        elif shared is not None and (own or self.shared is not None):
+            shared.take(self.shared, own, self.t)
         self.shared = shared
         lines, bodies = joined_lines(self.model, 0.0), self.model.body_numbers(0.0)
         self.solver = SystemSolver(lines, len(self.model.free), bodies, contacts, shared)
@@ -503,7 +508,7 @@ class SystemRun:
         """Look from now on which lines overlap without contact, beside those that are known to."""
         if self.target is None:
             return
-        self.watch = LinesWatch(self.system, self.model, self.passed, self.loop.clock)
+        self.watch = LinesWatch(self.system, self.model, self.passed, self.loop.clock, self.let_pass)
         if self.watch.is_needed:
             self.loop.watch(*self.watch.attach(self.solver.line_tables))
         else:
@@ -542,6 +547,8 @@ class SystemRun:
             self.recorder.event(0.0, 0.0, 0.0, kind, text)
         self._settle(self.solver)
         self._look_for_overlaps()
+        if self.watch is not None and self.watch.near() and begin_between(self):
+            self._settle(self.solver)
         if self.zones is not None:
             self.zones.begin()
         if self.system.environment.waves is not None:
@@ -699,6 +706,8 @@ class SystemRun:
             self.zones.accepted(self.last_step)
         if any(line.nears_itself for line in self.lines):
             begin_contact(self)
+        if loop.counts[b.FLAGS] & b.LINES_NEAR:
+            begin_between(self)
         if parted := [line.number for line in self.lines if line.parts_itself]:
             end_contact(self, parted)
         if loop.counts[b.FLAGS] & b.COLLAPSES:

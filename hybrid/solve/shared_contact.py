@@ -28,7 +28,7 @@ from hybrid.kernels.state.report import FORCE_A, NET_A, SELF_CONTACT_ENERGY
 from hybrid.kernels.state.state import Ends, Floats, Line, Work, blank_line, blank_state, no_ends, no_work
 from hybrid.kernels.step.newton import ADDRESS, ASKED, REST, SHARED
 from hybrid.model.lines_contact import Touching
-from hybrid.solve.self_contact import ContactBooks, contact_of_strands, forces_on_nodes, strand_of
+from hybrid.solve.self_contact import ContactBooks, SelfContact, contact_of_strands, forces_on_nodes, strand_of
 
 # Of the widest line: what lies between the arc lengths of two lines that stand one after the other, in windows.
 BETWEEN = 10.0
@@ -147,6 +147,11 @@ class SharedContact(ContactBooks):
         row = points[np.argmin(points[:, DISTANCE])]
         return *self.place(int(row[P])), *self.place(int(row[Q])), float(row[DISTANCE])
 
+    def points_between(self) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+        """Of the points of contact looked at last: number of the line and node beside it, on both sides."""
+        points = self.contact.points[: self.contact.counts[POINTS]]
+        return [(self.place(int(row[P])), self.place(int(row[Q]))) for row in points]
+
     def met(self) -> list[tuple[int, int, float, float, float]]:
         """Two lines each that have met: their numbers, when first (s), and at which arc lengths (m)."""
         found = []
@@ -182,6 +187,37 @@ class SharedContact(ContactBooks):
             x[:] = saved[name]
         super().restore(saved, t, remeshed)
         self._times[:] = np.nan if remeshed else t, np.nan
+
+    def take(self, before: SharedContact | None, own: Mapping[int, SelfContact], t: float) -> None:
+        """Go on at t, s, from contact of other lines with each other, and of lines with themselves, by number.
+
+        What is known of lines that are here no longer is forgotten.
+        """
+        places = {k: j for j, k in enumerate(self.lines)}
+        shares, meetings, grips = np.zeros_like(self._shares[0]), np.full_like(self.meetings, np.nan), []
+        parts = [x.checkpoint(t) for x in (*([before] if before is not None else []), *own.values())]
+        if before is not None:
+            saved = parts[0]
+            then = [j for j, k in enumerate(before.lines) if k in places]
+            now = [places[before.lines[j]] for j in then]
+            shift = np.full(len(before.lines), np.nan)  # of lines that are gone
+            shift[then] = self.starts[now] - saved["starts"][then]
+            shares[now], met = saved["shares"][then], saved["meetings"][np.ix_(then, then)]
+            met[:, :, MET_S] += shift[then, None]
+            met[:, :, MET_OTHER] += shift[then]
+            meetings[np.ix_(now, now)] = met
+            grips.append(saved["grips"].copy())
+            for column in (AT, FOOT):
+                of = np.searchsorted(saved["lows"], grips[0][:, column], side="right") - 1
+                grips[0][:, column] += shift[of]
+            grips[0] = grips[0][np.isfinite(grips[0]).all(axis=1)]
+        for k, part in zip(own, parts[before is not None :], strict=True):
+            rows = part["grips"].copy()
+            rows[:, [AT, FOOT]] += self.starts[places[k]]
+            grips.append(rows)
+        last = parts[0] | {"speed": max(x["speed"] for x in parts), "stored": sum(x["stored"] for x in parts)}
+        here = {"starts": self.starts.copy(), "lows": self._lows.copy(), "shares": shares, "meetings": meetings}
+        self.restore({**last, **here, "grips": np.concatenate(grips)}, t, remeshed=True)
 
     def _shifted(self, saved: Mapping[str, Any]) -> dict[str, Any]:
         """What is saved of lines that had other lengths, with the arc lengths that places have in the one line now."""

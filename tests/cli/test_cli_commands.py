@@ -199,6 +199,8 @@ def test_plan_of_lines_says_what_touches_what(call: Call) -> None:
         "contact={friction: 0.2, between: [[port, tow]]}",
         "obstacles={pile: {at: [0, 50, 0], axis: [0, 0, 1], radius: 1}}",
     ]
+    near = call("plan", "bridle.yaml", *(x for key in diameters for x in ("--set", key)))
+    assert "of lines with each other, from where they come near each other" in " ".join(near.out.split())
     said = call("plan", "bridle.yaml", *(x for key in (*diameters, *more) for x in ("--set", key)))
     flat = " ".join(said.out.split())
     assert (

@@ -7,6 +7,9 @@ Lines whose boxes are apart in a step cannot meet in it.  Two others that were c
 with M the sum of the mean displacements of a line in each step since, and R that of the largest deviations from them:
 exact, whatever the steps.  Where that is used up, the distance of all cells on their straight ways in the step is found
 anew; cells in boxes of BOX are left out together.
+
+Of lines that touch each other from where they come near, what AHEAD more steps like the last one may close is room that
+is used up as well: they are near once cells are less apart than that.
 """
 
 from __future__ import annotations
@@ -29,12 +32,18 @@ BOX = 8  # cells in a box
 # Of the width: way from line to line about a joint on which nothing is looked at; legs that leave it by 10 degrees or
 # more are apart beyond.
 JOINT = 12.0
-# Of `pairs`: lines, and whether they have met, 1, or not, 0.
-A, B, HAVE_MET, WATCHED = 0, 1, 2, 3
+# Steps that lines which may touch look ahead, and of the mean diameter how far apart they are near at least: contact acts
+# from there on.
+AHEAD, LEAST_APART = 3.0, 0.05
+# Of `pairs`: lines; whether they have met, 1, or are near, 2, or neither, 0; 1: contact begins where they are near; 1: their
+# boxes overlap.
+A, B, HAVE_MET, ASKS, CLOSE, WATCHED = 0, 1, 2, 3, 4, 5
+MET, NEAR = 1, 2
 # Of `room`: how far apart they were, m; M_a - M_b and R_a + R_b at that time; when they met, s, and where, m.
 APART, WAY, SPREAD, TIME, AT, OTHER, ROOM = 0, 1, 4, 5, 6, 7, 8
-# Of `moved`: M, R of a line; its box in the last step, wider by its radius, m; whether it is beside another one in that.
-MEAN, DEVIATION, LOW, HIGH, BESIDE, MOVED = 0, 3, 4, 7, 10, 11
+# Of `moved`: M, R of a line; its box in the last step, and AHEAD more, wider by its radius, m; whether it is beside another
+# one in that; the mean displacement of the last step, and the largest deviation from it; its widest diameter.
+MEAN, DEVIATION, LOW, HIGH, BESIDE, LAST, LAST_DEVIATION, WIDEST, MOVED = 0, 3, 4, 7, 10, 11, 14, 15, 16
 
 
 class LinesJob(NamedTuple):
@@ -74,9 +83,11 @@ def add_motion(moved, before, after):
     for i in range(n):
         d = sub(sub(get3(after, i), get3(before, i)), mean)
         square = max(square, dot(d, d))
+    moved[LAST_DEVIATION] = math.sqrt(square)
     for k in range(3):
+        moved[LAST + k] = mean[k]
         moved[MEAN + k] += mean[k]
-    moved[DEVIATION] += math.sqrt(square)
+    moved[DEVIATION] += moved[LAST_DEVIATION]
 
 
 @inner
@@ -91,27 +102,40 @@ def box_of(before, after, first, last):
 
 
 @inner
+def whole_box(before, after):
+    """Lowest and highest of all nodes on their ways in a step, and in AHEAD more like it."""
+    low, high = (math.inf, math.inf, math.inf), (-math.inf, -math.inf, -math.inf)
+    for i in range(after.shape[0]):
+        a, b = get3(before, i), get3(after, i)
+        c = add(b, scale(AHEAD, sub(b, a)))  # beyond b as seen from a
+        low = (min(low[0], min(a[0], c[0])), min(low[1], min(a[1], c[1])), min(low[2], min(a[2], c[2])))
+        high = (max(high[0], max(a[0], c[0])), max(high[1], max(a[1], c[1])), max(high[2], max(a[2], c[2])))
+    return low, high
+
+
+@inner
 def find_boxes(job):
-    """The boxes of all lines in the last step."""
+    """The boxes of all lines in the last step, and AHEAD more."""
     moved = job.moved
     for l in range(job.tables.shape[0]):
         line_job, widest = read(job.tables[l]), 0.0
         n = line_job.line.h.shape[0]
         for i in range(job.begins[l], job.begins[l] + n):
             widest = max(widest, job.width[i])
-        low, high = box_of(line_job.old.r, line_job.new.r, 0, n)
+        low, high = whole_box(line_job.old.r, line_job.new.r)
+        margin = (0.5 + LEAST_APART) * widest
         for k in range(3):
-            moved[l, LOW + k], moved[l, HIGH + k] = low[k] - 0.5 * widest, high[k] + 0.5 * widest
-        moved[l, BESIDE] = 0.0
+            moved[l, LOW + k], moved[l, HIGH + k] = low[k] - margin, high[k] + margin
+        moved[l, BESIDE], moved[l, WIDEST] = 0.0, widest
 
 
 @inner
 def overlap(moved, a, b):
     """Whether the boxes of two lines overlap."""
-    apart = False
     for k in range(3):
-        apart = apart or moved[a, LOW + k] > moved[b, HIGH + k] or moved[b, LOW + k] > moved[a, HIGH + k]
-    return not apart
+        if moved[a, LOW + k] > moved[b, HIGH + k] or moved[b, LOW + k] > moved[a, HIGH + k]:
+            return False
+    return True
 
 
 @inner
@@ -158,42 +182,117 @@ def cells_apart(before, after, other_before, other_after, i, j):
 
 
 @inner
-def search(job, row, a, b):
-    """The least clearance of two lines in their last step, m, and at which arc lengths, into a row of room."""
+def moves_apart(before, after, first, last, before_other, after_other, begin, end):
+    """How differently nodes of two lines, from `first` to `last` and from `begin` to `end`, move in a step at most, m."""
+    square = 0.0
+    for k in range(3):
+        low, high, lower, higher = math.inf, -math.inf, math.inf, -math.inf
+        for i in range(first, last + 1):
+            u = after[i, k] - before[i, k]
+            low, high = min(low, u), max(high, u)
+        for i in range(begin, end + 1):
+            u = after_other[i, k] - before_other[i, k]
+            lower, higher = min(lower, u), max(higher, u)
+        most = max(high - lower, higher - low)
+        square += most * most
+    return math.sqrt(square)
+
+
+@inner
+def widest_of(job, line, first, last):
+    """The largest diameter of cells of a line from the first to the one before the last, m."""
+    widest = 0.0
+    for i in range(job.begins[line] + first, job.begins[line] + last):
+        widest = max(widest, job.width[i])
+    return widest
+
+
+@inner
+def search(job, row, a, b, asks):
+    """The least clearance of two lines in their last step, m, and at which arc lengths, into a row of room.
+
+    asks: whether what matters is where cells are near: closer than AHEAD more steps like the last one may close; returns
+    whether any are.
+    """
     one, two = read(job.tables[a]), read(job.tables[b])
     line, other = one.line, two.line
-    n, m, best = line.h.shape[0], other.h.shape[0], math.inf
+    n, m, best, near = line.h.shape[0], other.h.shape[0], math.inf, False
     for first in range(0, n, BOX):
-        low, high = box_of(one.old.r, one.new.r, first, min(first + BOX, n))
+        last = min(first + BOX, n)
+        low, high = box_of(one.old.r, one.new.r, first, last)
+        widest = widest_of(job, a, first, last)
         for second in range(0, m, BOX):
-            lower, higher = box_of(two.old.r, two.new.r, second, min(second + BOX, m))
-            widest = 0.0
-            for i in range(first, min(first + BOX, n)):
-                widest = max(widest, job.width[job.begins[a] + i])
-            thick = 0.0
-            for j in range(second, min(second + BOX, m)):
-                thick = max(thick, job.width[job.begins[b] + j])
-            if not boxes_apart(low, high, lower, higher) - 0.5 * (widest + thick) < best:
+            end, ahead = min(second + BOX, m), 0.0
+            lower, higher = box_of(two.old.r, two.new.r, second, end)
+            width = 0.5 * (widest + widest_of(job, b, second, end))
+            gap = boxes_apart(low, high, lower, higher) - width
+            if asks and not near and gap < math.inf:
+                moves = moves_apart(one.old.r, one.new.r, first, last, two.old.r, two.new.r, second, end)
+                ahead = max(AHEAD * moves, LEAST_APART * width)
+            if not (gap < best or gap < ahead):
                 continue
-            for i in range(first, min(first + BOX, n)):
-                for j in range(second, min(second + BOX, m)):
+            for i in range(first, last):
+                for j in range(second, end):
                     width = 0.5 * (job.width[job.begins[a] + i] + job.width[job.begins[b] + j])
                     apart, x, y = cells_apart(one.old.r, one.new.r, two.old.r, two.new.r, i, j)
-                    if apart - width < best and not are_neighbours(job, a, b, line, other, i, j, JOINT * width):
+                    if not (apart - width < best or apart - width < ahead):
+                        continue
+                    if are_neighbours(job, a, b, line, other, i, j, JOINT * width):
+                        continue
+                    if apart - width < best:
                         best = apart - width
                         row[AT], row[OTHER] = line.s[i] + x * line.h[i], other.s[j] + y * other.h[j]
+                    if not near and apart - width < ahead:
+                        moves = moves_apart(one.old.r, one.new.r, i, i + 1, two.old.r, two.new.r, j, j + 1)
+                        near = apart - width < max(AHEAD * moves, LEAST_APART * width)
     row[APART] = best
+    return near
+
+
+@inner
+def closing(one, other):
+    """By how much two lines of `moved` can have closed in the last step, m."""
+    square = 0.0
+    for k in range(3):
+        gone = one[LAST + k] - other[LAST + k]
+        square += gone * gone
+    return math.sqrt(square) + one[LAST_DEVIATION] + other[LAST_DEVIATION]
+
+
+@inner
+def look_at_pair(job, pair, row):
+    """Whether two lines are near, or have met, in the last step, in which their boxes overlap; and note it."""
+    moved = job.moved
+    a, b, ahead = pair[A], pair[B], 0.0
+    if pair[ASKS]:
+        ahead = max(AHEAD * closing(moved[a], moved[b]), LEAST_APART * 0.5 * (moved[a, WIDEST] + moved[b, WIDEST]))
+    spread, square = moved[a, DEVIATION] + moved[b, DEVIATION], 0.0
+    for j in range(3):
+        gone = moved[a, MEAN + j] - moved[b, MEAN + j] - row[WAY + j]
+        square += gone * gone
+    if math.sqrt(square) + spread - row[SPREAD] + ahead < row[APART]:
+        return
+    near = search(job, row, a, b, pair[ASKS])
+    for j in range(3):
+        row[WAY + j] = moved[a, MEAN + j] - moved[b, MEAN + j]
+    row[SPREAD] = spread
+    if row[APART] < 0.0:
+        pair[HAVE_MET], row[TIME] = MET, job.clock[NOW]
+    elif near:
+        pair[HAVE_MET], row[TIME] = NEAR, job.clock[NOW]
 
 
 @kernel
 def watch_lines(table):
-    """Note which pairs of lines have met in the step that was taken last; how many."""
+    """Note which pairs of lines have met, or are near, in the step that was taken last; how many are near now."""
     job = read_lines(table)
-    pairs, room, moved, found = job.pairs, job.room, job.moved, 0
+    pairs, room, moved, near = job.pairs, job.room, job.moved, 0
     find_boxes(job)
     for k in range(pairs.shape[0]):
+        pairs[k, CLOSE] = 0
         if not pairs[k, HAVE_MET]:
             if overlap(moved, pairs[k, A], pairs[k, B]):
+                pairs[k, CLOSE] = 1
                 moved[pairs[k, A], BESIDE] = moved[pairs[k, B], BESIDE] = 1.0
             else:  # how far they have gone since is not followed
                 room[k, APART] = 0.0
@@ -202,20 +301,7 @@ def watch_lines(table):
             line_job = read(job.tables[l])
             add_motion(moved[l], line_job.old.r, line_job.new.r)
     for k in range(pairs.shape[0]):
-        a, b, row = pairs[k, A], pairs[k, B], room[k]
-        if pairs[k, HAVE_MET] or not overlap(moved, a, b):
-            continue
-        spread, square = moved[a, DEVIATION] + moved[b, DEVIATION], 0.0
-        for j in range(3):
-            gone = moved[a, MEAN + j] - moved[b, MEAN + j] - row[WAY + j]
-            square += gone * gone
-        if math.sqrt(square) + spread - row[SPREAD] < row[APART]:
-            continue
-        search(job, row, a, b)
-        for j in range(3):
-            row[WAY + j] = moved[a, MEAN + j] - moved[b, MEAN + j]
-        row[SPREAD] = spread
-        if row[APART] < 0.0:
-            pairs[k, HAVE_MET], row[TIME] = 1, job.clock[NOW]
-            found += 1
-    return found
+        if pairs[k, CLOSE]:
+            look_at_pair(job, pairs[k], room[k])
+        near += pairs[k, HAVE_MET] == NEAR
+    return near

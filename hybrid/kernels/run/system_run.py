@@ -62,6 +62,7 @@ from hybrid.kernels.state.books import (
     JUDGE,
     LAST_DT,
     LAST_RHO,
+    LINES_NEAR,
     LOG,
     NODES_DUE,
     NOW,
@@ -354,7 +355,8 @@ def accept(steps, system):
         watched = steps.watched_odd
         if counts[PARITY]:
             watched = steps.watched_even
-        call_watch(steps.watcher, watched)
+        if call_watch(steps.watcher, watched) > 0:
+            flags |= LINES_NEAR
     counts[ROWS] += 1
     counts[WASTED], counts[PHASE] = 0, SAMPLE
     if follow_lines(steps) != 0:

@@ -106,6 +106,7 @@ PARTS_ITSELF, HIDES_ITSELF = 32768, 65536
 COLLAPSES = 131072
 ZONES_DUE = 262144  # of a system: zones of a line are to be looked at
 NODES_DUE = 524288  # of a system: a node enters or leaves at a winch
+LINES_NEAR = 1048576  # of a system: two lines are near each other, between which contact begins
 
 # --- powers and work --------------------------------------------------------------------------------
 

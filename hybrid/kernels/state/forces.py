@@ -26,6 +26,8 @@ AXIAL_LAW = 16384
 
 # No force: the line may come to touch itself, which is computed from where it comes near itself on.
 MAY_TOUCH = 32768
+# Nor is this: it may come to touch other lines, which is computed from where it comes near one on.
+MAY_MEET = 8388608
 
 # Contact with obstacles (hybrid.kernels.laws.obstacles); what the line is pressed on by, bed or obstacles.
 OBSTACLES = 65536

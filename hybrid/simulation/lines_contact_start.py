@@ -1,0 +1,109 @@
+"""From when on contact between lines of a system is computed where the scene does not speak of it, and until when."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from hybrid.kernels.junctions.lines_distance import JOINT
+from hybrid.kernels.state.forces import SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state.state import Line
+from hybrid.model.build import Model
+from hybrid.model.lines_contact import touching_among
+from hybrid.model.self_reach import COST, contact_bits
+from hybrid.scene.schema import Scene
+from hybrid.simulation.lines_contact import pair_text
+from hybrid.simulation.self_watch import diameters
+from hybrid.simulation.system_contact_equilibrium import energy_between
+
+if TYPE_CHECKING:
+    from hybrid.simulation.system_run import SystemRun
+
+Pair = tuple[int, int]
+
+
+def lines_near(run: SystemRun) -> list[Pair]:
+    """Lines, two each, between which contact begins now, after an event; others that are near are let pass.
+
+    These are lines that already are in each other, or are pressed on each other beside what both are joined to: legs
+    that leave it by a narrow angle.
+    """
+    found = run.watch.near() if run.watch is not None else []
+    begun = []
+    for a, b, s, other in found:
+        if not _may_begin(run, (a, b)):
+            run.let_pass.add((a, b))
+            continue
+        begun.append((a, b))
+        one, two = run.model.names[a], run.model.names[b]
+        text = (
+            f"lines {one} and {two} come near each other, at s = {s:.4g} m of {one} and s = {other:.4g} m of {two}: "
+            f"contact between them is computed from here on; {COST.split(';')[0]}; contact: {{between: []}} switches "
+            "it off"
+        )
+        run.recorder.event(run.t, 0.0, 0.0, "contact begins", text)
+    return begun
+
+
+def _may_begin(run: SystemRun, pair: Pair) -> bool:
+    """Whether two lines are in each other nowhere, nor touch where both leave what they are joined to."""
+    touching = touching_among(run.system, run.model.scenes, [pair])
+    assert touching is not None
+    touching.meets[[0, 1], [0, 1]] = 0  # neither touches itself
+    model = replace(run.model, touching=touching)
+    energy, shared = energy_between(model, run.solver.lines, run.solver.bodies.copy(), run.state)
+    if energy == 0.0 or not math.isfinite(energy):
+        return energy == 0.0
+    joined = dict(zip(touching.lines, touching.joined.tolist(), strict=True))
+    return not any(
+        set(_beside(run.model.models[a], i, joined[a])) & set(_beside(run.model.models[c], j, joined[c]))
+        for (a, i), (c, j) in shared.points_between()
+    )
+
+
+def _beside(model: Model, node: int, joined: Sequence[int]) -> list[int]:
+    """What a line is joined to at ends that are near a node."""
+    s, reach = model.line.s, JOINT * float(diameters(model).max())
+    return [x for x, end in zip(joined, (s[0], s[-1]), strict=True) if abs(float(s[node] - end)) <= reach]
+
+
+def touch_each_other(run: SystemRun, pairs: Iterable[Pair]) -> None:
+    """Give a run models of which these lines touch each other, two each, and no others; its solver has to follow."""
+    before, touching = run.model.touching, touching_among(run.system, run.model.scenes, pairs)
+    now = touching.lines if touching is not None else ()
+    models = [*run.model.models]
+    for k in {*now, *(before.lines if before is not None else ())}:
+        scene = run.model.scenes[run.model.names[k]]
+
+        def change(line: Line, scene: Scene = scene, touches: bool = k in now) -> Line:
+            if touches and touching is not None:
+                return touching.bits(line)
+            return line._replace(bits=(line.bits & ~(SELF_CONTACT | SELF_FRICTION)) | contact_bits(scene))
+
+        models[k] = replace(models[k], line=change(models[k].line))
+        run.lines[k].follow(models[k])
+        if run.zones is not None:
+            run.zones.change_line(k, change)
+    run.model = replace(run.model, models=tuple(models), touching=touching)
+
+
+def touching_now(run: SystemRun) -> set[Pair]:
+    """Lines whose contact began by itself, two each, that touch in the state that was looked at last; a line that
+
+    touches itself beside others, twice.
+    """
+    shared = run.solver.shared
+    if shared is None or run.system.contact is not None:
+        return set()
+    return {(min(a, b), max(a, b)) for (a, _), (b, _) in shared.points_between()}
+
+
+def given_up_text(run: SystemRun, dt: float) -> str:
+    """Text of the event of contact that lets no step of dt (s) lead on."""
+    assert run.solver.shared is not None
+    return (
+        f"no step leads on with contact of lines, down to {dt:.3g} s: {pair_text(run.solver.shared, run.model)}; it is "
+        "computed no longer, and they pass through each other; shorter cells there would do"
+    )

@@ -1,0 +1,190 @@
+"""Contact between lines that nobody asks for: it begins where lines come near each other, and changes nothing before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.model.system import build_system
+from hybrid.simulation.system_contact import gives_up_contact
+from tests.validation.test_validation_lines_contact import PASSAGE, ROPE, lowered
+from tests.validation.test_validation_obstacles_of_lines import system_of
+
+Tables = dict[str, Any]
+BEGINS, NOT_ASKED = "contact begins", {"between": []}
+NAMES = ("position", "tension", "self_contact")
+
+
+def unasked(duration: float = 0.8, **more: Any) -> Tables:
+    tables = lowered(duration)
+    del tables["contact"]
+    return tables | more
+
+
+def kinds(result: Any) -> list[str]:
+    return [e.kind for e in result.events]
+
+
+def same(a: Any, b: Any, names: tuple[str, ...] = NAMES) -> float:
+    """The largest difference of results of several lines, as a part of the largest value."""
+    return max(
+        float(np.abs(x[name] - b.lines[line][name]).max() / (np.abs(x[name]).max() or 1.0))
+        for line, x in a.lines.items()
+        for name in names
+    )
+
+
+@pytest.fixture(scope="module")
+def begun() -> Any:
+    return hybrid.run(unasked())
+
+
+def test_contact_begins_where_lines_come_near_and_is_that_which_is_asked_for(begun: Any) -> None:
+    (event,) = (e for e in begun.events if e.kind == BEGINS)
+    met = next(e for e in begun.events if e.kind == "lines touch")
+    assert 0.0 < met.t - event.t < 0.1
+    assert "upper and lower" in event.text and "between: []" in event.text
+    assert PASSAGE not in kinds(begun)
+    assert begun.lines["upper"]["self_contact"].max() > 1.0
+    assert same(begun, hybrid.run(unasked(contact={}))) < 1e-9
+
+
+@pytest.mark.parametrize("until", [0.2, 0.5])
+def test_a_run_goes_on_to_the_bit_from_before_and_after_contact_began(begun: Any, until: float, tmp_path: Path) -> None:
+    hybrid.run(unasked(until), tmp_path / "half.h5")
+    resumed = hybrid.resume(tmp_path / "half.h5", until=0.8)
+    assert same(begun, resumed) == 0.0
+    assert kinds(resumed).count(BEGINS) == 1
+
+
+def test_stepped_back_to_before_contact_began_it_begins_again(begun: Any) -> None:
+    with hybrid.SystemSimulation(unasked()) as run:
+        run.advance(0.2)
+        saved = run.save()
+        run.advance(0.5)
+        run.restore(saved)
+        run.advance(0.5)
+        touching = run.save()
+        run.advance(0.8)
+        run.restore(touching)
+        run.advance(0.8)
+        result = run.result()
+    assert same(begun, result) < 1e-9
+    assert kinds(result).count(BEGINS) == 1
+
+
+def test_where_contact_is_off_or_an_accuracy_is_asked_lines_pass_and_that_is_said() -> None:
+    assert BEGINS not in kinds(off := hybrid.run(unasked(contact=NOT_ASKED)))
+    assert PASSAGE in kinds(off)
+    for more in ({"accuracy": "3%"}, {"output": {"errors": True}}, {"time": {"duration": 1.0}}):
+        assert build_system(system_of(unasked(**more))).may_meet == ()
+    assert build_system(system_of(unasked())).may_meet == (0, 1)
+    thin = deepcopy(unasked())
+    del thin["lines"]["lower"]["sections"][0]["diameter"]
+    assert build_system(system_of(thin)).may_meet == ()
+
+
+def bridle(half: float, fall: float = 0.0) -> Tables:
+    """Two legs that leave a knot by a narrow angle, half of it by half (m) over 0.8 m, and may swing together."""
+    leg = {"sections": [ROPE | {"length": 0.81}], "mesh": {"cells": 80}, "contact": {"self": False}}
+    move = {"travel": {"by": [0, fall, 0], "over": 0.3}}
+    return {
+        "environment": {"gravity": 9.81}, "time": {"duration": 0.4, "step": 0.01}, "output": {"points": 21, "every": 0.1},
+        "points": {"a": {"position": [0, -half, 0]}, "b": {"position": [0, half, 0]} | ({"motion": move} if fall else {}),
+                   "c": {"position": [1.6, 0, 0]}, "knot": {"kind": "free", "initial_guess": [0.8, 0, 0]}},
+        "lines": {"left": leg | {"start": "a", "end": "knot"}, "right": leg | {"start": "b", "end": "knot"},
+                  "tow": leg | {"start": "knot", "end": "c"}},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("half", [0.02, 0.05, 0.1])
+def test_legs_that_leave_a_point_by_a_narrow_angle_are_not_pressed_apart(half: float) -> None:
+    found = hybrid.run(bridle(half))
+    assert same(found, hybrid.run(bridle(half) | {"contact": NOT_ASKED}), ("position", "tension")) == 0.0
+    assert not any(x["self_contact"].any() for x in found.lines.values())
+
+
+def three(**more: Any) -> Tables:
+    """A third rope comes down on the two after they have met."""
+    tables = unasked(**{"time": {"duration": 0.9, "step": 0.004}} | more)
+    line = tables["lines"]["upper"]
+    tables["points"] |= {
+        "e": {"position": [-0.35, 0.2, 0.12], "motion": {"travel": {"by": [0, -0.05, -0.15], "over": 1.0}}},
+        "f": {"position": [0.35, -0.2, 0.12], "motion": {"travel": {"by": [0, 0.02, -0.15], "over": 1.0}}},
+    }
+    tables["lines"]["third"] = line | {"start": "e", "end": "f"}
+    return tables
+
+
+def test_a_third_line_joins_two_that_touch_already() -> None:
+    """What is known of the contact of two lines goes on in that of three."""
+    found = hybrid.run(three())
+    assert kinds(found).count(BEGINS) >= 2
+    assert len({e.t for e in found.events if e.kind == BEGINS}) >= 2
+    assert found.lines["third"]["self_contact"].max() > 1.0
+    whole = hybrid.run(three(contact={}))
+    assert same(found, whole) < 1e-7
+    told, of = ([e.text for e in x.events if e.kind == "lines touch"] for x in (found, whole))
+    assert told == of
+
+
+def test_contact_that_lets_no_step_lead_on_is_given_up_and_lines_pass(begun: Any, tmp_path: Path) -> None:
+    """By hand, because no scene is known in which it happens: the run goes on, says so, and is resumed so."""
+    tables = unasked()
+    with hybrid.SystemSimulation(tables, tmp_path / "whole.h5") as run:
+        run.advance(0.5)
+        assert gives_up_contact(run._run, 1e-6)
+        assert run._run.model.touching is None
+        run.advance(0.8)
+        result = run.result()
+    assert "contact given up" in kinds(result)
+    assert PASSAGE in kinds(result)
+    assert kinds(result).count(BEGINS) == 1
+    assert same(begun, result, ("position",)) > 1e-3
+
+
+def moving(tables: Tables) -> None:
+    for line in tables["lines"].values():
+        line["model"] = {"kind": "adaptive", "tolerance": 1e-3}
+
+
+def following(tables: Tables) -> None:
+    for line in tables["lines"].values():
+        line["model"] = {"kind": "adaptive", "curvature_error": 0.05}
+        del line["mesh"]
+
+
+def paid(tables: Tables) -> None:
+    tables["lines"]["upper"]["connections"] = {"end": {"kind": "pinned", "payout": {"rate": 0.01, "ramp": 0.2}}}
+
+
+@pytest.mark.parametrize("change", [moving, following, paid])
+def test_contact_begins_in_lines_whose_cells_come_and_go(change: Callable[[Tables], None], tmp_path: Path) -> None:
+    tables = unasked()
+    change(tables)
+    found = hybrid.run(tables)
+    assert BEGINS in kinds(found) and PASSAGE not in kinds(found)
+    assert found.lines["upper"]["self_contact"].max() > 1.0
+    upper, lower = (found.lines[x].position for x in ("upper", "lower"))
+    apart = np.linalg.norm(upper[:, :, None] - lower[:, None], axis=3).min(axis=(1, 2))
+    assert apart.min() > 0.9 * ROPE["diameter"]
+    hybrid.run(tables | {"time": {"duration": 0.5, "step": 0.01}}, tmp_path / "half.h5")
+    resumed = hybrid.resume(tmp_path / "half.h5", until=0.8)
+    for name, line in found.lines.items():  # outputs lie by the length that is out at the end of a run
+        for quantity in NAMES:
+            assert (line[quantity][-2:] == resumed.lines[name][quantity][-2:]).all()
+
+
+def test_other_loads_change_nothing_of_what_touches(begun: Any, tmp_path: Path) -> None:
+    tables = unasked(0.5)
+    hybrid.run(tables, tmp_path / "half.h5")
+    motion = "points.c.motion={travel: {by: [0, 0, 0.01], over: 0.5, begin: 0.5}}"
+    found = hybrid.resume(tmp_path / "half.h5", until=0.8, settings=[motion])
+    assert "loads change" in kinds(found) and PASSAGE not in kinds(found)
+    assert 0.0 < same(begun, found, ("position",)) < 0.05
