@@ -21,6 +21,7 @@ from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.plan import output_interval
 from hybrid.model.sections import section_changes
+from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.self_reach import system_without_contact
 from hybrid.model.system import build_system
 from hybrid.outputs.edge_errors import EDGE_ERRORS
@@ -83,7 +84,8 @@ def write_system_errors(system: System, target: Path | io.BytesIO, compute: Comp
 
     Where such a run fails, an event says so.
     """
-    given = system.model_copy(update={"output": system.output.model_copy(update={"errors": None})})
+    given = passing_each_other(system)  # as they do where errors are estimated
+    given = given.model_copy(update={"output": system.output.model_copy(update={"errors": None})})
     with open_result(target) as result:
         if not touch_unasked(system, result):  # coarser cells would meet where those of the result do not
             given = system_without_contact(given)

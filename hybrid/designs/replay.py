@@ -14,6 +14,7 @@ from hybrid.accuracy.api import run
 from hybrid.designs.numbers import AnyScene
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import build, places_of
+from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.output_points import NEAR
 from hybrid.model.resolution import Resolution, accuracy_of, first_resolution
 from hybrid.model.system import SystemResolution, build_system
@@ -49,6 +50,8 @@ class Course(NamedTuple):
         changed: dict[str, Any] = {"output": scene.output.model_copy(update={"errors": None})}
         if isinstance(self.scene, Scene):
             changed = {"output": scene.output.model_copy(update={"errors": False}), "model": self.scene.model}
+        elif scene.output.errors:  # lines pass each other as where these are estimated
+            changed["contact"] = passing_each_other(self.scene).contact
         out: Any = scene.model_copy(update=changed)  # of several lines runs estimate none by themselves
         return out
 

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.state.forces import MAY_MEET, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Floats, Line
+from hybrid.model.contents import Entry
 from hybrid.model.self_reach import payouts, self_reach
 from hybrid.scene.bodies import FreeBody
+from hybrid.scene.lines_contact import LinesContact
 from hybrid.scene.points import Fairlead, FreePoint
 from hybrid.scene.schema import Scene
 
@@ -78,7 +80,8 @@ def touching_among(
 
 
 # Of the contents of a line that may come to touch others.
-OTHERS, WHERE_NEAR = "contact with other lines", "from where they come near each other"
+OTHERS = "contact with other lines"
+MEETS = Entry(OTHERS, True, "from where they come near each other; contact: {between: []} switches it off")
 
 
 def beside_others(line: Line) -> Line:
@@ -96,6 +99,11 @@ def that_may_meet(system: System, scenes: Mapping[str, Scene]) -> tuple[int, ...
         return ()
     found = tuple(k for k, name in enumerate(system.lines) if _may_meet(scenes[name]))
     return found if len(found) > 1 else ()
+
+
+def passing_each_other(system: System) -> System:
+    """The same, of which no line touches another one unless the scene asks for it."""
+    return system if system.contact is not None else system.model_copy(update={"contact": LinesContact(between=())})
 
 
 def _may_meet(scene: Scene) -> bool:

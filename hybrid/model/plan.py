@@ -13,6 +13,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model, build
 from hybrid.model.contents import Entry, with_accuracy
+from hybrid.model.lines_contact import MEETS, that_may_meet
 from hybrid.model.first_state import HUNG
 from hybrid.model.initial_shape import hung
 from hybrid.model.material import material
@@ -143,13 +144,15 @@ class SystemPlan:
 
 def plan_system(system: System) -> SystemPlan:
     """What would be computed for several lines; nothing is computed."""
-    plans, guesses = {}, system.guesses
+    plans, scenes, guesses = {}, {}, system.guesses
     for name in system.lines:
-        scene = system.scene_of(name, system.carried(name), guesses)
+        scenes[name] = scene = system.scene_of(name, system.carried(name), guesses)
         if scene.time:
             refuse_too_much(scene)
         with said_of_line(name):
             plans[name] = _plan(scene)
+    for name in (tuple(system.lines)[k] for k in that_may_meet(system, scenes)):
+        plans[name] = replace(plans[name], contents=(*plans[name].contents, MEETS))
     every = list(plans.values())
     shortest = min(every, key=lambda x: x.step)  # all have the steps in common
     return SystemPlan(

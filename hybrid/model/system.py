@@ -30,7 +30,7 @@ from hybrid.model.contents import IDLE, Entry, obstacle_entries
 from hybrid.model.ends import EndLoad
 from hybrid.model.first_state import first_state
 from hybrid.model.initial_shape import dead_loads, hung
-from hybrid.model.lines_contact import OTHERS, WHERE_NEAR, Touching, beside_others, that_may_meet, touching_of
+from hybrid.model.lines_contact import MEETS, Touching, beside_others, that_may_meet, touching_of
 from hybrid.model.obstacles import obstacle_rows, pull_on_obstacles
 from hybrid.model.payout_law import said_of_line
 from hybrid.model.resolution import Resolution, first_resolution
@@ -321,8 +321,7 @@ def _with_contact(system: System, models: Sequence[Model], touching: Touching) -
 
 def _beside_others(model: Model) -> Model:
     """The model of a line that touches others from where it comes near them."""
-    entry = Entry(OTHERS, True, f"{WHERE_NEAR}; contact: {{between: []}} switches it off")
-    return replace(model, line=beside_others(model.line), contents=(*model.contents, entry))
+    return replace(model, line=beside_others(model.line), contents=(*model.contents, MEETS))
 
 
 def _takes_current(system: System, models: Sequence[Model]) -> bool:

@@ -69,7 +69,7 @@ def kernels_of_lines(system: System, static: bool = False) -> list[str]:
     found = [*OF_LINES, REST_OF_LINES if static else STEPS_OF_LINES]
     if system.adaptive:
         found.append(CRITERIA if static else ZONES)
-    if system.contact is not None:
+    if system.touching_pairs:
         found += TOUCHING_LINES
     if not static and any(payout_of(system.scene_of(name)) for name in system.lines):
         found += PAYOUT_OF_LINES

@@ -31,6 +31,7 @@ def lines_near(run: SystemRun) -> list[Pair]:
     that leave it by a narrow angle.
     """
     found = run.watch.near() if run.watch is not None else []
+    run.gather_events()  # in the order in which they happen
     begun = []
     for a, b, s, other in found:
         if not _may_begin(run, (a, b)):

@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
@@ -15,6 +16,7 @@ import numpy as np
 from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.model.build import Model, build
 from hybrid.model.ends import EndConditions
+from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.output_points import OutputPoints
 from hybrid.model.payout import longest_out, winch_at, winch_side
 from hybrid.model.plan import output_interval
@@ -133,9 +135,10 @@ def remaining_system(
         found, _ = parse_either(result.scene_text)
         if isinstance(found, Scene):
             return None
-        found = as_begun(found, result)
+        meets = _knows_lines_that_meet(path)
+        found = as_begun(found, result, meets)
         done, reached = result.done, float(result.times[-1]) if len(result.times) else 0.0
-        changes = tuple(LoadChange(t, as_begun(_several(text), result)) for t, text in _told(path, result))
+        changes = tuple(LoadChange(t, as_begun(_several(text), result, meets)) for t, text in _told(path, result))
     if start is not None and not settings:
         raise _refused("from", f"{start:g} s", "a change from then on", "name it with --set KEY=VALUE")
     if until is None and not settings:
@@ -204,9 +207,19 @@ def _check_lines(
                 _refuse_jump(one, other, k, begin, f"{where}.motion")
 
 
-def as_begun(system: System, result: Result) -> System:
-    """The same, without contact that no line asks for, in lines of a result of a version that computed none then."""
-    lines = dict(system.lines)
+def _knows_lines_that_meet(path: Path) -> bool:
+    """Whether the version that wrote a result computed contact between lines without being asked."""
+    with opened(path) as file, suppress(ResultError):  # without a checkpoint nothing goes on
+        return "let_pass" in read_checkpoint(file).state
+    return True
+
+
+def as_begun(system: System, result: Result, meets: bool) -> System:
+    """The same, without contact that nobody asks for, of a result of a version that computed none then.
+
+    meets: whether it computed that between lines.
+    """
+    system, lines = system if meets else passing_each_other(system), dict(system.lines)
     for name, line in system.lines.items():
         if "self_contact" not in result.lines[name] and self_reach(system.scene_of(name)).may:
             lines[name] = line.model_copy(update={"contact": line.contact.model_copy(update={"self": False})})

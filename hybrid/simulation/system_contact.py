@@ -165,6 +165,7 @@ def _gives_up_pairs(run: SystemRun, dt: float) -> bool:
     touches = touching_now(run)
     if not touches:
         return False
+    run.gather_events()
     run.recorder.event(run.t, 0.0, 0.0, GIVEN_UP, given_up_text(run, dt))
     assert run.model.touching is not None
     alone = {a for a, b in touches if a == b}

@@ -12,6 +12,7 @@ import pytest
 
 import hybrid
 from hybrid.model.system import build_system
+from hybrid.simulation import system_checkpoint
 from hybrid.simulation.system_contact import gives_up_contact
 from tests.validation.test_validation_lines_contact import PASSAGE, ROPE, lowered
 from tests.validation.test_validation_obstacles_of_lines import system_of
@@ -188,3 +189,24 @@ def test_other_loads_change_nothing_of_what_touches(begun: Any, tmp_path: Path) 
     found = hybrid.resume(tmp_path / "half.h5", until=0.8, settings=[motion])
     assert "loads change" in kinds(found) and PASSAGE not in kinds(found)
     assert 0.0 < same(begun, found, ("position",)) < 0.05
+
+
+def write_as_before(patch: pytest.MonkeyPatch) -> None:
+    """Let runs be those of a version that computed no contact between lines without being asked."""
+    content = system_checkpoint.content
+
+    def as_before(run: Any) -> dict[str, Any]:
+        kept = content(run)
+        kept["state"] = {key: x for key, x in kept["state"].items() if key not in ("let_pass", "between")}
+        return kept
+
+    patch.setattr("hybrid.model.system.that_may_meet", lambda *_: ())
+    patch.setattr("hybrid.simulation.system_run.content", as_before)
+
+
+def test_a_file_of_before_goes_on_without_contact(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    with monkeypatch.context() as before:
+        write_as_before(before)
+        hybrid.run(unasked(0.2), tmp_path / "half.h5")
+    resumed = hybrid.resume(tmp_path / "half.h5", until=0.8)
+    assert BEGINS not in kinds(resumed) and PASSAGE in kinds(resumed)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bits import differences
+from test_lines_contact_start import write_as_before
 from test_system_contact import RUBS, TIME, WIDTH, system
 from test_system_contact_zones import system as adaptive
 
@@ -89,6 +90,7 @@ def test_a_file_of_before_goes_on_as_it_began(tmp_path: Path, monkeypatch: pytes
     scene = system(contact={}) | {"time": TIME | {"duration": 0.2}}
     with monkeypatch.context() as before:
         before.setattr(hybrid.model.build, "contact_bits", lambda scene: 0)
+        write_as_before(before)
         hybrid.run(scene, tmp_path / "run.h5", progress=False).close()
     with hybrid.resume(tmp_path / "run.h5", until=1.7) as result:
         assert "self_contact" not in line(result)
