@@ -19,9 +19,9 @@ from hybrid.accuracy.error_report import CAUSES, UNITS
 from hybrid.accuracy.system_samples import touch_unasked
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.state.state import Floats
+from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.plan import output_interval
 from hybrid.model.sections import section_changes
-from hybrid.model.lines_contact import passing_each_other
 from hybrid.model.self_reach import system_without_contact
 from hybrid.model.system import build_system
 from hybrid.outputs.edge_errors import EDGE_ERRORS

@@ -58,9 +58,7 @@ def touching_of(system: System, scenes: Mapping[str, Scene]) -> Touching | None:
     return touching_among(system, scenes, [(names.index(a), names.index(b)) for a, b in system.touching_pairs])
 
 
-def touching_among(
-    system: System, scenes: Mapping[str, Scene], pairs: Iterable[tuple[int, int]]
-) -> Touching | None:
+def touching_among(system: System, scenes: Mapping[str, Scene], pairs: Iterable[tuple[int, int]]) -> Touching | None:
     """Lines of which these pairs, by number, touch each other; scenes: of the lines by name; None: there is no pair."""
     names, pairs = list(system.lines), [*pairs]
     lines = sorted({k for pair in pairs for k in pair})

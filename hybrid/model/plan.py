@@ -13,9 +13,9 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state.state import Floats
 from hybrid.model.build import Model, build
 from hybrid.model.contents import Entry, with_accuracy
-from hybrid.model.lines_contact import MEETS, that_may_meet
 from hybrid.model.first_state import HUNG
 from hybrid.model.initial_shape import hung
+from hybrid.model.lines_contact import MEETS, that_may_meet
 from hybrid.model.material import material
 from hybrid.model.mesh import Zone
 from hybrid.model.model_costs import structural, with_model

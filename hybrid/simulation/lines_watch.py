@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.junctions.lines_distance import (
-    ASKS,
     AT,
     HAVE_MET,
     MET,

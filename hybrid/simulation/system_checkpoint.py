@@ -78,7 +78,9 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     if run.zones is not None or run.payout is not None or near or between:
         run.make_solver()
     template = checkpoint(run) | {"dry": None, "overlaps": None, "under": None, "broken": None, "control": None}
-    template |= {name: None for name in ("contact", "between", "let_pass", "met", "passed", "payout") if name in template}  # as there are
+    template |= {
+        name: None for name in ("contact", "between", "let_pass", "met", "passed", "payout") if name in template
+    }  # as there are
     saved = {"quantities": run.quantities.unknown(), "under": {}, "overlaps": [], **saved}  # nor did it keep ranges
     saved["quantities"] = run.quantities.of_today(saved["quantities"])
     saved["lines"] = of_today(saved.get("lines"), template["lines"])
