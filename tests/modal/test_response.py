@@ -150,6 +150,16 @@ def test_few_components_as_in_time():
     assert response.valid_for("tension")
 
 
+def test_what_is_left_out_counts_more_where_ends_move():
+    """More than half of it comes true there: 4 % are too much, which waves alone may leave out."""
+    tables = leg(STORM | {"significant_height": 2.0, "peak_period": 8.0})
+    found = hybrid.response(tables)
+    assert 0.04 < found.lines["cable"].left_out["tension"].max() < 0.045 and found.valid_for("tension")
+    tables["ends"]["end"]["motion"] = {"surge": {"amplitude": 1e-4, "period": 8.0}, "ramp": 16.0}
+    found = hybrid.response(tables)
+    assert found.lines["cable"].left_out["tension"].max() > 0.025 and not found.valid_for("tension")
+
+
 def test_a_float_on_a_catenary_makes_a_kink_and_no_curvature():
     """At the float, and beside it, as in time; the kink itself would be several times as much, and grow with the mesh."""
     tables = hung(motion={"surge": {"amplitude": 0.05, "period": 7.0}, "ramp": 10.0})
