@@ -63,7 +63,7 @@ class CableAtRest(OfScene):
             if held[k]:
                 free[-k, 1:4] = False
         self._free, self._held = np.flatnonzero(free.ravel()), [k for k in (0, 1) if held[k]]
-        of_free = linear.stiffness[self._free]
+        of_free = (linear.stiffness + linear.by_layers)[self._free]
         self._factors = Factors(sparse.csc_array(of_free[:, self._free]))
         self._by_ends = {k: of_free[:, self._of_end(k)].toarray() for k in self._held}
         self.values, self.gradients = self.line.values(), Gradients(self.line)

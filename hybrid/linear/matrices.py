@@ -64,6 +64,7 @@ class LinearLine:
     net: Floats  # (2, 3) N, that each end passes to what it is joined to
     turned: Floats  # (2, 3, 5 (N+1)) N, N m, .. what turns of an end's frame do, from the left; zeros: it carries none
     held_moment: Floats  # (2, 3, 3) N m/rad, moment that the frame of an end resists a turn with
+    by_layers: sparse.csr_array  # what tension changes of the moments of layers, beside `stiffness`: no energy has it
 
     @property
     def r(self) -> Floats:
@@ -89,8 +90,8 @@ class LinearNetwork:
     lines: tuple[LinearLine, ...]
     at: np.ndarray
     place: sparse.csr_array
-    stiffness: sparse.csc_array  # A, made symmetric
-    skew: sparse.csc_array  # the part of A that was not
+    stiffness: sparse.csc_array  # A, made symmetric, without what tension changes of the moments of layers
+    skew: sparse.csc_array  # the rest of A, which no energy has
     mass: sparse.csc_array
     apart: sparse.csr_array  # the part of `mass` of points and bodies, without lines that end there
     points: int
@@ -169,8 +170,9 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: boo
         K = K + _through_zones(line)
     if line.tension_twist.size:
         K = _by_length(K)
+    layers = sparse.csr_array(K.shape)
     if line.slip_law.size:
-        K = K + by_layers(line, state, quick, lambda other: _left(other, x, ends, state))
+        layers = by_layers(line, state, quick, lambda other: _left(other, x, ends, state))
     free = np.ones((count, SIZE), bool)
     free[0, 0], free[-1, 4] = False, False
     free[:-1, 4] = line.spin != 0
@@ -182,7 +184,7 @@ def linear_line(x: JoinedLine, name: str, state: State, sticks: bool, quick: boo
         if x.seats[k, TURNS] != 0.0:
             turned[k], moments[k] = by_turn(line, x, ends, state, k)
     return LinearLine(
-        name, line, state, K, M, sparse_rows(standing), free.ravel(), forces, turned, moments
+        name, line, state, K, M, sparse_rows(standing), free.ravel(), forces, turned, moments, layers
     )  # fmt: skip
 
 
@@ -383,9 +385,10 @@ def linear_network(
     A = sparse.csr_array(place.T @ A @ place) + _couplings(coupling, at, place, own + 3 * points)
     A = A + _of_bodies(solver, states, extra, own + 3 * points, size)
     pull = max(float(np.abs(x.state.T).max()) for x in lines)
+    layers = sparse.csr_array(place.T @ sparse.block_diag([x.by_layers for x in lines], format="csr") @ place)
     slow = solver.anchor / STATIC_ANCHOR * max(pull / solver.scale, 1.0)
     return LinearNetwork(
-        lines, at, place, sparse.csc_array(0.5 * (A + A.T)), sparse.csc_array(0.5 * (A - A.T)),
+        lines, at, place, sparse.csc_array(0.5 * (A + A.T)), sparse.csc_array(0.5 * (A - A.T) + layers),
         sparse.csc_array(0.5 * (M + M.T)), apart, points, bodies, slow,
         np.asarray(place.T @ _lent(lines, solver)),
     )  # fmt: skip

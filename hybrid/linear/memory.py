@@ -50,7 +50,8 @@ def with_layers(line: Line, state: State, sticks: bool) -> Line:
         return line
     now, T = np.zeros_like(law), pulls(state.T)[:, None]
     now[:, STIFF::EACH] = law[:, STIFFNESS::EACH] + law[:, STIFFENING::EACH] * T
-    now[:, MOST::EACH] = np.inf if sticks else law[:, MOMENT::EACH] + law[:, PER_TENSION::EACH] * T
+    most, elastic = law[:, MOMENT::EACH] + law[:, PER_TENSION::EACH] * T, law[:, MOMENT::EACH] < 0.0
+    now[:, MOST::EACH] = np.where(elastic, most, np.inf) if sticks else most
     for k in range(KEPT if sticks else 0):
         now[:, FROM + k :: EACH] = state.layers[:, k::KEPT]
     return line._replace(slip_now=now, slip_at=NO_ADDRESS)

@@ -357,8 +357,9 @@ def _doubts(found: _Found, unstable: int, free: list[str], chosen: np.ndarray) -
         part = np.abs(np.sqrt(coupled[np.argsort(coupled.real)]) / np.sqrt(squares) - 1.0).max()
         if part > UNSYMMETRIC:
             yield (
-                "the current, or a moment that keeps its direction, has a part in the stiffness that no energy has; it "
-                f"is left out (among these modes it would change a period by up to {100.0 * part:.2g} %)"
+                "the current, a moment that keeps its direction, or a stiffness that grows with tension has a part in "
+                "the stiffness that no energy has; it is left out (among these modes it would change a period by up to "
+                f"{100.0 * part:.2g} %)"
             )
     if any(x.line.torsion.size for x in network.lines):
         yield "twist passes through catenary zones as through a torsion spring; what their shape adds is left out"

@@ -101,13 +101,23 @@ def _kinks(x: LoadedLine, found: LineResponse) -> Iterator[str]:
 
 
 def _layers(x: LoadedLine, found: LineResponse) -> Iterator[str]:
-    """Where layers slip that a response has sticking, within two deviations."""
+    """Where layers slip that a response has sticking, or lock, within two deviations."""
     line, deviation, T = x.line, found.deviation("curvature"), pulls(found.mean_tension)
     for j in range(0, line.slip_law.shape[1] if line.slip_law.size else 0, EACH):
         law = line.slip_law[:, j : j + EACH]
         K = line.slip_now[:, j + STIFF]
         most = law[:, SLIPS_AT] + law[:, PER_TENSION] * T
-        over = np.where(K > 0.0, 2.0 * deviation * K - most, -1.0)
+        locks = most < 0.0
+        at = np.divide(-most, np.abs(K), out=np.full(most.shape, np.inf), where=locks)
+        crosses = np.flatnonzero(np.abs(at - found.mean_curvature) < 2.0 * deviation)
+        if crosses.size:
+            k = int(crosses[0])
+            yield (
+                f"curvature at s = {found.s[k]:.4g} m, {found.mean_curvature[k]:.4g} 1/m in the mean with a standard "
+                f"deviation of {deviation[k]:.3g} 1/m, passes over {at[k]:.4g} 1/m, where the stiffness changes"
+            )
+            return
+        over = np.where((K > 0.0) & ~locks, 2.0 * deviation * K - most, -1.0)
         k = int(over.argmax())
         if over[k] > 0.0:
             yield (

@@ -7,13 +7,15 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.laws.bending_slip import EACH, follow_slip
 from hybrid.kernels.state.state import Line, blank_line, no_ends, no_work, state_for
-from hybrid.model.material import Material
+from hybrid.model.material import Material, elastic_layer
+from hybrid.scene.stretch import Layer, slopes
 
 
 def with_slip(line: Line, material: Material, of: NDArray[np.int64]) -> Line:
     """The line, whose cells are of pieces `of` (N,) of a material with layers, with these.
 
-    An element between layers of two kinds has one curvature, and of each as much as its half of the length.
+    An element between layers of two kinds has one curvature, and of each as much as its half of the length.  So it is
+    between a table of moment over curvature and two bending stiffnesses.
     """
     layers = material.layers
     number = [layers.index(x) for x in layers]
@@ -24,6 +26,11 @@ def with_slip(line: Line, material: Material, of: NDArray[np.int64]) -> Line:
         length = sum(0.5 * line.h[c] for c in sides)
         parts = {kind[c]: sum(0.5 * line.h[k] for k in sides if kind[k] == kind[c]) / length for c in sides}
         rows.append([x * part for k, part in parts.items() for layer in layers[k] for x in layer])
+        if len(sides) == 2 and material.meet(*of[sides]):
+            part = [0.5 * line.h[c] / line.hn[i] for c in sides]
+            line.kb[i, :2] = sum(x * material.B[of[c], :2] for x, c in zip(part, sides, strict=True)) / line.hn[i]
+            for x, c in zip(part, sides, strict=True):
+                rows[-1] += [x * number for layer in _of_table(material, int(of[c])) for number in layer]
     law = np.zeros((line.s.size, max(EACH, *map(len, rows))))
     for i, row in enumerate(rows):
         law[i, : len(row)] = row
@@ -32,3 +39,12 @@ def with_slip(line: Line, material: Material, of: NDArray[np.int64]) -> Line:
     state = state_for(blank)
     address = follow_slip.address(blank, no_ends(), state, state, no_work(), 0)
     return found._replace(slip_at=np.array([address], np.int64))
+
+
+def _of_table(material: Material, piece: int) -> list[Layer]:
+    """Elastic layers that a table of moment over curvature is beside its first piece; none without one."""
+    table = (material.bends or {piece: None})[piece]
+    if table is None:
+        return []
+    more = np.diff(slopes(table))
+    return [elastic_layer(x, float(K)) for (x, _), K in zip(table[1:-1], more, strict=True) if K != 0.0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,7 +41,8 @@ def bend_law(material: Material, line: Line, of: NDArray[np.int64]) -> tuple[Flo
     law[same, FIRST_B : HALF_B + 1] = 0.0
     plain = np.array([x is None for x in material.bends])[of]
     without = np.concatenate([[True], plain]) & np.concatenate([plain, [True]])
-    law[without | (line.element == 0)] = 0.0
+    mixed = np.array([False, *(material.meet(a, b) for a, b in pairwise(of)), False])
+    law[without | mixed | (line.element == 0)] = 0.0
     for k, spring in enumerate(material.springs):
         if law[-k, LAST_A] + law[-k, LAST_B] > 0.0 and spring < np.inf:
             stiffness = float(material.B[of[-k], :2].mean()) / half[-k]

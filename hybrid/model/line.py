@@ -62,7 +62,7 @@ def line_on(
         bits |= AXIAL_LAW
     if material.bends is not None:
         bits |= BENDING_LAW
-    if any(material.layers):
+    if material.layered:
         bits |= BENDING_SLIP
     return on_base(material, cable_on(material, s, bits, inertia), s, np.arange(rod.size), rod, bits)
 

@@ -41,7 +41,7 @@ from hybrid.model.sections import (
     torsional_stiffness,
 )
 from hybrid.scene.schema import BendRestrictor, BendStiffener, Scene, Section, Vortices
-from hybrid.scene.stretch import Curve, slopes, stiffened
+from hybrid.scene.stretch import Curve, Layer, slopes, stiffened
 
 # The tension below which bending counts as much as tension, in (EI w^2)^(1/3): there a cable bends under its weight as
 # much as its tension straightens it.  A cable without weight or stiffness has a least one, as a part of the scale.
@@ -113,6 +113,7 @@ class Material:
     rubs: bool = False  # whether friction with itself or other lines may turn it about its axis
     sections_turn: bool = False  # whether sections are given an inertia, which rods that come and go have too
     # (K,) of pieces, of each layer that slips: stiffness, N m2, slip moment, N m, what this and that gain by tension
+    # (kernels.laws.bending_slip; of one that is elastic the moment is below 0)
     layers: list[tuple[tuple[float, float, float, float], ...]] = field(default_factory=list)
 
     @property
@@ -136,7 +137,8 @@ class Material:
 
         know how a section lies, or how far it bends (catenaries, criteria).
         """
-        stuck = np.array([sum(x[0] for x in layers) for layers in self.layers]) if any(self.layers) else 0.0
+        layers = [sum(x[0] for x in row if x[1] >= 0.0) for row in self.layers]
+        stuck = np.array(layers) if any(layers) else 0.0
         return self._of_tables(max, self.mean_initial_bending) + stuck
 
     @property
@@ -199,6 +201,16 @@ class Material:
         """(K,) m, (EI/w)^(1/3): over it a cable without tension bends under its weight; w at least `least` N/m."""
         return np.asarray(np.cbrt(self.weakest_bending / np.maximum(np.abs(self.submerged_weight), least)))
 
+    def meet(self, a: int, b: int) -> bool:
+        """Whether one of two pieces has a table of moment over curvature, and the other two bending stiffnesses."""
+        bends, B = self.bends or [None] * self.mass.size, self.B
+        return any(bends[x] is not None and bends[y] is None and B[y, 0] != B[y, 1] for x, y in ((a, b), (b, a)))
+
+    @property
+    def layered(self) -> bool:
+        """Whether its elements have layers, that slip or are elastic."""
+        return any(self.layers) or any(self.meet(k, k + 1) for k in range(self.mass.size - 1))
+
     def piece(self, s: Floats) -> np.ndarray:
         """Piece that each of the arc lengths s (m) lies in."""
         return np.clip(np.searchsorted(self.bounds, s) - 1, 0, self.mass.size - 1)
@@ -243,7 +255,9 @@ def material(scene: Scene, nodes: Floats | None = None) -> Material:
         out.weight[on] += m.mass * scene.environment.gravity
     _stiffen(out, scene, middle)
     out.layers = [x.slip_layers for x in of]
-    if restrictors or any(x.elastic_table for x in of):
+    for k in (k for k, x in enumerate(of) if x.anisotropic):  # a table is the same about any axis
+        out.layers[k] += _locks(restrictors, of[k], float(middle[k]))
+    if any(x.elastic_table for x in of) or (restrictors and not all(x.anisotropic for x in of)):
         out.bends = _bending_tables(out, restrictors, of, middle)
     if scene.environment.fluid is not None:
         _wetted(out, scene, of, middle)
@@ -292,11 +306,27 @@ def _bending_tables(
         if rows is not None and own < EI:
             rows = stiffened(rows, 0.0, float(EI) - own)
         for x in restrictors:
-            if x.range[0] < s < x.range[1]:
+            if x.range[0] < s < x.range[1] and not section.anisotropic:
                 rows = rows or ((0.0, 0.0), (1.0 / x.radius, float(EI) / x.radius))
-                rows = stiffened(rows, 1.0 / x.radius, x.locked_stiffness or LOCKED * own)
+                rows = stiffened(rows, 1.0 / x.radius, _locked(x, section))
         found.append(rows)
     return found
+
+
+def _locks(restrictors: list[BendRestrictor], section: Section, s: float) -> tuple[Layer, ...]:
+    """Elastic layers of the restrictors at arc length s, m."""
+    here = (x for x in restrictors if x.range[0] < s < x.range[1])
+    return tuple(elastic_layer(1.0 / x.radius, _locked(x, section)) for x in here)
+
+
+def _locked(x: BendRestrictor, section: Section) -> float:
+    """Bending stiffness, N m2, that a restrictor adds when it is locked."""
+    return x.locked_stiffness or LOCKED * float(np.mean(section.initial_bending or (0.0, 0.0)))
+
+
+def elastic_layer(beyond: float, stiffness: float) -> Layer:
+    """A bending stiffness, N m2, more from a curvature on, 1/m."""
+    return stiffness, -abs(stiffness) * beyond, 0.0, 0.0
 
 
 def _stiff_at(stiffener: BendStiffener, a: float, b: float) -> float:

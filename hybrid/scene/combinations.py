@@ -241,8 +241,19 @@ def _tables_beside_two_stiffnesses(tables: Tables) -> Iterator[Place]:
     sections = cable.sections if cable is not None else ()
     for i, section in enumerate(sections):
         beside = (*sections[max(i - 1, 0) : i], *sections[i + 1 : i + 2])
-        if section.moment_curvature and any(x.anisotropic for x in beside):
+        if section.elastic_table and any(x.anisotropic for x in beside):
             yield "cable", "sections", i, "moment_curvature"
+
+
+def _locks(tables: Tables) -> Iterator[tuple[Place, float, float]]:
+    """Bend restrictors on sections of two bending stiffnesses, or beside these, and stretches (m) that both have."""
+    cable: Cable | None = tables.get("cable")
+    for at in _attached("bend_restrictor")(tables):
+        item = cable.attachments[int(at[2])]  # type: ignore[union-attr]
+        for end, x in zip(accumulate(x.length for x in cable.sections), cable.sections, strict=True):  # type: ignore[union-attr]
+            low, high = max(item.range[0], end - x.length), min(item.range[1], end)  # type: ignore[union-attr]
+            if x.anisotropic and low <= high:
+                yield at, low, high
 
 
 def _slips(tables: Tables) -> Iterator[Place]:
@@ -250,14 +261,18 @@ def _slips(tables: Tables) -> Iterator[Place]:
         if x.slip_layers:
             given = (key for key in ("bending_slip", "first_loading", "stiffness_per_tension") if getattr(x, key))
             yield *at, next(given)
+    yield from dict.fromkeys(at for at, _, _ in _locks(tables))
+    yield from _tables_beside_two_stiffnesses(tables)
 
 
 def _springs_beside_slip(tables: Tables) -> Iterator[Place]:
-    """Angular springs at the ends of a cable whose first or last section has layers that slip."""
+    """Angular springs at the ends of a cable whose first or last section has layers."""
     cable: Cable | None = tables.get("cable")
     ends: Ends | None = tables.get("ends")
+    near = SAME_LENGTH * cable.length if cable is not None else 0.0
+    locks = [(low <= near, high >= cable.length - near) for _, low, high in _locks(tables)]  # type: ignore[union-attr]
     for name, of in (("start", 0), ("end", -1)) if cable is not None else ():
-        if not cable.sections[of].slip_layers:  # type: ignore[union-attr]
+        if not cable.sections[of].slip_layers and not any(x[of] for x in locks):  # type: ignore[union-attr]
             continue
         for key, table in (
             ("ends", ends.named() if ends is not None else {}),
@@ -403,11 +418,11 @@ TORQUE_OF_TENSION = Feature("torque of tension", "tension_torque",
 STRETCH_LAW = Feature("tension over strain by a table or a rope's law", "tension_strain, dynamic_stiffness, syrope",
                       _stretch_laws)  # fmt: skip
 VORTICES = Feature("vortex-induced vibration", "vortices", _in_sections("vortices", of=lambda x: x.vortices))
-RESTRICTOR = Feature("bend restrictors", "attachments: kind: bend_restrictor", _attached("bend_restrictor"))
-TABLE_BESIDE = Feature("a section with a table of moment over curvature beside one of two bending stiffnesses",
-                       "moment_curvature", _tables_beside_two_stiffnesses)  # fmt: skip
-SLIP = Feature("layers that slip as a line bends, a bending stiffness that grows with tension",
-               "bending_slip, first_loading, stiffness_per_tension", _slips)  # fmt: skip
+SLIP = Feature(
+    "layers that slip as a line bends, a bending stiffness that grows with tension, a bend restrictor on two bending "
+    "stiffnesses, a table of moment beside them",
+    "bending_slip, first_loading, stiffness_per_tension, attachments: kind: bend_restrictor, moment_curvature", _slips,
+)  # fmt: skip
 SOIL = Feature("soil that remembers", "seabed.soil", _bed(lambda x: x.soil, "soil"))
 NO_WIDTH = Feature("a section without diameter", "diameter",
                    _in_sections("diameter", of=lambda x: x.diameter is None))  # fmt: skip
@@ -472,10 +487,6 @@ REFUSALS: tuple[Refusal, ...] = (
         "one number", "give one number, or write `model: rod`",
     ),
     Refusal(
-        RESTRICTOR, TWO_STIFFNESSES, "not worked out", "a table of moment is the same about any axis ({key})",
-        "a section of one bending_stiffness", "give one number there",
-    ),
-    Refusal(
         SLIP, MOVING_ZONES, "not worked out",
         "zones move (model), and a catenary forgets how far layers have slipped, and what tension adds to stiffness",
         fix="leave it out, or write `model: rod`",
@@ -489,12 +500,6 @@ REFUSALS: tuple[Refusal, ...] = (
         SPRING_BESIDE_SLIP, SLIP, "not worked out",
         "the section there has layers that slip, or is stiffer under tension ({key})",
         fix="leave it out, or put a short section without layers at the clamp",
-    ),
-    Refusal(
-        TABLE_BESIDE, TWO_STIFFNESSES, "not worked out",
-        "a table of moment is the same about any axis, and the section beside it is not ({key})",
-        "sections of one bending_stiffness beside it",
-        "give one number there, or put a short section with one bending_stiffness between them",
     ),
     Refusal(
         TORSION, PLANE, "physics", "dimension is 2 and there is no torsion", "nothing or 0",

@@ -50,6 +50,10 @@ SCENES = {
         bending_slip=[{"stiffness": 800, "moment": 2, "per_tension": 1e-3}, {"stiffness": 300, "moment": 40}],
         stiffness_per_tension=0.05, damping={"stiffness": 0.01},
     ),
+    "a restrictor on two stiffnesses": lambda: scene(
+        attachments=[{"kind": "bend_restrictor", "range": [0, 60], "radius": 60.0, "locked_stiffness": 2e3}],
+        bending_stiffness=[400, 900], intrinsic_curvature=[0.01, 0.005, 0],
+    ),
     "in soil": lambda: scene(more={"environment": {
         "fluid": {"density": 1025}, "seabed": {"z": -13, "soil": {"shear_strength": 100, "gradient": 500}}}}),
     "at the surface, in a sheared current": lambda: scene(
@@ -65,7 +69,8 @@ def test_it_is_what_the_equations_change_by(what):
     made = SCENES[what]()
     rest = CableAtRest(made, 1.0, [parse_result("tension@0", made.length)])
     line, state, free = rest.line, rest.line.state.copy(), rest._free
-    K = linear_line(line.joined(line.here), "cable", state, sticks=False, quick=False).stiffness.toarray()[free]
+    linear = linear_line(line.joined(line.here), "cable", state, sticks=False, quick=False)
+    K = (linear.stiffness + linear.by_layers).toarray()[free]
     chord, pull = np.linalg.norm(state.e, axis=1).min(), np.abs(state.T).max()
     steps, kinds = {0: 1e-5 * pull, 4: 1e-6}, free % SIZE
     for unknown in free:

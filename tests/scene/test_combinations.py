@@ -46,6 +46,7 @@ TABLE_BESIDE_TWO = {
     "cable.sections": [_HALF | {"bending_stiffness": [10, 20]}, _HALF | {"moment_curvature": [[0, 0], [1, 10]]}],
     END + "normal": [0, 1, 0],
 }
+LOCKS: dict[str, Any] = TWO | {"cable.attachments": [{"kind": "bend_restrictor", "range": [0, 2], "radius": 2}]}
 SLIPS: dict[str, Any] = {SECTION + "bending_slip": [{"stiffness": 20, "moment": 1}]}
 CURVED = {SECTION + "intrinsic_curvature": [0.01, 0, 0]}
 ROPE = {SECTION + "dynamic_stiffness": {"constant": 2e6, "relaxation_time": 100}}
@@ -67,14 +68,10 @@ PAID_LINE = {ONE + "connections.start.payout": {"rate": 0.1, "ramp": 1.0}}
 # By the pair: what makes a scene of CABLE, or of LINES, that has both, and what is done with it.
 EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
     (c.TWO_STIFFNESSES, c.MOVING_ZONES): (TWO | MOVING, ""),
-    (c.RESTRICTOR, c.TWO_STIFFNESSES): (
-        TWO | {"cable.attachments": [{"kind": "bend_restrictor", "range": [0, 2], "radius": 2}]}, ""
-    ),
     (c.SLIP, c.MOVING_ZONES): (SLIPS | MOVING, ""),
     (c.NO_WIDTH, c.SOIL): (CLAY | {"cable.sections": [{"length": 10, "mass": 2, "bending_stiffness": 10}]}, ""),
     (c.SLIP, c.PAYOUT): (SLIPS | PAID, ""),
     (c.SPRING_BESIDE_SLIP, c.SLIP): (SLIPS | {END + "bend_stiffness": 5}, ""),
-    (c.TABLE_BESIDE, c.TWO_STIFFNESSES): (TABLE_BESIDE_TWO, ""),
     (c.TORSION, c.PLANE): (TORQUE | {"dimension": 2}, ""),
     (c.PLANE, c.SELF_CONTACT): ({"dimension": 2, "contact": {"self": True}}, ""),
     (c.SWIVEL, c.TURNS): (SWIVEL | {END + "turns": 2}, ""),
@@ -99,6 +96,9 @@ EXAMPLES: dict[tuple[c.Feature, c.Feature], tuple[dict[str, Any], Use]] = {
 OTHERS: tuple[tuple[tuple[c.Feature, c.Feature], dict[str, Any], Use], ...] = (
     ((c.TORSION, c.PLANE), {END + "turns": 2, "dimension": 2}, ""),
     ((c.SWIVEL_BESIDE, c.DIRECTED), SWIVEL | CURVED, ""),
+    ((c.SLIP, c.PAYOUT), TABLE_BESIDE_TWO | PAID, ""),
+    ((c.SLIP, c.PAYOUT), LOCKS | PAID, ""),
+    ((c.SPRING_BESIDE_SLIP, c.SLIP), LOCKS | {"ends.start.bend_stiffness": 5}, ""),
     ((c.SLIP, c.MOVING_ZONES), {SECTION + "stiffness_per_tension": 0.01} | MOVING, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"time": {"duration": 3.0}}, ""),
     ((c.ESTIMATED, c.LINES_TOUCH), TWO_LINES | {"output.errors": True}, ""),

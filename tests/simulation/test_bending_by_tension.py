@@ -89,8 +89,6 @@ def test_no_stiffness_without_bending_and_refusals() -> None:
         hybrid.validate_scene(taut(10, BEGIN, bending_stiffness=0))
     with pytest.raises(SceneError, match="what tension adds to stiffness"):
         hybrid.validate_scene(taut(10, BEGIN) | {"model": "adaptive", "time": {"duration": 1.0, "step": 0.1}})
-    with pytest.raises(SceneError, match="or on its tension"):
-        hybrid.modes(taut(10, BEGIN))
 
 
 def test_a_constant_tension_is_a_constant_stiffness() -> None:

@@ -198,8 +198,3 @@ def test_a_line_of_several_is_the_same_in_soil() -> None:
 def test_what_is_refused(change: dict[str, Any], said: str) -> None:
     with pytest.raises(SceneError, match=said):
         hybrid.validate_scene(pressed({"soil": SOIL}, 1.0, 0.1, {"heave": HEAVE}) | change)
-
-
-def test_modes_in_soil_are_refused() -> None:
-    with pytest.raises(SceneError, match="which way"):
-        hybrid.modes(pressed({"soil": SOIL}, 1.0, 0.1, {"heave": HEAVE}))

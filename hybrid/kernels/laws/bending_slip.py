@@ -10,6 +10,8 @@
 
 A step maps x to m by radial return: m = most t/|t| where t = K (x/hn - p) is more than `most`, which has the exact
 derivative K/hn most/|t| (1 - t t^T/|t|^2); then p moves by (t - m)/K.  At rest p = 0: the curve of a first loading.
+A layer whose `most` is below 0 is elastic: m = (|t| + most) t/|t| beyond |t| = -most, and nothing below: what locks at a
+curvature, and the bends of a table of moment over curvature, whose K may be below 0.
 A layer whose `most` has no bound is a stiffness that grows with tension.  A step has the K of its start; behind it K
 changes at that bend, and hn dK |x/hn - p|^2/2 is no work of bending: it is booked beside what is lost.
 """
@@ -39,7 +41,8 @@ from hybrid.kernels.machine.compile import inner, kernel
 from hybrid.kernels.state.forces import BENDING_SLIP
 from hybrid.kernels.state.report import LOST_WORK
 
-# Columns of Line.slip_law, EACH of a layer: K0, N m2; m0, N m; mT, m; KT, m2.  K0, KT 0: none (as behind the last).
+# Columns of Line.slip_law, EACH of a layer: K0, N m2; m0, N m, below 0 of an elastic one; mT, m; KT, m2.  K0, KT 0: none (as
+# behind the last).
 STIFFNESS, MOMENT, PER_TENSION, STIFFENING, EACH = range(5)
 # Columns of Line.slip_now, EACH of a layer: p at the start of the step, 1/m; `most`, N m; K, N m2.  State.layers has KEPT.
 FROM, MOST, STIFF, KEPT = 0, 2, 3, 2
@@ -56,7 +59,7 @@ def slips(line, i):
 @inner
 def layered(line, i, j):
     """Whether there is a layer j (its first column) at node i."""
-    return line.slip_law[i, j + STIFFNESS] > 0.0 or line.slip_law[i, j + STIFFENING] > 0.0
+    return line.slip_law[i, j + STIFFNESS] != 0.0 or line.slip_law[i, j + STIFFENING] > 0.0
 
 
 @inner
@@ -66,6 +69,8 @@ def trial(line, i, j, x, y):
     K, one = line.slip_now[i, j + STIFF], 1.0 / line.hn[i]
     a, b = K * (x * one - line.slip_now[i, j + FROM]), K * (y * one - line.slip_now[i, j + FROM + 1])
     size, most = math.sqrt(a * a + b * b), line.slip_now[i, j + MOST]
+    if most < 0.0:
+        return a, b, size, (size + most) / size if size > -most else 0.0
     return a, b, size, most / size if size > most else 1.0
 
 
@@ -84,10 +89,10 @@ def slip_answer(line, i, x, y):
         mx, my = mx + part * a, my + part * b
         c = K / line.hn[i] * part
         c11, c22 = c11 + c, c22 + c
-        if part < 1.0:
-            c /= size * size
+        if 0.0 < part < 1.0:
+            c = (c if line.slip_now[i, j + MOST] >= 0.0 else c - K / line.hn[i]) / (size * size)
             c11, c12, c22 = c11 - c * a * a, c12 - c * a * b, c22 - c * b * b
-        stored += 0.5 * line.hn[i] * (part * size) ** 2 / K if K > 0.0 else 0.0
+        stored += 0.5 * line.hn[i] * (part * size) ** 2 / K if K != 0.0 else 0.0
     return mx, my, c11, c12, c22, stored
 
 
@@ -163,7 +168,7 @@ def follow_slip(line, ends, old, new, work, part):
                 continue
             K, p, q = now[i, j + STIFF], 0.0, 0.0
             a, b, _, left = trial(line, i, j, x, y)
-            if left < 1.0:
+            if left < 1.0 and now[i, j + MOST] >= 0.0:
                 p, q = (1.0 - left) * a / K, (1.0 - left) * b / K
                 lost += line.hn[i] * left * (a * p + b * q)
             new.layers[i, at], new.layers[i, at + 1] = now[i, j + FROM] + p, now[i, j + FROM + 1] + q

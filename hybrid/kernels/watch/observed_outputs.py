@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.algebra.rotations import cross, dot, get3
-from hybrid.kernels.laws.bending_slip import EACH, FROM, KEPT, STIFF, STIFFENING, STIFFNESS
+from hybrid.kernels.laws.bending_slip import EACH, FROM, KEPT, MOMENT, MOST, STIFF, STIFFENING, STIFFNESS
 from hybrid.kernels.laws.cell import chord
 from hybrid.kernels.machine.binding import Series
 from hybrid.kernels.machine.compile import kernel
@@ -98,6 +98,8 @@ def slipped(line: Line, batch: Batch) -> Floats:
     """`slip_now` (nb, N+1, 4 L) of outputs: their layers bear what they have, as stiff as their tension makes them."""
     n = batch.T.shape[1]
     out = np.full((batch.t.size, *line.slip_now.shape), np.inf)
+    elastic = line.slip_law[:, MOMENT::EACH]
+    out[:, :, MOST::EACH] = np.where(elastic < 0.0, elastic, np.inf)
     for k in range(KEPT):
         out[:, :, FROM + k :: EACH] = batch.layers[:, :, k::KEPT]
     T = np.maximum(0.5 * (batch.T[:, [0, *range(n)]] + batch.T[:, [*range(n), n - 1]]), 0.0)[:, :, None]
