@@ -1,12 +1,18 @@
 """Response by frequency against hours in time: standard deviations of tension and curvature, and the cost of both.
 
 pytest bench/test_bench_response.py -m bench -n 0 -s
-HYBRID_HOURS=3 pytest bench/test_bench_response.py -m bench -n 0 -s -k "taut or spread"
+HYBRID_HOURS=3 pytest bench/test_bench_response.py -m bench -n 0 -s -k "leg or bridle"
 
-Of each of twenty scenes ten hours (HYBRID_HOURS: fewer), each of its own seed; errors are of the mean of them, at five
-places (in brackets: at nineteen), of curvature where it is resolved as parts of the largest there, with the standard
-error of that mean.  Places whose curvature is not resolved (`LineResponse.resolved`, and `hybrid response` says so) are
-printed apart.  CPU time; of responses the median of three.
+Of each scene of bench/response_scenes.py ten hours (HYBRID_HOURS: fewer), each of its own seed.  Ratios are of the
+standard deviation by frequency over the mean of those of the hours, at nineteen places of every line, smallest and
+largest of them; curvature where it is resolved (`LineResponse.resolved`, and `hybrid response` says so), as parts of
+the largest of that line.  Behind +- is the standard error of that mean.  CPU time; of responses the median of three.
+
+What was run, on a busy machine: ten hours of the first ten scenes, three of "tensioned riser, current", two of
+"bridle", "sunken body", "lazy wave" and both "sagging", one of "spar"; not "tensioned riser, 5 m", "S tether" and "lazy
+wave, rods".  Beyond 3 % where valid: the ropes of the sunken body (3.6 %, near resonance: what is left out of the drag
+of members is not counted) and one place of a bridle's curvature (3.9 +-0.6 %).  The chain on a vessel was (4.0 %),
+since when lines whose ends move may leave out less.
 """
 
 from __future__ import annotations
@@ -17,124 +23,65 @@ import time as clock
 
 import numpy as np
 import pytest
+from response_scenes import SCENES
 
 import hybrid
 
 pytestmark = pytest.mark.bench
-PLACES, FIVE = np.linspace(0.05, 0.95, 19), [0, 4, 9, 14, 18]
+PLACES = np.linspace(0.05, 0.95, 19)
 HOUR, SEEDS = 3600.0, range(1, 1 + int(os.environ.get("HYBRID_HOURS", "10")))
-LINE = {
-    "mass": 30.0, "diameter": 0.1, "axial_stiffness": 5e6, "bending_stiffness": 2e3, "torsional_stiffness": 1e3,
-    "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
-}  # fmt: skip
-SEA = {"kind": "jonswap", "significant_height": 2.0, "peak_period": 8.0, "direction": 30.0, "ramp": 10.0}
-
-
-def scene(
-    length, first, last, waves, model="catenary", cells=60, bed=None, current=None, section=None, items=(), **ends
-):
-    """A line between two places, in waves that are those of SEA but for what is given."""
-    waves = (waves if "kind" in waves else SEA | waves) | {"ramp": 10.0}
-    fluid = {"density": 1025, "surface": 0, "waves": waves if bed else waves | {"depth": 100.0}}
-    if current:
-        fluid["current"] = current
-    line = LINE | {"length": length} | (section or {})
-    held = {name: {"kind": "pinned", "position": place} for name, place in (("start", first), ("end", last))}
-    return {
-        "environment": {"fluid": fluid} | ({"seabed": bed} if bed else {}),
-        "cable": {"sections": [line], "attachments": list(items)},
-        "ends": {name: held[name] | ends.get(name, {}) for name in held},
-        "initial": "equilibrium",
-        "model": model,
-        "mesh": {"cells": cells},
-    }
-
-
-def hung(waves, **more):
-    """60 m from 65 m down to 5 m down."""
-    return scene(60.0, [0, 0, -65], [6, 0, -5.15], waves, **more)
-
-
-def taut(waves, **more):
-    """A leg of fibre rope, 0.6 % stretched."""
-    rope = {"mass": 6.0, "diameter": 0.08, "axial_stiffness": 2e6, "bending_stiffness": 0.0, "torsional_stiffness": 0.0}
-    return scene(133.7, [0, 0, -95], [100, 0, -5], waves, section=rope, **more)
-
-
-def on_vessel(folder):
-    """A catenary mooring line whose fairlead heaves and surges with a vessel."""
-    rows = [
-        f"{w:.4f},{heading},{0.6 / (1 + (w / 0.6) ** 4):.5f},{0.5 / (1 + (w / 0.7) ** 4):.5f},-90,0"
-        for w in np.linspace(0.1, 4.0, 80)
-        for heading in (-180, 0, 180)
-    ]
-    path = folder / "rao.csv"
-    path.write_text("\n".join(["frequency,heading,surge,heave,surge_phase,heave_phase", *rows]))
-    held = {"motion": {"vessel": {"rao": str(path), "origin": [170.0, 0.0, -5.0]}}}
-    return scene(200.0, [0, 0, -60], [170, 0, -5], {"significant_height": 1.5}, bed=BED, cells=80, end=held)
-
-
-def spar(_folder):
-    """A spar of members on three chains."""
-    places = {"east": (1.0, 0.0), "north": (-0.5, 0.87), "south": (-0.5, -0.87)}
-    points = {x: {"position": [150.0 * a, 150.0 * b, -100]} for x, (a, b) in places.items()}
-    points |= {f"at_{x}": {"body": "hull", "place": [a, b, -3]} for x, (a, b) in places.items()}
-    section = {"length": 182.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}
-    hull = {
-        "mass": 4e4, "inertia": [3e6, 3e6, 3e4], "centre": [0, 0, -1.5], "initial_guess": [0, 0, -12],
-        "hydrostatics": {"level": -9.0, "heave": 1.78e4, "roll": 1.5e6, "pitch": 1.5e6},
-        "members": [{"start": [0, 0, -15], "end": [0, 0, 15], "diameter": 1.5, "drag": 1.0, "added_mass": 1.0}],
-    }  # fmt: skip
-    return {
-        "environment": {"fluid": {"density": 1025, "surface": 0.0, "waves": SEA | {"significant_height": 1.0}},
-                        "seabed": {"z": -100.0, "stiffness": 1e4}},
-        "points": points, "bodies": {"hull": hull},
-        "lines": {x: {"start": x, "end": f"at_{x}", "sections": [section], "mesh": {"cells": 16}} for x in places},
-    }  # fmt: skip
-
-
-BED = {"z": -60, "stiffness": 5e4}
-BUOY = {"kind": "float", "at": 30.0, "buoyancy": 2000.0, "mass": 100.0, "drag_area": 0.6, "added_mass": 150.0}
-MODULES = {"kind": "modules", "range": [90.0, 130.0], "buoyancy": 500.0, "mass": 40.0, "drag_area": 0.5,
-           "added_mass": 60.0}  # fmt: skip
-PARTS = [{"significant_height": 1.5, "peak_period": 13.0, "shape": 3.0},
-         {"significant_height": 1.2, "peak_period": 6.0, "shape": 1.2}]  # fmt: skip
-TOUCHDOWN = (200.0, [0, 0, -60], [170, 0, -5])
-SCENES = {
-    "hung, 2 m": hung({}),
-    "hung, 4 m": hung({"significant_height": 4.0, "peak_period": 12.0}),
-    "hung, rods": hung({}, model="rod"),
-    "hung, current": hung({}, current=[0.6, 0, 0]),
-    "sagging": scene(70.0, [0, 0, -20], [60, 0, -15], {"peak_period": 9.0, "direction": 60.0}),
-    "touchdown": scene(*TOUCHDOWN, {}, bed=BED, cells=80),
-    "touchdown, 4 m": scene(*TOUCHDOWN, {"significant_height": 4.0, "peak_period": 12.0}, bed=BED, cells=80),
-    "hung, spread sea": hung({"spreading": {"exponent": 8}}),
-    "hung, Torsethaugen": hung({"kind": "torsethaugen", "significant_height": 2.5, "peak_period": 12.0}),
-    "hung, two peaks": hung({"kind": "ochi_hubble", "parts": PARTS, "direction": 70.0}),
-    "hung, across": hung({"direction": 90.0}),
-    "hung, short waves": hung({"significant_height": 1.0, "peak_period": 5.0}),
-    "hung, stiff rod": hung({}, model="rod", section={"bending_stiffness": 2e5, "damping": 0.1},
-                            start={"kind": "clamped", "tangent": [0, 0, 1]}),
-    "hung, float": hung({}, items=[BUOY]),
-    "hung, storm": hung({"significant_height": 8.0, "peak_period": 13.0}),
-    "taut leg": taut({}),
-    "taut leg, 5 m": taut({"significant_height": 5.0, "peak_period": 12.0}),
-    "lazy wave": scene(*TOUCHDOWN, {"significant_height": 1.0}, bed=BED, cells=80, items=[MODULES]),
-    "fairlead on a vessel": on_vessel,
-    "spar on three chains": spar,
-}  # fmt: skip
+LATE = 100.0  # s, from which on the sea is stationary
+# s: steps of 0.15 s give 1.3 % more tension than those of 0.05 s where a vessel moves the end.
+STEP, ON_VESSEL = 0.1, 0.05
+QUANTITIES = ("tension", "curvature")
+# Parts by which a response that is valid may be off, beside two standard errors of the hours; what is told.
+WITHIN, TOLD = 0.03, 0.1
 
 
 def seeded(tables, seed):
     """An hour of another realisation."""
+    step = ON_VESSEL if "vessel" in tables.get("ends", {}).get("end", {}).get("motion", {}) else STEP
     data = json.loads(json.dumps(tables))
-    data["environment"]["fluid"]["waves"]["seed"] = seed
-    return data | {"time": {"duration": HOUR, "step": 0.15}}
+    waves = data["environment"]["fluid"]["waves"]
+    for k, sea in enumerate(waves.get("spectra", [waves])):
+        sea["seed"] = 100 * k + seed
+    return data | {"time": {"duration": HOUR, "step": step}}
+
+
+def measured(tables, found):
+    """Standard deviations of each hour, (hours, 19) by quantity and line, their places there, and the cost, s an hour."""
+    one = len(found.lines) == 1
+    lengths = {name: float(line.s[-1]) for name, line in found.lines.items()}
+    points = [round(part * next(iter(lengths.values())), 3) for part in PLACES.tolist()] if one else 101
+    there: dict[tuple[str, str], list] = {(what, name): [] for what in QUANTITIES for name in lengths}
+    places, begin = {}, clock.process_time()
+    for seed in SEEDS:
+        with hybrid.run(seeded(tables, seed) | {"output": {"every": 0.25, "points": points}}) as result:
+            late = result.times > LATE
+            for name, length in lengths.items():
+                line = result if one else result.lines[name]
+                columns = [int(np.abs(line.s - part * length).argmin()) for part in PLACES]
+                places[name] = line.s[columns]
+                for what in QUANTITIES:
+                    there[what, name].append(np.asarray(getattr(line, what))[late][:, columns].std(axis=0))
+    return {k: np.array(x) for k, x in there.items()}, places, (clock.process_time() - begin) / len(SEEDS)
+
+
+def ratios(what, line, places, hours):
+    """Ratios of each place, their standard errors, and whether each place is resolved."""
+    mean = hours.mean(axis=0)
+    error = hours.std(axis=0, ddof=1) / np.sqrt(len(hours)) if len(hours) > 1 else np.full(mean.size, np.nan)
+    if what == "tension":
+        ours = np.interp(places, line.middle, line.deviation(what))
+        return ours / mean, error / mean, np.ones(mean.size, bool)
+    known = line.resolved(what)[[int(np.abs(line.s - x).argmin()) for x in places]]
+    most = max(float(mean.max()), 1e-300)
+    return 1.0 + (np.interp(places, line.s, line.deviation(what)) - mean) / most, error / most, known
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_against_hours(name, tmp_path):
-    tables = SCENES[name](tmp_path) if callable(SCENES[name]) else SCENES[name]
+    tables = SCENES[name](tmp_path)
     hybrid.response(tables)
     costs = []
     for _ in range(3):
@@ -142,40 +89,27 @@ def test_against_hours(name, tmp_path):
         found = hybrid.response(tables)
         costs.append(clock.process_time() - begin)
     cost = float(np.median(costs))
-    line_name, line = next(iter(found.lines.items()))
-    places = [round(part * float(line.s[-1]), 3) for part in PLACES.tolist()]
-    there: dict[str, list] = {"tension": [], "curvature": []}
-    bends = bool(line.mean_curvature.max() > 0.0)
-    begin = clock.process_time()
-    for seed in SEEDS:
-        several = len(found.lines) > 1
-        output = {"every": 0.25, "points": 101 if several else places}
-        with hybrid.run(seeded(tables, seed) | {"output": output}) as result:
-            one = result.lines[line_name] if several else result
-            columns = [int(np.abs(one.s - x).argmin()) for x in places]
-            for what, values in there.items():
-                values.append(np.asarray(getattr(one, what))[result.times > 100.0][:, columns].std(axis=0))
-            at = one.s[columns]
-    hours = (clock.process_time() - begin) / len(SEEDS)
-    tension, curvature = (np.mean(there[x], axis=0) for x in ("tension", "curvature"))
-    scatter = [np.std(x, axis=0, ddof=1).max() / np.sqrt(len(x)) if len(x) > 1 else np.nan for x in there.values()]
-    ours = np.interp(at, line.middle, line.deviation("tension"))
-    bent = np.interp(at, line.s, line.deviation("curvature"))
-    off_tension = 100.0 * np.abs(ours / tension - 1.0)
-    off = off_tension[FIVE].max()
-    added = 100.0 * line.left_out["tension"].max()
-    known = line.resolved("curvature")[[int(np.abs(line.s - x).argmin()) for x in at]]
-    offs = 100.0 * np.abs(bent - curvature) / (curvature.max() if bends else 1.0)
-    five = np.isin(np.arange(PLACES.size), FIVE)
-    off_bent = offs[known & five].max(initial=0.0)
-    words = ["tension" if found.valid_for("tension") else "", "curvature" if found.valid_for("curvature") else ""]
-    print(
-        f"\n{name}: tension {off:.1f} % ({off_tension.max():.1f}; +-{100.0 * scatter[0] / tension.max():.1f}; "
-        f"{added:.1f} % are left out), curvature {off_bent:.1f} % ({offs[known].max(initial=0.0):.1f}; "
-        f"+-{100.0 * scatter[1] / max(curvature.max(), 1e-300):.1f}; {(~known).sum()} of {len(at)} places are not "
-        f"resolved, {offs[~known].max(initial=0.0):.1f} % there) of the largest; {cost:.3f} s of CPU for "
-        f"{hours:.1f} s an hour, {10.0 * hours / cost:.0f} times cheaper than ten; valid for "
-        f"{', '.join(x for x in words if x) or 'nothing'}{'; ' if found.notes else ''}{'; '.join(found.notes)}"
-    )
-    assert not found.valid_for("tension") or off_tension.max() < 10.0
-    assert not found.valid_for("curvature") or offs[known].max(initial=0.0) < 10.0
+    there, places, hours = measured(tables, found)
+    print(f"\n{name}: {cost:.3f} s of CPU for {hours:.1f} s an hour, {10.0 * hours / cost:.0f} times cheaper than ten")
+    for what in QUANTITIES:
+        valid, beyond = found.valid_for(what), 0.0
+        print(f"  {what}, {'valid' if valid else 'not valid'}:")
+        for line_name, line in found.lines.items():
+            ratio, error, known = ratios(what, line, places[line_name], there[what, line_name])
+            off = np.abs(ratio - 1.0)
+            text = "no place is resolved"
+            if known.any():
+                k = int(np.where(known, off, -1.0).argmax())
+                text = (
+                    f"{ratio[known].min():.3f} to {ratio[known].max():.3f}, worst at {places[line_name][k]:.4g} m, "
+                    f"+-{error[k]:.3f}"
+                )
+                beyond = max(beyond, float(off[k] - 2.0 * np.nan_to_num(error[k])))
+            unknown = f"; at {(~known).sum()} places that are not resolved up to {off[~known].max(initial=0.0):.2f} off"
+            added = f", {100.0 * line.left_out[what].max():.1f} % left out" if what == "tension" else ""
+            print(f"    {line_name}: {text}{unknown if not known.all() else ''}{added}")
+        assert not valid or beyond < TOLD
+        if valid and beyond > WITHIN:
+            print(f"    BEYOND {100.0 * WITHIN:g} %")
+    for note in found.notes:
+        print(f"  {note}")
