@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from hybrid.kernels.contact.self_contact_law import OUTER
 from hybrid.kernels.junctions.lines_distance import JOINT
 from hybrid.kernels.state.forces import SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state.state import Line
@@ -27,8 +28,8 @@ Pair = tuple[int, int]
 def lines_near(run: SystemRun) -> list[Pair]:
     """Lines, two each, between which contact begins now, after an event; others that are near are let pass.
 
-    These are lines that already are in each other, or are pressed on each other beside what both are joined to: legs
-    that leave it by a narrow angle.
+    These are lines that already are in each other, or in themselves, or are pressed on each other beside what both are
+    joined to: legs that leave it by a narrow angle.
     """
     found = run.watch.near() if run.watch is not None else []
     run.gather_events()  # in the order in which they happen
@@ -49,25 +50,31 @@ def lines_near(run: SystemRun) -> list[Pair]:
 
 
 def _may_begin(run: SystemRun, pair: Pair) -> bool:
-    """Whether two lines are in each other nowhere, nor touch where both leave what they are joined to."""
+    """Whether two lines are in each other nowhere, nor in themselves, nor touch by ends that are joined to the same.
+
+    Ends that are held, or moved, are joined to one thing where they would touch each other.
+    """
     touching = touching_among(run.system, run.model.scenes, [pair])
     assert touching is not None
-    touching.meets[[0, 1], [0, 1]] = 0  # neither touches itself
     model = replace(run.model, touching=touching)
     energy, shared = energy_between(model, run.solver.lines, run.solver.bodies.copy(), run.state)
-    if energy == 0.0 or not math.isfinite(energy):
-        return energy == 0.0
+    if not math.isfinite(energy):
+        return False
     joined = dict(zip(touching.lines, touching.joined.tolist(), strict=True))
+    models, r = run.model.models, [x.r for x in run.state.lines]
+    wide = OUTER * float(max(diameters(models[k]).max() for k in pair))
     return not any(
-        set(_beside(run.model.models[a], i, joined[a])) & set(_beside(run.model.models[c], j, joined[c]))
+        a != c and joined[a][e] == joined[c][f] and (joined[a][e] or math.dist(r[a][-e], r[c][-f]) <= wide)
         for (a, i), (c, j) in shared.points_between()
+        for e in _ends_beside(models[a], i)
+        for f in _ends_beside(models[c], j)
     )
 
 
-def _beside(model: Model, node: int, joined: Sequence[int]) -> list[int]:
-    """What a line is joined to at ends that are near a node."""
+def _ends_beside(model: Model, node: int) -> list[int]:
+    """Which ends of a line, 0 or 1, are near a node."""
     s, reach = model.line.s, JOINT * float(diameters(model).max())
-    return [x for x, end in zip(joined, (s[0], s[-1]), strict=True) if abs(float(s[node] - end)) <= reach]
+    return [k for k in (0, 1) if abs(float(s[node] - s[-k])) <= reach]
 
 
 def touch_each_other(run: SystemRun, pairs: Iterable[Pair]) -> None:

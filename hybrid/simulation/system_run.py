@@ -708,7 +708,7 @@ class SystemRun:
             begin_contact(self)
         if loop.counts[b.FLAGS] & b.LINES_NEAR:
             begin_between(self)
-        if parted := [line.number for line in self.lines if line.parts_itself]:
+        if parted := [line.number for line in self.lines if line.parts_itself and not line.shares]:
             end_contact(self, parted)
         if loop.counts[b.FLAGS] & b.COLLAPSES:
             self._tell_collapse()

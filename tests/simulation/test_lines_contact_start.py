@@ -111,6 +111,42 @@ def test_legs_that_leave_a_point_by_a_narrow_angle_are_not_pressed_apart(half: f
     assert not any(x["self_contact"].any() for x in found.lines.values())
 
 
+def hung_apart(**more: Any) -> Tables:
+    """Ropes held at points of their own cross slowly, 8 diameters from two that are 6 diameters apart."""
+    tables = unasked(0.3, **more)
+    move = {"travel": {"by": [0, 0, -0.006], "over": 0.3}}
+    for name, place in {"a": [-0.08, -0.03], "b": [0.72, 0.27], "c": [-0.08, 0.03], "d": [0.72, -0.27]}.items():
+        tables["points"][name] = {"position": [*place, 0]}
+    for name in "ab":
+        tables["points"][name] = {"position": [*tables["points"][name]["position"][:2], 0.012], "motion": move}
+    for line in tables["lines"].values():
+        line["sections"] = [ROPE | {"length": 0.86}]
+    return tables
+
+
+def test_lines_that_are_held_at_points_of_their_own_touch_near_these() -> None:
+    found = hybrid.run(hung_apart())
+    assert BEGINS in kinds(found) and PASSAGE not in kinds(found)
+    assert same(found, hybrid.run(hung_apart(contact={})), ("position",)) < 1e-4
+
+
+def test_a_line_within_itself_is_let_pass_and_the_run_goes_on() -> None:
+    tables, turn = unasked(0.6), np.linspace(0.0, 2 * np.pi, 25)
+    loop = [[0.0, 0.2 + 0.06 * np.sin(x), 0.06 - 0.06 * np.cos(x)] for x in turn]
+    points = [*([0.0, -0.4 + 0.1 * k, 0.0] for k in range(6)), *loop, [0.0, 0.3, 0.0], [0.0, 0.4, 0.0]]
+    length = 1.001 * float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    tables["lines"]["lower"] |= {"sections": [ROPE | {"length": length}], "initial": {"kind": "points", "points": points},
+                                 "contact": {}}  # fmt: skip
+    straight = {"kind": "straight", "direction": [1, 0, 0]}
+    tables["lines"]["upper"] |= {"sections": [ROPE | {"length": 0.8}], "initial": straight}
+    tables["environment"] = {"gravity": 1.0}
+    for name in "ab":
+        tables["points"][name]["motion"] = {"travel": {"by": [0, 0, -0.15], "over": 0.5}}
+    found = hybrid.run(tables)
+    assert "line meets itself" in kinds(found) and PASSAGE in kinds(found) and BEGINS not in kinds(found)
+    assert same(found, hybrid.run(tables | {"contact": NOT_ASKED}), ("position", "tension")) == 0.0
+
+
 def three(**more: Any) -> Tables:
     """A third rope comes down on the two after they have met."""
     tables = unasked(**{"time": {"duration": 0.9, "step": 0.004}} | more)
@@ -148,6 +184,15 @@ def test_contact_that_lets_no_step_lead_on_is_given_up_and_lines_pass(begun: Any
     assert PASSAGE in kinds(result)
     assert kinds(result).count(BEGINS) == 1
     assert same(begun, result, ("position",)) > 1e-3
+
+
+def test_a_line_that_parts_from_itself_as_it_comes_near_another_one_stays_in_contact(begun: Any) -> None:
+    with hybrid.SystemSimulation(unasked()) as run:
+        run.advance(0.5)
+        run._run.lines[0].parts_itself = True  # as if it had been seen in the step in which contact of two lines began
+        run._run._after_step(0.01)
+        run.advance(0.8)
+        assert same(begun, run.result()) < 1e-9
 
 
 def moving(tables: Tables) -> None:
